@@ -1,0 +1,102 @@
+"""Every exception the package raises.
+
+::
+
+    SelfmotionError
+    ├── RobotError                a URDF, frame, joint or configuration that cannot be used
+    ├── PathError                 a tool motion that is malformed or not followable as given
+    ├── ProblemError              robot, path, task and start do not fit together
+    │   ├── RedundancyError       no self-motion is left by the task
+    │   └── StartError            the start configuration is off the path
+    ├── InverseKinematicsError    no configuration found for a pose
+    ├── BreakdownError            the motion runs into a singular pose
+    ├── FileFormatError           a file that is not what it should be
+    └── PlanError                 a plan without the quality asked for (`Plan.require`)
+
+Each message names the thing, what was found, what was expected and what to do about it.
+"""
+
+
+class SelfmotionError(Exception):
+    """Root of the package's exceptions."""
+
+
+class RobotError(SelfmotionError):
+    """A URDF, frame, joint or configuration that cannot be used."""
+
+
+class PathError(SelfmotionError):
+    """A tool motion that is malformed or cannot be followed as given."""
+
+
+class ProblemError(SelfmotionError):
+    """Robot, path, task and start do not fit together."""
+
+
+class RedundancyError(ProblemError):
+    """No self-motion is left by the task.
+
+    Attributes
+    ----------
+    dof, rows : int
+        Joints of the arm and rows of the task.
+    """
+
+    def __init__(self, message: str, *, dof: int, rows: int) -> None:
+        super().__init__(message)
+        self.dof = dof
+        self.rows = rows
+
+
+class StartError(ProblemError):
+    """The start configuration does not put the tool on the start of the path.
+
+    Attributes
+    ----------
+    position_miss : float
+        Distance from the path's first position [m].
+    rotation_miss : float
+        Angle from the path's first orientation, in the rows the task prescribes [rad].
+    """
+
+    def __init__(self, message: str, *, position_miss: float, rotation_miss: float) -> None:
+        super().__init__(message)
+        self.position_miss = position_miss
+        self.rotation_miss = rotation_miss
+
+
+class InverseKinematicsError(SelfmotionError):
+    """No configuration within the joint limits reaches the pose.
+
+    Attributes
+    ----------
+    position_miss, rotation_miss : float
+        What the best attempt left over [m], [rad].
+    """
+
+    def __init__(self, message: str, *, position_miss: float, rotation_miss: float) -> None:
+        super().__init__(message)
+        self.position_miss = position_miss
+        self.rotation_miss = rotation_miss
+
+
+class BreakdownError(SelfmotionError):
+    """Eq. 4 cannot be integrated: the task Jacobian loses rank on the way.
+
+    Attributes
+    ----------
+    time : float
+        When it happens [s].
+    """
+
+    def __init__(self, message: str, *, time: float) -> None:
+        super().__init__(message)
+        self.time = time
+
+
+class FileFormatError(SelfmotionError):
+    """A file that is not what it should be; the message names the file and the row or key."""
+
+
+class PlanError(SelfmotionError):
+    """A plan without the quality asked for; raised by `Plan.require`."""
