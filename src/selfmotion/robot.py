@@ -10,11 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from selfmotion.arrays import Array, read_only
 from selfmotion.errors import InverseKinematicsError, RobotError
 from selfmotion.task import Task
 from selfmotion.urdf import Urdf, parse_urdf, read_urdf
-
-Array = npt.NDArray[np.float64]
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -222,9 +221,7 @@ class RobotModel:
             free = ~((q <= self.lower) & (gradient < 0) | (q >= self.upper) & (gradient > 0))
             jacobian = jacobian * free
             normal = jacobian @ jacobian.T + damping * np.eye(task.dimension)
-            trial = np.clip(
-                q + jacobian.T @ np.linalg.solve(normal, error), self.lower, self.upper
-            )
+            trial = np.clip(q + jacobian.T @ np.linalg.solve(normal, error), self.lower, self.upper)
             actual = self.pose(trial)
             new = task.select(task.twist_error(pose, actual)[:, None], actual.rotation)[:, 0]
             if np.linalg.norm(new) < np.linalg.norm(error):
@@ -316,8 +313,7 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
     """Build the chain from the root of a validated URDF to `tool`; see `load_robot`."""
     if tool not in urdf.links:
         raise RobotError(
-            f"{urdf.source}: no link '{tool}' to use as tool frame; "
-            f"links: {', '.join(urdf.links)}"
+            f"{urdf.source}: no link '{tool}' to use as tool frame; links: {', '.join(urdf.links)}"
         )
     full = pin.buildModelFromXML(urdf.text)
     _check_lock(urdf, full, lock)
@@ -351,9 +347,9 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
         name=model.name,
         tool=tool,
         joint_names=names,
-        lower=_read_only(np.where(continuous, -np.inf, model.lowerPositionLimit)),
-        upper=_read_only(np.where(continuous, np.inf, model.upperPositionLimit)),
-        velocity_limit=_read_only(np.where(velocity > 0, velocity, np.inf)),
+        lower=read_only(np.where(continuous, -np.inf, model.lowerPositionLimit)),
+        upper=read_only(np.where(continuous, np.inf, model.upperPositionLimit)),
+        velocity_limit=read_only(np.where(velocity > 0, velocity, np.inf)),
         locked=locked,
         model=model,
         tool_id=model.getFrameId(tool, pin.FrameType.BODY),
@@ -405,9 +401,7 @@ def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:
             raise RobotError(f"{urdf.source}: lock holds joint '{name}' at {value}, not finite")
 
 
-def _locked_joints(
-    model: Any, free: list[str], lock: Mapping[str, float]
-) -> dict[str, float]:
+def _locked_joints(model: Any, free: list[str], lock: Mapping[str, float]) -> dict[str, float]:
     locked = {}
     for index in range(1, model.njoints):
         joint, name = model.joints[index], model.names[index]
@@ -431,9 +425,3 @@ def _locked_configuration(model: Any, locked: Mapping[str, float]) -> tuple[Arra
         elif joint.nq != 1:
             ids.append(index)
     return reference, ids
-
-
-def _read_only(array: Array) -> Array:
-    array = np.array(array, dtype=np.float64)
-    array.setflags(write=False)
-    return array

@@ -7,9 +7,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from selfmotion.arrays import Array
 from selfmotion.errors import ProblemError
-
-Array = npt.NDArray[np.float64]
 
 _ROW_NAMES = ("vx", "vy", "vz", "wx", "wy", "wz")
 
@@ -54,8 +53,8 @@ class Task(Enum):
             raise ProblemError(f"unknown task '{task}', expected one of: {names}") from None
 
     @property
-    def rows(self) -> Array:
-        """Indices into [v, ω] of the prescribed rows, shape (m,), as integers."""
+    def rows(self) -> npt.NDArray[np.intp]:
+        """Indices into [v, ω] of the prescribed rows, (m,)."""
         return _ROWS[self]
 
     @property
