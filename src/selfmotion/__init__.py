@@ -1,0 +1,1 @@
+"""Plans the self-motion of redundant arms along a prescribed tool motion."""

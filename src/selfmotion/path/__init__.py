@@ -1,0 +1,18 @@
+"""Tool motion over time: what the tool frame is to do, as pose and twist at any time."""
+
+from selfmotion.path.base import Path, PathSamples, as_pose
+from selfmotion.path.files import path_from_dict
+from selfmotion.path.shapes import Circle, Line
+from selfmotion.path.twist import TwistPath
+from selfmotion.path.waypoints import Waypoints
+
+__all__ = [
+    "Circle",
+    "Line",
+    "Path",
+    "PathSamples",
+    "TwistPath",
+    "Waypoints",
+    "as_pose",
+    "path_from_dict",
+]

@@ -1,0 +1,182 @@
+"""What every tool motion offers."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from selfmotion.arrays import Array, read_only
+from selfmotion.errors import PathError
+
+# Rounding of a last time such as 50 * 0.02 must not count as outside the motion.
+_TIME_SLACK = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class PathSamples:
+    """A tool motion at K times, world axes.
+
+    Attributes
+    ----------
+    t : (K,)
+        Times [s].
+    translation : (K, 3)
+        Position of the tool frame's origin [m].
+    rotation : (K, 3, 3)
+        Orientation of the tool frame.
+    twist : (K, 6)
+        [v, ω]: velocity of the origin [m/s], angular velocity [rad/s].
+    """
+
+    t: Array
+    translation: Array
+    rotation: Array
+    twist: Array
+
+
+class Path(ABC):
+    """A tool motion over [0, duration]; poses and twists in world axes.
+
+    Subclasses give `duration`, `_evaluate` and `to_dict`; the twist must be the time derivative
+    of the pose.
+
+    Attributes
+    ----------
+    duration : float
+        Length of the motion [s].
+    """
+
+    duration: float
+
+    @property
+    def knots(self) -> Array:
+        """Times [s] between which the motion is smooth (C∞), first 0, last `duration`."""
+        return read_only([0.0, self.duration])
+
+    @abstractmethod
+    def _evaluate(self, t: Array) -> PathSamples:
+        """Return the motion at times (K,) known to lie in [0, duration]."""
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """Return a JSON-safe description from which `path_from_dict` restores the path."""
+
+    def samples(self, t: npt.ArrayLike) -> PathSamples:
+        """Return the motion at times `t` (K,) [s].
+
+        Raises
+        ------
+        PathError
+            A time is outside [0, duration].
+        """
+        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        slack = _TIME_SLACK * self.duration
+        if not (np.all(times >= -slack) and np.all(times <= self.duration + slack)):
+            raise PathError(
+                f"time {times.min()}..{times.max()} s is outside the path, 0..{self.duration} s"
+            )
+        return self._evaluate(np.clip(times, 0.0, self.duration))
+
+    def pose(self, t: float) -> pin.SE3:
+        """Return the tool's pose at time `t` [s]."""
+        samples = self.samples(t)
+        return pin.SE3(samples.rotation[0], samples.translation[0])
+
+    def twist(self, t: float) -> Array:
+        """Return [v, ω] at time `t` [s], (6,) in [m/s, rad/s]."""
+        twist: Array = self.samples(t).twist[0]
+        return twist
+
+
+def as_pose(pose: pin.SE3 | npt.ArrayLike) -> pin.SE3:
+    """Return `pose` (an SE3 or a (4, 4) homogeneous matrix) as an SE3 of its own.
+
+    Raises
+    ------
+    PathError
+        The matrix has another shape, is not finite, or its rotation is not orthonormal.
+    """
+    values = pose.homogeneous if isinstance(pose, pin.SE3) else pose
+    matrix = np.asarray(values, dtype=np.float64)
+    if matrix.shape != (4, 4):
+        raise PathError(f"pose has shape {matrix.shape}, expected an SE3 or a (4, 4) matrix")
+    if not np.all(np.isfinite(matrix)):
+        raise PathError("pose has numbers that are not finite")
+    rotation = matrix[:3, :3]
+    error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+    if error > 1e-6 or np.linalg.det(rotation) < 0:
+        raise PathError(f"pose: its rotation is not orthonormal and right-handed (by {error:.2g})")
+    return pin.SE3(np.array(rotation), np.array(matrix[:3, 3]))
+
+
+class TimeLaw(Enum):
+    """How far along the path (0 to 1) the tool is at normalised time τ (0 to 1)."""
+
+    CONSTANT = "constant"
+    MINIMUM_JERK = "minimum_jerk"
+
+    @classmethod
+    def of(cls, law: "TimeLaw | str") -> "TimeLaw":
+        """Return the time law of that name; PathError where there is none."""
+        try:
+            return cls(law)
+        except ValueError:
+            names = ", ".join(member.value for member in cls)
+            raise PathError(f"unknown time law '{law}', expected one of: {names}") from None
+
+    def __call__(self, tau: Array) -> tuple[Array, Array]:
+        """Return s(τ) and ds/dτ.
+
+        Constant speed: s = τ. Minimum jerk: s = 10τ³ - 15τ⁴ + 6τ⁵ (Flash and Hogan 1985).
+        """
+        return _TIME_LAWS[self](tau)
+
+
+def _constant(tau: Array) -> tuple[Array, Array]:
+    return tau, np.ones_like(tau)
+
+
+def _minimum_jerk(tau: Array) -> tuple[Array, Array]:
+    return tau**3 * (10.0 + tau * (6.0 * tau - 15.0)), 30.0 * (tau * (1.0 - tau)) ** 2
+
+
+_TIME_LAWS: dict[TimeLaw, Callable[[Array], tuple[Array, Array]]] = {
+    TimeLaw.CONSTANT: _constant,
+    TimeLaw.MINIMUM_JERK: _minimum_jerk,
+}
+
+
+def check_duration(duration: float) -> float:
+    """Return `duration` as a float; PathError unless it is positive and finite."""
+    if not (np.isfinite(duration) and duration > 0):
+        raise PathError(f"duration is {duration} s, expected a positive number")
+    return float(duration)
+
+
+def check_vector(values: npt.ArrayLike, name: str) -> Array:
+    """Return `values` as three finite numbers, read-only; PathError otherwise."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape != (3,) or not np.all(np.isfinite(array)):
+        raise PathError(f"{name} is {np.array2string(array)}, expected three finite numbers")
+    return read_only(array)
+
+
+def unit(vectors: Array) -> Array:
+    """Return `vectors` (…, k) with length 1; those that have it to rounding stay bit for bit."""
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.where(np.abs(lengths - 1.0) < 1e-14, vectors, vectors / lengths)
+
+
+def rotations_about(axis: Array, angles: Array) -> Array:
+    """Return exp([axis]× angle) for each of K angles about a unit axis, (K, 3, 3) (Rodrigues)."""
+    cross = pin.skew(axis)
+    return np.asarray(
+        np.eye(3)
+        + np.sin(angles)[:, None, None] * cross
+        + (1.0 - np.cos(angles))[:, None, None] * (cross @ cross)
+    )

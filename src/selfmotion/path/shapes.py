@@ -1,0 +1,176 @@
+"""Straight lines and circles."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from selfmotion.arrays import Array, read_only
+from selfmotion.errors import PathError
+from selfmotion.path.base import (
+    Path,
+    PathSamples,
+    TimeLaw,
+    as_pose,
+    check_duration,
+    check_vector,
+    rotations_about,
+    unit,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Line(Path):
+    """A straight line; the orientation turns about one fixed axis.
+
+    Parameters
+    ----------
+    start, end : SE3 or (4, 4)
+        Poses of the tool [m], world axes.
+    duration : float
+        [s].
+    time_law : {"minimum_jerk", "constant"}
+        Speed along the line.
+    """
+
+    start: pin.SE3
+    end: pin.SE3
+    duration: float
+    time_law: TimeLaw | str = TimeLaw.MINIMUM_JERK
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", as_pose(self.start))
+        object.__setattr__(self, "end", as_pose(self.end))
+        object.__setattr__(self, "duration", check_duration(self.duration))
+        object.__setattr__(self, "time_law", TimeLaw.of(self.time_law))
+
+    def _evaluate(self, t: Array) -> PathSamples:
+        s, speed = TimeLaw.of(self.time_law)(t / self.duration)
+        offset = self.end.translation - self.start.translation
+        turn = pin.log3(self.end.rotation @ self.start.rotation.T)
+        angle = float(np.linalg.norm(turn))
+        axis = turn / angle if angle > 0.0 else np.array([0.0, 0.0, 1.0])
+        return PathSamples(
+            t,
+            self.start.translation + s[:, None] * offset,
+            rotations_about(axis, s * angle) @ self.start.rotation,
+            (speed / self.duration)[:, None] * np.concatenate([offset, turn]),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Path.to_dict`."""
+        return {
+            "kind": "line",
+            "start": self.start.homogeneous.tolist(),
+            "end": self.end.homogeneous.tolist(),
+            "duration": self.duration,
+            "time_law": TimeLaw.of(self.time_law).value,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Circle(Path):
+    """A circle, or an arc, about an axis.
+
+    Parameters
+    ----------
+    start : SE3 or (4, 4)
+        Pose of the tool at the start [m], world axes.
+    center : (3,)
+        A point on the axis [m].
+    normal : (3,)
+        Direction of the axis; the tool moves counter-clockwise about it.
+    duration : float
+        [s].
+    turns : float
+        How many times round; negative for clockwise.
+    turn_tool : bool
+        Whether the tool turns with the circle. By default its orientation stays.
+    time_law : {"minimum_jerk", "constant"}
+        Speed along the circle.
+    """
+
+    start: pin.SE3
+    center: Array
+    normal: Array
+    duration: float
+    turns: float = 1.0
+    turn_tool: bool = False
+    time_law: TimeLaw | str = TimeLaw.MINIMUM_JERK
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", as_pose(self.start))
+        object.__setattr__(self, "center", check_vector(self.center, "circle: center"))
+        normal = check_vector(self.normal, "circle: normal")
+        if not np.any(normal):
+            raise PathError("circle: normal is zero, expected the direction of the axis")
+        object.__setattr__(self, "normal", read_only(unit(normal)))
+        object.__setattr__(self, "duration", check_duration(self.duration))
+        object.__setattr__(self, "time_law", TimeLaw.of(self.time_law))
+        if not np.isfinite(self.turns):
+            raise PathError(f"circle: turns is {self.turns}, expected a finite number")
+        if self.radius < 1e-9:
+            raise PathError("circle: the tool starts on the axis, so the radius is zero")
+
+    @classmethod
+    def around(
+        cls,
+        start: pin.SE3 | npt.ArrayLike,
+        radius: float,
+        duration: float,
+        *,
+        normal: npt.ArrayLike = (0.0, 0.0, 1.0),
+        **options: Any,
+    ) -> "Circle":
+        """Return a circle of `radius` [m] that begins at `start`.
+
+        Its centre lies from the start in the direction of -x, or of -y where the axis is x.
+        `options` are those of the class.
+        """
+        pose = as_pose(start)
+        axis = check_vector(normal, "circle: normal")
+        away = np.array([0.0, 1.0, 0.0]) if abs(axis[0]) > 0.9 * np.linalg.norm(axis) else None
+        away = np.array([1.0, 0.0, 0.0]) if away is None else away
+        away = away - axis * (axis @ away) / max(float(axis @ axis), 1e-300)
+        if not radius > 0.0:
+            raise PathError(f"circle: radius is {radius} m, expected a positive number")
+        center = pose.translation - radius * away / np.linalg.norm(away)
+        return cls(pose, center, axis, duration, **options)
+
+    @property
+    def radius(self) -> float:
+        """Distance of the tool from the axis [m]."""
+        return float(np.linalg.norm(self._arm - self.normal * (self.normal @ self._arm)))
+
+    @property
+    def _arm(self) -> Array:
+        return np.asarray(self.start.translation - self.center)
+
+    def _evaluate(self, t: Array) -> PathSamples:
+        s, speed = TimeLaw.of(self.time_law)(t / self.duration)
+        angle = 2.0 * np.pi * self.turns
+        turned = rotations_about(self.normal, angle * s)
+        arms = turned @ self._arm
+        omega = (angle / self.duration * speed)[:, None] * self.normal
+        if self.turn_tool:
+            rotation, angular = turned @ self.start.rotation, omega
+        else:
+            rotation = np.tile(self.start.rotation, (len(t), 1, 1))
+            angular = np.zeros_like(omega)
+        twist = np.hstack([np.cross(omega, arms), angular])
+        return PathSamples(t, self.center + arms, rotation, twist)
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Path.to_dict`."""
+        return {
+            "kind": "circle",
+            "start": self.start.homogeneous.tolist(),
+            "center": self.center.tolist(),
+            "normal": self.normal.tolist(),
+            "duration": self.duration,
+            "turns": self.turns,
+            "turn_tool": self.turn_tool,
+            "time_law": TimeLaw.of(self.time_law).value,
+        }

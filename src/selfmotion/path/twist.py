@@ -1,0 +1,181 @@
+"""A tool motion given by its velocity."""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+from numpy.polynomial import chebyshev
+
+from selfmotion.arrays import Array, read_only
+from selfmotion.errors import PathError
+from selfmotion.path.base import Path, PathSamples, as_pose, check_duration
+
+_DEGREE = 24
+# Chebyshev tail, relative to the largest velocity, at which a piece counts as resolved.
+_TAIL = 1e-13
+_SHORTEST = 2.0**-12
+
+
+class TwistPath(Path):
+    """A start pose and a velocity function.
+
+    The function is represented by piecewise Chebyshev polynomials to 13 digits; positions are
+    their exact integral, orientations that of an eighth-order Runge-Kutta method (DOP853).
+
+    Parameters
+    ----------
+    start : SE3 or (4, 4)
+        Pose of the tool at t = 0 [m], world axes.
+    velocity : callable
+        ``velocity(t)`` → [v, ω] (6,) or [v] (3,) at time t [s], world axes, smooth.
+    duration : float
+        [s].
+
+    Raises
+    ------
+    PathError
+        The function returns something else, or jumps.
+    """
+
+    def __init__(
+        self,
+        start: pin.SE3 | npt.ArrayLike,
+        velocity: Callable[[float], npt.ArrayLike],
+        duration: float,
+    ) -> None:
+        self._set(as_pose(start), *_resolve(velocity, check_duration(duration)))
+
+    @classmethod
+    def _restore(cls, start: npt.ArrayLike, breaks: Any, coefficients: Any) -> "TwistPath":
+        path = cls.__new__(cls)
+        path._set(as_pose(start), breaks, coefficients)
+        return path
+
+    def _set(self, start: pin.SE3, breaks: npt.ArrayLike, coefficients: npt.ArrayLike) -> None:
+        self._start = start
+        self._breaks = read_only(breaks)
+        self._coefficients = read_only(coefficients)
+        self.duration = float(self._breaks[-1])
+
+    @property
+    def start(self) -> pin.SE3:
+        """Pose of the tool at t = 0."""
+        return pin.SE3(self._start)
+
+    @property
+    def knots(self) -> Array:
+        """See `Path.knots`."""
+        return self._breaks
+
+    @cached_property
+    def _displacements(self) -> tuple[Array, Array]:
+        """Position polynomials of the pieces (K, d + 2, 3) and displacement at their start."""
+        half = 0.5 * np.diff(self._breaks)
+        integrals = np.array(
+            [
+                chebyshev.chebint(piece[:, :3], lbnd=-1) * h
+                for piece, h in zip(self._coefficients, half, strict=True)
+            ]
+        )
+        lengths = np.array([chebyshev.chebval(1.0, integral) for integral in integrals])
+        return integrals, np.vstack([np.zeros(3), np.cumsum(lengths, axis=0)])
+
+    @cached_property
+    def _orientation(self) -> Callable[[Array], Array] | None:
+        """Quaternions [x, y, z, w] over time, (4, K), or None where the tool does not turn."""
+        if not np.any(self._coefficients[:, :, 3:]):
+            return None
+        from scipy.integrate import solve_ivp
+
+        def rate(t: float, quaternion: Array) -> Array:
+            omega = self._twist(np.array([t]))[0, 3:]
+            x, w = quaternion[:3], quaternion[3]
+            return 0.5 * np.append(w * omega + np.cross(omega, x), -omega @ x)
+
+        solution = solve_ivp(
+            rate,
+            (0.0, self.duration),
+            pin.Quaternion(self._start.rotation).coeffs(),
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-13,
+            dense_output=True,
+        )
+        return cast(Callable[[Array], Array], solution.sol)
+
+    def _local(self, t: Array) -> tuple[npt.NDArray[np.intp], Array]:
+        k = np.clip(np.searchsorted(self._breaks, t, side="right") - 1, 0, len(self._breaks) - 2)
+        left, right = self._breaks[k], self._breaks[k + 1]
+        return k, (2.0 * t - left - right) / (right - left)
+
+    def _twist(self, t: Array) -> Array:
+        k, s = self._local(t)
+        basis = chebyshev.chebvander(s, self._coefficients.shape[1] - 1)
+        twist: Array = np.einsum("kd,kdi->ki", basis, self._coefficients[k])
+        return twist
+
+    def _evaluate(self, t: Array) -> PathSamples:
+        k, s = self._local(t)
+        integrals, offsets = self._displacements
+        basis = chebyshev.chebvander(s, integrals.shape[1] - 1)
+        position = self._start.translation + offsets[k]
+        position = position + np.einsum("kd,kdi->ki", basis, integrals[k])
+        return PathSamples(t, position, self._rotation(t), self._twist(t))
+
+    def _rotation(self, t: Array) -> Array:
+        if self._orientation is None:
+            return np.tile(self._start.rotation, (len(t), 1, 1))
+        from scipy.spatial.transform import Rotation
+
+        return np.asarray(Rotation.from_quat(self._orientation(t).T).as_matrix())
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Path.to_dict`."""
+        return {
+            "kind": "twist",
+            "start": self._start.homogeneous.tolist(),
+            "breaks": self._breaks.tolist(),
+            "coefficients": self._coefficients.tolist(),
+        }
+
+
+def _resolve(
+    velocity: Callable[[float], npt.ArrayLike], duration: float
+) -> tuple[list[float], list[Array]]:
+    """Return breaks and Chebyshev coefficients of pieces that resolve the velocity."""
+    scale = max(float(np.abs(_sample(velocity, t)).max()) for t in np.linspace(0, duration, 9))
+    pending, breaks, pieces = [(0.0, duration)], [0.0], []
+    nodes = chebyshev.chebpts1(_DEGREE + 1)
+    while pending:
+        left, right = pending.pop()
+        times = 0.5 * (left + right) + 0.5 * (right - left) * nodes
+        values = np.array([_sample(velocity, t) for t in times])
+        coefficients = chebyshev.chebfit(nodes, values, _DEGREE)
+        scale = max(scale, float(np.abs(values).max()))
+        if np.abs(coefficients[-3:]).max() <= _TAIL * max(scale, 1e-300):
+            pieces.append(coefficients)
+            breaks.append(right)
+        elif right - left < _SHORTEST * duration:
+            raise PathError(
+                f"twist path: the velocity is not smooth near t = {left:.6g} s; "
+                f"split the path there, or give poses (Waypoints)"
+            )
+        else:
+            middle = 0.5 * (left + right)
+            pending += [(middle, right), (left, middle)]
+    return breaks, pieces
+
+
+def _sample(velocity: Callable[[float], npt.ArrayLike], t: float) -> Array:
+    value = np.asarray(velocity(float(t)), dtype=np.float64)
+    if value.shape == (3,):
+        value = np.concatenate([value, np.zeros(3)])
+    if value.shape != (6,) or not np.all(np.isfinite(value)):
+        raise PathError(
+            f"twist path: velocity({t:.6g}) is {np.array2string(value)}, "
+            f"expected [v, ω] (6,) or [v] (3,), finite"
+        )
+    return value

@@ -1,0 +1,236 @@
+"""A tool motion through given poses at given times."""
+
+import csv
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from selfmotion.arrays import Array, read_only
+from selfmotion.errors import FileFormatError, PathError
+from selfmotion.path.base import Path, PathSamples, as_pose, unit
+
+_COLUMNS = ("t", "x", "y", "z")
+_QUATERNION = ("qw", "qx", "qy", "qz")
+
+
+class Waypoints(Path):
+    """Poses with times, joined smoothly in position and on SO(3), exact at each waypoint.
+
+    Positions follow a cubic spline (C², not-a-knot), orientations scipy's `RotationSpline` (C²).
+
+    Parameters
+    ----------
+    t : (N,)
+        Times [s], increasing; the first one becomes 0.
+    positions : (N, 3)
+        [m], world axes.
+    quaternions : (N, 4), optional
+        Orientations [w, x, y, z]; normalised, either sign. By default that of the world.
+    corners : {"blend", "stop"}
+        What to do where the path has a kink (see `corner_angle`): swing smoothly through the
+        waypoint, leaving the straight legs a little on both sides, or come to rest in it and keep
+        the legs. Either way each waypoint is met at its time.
+    corner_angle : float
+        Change of direction from one leg to the next that counts as a kink [rad].
+
+    Raises
+    ------
+    PathError
+        Shapes do not agree, fewer than two poses, times do not increase, a zero quaternion.
+    """
+
+    def __init__(
+        self,
+        t: npt.ArrayLike,
+        positions: npt.ArrayLike,
+        quaternions: npt.ArrayLike | None = None,
+        *,
+        corners: str = "blend",
+        corner_angle: float = np.pi / 6,
+    ) -> None:
+        times = np.asarray(t, dtype=np.float64)
+        points = np.asarray(positions, dtype=np.float64)
+        if quaternions is None:
+            quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
+        turns = np.asarray(quaternions, dtype=np.float64)
+        _check(times, points, turns)
+        if corners not in ("blend", "stop"):
+            raise PathError(f"waypoints: corners is '{corners}', expected 'blend' or 'stop'")
+        self._t = read_only(times - times[0])
+        self.duration = float(self._t[-1])
+        self._points = read_only(points)
+        self._turns = read_only(unit(turns))
+        self._corners = corners
+        self._corner_angle = float(corner_angle)
+
+    @classmethod
+    def from_poses(cls, t: npt.ArrayLike, poses: list[pin.SE3], **options: Any) -> "Waypoints":
+        """Return the path through `poses` (SE3 or (4, 4)) at times `t`; options as in the class."""
+        frames = [as_pose(pose) for pose in poses]
+        turns = [np.roll(pin.Quaternion(frame.rotation).coeffs(), 1) for frame in frames]
+        return cls(t, [frame.translation for frame in frames], turns, **options)
+
+    @classmethod
+    def from_csv(cls, file: str | FilePath, **options: Any) -> "Waypoints":
+        """Read ``t,x,y,z,qw,qx,qy,qz`` with a header line [s, m]; the quaternion may be missing.
+
+        Raises
+        ------
+        FileFormatError
+            The file cannot be read, a column is missing or unknown, a row is short or not
+            numeric; the row is named.
+        """
+        header, rows = _read_csv(FilePath(file))
+        table = np.array(rows)
+        column = {name: table[:, i] for i, name in enumerate(header)}
+        turns = None
+        if "qw" in column:
+            turns = np.stack([column[name] for name in _QUATERNION], axis=1)
+        points = np.stack([column[name] for name in _COLUMNS[1:]], axis=1)
+        try:
+            return cls(column["t"], points, turns, **options)
+        except PathError as error:
+            raise FileFormatError(f"{file}: {error}") from error
+
+    @property
+    def knots(self) -> Array:
+        """The waypoints' times [s]."""
+        return self._t
+
+    @property
+    def corner_times(self) -> Array:
+        """Times [s] of the waypoints where the tool comes to rest (`corners="stop"`)."""
+        return self._t[self._stops]
+
+    @cached_property
+    def _stops(self) -> npt.NDArray[np.bool_]:
+        legs = np.diff(self._points, axis=0)
+        lengths = np.linalg.norm(legs, axis=1)
+        stops = np.zeros(len(self._t), dtype=bool)
+        if self._corners == "stop":
+            cosine = np.einsum("ki,ki->k", legs[:-1], legs[1:])
+            bound = np.cos(self._corner_angle) * lengths[:-1] * lengths[1:]
+            # A tool that rests on one side has no direction there, hence no kink.
+            stops[1:-1] = (cosine < bound) & (lengths[:-1] > 0) & (lengths[1:] > 0)
+        return stops
+
+    @cached_property
+    def _pieces(self) -> tuple[npt.NDArray[np.intp], list[tuple[Any, Any]]]:
+        """First waypoint of each piece between corners, and its (position, rotation) splines."""
+        from scipy.interpolate import CubicSpline
+        from scipy.spatial.transform import Rotation, RotationSpline
+
+        bounds = np.flatnonzero(self._stops | (self._t == 0.0) | (self._t == self.duration))
+        splines = []
+        for first, last in pairwise(bounds):
+            part = slice(first, last + 1)
+            rotations = Rotation.from_quat(self._turns[part], scalar_first=True)
+            splines.append(
+                (
+                    CubicSpline(self._t[part], self._points[part]),
+                    RotationSpline(self._t[part], rotations),
+                )
+            )
+        return bounds[:-1], splines
+
+    def _warp(self, t: Array) -> tuple[Array, Array]:
+        """Return the time τ on the splines and dτ/dt: τ = t, but resting at the corners.
+
+        Next to a corner τ is the quintic between the waypoints' times with slope 0 at the corner,
+        1 at the other end, and no acceleration at either.
+        """
+        k = np.clip(np.searchsorted(self._t, t, side="right") - 1, 0, len(self._t) - 2)
+        h = self._t[k + 1] - self._t[k]
+        u = (t - self._t[k]) / h
+        a, b = 1.0 * ~self._stops[k], 1.0 * ~self._stops[k + 1]
+        c3, c4, c5 = 10 - 6 * a - 4 * b, -15 + 8 * a + 7 * b, 6 - 3 * a - 3 * b
+        tau = a * u + u**3 * (c3 + u * (c4 + u * c5))
+        slope = a + u**2 * (3 * c3 + u * (4 * c4 + 5 * u * c5))
+        return self._t[k] + h * tau, slope
+
+    def _evaluate(self, t: Array) -> PathSamples:
+        tau, slope = self._warp(t)
+        starts, splines = self._pieces
+        piece = np.searchsorted(self._t[starts], tau, side="right") - 1
+        position, rotation = np.empty((len(t), 3)), np.empty((len(t), 3, 3))
+        twist = np.empty((len(t), 6))
+        for index, (line, turn) in enumerate(splines):
+            here = piece == index
+            if not np.any(here):
+                continue
+            position[here] = line(tau[here])
+            turned = turn(tau[here])
+            rotation[here] = turned.as_matrix()
+            twist[here, :3] = line(tau[here], 1)
+            twist[here, 3:] = turned.apply(turn(tau[here], 1))  # its rates are in tool axes
+        return PathSamples(t, position, rotation, twist * slope[:, None])
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Path.to_dict`."""
+        return {
+            "kind": "waypoints",
+            "t": self._t.tolist(),
+            "positions": self._points.tolist(),
+            "quaternions": self._turns.tolist(),
+            "corners": self._corners,
+            "corner_angle": self._corner_angle,
+        }
+
+
+def _check(t: Array, points: Array, turns: Array) -> None:
+    if t.ndim != 1 or len(t) < 2:
+        raise PathError(f"waypoints: t has shape {t.shape}, expected (N,) with N ≥ 2")
+    for name, array, width in (("positions", points, 3), ("quaternions", turns, 4)):
+        if array.shape != (len(t), width):
+            raise PathError(
+                f"waypoints: {name} has shape {array.shape}, expected ({len(t)}, {width})"
+            )
+    for name, array in (("t", t[:, None]), ("positions", points), ("quaternions", turns)):
+        bad = np.flatnonzero(~np.all(np.isfinite(array), axis=1))
+        if bad.size:
+            raise PathError(f"waypoints: {name}[{bad[0]}] is not finite")
+    late = np.flatnonzero(np.diff(t) <= 0)
+    if late.size:
+        row = int(late[0]) + 1
+        raise PathError(
+            f"waypoints: t[{row}] = {t[row]} does not come after t[{row - 1}] = {t[row - 1]}"
+        )
+    zero = np.flatnonzero(np.linalg.norm(turns, axis=1) < 1e-9)
+    if zero.size:
+        raise PathError(f"waypoints: quaternions[{zero[0]}] is zero")
+
+
+def _read_csv(file: FilePath) -> tuple[list[str], list[list[float]]]:
+    try:
+        with file.open(newline="", encoding="utf-8") as stream:
+            lines = [row for row in csv.reader(stream) if row and not row[0].startswith("#")]
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileFormatError(f"{file}: cannot be read: {error}") from error
+    if not lines:
+        raise FileFormatError(f"{file}: is empty, expected a header line {','.join(_COLUMNS)}")
+    header = [name.strip() for name in lines[0]]
+    wanted = {*_COLUMNS, *_QUATERNION} if "qw" in header else {*_COLUMNS}
+    if set(header) != wanted or len(header) != len(wanted):
+        raise FileFormatError(
+            f"{file}: the header is {','.join(header)}, expected "
+            f"{','.join(_COLUMNS)} or {','.join(_COLUMNS + _QUATERNION)}"
+        )
+    rows = []
+    for number, line in enumerate(lines[1:], start=1):
+        try:
+            row = [float(value) for value in line]
+        except ValueError as error:
+            raise FileFormatError(f"{file}: row {number}: {error}") from error
+        if len(row) != len(header):
+            raise FileFormatError(
+                f"{file}: row {number} has {len(row)} values, expected {len(header)}"
+            )
+        rows.append(row)
+    if len(rows) < 2:
+        raise FileFormatError(f"{file}: has {len(rows)} rows, expected at least two poses")
+    return header, rows
