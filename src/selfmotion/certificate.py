@@ -1,0 +1,232 @@
+"""Re-checks a finished trajectory by forward kinematics; shares no code with the rollout."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from selfmotion.arrays import Array
+from selfmotion.path import Path
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
+from selfmotion.trajectory import Trajectory
+
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+# Points per interval of the trajectory's samples: odd, so that none but the samples are symmetric.
+_REFINEMENT = 5
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """What a verified motion may miss the path by, at any time.
+
+    Attributes
+    ----------
+    position : float
+        [m].
+    rotation : float
+        [rad].
+    """
+
+    position: float = 1e-6
+    rotation: float = 1e-6
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """The worst value of a quantity along a motion.
+
+    Attributes
+    ----------
+    value : float
+    time : float
+        When [s].
+    name : str
+        Of what: a joint, a frame, a pair of bodies.
+    """
+
+    value: float
+    time: float
+    name: str
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What forward kinematics says about a finished motion, on a grid finer than its samples.
+
+    Attributes
+    ----------
+    position_error : Extreme
+        Largest distance of the tool from the path, in the prescribed rows [m].
+    rotation_error : Extreme
+        Largest angle from the path's orientation, in the prescribed rows [rad].
+    limit_margin : Extreme
+        Smallest distance of a joint from its position limits [rad or m]; negative beyond them.
+    velocity_ratio : Extreme
+        Largest |q̇| relative to the joint's limit; above 1 it is exceeded.
+    smallest_singular_value : Extreme
+        Of the task Jacobian: distance from singular poses.
+    closure : float
+        max |q(T) - q(0)| [rad or m].
+    samples : int
+        Number of times looked at.
+    failures : tuple of str
+        What speaks against the motion; empty for a verified one.
+    """
+
+    position_error: Extreme
+    rotation_error: Extreme
+    limit_margin: Extreme
+    velocity_ratio: Extreme
+    smallest_singular_value: Extreme
+    closure: float
+    samples: int
+    failures: tuple[str, ...]
+
+    @property
+    def verified(self) -> bool:
+        """Whether the motion follows the path within tolerance and keeps the joint limits."""
+        return not self.failures
+
+    @property
+    def verdict(self) -> str:
+        """One line: verified, or what is wrong."""
+        if self.verified:
+            return (
+                f"verified: at most {self.position_error.value:.1e} m and "
+                f"{self.rotation_error.value:.1e} rad off the path"
+            )
+        return "not verified: " + "; ".join(self.failures)
+
+
+def certify(
+    robot: RobotModel,
+    path: Path,
+    task: Task,
+    trajectory: Trajectory,
+    tolerance: Tolerance | None = None,
+) -> Certificate:
+    """Check a motion against its path and the arm's limits.
+
+    Parameters
+    ----------
+    robot, path, task, trajectory
+        The motion and what it should do; times of the trajectory are those of the path.
+    tolerance : Tolerance, optional
+
+    Returns
+    -------
+    Certificate
+    """
+    tolerance = tolerance or Tolerance()
+    t = _refined(trajectory.t)
+    q, qd = trajectory(t), trajectory(t, order=1)
+    rotation, translation, jacobian = _kinematics(robot, q)
+    target = path.samples(t)
+    linear = task.rows[task.rows < 3]
+    distance = np.linalg.norm((target.translation - translation)[:, linear], axis=1)
+    angle = _angles(task, target.rotation, rotation)
+    rows = jacobian
+    if task.tool_axes:
+        turned = rotation.transpose(0, 2, 1) @ jacobian[:, 3:]
+        rows = np.concatenate([jacobian[:, :3], turned], axis=1)
+    singular = np.linalg.svd(rows[:, task.rows], compute_uv=False)[:, -1]
+    margin = np.minimum(q - robot.lower, robot.upper - q)
+    ratio = np.abs(qd) / robot.velocity_limit
+    names = robot.joint_names
+    worst = (
+        _extreme(distance, t, (robot.tool,), np.argmax),
+        _extreme(angle, t, (robot.tool,), np.argmax),
+        _extreme(margin, t, names, np.argmin),
+        _extreme(ratio, t, names, np.argmax),
+        _extreme(singular, t, (robot.tool,), np.argmin),
+    )
+    closure = float(np.abs(trajectory.q[-1] - trajectory.q[0]).max())
+    return Certificate(*worst, closure, len(t), _failures(*worst[:4], path, trajectory, tolerance))
+
+
+def _refined(t: Array) -> Array:
+    fractions = np.arange(_REFINEMENT) / _REFINEMENT
+    inner = t[:-1, None] + np.diff(t)[:, None] * fractions
+    return np.append(inner.ravel(), t[-1])
+
+
+def _kinematics(robot: RobotModel, q: Array) -> tuple[Array, Array, Array]:
+    model, data, tool = robot.model, robot.model.createData(), robot.tool_id
+    rotation, translation = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
+    jacobian = np.empty((len(q), 6, robot.dof))
+    for k, configuration in enumerate(q):
+        pin.computeJointJacobians(model, data, configuration)
+        pose = pin.updateFramePlacement(model, data, tool)
+        rotation[k], translation[k] = pose.rotation, pose.translation
+        jacobian[k] = pin.getFrameJacobian(model, data, tool, _AXES)
+    return rotation, translation, jacobian
+
+
+def _angles(task: Task, target: Array, actual: Array) -> Array:
+    """Return the angle between orientations in the rows that count, (K,) [rad]."""
+    if not np.any(task.rows >= 3):
+        return np.zeros(len(actual))
+    if task.tool_axes:
+        a, b = actual[:, :, 2], target[:, :, 2]
+        sine = np.linalg.norm(np.cross(a, b), axis=1)
+        return np.asarray(np.arctan2(sine, np.einsum("ki,ki->k", a, b)))
+    relative = target @ actual.transpose(0, 2, 1)
+    twice_sine = np.stack(
+        [
+            relative[:, 2, 1] - relative[:, 1, 2],
+            relative[:, 0, 2] - relative[:, 2, 0],
+            relative[:, 1, 0] - relative[:, 0, 1],
+        ],
+        axis=1,
+    )
+    cosine = 0.5 * (np.trace(relative, axis1=1, axis2=2) - 1.0)
+    return np.asarray(np.arctan2(0.5 * np.linalg.norm(twice_sine, axis=1), cosine))
+
+
+def _extreme(
+    values: Array, t: Array, names: tuple[str, ...], choose: Callable[[Array], np.intp]
+) -> Extreme:
+    table = values.reshape(len(t), -1)
+    row, column = np.unravel_index(int(choose(table)), table.shape)
+    return Extreme(float(table[row, column]), float(t[row]), names[int(column)])
+
+
+def _failures(
+    position: Extreme,
+    rotation: Extreme,
+    margin: Extreme,
+    ratio: Extreme,
+    path: Path,
+    trajectory: Trajectory,
+    tolerance: Tolerance,
+) -> tuple[str, ...]:
+    failures = []
+    # Written so that NaN fails.
+    if not abs(trajectory.duration - path.duration) <= 1e-9 * path.duration:
+        failures.append(
+            f"the motion lasts {trajectory.duration:.6g} s, the path {path.duration:.6g} s"
+        )
+    if not position.value <= tolerance.position:
+        failures.append(
+            f"'{position.name}' is {position.value:.2e} m off the path at t = {position.time:.3f} "
+            f"s (allowed: {tolerance.position:.0e})"
+        )
+    if not rotation.value <= tolerance.rotation:
+        failures.append(
+            f"'{rotation.name}' is {rotation.value:.2e} rad off the path at t = "
+            f"{rotation.time:.3f} s (allowed: {tolerance.rotation:.0e})"
+        )
+    if not margin.value >= 0.0:
+        failures.append(
+            f"joint '{margin.name}' is {-margin.value:.3g} beyond its limit at t = "
+            f"{margin.time:.3f} s"
+        )
+    if not ratio.value <= 1.0:
+        failures.append(
+            f"joint '{ratio.name}' moves at {ratio.value:.3g} times its limit at t = "
+            f"{ratio.time:.3f} s: give it {ratio.value:.3g} times the duration"
+        )
+    return tuple(failures)

@@ -1,0 +1,329 @@
+"""One stage of eq. 4 forward, and all stages backward, on one table with a row per stage.
+
+A call from Python costs as much per array argument as a good part of the arithmetic, hence one
+table in place of a dozen. `layout` says which columns hold what; `Rollout` makes views of them.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.arrays import Array
+from selfmotion.jit import kernel
+from selfmotion.kernels.algebra import (
+    LOGARITHM,
+    POINTING,
+    add_cross,
+    cholesky,
+    contract,
+    pointing_error,
+    pull_error,
+    rotation_error,
+    select,
+    solve_cholesky,
+    unselect,
+)
+
+Rows = npt.NDArray[np.intp]
+Layout = tuple[int, int, int, int, int, int, int, int, int, int, int, int, int, int, int]
+
+
+@kernel
+def layout(n: int, m: int) -> Layout:
+    """Return the first column of each part of a stage's row, and the number of columns.
+
+    q, q̇, ε (n each); the path's translation (3), rotation (9) and twist (6); the step length (1);
+    the tool's translation (3) and rotation (9); its pose error (6); J6 (6n); J (mn); L (mm); y (m).
+    """
+    q = 0
+    qd = q + n
+    epsilon = qd + n
+    target_translation = epsilon + n
+    target_rotation = target_translation + 3
+    target_twist = target_rotation + 9
+    step = target_twist + 6
+    translation = step + 1
+    rotation = translation + 3
+    error = rotation + 9
+    jacobian = error + 6
+    task_jacobian = jacobian + 6 * n
+    factor = task_jacobian + m * n
+    y = factor + m * m
+    return (
+        q,
+        qd,
+        epsilon,
+        target_translation,
+        target_rotation,
+        target_twist,
+        step,
+        translation,
+        rotation,
+        error,
+        jacobian,
+        task_jacobian,
+        factor,
+        y,
+        y + m,
+    )
+
+
+@kernel
+def evaluate(
+    s: int,
+    frame_jacobian: Array,
+    frame_rotation: Array,
+    frame_translation: Array,
+    table: Array,
+    rows: Rows,
+    angle_kind: int,
+    gain: float,
+    damping: float,
+) -> bool:
+    """Evaluate eq. 4 at stage s: q̇ = J⁺u + (I - J⁺J) ε.
+
+    False where A = JJᵀ + λ²I, λ² = `damping`, is not positive definite (a singular pose, or NaN).
+    """
+    n, m = frame_jacobian.shape[1], rows.shape[0]
+    at = layout(n, m)
+    row = table[s]
+    epsilon = row[at[2] : at[2] + n]
+    target_rotation = row[at[4] : at[4] + 9].reshape(3, 3)
+    translation = row[at[7] : at[7] + 3]
+    rotation = row[at[8] : at[8] + 9].reshape(3, 3)
+    error = row[at[9] : at[9] + 6]
+    jacobian = row[at[10] : at[10] + 6 * n].reshape(6, n)
+    task_jacobian = row[at[11] : at[11] + m * n].reshape(m, n)
+    factor = row[at[12] : at[12] + m * m].reshape(m, m)
+    y = row[at[13] : at[13] + m]
+    pointing = angle_kind == POINTING
+
+    jacobian[:] = frame_jacobian
+    rotation[:] = frame_rotation
+    translation[:] = frame_translation
+    for i in range(3):
+        error[i] = row[at[3] + i] - translation[i]
+    if angle_kind == LOGARITHM:
+        rotation_error(target_rotation, rotation, error[3:])
+    elif pointing:
+        pointing_error(target_rotation, rotation, error[3:])
+
+    # u = S(ẋ_d + K e), then y = A⁻¹(u - Jε)
+    command = np.empty(6)
+    for i in range(6):
+        command[i] = row[at[5] + i] + gain * error[i]
+    select(rows, pointing, rotation, command, y)
+    for k in range(n):
+        select(rows, pointing, rotation, jacobian[:, k], task_jacobian[:, k])
+    for i in range(m):
+        for k in range(n):
+            y[i] -= task_jacobian[i, k] * epsilon[k]
+        for j in range(i + 1):
+            total = damping if i == j else 0.0
+            for k in range(n):
+                total += task_jacobian[i, k] * task_jacobian[j, k]
+            factor[i, j] = total
+    if not cholesky(factor):
+        return False
+    solve_cholesky(factor, y)
+    for k in range(n):
+        total = epsilon[k]
+        for i in range(m):
+            total += task_jacobian[i, k] * y[i]
+        row[at[1] + k] = total
+    return True
+
+
+@kernel
+def advance(
+    s: int,
+    frame_jacobian: Array,
+    frame_rotation: Array,
+    frame_translation: Array,
+    table: Array,
+    rows: Rows,
+    angle_kind: int,
+    gain: float,
+    damping: float,
+) -> bool:
+    """Evaluate eq. 4 at stage s and set the next stage's q; see `evaluate`.
+
+    Stages come four to a step, then one for the end.
+    """
+    n, m = frame_jacobian.shape[1], rows.shape[0]
+    sound = evaluate(
+        s,
+        frame_jacobian,
+        frame_rotation,
+        frame_translation,
+        table,
+        rows,
+        angle_kind,
+        gain,
+        damping,
+    )
+    if sound and s + 1 < table.shape[0]:
+        _step(table, s, n, table[s, layout(n, m)[6]])
+    return sound
+
+
+@kernel
+def newton_step(row: Array, n: int, rows: Rows, angle_kind: int) -> Array:
+    """Return J⁺S e, the smallest correction of q that takes out the pose error e to first order."""
+    m = rows.shape[0]
+    at = layout(n, m)
+    rotation = row[at[8] : at[8] + 9].reshape(3, 3)
+    task_jacobian = row[at[11] : at[11] + m * n].reshape(m, n)
+    factor = row[at[12] : at[12] + m * m].reshape(m, m)
+    z = np.empty(m)
+    select(rows, angle_kind == POINTING, rotation, row[at[9] : at[9] + 6], z)
+    solve_cholesky(factor, z)
+    correction = np.zeros(n)
+    for i in range(m):
+        for k in range(n):
+            correction[k] += task_jacobian[i, k] * z[i]
+    return correction
+
+
+@kernel
+def _step(table: Array, s: int, n: int, h: float) -> None:
+    """Set q of stage s + 1 from the slopes so far (classical fourth-order Runge-Kutta)."""
+    first, i = s - s % 4, s % 4
+    for k in range(n):
+        q, slope = table[first, k], table[s, n + k]
+        if i == 3:
+            slope += table[first, n + k] + 2.0 * (table[first + 1, n + k] + table[s - 1, n + k])
+            table[s + 1, k] = q + h / 6.0 * slope
+        else:
+            table[s + 1, k] = q + (h if i == 2 else 0.5 * h) * slope
+
+
+@kernel
+def pull_stage(
+    w: Array,
+    row: Array,
+    rows: Rows,
+    angle_kind: int,
+    gain: float,
+    epsilon_bar: Array,
+    q_bar: Array,
+) -> None:
+    """Pull the cotangent w (n,) on q̇ of one stage back to ε (set) and q (added).
+
+    z = A⁻¹Jw,  ε̄ = w - Jᵀz,  q̄ = ⟨y ε̄ᵀ - z q̇ᵀ, ∂J/∂q⟩ + zᵀS K ∂e/∂q, and where the angular rows
+    are in tool axes, zᵀ ∂S u.
+    """
+    n, m = w.shape[0], rows.shape[0]
+    at = layout(n, m)
+    qd = row[at[1] : at[1] + n]
+    target_rotation = row[at[4] : at[4] + 9].reshape(3, 3)
+    rotation = row[at[8] : at[8] + 9].reshape(3, 3)
+    error = row[at[9] : at[9] + 6]
+    jacobian = row[at[10] : at[10] + 6 * n].reshape(6, n)
+    task_jacobian = row[at[11] : at[11] + m * n].reshape(m, n)
+    factor = row[at[12] : at[12] + m * m].reshape(m, m)
+    y = row[at[13] : at[13] + m]
+    pointing = angle_kind == POINTING
+
+    z = np.zeros(m)
+    for i in range(m):
+        for k in range(n):
+            z[i] += task_jacobian[i, k] * w[k]
+    solve_cholesky(factor, z)
+    for k in range(n):
+        total = w[k]
+        for i in range(m):
+            total -= task_jacobian[i, k] * z[i]
+        epsilon_bar[k] = total
+
+    full_y, full_z = np.empty(6), np.empty(6)
+    unselect(rows, pointing, rotation, y, full_y)
+    unselect(rows, pointing, rotation, z, full_z)
+    weights = np.empty((6, n))
+    for i in range(6):
+        for k in range(n):
+            weights[i, k] = full_y[i] * epsilon_bar[k] - full_z[i] * qd[k]
+    contract(jacobian, weights, q_bar)
+
+    # Everything else acts through the tool's own twist J6 ∂q.
+    twist_bar = np.zeros(6)
+    pull_error(angle_kind, error, rotation, target_rotation, gain * full_z, twist_bar)
+    if pointing:
+        first, second = np.zeros(3), np.zeros(3)
+        for i in range(3):
+            second[i] = -(row[at[5] + 3 + i] + gain * error[3 + i])
+            for k in range(n):
+                first[i] += jacobian[3 + i, k] * epsilon_bar[k]
+                second[i] += jacobian[3 + i, k] * qd[k]
+        add_cross(full_y[3], full_y[4], full_y[5], first, twist_bar[3:])
+        add_cross(-full_z[3], -full_z[4], -full_z[5], second, twist_bar[3:])
+    for k in range(n):
+        for i in range(6):
+            q_bar[k] += jacobian[i, k] * twist_bar[i]
+
+
+@kernel
+def pullback(
+    q_cotangent: Array,
+    qd_cotangent: Array,
+    table: Array,
+    rows: Rows,
+    angle_kind: int,
+    gain: float,
+    epsilon_bar: Array,
+) -> Array:
+    """Reverse the Runge-Kutta recursion: cotangents on all stages → ε (S, n) set, start (n,).
+
+    A stage's slope acts on the later stages of its step and on the step's end.
+    """
+    stages, n = q_cotangent.shape
+    step = layout(n, rows.shape[0])[6]
+    state, q_bar = np.zeros(n), np.zeros(n)
+    chi, slope = np.zeros((4, n)), np.empty(n)
+    for s in range(stages - 1, -1, -1):
+        i, h = s % 4, table[s, step]
+        last = s == stages - 1
+        for k in range(n):
+            slope[k] = qd_cotangent[s, k]
+            if not last:
+                slope[k] += state[k] * h / (6.0 if i in (0, 3) else 3.0)
+                if i < 3:
+                    slope[k] += chi[i + 1, k] * (h if i == 2 else 0.5 * h)
+            q_bar[k] = q_cotangent[s, k]
+        pull_stage(slope, table[s], rows, angle_kind, gain, epsilon_bar[s], q_bar)
+        chi[i] = q_bar
+        if last:
+            state[:] = q_bar
+        elif i == 0:
+            for k in range(n):
+                state[k] += chi[0, k] + chi[1, k] + chi[2, k] + chi[3, k]
+    return state
+
+
+@kernel
+def sensitivities(
+    table: Array, rows: Rows, angle_kind: int, gain: float, epsilon_matrix: Array
+) -> Array:
+    """Return ∂q̇/∂x at all stages, (S, n, d), for ∂ε/∂x = `epsilon_matrix` (S, n, d).
+
+    The tangent of the Runge-Kutta recursion: ∂q̇ = (I - J⁺J) ∂ε + (∂q̇/∂q) ∂q at every stage. The
+    rows of both matrices are pullbacks of the unit vectors.
+    """
+    stages, n, d = epsilon_matrix.shape
+    step = layout(n, rows.shape[0])[6]
+    projector, slope_by_q, unit = np.empty((n, n)), np.empty((n, n)), np.zeros(n)
+    state, now = np.zeros((n, d)), np.zeros((n, d))
+    out = np.empty((stages, n, d))
+    for s in range(stages):
+        for k in range(n):
+            unit[k] = 1.0
+            slope_by_q[k] = 0.0
+            pull_stage(unit, table[s], rows, angle_kind, gain, projector[k], slope_by_q[k])
+            unit[k] = 0.0
+        out[s] = projector @ epsilon_matrix[s] + slope_by_q @ now
+        i, h = s % 4, table[s, step]
+        if i == 3:
+            state += h / 6.0 * (out[s - 3] + 2.0 * out[s - 2] + 2.0 * out[s - 1] + out[s])
+            now[:] = state
+        else:
+            now[:] = state + (h if i == 2 else 0.5 * h) * out[s]
+    return out

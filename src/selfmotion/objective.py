@@ -1,0 +1,122 @@
+"""From the decision vector to the cost and its gradient: the only place with the chain rule."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from selfmotion.arrays import Array
+from selfmotion.costs import Cost, JointVelocity
+from selfmotion.null_motion import NullMotionTable
+from selfmotion.rollout import Rollout
+
+
+class Objective:
+    """F(x) = ∫ Σ G(q̇, q, t) dt along the motion that the coefficients x drive.
+
+    Parameters
+    ----------
+    rollout : Rollout
+        The engine; its grid is that of the null motion.
+    null_motion : NullMotionTable
+        x → ε at the stages.
+    costs : sequence of Cost
+    start : (n,)
+        q(0).
+
+    Attributes
+    ----------
+    evaluations, gradient_evaluations : int
+        How often F and ∇F were computed.
+    """
+
+    def __init__(
+        self,
+        rollout: Rollout,
+        null_motion: NullMotionTable,
+        costs: Sequence[Cost],
+        start: Array,
+    ) -> None:
+        self.rollout, self.null_motion = rollout, null_motion
+        self._costs, self._start = tuple(costs), start
+        self.evaluations = 0
+        self.gradient_evaluations = 0
+        self._at: Array | None = None
+        self._terms: dict[str, float] = {}
+
+    @property
+    def size(self) -> int:
+        """Number of decision variables."""
+        return self.null_motion.size
+
+    def value(self, x: Array) -> float:
+        """Return F(x); infinite where the motion breaks down."""
+        self.evaluations += 1
+        return self._run(x)
+
+    def gradient(self, x: Array) -> Array:
+        """Return ∇F(x), (size,): exact for the discretised motion; NaN where it breaks down."""
+        if self._at is None or not np.array_equal(self._at, x):
+            self._run(x)
+        self.gradient_evaluations += 1
+        if not np.isfinite(sum(self._terms.values())):
+            return np.full(self.size, np.nan)
+        samples = self.rollout.samples()
+        by_q, by_qd = np.zeros_like(samples.q), np.zeros_like(samples.qd)
+        weights = samples.weights[:, None]
+        for cost in self._costs:
+            partials = cost.gradient(samples)
+            if partials.q is not None:
+                by_q += weights * partials.q
+            if partials.qd is not None:
+                by_qd += weights * partials.qd
+        by_epsilon, _ = self.rollout.pullback(by_q, by_qd)
+        return self.null_motion.pullback(by_epsilon)
+
+    def slope(self, x: Array, direction: Array) -> float:
+        """Return the derivative of F at x along `direction`."""
+        return float(self.gradient(x) @ direction)
+
+    def terms(self, x: Array) -> dict[str, float]:
+        """Return what each cost contributes to F(x)."""
+        self.value(x)
+        return dict(self._terms)
+
+    def metric(self, x: Array) -> Array:
+        """Return the Gauss-Newton matrix ∫ (∂q̇/∂x)ᵀ W (∂q̇/∂x) dt at x, (size, size).
+
+        W is that of the joint-velocity costs, or I without any. Its inverse starts the
+        quasi-Newton method at the curvature of the quadratic part of F.
+        """
+        if self._at is None or not np.array_equal(self._at, x):
+            self._run(x)
+        sensitivities = self.rollout.sensitivities(self.null_motion.matrix())
+        n = self.rollout.robot.dof
+        quadratic = [cost.matrix(n) for cost in self._costs if isinstance(cost, JointVelocity)]
+        weight = sum(quadratic) if quadratic else np.eye(n)
+        flat = sensitivities.reshape(-1, self.size)
+        weighted = self.rollout.grid.weights[:, None, None] * (weight @ sensitivities)
+        return np.asarray(flat.T @ weighted.reshape(-1, self.size))
+
+    def _run(self, x: Array) -> float:
+        self._at = x.copy()
+        names = [cost.name for cost in self._costs]
+        if self.rollout.run(self._start, self.null_motion.epsilon(x)) is not None:
+            self._terms = dict.fromkeys(names, np.inf)
+            return np.inf
+        samples = self.rollout.samples()
+        self._terms = dict.fromkeys(names, 0.0)
+        for cost in self._costs:
+            self._terms[cost.name] += float(samples.weights @ cost.value(samples))
+        total = sum(self._terms.values())
+        return total if np.isfinite(total) else np.inf
+
+
+def inverse_metric(metric: Array, floor: float = 1e-9) -> Array:
+    """Return the inverse of a positive semidefinite matrix.
+
+    Directions without curvature (coefficients that do not act, as in the over-specified joint
+    space) are given that of `floor` times the largest.
+    """
+    values, vectors = np.linalg.eigh(metric)
+    values = np.maximum(values, floor * max(values[-1], np.finfo(float).tiny))
+    return np.asarray((vectors / values) @ vectors.T)

@@ -1,0 +1,201 @@
+"""Integrates eq. 4 with Pinocchio's frame Jacobians, and pulls gradients back through it."""
+
+import numpy as np
+import pinocchio as pin
+
+from selfmotion import kernels
+from selfmotion.arrays import Array
+from selfmotion.grid import Grid
+from selfmotion.path import Path
+from selfmotion.robot import RobotModel
+from selfmotion.samples import Samples
+from selfmotion.task import Task
+
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+# The pose feedback removes an error e at the rate K e; K times the duration.
+_FEEDBACK = 20.0
+
+# A Newton correction this small [rad or m] is rounding; quadratic convergence needs few steps.
+_POLISHED, _POLISHING_STEPS = 1e-13, 4
+
+
+class Rollout:
+    """Integrates q̇ = J⁺(ẋ + K e) + (I - J⁺J) ε(t) over a grid, from a start configuration.
+
+    Eq. 4 of the paper with pose feedback: e is the pose error (log on SO(3)), zero for the exact
+    solution, so that the feedback only takes out what the integration lets in. J⁺ is Jᵀ(JJᵀ)⁻¹,
+    or Jᵀ(JJᵀ + λ²I)⁻¹ (damped least squares). Classical fourth-order Runge-Kutta.
+
+    One object keeps its tables between runs; what `samples` and `pullback` return is that of the
+    last `run`.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    path : Path
+    task : Task
+    grid : Grid
+    damping : float
+        λ [m, rad].
+    """
+
+    def __init__(
+        self, robot: RobotModel, path: Path, task: Task, grid: Grid, *, damping: float = 0.0
+    ) -> None:
+        self.robot, self.path, self.task, self.grid = robot, path, task, grid
+        self.jacobian_evaluations = 0
+        self._data = robot.model.createData()
+        self._damping = damping**2
+        self._gain = _FEEDBACK / path.duration
+        self._rows = task.rows
+        self._angle_kind = _angle_kind(task)
+        times, n, m = grid.stage_times, robot.dof, task.dimension
+        start, stop = kernels.layout(n, m)[:-1], kernels.layout(n, m)[1:]
+        self._table = np.zeros((len(times), stop[-1]))
+        parts = [self._table[:, a:b] for a, b in zip(start, stop, strict=True)]
+        self._q, self._qd, self._epsilon, translation, rotation, twist, step = parts[:7]
+        # Reshaping splits the last axis of a view, hence shares the table's memory.
+        self._translation = parts[7]
+        self._rotation = parts[8].reshape(-1, 3, 3)
+        self._jacobian = parts[10].reshape(-1, 6, n)
+        self._task_jacobian = parts[11].reshape(-1, m, n)
+        target = path.samples(times)
+        translation[:] = target.translation
+        rotation[:] = target.rotation.reshape(-1, 9)
+        twist[:] = target.twist
+        step[:, 0] = grid.stage_steps
+        self._q_rows = list(self._q)
+
+    def run(self, start: Array, epsilon: Array) -> float | None:
+        """Integrate from `start` (n,) under null motion `epsilon` (S, n) at the stage times.
+
+        Returns
+        -------
+        float or None
+            None when it arrived; otherwise the time [s] at which the task Jacobian lost rank or a
+            number stopped being finite.
+        """
+        model, data, tool = self.robot.model, self._data, self.robot.tool_id
+        jacobians, frame_jacobian = pin.computeJointJacobians, pin.getFrameJacobian
+        place, advance, axes = pin.updateFramePlacement, kernels.advance, _AXES
+        # These two are views of Pinocchio's own memory: each `place` refreshes them.
+        rotation, translation = data.oMf[tool].rotation, data.oMf[tool].translation
+        table, rows, angle_kind = self._table, self._rows, self._angle_kind
+        gain, damping = self._gain, self._damping
+        self._epsilon[:] = epsilon
+        self._q[0] = start
+        for stage, q in enumerate(self._q_rows):
+            jacobians(model, data, q)
+            jacobian = frame_jacobian(model, data, tool, axes)
+            place(model, data, tool)
+            if not advance(
+                stage, jacobian, rotation, translation, table, rows, angle_kind, gain, damping
+            ):
+                self.jacobian_evaluations += stage + 1
+                return float(self.grid.stage_times[stage])
+        self.jacobian_evaluations += len(self._q_rows)
+        return None
+
+    def polish(self) -> tuple[Array, Array, Array]:
+        """Put the nodes of the last run exactly onto the path.
+
+        Newton's method q ← q + J⁺e, from errors the size of the integration's; then eq. 4 once
+        more for q̇.
+
+        Returns
+        -------
+        t, q, qd : (N + 1,), (N + 1, n), (N + 1, n)
+        """
+        model, data, tool = self.robot.model, self._data, self.robot.tool_id
+        rotation, translation = data.oMf[tool].rotation, data.oMf[tool].translation
+        rows, kind, n = self._rows, self._angle_kind, self.robot.dof
+        here = self.grid.node_stages
+        for stage in here:
+            q = self._q_rows[stage]
+            for _ in range(_POLISHING_STEPS + 1):
+                pin.computeJointJacobians(model, data, q)
+                jacobian = pin.getFrameJacobian(model, data, tool, _AXES)
+                pin.updateFramePlacement(model, data, tool)
+                sound = kernels.evaluate(
+                    stage,
+                    jacobian,
+                    rotation,
+                    translation,
+                    self._table,
+                    rows,
+                    kind,
+                    0.0,
+                    self._damping,
+                )
+                step = kernels.newton_step(self._table[stage], n, rows, kind)
+                if not sound or np.abs(step).max() < _POLISHED:
+                    break
+                q += step
+        self.jacobian_evaluations += len(here)
+        return self.grid.nodes, self._q[here], self._qd[here]
+
+    def sensitivities(self, epsilon_matrix: Array) -> Array:
+        """Return ∂q̇/∂x at the stages of the last run, (S, n, d).
+
+        Parameters
+        ----------
+        epsilon_matrix : (S, n, d)
+            ∂ε/∂x.
+        """
+        return kernels.sensitivities(
+            self._table,
+            self._rows,
+            self._angle_kind,
+            self._gain,
+            np.ascontiguousarray(epsilon_matrix),
+        )
+
+    def samples(self) -> Samples:
+        """Return the last run at its stages, without copying: valid until the next run."""
+        return Samples(
+            t=self.grid.stage_times,
+            weights=self.grid.weights,
+            q=self._q,
+            qd=self._qd,
+            jacobian=self._jacobian,
+            rotation=self._rotation,
+            translation=self._translation,
+            task=self.task,
+            task_jacobian=self._task_jacobian,
+        )
+
+    def pullback(self, q_cotangent: Array, qd_cotangent: Array) -> tuple[Array, Array]:
+        """Pull a gradient with respect to the last run's stages back to what drove it.
+
+        The exact derivative of the discrete scheme: one backward sweep, no finite differences.
+
+        Parameters
+        ----------
+        q_cotangent, qd_cotangent : (S, n)
+            ∂F/∂q and ∂F/∂q̇ at the stages.
+
+        Returns
+        -------
+        epsilon_gradient : (S, n)
+            ∂F/∂ε at the stages.
+        start_gradient : (n,)
+            ∂F/∂q(0).
+        """
+        epsilon_gradient = np.empty_like(self._qd)
+        start_gradient = kernels.pullback(
+            np.ascontiguousarray(q_cotangent),
+            np.ascontiguousarray(qd_cotangent),
+            self._table,
+            self._rows,
+            self._angle_kind,
+            self._gain,
+            epsilon_gradient,
+        )
+        return epsilon_gradient, start_gradient
+
+
+def _angle_kind(task: Task) -> int:
+    if task.tool_axes:
+        return kernels.POINTING
+    return kernels.LOGARITHM if np.any(task.rows >= 3) else kernels.NO_ANGLE

@@ -1,0 +1,70 @@
+"""A motion at sample times, as costs and constraints see it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from selfmotion import kernels
+from selfmotion.arrays import Array
+from selfmotion.task import Task
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A joint motion at S times, with the tool's kinematics there.
+
+    Attributes
+    ----------
+    t : (S,)
+        Times [s].
+    weights : (S,)
+        Quadrature weights [s]: ∫ G dt ≈ weights · G.
+    q, qd : (S, n)
+        Joint coordinates and velocities.
+    jacobian : (S, 6, n)
+        The tool's Jacobian [v, ω], world axes.
+    rotation, translation : (S, 3, 3), (S, 3)
+        The tool's pose.
+    task : Task
+        The rows the path prescribes.
+    task_jacobian : (S, m, n)
+        Those rows of the Jacobian.
+    """
+
+    t: Array
+    weights: Array
+    q: Array
+    qd: Array
+    jacobian: Array
+    rotation: Array
+    translation: Array
+    task: Task
+    task_jacobian: Array
+
+    @cached_property
+    def gram(self) -> Array:
+        """JJᵀ of the task Jacobian, (S, m, m)."""
+        gram: Array = self.task_jacobian @ self.task_jacobian.transpose(0, 2, 1)
+        return gram
+
+    @cached_property
+    def gram_determinant(self) -> Array:
+        """Det JJᵀ = w², the square of Yoshikawa's manipulability, (S,)."""
+        return np.asarray(np.linalg.det(self.gram))
+
+    @cached_property
+    def log_determinant_gradient(self) -> Array:
+        """∂ log det(JJᵀ) / ∂q = 2 ⟨(JJᵀ)⁻¹J, ∂J/∂q⟩, (S, n)."""
+        inverse = np.asarray(np.linalg.solve(self.gram, self.task_jacobian), dtype=np.float64)
+        return self.contract(2.0 * inverse)
+
+    def contract(self, weights: Array) -> Array:
+        """Return ⟨M, ∂J/∂q_k⟩ for `weights` M (S, m, n) on the task Jacobian, (S, n)."""
+        return kernels.contract_task(
+            self.jacobian,
+            self.rotation,
+            np.ascontiguousarray(weights),
+            self.task.rows,
+            self.task.tool_axes,
+        )
