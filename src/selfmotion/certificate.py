@@ -126,7 +126,8 @@ def certify(
     rotation, translation, jacobian = _kinematics(robot, q)
     target = path.samples(t)
     linear = task.rows[task.rows < 3]
-    distance = np.linalg.norm((target.translation - translation)[:, linear], axis=1)
+    miss = (target.translation - translation)[:, linear]
+    distance: Array = np.linalg.norm(miss, axis=1).astype(np.float64)
     angle = _angles(task, target.rotation, rotation)
     rows = jacobian
     if task.tool_axes:

@@ -68,18 +68,17 @@ class LineSearch:
         (α, φ(α)) or None
             None where no step decreases φ beyond rounding, or no evaluation is left.
         """
-        self_start = _Point(0.0, value0, slope0)
-        before, alpha = self_start, first
+        start = _Point(0.0, value0, slope0)
+        before, alpha = start, first
         while more():
             here = _Point(alpha, value(alpha))
-            if self._too_high(here, self_start) or here.value >= before.value:
-                return self._section(value, slope, self_start, before, here, more)
+            if self._too_high(here, start) or here.value >= before.value:
+                return self._section(value, slope, start, before, here, more)
             here = _Point(alpha, here.value, slope(alpha))
-            assert_slope = _slope(here)
-            if abs(assert_slope) <= -self.sigma * slope0:
+            if abs(_slope(here)) <= -self.sigma * slope0:
                 return here.alpha, here.value
-            if assert_slope >= 0.0:
-                return self._section(value, slope, self_start, here, before, more)
+            if _slope(here) >= 0.0:
+                return self._section(value, slope, start, here, before, more)
             advance = alpha - before.alpha
             nearest, farthest = alpha + advance, alpha + self.tau1 * advance
             alpha, before = _minimizer(before, here, nearest, farthest), here
@@ -147,9 +146,8 @@ def _minimizer(a: _Point, b: _Point, nearest: float, farthest: float) -> float:
         coefficients = np.array([rise - slope, slope, 0.0])
     else:
         end_slope = b.slope * length
-        coefficients = np.array(
-            [slope + end_slope - 2.0 * rise, 3.0 * rise - 2.0 * slope - end_slope, slope, 0.0]
-        )
+        cubic, square = slope + end_slope - 2.0 * rise, 3.0 * rise - 2.0 * slope - end_slope
+        coefficients = np.array([cubic, square, slope, 0.0])
     stationary = np.roots(np.polyder(coefficients))
     real = stationary[np.abs(stationary.imag) < 1e-12].real
     inside = real[(real > z.min()) & (real < z.max())]

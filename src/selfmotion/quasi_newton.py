@@ -1,7 +1,7 @@
 """The Broyden-family quasi-Newton method with Fletcher's switch; knows only x → (F, ∇F)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
@@ -135,7 +135,7 @@ class QuasiNewton:
     update: str = "fletcher"
     tolerance: float = 1e-9
     max_iterations: int = 200
-    line_search: LineSearch = LineSearch()
+    line_search: LineSearch = field(default_factory=LineSearch)
     unbounded: float = 1e8
 
     def __post_init__(self) -> None:

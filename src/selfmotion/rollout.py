@@ -109,7 +109,8 @@ class Rollout:
         """
         model, data, tool = self.robot.model, self._data, self.robot.tool_id
         rotation, translation = data.oMf[tool].rotation, data.oMf[tool].translation
-        rows, kind, n = self._rows, self._angle_kind, self.robot.dof
+        table, rows, kind, n = self._table, self._rows, self._angle_kind, self.robot.dof
+        damping = self._damping
         here = self.grid.node_stages
         for stage in here:
             q = self._q_rows[stage]
@@ -118,17 +119,9 @@ class Rollout:
                 jacobian = pin.getFrameJacobian(model, data, tool, _AXES)
                 pin.updateFramePlacement(model, data, tool)
                 sound = kernels.evaluate(
-                    stage,
-                    jacobian,
-                    rotation,
-                    translation,
-                    self._table,
-                    rows,
-                    kind,
-                    0.0,
-                    self._damping,
+                    stage, jacobian, rotation, translation, table, rows, kind, 0.0, damping
                 )
-                step = kernels.newton_step(self._table[stage], n, rows, kind)
+                step = kernels.newton_step(table[stage], n, rows, kind)
                 if not sound or np.abs(step).max() < _POLISHED:
                     break
                 q += step
