@@ -133,7 +133,7 @@ def certify(
     if task.tool_axes:
         turned = rotation.transpose(0, 2, 1) @ jacobian[:, 3:]
         rows = np.concatenate([jacobian[:, :3], turned], axis=1)
-    singular = np.linalg.svd(rows[:, task.rows], compute_uv=False)[:, -1]
+    singular = np.linalg.svd(rows[:, task.rows], compute_uv=False)[:, -1].astype(np.float64)
     margin = np.minimum(q - robot.lower, robot.upper - q)
     ratio = np.abs(qd) / robot.velocity_limit
     names = robot.joint_names

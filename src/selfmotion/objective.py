@@ -50,15 +50,14 @@ class Objective:
 
     def value(self, x: Array) -> float:
         """Return F(x); infinite where the motion breaks down."""
-        self.evaluations += 1
-        return self._run(x)
+        self._run(x)
+        return self._total
 
     def gradient(self, x: Array) -> Array:
         """Return ∇F(x), (size,): exact for the discretised motion; NaN where it breaks down."""
-        if self._at is None or not np.array_equal(self._at, x):
-            self._run(x)
+        self._run(x)
         self.gradient_evaluations += 1
-        if not np.isfinite(sum(self._terms.values())):
+        if not np.isfinite(self._total):
             return np.full(self.size, np.nan)
         samples = self.rollout.samples()
         by_q, by_qd = np.zeros_like(samples.q), np.zeros_like(samples.qd)
@@ -78,7 +77,7 @@ class Objective:
 
     def terms(self, x: Array) -> dict[str, float]:
         """Return what each cost contributes to F(x)."""
-        self.value(x)
+        self._run(x)
         return dict(self._terms)
 
     def metric(self, x: Array) -> Array:
@@ -87,8 +86,7 @@ class Objective:
         W is that of the joint-velocity costs, or I without any. Its inverse starts the
         quasi-Newton method at the curvature of the quadratic part of F.
         """
-        if self._at is None or not np.array_equal(self._at, x):
-            self._run(x)
+        self._run(x)
         sensitivities = self.rollout.sensitivities(self.null_motion.matrix())
         n = self.rollout.robot.dof
         quadratic = [cost.matrix(n) for cost in self._costs if isinstance(cost, JointVelocity)]
@@ -97,18 +95,25 @@ class Objective:
         weighted = self.rollout.grid.weights[:, None, None] * (weight @ sensitivities)
         return np.asarray(flat.T @ weighted.reshape(-1, self.size))
 
-    def _run(self, x: Array) -> float:
+    @property
+    def _total(self) -> float:
+        total = sum(self._terms.values())
+        return total if np.isfinite(total) else np.inf
+
+    def _run(self, x: Array) -> None:
+        """Make `x` the motion that the rollout holds."""
+        if self._at is not None and np.array_equal(self._at, x):
+            return
+        self.evaluations += 1
         self._at = x.copy()
         names = [cost.name for cost in self._costs]
         if self.rollout.run(self._start, self.null_motion.epsilon(x)) is not None:
             self._terms = dict.fromkeys(names, np.inf)
-            return np.inf
+            return
         samples = self.rollout.samples()
-        self._terms = dict.fromkeys(names, 0.0)
-        for cost in self._costs:
-            self._terms[cost.name] += float(samples.weights @ cost.value(samples))
-        total = sum(self._terms.values())
-        return total if np.isfinite(total) else np.inf
+        self._terms = {
+            cost.name: float(samples.weights @ cost.value(samples)) for cost in self._costs
+        }
 
 
 def inverse_metric(metric: Array, floor: float = 1e-9) -> Array:

@@ -133,7 +133,7 @@ class QuasiNewton:
     """
 
     update: str = "fletcher"
-    tolerance: float = 1e-9
+    tolerance: float = 1e-8
     max_iterations: int = 200
     line_search: LineSearch = field(default_factory=LineSearch)
     unbounded: float = 1e8

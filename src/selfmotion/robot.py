@@ -1,7 +1,8 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
+import dataclasses
 import importlib.metadata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -133,15 +134,28 @@ class RobotModel:
         pose = pin.updateFramePlacement(self.model, self._data, self.tool_id)
         return task.select(jacobian, pose.rotation)
 
-    def redundancy(self, task: Task) -> int:
-        """Return n - rank J for the task at a generic configuration (0: no self-motion)."""
-        rng = np.random.default_rng(0)
+    def redundancy(self, task: Task | str) -> int:
+        """Return n - rank J of the task at generic configurations (0: no self-motion)."""
+        task = Task.of(task)
+        jacobians = [self.task_jacobian(q, task) for q in self._generic_configurations()]
+        return self.dof - int(max(np.linalg.matrix_rank(jacobians, tol=_RANK_TOLERANCE)))
+
+    def can_follow(self, task: Task | str) -> bool:
+        """Return whether the arm can move the tool in every row that the task prescribes.
+
+        ``planar_pose`` also wants an arm that moves in the x-y plane: elsewhere there is no angle
+        about z that the rate ωz would be the derivative of.
+        """
+        task = Task.of(task)
+        if task is Task.PLANAR_POSE:
+            jacobians = np.array([self.jacobian(q) for q in self._generic_configurations()])
+            if np.abs(jacobians[:, 2:5]).max() > _RANK_TOLERANCE:
+                return False
+        return self.dof - self.redundancy(task) == task.dimension
+
+    def _generic_configurations(self) -> Array:
         lower, upper = self.finite_limits()
-        ranks = [
-            np.linalg.matrix_rank(self.task_jacobian(rng.uniform(lower, upper), task), tol=1e-6)
-            for _ in range(5)
-        ]
-        return self.dof - int(max(ranks))
+        return np.random.default_rng(0).uniform(lower, upper, (5, self.dof))
 
     def finite_limits(self) -> tuple[Array, Array]:
         """Return the position limits with ±π where a joint has none, for sampling."""
@@ -149,6 +163,20 @@ class RobotModel:
             np.where(np.isfinite(self.lower), self.lower, -np.pi),
             np.where(np.isfinite(self.upper), self.upper, np.pi),
         )
+
+    def dexterous_configuration(self, task: Task | str = Task.POSE) -> Array:
+        """Return a configuration well inside the limits and far from singular poses, (n,).
+
+        Of 1000 samples (fixed seed) in the middle half of the limits, the one with the largest
+        manipulability √det(JJᵀ) of the task: a start for motions that may begin anywhere.
+        """
+        task = Task.of(task)
+        lower, upper = self.finite_limits()
+        share = np.random.default_rng(0).uniform(0.25, 0.75, (1000, self.dof))
+        samples = lower + (upper - lower) * share
+        jacobians = np.array([self.task_jacobian(q, task) for q in samples])
+        determinants = np.linalg.det(jacobians @ jacobians.transpose(0, 2, 1))
+        return np.array(samples[np.argmax(determinants)])
 
     def inverse_kinematics(
         self,
@@ -262,6 +290,9 @@ class RobotModel:
         return reduced[0]
 
 
+# Singular values below this [m, rad] are zero.
+_RANK_TOLERANCE = 1e-6
+
 # What an inverse-kinematics solution may miss by, far below what a certificate accepts.
 _IK_TOLERANCE = 1e-10
 
@@ -359,10 +390,19 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
 
 
 def rebuild_robot(
-    text: str, package_dirs: tuple[str, ...], source: str, tool: str, locked: Mapping[str, float]
+    text: str,
+    package_dirs: Sequence[str],
+    source: str,
+    continuous: Sequence[str],
+    tool: str,
+    locked: Mapping[str, float],
 ) -> RobotModel:
-    """Build an arm from the URDF text that a saved plan carries."""
-    return build_robot(parse_urdf(text, source=source, package_dirs=package_dirs), tool, locked)
+    """Build an arm from what a saved plan carries of it."""
+    urdf = parse_urdf(text, source=source, package_dirs=tuple(package_dirs))
+    # The text has the continuous joints as revolute ones already.
+    for name in continuous:
+        urdf.joints[name] = dataclasses.replace(urdf.joints[name], kind="continuous")
+    return build_robot(urdf, tool, locked)
 
 
 def _read_named(arm: NamedArm) -> Urdf:

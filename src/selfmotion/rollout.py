@@ -56,7 +56,7 @@ class Rollout:
         parts = [self._table[:, a:b] for a, b in zip(start, stop, strict=True)]
         self._q, self._qd, self._epsilon, translation, rotation, twist, step = parts[:7]
         # Reshaping splits the last axis of a view, hence shares the table's memory.
-        self._translation = parts[7]
+        self._translation, self._error = parts[7], parts[9]
         self._rotation = parts[8].reshape(-1, 3, 3)
         self._jacobian = parts[10].reshape(-1, 6, n)
         self._task_jacobian = parts[11].reshape(-1, m, n)
@@ -110,7 +110,7 @@ class Rollout:
         model, data, tool = self.robot.model, self._data, self.robot.tool_id
         rotation, translation = data.oMf[tool].rotation, data.oMf[tool].translation
         table, rows, kind, n = self._table, self._rows, self._angle_kind, self.robot.dof
-        damping = self._damping
+        settings = (table, rows, kind, 0.0, self._damping)
         here = self.grid.node_stages
         for stage in here:
             q = self._q_rows[stage]
@@ -118,9 +118,7 @@ class Rollout:
                 pin.computeJointJacobians(model, data, q)
                 jacobian = pin.getFrameJacobian(model, data, tool, _AXES)
                 pin.updateFramePlacement(model, data, tool)
-                sound = kernels.evaluate(
-                    stage, jacobian, rotation, translation, table, rows, kind, 0.0, damping
-                )
+                sound = kernels.evaluate(stage, jacobian, rotation, translation, *settings)
                 step = kernels.newton_step(table[stage], n, rows, kind)
                 if not sound or np.abs(step).max() < _POLISHED:
                     break
@@ -143,6 +141,11 @@ class Rollout:
             self._gain,
             np.ascontiguousarray(epsilon_matrix),
         )
+
+    @property
+    def drift(self) -> Array:
+        """Pose error of the last run at the nodes, (N + 1, 6) [m, rad]: what integration let in."""
+        return self._error[self.grid.node_stages]
 
     def samples(self) -> Samples:
         """Return the last run at its stages, without copying: valid until the next run."""

@@ -1,0 +1,197 @@
+"""The command line: parse, call, print."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+import selfmotion as sm
+from selfmotion import report_text
+from selfmotion.arrays import Array
+
+app = typer.Typer(
+    help="Plan the joint motion of a redundant arm along a tool motion.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+_console = Console(highlight=False)
+
+VERIFIED, NOT_VERIFIED, BAD_INPUT = 0, 1, 2
+
+TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
+Corners = Literal["blend", "stop"]
+Axis = Literal["x", "y", "z"]
+
+RobotArgument = Annotated[
+    str, typer.Argument(help="Name (see `selfmotion robots`) or path of a .urdf file.")
+]
+PlanArgument = Annotated[Path, typer.Argument(help="A plan saved as .npz.")]
+
+
+def main() -> None:
+    """Run the command; exit code 2 and one line for bad input."""
+    try:
+        app()
+    except sm.SelfmotionError as error:
+        Console(stderr=True, highlight=False).print(
+            f"error: {error}", style="red", markup=False, soft_wrap=True
+        )
+        sys.exit(BAD_INPUT)
+
+
+@app.command(
+    epilog="Example: selfmotion plan panda --circle 0.15 --duration 4 --out plan.npz --html a.html"
+)
+def plan(
+    robot: RobotArgument,
+    path: Annotated[
+        Path | None, typer.Option(help="Waypoints: CSV with t,x,y,z,qw,qx,qy,qz (s, m).")
+    ] = None,
+    circle: Annotated[float | None, typer.Option(help="Or a circle of this radius (m).")] = None,
+    line: Annotated[str | None, typer.Option(help="Or a straight line by dx,dy,dz (m).")] = None,
+    normal: Annotated[Axis, typer.Option(help="Axis of the circle.")] = "x",
+    duration: Annotated[float, typer.Option(help="Of circle or line (s).")] = 4.0,
+    corners: Annotated[Corners, typer.Option(help="At kinks of the waypoints.")] = "blend",
+    task: Annotated[TaskName, typer.Option(help="What the path prescribes.")] = "pose",
+    start: Annotated[
+        str | None, typer.Option(help="q1,q2,… (rad or m); default: one that suits the path.")
+    ] = None,
+    tool: Annotated[str | None, typer.Option(help="Tool frame (a link).")] = None,
+    degree: Annotated[int, typer.Option(help="Degree of the null motion's polynomial.")] = 3,
+    mu: Annotated[
+        float, typer.Option(help="Weight of 1/det(JJᵀ), the distance from singular poses.")
+    ] = 0.0,
+    max_evaluations: Annotated[int | None, typer.Option(help="Limit on cost evaluations.")] = None,
+    out: Annotated[
+        list[Path] | None, typer.Option(help="Write the plan (.npz) or its motion (.csv).")
+    ] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a replay to open in a browser.")] = None,
+) -> None:
+    """Plan a motion, check it, and write it."""
+    _check_suffixes(out or [])
+    arm = sm.load_robot(robot, tool=tool)
+    rows = sm.Task.of(task)
+    configuration = _numbers(start, "--start") if start is not None else None
+    motion: sm.Path
+    if sum(option is not None for option in (path, circle, line)) != 1:
+        raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
+    if path is not None:
+        motion = sm.Waypoints.from_csv(path, corners=corners)
+    else:
+        if configuration is None:
+            configuration = arm.dexterous_configuration(rows)
+        pose = arm.pose(configuration)
+        if circle is not None:
+            axis = np.eye(3)["xyz".index(normal)]
+            motion = sm.Circle.around(pose, circle, duration, normal=axis)
+        else:
+            end = pose.copy()
+            end.translation = pose.translation + _numbers(line or "", "--line", 3)
+            motion = sm.Line(pose, end, duration)
+    costs: list[sm.Cost] = [sm.JointVelocity()]
+    if mu > 0.0:
+        costs.append(sm.InverseManipulability(mu))
+    problem = sm.Problem(
+        arm, motion, rows, configuration, sm.PolynomialNullMotion(degree), tuple(costs)
+    )
+    result = _plan_with_progress(problem, max_evaluations)
+    report_text.show(result, _console)
+    _write(result, out or [], html)
+    raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion check plan.npz")
+def check(plan: PlanArgument) -> None:
+    """Re-check a saved plan by forward kinematics."""
+    saved = sm.load_plan(plan)
+    certificate = sm.certify(saved.robot, saved.path, saved.task, saved.trajectory)
+    report_text.show_certificate(certificate, _console)
+    raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion replay plan.npz --html replay.html")
+def replay(
+    plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz, of one robot.")],
+    html: Annotated[Path, typer.Option(help="The page to write.")] = Path("replay.html"),
+) -> None:
+    """Write a page that replays plans in a browser, offline."""
+    from selfmotion.replay import write_replay
+
+    write_replay([sm.load_plan(plan) for plan in plans], html)
+    _console.print(f"wrote {html}", markup=False)
+
+
+@app.command(epilog="Example: selfmotion robots")
+def robots() -> None:
+    """List the arms known by name: joints, tool frame, and redundancy for each task."""
+    report_text.show_robots({name: sm.load_robot(name) for name in sm.NAMED_ARMS}, _console)
+
+
+@app.command(epilog="Example: selfmotion demo --out out")
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder for plans and replays.")] = Path("out"),
+) -> None:
+    """Plan, check and replay the paper's planar arm and a Panda on a circle."""
+    panda = sm.load_robot("panda")
+    start = np.array([0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4])
+    circle = sm.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    problems = {
+        "planar": sm.sample_problem(),
+        "panda": sm.Problem(panda, circle, start=start),
+    }
+    verified = True
+    for name, problem in problems.items():
+        _console.rule(name)
+        result = _plan_with_progress(problem, None)
+        report_text.show(result, _console)
+        files = [out / f"{name}.npz", out / f"{name}.csv"]
+        _write(result, files, out / f"{name}.html")
+        verified = verified and result.certificate.verified
+    raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
+
+
+def _plan_with_progress(problem: sm.Problem, max_evaluations: int | None) -> sm.Plan:
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=_console, transient=True) as progress:
+        bar = progress.add_task("planning", total=None)
+
+        def show(iteration: sm.Iteration) -> None:
+            text = f"cost {iteration.cost:.6g} after {iteration.evaluations} evaluations"
+            progress.update(bar, description=text)
+
+        return sm.plan(problem, max_evaluations=max_evaluations, callback=show)
+
+
+def _write(result: sm.Plan, out: list[Path], html: Path | None) -> None:
+    for file in out:
+        if file.suffix == ".csv":
+            result.to_csv(file)
+        else:
+            result.save(file)
+        _console.print(f"wrote {file}", markup=False)
+    if html is not None:
+        from selfmotion.replay import write_replay
+
+        write_replay(result, html)
+        _console.print(f"wrote {html}", markup=False)
+
+
+def _check_suffixes(files: list[Path]) -> None:
+    for file in files:
+        if file.suffix not in (".csv", ".npz"):
+            raise sm.FileFormatError(f"{file}: --out writes .npz (the plan) or .csv (its motion)")
+
+
+def _numbers(text: str, option: str, count: int | None = None) -> Array:
+    try:
+        numbers = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        raise sm.ProblemError(f"{option} is '{text}', expected numbers like 0,-0.8,1.6") from None
+    if count is not None and len(numbers) != count:
+        raise sm.ProblemError(f"{option} has {len(numbers)} numbers, expected {count}")
+    return numbers

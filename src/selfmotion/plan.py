@@ -1,0 +1,209 @@
+"""A finished plan: the motion, how it was found, and what the check says."""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from selfmotion import files
+from selfmotion.arrays import Array
+from selfmotion.certificate import Certificate, Extreme
+from selfmotion.errors import FileFormatError, PlanError
+from selfmotion.path import Path, path_from_dict
+from selfmotion.quasi_newton import Iteration, Status
+from selfmotion.robot import RobotModel, rebuild_robot
+from selfmotion.task import Task
+from selfmotion.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """How a plan was found.
+
+    Attributes
+    ----------
+    cost, initial_cost : float
+        F of the plan, and of the motion without self-motion (x = 0).
+    terms, initial_terms : dict
+        What each cost contributes to them.
+    evaluations, gradient_evaluations : int
+        How often F and ∇F were computed, on all grids.
+    jacobian_evaluations : int
+        How often Pinocchio was asked for the frame Jacobian.
+    steps : int
+        Runge-Kutta steps of the finest grid.
+    iterations : int
+        Of the optimiser.
+    history : tuple of Iteration
+        One per iteration, each grid's first being its start.
+    status : Status
+    message : str
+        What the status means and what to do about it.
+    seconds : float
+        Wall time of `plan`.
+    """
+
+    cost: float
+    initial_cost: float
+    terms: Mapping[str, float]
+    initial_terms: Mapping[str, float]
+    evaluations: int
+    gradient_evaluations: int
+    jacobian_evaluations: int
+    steps: int
+    iterations: int
+    history: tuple[Iteration, ...]
+    status: Status
+    message: str
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A joint motion along a tool motion.
+
+    Attributes
+    ----------
+    robot : RobotModel
+    path : Path
+    task : Task
+    trajectory : Trajectory
+        The motion.
+    initial_trajectory : Trajectory
+        The motion without self-motion (x = 0), for comparison.
+    coefficients : (size,)
+        x, the null motion's coefficients.
+    report : Report
+    certificate : Certificate
+    """
+
+    robot: RobotModel
+    path: Path
+    task: Task
+    trajectory: Trajectory
+    initial_trajectory: Trajectory
+    coefficients: Array
+    report: Report
+    certificate: Certificate
+
+    def require(self) -> "Plan":
+        """Return the plan itself if its certificate is verified.
+
+        Raises
+        ------
+        PlanError
+            It is not; the message is the verdict.
+        """
+        if not self.certificate.verified:
+            raise PlanError(f"{self.robot.name}: {self.certificate.verdict}")
+        return self
+
+    def save(self, file: str | FilePath) -> None:
+        """Write the plan, without loss, to a ``.npz`` file that `load_plan` reads.
+
+        The file carries the URDF's text, so that it can be checked where the URDF is not.
+        The write is atomic.
+        """
+        description, arrays = _describe(self)
+        files.write_archive(FilePath(file), description, arrays)
+
+    def to_csv(self, file: str | FilePath) -> None:
+        """Write ``t`` and a column per joint for q, then q̇ (``NAME`` and ``NAME_velocity``)."""
+        motion = self.trajectory
+        names = [*motion.joint_names, *(f"{name}_velocity" for name in motion.joint_names)]
+        table = np.column_stack([motion.t, motion.q, motion.qd])
+        files.write_csv(FilePath(file), ["t", *names], table)
+
+
+def load_plan(file: str | FilePath) -> Plan:
+    """Read a plan that `Plan.save` wrote.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, is no plan, or lacks something.
+    """
+    description, arrays = files.read_archive(FilePath(file))
+    try:
+        return _restore(description, arrays)
+    except (KeyError, TypeError, ValueError) as error:
+        raise FileFormatError(f"{file}: is no plan, or of another version: {error!r}") from error
+
+
+def _describe(plan: Plan) -> tuple[dict[str, Any], dict[str, Array]]:
+    robot, report = plan.robot, plan.report
+    description = {
+        "robot": {
+            "text": robot.urdf.text,
+            "package_dirs": list(robot.urdf.package_dirs),
+            "source": robot.urdf.source,
+            "continuous": sorted(robot.urdf.continuous()),
+            "tool": robot.tool,
+            "locked": dict(robot.locked),
+        },
+        "path": plan.path.to_dict(),
+        "task": plan.task.value,
+        "joint_names": list(plan.trajectory.joint_names),
+        "report": {
+            **{
+                field.name: getattr(report, field.name)
+                for field in dataclasses.fields(report)
+                if field.name not in ("history", "status")
+            },
+            "terms": dict(report.terms),
+            "initial_terms": dict(report.initial_terms),
+            "status": report.status.value,
+        },
+        "history": [
+            {
+                "cost": iteration.cost,
+                "gradient_norm": iteration.gradient_norm,
+                "update": iteration.update,
+                "step": iteration.step,
+                "evaluations": iteration.evaluations,
+            }
+            for iteration in report.history
+        ],
+        "certificate": dataclasses.asdict(plan.certificate),
+    }
+    arrays = {
+        "t": plan.trajectory.t,
+        "q": plan.trajectory.q,
+        "qd": plan.trajectory.qd,
+        "initial_t": plan.initial_trajectory.t,
+        "initial_q": plan.initial_trajectory.q,
+        "initial_qd": plan.initial_trajectory.qd,
+        "coefficients": plan.coefficients,
+        "history_x": np.array([iteration.x for iteration in report.history]),
+    }
+    return description, arrays
+
+
+def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Plan:
+    names = tuple(description["joint_names"])
+    history = tuple(
+        Iteration(x=x, **record)
+        for x, record in zip(arrays["history_x"], description["history"], strict=True)
+    )
+    report = dict(description["report"])
+    report["status"] = Status(report["status"])
+    certificate: dict[str, Any] = {
+        key: Extreme(**value) if isinstance(value, dict) else value
+        for key, value in description["certificate"].items()
+    }
+    certificate["failures"] = tuple(certificate["failures"])
+    return Plan(
+        robot=rebuild_robot(**description["robot"]),
+        path=path_from_dict(description["path"]),
+        task=Task.of(description["task"]),
+        trajectory=Trajectory(arrays["t"], arrays["q"], arrays["qd"], names),
+        initial_trajectory=Trajectory(
+            arrays["initial_t"], arrays["initial_q"], arrays["initial_qd"], names
+        ),
+        coefficients=arrays["coefficients"],
+        report=Report(history=history, **report),
+        certificate=Certificate(**certificate),
+    )
