@@ -48,6 +48,7 @@ class LineSearch:
         slope0: float,
         *,
         first: float,
+        longest: float,
         more: Callable[[], bool],
     ) -> tuple[float, float] | None:
         """Search along φ from α = 0.
@@ -60,6 +61,8 @@ class LineSearch:
             φ(0) and φ'(0) < 0.
         first : float
             The first step to try.
+        longest : float
+            A step that is accepted when φ still falls there.
         more : callable
             Whether another evaluation is allowed.
 
@@ -75,12 +78,15 @@ class LineSearch:
             if self._too_high(here, start) or here.value >= before.value:
                 return self._section(value, slope, start, before, here, more)
             here = _Point(alpha, here.value, slope(alpha))
-            if abs(_slope(here)) <= -self.sigma * slope0:
+            if abs(_slope(here)) <= -self.sigma * slope0 or (
+                alpha >= longest and _slope(here) < 0.0
+            ):
                 return here.alpha, here.value
             if _slope(here) >= 0.0:
                 return self._section(value, slope, start, here, before, more)
             advance = alpha - before.alpha
-            nearest, farthest = alpha + advance, alpha + self.tau1 * advance
+            nearest = min(alpha + advance, longest)
+            farthest = min(alpha + self.tau1 * advance, longest)
             alpha, before = _minimizer(before, here, nearest, farthest), here
         return _decreased(before)
 

@@ -116,7 +116,7 @@ class Objective:
         }
 
 
-def inverse_metric(metric: Array, floor: float = 1e-9) -> Array:
+def inverse_metric(metric: Array, floor: float = 1e-4) -> Array:
     """Return the inverse of a positive semidefinite matrix.
 
     Directions without curvature (coefficients that do not act, as in the over-specified joint

@@ -13,7 +13,7 @@ from selfmotion.null_motion import NullMotionTable, TransportedFrame
 from selfmotion.objective import Objective, inverse_metric
 from selfmotion.plan import Plan, Report
 from selfmotion.problem import Problem
-from selfmotion.quasi_newton import Callback, Iteration, Minimum, QuasiNewton
+from selfmotion.quasi_newton import Callback, Iteration, Minimum, QuasiNewton, Status
 from selfmotion.rollout import Rollout
 from selfmotion.trajectory import Trajectory
 
@@ -22,6 +22,8 @@ from selfmotion.trajectory import Trajectory
 _FEWEST_STEPS, _DRIFT = 32, 1e-4
 # Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands.
 _COST_AGREEMENT = 1e-4
+# After these the user has no more time to give.
+_CUT_SHORT = (Status.INTERRUPTED, Status.STOPPED, Status.MAX_EVALUATIONS)
 # The finest grid has 2 to this power times the steps of the first.
 _MOST_HALVINGS = 8
 
@@ -107,6 +109,8 @@ class _Session:
         h = inverse_metric(self._objective.metric(x)) if use_metric else None
         minimum = self._minimize(x, h)
         for _ in range(_MOST_HALVINGS):
+            if minimum.status in _CUT_SHORT:
+                break
             self._refine()
             finer = self._minimize(minimum.x, minimum.inverse_hessian)
             error = abs(finer.history[0].cost - minimum.cost)
@@ -168,16 +172,17 @@ class _Session:
             self._done.jacobians += rollout.jacobian_evaluations
             rows = problem.rows.rows
             drift = np.abs(rollout.drift[:, rows]) / np.where(rows < 3, extent, 1.0)
-            if broken is None and drift.max() <= _DRIFT:
+            off = ~(drift <= _DRIFT).all(axis=1)
+            if broken is None and not off.any():
                 return rollout
             grid = grid.halved()
-        if broken is None:
-            return rollout
+        # After the last halving: where eq. 4 broke down, or else where it first left the path.
+        time = rollout.grid.nodes[int(np.argmax(off))] if broken is None else broken
         raise BreakdownError(
-            f"{problem.robot.name}: without self-motion the tool reaches a singular pose at "
-            f"t = {broken:.4g} s; start elsewhere (start=), or keep the path away from the edge "
+            f"{problem.robot.name}: without self-motion the tool reaches a singular pose near "
+            f"t = {time:.4g} s; start elsewhere (start=), or keep the path away from the edge "
             f"of the workspace",
-            time=broken,
+            time=float(time),
         )
 
     def _null_space(self, reference: Rollout) -> TransportedFrame | None:

@@ -228,12 +228,14 @@ class _Run:
             return Status.CONVERGED
         if self._function.evaluations >= self._limit:
             return Status.MAX_EVALUATIONS
+        size = float(np.linalg.norm(direction))
         found = self._method.line_search.search(
             lambda alpha: self._function.value(self._x + alpha * direction),
             lambda alpha: self._function.slope(self._x + alpha * direction, direction),
             self._cost,
             slope,
-            first=1.0 if self._scaled else min(1.0, 1.0 / float(np.linalg.norm(direction))),
+            first=1.0 if self._scaled else min(1.0, 1.0 / size),
+            longest=2.0 * self._bound / size,
             more=lambda: self._function.evaluations < self._limit,
         )
         if found is None:

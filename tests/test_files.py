@@ -1,0 +1,116 @@
+"""Plans and tables on disk."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion import files
+
+
+@pytest.fixture(scope="module")
+def plan() -> sm.Plan:
+    return sm.plan(sm.sample_problem())
+
+
+def test_saved_plans_come_back_without_loss(plan: sm.Plan, tmp_path: Path) -> None:
+    plan.save(tmp_path / "folder" / "plan.npz")
+    loaded = sm.load_plan(tmp_path / "folder" / "plan.npz")
+    for one, other in (
+        (plan.trajectory, loaded.trajectory),
+        (plan.initial_trajectory, loaded.initial_trajectory),
+    ):
+        for name in ("t", "q", "qd"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        assert one.joint_names == other.joint_names
+    np.testing.assert_array_equal(plan.coefficients, loaded.coefficients)
+    assert loaded.certificate == plan.certificate
+    assert loaded.task is plan.task
+    for field in dataclasses.fields(plan.report):
+        if field.name != "history":
+            assert getattr(loaded.report, field.name) == getattr(plan.report, field.name)
+    for one, other in zip(plan.report.history, loaded.report.history, strict=True):
+        np.testing.assert_array_equal(one.x, other.x)
+        assert dataclasses.replace(one, x=other.x) != one or one.cost == other.cost
+    again = sm.certify(loaded.robot, loaded.path, loaded.task, loaded.trajectory)
+    assert again == plan.certificate
+
+
+def test_continuous_joints_and_locks_survive(tmp_path: Path) -> None:
+    for name, lock in (("kinova", {}), ("tiago", {"torso_lift_joint": 0.2})):
+        robot = sm.load_robot(name, lock=lock)
+        start = robot.dexterous_configuration("position")
+        path = sm.Circle.around(robot.pose(start), 0.03, 3.0)
+        plan = sm.plan(sm.Problem(robot, path, "position", start))
+        plan.save(tmp_path / "plan.npz")
+        loaded = sm.load_plan(tmp_path / "plan.npz").robot
+        assert loaded.joint_names == robot.joint_names
+        assert loaded.locked == robot.locked
+        np.testing.assert_array_equal(loaded.upper, robot.upper)
+        np.testing.assert_array_equal(loaded.pose(start).homogeneous, robot.pose(start).homogeneous)
+
+
+def test_csv_has_every_digit(plan: sm.Plan, tmp_path: Path) -> None:
+    plan.to_csv(tmp_path / "plan.csv")
+    lines = (tmp_path / "plan.csv").read_text().splitlines()
+    assert lines[0].split(",")[:3] == ["t", "joint1", "joint2"]
+    table = np.array([[float(value) for value in line.split(",")] for line in lines[1:]])
+    motion = plan.trajectory
+    np.testing.assert_array_equal(table, np.column_stack([motion.t, motion.q, motion.qd]))
+
+
+def test_failed_writes_leave_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    file = tmp_path / "plan.npz"
+    file.write_text("old")
+
+    def fail(stream: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        files.write_atomically(file, fail)
+    assert [path.name for path in tmp_path.iterdir()] == ["plan.npz"]
+    assert file.read_text() == "old"
+
+
+def test_files_that_are_no_plans_are_named(plan: sm.Plan, tmp_path: Path) -> None:
+    with pytest.raises(sm.FileFormatError, match=r"none\.npz: no such file"):
+        sm.load_plan(tmp_path / "none.npz")
+    text = tmp_path / "text.npz"
+    text.write_text("not a plan")
+    with pytest.raises(sm.FileFormatError, match=r"text\.npz: is no plan"):
+        sm.load_plan(text)
+    np.savez(tmp_path / "other.npz", a=np.zeros(2))
+    with pytest.raises(sm.FileFormatError, match=r"other\.npz: is no plan"):
+        sm.load_plan(tmp_path / "other.npz")
+    files.write_archive(tmp_path / "empty.npz", {}, {})
+    with pytest.raises(sm.FileFormatError, match="of another version"):
+        sm.load_plan(tmp_path / "empty.npz")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"t": [0.0, 0.0]}, "does not come after"),
+        ({"q": [[0.0], [np.nan]]}, "not finite"),
+        ({"q": [[0.0, 1.0]]}, "expected"),
+    ],
+)
+def test_malformed_trajectories_are_refused(change: dict[str, object], message: str) -> None:
+    sound = {"t": [0.0, 1.0], "q": [[0.0], [1.0]], "qd": [[0.0], [0.0]], "joint_names": ("a",)}
+    assert sm.Trajectory(**sound).duration == 1.0
+    with pytest.raises(sm.FileFormatError, match=message):
+        sm.Trajectory(**(sound | {k: np.array(v) for k, v in change.items()}))
+
+
+def test_trajectory_interpolates_cubics_exactly() -> None:
+    t = np.array([0.0, 0.4, 1.0])
+    motion = sm.Trajectory(t, (t**3)[:, None], (3 * t**2)[:, None], ("a",))
+    s = np.linspace(0, 1, 11)
+    np.testing.assert_allclose(motion(s)[:, 0], s**3, atol=1e-15)
+    np.testing.assert_allclose(motion(s, 1)[:, 0], 3 * s**2, atol=1e-14)
+    np.testing.assert_allclose(motion(s, 2)[:, 0], 6 * s, atol=1e-13)
+    assert motion(0.5).shape == (1,)
+    with pytest.raises(ValueError, match="outside the motion"):
+        motion(1.1)
