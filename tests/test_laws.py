@@ -115,12 +115,21 @@ def test_motion_equals_a_high_order_integration(case: Case) -> None:
 
 
 COSTS = {
-    "velocity": lambda n: sm.JointVelocity(),
-    "weighted velocity": lambda n: sm.JointVelocity(np.arange(1.0, n + 1.0)),
-    "full weight": lambda n: sm.JointVelocity(np.eye(n) + 0.3),
-    "inverse manipulability": lambda n: sm.InverseManipulability(0.01),
-    "manipulability": lambda n: sm.Manipulability(0.7),
-    "function": lambda n: sm.FunctionCost(
+    "velocity": lambda r, t: sm.JointVelocity(),
+    "weighted velocity": lambda r, t: sm.JointVelocity(np.arange(1.0, r.dof + 1.0)),
+    "full weight": lambda r, t: sm.JointVelocity(np.eye(r.dof) + 0.3),
+    "acceleration": lambda r, t: sm.JointAcceleration(),
+    "jerk": lambda r, t: sm.JointJerk(),
+    "posture": lambda r, t: sm.Posture(np.arange(1.0, r.dof + 1.0), posture=np.ones(r.dof)),
+    "joint limits": lambda r, t: sm.JointLimitDistance(r.lower, r.upper),
+    "path length": lambda r, t: sm.PathLength(),
+    "inverse manipulability": lambda r, t: sm.InverseManipulability(0.01),
+    "manipulability": lambda r, t: sm.Manipulability(0.7),
+    "directional": lambda r, t: sm.DirectionalManipulability(np.arange(1.0, t.dimension + 1)),
+    "smallest singular value": lambda r, t: sm.SmallestSingularValue(),
+    "kinetic energy": lambda r, t: sm.KineticEnergy(r),
+    "gravity torque": lambda r, t: sm.GravityTorque(r),
+    "function": lambda r, t: sm.FunctionCost(
         lambda qd, q, t: np.sin(q).sum(axis=1) * (qd**2).sum(axis=1) + t * q[:, 0]
     ),
 }
@@ -128,11 +137,11 @@ COSTS = {
 
 @pytest.mark.parametrize("cost", COSTS)
 def test_gradient_equals_central_differences(case: Case, cost: str) -> None:
-    robot, _, start, path = case
+    robot, task, start, path = case
     rollout = rollout_of(case, 8)
     functions = PolynomialNullMotion(2, "joint").functions(rollout.grid.stage_times, path.duration)
     table = NullMotionTable(functions, None, robot.dof)
-    objective = Objective(rollout, table, [COSTS[cost](robot.dof)], start)
+    objective = Objective(rollout, table, [COSTS[cost](robot, task)], start)
     x = 0.1 * np.random.default_rng(7).normal(size=objective.size)
     exact = objective.gradient(x)
     differences = central_difference(objective.value, x, 1e-5)
@@ -168,7 +177,7 @@ def test_sensitivities_equal_central_differences(case: Case) -> None:
     table = NullMotionTable(functions, None, robot.dof)
     x = 0.1 * np.random.default_rng(9).normal(size=table.size)
     assert rollout.run(start, table.epsilon(x)) is None
-    exact = rollout.sensitivities(table.matrix())
+    _, exact = rollout.sensitivities(table.matrix())
     for i in range(table.size):
         shift = np.zeros_like(x)
         shift[i] = 1e-6
@@ -256,6 +265,32 @@ def test_paper_parameterisation_has_the_papers_order() -> None:
     e = np.arange(12.0).reshape(3, 4)
     expected = np.array([[sum(e[i, k] * s**k for k in range(4)) for i in range(3)] for s in t])
     np.testing.assert_allclose(table.epsilon(e.ravel()), expected)
+
+
+def test_b_spline_functions_are_a_partition_of_unity_with_local_support() -> None:
+    motion = sm.BSplineNullMotion(intervals=6, degree=3)
+    t = np.linspace(0, 2.5, 61)
+    functions = motion.functions(t, 2.5)
+    assert functions.shape == (61, 9)
+    np.testing.assert_allclose(functions.sum(axis=1), 1.0, atol=1e-12)
+    assert (functions != 0).sum(axis=1).max() == 4
+    assert sm.BSplineNullMotion(1, 0).functions(t, 2.5).shape == (61, 1)
+    with pytest.raises(sm.ProblemError, match="intervals is 0"):
+        sm.BSplineNullMotion(0)
+
+
+def test_accelerations_and_jerks_are_derivatives(case: Case) -> None:
+    """Five-point differences of q̇ against differences of q̇ on a four times finer grid."""
+    rollout = rollout_of(case, 80)
+    assert rollout.run(case[2], random_epsilon(rollout, 5)) is None
+    samples = rollout.samples()
+    nodes = rollout.grid.node_stages[2:-2]
+    h = case[3].duration / rollout.grid.steps
+    qd = samples.qd[rollout.grid.node_stages]
+    central = (qd[:-4] - 8 * qd[1:-3] + 8 * qd[3:-1] - qd[4:]) / (12 * h)
+    np.testing.assert_allclose(samples.qdd[nodes], central, atol=1e-8)
+    second = (-qd[:-4] + 16 * qd[1:-3] - 30 * qd[2:-2] + 16 * qd[3:-1] - qd[4:]) / (12 * h**2)
+    np.testing.assert_allclose(samples.qddd[nodes], second, atol=1e-6)
 
 
 def test_legendre_functions_are_orthonormal_over_the_motion() -> None:

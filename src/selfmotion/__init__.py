@@ -7,10 +7,20 @@ the null space of the task.
 from selfmotion.certificate import Certificate, Extreme, Tolerance, certify
 from selfmotion.costs import (
     Cost,
+    DirectionalManipulability,
     FunctionCost,
+    GravityTorque,
     InverseManipulability,
+    JointAcceleration,
+    JointJerk,
+    JointLimitDistance,
     JointVelocity,
+    KineticEnergy,
     Manipulability,
+    Partials,
+    PathLength,
+    Posture,
+    SmallestSingularValue,
 )
 from selfmotion.errors import (
     BreakdownError,
@@ -25,7 +35,7 @@ from selfmotion.errors import (
     StartError,
 )
 from selfmotion.line_search import LineSearch
-from selfmotion.null_motion import NullMotion, PolynomialNullMotion
+from selfmotion.null_motion import BSplineNullMotion, NullMotion, PolynomialNullMotion
 from selfmotion.path import Circle, Line, Path, TwistPath, Waypoints
 from selfmotion.plan import Plan, Report, load_plan
 from selfmotion.planner import plan
@@ -38,26 +48,36 @@ from selfmotion.trajectory import Trajectory
 
 __all__ = [
     "NAMED_ARMS",
+    "BSplineNullMotion",
     "BreakdownError",
     "Certificate",
     "Circle",
     "Cost",
+    "DirectionalManipulability",
     "Extreme",
     "FileFormatError",
     "FunctionCost",
+    "GravityTorque",
     "InverseKinematicsError",
     "InverseManipulability",
     "Iteration",
+    "JointAcceleration",
+    "JointJerk",
+    "JointLimitDistance",
     "JointVelocity",
+    "KineticEnergy",
     "Line",
     "LineSearch",
     "Manipulability",
     "NullMotion",
+    "Partials",
     "Path",
     "PathError",
+    "PathLength",
     "Plan",
     "PlanError",
     "PolynomialNullMotion",
+    "Posture",
     "Problem",
     "ProblemError",
     "QuasiNewton",
@@ -66,6 +86,7 @@ __all__ = [
     "RobotError",
     "RobotModel",
     "SelfmotionError",
+    "SmallestSingularValue",
     "StartError",
     "Status",
     "Task",

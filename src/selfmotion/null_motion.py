@@ -61,6 +61,43 @@ class PolynomialNullMotion:
         return np.asarray(legendre.legvander(2.0 * t / duration - 1.0, self.degree) * norms)
 
 
+@dataclass(frozen=True)
+class BSplineNullMotion:
+    """ε(t) as a B-spline with equal intervals: for long paths, where one polynomial is too stiff.
+
+    Each coefficient acts on degree + 1 intervals only.
+
+    Parameters
+    ----------
+    intervals : int
+        Number of polynomial pieces, ≥ 1.
+    degree : int
+        p ≥ 0; C^(p-1) between pieces.
+    space : {"null", "joint"}
+        As in `PolynomialNullMotion`.
+    """
+
+    intervals: int = 8
+    degree: int = 3
+    space: str = "null"
+
+    def __post_init__(self) -> None:
+        _check_degree(self.degree)
+        _check_space(self.space)
+        if not (isinstance(self.intervals, int) and self.intervals >= 1):
+            raise ProblemError(
+                f"null motion: intervals is {self.intervals}, expected a whole number ≥ 1"
+            )
+
+    def functions(self, t: Array, duration: float) -> Array:
+        """See `NullMotion.functions`."""
+        from scipy.interpolate import BSpline
+
+        inner = np.linspace(0.0, duration, self.intervals + 1)
+        knots = np.concatenate([[0.0] * self.degree, inner, [duration] * self.degree])
+        return np.asarray(BSpline.design_matrix(t, knots, self.degree).toarray())
+
+
 @dataclass(frozen=True, eq=False)
 class NullMotionTable:
     """A null motion at S stages, bound to one motion: ε = R E φ.

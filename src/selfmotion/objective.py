@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmotion.arrays import Array
-from selfmotion.costs import Cost, JointVelocity
+from selfmotion.costs import Cost
 from selfmotion.null_motion import NullMotionTable
 from selfmotion.rollout import Rollout
 
@@ -62,12 +62,16 @@ class Objective:
         samples = self.rollout.samples()
         by_q, by_qd = np.zeros_like(samples.q), np.zeros_like(samples.qd)
         weights = samples.weights[:, None]
+        nodes = self.rollout.grid.node_stages
         for cost in self._costs:
             partials = cost.gradient(samples)
             if partials.q is not None:
                 by_q += weights * partials.q
             if partials.qd is not None:
                 by_qd += weights * partials.qd
+            for order, part in ((1, partials.qdd), (2, partials.qddd)):
+                if part is not None:
+                    by_qd[nodes] += self.rollout.grid.differentiation(order).T @ (weights * part)
         by_epsilon, _ = self.rollout.pullback(by_q, by_qd)
         return self.null_motion.pullback(by_epsilon)
 
@@ -81,19 +85,27 @@ class Objective:
         return dict(self._terms)
 
     def metric(self, x: Array) -> Array:
-        """Return the Gauss-Newton matrix ∫ (∂q̇/∂x)ᵀ W (∂q̇/∂x) dt at x, (size, size).
+        """Return the Gauss-Newton matrix of the quadratic costs at x, (size, size).
 
-        W is that of the joint-velocity costs, or I without any. Its inverse starts the
-        quasi-Newton method at the curvature of the quadratic part of F.
+        ∫ Σ_k (∂q^(k)/∂x)ᵀ W_k (∂q^(k)/∂x) dt over the derivatives q^(k) of q that the costs weigh;
+        without such a cost, that of ½ q̇ᵀq̇. Its inverse starts the quasi-Newton method.
         """
         self._run(x)
-        sensitivities = self.rollout.sensitivities(self.null_motion.matrix())
-        n = self.rollout.robot.dof
-        quadratic = [cost.matrix(n) for cost in self._costs if isinstance(cost, JointVelocity)]
-        weight = sum(quadratic) if quadratic else np.eye(n)
-        flat = sensitivities.reshape(-1, self.size)
-        weighted = self.rollout.grid.weights[:, None, None] * (weight @ sensitivities)
-        return np.asarray(flat.T @ weighted.reshape(-1, self.size))
+        n, grid = self.rollout.robot.dof, self.rollout.grid
+        by_q, by_qd = self.rollout.sensitivities(self.null_motion.matrix())
+        curvatures = [cost.curvature(n) for cost in self._costs]
+        if not any(curvatures):
+            curvatures = [{1: np.eye(n)}]
+        metric = np.zeros((self.size, self.size))
+        nodes = by_qd[grid.node_stages].reshape(len(grid.nodes), -1)
+        for curvature in curvatures:
+            for order, weight in curvature.items():
+                tangent = by_q if order == 0 else by_qd
+                if order > 1:
+                    tangent = (grid.differentiation(order - 1) @ nodes).reshape(by_qd.shape)
+                weighted = grid.weights[:, None, None] * (weight @ tangent)
+                metric += tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size)
+        return metric
 
     @property
     def _total(self) -> float:

@@ -126,21 +126,20 @@ class Rollout:
         self.jacobian_evaluations += len(here)
         return self.grid.nodes, self._q[here], self._qd[here]
 
-    def sensitivities(self, epsilon_matrix: Array) -> Array:
-        """Return ∂q̇/∂x at the stages of the last run, (S, n, d).
+    def sensitivities(self, epsilon_matrix: Array) -> tuple[Array, Array]:
+        """Return ∂q/∂x and ∂q̇/∂x at the stages of the last run, (S, n, d) each.
 
         Parameters
         ----------
         epsilon_matrix : (S, n, d)
             ∂ε/∂x.
         """
-        return kernels.sensitivities(
-            self._table,
-            self._rows,
-            self._angle_kind,
-            self._gain,
-            np.ascontiguousarray(epsilon_matrix),
+        epsilon_matrix = np.ascontiguousarray(epsilon_matrix)
+        by_q, by_qd = np.empty_like(epsilon_matrix), np.empty_like(epsilon_matrix)
+        kernels.sensitivities(
+            self._table, self._rows, self._angle_kind, self._gain, epsilon_matrix, by_q, by_qd
         )
+        return by_q, by_qd
 
     @property
     def drift(self) -> Array:
@@ -150,8 +149,7 @@ class Rollout:
     def samples(self) -> Samples:
         """Return the last run at its stages, without copying: valid until the next run."""
         return Samples(
-            t=self.grid.stage_times,
-            weights=self.grid.weights,
+            grid=self.grid,
             q=self._q,
             qd=self._qd,
             jacobian=self._jacobian,

@@ -7,6 +7,7 @@ import numpy as np
 
 from selfmotion import kernels
 from selfmotion.arrays import Array
+from selfmotion.grid import Grid
 from selfmotion.task import Task
 
 
@@ -16,10 +17,8 @@ class Samples:
 
     Attributes
     ----------
-    t : (S,)
-        Times [s].
-    weights : (S,)
-        Quadrature weights [s]: ∫ G dt ≈ weights · G.
+    grid : Grid
+        Whose stages the samples are.
     q, qd : (S, n)
         Joint coordinates and velocities.
     jacobian : (S, 6, n)
@@ -32,8 +31,7 @@ class Samples:
         Those rows of the Jacobian.
     """
 
-    t: Array
-    weights: Array
+    grid: Grid
     q: Array
     qd: Array
     jacobian: Array
@@ -41,6 +39,26 @@ class Samples:
     translation: Array
     task: Task
     task_jacobian: Array
+
+    @property
+    def t(self) -> Array:
+        """Times [s], (S,)."""
+        return self.grid.stage_times
+
+    @property
+    def weights(self) -> Array:
+        """Quadrature weights [s]: ∫ G dt ≈ weights · G, (S,)."""
+        return self.grid.weights
+
+    @cached_property
+    def qdd(self) -> Array:
+        """Joint accelerations, (S, n): differences of q̇ over the nodes."""
+        return np.asarray(self.grid.differentiation(1) @ self.qd[self.grid.node_stages])
+
+    @cached_property
+    def qddd(self) -> Array:
+        """Joint jerks, (S, n)."""
+        return np.asarray(self.grid.differentiation(2) @ self.qd[self.grid.node_stages])
 
     @cached_property
     def gram(self) -> Array:

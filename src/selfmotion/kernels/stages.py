@@ -301,9 +301,15 @@ def pullback(
 
 @kernel
 def sensitivities(
-    table: Array, rows: Rows, angle_kind: int, gain: float, epsilon_matrix: Array
-) -> Array:
-    """Return ∂q̇/∂x at all stages, (S, n, d), for ∂ε/∂x = `epsilon_matrix` (S, n, d).
+    table: Array,
+    rows: Rows,
+    angle_kind: int,
+    gain: float,
+    epsilon_matrix: Array,
+    q_matrix: Array,
+    qd_matrix: Array,
+) -> None:
+    """Set ∂q/∂x and ∂q̇/∂x at all stages, (S, n, d), for ∂ε/∂x = `epsilon_matrix` (S, n, d).
 
     The tangent of the Runge-Kutta recursion: ∂q̇ = (I - J⁺J) ∂ε + (∂q̇/∂q) ∂q at every stage. The
     rows of both matrices are pullbacks of the unit vectors.
@@ -312,18 +318,18 @@ def sensitivities(
     step = layout(n, rows.shape[0])[6]
     projector, slope_by_q, unit = np.empty((n, n)), np.empty((n, n)), np.zeros(n)
     state, now = np.zeros((n, d)), np.zeros((n, d))
-    out = np.empty((stages, n, d))
     for s in range(stages):
         for k in range(n):
             unit[k] = 1.0
             slope_by_q[k] = 0.0
             pull_stage(unit, table[s], rows, angle_kind, gain, projector[k], slope_by_q[k])
             unit[k] = 0.0
-        out[s] = projector @ epsilon_matrix[s] + slope_by_q @ now
+        slope = projector @ epsilon_matrix[s] + slope_by_q @ now
+        q_matrix[s], qd_matrix[s] = now, slope
         i, h = s % 4, table[s, step]
         if i == 3:
-            state += h / 6.0 * (out[s - 3] + 2.0 * out[s - 2] + 2.0 * out[s - 1] + out[s])
+            before = qd_matrix[s - 3] + 2.0 * (qd_matrix[s - 2] + qd_matrix[s - 1])
+            state += h / 6.0 * (before + slope)
             now[:] = state
         else:
-            now[:] = state + (h if i == 2 else 0.5 * h) * out[s]
-    return out
+            now[:] = state + (h if i == 2 else 0.5 * h) * slope

@@ -1,0 +1,96 @@
+"""What a cost is: an integrand G of samples, with its derivatives."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.arrays import Array, read_only
+from selfmotion.errors import ProblemError
+from selfmotion.samples import Samples
+
+
+@dataclass(frozen=True, eq=False)
+class Partials:
+    """Derivatives of an integrand at S samples; None stands for zero.
+
+    Attributes
+    ----------
+    q, qd, qdd, qddd : (S, n) or None
+        ∂G/∂q, ∂G/∂q̇, ∂G/∂q̈ and ∂G/∂q⃛.
+    """
+
+    q: Array | None = None
+    qd: Array | None = None
+    qdd: Array | None = None
+    qddd: Array | None = None
+
+
+class Cost(Protocol):
+    """An integrand G of the cost F = ∫ G dt. It sees samples, never coefficients."""
+
+    @property
+    def name(self) -> str:
+        """What to call the cost in reports."""
+
+    def value(self, samples: Samples) -> Array:
+        """Return G at the samples, (S,)."""
+
+    def gradient(self, samples: Samples) -> Partials:
+        """Return the derivatives of G at the samples."""
+
+    def curvature(self, dof: int) -> dict[int, Array]:
+        """Return W (n, n) by order of derivative, where G is ½ xᵀWx of q (0), q̇ (1), q̈ (2), q⃛ (3).
+
+        The Gauss-Newton matrix that starts the optimiser is made of these; {} where G is no
+        quadratic form.
+        """
+
+    def check(self, dof: int) -> None:
+        """Raise ProblemError where the cost does not fit an arm of `dof` joints."""
+
+
+def as_weight(weight: float | npt.ArrayLike, name: str) -> Array:
+    """Return a weight read-only; ProblemError unless it is positive semidefinite."""
+    array = read_only(weight)
+    if not np.all(np.isfinite(array)) or array.ndim > 2:
+        raise ProblemError(f"cost '{name}': weight is {array}, expected finite numbers")
+    symmetric = array.ndim < 2 or (
+        array.shape[0] == array.shape[1] and np.allclose(array, array.T, atol=1e-12)
+    )
+    if not symmetric:
+        raise ProblemError(f"cost '{name}': weight is not a symmetric matrix")
+    smallest = np.linalg.eigvalsh(array)[0] if array.ndim == 2 else array.min()
+    if smallest < -1e-12:
+        raise ProblemError(f"cost '{name}': weight has the negative value {smallest}")
+    return array
+
+
+def check_weight(weight: Array, dof: int, name: str) -> None:
+    """Raise ProblemError unless the weight has one entry per joint."""
+    if weight.ndim and weight.shape[0] != dof:
+        raise ProblemError(
+            f"cost '{name}': weight has shape {weight.shape}, expected one entry per joint ({dof})"
+        )
+
+
+def check_mu(mu: float, name: str) -> None:
+    """Raise ProblemError unless the factor is finite and not negative."""
+    if not (np.isfinite(mu) and mu >= 0.0):
+        raise ProblemError(f"cost '{name}': mu is {mu}, expected a finite number ≥ 0")
+
+
+def weight_matrix(weight: Array, dof: int) -> Array:
+    """Return a weight (a number, a diagonal or a matrix) as an (n, n) matrix."""
+    return weight if weight.ndim == 2 else np.diag(np.broadcast_to(weight, dof))
+
+
+def weighted(weight: Array, x: Array) -> Array:
+    """Return W x for each row of x (S, n)."""
+    return np.asarray(x @ weight if weight.ndim == 2 else x * weight)
+
+
+def half_square(weight: Array, x: Array) -> Array:
+    """Return ½ xᵀWx for each row of x (S, n), (S,)."""
+    return np.asarray(0.5 * np.einsum("si,si->s", x, weighted(weight, x)))

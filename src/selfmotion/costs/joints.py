@@ -1,0 +1,258 @@
+"""Quadratic forms of the motion and its derivatives, and other costs of the joints alone."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.arrays import Array, read_only
+from selfmotion.costs.base import (
+    Partials,
+    as_weight,
+    check_mu,
+    check_weight,
+    half_square,
+    weight_matrix,
+    weighted,
+)
+from selfmotion.errors import ProblemError
+from selfmotion.samples import Samples
+
+
+@dataclass(frozen=True, eq=False)
+class _Quadratic:
+    """What the quadratic costs share: the weight W."""
+
+    weight: float | npt.ArrayLike = 1.0
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weight", as_weight(self.weight, self.name))
+
+    @property
+    def _w(self) -> Array:
+        return np.asarray(self.weight)
+
+    def check(self, dof: int) -> None:
+        """See `Cost.check`."""
+        check_weight(self._w, dof, self.name)
+
+
+@dataclass(frozen=True, eq=False)
+class JointVelocity(_Quadratic):
+    """Joint speed: G = ½ q̇ᵀWq̇ [rad²/s²], the first term of the paper's eq. 11 and 12.
+
+    Parameters
+    ----------
+    weight : float, (n,) or (n, n)
+        W: a multiple of the identity, a diagonal, or a symmetric positive semidefinite matrix.
+    """
+
+    name: str = "joint velocity"
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        return half_square(self._w, samples.qd)
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`: Wq̇."""
+        return Partials(qd=weighted(self._w, samples.qd))
+
+    def curvature(self, dof: int) -> dict[int, Array]:
+        """See `Cost.curvature`."""
+        return {1: weight_matrix(self._w, dof)}
+
+
+@dataclass(frozen=True, eq=False)
+class JointAcceleration(_Quadratic):
+    """Joint acceleration: G = ½ q̈ᵀWq̈ [rad²/s⁴], q̈ by five-point differences of q̇.
+
+    Parameters
+    ----------
+    weight : float, (n,) or (n, n)
+        W: a multiple of the identity, a diagonal, or a symmetric positive semidefinite matrix.
+    """
+
+    name: str = "joint acceleration"
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        return half_square(self._w, samples.qdd)
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`: Wq̈."""
+        return Partials(qdd=weighted(self._w, samples.qdd))
+
+    def curvature(self, dof: int) -> dict[int, Array]:
+        """See `Cost.curvature`."""
+        return {2: weight_matrix(self._w, dof)}
+
+
+@dataclass(frozen=True, eq=False)
+class JointJerk(_Quadratic):
+    """Joint jerk: G = ½ q⃛ᵀWq⃛ [rad²/s⁶], q⃛ by five-point differences of q̇.
+
+    Parameters
+    ----------
+    weight : float, (n,) or (n, n)
+        W: a multiple of the identity, a diagonal, or a symmetric positive semidefinite matrix.
+    """
+
+    name: str = "joint jerk"
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        return half_square(self._w, samples.qddd)
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`: Wq⃛."""
+        return Partials(qddd=weighted(self._w, samples.qddd))
+
+    def curvature(self, dof: int) -> dict[int, Array]:
+        """See `Cost.curvature`."""
+        return {3: weight_matrix(self._w, dof)}
+
+
+@dataclass(frozen=True, eq=False)
+class Posture(_Quadratic):
+    """Distance from a posture: G = ½ (q - q*)ᵀW(q - q*) [rad²].
+
+    Parameters
+    ----------
+    weight : float, (n,) or (n, n)
+        W: a multiple of the identity, a diagonal, or a symmetric positive semidefinite matrix.
+    posture : (n,)
+        q* [rad or m].
+    """
+
+    name: str = "posture"
+    posture: npt.ArrayLike = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "posture", read_only(self.posture))
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        return half_square(self._w, samples.q - np.asarray(self.posture))
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`: W(q - q*)."""
+        return Partials(q=weighted(self._w, samples.q - np.asarray(self.posture)))
+
+    def curvature(self, dof: int) -> dict[int, Array]:
+        """See `Cost.curvature`."""
+        return {0: weight_matrix(self._w, dof)}
+
+    def check(self, dof: int) -> None:
+        """See `Cost.check`."""
+        super().check(dof)
+        posture = np.asarray(self.posture)
+        if posture.shape != (dof,) or not np.all(np.isfinite(posture)):
+            raise ProblemError(
+                f"cost '{self.name}': posture is {posture}, expected {dof} finite numbers"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimitDistance:
+    """Distance from the joint limits: G = μ Σ_i ((q_i - c_i) / h_i)^p.
+
+    c is the middle and h half the width of the range: 0 in the middle, μ at a limit, steep beyond.
+    With p = 2 the classical criterion (A. Liégeois, IEEE Trans. SMC 7(12), 1977, up to a factor);
+    larger p leaves the middle of the range free. Joints without limits do not count.
+
+    Parameters
+    ----------
+    lower, upper : (n,)
+        Limits [rad or m], for example ``robot.lower`` and ``robot.upper``.
+    mu : float
+        μ ≥ 0.
+    power : int
+        p, even.
+    """
+
+    lower: npt.ArrayLike
+    upper: npt.ArrayLike
+    mu: float = 1.0
+    power: int = 6
+    name: str = "joint limits"
+
+    def __post_init__(self) -> None:
+        lower, upper = read_only(self.lower), read_only(self.upper)
+        if lower.shape != upper.shape or not np.all(lower < upper):
+            raise ProblemError(f"cost '{self.name}': lower {lower} is not below upper {upper}")
+        object.__setattr__(self, "lower", lower)
+        object.__setattr__(self, "upper", upper)
+        if self.power < 2 or self.power % 2:
+            raise ProblemError(f"cost '{self.name}': power is {self.power}, expected 2, 4, 6, …")
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        return np.asarray(self.mu * np.sum(self._relative(samples) ** self.power, axis=1))
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`."""
+        relative = self._relative(samples) ** (self.power - 1)
+        return Partials(q=self.mu * self.power * relative * self._scale[1])
+
+    def curvature(self, dof: int) -> dict[int, Array]:
+        """See `Cost.curvature`."""
+        return {}
+
+    def check(self, dof: int) -> None:
+        """See `Cost.check`."""
+        check_mu(self.mu, self.name)
+        if np.asarray(self.lower).shape != (dof,):
+            raise ProblemError(
+                f"cost '{self.name}': limits for {np.asarray(self.lower).shape} joints, "
+                f"expected ({dof},)"
+            )
+
+    @property
+    def _scale(self) -> tuple[Array, Array]:
+        """Middle of the range, and 1/h (0 without limits)."""
+        lower, upper = np.asarray(self.lower), np.asarray(self.upper)
+        limited = np.isfinite(lower) & np.isfinite(upper)
+        lower, upper = np.where(limited, lower, -1.0), np.where(limited, upper, 1.0)
+        return 0.5 * (lower + upper), np.where(limited, 2.0 / (upper - lower), 0.0)
+
+    def _relative(self, samples: Samples) -> Array:
+        middle, inverse = self._scale
+        return (samples.q - middle) * inverse
+
+
+@dataclass(frozen=True)
+class PathLength:
+    """Length of the joint path, joint by joint: G = Σ_i √(q̇_i² + δ²) - δ [rad/s].
+
+    Its integral is Σ_i ∫ |q̇_i| dt, the sum over joints of what each travels, but smooth where a
+    joint turns round.
+
+    Parameters
+    ----------
+    smoothing : float
+        δ [rad/s]; the integral is too small by at most nδT.
+    """
+
+    smoothing: float = 1e-2
+    name: str = "path length"
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        return np.asarray(np.sum(np.hypot(samples.qd, self.smoothing) - self.smoothing, axis=1))
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`: q̇_i / √(q̇_i² + δ²)."""
+        return Partials(qd=samples.qd / np.hypot(samples.qd, self.smoothing))
+
+    def curvature(self, dof: int) -> dict[int, Array]:
+        """See `Cost.curvature`."""
+        return {}
+
+    def check(self, dof: int) -> None:
+        """See `Cost.check`."""
+        if not self.smoothing > 0.0:
+            raise ProblemError(
+                f"cost '{self.name}': smoothing is {self.smoothing}, expected a number > 0"
+            )
