@@ -1,0 +1,67 @@
+"""A plan's report and certificate as the rows of a table."""
+
+from typing import Any
+
+from selfmotion.replay.plan_like import Plan
+
+# A number and a remark, shown smaller after it.
+Cell = tuple[str, str]
+
+
+def facts(plan: Plan) -> dict[str, Cell]:
+    """Return what a reader wants to know of a plan: label → number and remark."""
+    report, certificate = plan.report, plan.certificate
+    rows: dict[str, Cell] = {"verdict": (certificate.verdict, "")}
+    rows["cost"] = _compared(report.cost, report.initial_cost)
+    for name, value in report.terms.items():
+        rows[f"cost term: {name}"] = _compared(value, report.initial_terms.get(name))
+    rows["position error, worst"] = _extreme(certificate.position_error, "m")
+    rows["rotation error, worst"] = _extreme(certificate.rotation_error, "rad")
+    rows["margin to a joint limit, least"] = _extreme(certificate.limit_margin, "rad or m")
+    rows["speed over its limit, most"] = _extreme(certificate.velocity_ratio, "")
+    rows["smallest singular value"] = _extreme(certificate.smallest_singular_value, "")
+    rows["end to start"] = (f"{certificate.closure:.3g} rad or m", "")
+    rows["checked at"] = (f"{certificate.samples} times", "by forward kinematics")
+    rows["duration"] = (f"{plan.trajectory.duration:.4g} s", "")
+    rows["task"] = (plan.task.value, f"{plan.task.dimension} rows, {plan.robot.dof} joints")
+    rows["outcome"] = (str(report.status.value), report.message)
+    rows["iterations"] = (str(report.iterations), f"in {report.seconds:.3g} s")
+    rows["evaluations"] = (
+        f"{report.evaluations} of F, {report.gradient_evaluations} of ∇F",
+        f"{report.jacobian_evaluations} Jacobians, {report.steps} steps",
+    )
+    return rows
+
+
+def table(plans: list[Plan]) -> list[dict[str, Any]]:
+    """Return the rows for several plans side by side; a plan without a row gets an empty cell."""
+    columns = [facts(plan) for plan in plans]
+    labels = list(dict.fromkeys(label for column in columns for label in column))
+    return [
+        {"label": label, "cells": [column.get(label, ("", "")) for column in columns]}
+        for label in labels
+    ]
+
+
+def describe(plan: Plan) -> str:
+    """Return one sentence that tells a stranger what the page shows."""
+    report = plan.report
+    saved = ""
+    if report.initial_cost:
+        change = report.cost / report.initial_cost - 1.0
+        saved = f", {abs(change):.0%} {'below' if change <= 0 else 'above'} the motion x = 0"
+    return (
+        f"{plan.robot.name}: {plan.robot.dof} joints follow a tool motion of "
+        f"{plan.trajectory.duration:.3g} s (task '{plan.task.value}') at cost {report.cost:.4g}"
+        f"{saved}. {plan.certificate.verdict}"
+    )
+
+
+def _compared(value: float, start: float | None) -> Cell:
+    return f"{value:.6g}", "" if start is None else f"x = 0: {start:.6g}"
+
+
+def _extreme(extreme: Any, unit: str) -> Cell:
+    number = f"{extreme.value:.3g} {unit}".strip()
+    where = f"{extreme.name}, " if extreme.name else ""
+    return number, f"{where}at {extreme.time:.3g} s"

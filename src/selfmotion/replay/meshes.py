@@ -1,0 +1,214 @@
+"""Visual meshes, made ready for a page: read, welded, shaded by creases, packed small.
+
+A mesh is kept as positions on a 16-bit grid over its bounding box (at most 1/131070 of the mesh's
+extent off: 4 µm for a link of half a metre) and triangles that refer to them. Every triangle of the
+file is kept unless the caller sets a budget.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from selfmotion.arrays import Array
+from selfmotion.errors import RobotError
+
+_GRID = 65535
+# Edges sharper than this are drawn as edges, flatter ones as part of a smooth surface.
+_CREASE = np.cos(np.radians(35.0))
+
+Color = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles of one colour.
+
+    Attributes
+    ----------
+    grid : (V, 3) of uint16
+        Vertices; vertex k lies at ``origin + step * grid[k]``, in the mesh file's units.
+    origin, step : (3,)
+        Corner of the bounding box, and one step of the grid per axis.
+    faces : (F, 3)
+        Indices of each triangle's vertices. Each vertex first appears in order: 0, 1, 2, …
+    color : tuple of float, optional
+        Red, green, blue, opacity in 0..1 from the file; None when the file gives none.
+    """
+
+    grid: npt.NDArray[np.uint16]
+    origin: Array
+    step: Array
+    faces: npt.NDArray[np.int64]
+    color: Color | None
+
+    @property
+    def vertices(self) -> Array:
+        """Vertex positions, (V, 3), in the mesh file's units."""
+        return np.asarray(self.origin + self.step * self.grid)
+
+
+def make_mesh(vertices: Array, faces: npt.NDArray[Any], color: Color | None = None) -> Mesh:
+    """Weld equal vertices, then split them again along creases.
+
+    Parameters
+    ----------
+    vertices : (V, 3)
+        Positions; the same position may occur many times.
+    faces : (F, 3)
+        Triangles. All are kept, degenerate ones as well.
+    color : tuple of float, optional
+        Red, green, blue, opacity in 0..1.
+    """
+    origin = vertices.min(axis=0)
+    step = np.ptp(vertices, axis=0) / _GRID
+    scale = np.divide(1.0, step, out=np.zeros(3), where=step > 0)
+    grid = np.rint((vertices - origin) * scale).astype(np.int64)
+    keys = (grid[:, 0] << 32) | (grid[:, 1] << 16) | grid[:, 2]
+    _, first, welded = np.unique(keys, return_index=True, return_inverse=True)
+    points = grid[first]
+    corners = welded[np.asarray(faces, dtype=np.int64)]
+    corner_vertex = _split_creases(points * step, corners)
+    # Number the vertices in the order in which the triangles meet them.
+    _, appears, vertex = np.unique(corner_vertex, return_index=True, return_inverse=True)
+    order = np.argsort(appears)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return Mesh(
+        grid=points[corners.ravel()[appears[order]]].astype(np.uint16),
+        origin=origin,
+        step=step,
+        faces=rank[vertex].reshape(-1, 3),
+        color=color,
+    )
+
+
+def _split_creases(points: Array, faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Return a label per corner, (3F,): corners with one label share a vertex and its normal.
+
+    Two triangles that meet at an edge share both its vertices unless the edge is a crease.
+    """
+    normals = np.cross(
+        points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]]
+    )
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
+    start = np.arange(faces.size)
+    end = start.reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    flat = faces.ravel()
+    # Corner at the edge's lower vertex first, so that the sides of an edge line up.
+    swap = flat[start] > flat[end]
+    low, high = np.where(swap, end, start), np.where(swap, start, end)
+    keys = flat[low] * len(points) + flat[high]
+    order = np.argsort(keys, kind="stable")
+    here, there = order[:-1], order[1:]
+    cosine = np.einsum("ij,ij->i", normals[here // 3], normals[there // 3])
+    smooth = (keys[here] == keys[there]) & (cosine > _CREASE)
+    here, there = here[smooth], there[smooth]
+    rows = np.concatenate([low[here], high[here]])
+    columns = np.concatenate([low[there], high[there]])
+    graph = coo_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=(faces.size,) * 2)
+    _, labels = connected_components(graph, directed=False)
+    return np.asarray(labels, dtype=np.int64)
+
+
+def simplify(mesh: Mesh, cells: int) -> Mesh:
+    """Merge vertices that share a cell of a grid with `cells` cells along the longest side.
+
+    Triangles that collapse are dropped. For meshes beyond a page's budget only.
+    """
+    vertices = mesh.vertices
+    size = float(np.ptp(vertices, axis=0).max()) / cells
+    _, first, merged = np.unique(
+        np.floor((vertices - mesh.origin) / size).astype(np.int64),
+        axis=0,
+        return_index=True,
+        return_inverse=True,
+    )
+    faces = merged.reshape(-1)[mesh.faces]
+    kept = faces[
+        (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    ]
+    return make_mesh(vertices[first], kept, mesh.color)
+
+
+def read_meshes(geometry: Any) -> list[Mesh]:
+    """Read the mesh file of one visual of a link, one `Mesh` per colour in it.
+
+    Parameters
+    ----------
+    geometry : pinocchio.GeometryObject
+        A visual with a mesh file. The scale is not applied.
+
+    Raises
+    ------
+    RobotError
+        Neither trimesh nor coal has triangles for the file.
+    """
+    parts = _read_with_trimesh(geometry.meshPath) or _triangles_of_coal(geometry)
+    if not parts:
+        raise RobotError(
+            f"visual '{geometry.name}': no triangles in mesh file {geometry.meshPath}; "
+            f"export it again as .stl, .dae or .obj"
+        )
+    return [
+        make_mesh(
+            np.concatenate([vertices for vertices, _ in group]),
+            np.concatenate([faces + offset for (_, faces), offset in _with_offsets(group)]),
+            color,
+        )
+        for color, group in parts.items()
+    ]
+
+
+_Triangles = tuple[Array, npt.NDArray[np.int64]]
+
+
+def _with_offsets(group: list[_Triangles]) -> list[tuple[_Triangles, int]]:
+    counts = np.cumsum([0] + [len(vertices) for vertices, _ in group[:-1]])
+    return [(part, int(count)) for part, count in zip(group, counts, strict=True)]
+
+
+def _read_with_trimesh(path: str) -> dict[Color | None, list[_Triangles]]:
+    import logging
+
+    import trimesh
+
+    # Its complaints about normals and materials concern files we do not own.
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
+    try:
+        scene = trimesh.load_scene(path, process=False)
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, OSError):
+        # trimesh has no error class of its own; coal may still have read the file.
+        return {}
+    parts: dict[Color | None, list[_Triangles]] = {}
+    for part in scene.dump():
+        if not isinstance(part, trimesh.Trimesh) or len(part.faces) == 0:
+            continue
+        parts.setdefault(_color(part.visual), []).append(
+            (np.asarray(part.vertices, dtype=np.float64), np.asarray(part.faces, dtype=np.int64))
+        )
+    return parts
+
+
+def _color(visual: Any) -> Color | None:
+    if not visual.defined:
+        return None
+    rgba = np.asarray(visual.material.main_color if visual.kind == "texture" else visual.main_color)
+    red, green, blue, opacity = (float(value) / 255.0 for value in rgba)
+    # Exporters that confuse opacity with transparency write 0 for a solid part.
+    return red, green, blue, opacity or 1.0
+
+
+def _triangles_of_coal(geometry: Any) -> dict[Color | None, list[_Triangles]]:
+    shape = geometry.geometry
+    count = getattr(shape, "num_tris", 0)
+    if not count:
+        return {}
+    # Pinocchio has applied the scale already; the caller applies it again to every mesh.
+    vertices = np.array(shape.vertices()) / np.asarray(geometry.meshScale).reshape(3)
+    triangles = [shape.tri_indices(k) for k in range(count)]
+    return {None: [(vertices, np.array([[t[0], t[1], t[2]] for t in triangles]))]}

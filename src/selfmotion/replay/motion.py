@@ -1,0 +1,193 @@
+"""A plan's motion, sampled for a page: key frames of the links, and curves over time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from selfmotion.arrays import Array
+from selfmotion.replay.plan_like import Plan
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
+from selfmotion.trajectory import Trajectory
+
+# Between key frames a page interpolates; it may be off by this much at most [m, and per entry of
+# the rotation matrix]. Below what a screen resolves and half of what our tests ask for.
+_TOLERANCE = 5e-5
+# Where a motion jumps, no interval is short enough; halving stops here [s].
+_SHORTEST = 1e-4
+# Points of each curve: one for every two or three pixels of a wide plot.
+_CURVE_POINTS = 401
+
+
+@dataclass(frozen=True, eq=False)
+class KeyFrames:
+    """Poses of the moving links over time.
+
+    Attributes
+    ----------
+    t : (K,)
+        Times from the start of the motion [s].
+    position : (K, n, 3)
+        Origin of each joint's frame in world axes [m].
+    quaternion : (K, n, 4)
+        Its orientation, (x, y, z, w).
+    """
+
+    t: Array
+    position: Array
+    quaternion: Array
+
+    def part(self, which: npt.NDArray[np.intp] | slice) -> "KeyFrames":
+        """Return some of the key frames."""
+        return KeyFrames(self.t[which], self.position[which], self.quaternion[which])
+
+    def transforms(self, k: int) -> Array:
+        """Return the homogeneous matrices of all joints at key frame `k`, (n, 4, 4)."""
+        matrices: Array = _homogeneous(self.position[k], self.quaternion[k])
+        return matrices
+
+
+def key_frames(robot: RobotModel, trajectory: Trajectory) -> KeyFrames:
+    """Sample the links' poses so densely that interpolation is right to 0.05 mm.
+
+    Linear interpolation of positions and spherical interpolation of orientations are compared with
+    forward kinematics halfway between key frames; where they differ, the interval is halved.
+    """
+    duration = trajectory.duration
+    times = np.linspace(0.0, duration, max(9, int(np.ceil(20 * duration)) + 1))
+    frames = _poses(robot, trajectory, times)
+    start, end = frames.part(slice(None, -1)), frames.part(slice(1, None))
+    while len(start.t):
+        middle = _poses(robot, trajectory, 0.5 * (start.t + end.t))
+        guess = _homogeneous(
+            0.5 * (start.position + end.position), _halfway(start.quaternion, end.quaternion)
+        )
+        miss = np.abs(guess - _homogeneous(middle.position, middle.quaternion)).max(axis=(1, 2, 3))
+        wrong = np.flatnonzero((miss > _TOLERANCE) & (end.t - start.t > _SHORTEST))
+        start, middle, end = start.part(wrong), middle.part(wrong), end.part(wrong)
+        frames = _joined(frames, middle)
+        start, end = _joined(start, middle), _joined(middle, end)
+    return frames.part(np.argsort(frames.t))
+
+
+def _joined(a: KeyFrames, b: KeyFrames) -> KeyFrames:
+    return KeyFrames(
+        np.concatenate([a.t, b.t]),
+        np.concatenate([a.position, b.position]),
+        np.concatenate([a.quaternion, b.quaternion]),
+    )
+
+
+def _poses(robot: RobotModel, trajectory: Trajectory, times: Array) -> KeyFrames:
+    model, data = robot.model, robot.model.createData()
+    count = robot.dof
+    poses = np.empty((len(times), count, 7))
+    for k, q in enumerate(trajectory(_clock(trajectory, times))):
+        pin.forwardKinematics(model, data, q)
+        for joint in range(count):
+            poses[k, joint] = pin.SE3ToXYZQUAT(data.oMi[joint + 1])
+    return KeyFrames(times, poses[..., :3], poses[..., 3:])
+
+
+def _clock(trajectory: Trajectory, times: Array) -> Array:
+    """Turn times from the start of the motion into the trajectory's own."""
+    return np.asarray(np.minimum(trajectory.t[0] + times, trajectory.t[-1]))
+
+
+def _halfway(a: Array, b: Array) -> Array:
+    sign = np.where(np.sum(a * b, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    middle = a + sign * b
+    return np.asarray(middle / np.linalg.norm(middle, axis=-1, keepdims=True))
+
+
+def _homogeneous(position: Array, quaternion: Array) -> Array:
+    x, y, z, w = np.moveaxis(quaternion, -1, 0)
+    matrix: Array = np.zeros((*position.shape[:-1], 4, 4))
+    matrix[..., 0, 0] = 1 - 2 * (y * y + z * z)
+    matrix[..., 0, 1] = 2 * (x * y - z * w)
+    matrix[..., 0, 2] = 2 * (x * z + y * w)
+    matrix[..., 1, 0] = 2 * (x * y + z * w)
+    matrix[..., 1, 1] = 1 - 2 * (x * x + z * z)
+    matrix[..., 1, 2] = 2 * (y * z - x * w)
+    matrix[..., 2, 0] = 2 * (x * z - y * w)
+    matrix[..., 2, 1] = 2 * (y * z + x * w)
+    matrix[..., 2, 2] = 1 - 2 * (x * x + y * y)
+    matrix[..., :3, 3] = position
+    matrix[..., 3, 3] = 1.0
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """What the plots show, on one uniform grid of M times.
+
+    Attributes
+    ----------
+    t : (M,)
+        Times from the start of the motion [s].
+    q, qd : (M, n)
+        Joint coordinates [rad or m] and velocities [rad/s or m/s].
+    manipulability : (M,)
+        √det(JJᵀ) of the rows the task prescribes, in SI units.
+    position_error, rotation_error : (M,)
+        Distance from the prescribed tool motion in the task's rows [m], [rad].
+    tool : (M, 3)
+        Position of the tool in world axes [m].
+    rotation : (M, 3, 3)
+        Orientation of the tool.
+    ellipsoid : (M, 3, 3)
+        (J_v J_vᵀ)^½ of the prescribed linear rows: maps the unit sphere of joint speeds to the
+        ellipsoid of tool speeds [m/s]. No axis is thinner than a fiftieth of the longest.
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    manipulability: Array
+    position_error: Array
+    rotation_error: Array
+    tool: Array
+    rotation: Array
+    ellipsoid: Array
+
+
+def curves(plan: Plan, trajectory: Trajectory, points: int = _CURVE_POINTS) -> Curves:
+    """Evaluate `trajectory` (the plan's, or its x = 0 motion) for the plots."""
+    robot, task = plan.robot, plan.task
+    times = np.linspace(0.0, trajectory.duration, points)
+    clock = _clock(trajectory, times)
+    q = trajectory(clock)
+    target = plan.path.samples(clock)
+    manipulability, ellipsoid = np.empty(points), np.empty((points, 3, 3))
+    errors, tool, rotation = np.empty((points, 2)), np.empty((points, 3)), np.empty((points, 3, 3))
+    for k in range(points):
+        jacobian = robot.jacobian(q[k])
+        pose = robot.pose(q[k])
+        rows = task.select(jacobian, pose.rotation)
+        manipulability[k] = np.prod(np.linalg.svd(rows, compute_uv=False))
+        ellipsoid[k] = _velocity_ellipsoid(jacobian, task)
+        errors[k] = task.miss(pin.SE3(target.rotation[k], target.translation[k]), pose)
+        tool[k], rotation[k] = pose.translation, pose.rotation
+    return Curves(
+        t=times,
+        q=q,
+        qd=trajectory(clock, 1),
+        manipulability=manipulability,
+        position_error=errors[:, 0],
+        rotation_error=errors[:, 1],
+        tool=tool,
+        rotation=rotation,
+        ellipsoid=ellipsoid,
+    )
+
+
+def _velocity_ellipsoid(jacobian: Array, task: Task) -> Array:
+    linear = np.zeros((3, jacobian.shape[1]))
+    rows = task.rows[task.rows < 3]
+    linear[rows] = jacobian[rows]
+    values, vectors = np.linalg.eigh(linear @ linear.T)
+    lengths = np.sqrt(np.maximum(values, 0.0))
+    # Flat where the tool cannot move; a little thickness gives the surface a normal.
+    return np.asarray((vectors * np.maximum(lengths, 0.02 * lengths[-1])) @ vectors.T)

@@ -1,0 +1,259 @@
+"""What stands around the arm: ground, light, camera, obstacles, and the traces of the tool."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from selfmotion.arrays import Array
+from selfmotion.errors import RobotError
+from selfmotion.replay import shapes, three
+from selfmotion.replay.links import Arm
+from selfmotion.replay.motion import Curves, KeyFrames
+from selfmotion.replay.payload import Json, Payload
+
+_ROOT = "/selfmotion"
+_OBSTACLE = (0.80, 0.62, 0.42)
+_PRESCRIBED = (0.55, 0.57, 0.60)
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """An axis-aligned box in world axes [m].
+
+    Attributes
+    ----------
+    low, high : (3,)
+        Opposite corners.
+    """
+
+    low: Array
+    high: Array
+
+    @property
+    def center(self) -> Array:
+        """Middle of the box."""
+        return np.asarray(0.5 * (self.low + self.high))
+
+    @property
+    def radius(self) -> float:
+        """Half the diagonal."""
+        return float(0.5 * np.linalg.norm(self.high - self.low))
+
+
+def outline(arm: Arm, motions: list[KeyFrames], points: list[Array]) -> Array:
+    """Return the corners of the hull of arm and `points` during all `motions`, (K, 3) [m]."""
+    corners = list(points)
+    for visual in arm.visuals:
+        if visual.joint < 0:
+            corners.append(visual.corners)
+            continue
+        for frames in motions:
+            for k in np.linspace(0, len(frames.t) - 1, 25).astype(int):
+                pose = frames.transforms(k)[visual.joint]
+                corners.append(visual.corners @ pose[:3, :3].T + pose[:3, 3])
+    stacked = np.concatenate(corners)
+    # Joggled, because a planar motion's hull may be flat.
+    return np.asarray(stacked[ConvexHull(stacked, qhull_options="QJ").vertices])
+
+
+def camera(hull: Array, tool: Array) -> Json:
+    """Return where to look from: a flat scene from above, others from beside the tool path.
+
+    The page works out the distance, which depends on the shape of the window.
+    """
+    size = np.ptp(hull, axis=0)
+    if size[2] < 0.15 * max(size[0], size[1]):
+        direction = np.array([0.0, -0.45, 1.0])
+    else:
+        ahead = tool.mean(axis=0)
+        azimuth = np.arctan2(ahead[1], ahead[0]) - np.radians(55.0)
+        direction = np.array([np.cos(azimuth), np.sin(azimuth), 0.36])
+    return {
+        "points": np.round(hull, 4).tolist(),
+        "direction": (direction / np.linalg.norm(direction)).tolist(),
+    }
+
+
+def stage_commands(box: Bounds) -> list[Json]:
+    """Return the commands for light, shadow and a ground grid, in place of meshcat's own."""
+    center, reach = box.center, max(box.radius, 0.1)
+    far = float(np.linalg.norm(center)) + 4.0 * reach
+    half = float(np.linalg.norm(center)) + 1.2 * reach
+    ground = np.eye(4)
+    ground[:3, 3] = [center[0], center[1], box.low[2] - 0.002 * reach]
+    return [
+        *(three.delete(path) for path in ("/Lights", "/Grid", "/Axes")),
+        {"type": "set_property", "path": "/Background", "property": "visible", "value": False},
+        three.set_light(
+            f"{_ROOT}/stage/sky",
+            np.array([0.0, 0.0, 1.0]),
+            type="HemisphereLight",
+            color=0xFFFFFF,
+            groundColor=0xA7ADB8,
+            intensity=0.78,
+        ),
+        three.set_light(
+            f"{_ROOT}/stage/sun",
+            center + reach * np.array([0.9, -1.3, 2.6]),
+            type="DirectionalLight",
+            color=0xFFFFFF,
+            intensity=0.55,
+            shadow={
+                "bias": -0.0005,
+                "radius": 4,
+                "mapSize": [2048, 2048],
+                "camera": {
+                    "uuid": "sun-shadow",
+                    "type": "OrthographicCamera",
+                    "left": -half,
+                    "right": half,
+                    "top": half,
+                    "bottom": -half,
+                    "near": 0.01 * reach,
+                    "far": far + 2.0 * half,
+                    "zoom": 1,
+                },
+            },
+        ),
+        three.set_object(
+            f"{_ROOT}/stage/ground",
+            {"type": "PlaneGeometry", "width": 12 * reach, "height": 12 * reach},
+            {"type": "ShadowMaterial", "color": 0, "opacity": 0.16, "transparent": True},
+            ground,
+        ),
+        _grid(center, reach, float(box.low[2])),
+    ]
+
+
+def _grid(center: Array, reach: float, height: float) -> Json:
+    """Return lines on the ground at a round spacing: 1, 2 or 5 times a power of ten."""
+    decade = 10.0 ** np.floor(np.log10(reach / 2))
+    spacing = max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= reach / 2)
+    count = int(np.ceil(2.2 * reach / spacing))
+    middle = np.round(center[:2] / spacing) * spacing
+    ends = spacing * np.arange(-count, count + 1)
+    z = height - 0.001 * reach
+    lines = [
+        point
+        for end in ends
+        for point in (
+            (middle[0] + end, middle[1] + ends[0], z),
+            (middle[0] + end, middle[1] + ends[-1], z),
+            (middle[0] + ends[0], middle[1] + end, z),
+            (middle[0] + ends[-1], middle[1] + end, z),
+        )
+    ]
+    path = f"{_ROOT}/stage/grid"
+    command = three.set_object(
+        path,
+        {"lines": np.round(np.array(lines), 6).ravel().tolist()},
+        {"type": "LineBasicMaterial", "color": 0x8A919C, "opacity": 0.38, "transparent": True},
+    )
+    command["object"]["object"]["type"] = "LineSegments"
+    return command
+
+
+def trace_commands(
+    root: str, payload: Payload, shown: Curves, start: Curves | None, target: Array, scale: Json
+) -> list[Json]:
+    """Return the commands for one plan's traces, below `root`.
+
+    The prescribed path is the far wall of a wide tube; the plan's trace a solid tube inside,
+    coloured by manipulability; the trace of the x = 0 motion a row of beads. All three usually
+    coincide, because the tool motion is prescribed, and so they stay apart to the eye.
+
+    Parameters
+    ----------
+    root : str
+        Node of the plan.
+    payload : Payload
+        Takes the meshes.
+    shown, start : Curves
+        The plan, and its x = 0 motion if there is one.
+    target : (M, 3)
+        The prescribed path [m].
+    scale : dict
+        ``low`` and ``high`` of the colour scale, ``radius`` of the trace [m].
+    """
+    radius = scale["radius"]
+    commands = []
+    kept = shapes.distinct(target, 0.5 * radius)
+    if len(kept) > 1:
+        surface = shapes.tube(target[kept], 2.2 * radius)
+        look = {**three.ghostly(_PRESCRIBED, 0.4), "side": 1}
+        commands.append(three.set_object(f"{root}/prescribed", _surface(payload, *surface), look))
+    kept = shapes.distinct(shown.tool, 0.5 * radius)
+    if len(kept) > 1:
+        colors = shapes.colors_of(shown.manipulability[kept], scale["low"], scale["high"])
+        surface = shapes.tube(shown.tool[kept], radius)
+        drawn = _surface(payload, *surface, np.repeat(colors, 8, axis=0))
+        commands.append(three.set_object(f"{root}/trace", drawn, _painted()))
+    if start is not None:
+        kept = shapes.distinct(start.tool, 9.0 * radius)
+        colors = shapes.colors_of(start.manipulability[kept], scale["low"], scale["high"])
+        surface = shapes.beads(start.tool[kept], 2.6 * radius)
+        drawn = _surface(payload, *surface, np.repeat(colors, 18, axis=0))
+        commands.append(three.set_object(f"{root}/start", drawn, _painted()))
+    return commands
+
+
+def triad_command(root: str, payload: Payload, shown: Curves, times: Array, length: float) -> Json:
+    """Return the command for the tool's axes at the samples nearest to `times` [s]."""
+    samples = np.unique(np.abs(shown.t[:, None] - times).argmin(axis=0))
+    vertices, faces, colors = shapes.triads(shown.tool[samples], shown.rotation[samples], length)
+    drawn = _surface(payload, vertices, faces, colors)
+    return three.set_object(f"{root}/triads", drawn, _painted())
+
+
+def _painted() -> Json:
+    return three.material((1.0, 1.0, 1.0), vertexColors=True, roughness=0.8)
+
+
+def _surface(
+    payload: Payload, vertices: Array, faces: shapes.Indices, colors: Array | None = None
+) -> Json:
+    drawn: Json = {"vertices": payload.array(vertices), "triangles": payload.array(faces, "u4")}
+    if colors is not None:
+        drawn["colors"] = payload.array(np.round(255 * colors), "u1")
+    return drawn
+
+
+def ellipsoid_command() -> Json:
+    """Return the command for the unit ball that the page stretches to the tool's ellipsoid."""
+    return three.set_object(
+        f"{_ROOT}/ellipsoid", three.sphere(1.0), three.ghostly((0.95, 0.55, 0.15), 0.38)
+    )
+
+
+def obstacle_commands(obstacles: tuple[Any, ...], payload: Payload) -> list[Json]:
+    """Return the commands that draw the world's obstacles.
+
+    Raises
+    ------
+    RobotError
+        An obstacle has a shape that cannot be drawn.
+    """
+    look = three.material(_OBSTACLE, opacity=0.85)
+    return [
+        three.set_object(
+            f"{_ROOT}/obstacles/{item.name.replace('/', '_')}", *_obstacle(item, payload, look)
+        )
+        for item in obstacles
+    ]
+
+
+def _obstacle(item: Any, payload: Payload, look: Json) -> tuple[Json, Json, Array]:
+    matrix: Array = item.pose.homogeneous
+    match type(item).__name__:
+        case "Box":
+            return three.box(item.size), look, matrix
+        case "Sphere":
+            return three.sphere(item.radius), look, matrix
+        case "Cylinder":
+            return three.cylinder(item.radius, item.length), look, three.about_z(matrix)
+        case "Capsule":
+            return three.capsule(item.radius, item.length), look, three.about_z(matrix)
+        case kind:
+            raise RobotError(f"obstacle '{item.name}' is a {kind}, which a replay cannot draw")

@@ -1,0 +1,263 @@
+// The page: one time, which the animator holds; buttons, keys and plots that set or follow it.
+
+const COLORS = ["#4269d0", "#e8871e", "#3ca951", "#e0508c", "#a463f2", "#12a5a5", "#9c6b4e", "#8a94a3"];
+const PLAY = "M7 4.5v15l12-7.5z";
+const PAUSE = "M6.5 4.5h4v15h-4zm7 0h4v15h-4z";
+
+const get = (id) => document.getElementById(id);
+
+class Page {
+  constructor(content, stage) {
+    this.content = content;
+    this.stage = stage;
+    this.layers = { ghost: false, trace: true, triads: true, ellipsoid: false };
+    this.now = 0;
+    this.playing = false;
+    this.plots = [];
+    this.makeChoice();
+    this.makeLegend();
+    this.makeLayers();
+    this.makeTable();
+    this.connect();
+    stage?.onRender((time) => this.follow(time));
+    this.choose(0);
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (stage && !still && !location.hash.includes("still")) this.play();
+  }
+
+  get duration() { return this.plan.duration; }
+
+  choose(number) {
+    this.plan = this.content.plans[number];
+    this.number = number;
+    get("time").max = this.duration;
+    get("verdict").textContent = this.plan.verdict;
+    get("verdict").classList.toggle("verified", this.plan.verified);
+    [...get("choice").children].forEach((button, k) => button.setAttribute("aria-pressed", k === number));
+    for (const cell of document.querySelectorAll("[data-plan]")) {
+      cell.classList.toggle("shown", this.content.plans.length > 1 && Number(cell.dataset.plan) === number);
+    }
+    this.stage?.load(this.plan);
+    this.applyLayers();
+    this.makePlots();
+    this.seek(Math.min(this.now, this.duration));
+  }
+
+  // Time
+
+  seek(time) {
+    this.now = Math.min(Math.max(time, 0), this.duration);
+    if (this.stage) this.stage.seek(this.now);
+    this.follow(this.now);
+  }
+
+  follow(time) {
+    this.now = time;
+    get("time").value = time;
+    get("time").setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
+    get("clock").textContent = `${time.toFixed(2)} / ${this.duration.toFixed(2)} s`;
+    for (const plot of this.plots) plot.seek(time);
+    if (this.layers.ellipsoid) this.stage?.stretch(this.plan.ellipsoid, time, this.content.ellipsoidSize);
+  }
+
+  play() {
+    this.playing = true;
+    this.drawPlay();
+    if (this.now >= this.duration) this.seek(0);
+    let last = performance.now();
+    const step = (now) => {
+      if (!this.playing) return;
+      const next = this.now + ((now - last) / 1000) * Number(get("speed").value);
+      last = now;
+      // Rest a moment at the end, then begin again.
+      if (next < this.duration) {
+        this.seek(next);
+      } else if (this.now < this.duration) {
+        this.seek(this.duration);
+        last += 700;
+      } else if (next > this.duration) {
+        this.seek(0);
+      }
+      requestAnimationFrame(step);
+    };
+    requestAnimationFrame(step);
+  }
+
+  pause() {
+    this.playing = false;
+    this.drawPlay();
+  }
+
+  toggle() {
+    if (this.playing) this.pause(); else this.play();
+  }
+
+  drawPlay() {
+    get("play").setAttribute("aria-label", this.playing ? "Pause" : "Play");
+    get("play").querySelector("path").setAttribute("d", this.playing ? PAUSE : PLAY);
+  }
+
+  // Controls
+
+  connect() {
+    this.drawPlay();
+    get("play").addEventListener("click", () => this.toggle());
+    get("time").addEventListener("input", (event) => { this.pause(); this.seek(Number(event.target.value)); });
+    get("home").addEventListener("click", () => this.stage?.frame());
+    document.addEventListener("keydown", (event) => this.key(event));
+    const letters = this.content.layers.map(({ key, label }) => [key, label]);
+    get("morekeys").replaceChildren(...letters.flatMap(([key, label]) => {
+      const kbd = document.createElement("kbd");
+      kbd.textContent = key;
+      return [" · ", kbd, ` ${label}`];
+    }));
+  }
+
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest("select")) return;
+    if (event.key === " " && event.target.closest("button, input[type=checkbox]")) return;
+    const step = this.duration * (event.shiftKey ? 0.1 : 0.01);
+    const layer = this.content.layers.find(({ key }) => key === event.key);
+    const actions = {
+      " ": () => this.toggle(),
+      ArrowLeft: () => { this.pause(); this.seek(this.now - step); },
+      ArrowRight: () => { this.pause(); this.seek(this.now + step); },
+      Home: () => { this.pause(); this.seek(0); },
+      End: () => { this.pause(); this.seek(this.duration); },
+      r: () => this.stage?.frame(),
+    };
+    const number = Number(event.key) - 1;
+    if (layer) this.setLayer(layer.name, !this.layers[layer.name]);
+    else if (this.content.plans[number] && this.content.plans.length > 1) this.choose(number);
+    else if (event.key in actions) actions[event.key]();
+    else return;
+    event.preventDefault();
+  }
+
+  makeChoice() {
+    get("choice").hidden = this.content.plans.length < 2;
+    this.content.plans.forEach((plan, k) => {
+      const button = element(get("choice"), "button", { type: "button", title: `Key ${k + 1}` }, plan.label);
+      button.addEventListener("click", () => this.choose(k));
+    });
+  }
+
+  makeLegend() {
+    const { low, high, colors } = this.content.scale;
+    get("legend").hidden = !this.stage;
+    get("scale").style.background = `linear-gradient(to right, ${colors.join(", ")})`;
+    const [from, to] = get("range").children;
+    from.textContent = format(low);
+    to.textContent = format(high);
+  }
+
+  makeLayers() {
+    get("layers").hidden = !this.stage;
+    for (const { name, label, key } of this.content.layers) {
+      const line = element(get("layers"), "label", { title: `Key ${key}` });
+      const box = element(line, "input", { type: "checkbox", id: `layer-${name}` });
+      line.append(label);
+      box.checked = this.layers[name];
+      box.addEventListener("change", () => this.setLayer(name, box.checked));
+    }
+  }
+
+  setLayer(name, visible) {
+    this.layers[name] = visible;
+    get(`layer-${name}`).checked = visible;
+    this.applyLayers();
+  }
+
+  applyLayers() {
+    if (!this.stage) return;
+    const { ghost, trace, triads, ellipsoid } = this.layers;
+    this.stage.show("/selfmotion/ghost", ghost && this.plan.ghost !== null);
+    this.stage.show("/selfmotion/ellipsoid", ellipsoid);
+    this.content.plans.forEach((plan, k) => {
+      const shown = k === this.number;
+      this.stage.show(`${plan.root}/prescribed`, shown && trace);
+      this.stage.show(`${plan.root}/trace`, shown && trace);
+      this.stage.show(`${plan.root}/start`, shown && trace && ghost);
+      this.stage.show(`${plan.root}/triads`, shown && triads);
+    });
+  }
+
+  // Plots and table
+
+  makePlots() {
+    for (const plot of this.plots) plot.remove();
+    this.plots = plotSpecs(this.content, this.plan).map((spec, id) => new Plot(
+      get("plots"), { ...spec, id }, (time) => { this.pause(); this.seek(time); }));
+  }
+
+  makeTable() {
+    element(get("numbers"), "h2", {}, "Report and certificate");
+    const table = element(element(get("numbers"), "div", { class: "wide" }), "table");
+    const head = element(element(table, "thead"), "tr");
+    element(head, "td");
+    this.content.plans.forEach((plan, k) => element(head, "th", { scope: "col", "data-plan": k }, plan.label));
+    const body = element(table, "tbody");
+    for (const { label, cells } of this.content.table) {
+      const row = element(body, "tr");
+      element(row, "th", { scope: "row" }, label);
+      cells.forEach(([value, note], k) => {
+        const cell = element(row, "td", { "data-plan": k }, value);
+        if (note) {
+          cell.append(" ");
+          element(cell, "small", {}, note);
+        }
+      });
+    }
+  }
+}
+
+// Column k of a table stored row by row.
+function column(table, k, width) {
+  return Float32Array.from({ length: table.length / width }, (_, row) => table[row * width + k]);
+}
+
+function plotSpecs({ joints }, { curves, start }) {
+  const unit = [...new Set(joints.map((joint) => joint.unit))].join(" or ");
+  const perJoint = (table, low, high) => joints.map((joint, k) => ({
+    name: joint.name, values: column(table, k, joints.length), color: COLORS[k % COLORS.length],
+    low: low(joint) ?? NaN, high: high(joint) ?? NaN }));
+  const both = (name) => [
+    { name: "plan", values: curves[name], color: COLORS[0] },
+    ...(start ? [{ name: "x = 0", values: start[name], color: COLORS[1], start: true }] : [])];
+  const errors = [
+    ...("position" in curves ? [{ name: "position [m]", values: curves.position, color: COLORS[0] }] : []),
+    ...("rotation" in curves ? [{ name: "rotation [rad]", values: curves.rotation, color: COLORS[3] }] : [])];
+  const { t } = curves;
+  return [
+    { title: "Joint positions q", unit, t, curves: perJoint(curves.q, (j) => j.lower, (j) => j.upper) },
+    { title: "Joint velocities q̇", unit: `${unit.replaceAll(/rad|m/g, "$&/s")}`, t,
+      curves: perJoint(curves.qd, (j) => (j.speed === null ? null : -j.speed), (j) => j.speed) },
+    { title: "Manipulability √det(JJᵀ)", unit: "", t, zero: true, curves: both("manipulability") },
+    { title: "Path error", unit: "", t, log: true, floor: 1e-16, curves: errors },
+    ...("clearance" in curves
+      ? [{ title: "Clearance", unit: "m", t, zero: true, curves: both("clearance") }] : []),
+  ];
+}
+
+async function start() {
+  const content = await readPayload(get("payload").textContent);
+  let stage = null;
+  try {
+    const code = new TextDecoder().decode(await inflate(get("viewer").textContent));
+    // Its hash is in the page's Content-Security-Policy: nothing else can be run this way.
+    element(document.head, "script", {}, code);
+    stage = new Stage(get("view"), content);
+    get("notice").hidden = true;
+  } catch (error) {
+    get("notice").textContent = `No 3-D view: ${error.message}. The plots and numbers are complete.`;
+    console.warn(error);
+  }
+  window.viewer = stage?.viewer;
+  window.replay = new Page(content, stage);
+  document.documentElement.dataset.replay = "ready";
+}
+
+start().catch((error) => {
+  get("notice").textContent = `This browser cannot unpack the replay: ${error.message}`;
+  throw error;
+});

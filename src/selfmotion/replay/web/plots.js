@@ -1,0 +1,189 @@
+// Plots over time as inline SVG: curves, limits, a cursor in step with the scene, values on hover.
+
+const SVG = "http://www.w3.org/2000/svg";
+const HEIGHT = 190;
+const MARGIN = { left: 52, right: 10, top: 10, bottom: 22 };
+
+function element(parent, name, attributes = {}, text = "") {
+  const child = parent.namespaceURI === SVG || name === "svg"
+    ? document.createElementNS(SVG, name) : document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) child.setAttribute(key, value);
+  if (text) child.textContent = text;
+  parent.append(child);
+  return child;
+}
+
+function format(value) {
+  if (!Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 1e-3 || size >= 1e5)) return value.toExponential(1);
+  return value.toFixed(size >= 100 ? 1 : size >= 10 ? 2 : 3);
+}
+
+// Round places between low and high, some `count` of them: 1, 2 or 5 times a power of ten.
+function ticks(low, high, count) {
+  const rough = (high - low) / count;
+  const decade = 10 ** Math.floor(Math.log10(rough));
+  const step = decade * [1, 2, 5, 10].find((factor) => factor * decade >= rough);
+  const places = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) places.push(k * step);
+  return places;
+}
+
+// spec: { title, unit, t, log, floor, curves: [{ name, values, color, start, low, high }] }
+class Plot {
+  constructor(parent, spec, onSeek) {
+    Object.assign(this, spec);
+    this.time = 0;
+    this.chosen = null;
+    this.figure = element(parent, "figure", { class: "plot" });
+    const caption = element(this.figure, "figcaption");
+    element(caption, "span", {}, `${this.title}${this.unit ? ` [${this.unit}]` : ""}`);
+    this.at = element(caption, "span", { class: "at" });
+    this.svg = element(this.figure, "svg", { role: "img", "aria-label": `${this.title} over time` });
+    this.key = element(this.figure, "div", { class: "key" });
+    this.makeKey();
+    this.svg.addEventListener("pointermove", (event) => {
+      this.hover = this.timeAt(event);
+      if (event.buttons & 1) onSeek(this.hover);
+      this.update();
+    });
+    this.svg.addEventListener("pointerdown", (event) => onSeek(this.timeAt(event)));
+    this.svg.addEventListener("pointerleave", () => { this.hover = undefined; this.update(); });
+    this.observer = new ResizeObserver(() => this.draw());
+    this.observer.observe(this.figure);
+    this.draw();
+  }
+
+  remove() {
+    this.observer.disconnect();
+    this.figure.remove();
+  }
+
+  // One entry per curve with its value; where curves have limits, a button that singles one out.
+  makeKey() {
+    for (const curve of this.curves) {
+      const limited = curve.low !== undefined;
+      const entry = element(this.key, limited ? "button" : "span", limited
+        ? { type: "button", "aria-pressed": "false", title: `Show ${curve.name} alone, with its limits` }
+        : { class: "entry" });
+      const swatch = element(entry, "i", { class: curve.start ? "start" : "" });
+      swatch.style.borderTopColor = curve.color;
+      element(entry, "span", {}, curve.name);
+      curve.output = element(entry, "output");
+      if (!limited) continue;
+      entry.addEventListener("click", () => {
+        this.chosen = this.chosen === curve ? null : curve;
+        for (const button of this.key.children) button.setAttribute("aria-pressed", "false");
+        entry.setAttribute("aria-pressed", String(this.chosen === curve));
+        this.draw();
+      });
+    }
+  }
+
+  scaled(value) {
+    return this.log ? Math.log10(Math.max(value, this.floor)) : value;
+  }
+
+  // Limits count for the range only when their curve is singled out: they would flatten the others.
+  range() {
+    let low = Infinity, high = -Infinity;
+    const include = (value) => {
+      if (!Number.isFinite(value)) return;
+      low = Math.min(low, value);
+      high = Math.max(high, value);
+    };
+    for (const curve of this.chosen ? [this.chosen] : this.curves) {
+      for (const value of curve.values) include(this.scaled(value));
+      if (this.chosen || this.limits) [curve.low, curve.high].forEach((v) => include(v ?? NaN));
+    }
+    if (this.zero) include(0);
+    if (!(high > low)) [low, high] = [low - 0.5, low + 0.5];
+    if (this.log) return [Math.floor(low), Math.max(Math.ceil(high), Math.floor(low) + 1)];
+    const room = 0.06 * (high - low);
+    return [low - (this.zero && low === 0 ? 0 : room), high + room];
+  }
+
+  draw() {
+    const width = Math.max(this.svg.clientWidth, 200);
+    this.svg.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
+    this.svg.replaceChildren();
+    const [low, high] = this.range();
+    const end = this.t[this.t.length - 1];
+    const { left, right, top, bottom } = MARGIN;
+    this.x = (time) => left + (time / end) * (width - left - right);
+    this.y = (value) => top + ((high - value) / (high - low)) * (HEIGHT - top - bottom);
+    this.inverse = (x) => Math.min(Math.max((x - left) / (width - left - right), 0), 1) * end;
+    this.drawAxes(low, high, end, width);
+    const clip = element(element(this.svg, "clipPath", { id: `clip-${this.id}` }), "rect", {
+      x: left, y: top, width: width - left - right, height: HEIGHT - top - bottom });
+    const group = element(this.svg, "g", { "clip-path": `url(#${clip.parentNode.id})` });
+    for (const curve of this.curves) this.drawCurve(group, curve, left, width - right);
+    this.hoverLine = element(this.svg, "line", { class: "hover", y1: top, y2: HEIGHT - bottom });
+    this.cursor = element(this.svg, "line", { class: "cursor", y1: top, y2: HEIGHT - bottom });
+    this.update();
+  }
+
+  drawAxes(low, high, end, width) {
+    const { left, right, bottom } = MARGIN;
+    const places = this.log
+      ? ticks(low, high, 5).filter(Number.isInteger) : ticks(low, high, 5);
+    const digits = Math.max(0, -Math.floor(Math.log10((places[1] ?? 1) - (places[0] ?? 0)) + 1e-9));
+    for (const place of places) {
+      const y = this.y(place);
+      element(this.svg, "line", { class: "grid", x1: left, x2: width - right, y1: y, y2: y });
+      const label = this.log ? `1e${place}` : place.toFixed(digits).replace(/^-(0(\.0+)?)$/, "$1");
+      element(this.svg, "text", { x: left - 6, y: y + 4, "text-anchor": "end" }, label);
+    }
+    for (const time of ticks(0, end, Math.max(3, width / 110))) {
+      element(this.svg, "text", { x: this.x(time), y: HEIGHT - bottom + 15, "text-anchor": "middle" },
+        `${Number(time.toPrecision(6))} s`);
+    }
+  }
+
+  drawCurve(group, curve, from, to) {
+    const beyond = this.chosen && this.chosen !== curve ? " beyond" : "";
+    let path = "";
+    curve.values.forEach((value, k) => {
+      path += `${k ? "L" : "M"}${this.x(this.t[k]).toFixed(1)},${this.y(this.scaled(value)).toFixed(1)}`;
+    });
+    const look = `curve${curve.start ? " start" : ""}${beyond}`;
+    element(group, "path", { class: look, d: path, stroke: curve.color });
+    for (const limit of [curve.low, curve.high]) {
+      if (!Number.isFinite(limit ?? NaN)) continue;
+      const y = this.y(limit);
+      element(group, "line", { class: `limit${beyond}`, x1: from, x2: to, y1: y, y2: y, stroke: curve.color });
+    }
+  }
+
+  timeAt(event) {
+    const box = this.svg.getBoundingClientRect();
+    return this.inverse(event.clientX - box.left);
+  }
+
+  seek(time) {
+    this.time = time;
+    this.update();
+  }
+
+  update() {
+    const time = this.hover ?? this.time;
+    this.move(this.cursor, this.time);
+    this.move(this.hoverLine, this.hover ?? this.time);
+    this.figure.classList.toggle("hovered", this.hover !== undefined);
+    this.at.textContent = this.hover === undefined ? "" : `at ${this.hover.toFixed(2)} s`;
+    const end = this.t[this.t.length - 1];
+    const place = Math.min(Math.max(time / end, 0), 1) * (this.t.length - 1);
+    const k = Math.min(Math.floor(place), this.t.length - 2);
+    for (const curve of this.curves) {
+      const [a, b] = [curve.values[k], curve.values[k + 1]];
+      curve.output.textContent = format(a + (place - k) * (b - a));
+    }
+  }
+
+  move(line, time) {
+    const x = this.x(time);
+    line.setAttribute("x1", x);
+    line.setAttribute("x2", x);
+  }
+}

@@ -1,0 +1,166 @@
+// The 3-D scene: meshcat's viewer, fed from the payload instead of a server.
+
+const ROOT = "/selfmotion";
+
+function attribute(array, itemSize, normalized = false) {
+  return { array, itemSize, normalized, type: array.constructor.name };
+}
+
+// Geometries that refer to the page's arrays become what three.js's loader expects.
+function expandGeometry(geometry, meshes) {
+  const attributes = {};
+  let index;
+  if ("mesh" in geometry) {
+    attributes.position = attribute(meshes[geometry.mesh].position, 3);
+    index = meshes[geometry.mesh].index;
+  } else if ("vertices" in geometry) {
+    attributes.position = attribute(geometry.vertices, 3);
+    if (geometry.colors) attributes.color = attribute(geometry.colors, 3, true);
+    index = geometry.triangles;
+  } else if ("lines" in geometry) {
+    attributes.position = attribute(new Float32Array(geometry.lines), 3);
+  } else {
+    return geometry;
+  }
+  const data = { attributes };
+  if (index) data.index = attribute(index, 1);
+  return { uuid: geometry.uuid, type: "BufferGeometry", data };
+}
+
+function tracks({ t, position, quaternion }, joint, joints) {
+  const keys = (array, width) => Array.from(t, (time, k) => {
+    const start = (k * joints + joint) * width;
+    return { time, value: Array.from(array.subarray(start, start + width)) };
+  });
+  return [
+    { name: ".position", type: "vector3", keys: keys(position, 3) },
+    { name: ".quaternion", type: "quaternion", keys: keys(quaternion, 4) },
+  ];
+}
+
+class Stage {
+  constructor(element, content) {
+    this.element = element;
+    this.content = content;
+    this.viewer = new MeshCat.Viewer(element);
+    const resize = this.viewer.set_3d_pane_size.bind(this.viewer);
+    // meshcat takes the window's height; the scene is only a part of this page.
+    this.viewer.set_3d_pane_size = () => resize(element.clientWidth, element.clientHeight);
+    this.turned = false;
+    new ResizeObserver(() => this.resize()).observe(element);
+    const meshes = content.meshes.map(decodeMesh);
+    for (const command of content.commands) this.run(command, meshes);
+    for (const plan of content.plans) for (const command of plan.commands) this.run(command, meshes);
+    this.viewer.controls.addEventListener("start", () => { this.turned = true; });
+    this.ball = this.find(`${ROOT}/ellipsoid`);
+    this.ball.matrixAutoUpdate = false;
+    // meshcat lets every object cast a shadow; here only what is solid does, and only one light.
+    this.find(ROOT).traverse((object) => { object.castShadow = false; });
+    for (const name of ["robot", "obstacles", "stage/sun"]) {
+      this.find(`${ROOT}/${name}`).traverse((object) => { object.castShadow = true; });
+    }
+    this.frame();
+  }
+
+  run(command, meshes) {
+    if (command.object?.geometries) {
+      command.object.geometries = command.object.geometries.map((g) => expandGeometry(g, meshes));
+    }
+    this.viewer.handle_command(command);
+  }
+
+  find(path) {
+    return this.viewer.scene_tree.find(path.split("/").filter(Boolean)).object;
+  }
+
+  show(path, visible) {
+    this.viewer.handle_command({ type: "set_property", path, property: "visible", value: visible });
+  }
+
+  // The plan's links and its ghost's move with meshcat's own animation, last of all commands.
+  load(plan) {
+    const clips = [];
+    const add = (root, frames) => this.content.joints.forEach((joint, k) => clips.push({
+      path: `${root}/${joint.node}`,
+      clip: { fps: 1, name: joint.name, tracks: tracks(frames, k, this.content.joints.length) },
+    }));
+    add(`${ROOT}/robot`, plan.frames);
+    if (plan.ghost) add(`${ROOT}/ghost`, plan.ghost);
+    this.viewer.handle_command({
+      type: "set_animation", animations: clips, options: { play: true, repetitions: 1 } });
+    this.viewer.animator.pause();
+  }
+
+  // Everything that moves follows the animator's time just before a frame is drawn.
+  onRender(callback) {
+    const render = this.viewer.render.bind(this.viewer);
+    this.viewer.render = () => {
+      callback(this.time);
+      render();
+    };
+  }
+
+  get time() {
+    const actions = this.viewer.animator.actions;
+    return actions.length ? Math.max(...actions.map((action) => action.time)) : 0;
+  }
+
+  seek(time) {
+    this.viewer.animator.seek(time);
+    this.viewer.animator.display_progress(time);
+  }
+
+  // Place the tool's ellipsoid: a symmetric matrix per sample, interpolated between samples.
+  stretch({ matrix, tool, t }, time, size) {
+    const place = Math.min(time / t[t.length - 1], 1) * (t.length - 1);
+    const k = Math.min(Math.floor(place), t.length - 2);
+    const mix = (array, width, i) => array[width * k + i]
+      + (place - k) * (array[width * (k + 1) + i] - array[width * k + i]);
+    const m = Array.from({ length: 9 }, (_, i) => size * mix(matrix, 9, i));
+    const p = [0, 1, 2].map((i) => mix(tool, 3, i));
+    this.ball.matrix.set(
+      m[0], m[1], m[2], p[0], m[3], m[4], m[5], p[1], m[6], m[7], m[8], p[2], 0, 0, 0, 1);
+    this.ball.matrixWorldNeedsUpdate = true;
+  }
+
+  resize() {
+    this.viewer.set_3d_pane_size();
+    if (!this.turned) this.frame();
+  }
+
+  // Stand just far enough away that the moving arm and its path fill the window.
+  frame() {
+    const { THREE } = MeshCat;
+    const { points, direction } = this.content.camera;
+    // meshcat's camera lives in axes with y up.
+    const upright = ([x, y, z]) => new THREE.Vector3(x, z, -y);
+    const toEye = upright(direction);
+    const right = new THREE.Vector3(0, 1, 0).cross(toEye).normalize();
+    const up = toEye.clone().cross(right);
+    const camera = this.viewer.camera;
+    camera.fov = 36;
+    const aspect = Math.max(this.element.clientWidth, 1) / Math.max(this.element.clientHeight, 1);
+    const tangent = Math.tan(THREE.MathUtils.degToRad(camera.fov / 2)) * 0.9;
+    const seen = points.map(upright).map((p) => [p.dot(right), p.dot(up), p.dot(toEye)]);
+    // Along each of the picture's axes, the two sides of the view touch the scene: a line through
+    // the eye with slope ±s bounds it, which gives centre and distance for that axis.
+    const fit = (axis, slope) => {
+      const from = Math.min(...seen.map((p) => p[axis] - slope * p[2]));
+      const to = Math.max(...seen.map((p) => p[axis] + slope * p[2]));
+      return [(from + to) / 2, (to - from) / 2 / slope];
+    };
+    const [x, across] = fit(0, tangent * aspect);
+    const [y, along] = fit(1, tangent);
+    const depths = seen.map((p) => p[2]);
+    const depth = (Math.min(...depths) + Math.max(...depths)) / 2;
+    const target = right.clone().multiplyScalar(x).addScaledVector(up, y).addScaledVector(toEye, depth);
+    const distance = Math.max(across, along) - depth;
+    camera.position.copy(target).addScaledVector(toEye, distance);
+    camera.near = distance / 200;
+    camera.far = distance * 20;
+    this.viewer.controls.target.copy(target);
+    this.viewer.controls.update();
+    this.turned = false;
+    this.viewer.set_dirty();
+  }
+}
