@@ -19,7 +19,7 @@ from selfmotion.trajectory import Trajectory
 
 # Steps to begin with; halved until the motion at x = 0 drifts off the path by less than this,
 # relative to the extent of the path. Costs are then right to about the same.
-_FEWEST_STEPS, _DRIFT = 32, 1e-4
+_FEWEST_STEPS, _DRIFT = 32, 1e-3
 # Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands.
 _COST_AGREEMENT = 1e-4
 # After these the user has no more time to give.

@@ -142,6 +142,11 @@ class Rollout:
         return by_q, by_qd
 
     @property
+    def table_bytes(self) -> int:
+        """Memory that the tables take."""
+        return int(self._table.nbytes)
+
+    @property
     def drift(self) -> Array:
         """Pose error of the last run at the nodes, (N + 1, 6) [m, rad]: what integration let in."""
         return self._error[self.grid.node_stages]
