@@ -35,7 +35,7 @@ def files(tmp_path_factory):
         "planar": planar_plan(),
         "panda": arm_plan("panda"),
         "ur5": arm_plan("ur5"),
-        "two": [planar_plan(), planar_plan(0.5)],
+        "two": [planar_plan(), planar_plan(mu=30.0)],
     }
     return {name: write_replay(plan, folder / f"{name}.html") for name, plan in plans.items()}
 
@@ -216,10 +216,10 @@ def test_hover_shows_the_values_there(open_page, files):
 def test_a_joint_singled_out_shows_its_limits(open_page, files):
     page = open_page(files["panda"])
     plot = page.locator(".plot").first
-    before = plot.locator("svg text").all_inner_texts()
+    before = plot.locator("svg text").all_text_contents()
     plot.locator("button").nth(3).click()
     assert plot.locator("button").nth(3).get_attribute("aria-pressed") == "true"
-    assert plot.locator("svg text").all_inner_texts() != before
+    assert plot.locator("svg text").all_text_contents() != before
     heights = plot.locator("svg .limit:not(.beyond)").evaluate_all(
         "lines => lines.map((line) => Number(line.getAttribute('y1')))"
     )
@@ -229,7 +229,7 @@ def test_a_joint_singled_out_shows_its_limits(open_page, files):
 
 def test_plans_share_a_page(open_page, files):
     page = open_page(files["two"])
-    second = planar_plan(0.5)
+    second = planar_plan(mu=30.0)
     assert page.locator("#choice button").count() == 2
     page.locator("#choice button").nth(1).click()
     page.evaluate("viewer.animator.seek(1.3)")

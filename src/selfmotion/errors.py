@@ -11,6 +11,7 @@
     ├── InverseKinematicsError    no configuration found for a pose
     ├── BreakdownError            the motion runs into a singular pose
     ├── FileFormatError           a file that is not what it should be
+    ├── RenderError               no browser to draw a picture of a replay with
     └── PlanError                 a plan without the quality asked for (`Plan.require`)
 
 Each message names the thing, what was found, what was expected and what to do about it.
@@ -96,6 +97,10 @@ class BreakdownError(SelfmotionError):
 
 class FileFormatError(SelfmotionError):
     """A file that is not what it should be; the message names the file and the row or key."""
+
+
+class RenderError(SelfmotionError):
+    """A replay cannot be drawn as a picture: no browser, or it fails."""
 
 
 class PlanError(SelfmotionError):

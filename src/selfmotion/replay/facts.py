@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from selfmotion.replay.plan_like import Plan
+from selfmotion.plan import Plan
 
 # A number and a remark, shown smaller after it.
 Cell = tuple[str, str]

@@ -15,8 +15,9 @@ from selfmotion.replay.meshes import Color, Mesh, read_meshes, simplify
 from selfmotion.replay.payload import Json, Payload
 from selfmotion.robot import RobotModel
 
+ROBOT, GHOST = "/selfmotion/robot", "/selfmotion/ghost"
 # Blue-violet: no robot in example-robot-data has it, and it shows on light and dark ground.
-_GHOST = (0.42, 0.36, 0.95)
+_GHOST_COLOR = (0.42, 0.36, 0.95)
 _GHOST_OPACITY = 0.28
 
 
@@ -28,6 +29,8 @@ class Visual:
     ----------
     joint : int
         Index of the moving joint that carries it, -1 for the fixed base.
+    link : str
+        The link it belongs to.
     name : str
         Unique within the robot.
     geometry : dict
@@ -41,6 +44,7 @@ class Visual:
     """
 
     joint: int
+    link: str
     name: str
     geometry: Json
     matrix: Array
@@ -91,7 +95,9 @@ def bake(robot: RobotModel, payload: Payload, triangle_budget: int) -> Arm:
     files: dict[str, list[Mesh]] = {}
     for item in objects:
         if _is_mesh(item) and item.meshPath not in files:
-            files[item.meshPath] = read_meshes(item)
+            files[item.meshPath] = read_meshes(
+                item.meshPath, f"visual '{item.name}'", item.geometry, _scale(item)
+            )
     triangles = sum(len(mesh.faces) for group in files.values() for mesh in group)
     if triangles > triangle_budget:
         share = triangle_budget / triangles
@@ -104,7 +110,12 @@ def bake(robot: RobotModel, payload: Payload, triangle_budget: int) -> Arm:
     visuals = [
         visual
         for item in objects
-        for visual in _visuals(item, files.get(item.meshPath, []), numbers.get(item.meshPath, []))
+        for visual in _visuals(
+            item,
+            robot.model.frames[item.parentFrame].name,
+            files.get(item.meshPath, []),
+            numbers.get(item.meshPath, []),
+        )
     ]
     drawn = sum(len(mesh.faces) for group in files.values() for mesh in group)
     return Arm(tuple(visuals), meshes, triangles, drawn)
@@ -122,7 +133,11 @@ def _is_mesh(item: Any) -> bool:
     return isinstance(item.geometry, coal.BVHModelBase | coal.ConvexBase)
 
 
-def _visuals(item: Any, meshes: list[Mesh], numbers: list[int]) -> Iterator[Visual]:
+def _scale(item: Any) -> Array:
+    return np.asarray(item.meshScale, dtype=np.float64).reshape(3)
+
+
+def _visuals(item: Any, link: str, meshes: list[Mesh], numbers: list[int]) -> Iterator[Visual]:
     joint = int(item.parentJoint) - 1
     placement: Array = item.placement.homogeneous
     red, green, blue, opacity = (float(value) for value in item.meshColor)
@@ -130,15 +145,15 @@ def _visuals(item: Any, meshes: list[Mesh], numbers: list[int]) -> Iterator[Visu
     if not _is_mesh(item):
         geometry, turned, half = _primitive(item, placement)
         box = _box(-half, half, placement)
-        yield Visual(joint, item.name, geometry, turned, own, box)
+        yield Visual(joint, link, item.name, geometry, turned, own, box)
         return
-    matrix = placement @ np.diag([*np.asarray(item.meshScale, dtype=float).reshape(3), 1.0])
+    matrix = placement @ np.diag([*_scale(item), 1.0])
     for part, (mesh, number) in enumerate(zip(meshes, numbers, strict=True)):
         vertices = mesh.vertices
         corners = _box(vertices.min(axis=0), vertices.max(axis=0), matrix)
         color = own if item.overrideMaterial or mesh.color is None else mesh.color
         name = f"{item.name}_{part}" if len(meshes) > 1 else item.name
-        yield Visual(joint, name, {"mesh": number}, matrix, color, corners)
+        yield Visual(joint, link, name, {"mesh": number}, matrix, color, corners)
 
 
 def _primitive(item: Any, placement: Array) -> tuple[Json, Array, Array]:
@@ -169,35 +184,44 @@ def _box(low: Array, high: Array, matrix: Array) -> Array:
     return np.asarray(corners @ matrix[:3, :3].T + matrix[:3, 3])
 
 
-def node(root: str, joint_names: tuple[str, ...], joint: int) -> str:
-    """Return the path of the node that moves with joint `joint` (-1: the fixed base)."""
-    name = joint_names[joint].replace("/", "_") if joint >= 0 else "base"
-    return f"{root}/{name}"
+def joint_name(robot: RobotModel, joint: int) -> str:
+    """Return the name of the node that moves with joint `joint`; -1 is the fixed base."""
+    return safe(robot.joint_names[joint]) if joint >= 0 else "base"
+
+
+def link_node(robot: RobotModel, visual: Visual) -> str:
+    """Return the path of the node that holds the visuals of a link."""
+    return f"{ROBOT}/{joint_name(robot, visual.joint)}/{safe(visual.link)}"
+
+
+def safe(name: str) -> str:
+    """Return `name` as one part of a node's path."""
+    return name.replace("/", "_")
 
 
 def arm_commands(robot: RobotModel, arm: Arm) -> list[Json]:
-    """Return the commands that draw the arm below ``/selfmotion/robot``."""
+    """Return the commands that draw the arm below `ROBOT`."""
     return [
-        _put(
-            "/selfmotion/robot",
-            robot,
-            visual,
+        three.set_object(
+            f"{link_node(robot, visual)}/{safe(visual.name)}",
+            visual.geometry,
             three.material(visual.color, opacity=visual.color[3]),
+            visual.matrix,
         )
         for visual in arm.visuals
     ]
 
 
 def ghost_commands(robot: RobotModel, arm: Arm) -> list[Json]:
-    """Return the commands that draw the moving links once more below ``/selfmotion/ghost``."""
-    look = three.ghostly(_GHOST, _GHOST_OPACITY)
+    """Return the commands that draw the moving links once more below `GHOST`."""
+    look = three.ghostly(_GHOST_COLOR, _GHOST_OPACITY)
     return [
-        _put("/selfmotion/ghost", robot, visual, look)
+        three.set_object(
+            f"{GHOST}/{joint_name(robot, visual.joint)}/{safe(visual.name)}",
+            visual.geometry,
+            look,
+            visual.matrix,
+        )
         for visual in arm.visuals
         if visual.joint >= 0
     ]
-
-
-def _put(root: str, robot: RobotModel, visual: Visual, look: Json) -> Json:
-    path = f"{node(root, robot.joint_names, visual.joint)}/{visual.name.replace('/', '_')}"
-    return three.set_object(path, visual.geometry, look, visual.matrix)

@@ -135,24 +135,34 @@ def simplify(mesh: Mesh, cells: int) -> Mesh:
     return make_mesh(vertices[first], kept, mesh.color)
 
 
-def read_meshes(geometry: Any) -> list[Mesh]:
-    """Read the mesh file of one visual of a link, one `Mesh` per colour in it.
+def read_meshes(
+    path: str, owner: str, loaded: Any = None, scale: Array | float = 1.0
+) -> list[Mesh]:
+    """Read a mesh file, one `Mesh` per colour in it, in the file's units.
 
     Parameters
     ----------
-    geometry : pinocchio.GeometryObject
-        A visual with a mesh file. The scale is not applied.
+    path : str
+        STL, DAE or OBJ file.
+    owner : str
+        Whose mesh it is, for messages.
+    loaded : coal.BVHModelBase, optional
+        What coal has read from the file and multiplied by `scale`; taken where trimesh cannot
+        read it. It comes second because it has no colours, and mixes up the triangles of files
+        with several meshes.
+
+    scale : (3,) or float
+        Metres per unit of the file that `loaded` was made with.
 
     Raises
     ------
     RobotError
-        Neither trimesh nor coal has triangles for the file.
+        Neither has triangles for the file.
     """
-    parts = _read_with_trimesh(geometry.meshPath) or _triangles_of_coal(geometry)
+    parts = _read_with_trimesh(path) or _triangles_of_coal(loaded, scale)
     if not parts:
         raise RobotError(
-            f"visual '{geometry.name}': no triangles in mesh file {geometry.meshPath}; "
-            f"export it again as .stl, .dae or .obj"
+            f"{owner}: no triangles in mesh file {path}; export it again as .stl, .dae or .obj"
         )
     return [
         make_mesh(
@@ -203,12 +213,9 @@ def _color(visual: Any) -> Color | None:
     return red, green, blue, opacity or 1.0
 
 
-def _triangles_of_coal(geometry: Any) -> dict[Color | None, list[_Triangles]]:
-    shape = geometry.geometry
-    count = getattr(shape, "num_tris", 0)
-    if not count:
+def _triangles_of_coal(loaded: Any, scale: Array | float) -> dict[Color | None, list[_Triangles]]:
+    if loaded is None or loaded.num_tris == 0:
         return {}
-    # Pinocchio has applied the scale already; the caller applies it again to every mesh.
-    vertices = np.array(shape.vertices()) / np.asarray(geometry.meshScale).reshape(3)
-    triangles = [shape.tri_indices(k) for k in range(count)]
-    return {None: [(vertices, np.array([[t[0], t[1], t[2]] for t in triangles]))]}
+    triangles = [loaded.tri_indices(k) for k in range(loaded.num_tris)]
+    faces = np.array([[triangle[0], triangle[1], triangle[2]] for triangle in triangles])
+    return {None: [(np.array(loaded.vertices()) / scale, faces)]}

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion.arrays import Array
-from selfmotion.replay.plan_like import Plan
+from selfmotion.plan import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 from selfmotion.trajectory import Trajectory

@@ -1,5 +1,6 @@
 """What stands around the arm: ground, light, camera, obstacles, and the traces of the tool."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,15 +8,18 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from selfmotion.arrays import Array
-from selfmotion.errors import RobotError
 from selfmotion.replay import shapes, three
-from selfmotion.replay.links import Arm
+from selfmotion.replay.links import Arm, safe
+from selfmotion.replay.meshes import read_meshes
 from selfmotion.replay.motion import Curves, KeyFrames
 from selfmotion.replay.payload import Json, Payload
+from selfmotion.replay.shapes import Indices, Surface
 
 _ROOT = "/selfmotion"
 _OBSTACLE = (0.80, 0.62, 0.42)
 _PRESCRIBED = (0.55, 0.57, 0.60)
+# three.js: draw only faces seen from behind.
+_INSIDE = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,13 +160,20 @@ def _grid(center: Array, reach: float, height: float) -> Json:
 
 
 def trace_commands(
-    root: str, payload: Payload, shown: Curves, start: Curves | None, target: Array, scale: Json
+    root: str,
+    payload: Payload,
+    shown: Curves,
+    start: Curves,
+    target: Array,
+    scale: Json,
+    radius: float,
 ) -> list[Json]:
     """Return the commands for one plan's traces, below `root`.
 
     The prescribed path is the far wall of a wide tube; the plan's trace a solid tube inside,
     coloured by manipulability; the trace of the x = 0 motion a row of beads. All three usually
-    coincide, because the tool motion is prescribed, and so they stay apart to the eye.
+    coincide, because the tool motion is prescribed, and so they stay apart to the eye. A tool that
+    only turns leaves no trace.
 
     Parameters
     ----------
@@ -171,31 +182,33 @@ def trace_commands(
     payload : Payload
         Takes the meshes.
     shown, start : Curves
-        The plan, and its x = 0 motion if there is one.
+        The plan and its x = 0 motion.
     target : (M, 3)
         The prescribed path [m].
     scale : dict
-        ``low`` and ``high`` of the colour scale, ``radius`` of the trace [m].
+        ``low`` and ``high`` of the colour scale.
+    radius : float
+        Of the plan's trace [m].
     """
-    radius = scale["radius"]
+
+    def painted(curve: Curves, kept: Indices, surface: Surface) -> Json:
+        colors = shapes.colors_of(curve.manipulability[kept], scale["low"], scale["high"])
+        copies = len(surface[0]) // len(kept)
+        return _surface(payload, *surface, np.repeat(colors, copies, axis=0))
+
     commands = []
     kept = shapes.distinct(target, 0.5 * radius)
     if len(kept) > 1:
-        surface = shapes.tube(target[kept], 2.2 * radius)
-        look = {**three.ghostly(_PRESCRIBED, 0.4), "side": 1}
-        commands.append(three.set_object(f"{root}/prescribed", _surface(payload, *surface), look))
+        drawn = _surface(payload, *shapes.tube(target[kept], 2.2 * radius))
+        look = {**three.ghostly(_PRESCRIBED, 0.4), "side": _INSIDE}
+        commands.append(three.set_object(f"{root}/prescribed", drawn, look))
     kept = shapes.distinct(shown.tool, 0.5 * radius)
     if len(kept) > 1:
-        colors = shapes.colors_of(shown.manipulability[kept], scale["low"], scale["high"])
-        surface = shapes.tube(shown.tool[kept], radius)
-        drawn = _surface(payload, *surface, np.repeat(colors, 8, axis=0))
+        drawn = painted(shown, kept, shapes.tube(shown.tool[kept], radius))
         commands.append(three.set_object(f"{root}/trace", drawn, _painted()))
-    if start is not None:
-        kept = shapes.distinct(start.tool, 9.0 * radius)
-        colors = shapes.colors_of(start.manipulability[kept], scale["low"], scale["high"])
-        surface = shapes.beads(start.tool[kept], 2.6 * radius)
-        drawn = _surface(payload, *surface, np.repeat(colors, 18, axis=0))
-        commands.append(three.set_object(f"{root}/start", drawn, _painted()))
+    kept = shapes.distinct(start.tool, 9.0 * radius)
+    drawn = painted(start, kept, shapes.beads(start.tool[kept], 2.6 * radius))
+    commands.append(three.set_object(f"{root}/start", drawn, _painted()))
     return commands
 
 
@@ -212,7 +225,7 @@ def _painted() -> Json:
 
 
 def _surface(
-    payload: Payload, vertices: Array, faces: shapes.Indices, colors: Array | None = None
+    payload: Payload, vertices: Array, faces: Indices, colors: Array | None = None
 ) -> Json:
     drawn: Json = {"vertices": payload.array(vertices), "triangles": payload.array(faces, "u4")}
     if colors is not None:
@@ -227,33 +240,39 @@ def ellipsoid_command() -> Json:
     )
 
 
-def obstacle_commands(obstacles: tuple[Any, ...], payload: Payload) -> list[Json]:
-    """Return the commands that draw the world's obstacles.
+def obstacle_node(obstacle: Any) -> str:
+    """Return the path of an obstacle's node."""
+    return f"{_ROOT}/obstacles/{safe(obstacle.name)}"
+
+
+def obstacle_commands(obstacles: Sequence[Any], payload: Payload) -> list[Json]:
+    """Return the commands that draw the obstacles of `selfmotion.collision`.
 
     Raises
     ------
     RobotError
-        An obstacle has a shape that cannot be drawn.
+        A mesh cannot be read.
     """
     look = three.material(_OBSTACLE, opacity=0.85)
     return [
-        three.set_object(
-            f"{_ROOT}/obstacles/{item.name.replace('/', '_')}", *_obstacle(item, payload, look)
-        )
+        three.set_object(f"{obstacle_node(item)}/{k}", geometry, look, matrix)
         for item in obstacles
+        for k, (geometry, matrix) in enumerate(_obstacle(item, payload))
     ]
 
 
-def _obstacle(item: Any, payload: Payload, look: Json) -> tuple[Json, Json, Array]:
+def _obstacle(item: Any, payload: Payload) -> list[tuple[Json, Array]]:
     matrix: Array = item.pose.homogeneous
-    match type(item).__name__:
-        case "Box":
-            return three.box(item.size), look, matrix
-        case "Sphere":
-            return three.sphere(item.radius), look, matrix
-        case "Cylinder":
-            return three.cylinder(item.radius, item.length), look, three.about_z(matrix)
-        case "Capsule":
-            return three.capsule(item.radius, item.length), look, three.about_z(matrix)
-        case kind:
-            raise RobotError(f"obstacle '{item.name}' is a {kind}, which a replay cannot draw")
+    match item.shape:
+        case "box":
+            return [(three.box(item.size), matrix)]
+        case "sphere":
+            return [(three.sphere(item.radius), matrix)]
+        case "cylinder":
+            return [(three.cylinder(item.radius, item.length), three.about_z(matrix))]
+        case "capsule":
+            return [(three.capsule(item.radius, item.length), three.about_z(matrix))]
+        case _:
+            scaled = matrix @ np.diag([item.scale, item.scale, item.scale, 1.0])
+            meshes = read_meshes(str(item.file), f"obstacle '{item.name}'")
+            return [(_surface(payload, mesh.vertices, mesh.faces), scaled) for mesh in meshes]

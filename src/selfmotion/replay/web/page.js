@@ -10,7 +10,7 @@ class Page {
   constructor(content, stage) {
     this.content = content;
     this.stage = stage;
-    this.layers = { ghost: false, trace: true, triads: true, ellipsoid: false };
+    this.layers = Object.fromEntries(content.layers.map(({ name, on }) => [name, on]));
     this.now = 0;
     this.playing = false;
     this.plots = [];
@@ -22,7 +22,7 @@ class Page {
     stage?.onRender((time) => this.follow(time));
     this.choose(0);
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    if (stage && !still && !location.hash.includes("still")) this.play();
+    if (stage && !still) this.play();
   }
 
   get duration() { return this.plan.duration; }
@@ -57,7 +57,24 @@ class Page {
     get("time").setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
     get("clock").textContent = `${time.toFixed(2)} / ${this.duration.toFixed(2)} s`;
     for (const plot of this.plots) plot.seek(time);
+    this.showPair(time);
     if (this.layers.ellipsoid) this.stage?.stretch(this.plan.ellipsoid, time, this.content.ellipsoidSize);
+  }
+
+  // The closest pair at the sample nearest in time: by name, and tinted in the scene.
+  showPair(time) {
+    const { clearance } = this.plan;
+    const shown = clearance !== null && this.layers.pair;
+    get("pair").hidden = !shown;
+    if (!shown) {
+      this.stage?.mark([]);
+      return;
+    }
+    const last = clearance.t.length - 1;
+    const k = Math.round((time / clearance.t[last]) * last);
+    const [first, second] = clearance.pairs[k];
+    get("pair").textContent = `closest: ${first} and ${second}, ${format(clearance.value[k])} m`;
+    this.stage?.mark([first, second]);
   }
 
   play() {
@@ -169,9 +186,10 @@ class Page {
   }
 
   applyLayers() {
+    this.showPair(this.now);
     if (!this.stage) return;
     const { ghost, trace, triads, ellipsoid } = this.layers;
-    this.stage.show("/selfmotion/ghost", ghost && this.plan.ghost !== null);
+    this.stage.show("/selfmotion/ghost", ghost);
     this.stage.show("/selfmotion/ellipsoid", ellipsoid);
     this.content.plans.forEach((plan, k) => {
       const shown = k === this.number;
@@ -216,14 +234,14 @@ function column(table, k, width) {
   return Float32Array.from({ length: table.length / width }, (_, row) => table[row * width + k]);
 }
 
-function plotSpecs({ joints }, { curves, start }) {
+function plotSpecs({ joints }, { curves, start, clearance }) {
   const unit = [...new Set(joints.map((joint) => joint.unit))].join(" or ");
   const perJoint = (table, low, high) => joints.map((joint, k) => ({
     name: joint.name, values: column(table, k, joints.length), color: COLORS[k % COLORS.length],
     low: low(joint) ?? NaN, high: high(joint) ?? NaN }));
   const both = (name) => [
     { name: "plan", values: curves[name], color: COLORS[0] },
-    ...(start ? [{ name: "x = 0", values: start[name], color: COLORS[1], start: true }] : [])];
+    { name: "x = 0", values: start[name], color: COLORS[1], start: true }];
   const errors = [
     ...("position" in curves ? [{ name: "position [m]", values: curves.position, color: COLORS[0] }] : []),
     ...("rotation" in curves ? [{ name: "rotation [rad]", values: curves.rotation, color: COLORS[3] }] : [])];
@@ -234,8 +252,8 @@ function plotSpecs({ joints }, { curves, start }) {
       curves: perJoint(curves.qd, (j) => (j.speed === null ? null : -j.speed), (j) => j.speed) },
     { title: "Manipulability √det(JJᵀ)", unit: "", t, zero: true, curves: both("manipulability") },
     { title: "Path error", unit: "", t, log: true, floor: 1e-16, curves: errors },
-    ...("clearance" in curves
-      ? [{ title: "Clearance", unit: "m", t, zero: true, curves: both("clearance") }] : []),
+    ...(clearance ? [{ title: "Clearance", unit: "m", t: clearance.t, zero: true,
+      curves: [{ name: "closest pair", values: clearance.value, color: COLORS[0] }] }] : []),
   ];
 }
 

@@ -47,6 +47,7 @@ class Stage {
     // meshcat takes the window's height; the scene is only a part of this page.
     this.viewer.set_3d_pane_size = () => resize(element.clientWidth, element.clientHeight);
     this.turned = false;
+    this.marked = [];
     new ResizeObserver(() => this.resize()).observe(element);
     const meshes = content.meshes.map(decodeMesh);
     for (const command of content.commands) this.run(command, meshes);
@@ -85,7 +86,7 @@ class Stage {
       clip: { fps: 1, name: joint.name, tracks: tracks(frames, k, this.content.joints.length) },
     }));
     add(`${ROOT}/robot`, plan.frames);
-    if (plan.ghost) add(`${ROOT}/ghost`, plan.ghost);
+    add(`${ROOT}/ghost`, plan.ghost);
     this.viewer.handle_command({
       type: "set_animation", animations: clips, options: { play: true, repetitions: 1 } });
     this.viewer.animator.pause();
@@ -123,6 +124,18 @@ class Stage {
     this.ball.matrixWorldNeedsUpdate = true;
   }
 
+  // Tint the named bodies: links or obstacles.
+  mark(bodies) {
+    const wanted = bodies.map((name) => this.content.bodies[name]).filter(Boolean);
+    if (String(wanted) === String(this.marked)) return;
+    const tint = (paths, color) => paths.forEach((path) => this.find(path).traverse((object) => {
+      object.material?.emissive?.setHex(color);
+    }));
+    tint(this.marked, 0);
+    tint(wanted, 0x9c2f00);
+    this.marked = wanted;
+  }
+
   resize() {
     this.viewer.set_3d_pane_size();
     if (!this.turned) this.frame();
@@ -140,21 +153,23 @@ class Stage {
     const camera = this.viewer.camera;
     camera.fov = 36;
     const aspect = Math.max(this.element.clientWidth, 1) / Math.max(this.element.clientHeight, 1);
-    const tangent = Math.tan(THREE.MathUtils.degToRad(camera.fov / 2)) * 0.9;
+    const tangent = Math.tan(THREE.MathUtils.degToRad(camera.fov / 2));
     const seen = points.map(upright).map((p) => [p.dot(right), p.dot(up), p.dot(toEye)]);
-    // Along each of the picture's axes, the two sides of the view touch the scene: a line through
-    // the eye with slope ±s bounds it, which gives centre and distance for that axis.
-    const fit = (axis, slope) => {
-      const from = Math.min(...seen.map((p) => p[axis] - slope * p[2]));
-      const to = Math.max(...seen.map((p) => p[axis] + slope * p[2]));
-      return [(from + to) / 2, (to - from) / 2 / slope];
-    };
-    const [x, across] = fit(0, tangent * aspect);
-    const [y, along] = fit(1, tangent);
+    // Along each of the picture's axes two lines through the eye bound the scene, with slopes that
+    // leave a margin: more at the top, where the verdict stands. An eye at depth d sees all points
+    // if its coordinate lies between `high - upper * d` and `low + lower * d`.
+    const bounds = [[0, 0.92 * aspect, 0.92 * aspect], [1, 0.92, 0.8]].map(([axis, lower, upper]) => ({
+      lower: lower * tangent,
+      upper: upper * tangent,
+      low: Math.min(...seen.map((p) => p[axis] - lower * tangent * p[2])),
+      high: Math.max(...seen.map((p) => p[axis] + upper * tangent * p[2])),
+    }));
+    const eye = Math.max(...bounds.map((b) => (b.high - b.low) / (b.lower + b.upper)));
+    const [x, y] = bounds.map((b) => (b.high - b.upper * eye + b.low + b.lower * eye) / 2);
     const depths = seen.map((p) => p[2]);
     const depth = (Math.min(...depths) + Math.max(...depths)) / 2;
     const target = right.clone().multiplyScalar(x).addScaledVector(up, y).addScaledVector(toEye, depth);
-    const distance = Math.max(across, along) - depth;
+    const distance = eye - depth;
     camera.position.copy(target).addScaledVector(toEye, distance);
     camera.near = distance / 200;
     camera.far = distance * 20;

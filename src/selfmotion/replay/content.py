@@ -1,0 +1,192 @@
+"""All that a page knows, from plans: see `Payload` for how it travels."""
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.arrays import Array
+from selfmotion.plan import Plan
+from selfmotion.replay import links, scene, shapes
+from selfmotion.replay.clearance import ClearanceCurve, Distances, clearance_curve
+from selfmotion.replay.facts import table
+from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames
+from selfmotion.replay.payload import Json, Payload
+
+# What can be shown and hidden: with its key, and whether it is shown at first.
+_LAYERS = [
+    {"name": "ghost", "label": "x = 0 motion", "key": "g", "on": False},
+    {"name": "trace", "label": "tool path", "key": "t", "on": True},
+    {"name": "triads", "label": "tool axes", "key": "a", "on": True},
+    {"name": "ellipsoid", "label": "velocity ellipsoid", "key": "e", "on": False},
+]
+_PAIR_LAYER = {"name": "pair", "label": "closest pair", "key": "c", "on": True}
+
+# Sizes of what is drawn, relative to half the diagonal of the scene.
+_TRACE_RADIUS = 0.005
+_TRIAD_LENGTH = 0.09
+_ELLIPSOID_LENGTH = 0.3
+
+
+class _Motion:
+    """A plan, sampled: the motion itself and x = 0."""
+
+    def __init__(self, plan: Plan, distances: Distances | None) -> None:
+        robot = plan.robot
+        self.plan = plan
+        self.frames = key_frames(robot, plan.trajectory)
+        self.ghost = key_frames(robot, plan.initial_trajectory)
+        self.shown = curves(plan, plan.trajectory)
+        self.start = curves(plan, plan.initial_trajectory)
+        self.target: Array = plan.path.samples(self.shown.t + plan.trajectory.t[0]).translation
+        self.clearance: ClearanceCurve | None = None
+        if distances is not None:
+            self.clearance = clearance_curve(plan.trajectory, distances)
+
+
+def page_content(
+    plans: list[Plan],
+    names: list[str],
+    payload: Payload,
+    *,
+    triads: int | npt.ArrayLike,
+    triangle_budget: int,
+    distances: Distances | None,
+) -> Json:
+    """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`."""
+    robot = plans[0].robot
+    obstacles = () if distances is None else tuple(distances.obstacles)
+    arm = links.bake(robot, payload, triangle_budget)
+    motions = [_Motion(plan, distances) for plan in plans]
+    hull = scene.outline(
+        arm,
+        [frames for motion in motions for frames in (motion.frames, motion.ghost)],
+        [points for motion in motions for points in (motion.shown.tool, motion.target)],
+    )
+    box = scene.Bounds(hull.min(axis=0), hull.max(axis=0))
+    scale = _scale(motions)
+    longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
+    return {
+        "camera": scene.camera(hull, motions[0].shown.tool),
+        "commands": [
+            *scene.stage_commands(box),
+            *links.arm_commands(robot, arm),
+            *links.ghost_commands(robot, arm),
+            *scene.obstacle_commands(obstacles, payload),
+            scene.ellipsoid_command(),
+        ],
+        "meshes": arm.meshes,
+        "joints": _joints(plans[0]),
+        "layers": _LAYERS if distances is None else [*_LAYERS, _PAIR_LAYER],
+        "scale": {**scale, "colors": shapes.COLOR_SCALE},
+        "ellipsoidSize": _ELLIPSOID_LENGTH * box.radius / longest,
+        "bodies": {
+            **{visual.link: links.link_node(robot, visual) for visual in arm.visuals},
+            **{item.name: scene.obstacle_node(item) for item in obstacles},
+        },
+        "plans": [
+            _plan(motion, name, f"/selfmotion/plan{k}", payload, scale, triads, box.radius)
+            for k, (motion, name) in enumerate(zip(motions, names, strict=True))
+        ],
+        "table": table(plans),
+    }
+
+
+def _scale(motions: list[_Motion]) -> Json:
+    """Return the ends of the colour scale, the same for all plans, so that colours compare."""
+    values = np.concatenate(
+        [each.manipulability for motion in motions for each in (motion.shown, motion.start)]
+    )
+    low, high = float(values.min()), float(values.max())
+    if high - low < 1e-9 * high:
+        low, high = 0.9 * low, 1.1 * high or 1.0
+    return {"low": low, "high": high}
+
+
+def _plan(
+    motion: _Motion,
+    name: str,
+    root: str,
+    payload: Payload,
+    scale: Json,
+    triads: int | npt.ArrayLike,
+    size: float,
+) -> Json:
+    """Return what a page needs of one plan, its traces below the node `root`."""
+    shown = motion.shown
+    times = (
+        np.linspace(0.0, shown.t[-1], triads)
+        if isinstance(triads, int)
+        else np.atleast_1d(np.asarray(triads, dtype=float))
+    )
+    return {
+        "label": name,
+        "root": root,
+        "duration": motion.plan.trajectory.duration,
+        "verdict": motion.plan.certificate.verdict,
+        "verified": bool(motion.plan.certificate.verified),
+        "frames": _packed(motion.frames, payload),
+        "ghost": _packed(motion.ghost, payload),
+        "curves": _curves(motion.plan, shown, payload),
+        "start": _curves(motion.plan, motion.start, payload),
+        "ellipsoid": {
+            "t": payload.array(shown.t),
+            "matrix": payload.array(shown.ellipsoid),
+            "tool": payload.array(shown.tool),
+        },
+        "clearance": None if motion.clearance is None else _clearance(motion.clearance, payload),
+        "commands": [
+            *scene.trace_commands(
+                root, payload, shown, motion.start, motion.target, scale, _TRACE_RADIUS * size
+            ),
+            scene.triad_command(root, payload, shown, times, _TRIAD_LENGTH * size),
+        ],
+    }
+
+
+def _packed(frames: KeyFrames, payload: Payload) -> Json:
+    return {
+        "t": payload.array(frames.t, "f8"),
+        "position": payload.array(frames.position),
+        "quaternion": payload.array(frames.quaternion),
+    }
+
+
+def _curves(plan: Plan, sampled: Curves, payload: Payload) -> Json:
+    drawn = {
+        "t": payload.array(sampled.t),
+        "q": payload.array(sampled.q),
+        "qd": payload.array(sampled.qd),
+        "manipulability": payload.array(sampled.manipulability),
+    }
+    if np.any(plan.task.rows < 3):
+        drawn["position"] = payload.array(sampled.position_error)
+    if np.any(plan.task.rows >= 3):
+        drawn["rotation"] = payload.array(sampled.rotation_error)
+    return drawn
+
+
+def _clearance(curve: ClearanceCurve, payload: Payload) -> Json:
+    return {
+        "t": payload.array(curve.t),
+        "value": payload.array(curve.value),
+        "pairs": curve.pairs,
+    }
+
+
+def _joints(plan: Plan) -> list[Json]:
+    robot = plan.robot
+    kinds = [robot.urdf.joints[name].kind for name in robot.joint_names]
+    return [
+        {
+            "name": name,
+            "node": links.joint_name(robot, k),
+            "unit": "m" if kinds[k] == "prismatic" else "rad",
+            "lower": _finite(robot.lower[k]),
+            "upper": _finite(robot.upper[k]),
+            "speed": _finite(robot.velocity_limit[k]),
+        }
+        for k, name in enumerate(robot.joint_names)
+    ]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
