@@ -114,16 +114,32 @@ def check(plan: PlanArgument) -> None:
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
 
 
-@app.command(epilog="Example: selfmotion replay plan.npz --html replay.html")
+@app.command(
+    epilog="Example: selfmotion replay plan.npz --html replay.html --png 1.5 --gif motion.gif"
+)
 def replay(
     plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz, of one robot.")],
     html: Annotated[Path, typer.Option(help="The page to write.")] = Path("replay.html"),
+    png: Annotated[
+        float | None, typer.Option(help="Also draw the scene at this time (s), beside the page.")
+    ] = None,
+    gif: Annotated[Path | None, typer.Option(help="Also draw the motion as a GIF.")] = None,
 ) -> None:
-    """Write a page that replays plans in a browser, offline."""
-    from selfmotion.replay import write_replay
+    """Write a page that replays plans in a browser, offline; several get a switch.
 
-    write_replay([sm.load_plan(plan) for plan in plans], html)
-    _console.print(f"wrote {html}", markup=False)
+    Pictures need a browser (chromium) on this machine.
+    """
+    from selfmotion.replay import render_gif, render_png, write_replay
+
+    saved = [sm.load_plan(plan) for plan in plans]
+    labels = [plan.stem for plan in plans] if len(plans) > 1 else None
+    written = [write_replay(saved, html, labels=labels)]
+    if png is not None:
+        written.append(render_png(saved[0], html.with_suffix(".png"), t=png))
+    if gif is not None:
+        written.append(render_gif(saved[0], gif))
+    for file in written:
+        _console.print(f"wrote {file}", markup=False)
 
 
 @app.command(epilog="Example: selfmotion robots")

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from selfmotion.quasi_newton import Iteration, Status
 from selfmotion.robot import RobotModel, rebuild_robot
 from selfmotion.task import Task
 from selfmotion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +119,21 @@ class Plan:
         names = [*motion.joint_names, *(f"{name}_velocity" for name in motion.joint_names)]
         table = np.column_stack([motion.t, motion.q, motion.qd])
         files.write_csv(FilePath(file), ["t", *names], table)
+
+    def figure(self) -> "Figure":
+        """Return joint positions and velocities, manipulability and path error as a figure.
+
+        Needs matplotlib (``pip install 'selfmotion[plots]'``).
+        """
+        from selfmotion.replay import figure
+
+        return figure(self)
+
+    def _repr_html_(self) -> str:
+        """Show the replay inline in a notebook."""
+        from selfmotion.replay import notebook_html
+
+        return notebook_html(self)
 
 
 def load_plan(file: str | FilePath) -> Plan:
