@@ -95,7 +95,7 @@ class Solid:
         """Points of the solid, one at least on each connected surface, (S, 3)."""
         if not is_mesh(self.geometry):
             return np.zeros((1, 3))
-        faces, count = _triangles(self.geometry), self.geometry.num_vertices
+        faces, count = triangles(self.geometry), self.geometry.num_vertices
         links = coo_array(
             (np.ones(2 * len(faces)), (faces[:, :2].ravel(), faces[:, 1:].ravel())),
             shape=(count, count),
@@ -107,7 +107,7 @@ class Solid:
 
     @cached_property
     def _corners(self) -> Array:
-        corners: Array = self.geometry.vertices()[_triangles(self.geometry)]
+        corners: Array = self.geometry.vertices()[triangles(self.geometry)]
         return corners
 
     def contains_any(self, points: Array) -> bool:
@@ -122,7 +122,7 @@ class Solid:
         return any(abs(winding_number(self._corners, point)) > 0.5 for point in points[within])
 
 
-def _triangles(mesh: Any) -> npt.NDArray[np.intp]:
+def triangles(mesh: Any) -> npt.NDArray[np.intp]:
     """Return the corner indices of a mesh's triangles, (T, 3)."""
     corners = (mesh.tri_indices(i) for i in range(mesh.num_tris))
     return np.array([(t[0], t[1], t[2]) for t in corners], dtype=np.intp).reshape(-1, 3)
