@@ -1,5 +1,6 @@
 """Collisions: exact distances for certificates, smooth conservative ones for optimisation."""
 
+from selfmotion.collision.clearance import ClearanceModel, Clearances
 from selfmotion.collision.exact import Clearance, CollisionModel
 from selfmotion.collision.obstacles import (
     Box,
@@ -15,6 +16,8 @@ __all__ = [
     "Box",
     "Capsule",
     "Clearance",
+    "ClearanceModel",
+    "Clearances",
     "CollisionModel",
     "Cylinder",
     "Mesh",

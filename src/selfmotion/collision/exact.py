@@ -94,7 +94,7 @@ class CollisionModel:
         world = [Body(obstacle.name, 0, is_obstacle=True) for obstacle in self.obstacles]
         self._bodies = links + world
         for obstacle in self.obstacles:
-            self._meshes.addGeometryObject(_place(obstacle))
+            self._meshes.addGeometryObject(_geometry_object(obstacle))
         self._hulls = _hulls_of(self._meshes)
         self._solids = [shapes.Solid(piece.geometry) for piece in self._meshes.geometryObjects]
         self._set_pairs(candidate_pairs(self._bodies, robot.urdf, srdf))
@@ -151,18 +151,24 @@ class CollisionModel:
             return False
         if not self._refined:
             return True
-        lower = self._hull_distances()
-        self._place_meshes()
+        lower = self._lower_bounds()
         near = np.flatnonzero(lower < margin)
         return any(self._pair_distance(int(i), lower[i]) < margin for i in near)
+
+    def overlaps(self, q_samples: Array) -> dict[tuple[str, str], npt.NDArray[np.bool_]]:
+        """Return for each pair of names at which samples (K, n) the two overlap, (K,)."""
+        found = {names: np.zeros(len(q_samples), dtype=bool) for names in self.pairs}
+        for k, q in enumerate(q_samples):
+            for i in np.flatnonzero(self._place(self.robot.configuration(q)) <= 0.0):
+                row = found[self._names(int(i))]
+                row[k] = row[k] or self._pair_distance(int(i), 0.0) <= 0.0
+        return found
 
     def _closest(self, q: Array, best: Clearance, index: int) -> Clearance:
         """Return the smaller of `best` and the distance at `q`."""
         if not self._index_pairs:
             return best
-        pin.updateGeometryPlacements(self.robot.model, self._data, self._hulls, self._hull_data, q)
-        lower = self._hull_distances()
-        self._place_meshes()
+        lower = self._place(q)
         for i in np.argsort(lower, kind="stable"):
             if lower[i] >= best.value:
                 break
@@ -175,13 +181,16 @@ class CollisionModel:
         first, second = self._index_pairs[pair]
         return self._bodies[first].name, self._bodies[second].name
 
-    def _hull_distances(self) -> Array:
+    def _place(self, q: Array) -> Array:
+        """Place all bodies and return the distances of their hulls, (P,)."""
+        pin.updateGeometryPlacements(self.robot.model, self._data, self._hulls, self._hull_data, q)
+        return self._lower_bounds()
+
+    def _lower_bounds(self) -> Array:
+        """Return the distances of the hulls as they are placed, and place the meshes with them."""
+        pin.updateGeometryPlacements(self.robot.model, self._data, self._meshes, self._mesh_data)
         pin.computeDistances(self._hulls, self._hull_data)
         return np.array([result.min_distance for result in self._hull_results])
-
-    def _place_meshes(self) -> None:
-        """Place the meshes where the last call put the joints."""
-        pin.updateGeometryPlacements(self.robot.model, self._data, self._meshes, self._mesh_data)
 
     def _pair_distance(self, pair: int, hulls: float) -> float:
         """Return the distance of one pair [m], given that of its convex hulls."""
@@ -214,12 +223,7 @@ class CollisionModel:
         for _ in range(_SAMPLES):
             if not touching:
                 break
-            q = rng.uniform(lower, upper)
-            pin.updateGeometryPlacements(
-                self.robot.model, self._data, self._hulls, self._hull_data, q
-            )
-            self._place_meshes()
-            distances = self._hull_distances()
+            distances = self._place(rng.uniform(lower, upper))
             touching = [i for i in touching if self._pair_distance(i, distances[i]) <= 0.0]
         return [pair for i, pair in enumerate(self._index_pairs) if i not in set(touching)]
 
@@ -269,7 +273,7 @@ def _check_names(obstacles: Sequence[Obstacle], links: Sequence[str]) -> None:
         taken.add(obstacle.name)
 
 
-def _place(obstacle: Obstacle) -> Any:
+def _geometry_object(obstacle: Obstacle) -> Any:
     return pin.GeometryObject(
         obstacle.name, 0, 0, obstacle.pose, shapes.obstacle_geometry(obstacle)
     )
