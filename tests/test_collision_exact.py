@@ -88,7 +88,7 @@ def test_collides_says_what_distance_says(name: str) -> None:
     model = CollisionModel(robot, () if name == "planar_3r" else BOXES)
     for q, margin in itertools.product(samples(robot, 40), (0.0, 0.02)):
         value = model.distance(q).value
-        if abs(value - margin) > GJK:
+        if abs(value - margin) > HULL:
             assert model.collides(q, margin) == (value < margin)
 
 

@@ -61,26 +61,26 @@ def _total(capsules: Array) -> float:
 def _enclose(points: Array, radii: Array) -> Array:
     """Return [middle, half, radius] of a small capsule around balls.
 
-    Nelder-Mead over the direction and place of the axis and the radius, from each principal axis;
-    for these the segment follows in closed form, so that every trial contains the balls.
+    Nelder-Mead over the direction and place of the axis and the radius, from the best principal
+    axis; for these the segment follows in closed form, so that every trial contains the balls.
     """
     points = np.ascontiguousarray(points)
     centre = points.mean(axis=0)
     size = max(float(np.ptp(points, axis=0).max()), float(radii.max()), 1e-9)
     axes = np.linalg.svd(np.vstack([points - centre, 1e-12 * np.eye(3)]), full_matrices=False)[2]
-    best, volume = np.zeros(7), math.inf
-    for k in range(3):
-        frame = np.ascontiguousarray(np.roll(axes, -k, axis=0))
-        fixed = (points, radii, centre, frame, size)
-        answer = minimize(
-            _trial_volume,
-            np.zeros(5),
-            args=fixed,
-            method="Nelder-Mead",
-            options={"initial_simplex": 0.1 * np.eye(6, 5, k=-1), "maxfev": 300, "xatol": 1e-4},
-        )
-        if answer.fun < volume:
-            best, volume = _trial(answer.x, *fixed), float(answer.fun)
+    starts = [
+        (points, radii, centre, np.ascontiguousarray(np.roll(axes, -k, axis=0)), size)
+        for k in range(3)
+    ]
+    start = min(starts, key=lambda fixed: _trial_volume(np.zeros(5), *fixed))
+    answer = minimize(
+        _trial_volume,
+        np.zeros(5),
+        args=start,
+        method="Nelder-Mead",
+        options={"initial_simplex": 0.1 * np.eye(6, 5, k=-1), "maxfev": 400, "xatol": 1e-4},
+    )
+    best = _trial(answer.x, *start)
     # The radius anew, from the finished segment: containment must not rest on rounding above.
     best[6] = (axis_distance(points, best[:3], best[3:6]) + radii).max()
     return best
@@ -97,9 +97,9 @@ def _trial(
     along, aside = np.empty(len(points)), np.empty(len(points))
     radius = 0.0
     for i in range(len(points)):
-        offset = points[i] - origin
-        along[i] = (offset * axis).sum()
-        aside[i] = math.sqrt(max((offset * offset).sum() - along[i] ** 2, 0.0))
+        u, v, w = points[i, 0] - origin[0], points[i, 1] - origin[1], points[i, 2] - origin[2]
+        along[i] = u * axis[0] + v * axis[1] + w * axis[2]
+        aside[i] = math.sqrt(max(u * u + v * v + w * w - along[i] ** 2, 0.0))
         radius = max(radius, aside[i] + radii[i])
     radius *= 1.0 + x[4] ** 2
     low, high = math.inf, -math.inf
