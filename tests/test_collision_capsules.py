@@ -47,7 +47,17 @@ def surface(geometry) -> np.ndarray:
 
 def outside(capsules: list[LinkCapsule], points: np.ndarray) -> float:
     """How far the worst point is outside all capsules [m]."""
-    return float(np.min([capsule.reach(points) for capsule in capsules], axis=0).max())
+    return float(np.min([reach(capsule, points) for capsule in capsules], axis=0).max())
+
+
+def reach(capsule: LinkCapsule, points: np.ndarray) -> np.ndarray:
+    """How far points are outside one capsule, by their place along and aside of its axis."""
+    half = np.linalg.norm(capsule.half)
+    axis = capsule.half / half if half > 0 else np.zeros(3)
+    offset = points - capsule.middle
+    along = offset @ axis
+    aside = np.linalg.norm(offset - along[:, None] * axis, axis=1)
+    return np.hypot(aside, np.maximum(np.abs(along) - half, 0.0)) - capsule.radius
 
 
 @pytest.mark.parametrize("name", NAMED_ARMS)

@@ -71,7 +71,7 @@ def mesh_distances(robot: RobotModel, boxes, q) -> dict[tuple[str, str], float]:
 def test_distance_is_coals_distance_of_the_meshes(name: str) -> None:
     robot = load_robot(name)
     model = CollisionModel(robot, BOXES)
-    for q in samples(robot, 15):
+    for q in samples(robot, 8):
         expected = mesh_distances(robot, BOXES, q)
         smallest = min(expected[pair] for pair in set(model.pairs))
         clearance = model.distance(q)

@@ -6,6 +6,7 @@ import pytest
 from scipy.optimize import minimize
 
 from selfmotion.collision.segments import segment_box, segment_cylinder, segment_segment
+from selfmotion.jit import kernel
 
 BOX = (0.3, 0.2, 0.1)
 RADIUS, HALF = 0.2, 0.3
@@ -148,3 +149,22 @@ def test_points_serve_as_segments() -> None:
     assert segment_box((1.3, 0.0, 0.0), zero, BOX)[0] == pytest.approx(1.0)
     assert segment_box((0.25, 0.0, 0.0), zero, BOX)[0] == pytest.approx(-0.05)
     assert segment_cylinder((0.0, 0.0, 1.0), zero, RADIUS, HALF)[0] == pytest.approx(0.7)
+
+
+def test_kernels_compile_where_no_cache_folder_can_be_written(monkeypatch) -> None:
+    def njit(cache: bool):
+        if cache:
+            raise RuntimeError("cannot cache function 'f': no locator available for file 'f.py'")
+        return lambda function: function
+
+    monkeypatch.setattr("numba.njit", njit)
+    assert kernel(abs)(-1.0) == 1.0
+
+
+def test_other_compiler_errors_are_not_hidden(monkeypatch) -> None:
+    def njit(cache: bool):
+        raise RuntimeError("something else")
+
+    monkeypatch.setattr("numba.njit", njit)
+    with pytest.raises(RuntimeError, match="something else"):
+        kernel(abs)

@@ -49,12 +49,8 @@ class LinkCapsule:
         """Its volume [m³]."""
         return capsule_volume(2.0 * float(np.linalg.norm(self.half)), self.radius)
 
-    def reach(self, points: Array) -> Array:
-        """Return how far points (N, 3) in the joint's axes are outside; negative inside [m]."""
-        return axis_distance(points, self.middle, self.half) - self.radius
 
-
-def link_outlines(robot: RobotModel) -> dict[tuple[str, int], Outline]:
+def _link_outlines(robot: RobotModel) -> dict[tuple[str, int], Outline]:
     """Return the outline of each link's collision geometry in its joint's axes.
 
     Keys are the link and the index of its joint.
@@ -79,7 +75,7 @@ def link_capsules(robot: RobotModel) -> tuple[LinkCapsule, ...]:
         A mesh of the robot is missing.
     """
     capsules = []
-    for (link, joint), shape in link_outlines(robot).items():
+    for (link, joint), shape in _link_outlines(robot).items():
         for ends in _fit_or_load(shape):
             capsules.append(LinkCapsule(link, joint, ends[:3], ends[3:6], float(ends[6])))
     return tuple(capsules)
@@ -88,15 +84,6 @@ def link_capsules(robot: RobotModel) -> tuple[LinkCapsule, ...]:
 def capsule_volume(length: float, radius: float) -> float:
     """Return the volume [m³] of a capsule around a segment of that length [m]."""
     return math.pi * radius**2 * (length + 4.0 / 3.0 * radius)
-
-
-def axis_distance(points: Array, middle: Array, half: Array) -> Array:
-    """Return the distance of points (N, 3) from the segment middle ± half [m]."""
-    offset = points - middle
-    length = float(half @ half)
-    s = np.clip(offset @ half / length, -1.0, 1.0) if length > 0.0 else np.zeros(len(points))
-    distance: Array = np.linalg.norm(offset - s[:, None] * half, axis=1)
-    return distance
 
 
 def _fit_or_load(shape: Outline) -> Array:

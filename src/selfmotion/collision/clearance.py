@@ -56,15 +56,13 @@ class Clearances:
 
     def jacobian(self) -> Array:
         """Return ∂d/∂q, (K, P, n); `pullback` is far cheaper where a sum is wanted."""
-        columns = [self.pullback(weights) for weights in self._units()]
-        return np.stack(columns, axis=1) if columns else self._empty()
-
-    def _units(self) -> list[Array]:
         count, pairs = self.values.shape
-        return [np.tile(row, (count, 1)) for row in np.eye(pairs)]
-
-    def _empty(self) -> Array:
-        return np.zeros((len(self.values), 0, self._jacobians.shape[2]))
+        gradient = np.empty((count, pairs, self._jacobians.shape[2]))
+        for pair in range(pairs):
+            only = np.zeros((count, pairs))
+            only[:, pair] = 1.0
+            gradient[:, pair] = self.pullback(only)
+        return gradient
 
 
 class ClearanceModel:

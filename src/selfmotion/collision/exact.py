@@ -253,13 +253,10 @@ class CollisionModel:
 
     def _pairs_to_refine(self) -> dict[int, bool]:
         """Map the pairs with a mesh to whether the hulls decide about overlap all the same."""
-        pieces = [piece.geometry for piece in self._meshes.geometryObjects]
-        mesh = [shapes.is_mesh(piece) for piece in pieces]
-        convex = [shapes.is_convex(piece) for piece in pieces]
         return {
-            index: convex[i] and convex[j]
+            index: self._solids[i].is_convex and self._solids[j].is_convex
             for index, (i, j) in enumerate(self._index_pairs)
-            if mesh[i] or mesh[j]
+            if self._solids[i].is_mesh or self._solids[j].is_mesh
         }
 
 

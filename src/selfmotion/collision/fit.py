@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 from scipy.spatial import ConvexHull, QhullError
 
 from selfmotion.arrays import Array
-from selfmotion.collision.capsules import axis_distance, capsule_volume
+from selfmotion.collision.capsules import capsule_volume
 from selfmotion.collision.outlines import Outline, extreme
 from selfmotion.jit import kernel
 
@@ -82,8 +82,17 @@ def _enclose(points: Array, radii: Array) -> Array:
     )
     best = _trial(answer.x, *start)
     # The radius anew, from the finished segment: containment must not rest on rounding above.
-    best[6] = (axis_distance(points, best[:3], best[3:6]) + radii).max()
+    best[6] = (_axis_distance(points, best[:3], best[3:6]) + radii).max()
     return best
+
+
+def _axis_distance(points: Array, middle: Array, half: Array) -> Array:
+    """Return the distance of points (N, 3) from the segment middle ± half [m]."""
+    offset = points - middle
+    length = float(half @ half)
+    s = np.clip(offset @ half / length, -1.0, 1.0) if length > 0.0 else np.zeros(len(points))
+    distance: Array = np.linalg.norm(offset - s[:, None] * half, axis=1)
+    return distance
 
 
 @kernel

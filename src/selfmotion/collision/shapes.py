@@ -67,19 +67,8 @@ def convex_hull(geometry: Any) -> Any:
     return geometry.convex
 
 
-def is_convex(geometry: Any) -> bool:
-    """Whether a geometry and its convex hull are the same solid, to 0.1 % of the volume."""
-    if not is_mesh(geometry):
-        return True
-    hull = convex_hull(geometry)
-    if is_mesh(hull):
-        return False
-    volume: float = hull.computeVolume()
-    return bool(abs(volume - geometry.computeVolume()) <= _CONVEX * volume)
-
-
 class Solid:
-    """Tells whether points are inside a geometry, which for a mesh coal cannot.
+    """What coal cannot tell of a mesh: whether it is convex, and what is inside.
 
     Attributes
     ----------
@@ -89,11 +78,23 @@ class Solid:
 
     def __init__(self, geometry: Any) -> None:
         self.geometry = geometry
+        self.is_mesh = is_mesh(geometry)
+
+    @cached_property
+    def is_convex(self) -> bool:
+        """Whether it and its convex hull are the same solid, to 0.1 % of the volume."""
+        if not self.is_mesh:
+            return True
+        hull = convex_hull(self.geometry)
+        if is_mesh(hull):
+            return False
+        volume: float = hull.computeVolume()
+        return bool(abs(volume - self.geometry.computeVolume()) <= _CONVEX * volume)
 
     @cached_property
     def seeds(self) -> Array:
         """Points of the solid, one at least on each connected surface, (S, 3)."""
-        if not is_mesh(self.geometry):
+        if not self.is_mesh:
             return np.zeros((1, 3))
         faces, count = triangles(self.geometry), self.geometry.num_vertices
         links = coo_array(
@@ -115,7 +116,7 @@ class Solid:
 
         Inside a mesh means a winding number above one half, which also serves meshes with holes.
         """
-        if not is_mesh(self.geometry):
+        if not self.is_mesh:
             return any(_point_distance(self.geometry, point) <= 0.0 for point in points)
         box = self.geometry.aabb_local
         within = np.all((points >= box.min_) & (points <= box.max_), axis=1)
