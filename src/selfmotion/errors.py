@@ -9,6 +9,7 @@
     │   ├── RedundancyError       no self-motion is left by the task
     │   └── StartError            the start configuration is off the path
     ├── InverseKinematicsError    no configuration found for a pose
+    ├── CollisionError            an obstacle, SRDF or geometry that cannot be checked
     ├── BreakdownError            the motion runs into a singular pose
     ├── FileFormatError           a file that is not what it should be
     ├── RenderError               no browser to draw a picture of a replay with
@@ -79,6 +80,10 @@ class InverseKinematicsError(SelfmotionError):
         super().__init__(message)
         self.position_miss = position_miss
         self.rotation_miss = rotation_miss
+
+
+class CollisionError(SelfmotionError):
+    """An obstacle, SRDF or collision geometry that cannot be used; the message names it."""
 
 
 class BreakdownError(SelfmotionError):

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numba
 from numba.core import event
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no types
@@ -27,13 +27,19 @@ class _Announcement(event.Listener):  # type: ignore[misc]  # numba ships no typ
         pass
 
 
-def kernel(function: Function) -> Function:
-    """Compile `function` with numba, cached on disk where a folder for that can be written."""
+def kernel(function: _Function) -> _Function:
+    """Compile a numeric function when it is first called.
+
+    The machine code is kept in numba's cache; where neither the package folder nor the user's
+    cache folder can be written, each process compiles anew. Division follows NumPy (no error).
+    """
     try:
-        return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
-    except RuntimeError:
-        # "no locator available": neither the package folder nor HOME is writable
-        return numba.njit(error_model="numpy")(function)  # type: ignore[no-any-return]
+        compiled: _Function = numba.njit(cache=True, error_model="numpy")(function)
+    except RuntimeError as error:
+        if "no locator available" not in str(error):
+            raise
+        compiled = numba.njit(cache=False, error_model="numpy")(function)
+    return compiled
 
 
 event.register("numba:compile", _Announcement())

@@ -1,0 +1,255 @@
+"""Obstacles that stand still in the world."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from selfmotion.arrays import Array, read_only
+from selfmotion.errors import CollisionError
+
+# How far a rotation matrix read from a file may be from orthonormal.
+_ROTATION_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """What every obstacle has; use `Box`, `Sphere`, `Cylinder`, `Capsule` or `Mesh`.
+
+    Attributes
+    ----------
+    name : str
+        What reports call it; unique among the obstacles and links of a model.
+    pose : pinocchio.SE3
+        The obstacle's frame in world axes; a position (3,) [m] is taken as a pose along them.
+
+    Raises
+    ------
+    CollisionError
+        The name is empty, the pose is no rigid motion, or a length is not positive.
+    """
+
+    shape: ClassVar[str] = ""
+
+    name: str
+    pose: pin.SE3
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and self.name):
+            raise CollisionError(f"{self.shape}: has name {self.name!r}, expected a text")
+        object.__setattr__(self, "pose", _pose(self.label, self.pose))
+
+    @property
+    def label(self) -> str:
+        """Shape and name, as messages say it."""
+        return f"{self.shape} '{self.name}'"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as JSON-safe values; `obstacle_from_dict` reverses this exactly."""
+        rest = (f.name for f in fields(self) if f.name not in ("name", "pose"))
+        return {
+            "shape": self.shape,
+            "name": self.name,
+            "position": self.pose.translation.tolist(),
+            "rotation": self.pose.rotation.tolist(),
+            **{key: _plain(getattr(self, key)) for key in rest},
+        }
+
+    def _set_length(self, key: str) -> None:
+        """Replace the attribute by a float, which must be positive."""
+        value = getattr(self, key)
+        try:
+            length = float(value)
+        except (TypeError, ValueError):
+            length = np.nan
+        if not (np.isfinite(length) and length > 0):
+            raise CollisionError(f"{self.label}: {key} is {value!r}, expected a number above 0")
+        object.__setattr__(self, key, length)
+
+
+@dataclass(frozen=True, eq=False)
+class Box(Obstacle):
+    """A solid box, its centre at the pose.
+
+    Attributes
+    ----------
+    size : (3,)
+        Full lengths along the pose's axes [m].
+    """
+
+    shape: ClassVar[str] = "box"
+
+    size: Array
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        size = _numbers(self.size)
+        if size.shape != (3,) or not np.all(size > 0) or not np.all(np.isfinite(size)):
+            raise CollisionError(
+                f"{self.label}: size is {self.size!r}, expected three numbers above 0"
+            )
+        object.__setattr__(self, "size", read_only(size))
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere(Obstacle):
+    """A solid sphere.
+
+    Attributes
+    ----------
+    radius : float
+        [m]
+    """
+
+    shape: ClassVar[str] = "sphere"
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._set_length("radius")
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder(Obstacle):
+    """A solid cylinder, its centre at the pose and its axis along the pose's z.
+
+    Attributes
+    ----------
+    radius, length : float
+        [m]
+    """
+
+    shape: ClassVar[str] = "cylinder"
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._set_length("radius")
+        self._set_length("length")
+
+
+@dataclass(frozen=True, eq=False)
+class Capsule(Obstacle):
+    """All points within `radius` of a segment along the pose's z axis, centred at the pose.
+
+    Attributes
+    ----------
+    radius, length : float
+        Radius, and length of the segment (the caps come on top) [m].
+    """
+
+    shape: ClassVar[str] = "capsule"
+
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._set_length("radius")
+        self._set_length("length")
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh(Obstacle):
+    """The solid bounded by a triangle mesh; the file is read when a model is built from it.
+
+    Attributes
+    ----------
+    file : Path
+        STL, OBJ, DAE or PLY.
+    scale : float
+        Metres per unit of the file.
+    """
+
+    shape: ClassVar[str] = "mesh"
+
+    file: Path
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "file", Path(self.file))
+        self._set_length("scale")
+
+
+_SHAPES: Mapping[str, type[Obstacle]] = {
+    cls.shape: cls for cls in (Box, Sphere, Cylinder, Capsule, Mesh)
+}
+
+
+def obstacle_from_dict(values: Mapping[str, Any]) -> Obstacle:
+    """Build an obstacle from what `Obstacle.to_dict` returns.
+
+    Parameters
+    ----------
+    values : dict
+        ``shape`` and ``name``; ``position`` (3,) [m] and optionally ``rotation`` (3, 3); and the
+        lengths of the shape.
+
+    Raises
+    ------
+    CollisionError
+        A key is missing, unknown or has a value that cannot be used.
+    """
+    rest = dict(values)
+    shape, name = rest.pop("shape", None), rest.pop("name", None)
+    if shape not in _SHAPES:
+        raise CollisionError(
+            f"obstacle {name!r}: shape is {shape!r}, expected one of {', '.join(_SHAPES)}"
+        )
+    label = f"{shape} {name!r}"
+    if "position" not in rest:
+        raise CollisionError(f"{label}: 'position' is missing")
+    position = _numbers(rest.pop("position"))
+    rotation = _numbers(rest.pop("rotation", np.eye(3)))
+    if position.shape != (3,) or rotation.shape != (3, 3):
+        raise CollisionError(
+            f"{label}: position has shape {position.shape} and rotation {rotation.shape}, "
+            f"expected (3,) and (3, 3)"
+        )
+    cls = _SHAPES[shape]
+    known = {f.name for f in fields(cls)} - {"name", "pose"}
+    unknown = sorted(set(rest) - known)
+    if unknown:
+        raise CollisionError(f"{label}: has '{unknown[0]}', expected {', '.join(sorted(known))}")
+    missing = sorted(known - set(rest) - {"scale"})
+    if missing:
+        raise CollisionError(f"{label}: '{missing[0]}' is missing")
+    return cls(name, pin.SE3(rotation, position), **rest)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return str(value) if isinstance(value, Path) else value
+
+
+def _numbers(values: npt.ArrayLike) -> Array:
+    """Return `values` as floats, or NaN where they are none, for one check to refuse."""
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        return np.array(np.nan)
+
+
+def _pose(label: str, pose: Any) -> pin.SE3:
+    if not isinstance(pose, pin.SE3):
+        position = _numbers(pose)
+        if position.shape != (3,):
+            raise CollisionError(f"{label}: pose is {pose!r}, expected an SE3 or a position (3,)")
+        pose = pin.SE3(np.eye(3), position)
+    rotation = pose.rotation
+    skew = np.abs(rotation @ rotation.T - np.eye(3)).max()
+    # Written so that NaN is refused too.
+    if not (skew < _ROTATION_TOLERANCE and np.linalg.det(rotation) > 0):
+        raise CollisionError(f"{label}: rotation is not orthonormal and right-handed")
+    if not np.all(np.isfinite(pose.translation)):
+        raise CollisionError(f"{label}: position is {pose.translation.tolist()}, not finite")
+    return pin.SE3(pose)

@@ -1,0 +1,100 @@
+"""Which pairs of bodies have to be checked."""
+
+import itertools
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from selfmotion.errors import CollisionError
+from selfmotion.urdf import Urdf
+
+
+@dataclass(frozen=True)
+class Body:
+    """A piece of geometry and what carries it.
+
+    Attributes
+    ----------
+    name : str
+        The link it belongs to, or the obstacle.
+    joint : int
+        Index of the joint that moves it; 0 for the world.
+    is_obstacle : bool
+        Whether it belongs to the world rather than to the robot.
+    """
+
+    name: str
+    joint: int
+    is_obstacle: bool
+
+
+def candidate_pairs(
+    bodies: Sequence[Body], urdf: Urdf, srdf: str | Path | None = None
+) -> list[tuple[int, int]]:
+    """Return the index pairs of `bodies` that can meet and are not meant to.
+
+    Left out are pairs whose distance no joint changes (so also the robot's base against the
+    world: an arm bolted to a table touches it), links that a movable joint joins, where links
+    joined by fixed joints count as one, and links that the SRDF disables.
+
+    Raises
+    ------
+    CollisionError
+        The SRDF cannot be read.
+    """
+    excluded = _joined_links(urdf)
+    if srdf is not None:
+        excluded |= _disabled_links(srdf)
+    part = _rigid_parts(urdf)
+
+    def can_meet(first: Body, second: Body) -> bool:
+        if first.joint == second.joint:
+            return False
+        if first.is_obstacle or second.is_obstacle:
+            return True
+        links = {frozenset((first.name, second.name))}
+        links.add(frozenset((part[first.name], part[second.name])))
+        return not links & excluded
+
+    return [
+        (i, j)
+        for i, j in itertools.combinations(range(len(bodies)), 2)
+        if can_meet(bodies[i], bodies[j])
+    ]
+
+
+def _rigid_parts(urdf: Urdf) -> dict[str, str]:
+    """Map each link to the first link of the group that fixed joints make with it."""
+    by_child = {joint.child: joint for joint in urdf.joints.values()}
+
+    def first(link: str) -> str:
+        while link in by_child and by_child[link].kind == "fixed":
+            link = by_child[link].parent
+        return link
+
+    return {link: first(link) for link in urdf.links}
+
+
+def _joined_links(urdf: Urdf) -> set[frozenset[str]]:
+    part = _rigid_parts(urdf)
+    return {
+        frozenset((part[joint.parent], part[joint.child]))
+        for joint in urdf.joints.values()
+        if joint.kind != "fixed"
+    }
+
+
+def _disabled_links(srdf: str | Path) -> set[frozenset[str]]:
+    try:
+        root = ElementTree.parse(srdf).getroot()
+    except OSError as error:
+        raise CollisionError(f"{srdf}: SRDF cannot be read: {error}") from error
+    except ElementTree.ParseError as error:
+        raise CollisionError(f"{srdf}: SRDF is not well-formed XML: {error}") from error
+    if root.tag != "robot":
+        raise CollisionError(f"{srdf}: the root element is <{root.tag}>, expected <robot>")
+    return {
+        frozenset((tag.get("link1", ""), tag.get("link2", "")))
+        for tag in root.iter("disable_collisions")
+    }

@@ -1,0 +1,142 @@
+"""Smooth clearances: conservative, with exact gradients, on every arm."""
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import trimesh
+
+from selfmotion.collision import (
+    Box,
+    Capsule,
+    ClearanceModel,
+    CollisionModel,
+    Cylinder,
+    Mesh,
+    Sphere,
+)
+from selfmotion.errors import RobotError
+from selfmotion.robot import NAMED_ARMS, load_robot
+
+TURNED = pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.3, 0.8), np.array([0.5, -0.4, 0.6]))
+WORLD = (
+    Box("box", TURNED, [0.2, 0.3, 0.1]),
+    Sphere("sphere", [0.6, 0.5, 0.7], 0.1),
+    Cylinder("cylinder", TURNED.inverse(), 0.1, 0.3),
+    Capsule("capsule", pin.SE3(TURNED.rotation, np.array([-0.4, 0.5, 0.8])), 0.05, 0.4),
+)
+# coal's iterations stop within 1e-6 of the distance.
+GJK = 2e-6
+# Central differences with a step of 1e-6 of distances near 1.
+DIFFERENCE = 1e-7
+ARMS = [name for name in NAMED_ARMS if name != "planar_3r"]
+
+
+@pytest.fixture(scope="module", params=ARMS)
+def models(request) -> tuple[CollisionModel, ClearanceModel]:
+    exact = CollisionModel(load_robot(request.param), WORLD)
+    return exact, ClearanceModel(exact)
+
+
+def samples(robot, count: int, seed: int = 1) -> np.ndarray:
+    lower, upper = robot.finite_limits()
+    return np.random.default_rng(seed).uniform(lower, upper, (count, robot.dof))
+
+
+def test_gradient_is_the_central_difference(models) -> None:
+    _, model = models
+    q = samples(model.robot, 6)
+    step = 1e-6
+    gradient = model.clearances(q).jacobian()
+    wrong = np.zeros(gradient.shape, dtype=bool)
+    for joint, unit in enumerate(np.eye(model.robot.dof)):
+        ahead = model.clearances(q + step * unit).values
+        behind = model.clearances(q - step * unit).values
+        difference = (ahead - behind) / (2.0 * step)
+        wrong[:, :, joint] = np.abs(difference - gradient[:, :, joint]) > DIFFERENCE
+    # Where the closest points jump within the step there is no derivative to agree with.
+    assert wrong.any(axis=2).mean() < 2e-3
+
+
+def test_pullback_is_the_weighted_sum_of_the_gradients(models) -> None:
+    _, model = models
+    clearances = model.clearances(samples(model.robot, 4))
+    weights = np.random.default_rng(2).normal(size=clearances.values.shape)
+    expected = np.einsum("kp,kpn->kn", weights, clearances.jacobian())
+    assert clearances.pullback(weights) == pytest.approx(expected, abs=1e-10)
+
+
+def test_links_are_never_closer_than_their_capsules_say(models) -> None:
+    """Each pair alone: the exact model of this pair is no closer than the smallest column."""
+    exact, model = models
+    q = samples(model.robot, 25)
+    values = model.clearances(q).values
+    overlaps = exact.overlaps(q)
+    for pair in set(model.pairs):
+        columns = [name == pair for name in model.pairs]
+        apart = values[:, columns].min(axis=1) > GJK
+        assert not np.any(apart & overlaps[pair])
+
+
+def test_smallest_distance_is_below_the_exact_one() -> None:
+    """Panda against the world alone, where no pair is left out."""
+    exact = CollisionModel(load_robot("panda"), WORLD)
+    model = ClearanceModel(exact)
+    world = np.array([pair[1] in {o.name for o in WORLD} for pair in model.pairs])
+    for q in samples(model.robot, 50):
+        clearance = exact.distance(q)
+        if clearance.second in {o.name for o in WORLD} and clearance.value > 0:
+            assert model.clearances(q[None]).values[:, world].min() <= clearance.value + GJK
+
+
+def test_few_clear_configurations_are_refused() -> None:
+    """What being conservative costs on Panda: under a tenth of the free configurations."""
+    exact = CollisionModel(load_robot("panda"), WORLD)
+    model = ClearanceModel(exact)
+    q = samples(model.robot, 400)
+    free = np.array([not exact.collides(row) for row in q])
+    refused = model.clearances(q).values.min(axis=1) <= 0
+    assert (refused & free).sum() < 0.1 * free.sum()
+
+
+def test_a_known_collision_is_refused() -> None:
+    robot = load_robot("panda")
+    q = np.array([0.4, 0.2, 0.0, -1.5, 0.0, 1.5, 0.0])
+    at_hand = CollisionModel(robot, [Sphere("ball", robot.pose(q).translation, 0.03)])
+    model = ClearanceModel(at_hand)
+    values = model.clearances(q[None]).values[0]
+    worst = model.pairs[int(values.argmin())]
+    assert values.min() < 0
+    assert worst[1] == "ball"
+
+
+def test_a_mesh_counts_as_the_box_around_it(tmp_path: Path) -> None:
+    trimesh.creation.box([200.0, 300.0, 100.0]).apply_translation([10.0, 20.0, 30.0]).export(
+        tmp_path / "part.stl"
+    )
+    robot = load_robot("panda")
+    offset = TURNED * pin.SE3(np.eye(3), np.array([0.01, 0.02, 0.03]))
+    mesh = ClearanceModel(CollisionModel(robot, [Mesh("it", TURNED, tmp_path / "part.stl", 1e-3)]))
+    box = ClearanceModel(CollisionModel(robot, [Box("it", offset, [0.2, 0.3, 0.1])]))
+    q = samples(robot, 5)
+    # STL keeps seven digits.
+    assert mesh.clearances(q).values == pytest.approx(box.clearances(q).values, abs=1e-7)
+
+
+def test_an_arm_without_geometry_has_no_pairs() -> None:
+    model = ClearanceModel(CollisionModel(load_robot("planar_3r"), WORLD))
+    clearances = model.clearances(np.zeros((4, 3)))
+    assert model.pairs == ()
+    assert clearances.values.shape == (4, 0)
+    assert np.array_equal(clearances.pullback(np.zeros((4, 0))), np.zeros((4, 3)))
+    assert clearances.jacobian().shape == (4, 0, 3)
+
+
+def test_refuses_wrong_shapes() -> None:
+    model = ClearanceModel(CollisionModel(load_robot("ur10")))
+    for q in (np.zeros(6), np.zeros((2, 5)), np.full((2, 6), np.nan)):
+        with pytest.raises(RobotError, match="samples have shape"):
+            model.clearances(q)
+    with pytest.raises(ValueError, match="weights have shape"):
+        model.clearances(np.zeros((2, 6))).pullback(np.zeros((1, 1)))

@@ -1,0 +1,239 @@
+"""Exact clearance: against coal on the real meshes, and what has to be refused."""
+
+import itertools
+from pathlib import Path
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+import trimesh
+
+from selfmotion.collision import Box, Capsule, CollisionModel, Cylinder, Mesh, Sphere
+from selfmotion.collision.pairs import Body, candidate_pairs
+from selfmotion.collision.shapes import winding_number
+from selfmotion.errors import CollisionError, RobotError
+from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
+
+BOXES = (
+    Box("box", [0.5, 0.2, 0.5], [0.2, 0.2, 0.2]),
+    Box(
+        "wall",
+        pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([0.4, -0.5, 0.3])),
+        [0.2, 0.05, 0.8],
+    ),
+)
+# coal's iterations stop within 1e-6 of the distance, relative or absolute.
+GJK = 2e-6
+# A hull that is larger than its mesh by 0.1 % of the volume may touch this much earlier [m].
+HULL = 5e-4
+
+
+@pytest.fixture(scope="module")
+def panda() -> RobotModel:
+    return load_robot("panda")
+
+
+def samples(robot: RobotModel, count: int, seed: int = 0) -> np.ndarray:
+    lower, upper = robot.finite_limits()
+    return np.random.default_rng(seed).uniform(lower, upper, (count, robot.dof))
+
+
+def srdf_of(name: str) -> Path:
+    urdf = Path(load_robot(name).urdf.source)
+    return next(urdf.parents[1].glob("srdf/*.srdf"))
+
+
+def mesh_distances(robot: RobotModel, boxes, q) -> dict[tuple[str, str], float]:
+    """Smallest distance of every two links or obstacles, from coal alone, mesh to mesh."""
+    geometry = robot.geometry(pin.GeometryType.COLLISION)
+    data, places = robot.model.createData(), geometry.createData()
+    pin.updateGeometryPlacements(robot.model, data, geometry, places, q)
+    pieces = [
+        (robot.model.frames[piece.parentFrame].name, piece.geometry, places.oMg[i])
+        for i, piece in enumerate(geometry.geometryObjects)
+    ] + [(box.name, coal.Box(*box.size), box.pose) for box in boxes]
+    found: dict[tuple[str, str], float] = {}
+    for (a, shape_a, pose_a), (b, shape_b, pose_b) in itertools.combinations(pieces, 2):
+        value = coal.distance(
+            shape_a,
+            coal.Transform3s(pose_a.rotation, pose_a.translation),
+            shape_b,
+            coal.Transform3s(pose_b.rotation, pose_b.translation),
+            coal.DistanceRequest(),
+            coal.DistanceResult(),
+        )
+        found[a, b] = min(value, found.get((a, b), np.inf))
+    return found
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5", "z1"])
+def test_distance_is_coals_distance_of_the_meshes(name: str) -> None:
+    robot = load_robot(name)
+    model = CollisionModel(robot, BOXES)
+    for q in samples(robot, 8):
+        expected = mesh_distances(robot, BOXES, q)
+        smallest = min(expected[pair] for pair in set(model.pairs))
+        clearance = model.distance(q)
+        if smallest > HULL:
+            assert clearance.value == pytest.approx(smallest, abs=GJK)
+            assert expected[clearance.first, clearance.second] == pytest.approx(smallest, abs=GJK)
+        else:
+            assert clearance.value <= HULL
+
+
+@pytest.mark.parametrize("name", NAMED_ARMS)
+def test_collides_says_what_distance_says(name: str) -> None:
+    robot = load_robot(name)
+    model = CollisionModel(robot, () if name == "planar_3r" else BOXES)
+    for q, margin in itertools.product(samples(robot, 40), (0.0, 0.02)):
+        value = model.distance(q).value
+        if abs(value - margin) > HULL:
+            assert model.collides(q, margin) == (value < margin)
+
+
+def test_worst_is_the_smallest_distance_and_its_row(panda: RobotModel) -> None:
+    model = CollisionModel(panda, BOXES)
+    motion = np.linspace(*samples(panda, 2), 50)
+    every = [model.distance(q) for q in motion]
+    worst = model.worst(motion)
+    row = int(np.argmin([clearance.value for clearance in every]))
+    assert worst.index == row
+    assert worst.value == pytest.approx(every[row].value, abs=GJK)
+    assert (worst.first, worst.second) == (every[row].first, every[row].second)
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        Box("it", [0, 0, 0], [0.04, 0.04, 0.04]),
+        Sphere("it", [0, 0, 0], 0.02),
+        Cylinder("it", [0, 0, 0], 0.02, 0.04),
+        Capsule("it", [0, 0, 0], 0.01, 0.02),
+    ],
+    ids=lambda obstacle: obstacle.shape,
+)
+def test_an_obstacle_wholly_inside_a_link_is_refused(panda: RobotModel, obstacle) -> None:
+    """The surfaces are apart there: a distance of meshes alone calls this free."""
+    q = np.array([0.3, -0.4, 0.2, -1.8, 0.1, 1.6, 0.5])
+    centre = _inside_link5(panda, q)
+    moved = type(obstacle)(**{**obstacle.__dict__, "pose": centre})
+    model = CollisionModel(panda, [moved])
+    clearance = model.distance(q)
+    assert model.collides(q)
+    assert clearance.value < 0
+    assert (clearance.first, clearance.second) == ("panda_link5", "it")
+
+
+def _inside_link5(robot: RobotModel, q: np.ndarray) -> np.ndarray:
+    geometry = robot.geometry(pin.GeometryType.COLLISION)
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    index = geometry.getGeometryId("panda_link5_0")
+    piece = geometry.geometryObjects[index]
+    place = data.oMi[piece.parentJoint] * piece.placement
+    return place.act(piece.geometry.vertices().mean(axis=0))
+
+
+@pytest.fixture
+def ring(tmp_path: Path) -> Path:
+    """A ring about z, inner radius 0.3, outer 0.4, height 0.1: not convex."""
+    file = tmp_path / "ring.stl"
+    trimesh.creation.annulus(0.3, 0.4, 0.1, sections=48).export(file)
+    return file
+
+
+def test_the_hole_of_a_mesh_is_free_and_its_wall_is_not(panda: RobotModel, ring: Path) -> None:
+    upright = np.array([0.0, 0.0, 0.0, -0.1, 0.0, 1.5, 0.0])
+    around = CollisionModel(panda, [Mesh("ring", [0.0, 0.0, 0.45], ring)])
+    through = CollisionModel(panda, [Mesh("ring", [0.35, 0.0, 0.45], ring)])
+    assert around.distance(upright).value > 0
+    assert not around.collides(upright)
+    assert through.distance(upright).value < 0
+    assert through.collides(upright)
+
+
+def test_a_link_wholly_inside_an_obstacle_mesh_is_refused(panda: RobotModel, tmp_path) -> None:
+    """A shell with a bore, so that its hull does not decide."""
+    shell = trimesh.creation.annulus(0.01, 3.0, 6.0, sections=32)
+    shell.export(tmp_path / "shell.stl")
+    model = CollisionModel(panda, [Mesh("shell", [1.0, 1.0, 0.0], tmp_path / "shell.stl")])
+    q = np.array([0.0, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0])
+    assert model.collides(q)
+    assert model.distance(q).value < 0
+
+
+def test_winding_number_counts_a_closed_surface_once() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2).triangles
+    assert winding_number(ball, np.array([0.2, 0.3, 0.1])) == pytest.approx(1.0)
+    assert winding_number(ball, np.array([0.2, 1.3, 0.1])) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_pairs_of_panda_with_its_srdf(panda: RobotModel) -> None:
+    """44, counted by hand from the file: 17 pieces of geometry, 35 disabled pairs of links."""
+    model = CollisionModel(panda, srdf=srdf_of("panda"))
+    assert len(model.pairs) == 44
+    assert ("panda_link0", "panda_leftfinger") in model.pairs
+    assert len(CollisionModel(panda).pairs) > 44
+
+
+def test_links_that_touch_by_design_are_no_pair(panda: RobotModel) -> None:
+    pairs = set(CollisionModel(panda).pairs)
+    joined = {(f"panda_link{i}", f"panda_link{i + 1}") for i in range(7)}
+    assert not pairs & (joined | {("panda_link6", "panda_hand"), ("panda_link7", "panda_hand")})
+
+
+def test_the_base_is_not_checked_against_the_world(panda: RobotModel) -> None:
+    table = Body("table", 0, is_obstacle=True)
+    base = Body("panda_link0", 0, is_obstacle=False)
+    arm = Body("panda_link1", 1, is_obstacle=False)
+    assert candidate_pairs([base, arm, table], panda.urdf) == [(1, 2)]
+
+
+def test_known_collisions_are_refused(panda: RobotModel) -> None:
+    model = CollisionModel(panda, BOXES)
+    folded = np.array([0.0, 1.0, 0.0, -3.0, 0.0, 3.0, 0.0])
+    tool = np.array([0.4, 0.2, 0.0, -1.5, 0.0, 1.5, 0.0])
+    at_tool = CollisionModel(panda, [Sphere("ball", panda.pose(tool).translation, 0.03)])
+    assert model.collides(folded)
+    assert at_tool.collides(tool)
+    assert at_tool.distance(tool).second == "ball"
+
+
+def test_without_geometry_there_is_nothing_to_check() -> None:
+    robot = load_robot("planar_3r")
+    model = CollisionModel(robot, BOXES)
+    assert not model.has_bodies
+    assert model.pairs == ()
+    assert model.distance(np.zeros(3)).value == np.inf
+    assert not model.collides(np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda r: CollisionModel(r, [BOXES[0], BOXES[0]]), "box 'box': a link or another"),
+        (lambda r: CollisionModel(r, [Sphere("panda_hand", [0, 0, 0], 1)]), "a link or another"),
+        (lambda r: CollisionModel(r, [Mesh("m", [0, 0, 0], "no.stl")]), "mesh 'm': no such file"),
+        (lambda r: CollisionModel(r, srdf="no.srdf"), "no.srdf: SRDF cannot be read"),
+        (lambda r: CollisionModel(r, srdf=__file__), "not well-formed XML"),
+    ],
+)
+def test_refuses_what_cannot_be_checked(panda: RobotModel, make, message: str) -> None:
+    with pytest.raises(CollisionError, match=message):
+        make(panda)
+
+
+def test_refuses_a_mesh_file_that_is_none(panda: RobotModel, tmp_path: Path) -> None:
+    file = tmp_path / "noise.stl"
+    file.write_bytes(b"no mesh")
+    with pytest.raises(CollisionError, match="cannot be read"):
+        CollisionModel(panda, [Mesh("m", [0, 0, 0], file)])
+
+
+@pytest.mark.parametrize("q", [np.zeros(6), np.full(7, np.nan)])
+def test_refuses_what_is_no_configuration(panda: RobotModel, q: np.ndarray) -> None:
+    model = CollisionModel(panda)
+    for call in (model.distance, model.collides):
+        with pytest.raises(RobotError):
+            call(q)
