@@ -1,0 +1,24 @@
+"""What a motion must keep: limits, end conditions, closed paths, clearance."""
+
+from selfmotion.constraints.base import BoundConstraint, Constraint, NodePartials, NodeTangents
+from selfmotion.constraints.clearance import Clearance
+from selfmotion.constraints.ends import ClosedPath, EndConfiguration, EndVelocity
+from selfmotion.constraints.limits import (
+    JointAccelerationLimits,
+    JointPositionLimits,
+    JointVelocityLimits,
+)
+
+__all__ = [
+    "BoundConstraint",
+    "Clearance",
+    "ClosedPath",
+    "Constraint",
+    "EndConfiguration",
+    "EndVelocity",
+    "JointAccelerationLimits",
+    "JointPositionLimits",
+    "JointVelocityLimits",
+    "NodePartials",
+    "NodeTangents",
+]

@@ -1,0 +1,92 @@
+"""What a constraint is: conditions h ≤ 0 or h = 0 on the motion at the nodes of the grid.
+
+A constraint is written down without an arm (`Constraint`) and bound to one when a plan is made
+(`BoundConstraint`). Limits are kept with a margin, so that the motion between nodes and the last
+digits of the optimisation stay within the limits themselves.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from selfmotion.arrays import Array
+from selfmotion.robot import RobotModel
+from selfmotion.samples import Samples
+
+
+@dataclass(frozen=True, eq=False)
+class NodePartials:
+    """Derivatives of a number with respect to the motion at the nodes; None stands for zero.
+
+    Attributes
+    ----------
+    q, qd, qdd : (N + 1, n) or None
+    """
+
+    q: Array | None = None
+    qd: Array | None = None
+    qdd: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class NodeTangents:
+    """How the motion at the nodes changes with d decision variables.
+
+    Attributes
+    ----------
+    q, qd, qdd : (N + 1, n, d)
+    """
+
+    q: Array
+    qd: Array
+    qdd: Array
+
+    def of_order(self, order: int) -> Array:
+        """Return the tangents of q (0), q̇ (1) or q̈ (2)."""
+        return (self.q, self.qd, self.qdd)[order]
+
+
+class Constraint(Protocol):
+    """A condition on the motion, not yet bound to an arm."""
+
+    def bind(self, robot: RobotModel) -> "BoundConstraint":
+        """Return the constraint for an arm; ProblemError where it does not fit."""
+
+
+class BoundConstraint(Protocol):
+    """A condition on the motion of one arm."""
+
+    @property
+    def name(self) -> str:
+        """What to call it in messages."""
+
+    @property
+    def equality(self) -> bool:
+        """Whether h = 0 is meant, rather than h ≤ 0."""
+
+    @property
+    def tolerance(self) -> float:
+        """What h (|h| for an equality) may be and still count as kept."""
+
+    def residual(self, samples: Samples) -> Array:
+        """Return h: (N + 1, C) for conditions at every node, (1, C) for conditions on the whole."""
+
+    def pullback(self, samples: Samples, weights: Array) -> NodePartials:
+        """Return the derivative of Σ weights · h, weights shaped as h."""
+
+    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
+        """Return ∂h/∂x for d variables: h's shape with d appended."""
+
+    def describe(self, samples: Samples, row: int, column: int) -> str:
+        """Return what is wrong where h[row, column] is too large, with names and numbers."""
+
+
+def motion_of_order(samples: Samples, order: int) -> Array:
+    """Return q (0), q̇ (1) or q̈ (2) at the nodes, (N + 1, n)."""
+    table = (samples.q, samples.qd)[order] if order < 2 else samples.qdd
+    nodes: Array = table[samples.grid.node_stages]
+    return nodes
+
+
+def partials_of_order(order: int, values: Array) -> NodePartials:
+    """Return `values` (N + 1, n) as the derivative with respect to q (0), q̇ (1) or q̈ (2)."""
+    return NodePartials(**{("q", "qd", "qdd")[order]: values})

@@ -1,0 +1,166 @@
+"""Limits of joint position, velocity and acceleration."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.arrays import Array, read_only
+from selfmotion.constraints.base import (
+    NodePartials,
+    NodeTangents,
+    motion_of_order,
+    partials_of_order,
+)
+from selfmotion.errors import ProblemError
+from selfmotion.robot import RobotModel
+from selfmotion.samples import Samples
+
+
+@dataclass(frozen=True, eq=False)
+class JointPositionLimits:
+    """Joint coordinates stay within limits.
+
+    Parameters
+    ----------
+    lower, upper : (n,), optional
+        [rad or m]; by default the URDF's.
+    margin : float
+        Distance kept from them [rad or m].
+    """
+
+    lower: npt.ArrayLike | None = None
+    upper: npt.ArrayLike | None = None
+    margin: float = 2e-4
+
+    def bind(self, robot: RobotModel) -> "BoundLimits":
+        """See `Constraint.bind`."""
+        lower = robot.lower if self.lower is None else read_only(self.lower)
+        upper = robot.upper if self.upper is None else read_only(self.upper)
+        return BoundLimits.of(robot, "joint limits", 0, (lower, upper), self.margin)
+
+
+@dataclass(frozen=True, eq=False)
+class JointVelocityLimits:
+    """Joint speeds stay below limits.
+
+    Parameters
+    ----------
+    limit : (n,), optional
+        [rad/s or m/s]; by default the URDF's.
+    margin : float
+        Share of the limit that is left unused.
+    """
+
+    limit: npt.ArrayLike | None = None
+    margin: float = 2e-3
+
+    def bind(self, robot: RobotModel) -> "BoundLimits":
+        """See `Constraint.bind`."""
+        limit = robot.velocity_limit if self.limit is None else read_only(self.limit)
+        return BoundLimits.symmetric(robot, "velocity limits", 1, limit, self.margin)
+
+
+@dataclass(frozen=True, eq=False)
+class JointAccelerationLimits:
+    """Joint accelerations stay below limits (URDFs give none).
+
+    Parameters
+    ----------
+    limit : (n,) or float
+        [rad/s² or m/s²].
+    margin : float
+        Share of the limit that is left unused.
+    """
+
+    limit: npt.ArrayLike
+    margin: float = 1e-2
+
+    def bind(self, robot: RobotModel) -> "BoundLimits":
+        """See `Constraint.bind`."""
+        limit = np.broadcast_to(np.asarray(self.limit, dtype=np.float64), (robot.dof,))
+        return BoundLimits.symmetric(robot, "acceleration limits", 2, limit, self.margin)
+
+
+@dataclass(frozen=True, eq=False)
+class BoundLimits:
+    """lower ≤ x ≤ upper for x = q, q̇ or q̈ of the joints that have finite limits.
+
+    h = (x - upper) / s + margin and (lower - x) / s + margin, with s = 1 for positions and the
+    limit itself for its derivatives.
+    """
+
+    name: str
+    order: int
+    joints: npt.NDArray[np.intp]
+    joint_names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    scale: Array
+    margin: float
+    equality = False
+
+    @classmethod
+    def symmetric(
+        cls, robot: RobotModel, name: str, order: int, limit: Array, margin: float
+    ) -> "BoundLimits":
+        """Return -limit ≤ x ≤ limit, relative to the limit."""
+        if np.any(np.asarray(limit) <= 0.0):
+            raise ProblemError(f"{robot.name}: {name} {limit} must be positive")
+        return cls.of(robot, name, order, (-np.asarray(limit), np.asarray(limit)), margin)
+
+    @classmethod
+    def of(
+        cls, robot: RobotModel, name: str, order: int, limits: tuple[Array, Array], margin: float
+    ) -> "BoundLimits":
+        """Return lower ≤ x ≤ upper for the joints with finite limits."""
+        lower, upper = limits
+        for array in limits:
+            if array.shape != (robot.dof,) or np.any(np.isnan(array)):
+                raise ProblemError(
+                    f"{robot.name}: {name} have shape {array.shape}, expected one number for each "
+                    f"of the {robot.dof} joints"
+                )
+        if not np.all(lower < upper):
+            raise ProblemError(f"{robot.name}: {name}: lower {lower} is not below upper {upper}")
+        if not margin > 0.0:
+            raise ProblemError(f"{robot.name}: {name}: margin is {margin}, expected > 0")
+        joints = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
+        scale = np.ones(len(joints)) if order == 0 else upper[joints]
+        names = tuple(robot.joint_names[k] for k in joints)
+        return cls(name, order, joints, names, lower[joints], upper[joints], scale, margin)
+
+    @property
+    def tolerance(self) -> float:
+        """See `BoundConstraint.tolerance`: half the margin."""
+        return 0.5 * self.margin
+
+    def residual(self, samples: Samples) -> Array:
+        """See `BoundConstraint.residual`."""
+        x = motion_of_order(samples, self.order)[:, self.joints]
+        above = (x - self.upper) / self.scale + self.margin
+        below = (self.lower - x) / self.scale + self.margin
+        return np.hstack([above, below])
+
+    def pullback(self, samples: Samples, weights: Array) -> NodePartials:
+        """See `BoundConstraint.pullback`."""
+        count = len(self.joints)
+        values = np.zeros((len(weights), samples.q.shape[1]))
+        values[:, self.joints] = (weights[:, :count] - weights[:, count:]) / self.scale
+        return partials_of_order(self.order, values)
+
+    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
+        """See `BoundConstraint.tangents`."""
+        above = motion.of_order(self.order)[:, self.joints] / self.scale[:, None]
+        return np.concatenate([above, -above], axis=1)
+
+    def describe(self, samples: Samples, row: int, column: int) -> str:
+        """See `BoundConstraint.describe`."""
+        joint = column % len(self.joints)
+        value = motion_of_order(samples, self.order)[row, self.joints[joint]]
+        limit = self.upper[joint] if column < len(self.joints) else self.lower[joint]
+        quantity = ("position", "velocity", "acceleration")[self.order]
+        return (
+            f"{quantity} of joint '{self.joint_names[joint]}' is {value:.4g} at t = "
+            f"{samples.grid.nodes[row]:.3f} s, limit {limit:.4g}"
+        )

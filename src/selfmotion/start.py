@@ -1,0 +1,98 @@
+"""The start configuration: given, or free to move along its self-motion."""
+
+from typing import Protocol
+
+import numpy as np
+
+from selfmotion.arrays import Array
+from selfmotion.path import Path
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
+
+# Newton's method onto the start of the path: quadratic, so few steps; far moves fail and say so.
+_STEPS, _ARRIVED = 20, 1e-12
+
+
+class Start(Protocol):
+    """q(0) as a function of `size` decision variables z."""
+
+    @property
+    def size(self) -> int:
+        """Number of decision variables."""
+
+    def configuration(self, z: Array) -> Array | None:
+        """Return q(0) (n,), or None where no configuration belongs to z."""
+
+    def tangent(self, z: Array) -> Array:
+        """Return ∂q(0)/∂z, (n, size), at the z of the last `configuration`."""
+
+
+class FixedStart:
+    """A given start configuration."""
+
+    size = 0
+
+    def __init__(self, q: Array) -> None:
+        self._q = q
+
+    def configuration(self, z: Array) -> Array:
+        """See `Start.configuration`."""
+        return self._q
+
+    def tangent(self, z: Array) -> Array:
+        """See `Start.tangent`."""
+        return np.zeros((len(self._q), 0))
+
+
+class FreeStart:
+    """The start moves along the self-motion manifold of the path's first pose.
+
+    q(0) solves F(q) = x(0) and N0ᵀ(q - q_ref) = z, with N0 an orthonormal null-space basis at the
+    reference: coordinates of the manifold, exact and smooth near it.
+
+    Parameters
+    ----------
+    robot, path, task
+    reference : (n,)
+        q_ref, on the manifold; z = 0.
+    """
+
+    def __init__(self, robot: RobotModel, path: Path, task: Task, reference: Array) -> None:
+        self._robot, self._task, self._reference = robot, task, reference
+        self._target = path.pose(0.0)
+        _, _, right = np.linalg.svd(robot.task_jacobian(reference, task))
+        self._null = right[task.dimension :].T
+        self._at = reference
+
+    @property
+    def size(self) -> int:
+        """See `Start.size`: the redundancy r."""
+        return int(self._null.shape[1])
+
+    def configuration(self, z: Array) -> Array | None:
+        """See `Start.configuration`."""
+        q = self._reference + self._null @ z
+        for _ in range(_STEPS):
+            if not np.all(np.isfinite(q)):
+                return None
+            pose = self._robot.pose(q)
+            twist = self._task.twist_error(self._target, pose)
+            error = self._task.select(twist[:, None], pose.rotation)[:, 0]
+            rest = z - self._null.T @ (q - self._reference)
+            if max(np.abs(error).max(), np.abs(rest).max(initial=0.0)) < _ARRIVED:
+                self._at = q
+                return q
+            try:
+                q = q + np.linalg.solve(self._system(q), np.concatenate([error, rest]))
+            except np.linalg.LinAlgError:
+                return None
+        return None
+
+    def tangent(self, z: Array) -> Array:
+        """See `Start.tangent`: [J; N0ᵀ]⁻¹ [0; I]."""
+        m = self._task.dimension
+        right = np.vstack([np.zeros((m, self.size)), np.eye(self.size)])
+        return np.asarray(np.linalg.solve(self._system(self._at), right))
+
+    def _system(self, q: Array) -> Array:
+        return np.vstack([self._robot.task_jacobian(q, self._task), self._null.T])
