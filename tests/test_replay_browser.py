@@ -8,8 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from replay_plans import arm_plan, planar_plan
+from replay_plans import Shelf, arm_plan, planar_plan
 from selfmotion.replay import write_replay
+from selfmotion.robot import NAMED_ARMS
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 pytestmark = pytest.mark.skipif(
@@ -239,6 +240,55 @@ def test_plans_share_a_page(open_page, files):
     page.evaluate("viewer.animator.seek(1.3)")
     assert largest_difference(page_poses(page), planar_plan(), 1.3) < 1e-4
     assert page.locator("#numbers thead th").all_inner_texts() == ["Plan A", "Plan B"]
+    assert_quiet(page)
+
+
+LIT = """() => {
+  const names = [];
+  viewer.scene_tree.find(["selfmotion"]).object.traverse((object) => {
+    if (object.material?.emissive?.getHex()) names.push(object.uuid);
+  });
+  return names;
+}"""
+
+
+def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
+    plan = arm_plan("panda")
+    shelf = Shelf(plan)
+    page = open_page(write_replay(plan, tmp_path / "shelf.html", distances=shelf))
+    shown = set()
+    for time in (0.5, 2.0):
+        page.evaluate("t => replay.seek(t)", time)
+        expected = shelf.distance(plan.trajectory(time))
+        shown.add(expected.second)
+        said = page.locator("#pair").inner_text()
+        assert said == f"closest: panda_hand and {expected.second}, {expected.value:.3f} m"
+        lit = page.evaluate(LIT)
+        assert any("/panda_hand/" in name for name in lit)
+        assert all("/panda_hand/" in name or "/obstacles/" in name for name in lit)
+        assert any(expected.second.replace("/", "_") in name for name in lit)
+    assert shown == {"shelf", "a/b"}
+    assert page.locator(".plot figcaption", has_text="Clearance").count() == 1
+    page.keyboard.press("c")
+    assert page.evaluate(LIT) == []
+    assert not page.locator("#pair").is_visible()
+    assert_quiet(page)
+
+
+@pytest.mark.parametrize("name", sorted(NAMED_ARMS))
+def test_every_named_arm_is_drawn(open_page, tmp_path, name):
+    plan = planar_plan() if name == "planar_3r" else arm_plan(name)
+    small = {"width": 240, "height": 500}
+    page = open_page(write_replay(plan, tmp_path / "arm.html"), viewport=small)
+    page.evaluate("replay.seek(0.5 * replay.duration)")
+    time = 0.5 * plan.trajectory.duration
+    assert largest_difference(page_poses(page), plan, time) < 1e-4
+    # Without the arm the picture is another one.
+    shots = page.evaluate("""() => [true, false].map((visible) => {
+      replay.stage.show("/selfmotion/robot", visible);
+      return viewer.capture_image();
+    })""")
+    assert shots[0] != shots[1]
     assert_quiet(page)
 
 
