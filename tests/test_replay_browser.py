@@ -236,7 +236,10 @@ def test_plans_share_a_page(open_page, files):
     page.evaluate("viewer.animator.seek(1.3)")
     assert largest_difference(page_poses(page), second, 1.3) < 1e-4
     assert largest_difference(page_poses(page), planar_plan(), 1.3) > 1e-3
+    cost = f"{second.report.cost:.4g}"
+    assert cost in page.locator("#description").inner_text()
     page.keyboard.press("1")
+    assert cost not in page.locator("#description").inner_text()
     page.evaluate("viewer.animator.seek(1.3)")
     assert largest_difference(page_poses(page), planar_plan(), 1.3) < 1e-4
     assert page.locator("#numbers thead th").all_inner_texts() == ["Plan A", "Plan B"]

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from selfmotion.arrays import Array
 from selfmotion.replay import links, scene, shapes
 from selfmotion.replay.clearance import ClearanceCurve, Distances, clearance_curve
-from selfmotion.replay.facts import table
+from selfmotion.replay.facts import describe, table
 from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames
 from selfmotion.replay.payload import Json, Payload
 
@@ -123,6 +123,7 @@ def _plan(
     )
     return {
         "label": name,
+        "description": describe(motion.plan),
         "root": root,
         "duration": motion.plan.trajectory.duration,
         "verdict": motion.plan.certificate.verdict,

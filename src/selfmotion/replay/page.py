@@ -76,7 +76,10 @@ def replay_html(
         distances=distances,
     )
     heading = title or f"{shown[0].robot.name}, {shown[0].task.value} task"
-    return _assemble(heading, " ".join(describe(plan) for plan in shown), payload.pack(content))
+    sentences = [describe(plan) for plan in shown]
+    if len(shown) > 1:
+        sentences = [f"{name}: {said}." for name, said in zip(names, sentences, strict=True)]
+    return _assemble(heading, " ".join(sentences), payload.pack(content))
 
 
 def write_replay(

@@ -31,6 +31,7 @@ class Page {
     this.plan = this.content.plans[number];
     this.number = number;
     get("time").max = this.duration;
+    get("description").textContent = this.plan.description;
     get("verdict").textContent = this.plan.verdict;
     get("verdict").classList.toggle("verified", this.plan.verified);
     [...get("choice").children].forEach((button, k) => button.setAttribute("aria-pressed", k === number));
