@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from replay_plans import Shelf, arm_plan, planar_plan
-from selfmotion.replay import write_replay
+from selfmotion.replay import notebook_html, write_replay
 from selfmotion.robot import NAMED_ARMS
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
@@ -132,7 +132,7 @@ def test_every_triangle_reaches_the_scene(open_page, files):
 
 
 def test_pixels_change_with_time_and_come_back(open_page, files):
-    page = open_page(files["panda"])
+    page = open_page(files["panda"], viewport={"width": 320, "height": 400})
     shots = [
         page.evaluate("t => { viewer.animator.seek(t); return viewer.capture_image(); }", t)
         for t in (0.5, 2.0, 0.5)
@@ -293,6 +293,27 @@ def test_every_named_arm_is_drawn(open_page, tmp_path, name):
     })""")
     assert shots[0] != shots[1]
     assert_quiet(page)
+
+
+def test_a_notebook_frame_works_in_its_sandbox(browser, tmp_path):
+    notebook = tmp_path / "notebook.html"
+    notebook.write_text(f"<!doctype html>{notebook_html(planar_plan())}", encoding="utf-8")
+    context = browser.new_context(reduced_motion="reduce")
+    page = context.new_page()
+    page.seen = Seen(page)
+    page.goto(notebook.as_uri())
+    frame = page.frame_locator("iframe")
+    frame.locator("html[data-replay=ready]").wait_for(timeout=60_000)
+    assert frame.locator("#notice").is_hidden()
+    assert_quiet(page)
+    context.close()
+
+
+def test_simplified_meshes_are_admitted(open_page, files, tmp_path):
+    cut = write_replay(arm_plan("xarm7"), tmp_path / "cut.html", triangle_budget=10_000)
+    row = open_page(cut).locator("#numbers tr", has_text="meshes")
+    assert "simplified from 41096" in row.inner_text()
+    assert open_page(files["planar"]).locator("#numbers tr", has_text="meshes").count() == 0
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -90,8 +90,16 @@ def page_content(
             _plan(motion, name, f"/selfmotion/plan{k}", payload, scale, triads, box.radius)
             for k, (motion, name) in enumerate(zip(motions, names, strict=True))
         ],
-        "table": table(plans),
+        "table": [*table(plans), *_simplified(arm, len(plans))],
     }
+
+
+def _simplified(arm: links.Arm, columns: int) -> list[Json]:
+    """Return a row of the table that admits to simplified meshes, where they are."""
+    if arm.drawn == arm.triangles:
+        return []
+    cell = (f"{arm.drawn} triangles", f"simplified from {arm.triangles}")
+    return [{"label": "meshes", "cells": [cell] * columns}]
 
 
 def _scale(motions: list[_Motion]) -> Json:
