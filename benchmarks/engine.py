@@ -12,6 +12,7 @@ from selfmotion.grid import Grid
 from selfmotion.null_motion import NullMotionTable, TransportedFrame
 from selfmotion.objective import Objective
 from selfmotion.rollout import Rollout
+from selfmotion.start import FixedStart
 
 
 def objective_on(problem: sm.Problem, steps: int) -> Objective:
@@ -27,7 +28,7 @@ def objective_on(problem: sm.Problem, steps: int) -> Objective:
         rows = frame.shape[2]
     functions = problem.null_motion.functions(grid.stage_times, problem.path.duration)
     table = NullMotionTable(functions, frame, rows)
-    return Objective(rollout, table, problem.costs, problem.start_configuration)
+    return Objective(rollout, table, problem.costs, FixedStart(problem.start_configuration))
 
 
 class Evaluation:

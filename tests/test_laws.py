@@ -11,6 +11,7 @@ from selfmotion.grid import Grid
 from selfmotion.null_motion import NullMotionTable, PolynomialNullMotion, transport
 from selfmotion.objective import Objective
 from selfmotion.rollout import Rollout
+from selfmotion.start import FixedStart
 
 Case = tuple[sm.RobotModel, sm.Task, Array, sm.Path]
 
@@ -141,7 +142,7 @@ def test_gradient_equals_central_differences(case: Case, cost: str) -> None:
     rollout = rollout_of(case, 8)
     functions = PolynomialNullMotion(2, "joint").functions(rollout.grid.stage_times, path.duration)
     table = NullMotionTable(functions, None, robot.dof)
-    objective = Objective(rollout, table, [COSTS[cost](robot, task)], start)
+    objective = Objective(rollout, table, [COSTS[cost](robot, task)], FixedStart(start))
     x = 0.1 * np.random.default_rng(7).normal(size=objective.size)
     exact = objective.gradient(x)
     differences = central_difference(objective.value, x, 1e-5)
@@ -177,7 +178,7 @@ def test_sensitivities_equal_central_differences(case: Case) -> None:
     table = NullMotionTable(functions, None, robot.dof)
     x = 0.1 * np.random.default_rng(9).normal(size=table.size)
     assert rollout.run(start, table.epsilon(x)) is None
-    _, exact = rollout.sensitivities(table.matrix())
+    _, exact = rollout.sensitivities(table.matrix(), np.zeros((robot.dof, table.size)))
     for i in range(table.size):
         shift = np.zeros_like(x)
         shift[i] = 1e-6
@@ -241,7 +242,7 @@ def test_breakdown_is_reported_not_raised(planar: sm.RobotModel) -> None:
     rollout = Rollout(planar, path, sm.Task.PLANAR, Grid.aligned(path.knots, 10))
     assert rollout.run(start, np.zeros((41, 3))) == 0.0
     table = NullMotionTable(np.ones((41, 1)), None, 3)
-    objective = Objective(rollout, table, [sm.JointVelocity()], start)
+    objective = Objective(rollout, table, [sm.JointVelocity()], FixedStart(start))
     assert objective.value(np.zeros(3)) == np.inf
     assert np.isnan(objective.gradient(np.zeros(3))).all()
     assert rollout.run(np.array([0.3, 1.0, np.nan]), np.zeros((41, 3))) is not None

@@ -8,8 +8,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from replay_plans import arm_plan, planar_plan
-from selfmotion.replay import write_replay
+from replay_plans import Shelf, arm_plan, planar_plan
+from selfmotion.replay import notebook_html, write_replay
+from selfmotion.robot import NAMED_ARMS
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 pytestmark = pytest.mark.skipif(
@@ -131,7 +132,7 @@ def test_every_triangle_reaches_the_scene(open_page, files):
 
 
 def test_pixels_change_with_time_and_come_back(open_page, files):
-    page = open_page(files["panda"])
+    page = open_page(files["panda"], viewport={"width": 320, "height": 400})
     shots = [
         page.evaluate("t => { viewer.animator.seek(t); return viewer.capture_image(); }", t)
         for t in (0.5, 2.0, 0.5)
@@ -235,11 +236,84 @@ def test_plans_share_a_page(open_page, files):
     page.evaluate("viewer.animator.seek(1.3)")
     assert largest_difference(page_poses(page), second, 1.3) < 1e-4
     assert largest_difference(page_poses(page), planar_plan(), 1.3) > 1e-3
+    cost = f"{second.report.cost:.4g}"
+    assert cost in page.locator("#description").inner_text()
     page.keyboard.press("1")
+    assert cost not in page.locator("#description").inner_text()
     page.evaluate("viewer.animator.seek(1.3)")
     assert largest_difference(page_poses(page), planar_plan(), 1.3) < 1e-4
     assert page.locator("#numbers thead th").all_inner_texts() == ["Plan A", "Plan B"]
     assert_quiet(page)
+
+
+LIT = """() => {
+  const names = [];
+  viewer.scene_tree.find(["selfmotion"]).object.traverse((object) => {
+    if (object.material?.emissive?.getHex()) names.push(object.uuid);
+  });
+  return names;
+}"""
+
+
+def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
+    plan = arm_plan("panda")
+    shelf = Shelf(plan)
+    page = open_page(write_replay(plan, tmp_path / "shelf.html", distances=shelf))
+    shown = set()
+    for time in (0.5, 2.0):
+        page.evaluate("t => replay.seek(t)", time)
+        expected = shelf.distance(plan.trajectory(time))
+        shown.add(expected.second)
+        said = page.locator("#pair").inner_text()
+        assert said == f"closest: panda_hand and {expected.second}, {expected.value:.3f} m"
+        lit = page.evaluate(LIT)
+        assert any("/panda_hand/" in name for name in lit)
+        assert all("/panda_hand/" in name or "/obstacles/" in name for name in lit)
+        assert any(expected.second.replace("/", "_") in name for name in lit)
+    assert shown == {"shelf", "a/b"}
+    assert page.locator(".plot figcaption", has_text="Clearance").count() == 1
+    page.keyboard.press("c")
+    assert page.evaluate(LIT) == []
+    assert not page.locator("#pair").is_visible()
+    assert_quiet(page)
+
+
+@pytest.mark.parametrize("name", sorted(NAMED_ARMS))
+def test_every_named_arm_is_drawn(open_page, tmp_path, name):
+    plan = planar_plan() if name == "planar_3r" else arm_plan(name)
+    small = {"width": 240, "height": 500}
+    page = open_page(write_replay(plan, tmp_path / "arm.html"), viewport=small)
+    page.evaluate("replay.seek(0.5 * replay.duration)")
+    time = 0.5 * plan.trajectory.duration
+    assert largest_difference(page_poses(page), plan, time) < 1e-4
+    # Without the arm the picture is another one.
+    shots = page.evaluate("""() => [true, false].map((visible) => {
+      replay.stage.show("/selfmotion/robot", visible);
+      return viewer.capture_image();
+    })""")
+    assert shots[0] != shots[1]
+    assert_quiet(page)
+
+
+def test_a_notebook_frame_works_in_its_sandbox(browser, tmp_path):
+    notebook = tmp_path / "notebook.html"
+    notebook.write_text(f"<!doctype html>{notebook_html(planar_plan())}", encoding="utf-8")
+    context = browser.new_context(reduced_motion="reduce")
+    page = context.new_page()
+    page.seen = Seen(page)
+    page.goto(notebook.as_uri())
+    frame = page.frame_locator("iframe")
+    frame.locator("html[data-replay=ready]").wait_for(timeout=60_000)
+    assert frame.locator("#notice").is_hidden()
+    assert_quiet(page)
+    context.close()
+
+
+def test_simplified_meshes_are_admitted(open_page, files, tmp_path):
+    cut = write_replay(arm_plan("xarm7"), tmp_path / "cut.html", triangle_budget=10_000)
+    row = open_page(cut).locator("#numbers tr", has_text="meshes")
+    assert "simplified from 41096" in row.inner_text()
+    assert open_page(files["planar"]).locator("#numbers tr", has_text="meshes").count() == 0
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

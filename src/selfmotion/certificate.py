@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.arrays import Array
+from selfmotion.collision import CollisionModel
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -32,6 +33,38 @@ class Tolerance:
 
     position: float = 1e-6
     rotation: float = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Requirements:
+    """What a verified motion must keep besides the path; None: the URDF's limits, or nothing.
+
+    Attributes
+    ----------
+    lower, upper : (n,) or None
+        Position limits [rad or m].
+    velocity : (n,) or None
+        Speed limits [rad/s or m/s].
+    acceleration : (n,) or None
+        Acceleration limits [rad/s² or m/s²]; without them none are checked.
+    end : (n,) or None
+        q(T) [rad or m].
+    closed : bool
+        Whether q(T) = q(0) is wanted.
+    collision : CollisionModel or None
+        Bodies to keep apart; without it clearance is not checked.
+    clearance : float
+        Smallest distance between bodies [m].
+    """
+
+    lower: Array | None = None
+    upper: Array | None = None
+    velocity: Array | None = None
+    acceleration: Array | None = None
+    end: Array | None = None
+    closed: bool = False
+    collision: CollisionModel | None = None
+    clearance: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -68,6 +101,10 @@ class Certificate:
         Largest |q̇| relative to the joint's limit; above 1 it is exceeded.
     smallest_singular_value : Extreme
         Of the task Jacobian: distance from singular poses.
+    acceleration_ratio : Extreme or None
+        Largest |q̈| relative to the limits asked for; None without any.
+    clearance : Extreme or None
+        Smallest distance between bodies [m], with their names; None where it was not asked for.
     closure : float
         max |q(T) - q(0)| [rad or m].
     samples : int
@@ -81,6 +118,8 @@ class Certificate:
     limit_margin: Extreme
     velocity_ratio: Extreme
     smallest_singular_value: Extreme
+    acceleration_ratio: Extreme | None
+    clearance: Extreme | None
     closure: float
     samples: int
     failures: tuple[str, ...]
@@ -107,45 +146,78 @@ def certify(
     task: Task,
     trajectory: Trajectory,
     tolerance: Tolerance | None = None,
+    requirements: Requirements | None = None,
 ) -> Certificate:
-    """Check a motion against its path and the arm's limits.
+    """Check a motion against its path, the arm's limits and what else is required.
 
     Parameters
     ----------
     robot, path, task, trajectory
         The motion and what it should do; times of the trajectory are those of the path.
     tolerance : Tolerance, optional
+    requirements : Requirements, optional
 
     Returns
     -------
     Certificate
     """
-    tolerance = tolerance or Tolerance()
+    tolerance, wanted = tolerance or Tolerance(), requirements or Requirements()
     t = _refined(trajectory.t)
     q, qd = trajectory(t), trajectory(t, order=1)
+    distance, angle, singular = _path_errors(robot, path, task, t, q)
+    lower = robot.lower if wanted.lower is None else wanted.lower
+    upper = robot.upper if wanted.upper is None else wanted.upper
+    limit = robot.velocity_limit if wanted.velocity is None else wanted.velocity
+    tool, names = (robot.tool,), robot.joint_names
+    worst = (
+        _extreme(distance, t, tool, np.argmax),
+        _extreme(angle, t, tool, np.argmax),
+        _extreme(np.minimum(q - lower, upper - q), t, names, np.argmin),
+        _extreme(np.abs(qd) / limit, t, names, np.argmax),
+    )
+    acceleration = None
+    if wanted.acceleration is not None:
+        # In the middle between samples the cubic's second derivative is the most accurate.
+        middle = 0.5 * (trajectory.t[:-1] + trajectory.t[1:])
+        share = np.abs(trajectory(middle, order=2)) / wanted.acceleration
+        acceleration = _extreme(share, middle, names, np.argmax)
+    clearance = None if wanted.collision is None else _clearance(wanted.collision, t, q)
+    closure = float(np.abs(trajectory.q[-1] - trajectory.q[0]).max())
+    return Certificate(
+        *worst,
+        smallest_singular_value=_extreme(singular, t, tool, np.argmin),
+        acceleration_ratio=acceleration,
+        clearance=clearance,
+        closure=closure,
+        samples=len(t),
+        failures=(
+            *_failures(*worst, path, trajectory, tolerance),
+            *_unmet(wanted, acceleration, clearance, closure, trajectory),
+        ),
+    )
+
+
+def _path_errors(
+    robot: RobotModel, path: Path, task: Task, t: Array, q: Array
+) -> tuple[Array, Array, Array]:
+    """Return distance [m] and angle [rad] off the path, and the smallest singular value, (K,)."""
     rotation, translation, jacobian = _kinematics(robot, q)
     target = path.samples(t)
     linear = task.rows[task.rows < 3]
     miss = (target.translation - translation)[:, linear]
     distance: Array = np.linalg.norm(miss, axis=1).astype(np.float64)
-    angle = _angles(task, target.rotation, rotation)
     rows = jacobian
     if task.tool_axes:
         turned = rotation.transpose(0, 2, 1) @ jacobian[:, 3:]
         rows = np.concatenate([jacobian[:, :3], turned], axis=1)
-    singular = np.linalg.svd(rows[:, task.rows], compute_uv=False)[:, -1].astype(np.float64)
-    margin = np.minimum(q - robot.lower, robot.upper - q)
-    ratio = np.abs(qd) / robot.velocity_limit
-    names = robot.joint_names
-    worst = (
-        _extreme(distance, t, (robot.tool,), np.argmax),
-        _extreme(angle, t, (robot.tool,), np.argmax),
-        _extreme(margin, t, names, np.argmin),
-        _extreme(ratio, t, names, np.argmax),
-        _extreme(singular, t, (robot.tool,), np.argmin),
-    )
-    closure = float(np.abs(trajectory.q[-1] - trajectory.q[0]).max())
-    return Certificate(*worst, closure, len(t), _failures(*worst[:4], path, trajectory, tolerance))
+    values = np.linalg.svd(rows[:, task.rows], compute_uv=False)
+    return distance, _angles(task, target.rotation, rotation), values[:, -1].astype(np.float64)
+
+
+def _clearance(model: CollisionModel, t: Array, q: Array) -> Extreme:
+    closest = model.worst(q)
+    names = f"{closest.first} - {closest.second}" if closest.first else "nothing"
+    return Extreme(closest.value, float(t[closest.index]), names)
 
 
 def _refined(t: Array) -> Array:
@@ -230,4 +302,37 @@ def _failures(
             f"joint '{ratio.name}' moves at {ratio.value:.3g} times its limit at t = "
             f"{ratio.time:.3f} s: give it {ratio.value:.3g} times the duration"
         )
+    return tuple(failures)
+
+
+# What closed paths and end configurations may miss by [rad or m].
+_ARRIVED = 1e-6
+
+
+def _unmet(
+    wanted: Requirements,
+    acceleration: Extreme | None,
+    clearance: Extreme | None,
+    closure: float,
+    trajectory: Trajectory,
+) -> tuple[str, ...]:
+    failures = []
+    if acceleration is not None and not acceleration.value <= 1.0:
+        failures.append(
+            f"joint '{acceleration.name}' accelerates at {acceleration.value:.3g} times its limit "
+            f"at t = {acceleration.time:.3f} s: give it {acceleration.value**0.5:.3g} times the "
+            f"duration"
+        )
+    if clearance is not None and not clearance.value >= wanted.clearance:
+        failures.append(
+            f"{clearance.name} are {clearance.value * 1e3:.2f} mm apart at t = "
+            f"{clearance.time:.3f} s (wanted: {wanted.clearance * 1e3:.2f} mm)"
+        )
+    if wanted.closed and not closure <= _ARRIVED:
+        failures.append(f"the end is {closure:.2e} (rad or m) away from the start")
+    if wanted.end is not None:
+        miss = np.abs(trajectory.q[-1] - wanted.end)
+        if not miss.max() <= _ARRIVED:
+            joint = trajectory.joint_names[int(np.argmax(miss))]
+            failures.append(f"joint '{joint}' ends {miss.max():.2e} away from where it should")
     return tuple(failures)

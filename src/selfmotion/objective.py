@@ -5,13 +5,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmotion.arrays import Array
+from selfmotion.augmented_lagrangian import AugmentedLagrangian
+from selfmotion.constraints import NodeTangents
 from selfmotion.costs import Cost
 from selfmotion.null_motion import NullMotionTable
 from selfmotion.rollout import Rollout
+from selfmotion.start import Start
 
 
 class Objective:
-    """F(x) = ∫ Σ G(q̇, q, t) dt along the motion that the coefficients x drive.
+    """F = ∫ Σ G(q̇, q, t) dt along the motion of a decision vector, plus its constraints' terms.
+
+    The decision vector is [z | x]: where the start is on its self-motion manifold (nothing for a
+    given start), then the null motion's coefficients.
 
     Parameters
     ----------
@@ -20,8 +26,9 @@ class Objective:
     null_motion : NullMotionTable
         x → ε at the stages.
     costs : sequence of Cost
-    start : (n,)
-        q(0).
+    start : Start
+        z → q(0).
+    constraints : AugmentedLagrangian, optional
 
     Attributes
     ----------
@@ -34,10 +41,12 @@ class Objective:
         rollout: Rollout,
         null_motion: NullMotionTable,
         costs: Sequence[Cost],
-        start: Array,
+        start: Start,
+        constraints: AugmentedLagrangian | None = None,
     ) -> None:
-        self.rollout, self.null_motion = rollout, null_motion
-        self._costs, self._start = tuple(costs), start
+        self.rollout, self.null_motion, self.start = rollout, null_motion, start
+        self.constraints = constraints
+        self._costs = tuple(costs)
         self.evaluations = 0
         self.gradient_evaluations = 0
         self._at: Array | None = None
@@ -46,53 +55,52 @@ class Objective:
     @property
     def size(self) -> int:
         """Number of decision variables."""
-        return self.null_motion.size
+        return self.start.size + self.null_motion.size
 
     def value(self, x: Array) -> float:
-        """Return F(x); infinite where the motion breaks down."""
-        self._run(x)
-        return self._total
+        """Return cost and constraints' terms at x; infinite where the motion breaks down."""
+        self.run(x)
+        total = sum(self._terms.values())
+        if not np.isfinite(total):
+            return np.inf
+        if self.constraints is not None:
+            total += self.constraints.value(self.rollout.samples())
+        return total if np.isfinite(total) else np.inf
 
     def gradient(self, x: Array) -> Array:
-        """Return ∇F(x), (size,): exact for the discretised motion; NaN where it breaks down."""
-        self._run(x)
+        """Return the gradient of `value` at x, (size,).
+
+        Exact for the discretised motion; NaN where it breaks down.
+        """
+        self.run(x)
         self.gradient_evaluations += 1
-        if not np.isfinite(self._total):
+        if not np.isfinite(sum(self._terms.values())):
             return np.full(self.size, np.nan)
-        samples = self.rollout.samples()
-        by_q, by_qd = np.zeros_like(samples.q), np.zeros_like(samples.qd)
-        weights = samples.weights[:, None]
-        nodes = self.rollout.grid.node_stages
-        for cost in self._costs:
-            partials = cost.gradient(samples)
-            if partials.q is not None:
-                by_q += weights * partials.q
-            if partials.qd is not None:
-                by_qd += weights * partials.qd
-            for order, part in ((1, partials.qdd), (2, partials.qddd)):
-                if part is not None:
-                    by_qd[nodes] += self.rollout.grid.differentiation(order).T @ (weights * part)
-        by_epsilon, _ = self.rollout.pullback(by_q, by_qd)
-        return self.null_motion.pullback(by_epsilon)
+        by_epsilon, by_start = self.rollout.pullback(*self._cotangents())
+        by_coefficients = self.null_motion.pullback(by_epsilon)
+        if self.start.size == 0:
+            return by_coefficients
+        by_z = by_start @ self.start.tangent(x[: self.start.size])
+        return np.concatenate([by_z, by_coefficients])
 
     def slope(self, x: Array, direction: Array) -> float:
-        """Return the derivative of F at x along `direction`."""
+        """Return the derivative of `value` at x along `direction`."""
         return float(self.gradient(x) @ direction)
 
     def terms(self, x: Array) -> dict[str, float]:
-        """Return what each cost contributes to F(x)."""
-        self._run(x)
+        """Return what each cost contributes to F at x, without the constraints' terms."""
+        self.run(x)
         return dict(self._terms)
 
     def metric(self, x: Array) -> Array:
-        """Return the Gauss-Newton matrix of the quadratic costs at x, (size, size).
+        """Return the Gauss-Newton matrix of quadratic costs and active constraints, (size, size).
 
-        ∫ Σ_k (∂q^(k)/∂x)ᵀ W_k (∂q^(k)/∂x) dt over the derivatives q^(k) of q that the costs weigh;
-        without such a cost, that of ½ q̇ᵀq̇. Its inverse starts the quasi-Newton method.
+        ∫ Σ_k (∂q^(k)/∂x)ᵀ W_k (∂q^(k)/∂x) dt over the derivatives q^(k) of q that the costs weigh
+        (that of ½ q̇ᵀq̇ where none does). Its inverse starts the quasi-Newton method.
         """
-        self._run(x)
+        self.run(x)
         n, grid = self.rollout.robot.dof, self.rollout.grid
-        by_q, by_qd = self.rollout.sensitivities(self.null_motion.matrix())
+        by_q, by_qd = self._sensitivities(x)
         curvatures = [cost.curvature(n) for cost in self._costs]
         if not any(curvatures):
             curvatures = [{1: np.eye(n)}]
@@ -105,27 +113,63 @@ class Objective:
                     tangent = (grid.differentiation(order - 1) @ nodes).reshape(by_qd.shape)
                 weighted = grid.weights[:, None, None] * (weight @ tangent)
                 metric += tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size)
+        if self.constraints is not None:
+            here = grid.node_stages
+            faster = (grid.differentiation(1)[here] @ nodes).reshape(by_qd[here].shape)
+            tangents = NodeTangents(by_q[here], by_qd[here], faster)
+            metric += self.constraints.curvature(self.rollout.samples(), tangents)
         return metric
 
-    @property
-    def _total(self) -> float:
-        total = sum(self._terms.values())
-        return total if np.isfinite(total) else np.inf
-
-    def _run(self, x: Array) -> None:
-        """Make `x` the motion that the rollout holds."""
+    def run(self, x: Array) -> None:
+        """Make x the motion that the rollout holds."""
         if self._at is not None and np.array_equal(self._at, x):
             return
         self.evaluations += 1
         self._at = x.copy()
-        names = [cost.name for cost in self._costs]
-        if self.rollout.run(self._start, self.null_motion.epsilon(x)) is not None:
-            self._terms = dict.fromkeys(names, np.inf)
+        self._terms = {cost.name: np.inf for cost in self._costs}
+        start = self.start.configuration(x[: self.start.size])
+        if start is None:
+            return
+        epsilon = self.null_motion.epsilon(x[self.start.size :])
+        if self.rollout.run(start, epsilon) is not None:
             return
         samples = self.rollout.samples()
-        self._terms = {
-            cost.name: float(samples.weights @ cost.value(samples)) for cost in self._costs
-        }
+        for cost in self._costs:
+            self._terms[cost.name] = float(samples.weights @ cost.value(samples))
+
+    def _cotangents(self) -> tuple[Array, Array]:
+        """Return the derivatives of `value` with respect to q and q̇ at the stages."""
+        samples, grid = self.rollout.samples(), self.rollout.grid
+        by_q, by_qd = np.zeros_like(samples.q), np.zeros_like(samples.qd)
+        weights, nodes = samples.weights[:, None], grid.node_stages
+        for cost in self._costs:
+            partials = cost.gradient(samples)
+            if partials.q is not None:
+                by_q += weights * partials.q
+            if partials.qd is not None:
+                by_qd += weights * partials.qd
+            for order, part in ((1, partials.qdd), (2, partials.qddd)):
+                if part is not None:
+                    by_qd[nodes] += grid.differentiation(order).T @ (weights * part)
+        for condition in self.constraints.gradient(samples) if self.constraints else ():
+            if condition.q is not None:
+                by_q[nodes] += condition.q
+            if condition.qd is not None:
+                by_qd[nodes] += condition.qd
+            if condition.qdd is not None:
+                by_qd[nodes] += grid.differentiation(1)[nodes].T @ condition.qdd
+        return by_q, by_qd
+
+    def _sensitivities(self, x: Array) -> tuple[Array, Array]:
+        """Return ∂q/∂[z | x] and ∂q̇/∂[z | x] at the stages, (S, n, size)."""
+        by_coefficients = self.null_motion.matrix()
+        free = self.start.size
+        stages, n, _ = by_coefficients.shape
+        epsilon_matrix = np.concatenate([np.zeros((stages, n, free)), by_coefficients], axis=2)
+        start_matrix = np.zeros((n, self.size))
+        if free:
+            start_matrix[:, :free] = self.start.tangent(x[:free])
+        return self.rollout.sensitivities(epsilon_matrix, start_matrix)
 
 
 def inverse_metric(metric: Array, floor: float = 1e-4) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from selfmotion import files
 from selfmotion.arrays import Array
 from selfmotion.certificate import Certificate, Extreme
+from selfmotion.constraints import Clearance
 from selfmotion.errors import FileFormatError, PlanError
 from selfmotion.path import Path, path_from_dict
 from selfmotion.quasi_newton import Iteration, Status
@@ -81,6 +82,8 @@ class Plan:
         x, the null motion's coefficients.
     report : Report
     certificate : Certificate
+    clearance : Clearance or None
+        The obstacles and the distance kept from them, where asked for.
     """
 
     robot: RobotModel
@@ -91,6 +94,7 @@ class Plan:
     coefficients: Array
     report: Report
     certificate: Certificate
+    clearance: Clearance | None = None
 
     def require(self) -> "Plan":
         """Return the plan itself if its certificate is verified.

@@ -1,13 +1,24 @@
 """What to plan: an arm, a tool motion, the rows that count, and what to minimise."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.arrays import Array, read_only
+from selfmotion.certificate import Requirements
+from selfmotion.constraints import (
+    BoundConstraint,
+    Clearance,
+    ClosedPath,
+    Constraint,
+    EndConfiguration,
+    JointAccelerationLimits,
+    JointPositionLimits,
+    JointVelocityLimits,
+)
 from selfmotion.costs import Cost, JointVelocity
 from selfmotion.errors import ProblemError, RedundancyError, StartError
 from selfmotion.null_motion import NullMotion, PolynomialNullMotion
@@ -30,13 +41,15 @@ class Problem:
         The tool's motion.
     task : Task or str
         The rows of it that are prescribed; ``"pose"`` by default.
-    start : (n,), optional
-        q(0) [rad or m]; must put the tool on the start of the path. By default an
-        inverse-kinematics solution.
+    start : (n,) or "free", optional
+        q(0) [rad or m]; must put the tool on the start of the path. By default free: many starts
+        are tried, and the best ones optimised along with the rest of the motion.
     null_motion : NullMotion
         The parameterisation of the self-motion.
     costs : sequence of Cost
         Their integrals are added up. By default ∫ ½ q̇ᵀq̇ dt.
+    constraints : sequence of Constraint
+        What the motion must keep. By default the URDF's limits of joint position and velocity.
 
     Raises
     ------
@@ -51,15 +64,24 @@ class Problem:
     robot: RobotModel
     path: Path
     task: Task | str = Task.POSE
-    start: npt.ArrayLike | None = None
+    start: npt.ArrayLike | str | None = None
     null_motion: NullMotion = field(default_factory=PolynomialNullMotion)
     costs: Sequence[Cost] = field(default_factory=lambda: (JointVelocity(),))
+    constraints: Sequence[Constraint] = field(
+        default_factory=lambda: (JointPositionLimits(), JointVelocityLimits())
+    )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "task", Task.of(self.task))
         object.__setattr__(self, "costs", tuple(self.costs))
+        object.__setattr__(self, "constraints", tuple(self.constraints))
+        if isinstance(self.start, str):
+            if self.start != "free":
+                raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
+            object.__setattr__(self, "start", None)
         self._check_rank()
         self._check_costs()
+        self._check_closed()
         if self.start is not None:
             start = read_only(self.robot.configuration(self.start))
             object.__setattr__(self, "start", start)
@@ -70,19 +92,29 @@ class Problem:
         """The task."""
         return Task.of(self.task)
 
-    @cached_property
-    def start_configuration(self) -> Array:
-        """q(0), (n,): the given one, or an inverse-kinematics solution.
+    @property
+    def given_start(self) -> Array | None:
+        """The start configuration (n,), or None where it is free."""
+        return None if self.start is None else np.asarray(self.start, dtype=np.float64)
 
-        Raises
-        ------
-        InverseKinematicsError
-            Nothing was given and no configuration reaches the start of the path.
-        """
-        if self.start is not None:
-            return np.asarray(self.start)
-        pose = self.path.pose(0.0)
-        return read_only(self.robot.inverse_kinematics(pose, self.rows))
+    @cached_property
+    def bound_constraints(self) -> tuple[BoundConstraint, ...]:
+        """The constraints, for this arm."""
+        return tuple(constraint.bind(self.robot) for constraint in self.constraints)
+
+    @cached_property
+    def clearance(self) -> Clearance | None:
+        """The clearance asked for."""
+        found = [item for item in self.constraints if isinstance(item, Clearance)]
+        return found[0] if found else None
+
+    @cached_property
+    def requirements(self) -> Requirements:
+        """What the certificate has to check besides the path."""
+        wanted = Requirements()
+        for item in self.constraints:
+            wanted = _require(wanted, item, self.robot)
+        return wanted
 
     def _check_rank(self) -> None:
         robot, task = self.robot, self.rows
@@ -112,6 +144,17 @@ class Problem:
         for cost in self.costs:
             cost.check(self.robot.dof)
 
+    def _check_closed(self) -> None:
+        if not any(isinstance(item, ClosedPath) for item in self.constraints):
+            return
+        first, last = self.path.pose(0.0), self.path.pose(self.path.duration)
+        position, rotation = self.rows.miss(first, last)
+        if max(position, rotation) > _ON_PATH:
+            raise ProblemError(
+                f"a closed joint path needs a closed tool path, but the tool ends {position:.3g} m "
+                f"and {rotation:.3g} rad from where it began"
+            )
+
     def _check_start(self, start: Array) -> None:
         pose = self.path.pose(0.0)
         position, rotation = self.rows.miss(pose, self.robot.pose(start))
@@ -123,3 +166,23 @@ class Problem:
                 position_miss=position,
                 rotation_miss=rotation,
             )
+
+
+def _require(wanted: Requirements, item: Constraint, robot: RobotModel) -> Requirements:
+    """Return the requirements with those of one constraint."""
+    if isinstance(item, JointPositionLimits):
+        lower = robot.lower if item.lower is None else read_only(item.lower)
+        upper = robot.upper if item.upper is None else read_only(item.upper)
+        return replace(wanted, lower=lower, upper=upper)
+    if isinstance(item, JointVelocityLimits) and item.limit is not None:
+        return replace(wanted, velocity=read_only(item.limit))
+    if isinstance(item, JointAccelerationLimits):
+        limit = np.broadcast_to(np.asarray(item.limit, dtype=np.float64), (robot.dof,))
+        return replace(wanted, acceleration=read_only(limit))
+    if isinstance(item, EndConfiguration):
+        return replace(wanted, end=read_only(item.q))
+    if isinstance(item, ClosedPath):
+        return replace(wanted, closed=True)
+    if isinstance(item, Clearance):
+        return replace(wanted, collision=item.model(robot), clearance=item.distance)
+    return wanted

@@ -126,18 +126,27 @@ class Rollout:
         self.jacobian_evaluations += len(here)
         return self.grid.nodes, self._q[here], self._qd[here]
 
-    def sensitivities(self, epsilon_matrix: Array) -> tuple[Array, Array]:
+    def sensitivities(self, epsilon_matrix: Array, start_matrix: Array) -> tuple[Array, Array]:
         """Return ∂q/∂x and ∂q̇/∂x at the stages of the last run, (S, n, d) each.
 
         Parameters
         ----------
         epsilon_matrix : (S, n, d)
-            ∂ε/∂x.
+            ∂ε/∂x at the stages.
+        start_matrix : (n, d)
+            ∂q(0)/∂x.
         """
         epsilon_matrix = np.ascontiguousarray(epsilon_matrix)
         by_q, by_qd = np.empty_like(epsilon_matrix), np.empty_like(epsilon_matrix)
         kernels.sensitivities(
-            self._table, self._rows, self._angle_kind, self._gain, epsilon_matrix, by_q, by_qd
+            self._table,
+            self._rows,
+            self._angle_kind,
+            self._gain,
+            epsilon_matrix,
+            np.ascontiguousarray(start_matrix),
+            by_q,
+            by_qd,
         )
         return by_q, by_qd
 

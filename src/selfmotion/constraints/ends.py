@@ -12,7 +12,6 @@ from selfmotion.constraints.base import (
     motion_of_order,
     partials_of_order,
 )
-from selfmotion.errors import ProblemError
 from selfmotion.robot import RobotModel
 from selfmotion.samples import Samples
 
@@ -127,14 +126,4 @@ class BoundEnd:
         return (
             f"{quantity} of joint '{self.robot.joint_names[column % n]}' at the end is "
             f"{miss:.3g} away from {goal}"
-        )
-
-
-def closed_path_is_possible(first: Array, last: Array) -> None:
-    """Raise ProblemError unless the tool ends where it began (`first`, `last` (6,): pose error)."""
-    miss = float(np.abs(last - first).max())
-    if miss > 1e-6:
-        raise ProblemError(
-            f"a closed joint path needs a closed tool path, but the tool ends {miss:.3g} (m, rad) "
-            f"from where it began"
         )

@@ -306,18 +306,21 @@ def sensitivities(
     angle_kind: int,
     gain: float,
     epsilon_matrix: Array,
+    start_matrix: Array,
     q_matrix: Array,
     qd_matrix: Array,
 ) -> None:
-    """Set ∂q/∂x and ∂q̇/∂x at all stages, (S, n, d), for ∂ε/∂x = `epsilon_matrix` (S, n, d).
+    """Set ∂q/∂x and ∂q̇/∂x at all stages, (S, n, d).
+
+    For ∂ε/∂x = `epsilon_matrix` (S, n, d) and ∂q(0)/∂x = `start_matrix` (n, d).
 
     The tangent of the Runge-Kutta recursion: ∂q̇ = (I - J⁺J) ∂ε + (∂q̇/∂q) ∂q at every stage. The
     rows of both matrices are pullbacks of the unit vectors.
     """
-    stages, n, d = epsilon_matrix.shape
+    stages, n = epsilon_matrix.shape[:2]
     step = layout(n, rows.shape[0])[6]
     projector, slope_by_q, unit = np.empty((n, n)), np.empty((n, n)), np.zeros(n)
-    state, now = np.zeros((n, d)), np.zeros((n, d))
+    state, now = start_matrix.copy(), start_matrix.copy()
     for s in range(stages):
         for k in range(n):
             unit[k] = 1.0

@@ -1,15 +1,19 @@
 """All that a page knows, from plans: see `Payload` for how it travels."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.arrays import Array
-from selfmotion.plan import Plan
 from selfmotion.replay import links, scene, shapes
 from selfmotion.replay.clearance import ClearanceCurve, Distances, clearance_curve
-from selfmotion.replay.facts import table
+from selfmotion.replay.facts import describe, table
 from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames
 from selfmotion.replay.payload import Json, Payload
+
+if TYPE_CHECKING:
+    from selfmotion.plan import Plan
 
 # What can be shown and hidden: with its key, and whether it is shown at first.
 _LAYERS = [
@@ -29,7 +33,7 @@ _ELLIPSOID_LENGTH = 0.3
 class _Motion:
     """A plan, sampled: the motion itself and x = 0."""
 
-    def __init__(self, plan: Plan, distances: Distances | None) -> None:
+    def __init__(self, plan: "Plan", distances: Distances | None) -> None:
         robot = plan.robot
         self.plan = plan
         self.frames = key_frames(robot, plan.trajectory)
@@ -43,7 +47,7 @@ class _Motion:
 
 
 def page_content(
-    plans: list[Plan],
+    plans: "list[Plan]",
     names: list[str],
     payload: Payload,
     *,
@@ -86,8 +90,16 @@ def page_content(
             _plan(motion, name, f"/selfmotion/plan{k}", payload, scale, triads, box.radius)
             for k, (motion, name) in enumerate(zip(motions, names, strict=True))
         ],
-        "table": table(plans),
+        "table": [*table(plans), *_simplified(arm, len(plans))],
     }
+
+
+def _simplified(arm: links.Arm, columns: int) -> list[Json]:
+    """Return a row of the table that admits to simplified meshes, where they are."""
+    if arm.drawn == arm.triangles:
+        return []
+    cell = (f"{arm.drawn} triangles", f"simplified from {arm.triangles}")
+    return [{"label": "meshes", "cells": [cell] * columns}]
 
 
 def _scale(motions: list[_Motion]) -> Json:
@@ -119,6 +131,7 @@ def _plan(
     )
     return {
         "label": name,
+        "description": describe(motion.plan),
         "root": root,
         "duration": motion.plan.trajectory.duration,
         "verdict": motion.plan.certificate.verdict,
@@ -150,7 +163,7 @@ def _packed(frames: KeyFrames, payload: Payload) -> Json:
     }
 
 
-def _curves(plan: Plan, sampled: Curves, payload: Payload) -> Json:
+def _curves(plan: "Plan", sampled: Curves, payload: Payload) -> Json:
     drawn = {
         "t": payload.array(sampled.t),
         "q": payload.array(sampled.q),
@@ -172,7 +185,7 @@ def _clearance(curve: ClearanceCurve, payload: Payload) -> Json:
     }
 
 
-def _joints(plan: Plan) -> list[Json]:
+def _joints(plan: "Plan") -> list[Json]:
     robot = plan.robot
     kinds = [robot.urdf.joints[name].kind for name in robot.joint_names]
     return [

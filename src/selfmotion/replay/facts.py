@@ -1,14 +1,16 @@
 """A plan's report and certificate as the rows of a table."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from selfmotion.plan import Plan
+if TYPE_CHECKING:
+    from selfmotion.plan import Plan
+
 
 # A number and a remark, shown smaller after it.
 Cell = tuple[str, str]
 
 
-def facts(plan: Plan) -> dict[str, Cell]:
+def facts(plan: "Plan") -> dict[str, Cell]:
     """Return what a reader wants to know of a plan: label → number and remark."""
     report, certificate = plan.report, plan.certificate
     rows: dict[str, Cell] = {"verdict": (certificate.verdict, "")}
@@ -33,7 +35,7 @@ def facts(plan: Plan) -> dict[str, Cell]:
     return rows
 
 
-def table(plans: list[Plan]) -> list[dict[str, Any]]:
+def table(plans: "list[Plan]") -> list[dict[str, Any]]:
     """Return the rows for several plans side by side; a plan without a row gets an empty cell."""
     columns = [facts(plan) for plan in plans]
     labels = list(dict.fromkeys(label for column in columns for label in column))
@@ -43,13 +45,14 @@ def table(plans: list[Plan]) -> list[dict[str, Any]]:
     ]
 
 
-def describe(plan: Plan) -> str:
+def describe(plan: "Plan") -> str:
     """Return one sentence that tells a stranger what the page shows."""
     report = plan.report
     saved = ""
     if report.initial_cost:
         change = report.cost / report.initial_cost - 1.0
-        saved = f", {abs(change):.0%} {'below' if change <= 0 else 'above'} the motion x = 0"
+        side = "below" if change <= 0 else "above"
+        saved = f", {abs(100 * change):.1f} % {side} the motion x = 0"
     return (
         f"{plan.robot.name}: {plan.robot.dof} joints follow a tool motion of "
         f"{plan.trajectory.duration:.3g} s (task '{plan.task.value}') at cost {report.cost:.4g}"

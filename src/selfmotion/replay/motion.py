@@ -1,16 +1,20 @@
 """A plan's motion, sampled for a page: key frames of the links, and curves over time."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
+from scipy.ndimage import maximum_filter1d
 
 from selfmotion.arrays import Array
-from selfmotion.plan import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 from selfmotion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from selfmotion.plan import Plan
 
 # Between key frames a page interpolates; it may be off by this much at most [m, and per entry of
 # the rotation matrix]. Below what a screen resolves and half of what our tests ask for.
@@ -132,7 +136,8 @@ class Curves:
     manipulability : (M,)
         √det(JJᵀ) of the rows the task prescribes, in SI units.
     position_error, rotation_error : (M,)
-        Distance from the prescribed tool motion in the task's rows [m], [rad].
+        Distance from the prescribed tool motion in the task's rows [m], [rad]: the largest within
+        1 % of the duration, because at the trajectory's samples it is next to nothing.
     tool : (M, 3)
         Position of the tool in world axes [m].
     rotation : (M, 3, 3)
@@ -153,7 +158,7 @@ class Curves:
     ellipsoid: Array
 
 
-def curves(plan: Plan, trajectory: Trajectory, points: int = _CURVE_POINTS) -> Curves:
+def curves(plan: "Plan", trajectory: Trajectory, points: int = _CURVE_POINTS) -> Curves:
     """Evaluate `trajectory` (the plan's, or its x = 0 motion) for the plots."""
     robot, task = plan.robot, plan.task
     times = np.linspace(0.0, trajectory.duration, points)
@@ -170,13 +175,14 @@ def curves(plan: Plan, trajectory: Trajectory, points: int = _CURVE_POINTS) -> C
         ellipsoid[k] = _velocity_ellipsoid(jacobian, task)
         errors[k] = task.miss(pin.SE3(target.rotation[k], target.translation[k]), pose)
         tool[k], rotation[k] = pose.translation, pose.rotation
+    window = 2 * (points // 100) + 1
     return Curves(
         t=times,
         q=q,
         qd=trajectory(clock, 1),
         manipulability=manipulability,
-        position_error=errors[:, 0],
-        rotation_error=errors[:, 1],
+        position_error=maximum_filter1d(errors[:, 0], window),
+        rotation_error=maximum_filter1d(errors[:, 1], window),
         tool=tool,
         rotation=rotation,
         ellipsoid=ellipsoid,

@@ -10,17 +10,19 @@ from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from string import Template
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
 from selfmotion.errors import ProblemError
 from selfmotion.files import write_atomically
-from selfmotion.plan import Plan
 from selfmotion.replay.clearance import Distances
 from selfmotion.replay.content import page_content
 from selfmotion.replay.facts import describe
 from selfmotion.replay.payload import Payload
+
+if TYPE_CHECKING:
+    from selfmotion.plan import Plan
 
 # All arms in example-robot-data stay below this; beyond it a page would take seconds to open.
 TRIANGLE_BUDGET = 600_000
@@ -30,7 +32,7 @@ _SCRIPTS = ("payload.js", "stage.js", "plots.js", "page.js")
 
 
 def replay_html(
-    plans: Plan | Sequence[Plan],
+    plans: "Plan | Sequence[Plan]",
     *,
     title: str | None = None,
     labels: Sequence[str] | None = None,
@@ -74,11 +76,14 @@ def replay_html(
         distances=distances,
     )
     heading = title or f"{shown[0].robot.name}, {shown[0].task.value} task"
-    return _assemble(heading, " ".join(describe(plan) for plan in shown), payload.pack(content))
+    sentences = [describe(plan) for plan in shown]
+    if len(shown) > 1:
+        sentences = [f"{name}: {said}." for name, said in zip(names, sentences, strict=True)]
+    return _assemble(heading, " ".join(sentences), payload.pack(content))
 
 
 def write_replay(
-    plans: Plan | Sequence[Plan], file: str | os.PathLike[str], **options: Any
+    plans: "Plan | Sequence[Plan]", file: str | os.PathLike[str], **options: Any
 ) -> Path:
     """Write `replay_html` to `file`, whole or not at all; options are those of `replay_html`.
 
@@ -97,7 +102,7 @@ def write_replay(
     return path
 
 
-def notebook_html(plan: Plan, height: int = 900) -> str:
+def notebook_html(plan: "Plan", height: int = 900) -> str:
     """Return the replay as an inline frame, for ``Plan._repr_html_`` in a notebook."""
     page = html.escape(replay_html(plan), quote=True)
     return (
@@ -106,7 +111,7 @@ def notebook_html(plan: Plan, height: int = 900) -> str:
     )
 
 
-def _as_list(plans: Any) -> list[Plan]:
+def _as_list(plans: Any) -> "list[Plan]":
     shown = list(plans) if isinstance(plans, Sequence) else [plans]
     if not shown:
         raise ProblemError("a replay needs at least one plan")
@@ -121,7 +126,7 @@ def _as_list(plans: Any) -> list[Plan]:
     return shown
 
 
-def _labels(plans: list[Plan], labels: Sequence[str] | None) -> list[str]:
+def _labels(plans: "list[Plan]", labels: Sequence[str] | None) -> list[str]:
     if labels is None:
         return ["plan"] if len(plans) == 1 else [f"Plan {chr(65 + k)}" for k in range(len(plans))]
     if len(labels) != len(plans):

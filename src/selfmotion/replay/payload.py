@@ -62,7 +62,7 @@ class Payload:
             separators=(",", ":"),
         ).encode()
         data = _padded(struct.pack("<I", len(text)) + text) + b"".join(chunks)
-        return base64.b64encode(gzip.compress(data, compresslevel=9, mtime=0)).decode("ascii")
+        return base64.b64encode(gzip.compress(data, compresslevel=6, mtime=0)).decode("ascii")
 
 
 def grid_codes(grid: npt.NDArray[np.uint16]) -> npt.NDArray[np.uint16]:

@@ -106,6 +106,7 @@ def stage_commands(box: Bounds) -> list[Json]:
             intensity=0.55,
             shadow={
                 "bias": -0.0005,
+                "normalBias": 0.01 * reach,
                 "radius": 4,
                 "mapSize": [2048, 2048],
                 "camera": {

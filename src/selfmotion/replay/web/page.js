@@ -31,6 +31,7 @@ class Page {
     this.plan = this.content.plans[number];
     this.number = number;
     get("time").max = this.duration;
+    get("description").textContent = this.plan.description;
     get("verdict").textContent = this.plan.verdict;
     get("verdict").classList.toggle("verified", this.plan.verified);
     [...get("choice").children].forEach((button, k) => button.setAttribute("aria-pressed", k === number));
@@ -246,9 +247,10 @@ function plotSpecs({ joints }, { curves, start, clearance }) {
     ...("position" in curves ? [{ name: "position [m]", values: curves.position, color: COLORS[0] }] : []),
     ...("rotation" in curves ? [{ name: "rotation [rad]", values: curves.rotation, color: COLORS[3] }] : [])];
   const { t } = curves;
+  const note = "dashed: limits";
   return [
-    { title: "Joint positions q", unit, t, curves: perJoint(curves.q, (j) => j.lower, (j) => j.upper) },
-    { title: "Joint velocities q̇", unit: `${unit.replaceAll(/rad|m/g, "$&/s")}`, t,
+    { title: "Joint positions q", unit, t, note, curves: perJoint(curves.q, (j) => j.lower, (j) => j.upper) },
+    { title: "Joint velocities q̇", unit: unit.replaceAll(/rad|m/g, "$&/s"), t, note,
       curves: perJoint(curves.qd, (j) => (j.speed === null ? null : -j.speed), (j) => j.speed) },
     { title: "Manipulability √det(JJᵀ)", unit: "", t, zero: true, curves: both("manipulability") },
     { title: "Path error", unit: "", t, log: true, floor: 1e-16, curves: errors },

@@ -30,7 +30,7 @@ function ticks(low, high, count) {
   return places;
 }
 
-// spec: { title, unit, t, log, floor, curves: [{ name, values, color, start, low, high }] }
+// spec: { title, unit, note, t, log, floor, curves: [{ name, values, color, start, low, high }] }
 class Plot {
   constructor(parent, spec, onSeek) {
     Object.assign(this, spec);
@@ -111,6 +111,7 @@ class Plot {
     const [low, high] = this.range();
     const end = this.t[this.t.length - 1];
     const { left, right, top, bottom } = MARGIN;
+    this.noise = this.log ? 0 : 1e-7 * (high - low);
     this.x = (time) => left + (time / end) * (width - left - right);
     this.y = (value) => top + ((high - value) / (high - low)) * (HEIGHT - top - bottom);
     this.inverse = (x) => Math.min(Math.max((x - left) / (width - left - right), 0), 1) * end;
@@ -171,13 +172,15 @@ class Plot {
     this.move(this.cursor, this.time);
     this.move(this.hoverLine, this.hover ?? this.time);
     this.figure.classList.toggle("hovered", this.hover !== undefined);
-    this.at.textContent = this.hover === undefined ? "" : `at ${this.hover.toFixed(2)} s`;
+    this.at.textContent = this.hover === undefined ? this.note ?? "" : `at ${this.hover.toFixed(2)} s`;
     const end = this.t[this.t.length - 1];
     const place = Math.min(Math.max(time / end, 0), 1) * (this.t.length - 1);
     const k = Math.min(Math.floor(place), this.t.length - 2);
     for (const curve of this.curves) {
       const [a, b] = [curve.values[k], curve.values[k + 1]];
-      curve.output.textContent = format(a + (place - k) * (b - a));
+      const value = a + (place - k) * (b - a);
+      // Rounding noise about zero is zero, except where noise is what the plot is about.
+      curve.output.textContent = format(Math.abs(value) < this.noise ? 0 : value);
     }
   }
 

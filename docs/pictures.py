@@ -1,0 +1,45 @@
+"""Draw the pictures of the README and of `docs` from real replays: ``python docs/pictures.py``.
+
+Needs a Chromium browser. Takes about a minute.
+"""
+
+from pathlib import Path
+
+import selfmotion as sm
+from selfmotion.replay import render_png
+
+DOCS = Path(__file__).parent
+
+
+def plan_of(name: str) -> sm.Plan:
+    """Plan a vertical circle for a named arm, or the paper's sample problem for the planar one."""
+    if name == "planar_3r":
+        return sm.plan(sm.sample_problem())
+    robot = sm.load_robot(name)
+    task = sm.Task.POSE if robot.dof > 6 else sm.Task.POSITION
+    start = robot.dexterous_configuration(task)
+    path = sm.Circle.around(robot.pose(start), 0.06, 4.0, normal=(1.0, 0.0, 0.0))
+    return sm.plan(sm.Problem(robot, path, task, start))
+
+
+def readme_plan() -> sm.Plan:
+    """Plan the README's first example, where the self-motion is large."""
+    panda = sm.load_robot("panda")
+    start = panda.dexterous_configuration()
+    circle = sm.Circle.around(panda.pose(start), radius=0.15, duration=4.0, normal=(1, 0, 0))
+    return sm.plan(sm.Problem(panda, circle, task="position", start=start))
+
+
+def main() -> None:
+    """Draw README's picture, then one of every named arm."""
+    shown = ("trace", "triads", "ghost")
+    size = (1200, 900)
+    render_png(readme_plan(), DOCS / "replay.png", t=1.4, size=size, layers=shown, whole_page=True)
+    for name in sm.NAMED_ARMS:
+        plan = plan_of(name)
+        time = 0.3 * plan.trajectory.duration
+        render_png(plan, DOCS / "arms" / f"{name}.png", t=time, size=(640, 420), layers=shown)
+
+
+if __name__ == "__main__":
+    main()

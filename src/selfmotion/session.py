@@ -1,0 +1,250 @@
+"""One start of one problem, optimised on a grid that becomes finer."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from selfmotion.arrays import Array
+from selfmotion.augmented_lagrangian import AugmentedLagrangian
+from selfmotion.errors import BreakdownError
+from selfmotion.grid import Grid
+from selfmotion.null_motion import NullMotionTable, TransportedFrame
+from selfmotion.objective import Objective, inverse_metric
+from selfmotion.problem import Problem
+from selfmotion.quasi_newton import Callback as IterationCallback
+from selfmotion.quasi_newton import Iteration, Minimum, QuasiNewton, Status
+from selfmotion.rollout import Rollout
+from selfmotion.start import FixedStart, FreeStart, Start
+from selfmotion.trajectory import Trajectory
+
+_Result = TypeVar("_Result")
+
+# Steps to begin with; halved until the motion at x = 0 drifts off the path by less than this,
+# relative to the extent of the path. Costs are then right to about the same.
+_FEWEST_STEPS, _DRIFT = 32, 1e-3
+# Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands.
+_COST_AGREEMENT = 1e-4
+# The finest grid has 2 to this power times the steps of the first.
+MOST_HALVINGS = 8
+# Rounds of the augmented Lagrangian.
+_ROUNDS = 20
+# After these the user has no more time to give.
+_CUT_SHORT = (Status.INTERRUPTED, Status.STOPPED, Status.MAX_EVALUATIONS)
+
+
+@dataclass
+class Counts:
+    """Work done, over all starts and grids."""
+
+    evaluations: int = 0
+    gradients: int = 0
+    jacobians: int = 0
+
+
+class Session:
+    """The optimisation from one start.
+
+    Parameters
+    ----------
+    problem : Problem
+    optimizer : QuasiNewton
+    callback : callable or None
+        Called with each `Iteration`.
+    max_evaluations : int or None
+        Limit on evaluations of this session.
+    counts : Counts
+        Where work is added up, shared by all sessions of a plan.
+    configuration : (n,)
+        The start.
+    free : bool
+        Whether the start may move along its self-motion.
+
+    Raises
+    ------
+    BreakdownError
+        The motion at x = 0 runs into a singular pose.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        optimizer: QuasiNewton,
+        callback: IterationCallback | None,
+        max_evaluations: int | None,
+        counts: Counts,
+        configuration: Array,
+        *,
+        free: bool,
+    ) -> None:
+        self._problem, self._optimizer, self._callback = problem, optimizer, callback
+        self._limit, self._spent = max_evaluations, 0
+        self.counts = counts
+        self.history: list[Iteration] = []
+        self.violations: tuple[str, ...] = ()
+        robot, path, task = problem.robot, problem.path, problem.rows
+        self._start: Start = (
+            FreeStart(robot, path, task, configuration) if free else FixedStart(configuration)
+        )
+        reference = self._reference(configuration)
+        self._frame = self._null_space(reference)
+        conditions = AugmentedLagrangian(problem.bound_constraints, reference.grid)
+        self._objective = self._bind(reference.grid, conditions)
+        self._minimum: Minimum | None = None
+        self._x = np.zeros(self._objective.size)
+
+    @property
+    def status(self) -> Status:
+        """How the last minimisation ended."""
+        return Status.STOPPED if self._minimum is None else self._minimum.status
+
+    @property
+    def coefficients(self) -> Array:
+        """The null motion's coefficients."""
+        return self._x[self._start.size :]
+
+    @property
+    def initial_score(self) -> float:
+        """Return the cost of x = 0, much larger where constraints are violated: for ranking."""
+        x = np.zeros(self._objective.size)
+        cost = sum(self._objective.terms(x).values())
+        conditions = self._conditions
+        conditions.start(self._objective.rollout.samples(), cost)
+        return float(cost + conditions.value(self._objective.rollout.samples()))
+
+    @property
+    def score(self) -> tuple[bool, float]:
+        """Whether constraints are violated, then the cost: the smaller, the better."""
+        return bool(self.violations), sum(self.terms().values())
+
+    def terms(self) -> dict[str, float]:
+        """Return what each cost contributes to the motion's cost."""
+        return self._counted(lambda: self._objective.terms(self._x))
+
+    def initial_terms(self) -> dict[str, float]:
+        """Return what each cost contributes at x = 0, and leave the rollout there."""
+        return self._counted(lambda: self._objective.terms(np.zeros_like(self._x)))
+
+    def trajectory(self) -> Trajectory:
+        """Return the motion that was evaluated last, its nodes put exactly onto the path."""
+        rollout = self._objective.rollout
+        before = rollout.jacobian_evaluations
+        trajectory = Trajectory(*rollout.polish(), self._problem.robot.joint_names)
+        self.counts.jacobians += rollout.jacobian_evaluations - before
+        return trajectory
+
+    def minimize(self, use_metric: bool) -> None:
+        """Optimise on the present grid: rounds of the augmented Lagrangian until all is kept."""
+        objective, conditions = self._objective, self._conditions
+        cost = sum(self.terms().values())
+        conditions.start(objective.rollout.samples(), cost)
+        h = None if self._minimum is None else self._minimum.inverse_hessian
+        for round_number in range(_ROUNDS):
+            if use_metric and (round_number > 0 or h is None):
+                h = inverse_metric(self._counted(lambda: objective.metric(self._x)))
+            self._minimum = self._run_optimizer(h)
+            self._x = np.array(self._minimum.x)
+            self.terms()
+            samples = objective.rollout.samples()
+            kept = conditions.update(samples)
+            if kept or self.status in _CUT_SHORT:
+                break
+        self.violations = conditions.violated(objective.rollout.samples())
+
+    def refine_until_settled(self) -> None:
+        """Optimise on halved grids until the cost agrees."""
+        for _ in range(MOST_HALVINGS):
+            if self.status in _CUT_SHORT:
+                return
+            before = sum(self.terms().values())
+            self.refine()
+            error = abs(sum(self.terms().values()) - before)
+            self.minimize(use_metric=True)
+            if error <= _COST_AGREEMENT * abs(before):
+                return
+
+    def refine(self) -> None:
+        """Go on with half the step length."""
+        grid = self._objective.rollout.grid.halved()
+        self._objective = self._bind(grid, self._conditions.refined(grid))
+
+    @property
+    def _conditions(self) -> AugmentedLagrangian:
+        conditions = self._objective.constraints
+        if conditions is None:
+            raise RuntimeError("a session's objective always has constraints")
+        return conditions
+
+    def _reference(self, configuration: Array) -> Rollout:
+        """Return the motion at x = 0, on the coarsest grid on which it stays near the path."""
+        problem = self._problem
+        grid = Grid.aligned(problem.path.knots, _FEWEST_STEPS)
+        target = problem.path.samples(grid.nodes)
+        extent = max(float(np.ptp(target.translation, axis=0).max()), 1e-3)
+        rows = problem.rows.rows
+        for _ in range(MOST_HALVINGS):
+            rollout = Rollout(problem.robot, problem.path, problem.rows, grid)
+            epsilon = np.zeros((len(grid.stage_times), problem.robot.dof))
+            broken = rollout.run(configuration, epsilon)
+            self.counts.jacobians += rollout.jacobian_evaluations
+            drift = np.abs(rollout.drift[:, rows]) / np.where(rows < 3, extent, 1.0)
+            off = ~(drift <= _DRIFT).all(axis=1)
+            if broken is None and not off.any():
+                return rollout
+            grid = grid.halved()
+        # After the last halving: where eq. 4 broke down, or else where it first left the path.
+        time = rollout.grid.nodes[int(np.argmax(off))] if broken is None else broken
+        raise BreakdownError(
+            f"{problem.robot.name}: without self-motion the tool reaches a singular pose near "
+            f"t = {time:.4g} s; start elsewhere (start=), or keep the path away from the edge "
+            f"of the workspace",
+            time=float(time),
+        )
+
+    def _null_space(self, reference: Rollout) -> TransportedFrame | None:
+        if self._problem.null_motion.space == "joint":
+            return None
+        nodes = reference.grid.node_stages
+        return TransportedFrame(reference.grid.nodes, reference.samples().task_jacobian[nodes])
+
+    def _bind(self, grid: Grid, conditions: AugmentedLagrangian) -> Objective:
+        problem = self._problem
+        t = grid.stage_times
+        functions = problem.null_motion.functions(t, problem.path.duration)
+        frame = None if self._frame is None else self._frame(t)
+        rows = problem.robot.dof if frame is None else frame.shape[2]
+        return Objective(
+            Rollout(problem.robot, problem.path, problem.rows, grid),
+            NullMotionTable(functions, frame, rows),
+            problem.costs,
+            self._start,
+            conditions,
+        )
+
+    def _run_optimizer(self, h: Array | None) -> Minimum:
+        limit = None if self._limit is None else max(self._limit - self._spent, 1)
+        minimum = self._counted(
+            lambda: self._optimizer.minimize(
+                self._objective,
+                self._x,
+                h,
+                max_evaluations=None if limit is None else limit + self._objective.evaluations,
+                callback=self._callback,
+            )
+        )
+        self.history += minimum.history
+        return minimum
+
+    def _counted(self, work: Callable[[], _Result]) -> _Result:
+        """Do some work with the objective and add up what it took."""
+        objective = self._objective
+        rollout = objective.rollout
+        before = objective.evaluations, objective.gradient_evaluations, rollout.jacobian_evaluations
+        try:
+            return work()
+        finally:
+            self.counts.evaluations += objective.evaluations - before[0]
+            self._spent += objective.evaluations - before[0]
+            self.counts.gradients += objective.gradient_evaluations - before[1]
+            self.counts.jacobians += rollout.jacobian_evaluations - before[2]
