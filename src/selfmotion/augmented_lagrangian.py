@@ -20,7 +20,7 @@ from selfmotion.grid import Grid
 from selfmotion.samples import Samples
 
 # A constraint that has not fallen to this share of its last violation gets a larger penalty.
-_FALL, _GROWTH, _LARGEST = 0.25, 10.0, 1e10
+_FALL, _GROWTH, _LARGEST = 0.25, 10.0, 1e8
 
 
 class _Term:
@@ -129,6 +129,19 @@ class AugmentedLagrangian:
                 term.penalty = min(_GROWTH * term.penalty, _LARGEST)
             term.violation = excess
         return kept
+
+    def equalities(self, samples: Samples, motion: NodeTangents) -> tuple[Array, Array]:
+        """Return the residuals of all equalities, (C,), and their derivatives, (C, d)."""
+        terms = [term.constraint for term in self._terms if term.constraint.equality]
+        residuals = [term.residual(samples).ravel() for term in terms]
+        size = motion.q.shape[2]
+        rows = [term.tangents(samples, motion).reshape(-1, size) for term in terms]
+        return np.concatenate([np.zeros(0), *residuals]), np.vstack([np.zeros((0, size)), *rows])
+
+    @property
+    def has_equalities(self) -> bool:
+        """Whether a constraint is an equality."""
+        return any(term.constraint.equality for term in self._terms)
 
     def violated(self, samples: Samples) -> tuple[str, ...]:
         """Return a message for each constraint that is not kept, on its worst place."""

@@ -114,11 +114,21 @@ class Objective:
                 weighted = grid.weights[:, None, None] * (weight @ tangent)
                 metric += tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size)
         if self.constraints is not None:
-            here = grid.node_stages
-            faster = (grid.differentiation(1)[here] @ nodes).reshape(by_qd[here].shape)
-            tangents = NodeTangents(by_q[here], by_qd[here], faster)
+            tangents = self._at_nodes(by_q, by_qd)
             metric += self.constraints.curvature(self.rollout.samples(), tangents)
         return metric
+
+    def node_tangents(self, x: Array) -> NodeTangents:
+        """Return how the motion at the nodes changes with the decision vector, at x."""
+        self.run(x)
+        return self._at_nodes(*self._sensitivities(x))
+
+    def _at_nodes(self, by_q: Array, by_qd: Array) -> NodeTangents:
+        grid = self.rollout.grid
+        here = grid.node_stages
+        nodes = by_qd[here]
+        faster = grid.differentiation(1)[here] @ nodes.reshape(len(nodes), -1)
+        return NodeTangents(by_q[here], nodes, faster.reshape(nodes.shape))
 
     def run(self, x: Array) -> None:
         """Make x the motion that the rollout holds."""

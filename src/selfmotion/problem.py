@@ -97,10 +97,9 @@ class Problem:
         """The start configuration (n,), or None where it is free."""
         return None if self.start is None else np.asarray(self.start, dtype=np.float64)
 
-    @cached_property
-    def bound_constraints(self) -> tuple[BoundConstraint, ...]:
-        """The constraints, for this arm."""
-        return tuple(constraint.bind(self.robot) for constraint in self.constraints)
+    def bind_constraints(self, start: Array) -> tuple[BoundConstraint, ...]:
+        """Return the constraints for this arm and a start configuration (n,)."""
+        return tuple(item.bind(self.robot, self.rows, start) for item in self.constraints)
 
     @cached_property
     def clearance(self) -> Clearance | None:

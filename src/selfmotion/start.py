@@ -5,6 +5,7 @@ from typing import Protocol
 import numpy as np
 
 from selfmotion.arrays import Array
+from selfmotion.constraints.ends import null_basis
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -60,8 +61,7 @@ class FreeStart:
     def __init__(self, robot: RobotModel, path: Path, task: Task, reference: Array) -> None:
         self._robot, self._task, self._reference = robot, task, reference
         self._target = path.pose(0.0)
-        _, _, right = np.linalg.svd(robot.task_jacobian(reference, task))
-        self._null = right[task.dimension :].T
+        self._null = null_basis(robot, task, reference)
         self._at = reference
 
     @property

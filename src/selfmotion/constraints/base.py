@@ -11,6 +11,7 @@ from typing import Protocol
 from selfmotion.arrays import Array
 from selfmotion.robot import RobotModel
 from selfmotion.samples import Samples
+from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +49,8 @@ class NodeTangents:
 class Constraint(Protocol):
     """A condition on the motion, not yet bound to an arm."""
 
-    def bind(self, robot: RobotModel) -> "BoundConstraint":
-        """Return the constraint for an arm; ProblemError where it does not fit."""
+    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundConstraint":
+        """Return the constraint for an arm, task and start (n,); ProblemError where it misfits."""
 
 
 class BoundConstraint(Protocol):

@@ -11,6 +11,7 @@ from selfmotion.constraints.base import NodePartials, NodeTangents, motion_of_or
 from selfmotion.errors import ProblemError
 from selfmotion.robot import RobotModel
 from selfmotion.samples import Samples
+from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +39,7 @@ class Clearance:
         """Return the exact model that the certificate measures with."""
         return CollisionModel(robot, self.obstacles, self.srdf)
 
-    def bind(self, robot: RobotModel) -> "BoundClearance":
+    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundClearance":
         """See `Constraint.bind`."""
         if not self.distance >= 0.0:
             raise ProblemError(f"clearance: distance is {self.distance} m, expected ≥ 0")

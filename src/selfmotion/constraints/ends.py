@@ -1,4 +1,10 @@
-"""Conditions on the end of the motion: a configuration, rest, repetition."""
+"""Conditions on the end of the motion: a configuration, rest, repetition.
+
+The tool's rows of q(T) and q̇(T) are given by the path already. What is left to ask for are the r
+coordinates along the self-motion: h = Nᵀ(x(T) - target), with N an orthonormal null-space basis at
+the target (or at the start). Two configurations on the same pose with equal coordinates are equal,
+near the reference; the residual is free of what the integration leaves of the path error.
+"""
 
 from dataclasses import dataclass
 
@@ -6,17 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.arrays import Array, read_only
-from selfmotion.constraints.base import (
-    NodePartials,
-    NodeTangents,
-    motion_of_order,
-    partials_of_order,
-)
+from selfmotion.constraints.base import NodePartials, NodeTangents, motion_of_order
 from selfmotion.robot import RobotModel
 from selfmotion.samples import Samples
+from selfmotion.task import Task
 
-# Residuals below this [rad, rad/s] are closed: a thousandth of what a hundred loops may drift.
-_CLOSED = 1e-9
+# The augmented Lagrangian need only come near [rad, rad/s]: Newton's method then closes the rest.
+_NEAR = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,27 +33,30 @@ class EndConfiguration:
 
     q: npt.ArrayLike
 
-    def bind(self, robot: RobotModel) -> "BoundEnd":
+    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundEnd":
         """See `Constraint.bind`."""
-        return BoundEnd("end configuration", 0, read_only(robot.configuration(self.q)), robot)
+        target = read_only(robot.configuration(self.q))
+        null = null_basis(robot, task, target)
+        return BoundEnd("end configuration", (0,), target, null)
 
 
 @dataclass(frozen=True, eq=False)
 class EndVelocity:
-    """The motion ends with a joint velocity.
+    """The motion ends with a joint velocity, in the directions that the path leaves free.
 
     Parameters
     ----------
     qd : (n,) or 0
-        q̇(T) [rad/s or m/s]; must move the tool as the path does.
+        q̇(T) [rad/s or m/s].
     """
 
     qd: npt.ArrayLike = 0.0
 
-    def bind(self, robot: RobotModel) -> "BoundEnd":
+    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundEnd":
         """See `Constraint.bind`."""
         qd = np.broadcast_to(np.asarray(self.qd, dtype=np.float64), (robot.dof,))
-        return BoundEnd("end velocity", 1, read_only(robot.configuration(qd)), robot)
+        target = read_only(robot.configuration(qd))
+        return BoundEnd("end velocity", (1,), target, null_basis(robot, task, start))
 
 
 @dataclass(frozen=True)
@@ -66,64 +71,61 @@ class ClosedPath:
 
     velocity: bool = True
 
-    def bind(self, robot: RobotModel) -> "BoundEnd":
+    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundEnd":
         """See `Constraint.bind`."""
-        name = "closed path, velocity" if self.velocity else "closed path"
-        return BoundEnd(name, 0, None, robot, also_velocity=self.velocity)
+        orders = (0, 1) if self.velocity else (0,)
+        return BoundEnd("closed path", orders, None, null_basis(robot, task, start))
 
 
 @dataclass(frozen=True, eq=False)
 class BoundEnd:
-    """x(T) - target = 0, or x(T) - x(0) = 0 without a target, for x = q or q̇ (or both)."""
+    """Nᵀ(x(T) - target) = 0, or Nᵀ(x(T) - x(0)) = 0 without a target, for x = q, q̇ or both."""
 
     name: str
-    order: int
+    orders: tuple[int, ...]
     target: Array | None
-    robot: RobotModel
-    also_velocity: bool = False
+    null: Array
     equality = True
-    tolerance = _CLOSED
-
-    @property
-    def _orders(self) -> tuple[int, ...]:
-        return (0, 1) if self.also_velocity else (self.order,)
+    tolerance = _NEAR
 
     def residual(self, samples: Samples) -> Array:
         """See `BoundConstraint.residual`."""
         parts = []
-        for order in self._orders:
+        for order in self.orders:
             x = motion_of_order(samples, order)
-            parts.append(x[-1] - (x[0] if self.target is None else self.target))
+            parts.append(self.null.T @ (x[-1] - (x[0] if self.target is None else self.target)))
         return np.concatenate(parts)[None, :]
 
     def pullback(self, samples: Samples, weights: Array) -> NodePartials:
         """See `BoundConstraint.pullback`."""
-        n, nodes = self.robot.dof, len(samples.grid.nodes)
-        values = [np.zeros((nodes, n)) for _ in self._orders]
-        for k, table in enumerate(values):
-            table[-1] = weights[0, k * n : (k + 1) * n]
+        n, r = self.null.shape
+        tables = {}
+        for k, order in enumerate(self.orders):
+            table = np.zeros((len(samples.grid.nodes), n))
+            table[-1] = self.null @ weights[0, k * r : (k + 1) * r]
             if self.target is None:
                 table[0] = -table[-1]
-        if self.also_velocity:
-            return NodePartials(q=values[0], qd=values[1])
-        return partials_of_order(self.order, values[0])
+            tables[("q", "qd")[order]] = table
+        return NodePartials(**tables)
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
         parts = []
-        for order in self._orders:
+        for order in self.orders:
             x = motion.of_order(order)
-            parts.append(x[-1] - x[0] if self.target is None else x[-1])
+            parts.append(self.null.T @ (x[-1] - x[0] if self.target is None else x[-1]))
         return np.concatenate(parts)[None]
 
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""
-        n = self.robot.dof
-        miss = self.residual(samples)[0, column]
-        order = self._orders[column // n]
-        quantity = ("position", "velocity")[order]
-        goal = "its value at the start" if self.target is None else "the one asked for"
-        return (
-            f"{quantity} of joint '{self.robot.joint_names[column % n]}' at the end is "
-            f"{miss:.3g} away from {goal}"
-        )
+        order = self.orders[column // self.null.shape[1]]
+        quantity = ("configuration", "velocity")[order]
+        goal = "that of the start" if self.target is None else "the one asked for"
+        miss = np.abs(self.residual(samples)).max()
+        return f"the {quantity} at the end is {miss:.3g} (rad or m, per s) away from {goal}"
+
+
+def null_basis(robot: RobotModel, task: Task, q: Array) -> Array:
+    """Return an orthonormal basis of the null space of the task Jacobian at q, (n, r)."""
+    _, _, right = np.linalg.svd(robot.task_jacobian(q, task))
+    return np.asarray(right[task.dimension :].T)
