@@ -4,7 +4,18 @@ The tool motion holds by construction; what is optimised is the self-motion, the
 the null space of the task.
 """
 
-from selfmotion.certificate import Certificate, Extreme, Tolerance, certify
+from selfmotion.certificate import Certificate, Extreme, Requirements, Tolerance, certify
+from selfmotion.collision import Box, Capsule, CollisionModel, Cylinder, Mesh, Sphere
+from selfmotion.constraints import (
+    Clearance,
+    ClosedPath,
+    Constraint,
+    EndConfiguration,
+    EndVelocity,
+    JointAccelerationLimits,
+    JointPositionLimits,
+    JointVelocityLimits,
+)
 from selfmotion.costs import (
     Cost,
     DirectionalManipulability,
@@ -50,11 +61,20 @@ from selfmotion.trajectory import Trajectory
 __all__ = [
     "NAMED_ARMS",
     "BSplineNullMotion",
+    "Box",
     "BreakdownError",
+    "Capsule",
     "Certificate",
     "Circle",
+    "Clearance",
+    "ClosedPath",
+    "CollisionModel",
+    "Constraint",
     "Cost",
+    "Cylinder",
     "DirectionalManipulability",
+    "EndConfiguration",
+    "EndVelocity",
     "Extreme",
     "FileFormatError",
     "FunctionCost",
@@ -63,13 +83,17 @@ __all__ = [
     "InverseManipulability",
     "Iteration",
     "JointAcceleration",
+    "JointAccelerationLimits",
     "JointJerk",
     "JointLimitDistance",
+    "JointPositionLimits",
     "JointVelocity",
+    "JointVelocityLimits",
     "KineticEnergy",
     "Line",
     "LineSearch",
     "Manipulability",
+    "Mesh",
     "NullMotion",
     "Partials",
     "Path",
@@ -85,10 +109,12 @@ __all__ = [
     "RedundancyError",
     "RenderError",
     "Report",
+    "Requirements",
     "RobotError",
     "RobotModel",
     "SelfmotionError",
     "SmallestSingularValue",
+    "Sphere",
     "StartError",
     "Status",
     "Task",

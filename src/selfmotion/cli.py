@@ -109,7 +109,7 @@ def plan(
 def check(plan: PlanArgument) -> None:
     """Re-check a saved plan by forward kinematics."""
     saved = sm.load_plan(plan)
-    certificate = sm.certify(saved.robot, saved.path, saved.task, saved.trajectory)
+    certificate = saved.check()
     report_text.show_certificate(certificate, _console)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
 

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from selfmotion import files
 from selfmotion.arrays import Array
-from selfmotion.certificate import Certificate, Extreme
+from selfmotion.certificate import Certificate, Extreme, Requirements, certify
+from selfmotion.collision import obstacle_from_dict
 from selfmotion.constraints import Clearance
 from selfmotion.errors import FileFormatError, PlanError
 from selfmotion.path import Path, path_from_dict
@@ -82,6 +83,8 @@ class Plan:
         x, the null motion's coefficients.
     report : Report
     certificate : Certificate
+    requirements : Requirements
+        What the certificate checked besides the path, but for clearance.
     clearance : Clearance or None
         The obstacles and the distance kept from them, where asked for.
     """
@@ -94,7 +97,16 @@ class Plan:
     coefficients: Array
     report: Report
     certificate: Certificate
+    requirements: Requirements = field(default_factory=Requirements)
     clearance: Clearance | None = None
+
+    def check(self) -> Certificate:
+        """Return a new certificate of the motion, by the same requirements."""
+        wanted = self.requirements
+        if self.clearance is not None:
+            model = self.clearance.model(self.robot)
+            wanted = dataclasses.replace(wanted, collision=model, clearance=self.clearance.distance)
+        return certify(self.robot, self.path, self.task, self.trajectory, requirements=wanted)
 
     def require(self) -> "Plan":
         """Return the plan itself if its certificate is verified.
@@ -190,6 +202,7 @@ def _describe(plan: Plan) -> tuple[dict[str, Any], dict[str, Array]]:
             for iteration in report.history
         ],
         "certificate": dataclasses.asdict(plan.certificate),
+        "requirements": _requirements_to_dict(plan),
     }
     arrays = {
         "t": plan.trajectory.t,
@@ -228,4 +241,38 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Plan:
         coefficients=arrays["coefficients"],
         report=Report(history=history, **report),
         certificate=Certificate(**certificate),
+        **_requirements_from_dict(description["requirements"]),
     )
+
+
+def _requirements_to_dict(plan: Plan) -> dict[str, Any]:
+    wanted, clearance = plan.requirements, plan.clearance
+    arrays = {
+        name: None if getattr(wanted, name) is None else getattr(wanted, name).tolist()
+        for name in ("lower", "upper", "velocity", "acceleration", "end")
+    }
+    return {
+        **arrays,
+        "closed": wanted.closed,
+        "clearance": None
+        if clearance is None
+        else {
+            "obstacles": [obstacle.to_dict() for obstacle in clearance.obstacles],
+            "distance": clearance.distance,
+            "srdf": None if clearance.srdf is None else str(clearance.srdf),
+        },
+    }
+
+
+def _requirements_from_dict(description: Mapping[str, Any]) -> dict[str, Any]:
+    values = dict(description)
+    stored = values.pop("clearance")
+    clearance = None
+    if stored is not None:
+        obstacles = tuple(obstacle_from_dict(item) for item in stored["obstacles"])
+        clearance = Clearance(obstacles, stored["distance"], stored["srdf"])
+    closed = values.pop("closed")
+    arrays: dict[str, Any] = {
+        name: None if x is None else np.array(x) for name, x in values.items()
+    }
+    return {"clearance": clearance, "requirements": Requirements(**arrays, closed=closed)}

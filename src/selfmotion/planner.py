@@ -1,6 +1,7 @@
 """From a problem to a plan."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -151,6 +152,7 @@ def _finish(problem: Problem, session: Session, tolerance: Tolerance, began: flo
         coefficients=read_only(x),
         report=report,
         certificate=certificate,
+        requirements=replace(problem.requirements, collision=None),
         clearance=problem.clearance,
     )
 

@@ -47,8 +47,12 @@ def show_certificate(certificate: Certificate, console: Console) -> None:
         ("margin to joint limits", certificate.limit_margin, "{:.4g}"),
         ("speed over its limit", certificate.velocity_ratio, "{:.3f}"),
         ("smallest singular value", certificate.smallest_singular_value, "{:.4g}"),
+        ("acceleration over its limit", certificate.acceleration_ratio, "{:.3f}"),
+        ("clearance", certificate.clearance, "{:.4g} m"),
     )
     for name, worst, form in rows:
+        if worst is None:
+            continue
         table.add_row(name, form.format(worst.value), f"{worst.time:.3f} s", worst.name)
     table.add_row("end to start", f"{certificate.closure:.4g}", "", "")
     console.print(table)

@@ -1,7 +1,7 @@
 """One start of one problem, optimised on a grid that becomes finer."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -28,6 +28,8 @@ _FEWEST_STEPS, _DRIFT = 32, 1e-3
 _COST_AGREEMENT = 1e-4
 # The finest grid has 2 to this power times the steps of the first.
 MOST_HALVINGS = 8
+# The first round of the augmented Lagrangian is minimised this much more coarsely.
+_FIRST_SLACK = 1e4
 # Rounds of the augmented Lagrangian.
 _ROUNDS = 12
 # Equalities are met to this [rad, rad/s], which Newton's method needs a few steps for.
@@ -94,6 +96,8 @@ class Session:
         conditions = AugmentedLagrangian(problem.bind_constraints(configuration), reference.grid)
         self._objective = self._bind(reference.grid, conditions)
         self._minimum: Minimum | None = None
+        # Whether the last motion kept all constraints: so far none is known to be active.
+        self._feasible = True
         self._x = np.zeros(self._objective.size)
 
     @property
@@ -145,13 +149,14 @@ class Session:
         for round_number in range(_ROUNDS):
             if use_metric and (round_number > 0 or h is None):
                 h = inverse_metric(self._counted(lambda: objective.metric(self._x)))
-            self._minimum = self._run_optimizer(h)
+            self._minimum = self._run_optimizer(h, round_number)
             self._x = np.array(self._minimum.x)
             self.terms()
             samples = objective.rollout.samples()
             kept = conditions.update(samples)
-            if kept or self.status in _CUT_SHORT:
+            if (kept and self._feasible) or self.status in _CUT_SHORT:
                 break
+            self._feasible = kept
         self._close()
         self.violations = conditions.violated(objective.rollout.samples())
 
@@ -246,10 +251,13 @@ class Session:
             conditions,
         )
 
-    def _run_optimizer(self, h: Array | None) -> Minimum:
+    def _run_optimizer(self, h: Array | None, round_number: int) -> Minimum:
+        # While multipliers are still far off, minimising to the last digit is lost work.
+        slack = 1.0 if self._feasible else _FIRST_SLACK * 0.1**round_number
+        optimizer = replace(self._optimizer, tolerance=self._optimizer.tolerance * max(slack, 1.0))
         limit = None if self._limit is None else max(self._limit - self._spent, 1)
         minimum = self._counted(
-            lambda: self._optimizer.minimize(
+            lambda: optimizer.minimize(
                 self._objective,
                 self._x,
                 h,

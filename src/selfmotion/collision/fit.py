@@ -4,8 +4,6 @@ import itertools
 import math
 
 import numpy as np
-from scipy.optimize import minimize
-from scipy.spatial import ConvexHull, QhullError
 
 from selfmotion.arrays import Array
 from selfmotion.collision.capsules import capsule_volume
@@ -39,6 +37,8 @@ def fit(shape: Outline) -> Array:
 
 
 def _hull_volume(points: Array) -> float:
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         return float(ConvexHull(points).volume)
     except (QhullError, ValueError):  # flat, or too few
@@ -73,6 +73,8 @@ def _enclose(points: Array, radii: Array) -> Array:
         for k in range(3)
     ]
     start = min(starts, key=lambda fixed: _trial_volume(np.zeros(5), *fixed))
+    from scipy.optimize import minimize
+
     answer = minimize(
         _trial_volume,
         np.zeros(5),

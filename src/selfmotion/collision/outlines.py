@@ -6,7 +6,6 @@ from typing import Any
 import coal
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import ConvexHull, QhullError
 
 from selfmotion.arrays import Array
 from selfmotion.collision.shapes import is_mesh, triangles
@@ -99,6 +98,8 @@ def extreme(points: Array, radii: Array) -> tuple[Array, Array]:
     """Return those of the balls that decide about the convex hull."""
     if radii.any() or len(points) < 5:
         return points, radii
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         corners = ConvexHull(points).vertices
     except QhullError:  # all in one plane

@@ -6,8 +6,6 @@ from typing import Any
 import coal
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from selfmotion.arrays import Array
 from selfmotion.collision.obstacles import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
@@ -97,6 +95,9 @@ class Solid:
         if not self.is_mesh:
             return np.zeros((1, 3))
         faces, count = triangles(self.geometry), self.geometry.num_vertices
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
         links = coo_array(
             (np.ones(2 * len(faces)), (faces[:, :2].ravel(), faces[:, 1:].ravel())),
             shape=(count, count),

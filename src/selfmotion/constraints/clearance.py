@@ -1,12 +1,13 @@
 """Distance from obstacles, and of links from each other."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
 from selfmotion.arrays import Array
-from selfmotion.collision import ClearanceModel, CollisionModel, Obstacle
+from selfmotion.collision import ClearanceModel, Clearances, CollisionModel, Obstacle
 from selfmotion.constraints.base import NodePartials, NodeTangents, motion_of_order
 from selfmotion.errors import ProblemError
 from selfmotion.robot import RobotModel
@@ -55,6 +56,7 @@ class BoundClearance:
     name: str = "clearance"
     equality = False
     margin: float = 5e-4
+    _last: list[Any] = field(default_factory=list, repr=False)
 
     @property
     def tolerance(self) -> float:
@@ -63,18 +65,23 @@ class BoundClearance:
 
     def residual(self, samples: Samples) -> Array:
         """See `BoundConstraint.residual`."""
-        values = self.model.clearances(motion_of_order(samples, 0)).values
-        return (self.distance + self.margin - values) / _METRE
+        return (self.distance + self.margin - self._clearances(samples).values) / _METRE
 
     def pullback(self, samples: Samples, weights: Array) -> NodePartials:
         """See `BoundConstraint.pullback`."""
-        clearances = self.model.clearances(motion_of_order(samples, 0))
-        return NodePartials(q=clearances.pullback(-weights / _METRE))
+        return NodePartials(q=self._clearances(samples).pullback(-weights / _METRE))
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
-        jacobian = self.model.clearances(motion_of_order(samples, 0)).jacobian()
+        jacobian = self._clearances(samples).jacobian()
         return np.asarray(-(jacobian @ motion.q) / _METRE)
+
+    def _clearances(self, samples: Samples) -> Clearances:
+        """Return the distances at the nodes; those of the last motion are kept."""
+        q = motion_of_order(samples, 0)
+        if not self._last or not np.array_equal(self._last[0], q):
+            self._last[:] = [q, self.model.clearances(q)]
+        return cast(Clearances, self._last[1])
 
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""

@@ -55,7 +55,7 @@ class Path(ABC):
 
     @property
     def knots(self) -> Array:
-        """Times [s] between which the motion is smooth (C∞), first 0, last `duration`."""
+        """Times [s] between which the motion is C² or better, first 0, last `duration`."""
         return read_only([0.0, self.duration])
 
     @abstractmethod

@@ -99,7 +99,12 @@ class Waypoints(Path):
 
     @property
     def knots(self) -> Array:
-        """The waypoints' times [s]."""
+        """The corners' times [s], with start and end; in between the path is C²."""
+        return read_only(self._t[self._bounds])
+
+    @property
+    def waypoint_times(self) -> Array:
+        """The waypoints' times [s], (N,)."""
         return self._t
 
     @property
@@ -120,13 +125,17 @@ class Waypoints(Path):
         return stops
 
     @cached_property
+    def _bounds(self) -> npt.NDArray[np.intp]:
+        """Waypoints at which pieces of the path begin and end."""
+        return np.flatnonzero(self._stops | (self._t == 0.0) | (self._t == self.duration))
+
+    @cached_property
     def _pieces(self) -> tuple[npt.NDArray[np.intp], list[tuple[Any, Any]]]:
         """First waypoint of each piece between corners, and its (position, rotation) splines."""
         from scipy.interpolate import CubicSpline
         from scipy.spatial.transform import Rotation, RotationSpline
 
-        bounds = np.flatnonzero(self._stops | (self._t == 0.0) | (self._t == self.duration))
-        splines = []
+        bounds, splines = self._bounds, []
         for first, last in pairwise(bounds):
             part = slice(first, last + 1)
             rotations = Rotation.from_quat(self._turns[part], scalar_first=True)
