@@ -1,19 +1,16 @@
 """All that a page knows, from plans: see `Payload` for how it travels."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.arrays import Array
+from selfmotion.collision import CollisionModel
+from selfmotion.plan import Plan
 from selfmotion.replay import links, scene, shapes
-from selfmotion.replay.clearance import ClearanceCurve, Distances, clearance_curve
+from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
 from selfmotion.replay.facts import describe, table
 from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames
 from selfmotion.replay.payload import Json, Payload
-
-if TYPE_CHECKING:
-    from selfmotion.plan import Plan
 
 # What can be shown and hidden: with its key, and whether it is shown at first.
 _LAYERS = [
@@ -33,7 +30,7 @@ _ELLIPSOID_LENGTH = 0.3
 class _Motion:
     """A plan, sampled: the motion itself and x = 0."""
 
-    def __init__(self, plan: "Plan", distances: Distances | None) -> None:
+    def __init__(self, plan: Plan, collision: CollisionModel | None) -> None:
         robot = plan.robot
         self.plan = plan
         self.frames = key_frames(robot, plan.trajectory)
@@ -42,24 +39,24 @@ class _Motion:
         self.start = curves(plan, plan.initial_trajectory)
         self.target: Array = plan.path.samples(self.shown.t + plan.trajectory.t[0]).translation
         self.clearance: ClearanceCurve | None = None
-        if distances is not None:
-            self.clearance = clearance_curve(plan.trajectory, distances)
+        if collision is not None:
+            self.clearance = clearance_curve(plan.trajectory, collision)
 
 
 def page_content(
-    plans: "list[Plan]",
+    plans: list[Plan],
     names: list[str],
     payload: Payload,
     *,
     triads: int | npt.ArrayLike,
     triangle_budget: int,
-    distances: Distances | None,
+    collision: CollisionModel | None,
 ) -> Json:
     """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`."""
     robot = plans[0].robot
-    obstacles = () if distances is None else tuple(distances.obstacles)
+    obstacles = () if collision is None else tuple(collision.obstacles)
     arm = links.bake(robot, payload, triangle_budget)
-    motions = [_Motion(plan, distances) for plan in plans]
+    motions = [_Motion(plan, collision) for plan in plans]
     hull = scene.outline(
         arm,
         [frames for motion in motions for frames in (motion.frames, motion.ghost)],
@@ -79,7 +76,7 @@ def page_content(
         ],
         "meshes": arm.meshes,
         "joints": _joints(plans[0]),
-        "layers": _LAYERS if distances is None else [*_LAYERS, _PAIR_LAYER],
+        "layers": _LAYERS if collision is None else [*_LAYERS, _PAIR_LAYER],
         "scale": {**scale, "colors": shapes.COLOR_SCALE},
         "ellipsoidSize": _ELLIPSOID_LENGTH * box.radius / longest,
         "bodies": {
@@ -163,7 +160,7 @@ def _packed(frames: KeyFrames, payload: Payload) -> Json:
     }
 
 
-def _curves(plan: "Plan", sampled: Curves, payload: Payload) -> Json:
+def _curves(plan: Plan, sampled: Curves, payload: Payload) -> Json:
     drawn = {
         "t": payload.array(sampled.t),
         "q": payload.array(sampled.q),
@@ -185,7 +182,7 @@ def _clearance(curve: ClearanceCurve, payload: Payload) -> Json:
     }
 
 
-def _joints(plan: "Plan") -> list[Json]:
+def _joints(plan: Plan) -> list[Json]:
     robot = plan.robot
     kinds = [robot.urdf.joints[name].kind for name in robot.joint_names]
     return [
