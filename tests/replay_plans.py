@@ -1,12 +1,14 @@
 """Plans to replay, made once per test run."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
-from selfmotion.collision import Box, Capsule, CollisionModel, Cylinder, Mesh, Sphere
+from selfmotion.collision import Box, Capsule, Cylinder, Mesh, Sphere
+from selfmotion.constraints import Clearance
 
 
 @cache
@@ -25,21 +27,20 @@ def arm_plan(name: str) -> sm.Plan:
     return sm.plan(sm.Problem(robot, path, task, start))
 
 
-def shelf(plan: sm.Plan) -> CollisionModel:
-    """One obstacle of each shape around the tool's path, none of them on it."""
+def shelf_plan() -> sm.Plan:
+    """Panda's circle with one obstacle of each shape around it, none of them on it."""
+    plan = arm_plan("panda")
     middle = plan.path.samples(np.linspace(0, plan.path.duration, 9)).translation.mean(axis=0)
 
     def at(*offset: float) -> np.ndarray:
         return middle + np.array(offset)
 
     file = plan.robot.geometry(pin.GeometryType.VISUAL).geometryObjects[0].meshPath
-    return CollisionModel(
-        plan.robot,
-        [
-            Box("shelf", at(0.0, 0.0, -0.4), (0.3, 0.4, 0.02)),
-            Sphere("ball", at(0.0, 0.5, 0.0), 0.05),
-            Cylinder("post", at(0.3, -0.4, 0.0), 0.03, 0.4),
-            Capsule("a/b", at(0.4, 0.1, 0.0), 0.02, 0.2),
-            Mesh("part", at(0.8, 0.0, 0.0), file, 0.5),
-        ],
+    obstacles = (
+        Box("shelf", at(0.0, 0.0, -0.4), (0.3, 0.4, 0.02)),
+        Sphere("ball", at(0.0, 0.5, 0.0), 0.05),
+        Cylinder("post", at(0.3, -0.4, 0.0), 0.03, 0.4),
+        Capsule("a/b", at(0.4, 0.1, 0.0), 0.02, 0.2),
+        Mesh("part", at(0.8, 0.0, 0.0), file, 0.5),
     )
+    return replace(plan, clearance=Clearance(obstacles))

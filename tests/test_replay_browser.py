@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from replay_plans import arm_plan, planar_plan, shelf
+from replay_plans import arm_plan, planar_plan, shelf_plan
 from selfmotion.replay import notebook_html, write_replay
 from selfmotion.robot import NAMED_ARMS
 
@@ -256,9 +256,9 @@ LIT = """() => {
 
 
 def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
-    plan = arm_plan("panda")
-    world = shelf(plan)
-    page = open_page(write_replay(plan, tmp_path / "shelf.html", collision=world))
+    plan = shelf_plan()
+    world = plan.clearance.model(plan.robot)
+    page = open_page(write_replay([plan, arm_plan("panda")], tmp_path / "shelf.html"))
     for time in (0.5, 2.0):
         page.evaluate("t => replay.seek(t)", time)
         expected = world.distance(plan.trajectory(time))
@@ -269,13 +269,19 @@ def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
         assert lit
         assert all(any(f"/{body}/" in name for body in bodies) for name in lit)
         assert all(any(f"/{body}/" in name for name in lit) for body in bodies)
-    drawn = page.evaluate("""viewer.scene_tree.find(["selfmotion", "obstacles"]).object
+    drawn = page.evaluate("""viewer.scene_tree.find(["selfmotion", "plan0", "obstacles"]).object
       .children.map((node) => node.name)""")
     assert drawn == ["shelf", "ball", "post", "a_b", "part"]
     assert page.locator(".plot figcaption", has_text="Clearance").count() == 1
     page.keyboard.press("c")
     assert page.evaluate(LIT) == []
     assert not page.locator("#pair").is_visible()
+    page.keyboard.press("c")
+    page.keyboard.press("2")
+    assert page.evaluate(LIT) == [], "the second plan knows of no obstacles"
+    assert not page.evaluate(
+        'viewer.scene_tree.find(["selfmotion", "plan0", "obstacles"]).object.visible'
+    )
     assert_quiet(page)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.arrays import Array
-from selfmotion.collision import CollisionModel
+from selfmotion.collision import Obstacle
 from selfmotion.plan import Plan
 from selfmotion.replay import links, scene, shapes
 from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
@@ -30,7 +30,7 @@ _ELLIPSOID_LENGTH = 0.3
 class _Motion:
     """A plan, sampled: the motion itself and x = 0."""
 
-    def __init__(self, plan: Plan, collision: CollisionModel | None) -> None:
+    def __init__(self, plan: Plan) -> None:
         robot = plan.robot
         self.plan = plan
         self.frames = key_frames(robot, plan.trajectory)
@@ -39,8 +39,10 @@ class _Motion:
         self.start = curves(plan, plan.initial_trajectory)
         self.target: Array = plan.path.samples(self.shown.t + plan.trajectory.t[0]).translation
         self.clearance: ClearanceCurve | None = None
-        if collision is not None:
-            self.clearance = clearance_curve(plan.trajectory, collision)
+        self.obstacles: tuple[Obstacle, ...] = ()
+        if plan.clearance is not None:
+            self.obstacles = plan.clearance.obstacles
+            self.clearance = clearance_curve(plan.trajectory, plan.clearance.model(robot))
 
 
 def page_content(
@@ -50,13 +52,11 @@ def page_content(
     *,
     triads: int | npt.ArrayLike,
     triangle_budget: int,
-    collision: CollisionModel | None,
 ) -> Json:
     """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`."""
     robot = plans[0].robot
-    obstacles = () if collision is None else tuple(collision.obstacles)
     arm = links.bake(robot, payload, triangle_budget)
-    motions = [_Motion(plan, collision) for plan in plans]
+    motions = [_Motion(plan) for plan in plans]
     hull = scene.outline(
         arm,
         [frames for motion in motions for frames in (motion.frames, motion.ghost)],
@@ -71,18 +71,14 @@ def page_content(
             *scene.stage_commands(box),
             *links.arm_commands(robot, arm),
             *links.ghost_commands(robot, arm),
-            *scene.obstacle_commands(obstacles, payload),
             scene.ellipsoid_command(),
         ],
         "meshes": arm.meshes,
         "joints": _joints(plans[0]),
-        "layers": _LAYERS if collision is None else [*_LAYERS, _PAIR_LAYER],
+        "layers": [*_LAYERS, _PAIR_LAYER] if any(m.clearance for m in motions) else _LAYERS,
         "scale": {**scale, "colors": shapes.COLOR_SCALE},
         "ellipsoidSize": _ELLIPSOID_LENGTH * box.radius / longest,
-        "bodies": {
-            **{visual.link: links.link_node(robot, visual) for visual in arm.visuals},
-            **{item.name: scene.obstacle_node(item) for item in obstacles},
-        },
+        "links": {visual.link: links.link_node(robot, visual) for visual in arm.visuals},
         "plans": [
             _plan(motion, name, f"/selfmotion/plan{k}", payload, scale, triads, box.radius)
             for k, (motion, name) in enumerate(zip(motions, names, strict=True))
@@ -143,7 +139,9 @@ def _plan(
             "tool": payload.array(shown.tool),
         },
         "clearance": None if motion.clearance is None else _clearance(motion.clearance, payload),
+        "obstacles": {item.name: scene.obstacle_node(root, item) for item in motion.obstacles},
         "commands": [
+            *scene.obstacle_commands(root, motion.obstacles, payload),
             *scene.trace_commands(
                 root, payload, shown, motion.start, motion.target, scale, _TRACE_RADIUS * size
             ),

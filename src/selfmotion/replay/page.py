@@ -14,7 +14,6 @@ from typing import IO, Any
 
 import numpy.typing as npt
 
-from selfmotion.collision import CollisionModel
 from selfmotion.errors import ProblemError
 from selfmotion.files import write_atomically
 from selfmotion.plan import Plan
@@ -36,9 +35,10 @@ def replay_html(
     labels: Sequence[str] | None = None,
     triads: int | npt.ArrayLike = _TRIADS,
     triangle_budget: int = TRIANGLE_BUDGET,
-    collision: CollisionModel | None = None,
 ) -> str:
     """Return a page that replays plans: complete, offline, the same bytes for the same plans.
+
+    For plans that keep a clearance, obstacles and the closest pair of bodies are shown too.
 
     Parameters
     ----------
@@ -52,8 +52,6 @@ def replay_html(
         Where the tool's axes are drawn: how many, evenly spaced in time, or at which times [s].
     triangle_budget : int
         Meshes are simplified only when the arm has more triangles than this.
-    collision : CollisionModel, optional
-        Its obstacles are drawn, and its clearance and closest pair shown over time.
 
     Raises
     ------
@@ -71,7 +69,6 @@ def replay_html(
         payload,
         triads=triads,
         triangle_budget=triangle_budget,
-        collision=collision,
     )
     heading = title or f"{shown[0].robot.name}, {shown[0].task.value} task"
     sentences = [describe(plan) for plan in shown]

@@ -242,13 +242,13 @@ def ellipsoid_command() -> Json:
     )
 
 
-def obstacle_node(obstacle: Obstacle) -> str:
-    """Return the path of an obstacle's node."""
-    return f"{_ROOT}/obstacles/{safe(obstacle.name)}"
+def obstacle_node(root: str, obstacle: Obstacle) -> str:
+    """Return the path of the node of an obstacle of the plan at `root`."""
+    return f"{root}/obstacles/{safe(obstacle.name)}"
 
 
-def obstacle_commands(obstacles: Sequence[Obstacle], payload: Payload) -> list[Json]:
-    """Return the commands that draw obstacles.
+def obstacle_commands(root: str, obstacles: Sequence[Obstacle], payload: Payload) -> list[Json]:
+    """Return the commands that draw the obstacles of the plan at `root`.
 
     Raises
     ------
@@ -257,7 +257,7 @@ def obstacle_commands(obstacles: Sequence[Obstacle], payload: Payload) -> list[J
     """
     look = three.material(_OBSTACLE, opacity=0.85)
     return [
-        three.set_object(f"{obstacle_node(item)}/{k}", geometry, look, matrix)
+        three.set_object(f"{obstacle_node(root, item)}/{k}", geometry, look, matrix)
         for item in obstacles
         for k, (geometry, matrix) in enumerate(_obstacle(item, payload))
     ]
