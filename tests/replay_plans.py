@@ -1,13 +1,14 @@
 """Plans to replay, made once per test run."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
+from selfmotion.collision import Box, Capsule, Cylinder, Mesh, Sphere
+from selfmotion.constraints import Clearance
 
 
 @cache
@@ -26,32 +27,20 @@ def arm_plan(name: str) -> sm.Plan:
     return sm.plan(sm.Problem(robot, path, task, start))
 
 
-@dataclass(frozen=True)
-class Clearance:
-    value: float
-    first: str
-    second: str
+def shelf_plan() -> sm.Plan:
+    """Panda's circle with one obstacle of each shape around it, none of them on it."""
+    plan = arm_plan("panda")
+    middle = plan.path.samples(np.linspace(0, plan.path.duration, 9)).translation.mean(axis=0)
 
+    def at(*offset: float) -> np.ndarray:
+        return middle + np.array(offset)
 
-class Shelf:
-    """A stand-in for a collision model: one obstacle of each shape below the tool's path."""
-
-    def __init__(self, plan: sm.Plan) -> None:
-        self.robot = plan.robot
-        middle = plan.path.samples(np.linspace(0, plan.path.duration, 9)).translation.mean(axis=0)
-        below = pin.SE3(np.eye(3), middle - [0.0, 0.0, 0.3])
-        self.start = plan.path.pose(0.0).translation
-        self.height = below.translation[2]
-        file = plan.robot.geometry(pin.GeometryType.VISUAL).geometryObjects[0].meshPath
-        self.obstacles = (
-            SimpleNamespace(shape="box", name="shelf", pose=below, size=np.array([0.3, 0.4, 0.02])),
-            SimpleNamespace(shape="sphere", name="ball", pose=below, radius=0.05),
-            SimpleNamespace(shape="cylinder", name="post", pose=below, radius=0.03, length=0.4),
-            SimpleNamespace(shape="capsule", name="a/b", pose=below, radius=0.02, length=0.2),
-            SimpleNamespace(shape="mesh", name="part", pose=below, file=file, scale=0.5),
-        )
-
-    def distance(self, q: np.ndarray) -> Clearance:
-        tool = self.robot.pose(q).translation
-        other = "shelf" if np.linalg.norm(tool - self.start) < 0.06 else "a/b"
-        return Clearance(float(tool[2] - self.height), "panda_hand", other)
+    file = plan.robot.geometry(pin.GeometryType.VISUAL).geometryObjects[0].meshPath
+    obstacles = (
+        Box("shelf", at(0.0, 0.0, -0.4), (0.3, 0.4, 0.02)),
+        Sphere("ball", at(0.0, 0.5, 0.0), 0.05),
+        Cylinder("post", at(0.3, -0.4, 0.0), 0.03, 0.4),
+        Capsule("a/b", at(0.4, 0.1, 0.0), 0.02, 0.2),
+        Mesh("part", at(0.8, 0.0, 0.0), file, 0.5),
+    )
+    return replace(plan, clearance=Clearance(obstacles))

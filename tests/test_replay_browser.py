@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from replay_plans import Shelf, arm_plan, planar_plan
+from replay_plans import arm_plan, planar_plan, shelf_plan
 from selfmotion.replay import notebook_html, write_replay
 from selfmotion.robot import NAMED_ARMS
 
@@ -256,25 +256,32 @@ LIT = """() => {
 
 
 def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
-    plan = arm_plan("panda")
-    shelf = Shelf(plan)
-    page = open_page(write_replay(plan, tmp_path / "shelf.html", distances=shelf))
-    shown = set()
+    plan = shelf_plan()
+    world = plan.clearance.model(plan.robot)
+    page = open_page(write_replay([plan, arm_plan("panda")], tmp_path / "shelf.html"))
     for time in (0.5, 2.0):
         page.evaluate("t => replay.seek(t)", time)
-        expected = shelf.distance(plan.trajectory(time))
-        shown.add(expected.second)
+        expected = world.distance(plan.trajectory(time))
         said = page.locator("#pair").inner_text()
-        assert said == f"closest: panda_hand and {expected.second}, {expected.value:.3f} m"
+        assert said == (f"closest: {expected.first} and {expected.second}, {expected.value:.3f} m")
+        bodies = [name.replace("/", "_") for name in (expected.first, expected.second)]
         lit = page.evaluate(LIT)
-        assert any("/panda_hand/" in name for name in lit)
-        assert all("/panda_hand/" in name or "/obstacles/" in name for name in lit)
-        assert any(expected.second.replace("/", "_") in name for name in lit)
-    assert shown == {"shelf", "a/b"}
+        assert lit
+        assert all(any(f"/{body}/" in name for body in bodies) for name in lit)
+        assert all(any(f"/{body}/" in name for name in lit) for body in bodies)
+    drawn = page.evaluate("""viewer.scene_tree.find(["selfmotion", "plan0", "obstacles"]).object
+      .children.map((node) => node.name)""")
+    assert drawn == ["shelf", "ball", "post", "a_b", "part"]
     assert page.locator(".plot figcaption", has_text="Clearance").count() == 1
     page.keyboard.press("c")
     assert page.evaluate(LIT) == []
     assert not page.locator("#pair").is_visible()
+    page.keyboard.press("c")
+    page.keyboard.press("2")
+    assert page.evaluate(LIT) == [], "the second plan knows of no obstacles"
+    assert not page.evaluate(
+        'viewer.scene_tree.find(["selfmotion", "plan0", "obstacles"]).object.visible'
+    )
     assert_quiet(page)
 
 

@@ -7,16 +7,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import numpy as np
 
 from selfmotion.errors import RenderError
 from selfmotion.files import write_atomically
+from selfmotion.plan import Plan
 from selfmotion.replay.page import replay_html
-
-if TYPE_CHECKING:
-    from selfmotion.plan import Plan
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # Draw on the processor: the same picture on every machine, and no display needed.
@@ -25,7 +23,7 @@ LAYERS = ("trace", "triads")
 
 
 def render_png(
-    plans: "Plan | Sequence[Plan]",
+    plans: Plan | Sequence[Plan],
     file: str | os.PathLike[str],
     *,
     t: float,
@@ -73,7 +71,7 @@ def render_png(
 
 
 def render_gif(
-    plans: "Plan | Sequence[Plan]",
+    plans: Plan | Sequence[Plan],
     file: str | os.PathLike[str],
     *,
     size: tuple[int, int] = (640, 400),

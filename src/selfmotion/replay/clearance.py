@@ -1,35 +1,15 @@
 """The closest pair of bodies over time, for a page."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 
 from selfmotion.arrays import Array
+from selfmotion.collision import CollisionModel
 from selfmotion.trajectory import Trajectory
 
 # A distance query costs milliseconds, a hundred times one point of the other curves.
 _POINTS = 121
-
-
-class Clearance(Protocol):
-    """A smallest distance [m] and the names of the two bodies."""
-
-    @property
-    def value(self) -> float: ...  # noqa: D102
-    @property
-    def first(self) -> str: ...  # noqa: D102
-    @property
-    def second(self) -> str: ...  # noqa: D102
-
-
-class Distances(Protocol):
-    """What a replay asks of a collision model: its obstacles, and the clearance at q (n,)."""
-
-    @property
-    def obstacles(self) -> Sequence[Any]: ...  # noqa: D102
-    def distance(self, q: Array, /) -> Clearance: ...  # noqa: D102
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +31,13 @@ class ClearanceCurve:
     pairs: tuple[tuple[str, str], ...]
 
 
-def clearance_curve(trajectory: Trajectory, distances: Distances) -> ClearanceCurve:
-    """Ask for the clearance along a motion."""
+def clearance_curve(trajectory: Trajectory, collision: CollisionModel) -> ClearanceCurve | None:
+    """Return the clearance along a motion, or None where there is no pair of bodies to check."""
+    if not collision.pairs:
+        return None
     times = np.linspace(0.0, trajectory.duration, _POINTS)
-    found = [distances.distance(q) for q in trajectory(trajectory.t[0] + times)]
+    clock = np.minimum(trajectory.t[0] + times, trajectory.t[-1])
+    found = [collision.distance(q) for q in trajectory(clock)]
     return ClearanceCurve(
         times,
         np.array([each.value for each in found]),

@@ -1,19 +1,16 @@
 """All that a page knows, from plans: see `Payload` for how it travels."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.arrays import Array
+from selfmotion.collision import Obstacle
+from selfmotion.plan import Plan
 from selfmotion.replay import links, scene, shapes
-from selfmotion.replay.clearance import ClearanceCurve, Distances, clearance_curve
+from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
 from selfmotion.replay.facts import describe, table
 from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames
 from selfmotion.replay.payload import Json, Payload
-
-if TYPE_CHECKING:
-    from selfmotion.plan import Plan
 
 # What can be shown and hidden: with its key, and whether it is shown at first.
 _LAYERS = [
@@ -33,7 +30,7 @@ _ELLIPSOID_LENGTH = 0.3
 class _Motion:
     """A plan, sampled: the motion itself and x = 0."""
 
-    def __init__(self, plan: "Plan", distances: Distances | None) -> None:
+    def __init__(self, plan: Plan) -> None:
         robot = plan.robot
         self.plan = plan
         self.frames = key_frames(robot, plan.trajectory)
@@ -42,24 +39,24 @@ class _Motion:
         self.start = curves(plan, plan.initial_trajectory)
         self.target: Array = plan.path.samples(self.shown.t + plan.trajectory.t[0]).translation
         self.clearance: ClearanceCurve | None = None
-        if distances is not None:
-            self.clearance = clearance_curve(plan.trajectory, distances)
+        self.obstacles: tuple[Obstacle, ...] = ()
+        if plan.clearance is not None:
+            self.obstacles = plan.clearance.obstacles
+            self.clearance = clearance_curve(plan.trajectory, plan.clearance.model(robot))
 
 
 def page_content(
-    plans: "list[Plan]",
+    plans: list[Plan],
     names: list[str],
     payload: Payload,
     *,
     triads: int | npt.ArrayLike,
     triangle_budget: int,
-    distances: Distances | None,
 ) -> Json:
     """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`."""
     robot = plans[0].robot
-    obstacles = () if distances is None else tuple(distances.obstacles)
     arm = links.bake(robot, payload, triangle_budget)
-    motions = [_Motion(plan, distances) for plan in plans]
+    motions = [_Motion(plan) for plan in plans]
     hull = scene.outline(
         arm,
         [frames for motion in motions for frames in (motion.frames, motion.ghost)],
@@ -74,18 +71,14 @@ def page_content(
             *scene.stage_commands(box),
             *links.arm_commands(robot, arm),
             *links.ghost_commands(robot, arm),
-            *scene.obstacle_commands(obstacles, payload),
             scene.ellipsoid_command(),
         ],
         "meshes": arm.meshes,
         "joints": _joints(plans[0]),
-        "layers": _LAYERS if distances is None else [*_LAYERS, _PAIR_LAYER],
+        "layers": [*_LAYERS, _PAIR_LAYER] if any(m.clearance for m in motions) else _LAYERS,
         "scale": {**scale, "colors": shapes.COLOR_SCALE},
         "ellipsoidSize": _ELLIPSOID_LENGTH * box.radius / longest,
-        "bodies": {
-            **{visual.link: links.link_node(robot, visual) for visual in arm.visuals},
-            **{item.name: scene.obstacle_node(item) for item in obstacles},
-        },
+        "links": {visual.link: links.link_node(robot, visual) for visual in arm.visuals},
         "plans": [
             _plan(motion, name, f"/selfmotion/plan{k}", payload, scale, triads, box.radius)
             for k, (motion, name) in enumerate(zip(motions, names, strict=True))
@@ -146,7 +139,9 @@ def _plan(
             "tool": payload.array(shown.tool),
         },
         "clearance": None if motion.clearance is None else _clearance(motion.clearance, payload),
+        "obstacles": {item.name: scene.obstacle_node(root, item) for item in motion.obstacles},
         "commands": [
+            *scene.obstacle_commands(root, motion.obstacles, payload),
             *scene.trace_commands(
                 root, payload, shown, motion.start, motion.target, scale, _TRACE_RADIUS * size
             ),
@@ -163,7 +158,7 @@ def _packed(frames: KeyFrames, payload: Payload) -> Json:
     }
 
 
-def _curves(plan: "Plan", sampled: Curves, payload: Payload) -> Json:
+def _curves(plan: Plan, sampled: Curves, payload: Payload) -> Json:
     drawn = {
         "t": payload.array(sampled.t),
         "q": payload.array(sampled.q),
@@ -185,7 +180,7 @@ def _clearance(curve: ClearanceCurve, payload: Payload) -> Json:
     }
 
 
-def _joints(plan: "Plan") -> list[Json]:
+def _joints(plan: Plan) -> list[Json]:
     robot = plan.robot
     kinds = [robot.urdf.joints[name].kind for name in robot.joint_names]
     return [

@@ -1,16 +1,15 @@
 """A plan's report and certificate as the rows of a table."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from selfmotion.plan import Plan
-
+from selfmotion.certificate import Extreme
+from selfmotion.plan import Plan
 
 # A number and a remark, shown smaller after it.
 Cell = tuple[str, str]
 
 
-def facts(plan: "Plan") -> dict[str, Cell]:
+def facts(plan: Plan) -> dict[str, Cell]:
     """Return what a reader wants to know of a plan: label → number and remark."""
     report, certificate = plan.report, plan.certificate
     rows: dict[str, Cell] = {"verdict": (certificate.verdict, "")}
@@ -35,7 +34,7 @@ def facts(plan: "Plan") -> dict[str, Cell]:
     return rows
 
 
-def table(plans: "list[Plan]") -> list[dict[str, Any]]:
+def table(plans: list[Plan]) -> list[dict[str, Any]]:
     """Return the rows for several plans side by side; a plan without a row gets an empty cell."""
     columns = [facts(plan) for plan in plans]
     labels = list(dict.fromkeys(label for column in columns for label in column))
@@ -45,7 +44,7 @@ def table(plans: "list[Plan]") -> list[dict[str, Any]]:
     ]
 
 
-def describe(plan: "Plan") -> str:
+def describe(plan: Plan) -> str:
     """Return one sentence that tells a stranger what the page shows."""
     report = plan.report
     saved = ""
@@ -64,7 +63,7 @@ def _compared(value: float, start: float | None) -> Cell:
     return f"{value:.6g}", "" if start is None else f"x = 0: {start:.6g}"
 
 
-def _extreme(extreme: Any, unit: str) -> Cell:
+def _extreme(extreme: Extreme, unit: str) -> Cell:
     number = f"{extreme.value:.3g} {unit}".strip()
     where = f"{extreme.name}, " if extreme.name else ""
     return number, f"{where}at {extreme.time:.3g} s"

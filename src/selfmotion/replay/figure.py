@@ -6,16 +6,15 @@ import numpy as np
 
 from selfmotion.arrays import Array
 from selfmotion.errors import RenderError
+from selfmotion.plan import Plan
 from selfmotion.replay.motion import Curves, curves
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from selfmotion.plan import Plan
 
-
-def figure(plan: "Plan") -> "Figure":
+def figure(plan: Plan) -> "Figure":
     """Return joint positions and velocities with limits, manipulability and path error over time.
 
     The figure is not registered with pyplot: nothing needs closing, and notebooks show it.
@@ -63,7 +62,7 @@ def _per_joint(
     axes.set_ylim(float(values.min()) - room, float(values.max()) + room)
 
 
-def _errors(axes: "Axes", shown: Curves, plan: "Plan") -> None:
+def _errors(axes: "Axes", shown: Curves, plan: Plan) -> None:
     rows = plan.task.rows
     # Zero has no place on a logarithmic axis.
     floor = 1e-16

@@ -1,7 +1,6 @@
 """A plan's motion, sampled for a page: key frames of the links, and curves over time."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -9,12 +8,10 @@ import pinocchio as pin
 from scipy.ndimage import maximum_filter1d
 
 from selfmotion.arrays import Array
+from selfmotion.plan import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 from selfmotion.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from selfmotion.plan import Plan
 
 # Between key frames a page interpolates; it may be off by this much at most [m, and per entry of
 # the rotation matrix]. Below what a screen resolves and half of what our tests ask for.
@@ -158,7 +155,7 @@ class Curves:
     ellipsoid: Array
 
 
-def curves(plan: "Plan", trajectory: Trajectory, points: int = _CURVE_POINTS) -> Curves:
+def curves(plan: Plan, trajectory: Trajectory, points: int = _CURVE_POINTS) -> Curves:
     """Evaluate `trajectory` (the plan's, or its x = 0 motion) for the plots."""
     robot, task = plan.robot, plan.task
     times = np.linspace(0.0, trajectory.duration, points)

@@ -10,19 +10,16 @@ from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from string import Template
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import numpy.typing as npt
 
 from selfmotion.errors import ProblemError
 from selfmotion.files import write_atomically
-from selfmotion.replay.clearance import Distances
+from selfmotion.plan import Plan
 from selfmotion.replay.content import page_content
 from selfmotion.replay.facts import describe
 from selfmotion.replay.payload import Payload
-
-if TYPE_CHECKING:
-    from selfmotion.plan import Plan
 
 # All arms in example-robot-data stay below this; beyond it a page would take seconds to open.
 TRIANGLE_BUDGET = 600_000
@@ -32,15 +29,16 @@ _SCRIPTS = ("payload.js", "stage.js", "plots.js", "page.js")
 
 
 def replay_html(
-    plans: "Plan | Sequence[Plan]",
+    plans: Plan | Sequence[Plan],
     *,
     title: str | None = None,
     labels: Sequence[str] | None = None,
     triads: int | npt.ArrayLike = _TRIADS,
     triangle_budget: int = TRIANGLE_BUDGET,
-    distances: Distances | None = None,
 ) -> str:
     """Return a page that replays plans: complete, offline, the same bytes for the same plans.
+
+    For plans that keep a clearance, obstacles and the closest pair of bodies are shown too.
 
     Parameters
     ----------
@@ -54,8 +52,6 @@ def replay_html(
         Where the tool's axes are drawn: how many, evenly spaced in time, or at which times [s].
     triangle_budget : int
         Meshes are simplified only when the arm has more triangles than this.
-    distances : collision model, optional
-        Its obstacles are drawn, and its clearance and closest pair shown over time.
 
     Raises
     ------
@@ -73,7 +69,6 @@ def replay_html(
         payload,
         triads=triads,
         triangle_budget=triangle_budget,
-        distances=distances,
     )
     heading = title or f"{shown[0].robot.name}, {shown[0].task.value} task"
     sentences = [describe(plan) for plan in shown]
@@ -83,7 +78,7 @@ def replay_html(
 
 
 def write_replay(
-    plans: "Plan | Sequence[Plan]", file: str | os.PathLike[str], **options: Any
+    plans: Plan | Sequence[Plan], file: str | os.PathLike[str], **options: Any
 ) -> Path:
     """Write `replay_html` to `file`, whole or not at all; options are those of `replay_html`.
 
@@ -102,7 +97,7 @@ def write_replay(
     return path
 
 
-def notebook_html(plan: "Plan", height: int = 900) -> str:
+def notebook_html(plan: Plan, height: int = 900) -> str:
     """Return the replay as an inline frame, for ``Plan._repr_html_`` in a notebook."""
     page = html.escape(replay_html(plan), quote=True)
     return (
@@ -111,7 +106,7 @@ def notebook_html(plan: "Plan", height: int = 900) -> str:
     )
 
 
-def _as_list(plans: Any) -> "list[Plan]":
+def _as_list(plans: Any) -> list[Plan]:
     shown = list(plans) if isinstance(plans, Sequence) else [plans]
     if not shown:
         raise ProblemError("a replay needs at least one plan")
@@ -126,7 +121,7 @@ def _as_list(plans: Any) -> "list[Plan]":
     return shown
 
 
-def _labels(plans: "list[Plan]", labels: Sequence[str] | None) -> list[str]:
+def _labels(plans: list[Plan], labels: Sequence[str] | None) -> list[str]:
     if labels is None:
         return ["plan"] if len(plans) == 1 else [f"Plan {chr(65 + k)}" for k in range(len(plans))]
     if len(labels) != len(plans):

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.spatial import ConvexHull
 
 from selfmotion.arrays import Array
+from selfmotion.collision import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
+from selfmotion.errors import CollisionError
 from selfmotion.replay import shapes, three
 from selfmotion.replay.links import Arm, safe
 from selfmotion.replay.meshes import read_meshes
@@ -241,13 +242,13 @@ def ellipsoid_command() -> Json:
     )
 
 
-def obstacle_node(obstacle: Any) -> str:
-    """Return the path of an obstacle's node."""
-    return f"{_ROOT}/obstacles/{safe(obstacle.name)}"
+def obstacle_node(root: str, obstacle: Obstacle) -> str:
+    """Return the path of the node of an obstacle of the plan at `root`."""
+    return f"{root}/obstacles/{safe(obstacle.name)}"
 
 
-def obstacle_commands(obstacles: Sequence[Any], payload: Payload) -> list[Json]:
-    """Return the commands that draw the obstacles of `selfmotion.collision`.
+def obstacle_commands(root: str, obstacles: Sequence[Obstacle], payload: Payload) -> list[Json]:
+    """Return the commands that draw the obstacles of the plan at `root`.
 
     Raises
     ------
@@ -256,24 +257,25 @@ def obstacle_commands(obstacles: Sequence[Any], payload: Payload) -> list[Json]:
     """
     look = three.material(_OBSTACLE, opacity=0.85)
     return [
-        three.set_object(f"{obstacle_node(item)}/{k}", geometry, look, matrix)
+        three.set_object(f"{obstacle_node(root, item)}/{k}", geometry, look, matrix)
         for item in obstacles
         for k, (geometry, matrix) in enumerate(_obstacle(item, payload))
     ]
 
 
-def _obstacle(item: Any, payload: Payload) -> list[tuple[Json, Array]]:
+def _obstacle(item: Obstacle, payload: Payload) -> list[tuple[Json, Array]]:
     matrix: Array = item.pose.homogeneous
-    match item.shape:
-        case "box":
+    match item:
+        case Box():
             return [(three.box(item.size), matrix)]
-        case "sphere":
+        case Sphere():
             return [(three.sphere(item.radius), matrix)]
-        case "cylinder":
+        case Cylinder():
             return [(three.cylinder(item.radius, item.length), three.about_z(matrix))]
-        case "capsule":
+        case Capsule():
             return [(three.capsule(item.radius, item.length), three.about_z(matrix))]
-        case _:
+        case Mesh():
             scaled = matrix @ np.diag([item.scale, item.scale, item.scale, 1.0])
-            meshes = read_meshes(str(item.file), f"obstacle '{item.name}'")
+            meshes = read_meshes(str(item.file), item.label)
             return [(_surface(payload, mesh.vertices, mesh.faces), scaled) for mesh in meshes]
+    raise CollisionError(f"{item!r} is no obstacle")

@@ -68,14 +68,14 @@ class Page {
     const shown = clearance !== null && this.layers.pair;
     get("pair").hidden = !shown;
     if (!shown) {
-      this.stage?.mark([]);
+      this.stage?.mark([], {});
       return;
     }
     const last = clearance.t.length - 1;
     const k = Math.round((time / clearance.t[last]) * last);
     const [first, second] = clearance.pairs[k];
     get("pair").textContent = `closest: ${first} and ${second}, ${format(clearance.value[k])} m`;
-    this.stage?.mark([first, second]);
+    this.stage?.mark([first, second], this.plan.obstacles);
   }
 
   play() {
@@ -194,6 +194,7 @@ class Page {
     this.stage.show("/selfmotion/ellipsoid", ellipsoid);
     this.content.plans.forEach((plan, k) => {
       const shown = k === this.number;
+      this.stage.show(`${plan.root}/obstacles`, shown);
       this.stage.show(`${plan.root}/prescribed`, shown && trace);
       this.stage.show(`${plan.root}/trace`, shown && trace);
       this.stage.show(`${plan.root}/start`, shown && trace && ghost);

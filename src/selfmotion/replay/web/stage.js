@@ -57,8 +57,9 @@ class Stage {
     this.ball.matrixAutoUpdate = false;
     // meshcat lets every object cast a shadow; here only what is solid does, and only one light.
     this.find(ROOT).traverse((object) => { object.castShadow = false; });
-    for (const name of ["robot", "obstacles", "stage/sun"]) {
-      this.find(`${ROOT}/${name}`).traverse((object) => { object.castShadow = true; });
+    const solid = content.plans.map((plan) => `${plan.root}/obstacles`);
+    for (const path of [`${ROOT}/robot`, `${ROOT}/stage/sun`, ...solid]) {
+      this.find(path).traverse((object) => { object.castShadow = true; });
     }
     this.frame();
   }
@@ -124,9 +125,9 @@ class Stage {
     this.ball.matrixWorldNeedsUpdate = true;
   }
 
-  // Tint the named bodies: links or obstacles.
-  mark(bodies) {
-    const wanted = bodies.map((name) => this.content.bodies[name]).filter(Boolean);
+  // Tint the named bodies: links, or obstacles of the plan.
+  mark(names, obstacles) {
+    const wanted = names.map((name) => obstacles[name] ?? this.content.links[name]).filter(Boolean);
     if (String(wanted) === String(this.marked)) return;
     const tint = (paths, color) => paths.forEach((path) => this.find(path).traverse((object) => {
       object.material?.emissive?.setHex(color);
