@@ -10,8 +10,9 @@ from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
-# Newton's method onto the start of the path: quadratic, so few steps; far moves fail and say so.
-_STEPS, _ARRIVED = 20, 1e-12
+# Newton's method onto the start of the path is quadratic: few steps, and the one after an error of
+# this is exact. Far moves fail and say so.
+_STEPS, _ARRIVED = 20, 1e-9
 
 
 class Start(Protocol):
@@ -79,13 +80,14 @@ class FreeStart:
             twist = self._task.twist_error(self._target, pose)
             error = self._task.select(twist[:, None], pose.rotation)[:, 0]
             rest = z - self._null.T @ (q - self._reference)
-            if max(np.abs(error).max(), np.abs(rest).max(initial=0.0)) < _ARRIVED:
-                self._at = q
-                return q
+            arrived = max(np.abs(error).max(), np.abs(rest).max(initial=0.0)) < _ARRIVED
             try:
                 q = q + np.linalg.solve(self._system(q), np.concatenate([error, rest]))
             except np.linalg.LinAlgError:
                 return None
+            if arrived:
+                self._at = q
+                return q
         return None
 
     def tangent(self, z: Array) -> Array:

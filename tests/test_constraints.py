@@ -1,0 +1,284 @@
+"""Constraints: exact gradients, kept on the fine grid, or named where they cannot be."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from conftest import PANDA_HOME, central_difference, robot_named, short_line, start_of
+from selfmotion.arrays import Array
+from selfmotion.augmented_lagrangian import AugmentedLagrangian
+from selfmotion.constraints import NodeTangents
+from selfmotion.grid import Grid
+from selfmotion.null_motion import NullMotionTable, PolynomialNullMotion
+from selfmotion.objective import Objective
+from selfmotion.rollout import Rollout
+from selfmotion.start import FreeStart
+
+Circle = Callable[..., sm.Problem]
+
+LIMITS = (sm.JointPositionLimits(), sm.JointVelocityLimits())
+# Exact gradients against central differences, relative to the gradient's largest entry.
+GRADIENT = 1e-6
+
+CONSTRAINTS = {
+    "position": lambda r: sm.JointPositionLimits(np.full(r.dof, -0.02), np.full(r.dof, 0.02)),
+    "velocity": lambda r: sm.JointVelocityLimits(np.full(r.dof, 0.02)),
+    "acceleration": lambda r: sm.JointAccelerationLimits(0.05),
+    "end": lambda r: sm.EndConfiguration(np.full(r.dof, 0.3)),
+    "end velocity": lambda r: sm.EndVelocity(),
+    "closed": lambda r: sm.ClosedPath(),
+    "closed in position": lambda r: sm.ClosedPath(velocity=False),
+}
+
+
+def objective_with(
+    constraint: sm.Constraint, name: str, task: str
+) -> tuple[Objective, AugmentedLagrangian]:
+    """Return an objective with a free start and one constraint that is violated."""
+    robot, rows = robot_named(name), sm.Task.of(task)
+    start = start_of(robot, task)
+    path = short_line(robot, start)
+    grid = Grid.aligned(path.knots, 12)
+    rollout = Rollout(robot, path, rows, grid)
+    functions = PolynomialNullMotion(1, "joint").functions(grid.stage_times, path.duration)
+    table = NullMotionTable(functions, None, robot.dof)
+    conditions = AugmentedLagrangian([constraint.bind(robot, rows, start)], grid)
+    free = FreeStart(robot, path, rows, start)
+    return Objective(rollout, table, [sm.JointVelocity()], free, conditions), conditions
+
+
+@pytest.mark.parametrize("constraint", CONSTRAINTS)
+@pytest.mark.parametrize(("name", "task"), [("planar_3r", "planar"), ("panda", "pointing")])
+def test_gradients_equal_central_differences(constraint: str, name: str, task: str) -> None:
+    made = CONSTRAINTS[constraint](robot_named(name))
+    objective, conditions = objective_with(made, name, task)
+    x = 0.02 * np.random.default_rng(1).normal(size=objective.size)
+    objective.run(x)
+    conditions.start(objective.rollout.samples(), 1.0)
+    conditions.update(objective.rollout.samples())
+    x = x + 0.005
+    assert conditions.value(objective.rollout.samples()) > 0.0
+    exact = objective.gradient(x)
+    differences = central_difference(objective.value, x, 1e-6)
+    assert np.abs(exact - differences).max() <= GRADIENT * np.abs(differences).max()
+
+
+@pytest.mark.parametrize("constraint", CONSTRAINTS)
+def test_tangents_equal_central_differences(constraint: str) -> None:
+    made = CONSTRAINTS[constraint](robot_named("panda"))
+    objective, _ = objective_with(made, "panda", "pose")
+    bound = made.bind(robot_named("panda"), sm.Task.POSE, np.zeros(7))
+    x = 0.02 * np.random.default_rng(2).normal(size=objective.size)
+    tangents: NodeTangents = objective.node_tangents(x)
+    exact = bound.tangents(objective.rollout.samples(), tangents)
+    for i in (0, 1, objective.size - 1):
+        ends = []
+        for sign in (1.0, -1.0):
+            shift = np.zeros_like(x)
+            shift[i] = sign * 1e-5
+            objective.run(x + shift)
+            ends.append(bound.residual(objective.rollout.samples()).copy())
+        differences = (ends[0] - ends[1]) / 2e-5
+        scale = max(1.0, np.abs(differences).max())
+        np.testing.assert_allclose(exact[..., i], differences, atol=1e-6 * scale)
+
+
+def test_clearance_gradient_equals_central_differences() -> None:
+    robot = robot_named("panda")
+    pose = robot.pose(start_of(robot, "pose"))
+    box = sm.Box("box", pose.translation + np.array([0.0, 0.0, 0.25]), [0.1, 0.1, 0.1])
+    objective, conditions = objective_with(sm.Clearance((box,), 0.1), "panda", "pose")
+    x = 0.01 * np.random.default_rng(3).normal(size=objective.size)
+    objective.run(x)
+    conditions.start(objective.rollout.samples(), 1.0)
+    assert conditions.value(objective.rollout.samples()) > 0.0
+    exact = objective.gradient(x)
+    differences = central_difference(objective.value, x, 1e-7)
+    # Closest points jump on flat faces; away from jumps the agreement is that of the differences.
+    assert np.abs(exact - differences).max() <= 1e-4 * np.abs(differences).max()
+
+
+def test_a_hundred_loops_of_a_closed_circle_do_not_drift(panda_circle: Circle) -> None:
+    open_loop = sm.plan(panda_circle())
+    plan = sm.plan(panda_circle(constraints=(*LIMITS, sm.ClosedPath())))
+    assert plan.certificate.verified
+    assert plan.certificate.closure <= 1e-9
+    assert plan.certificate.closure * 100 <= 1e-6
+    assert open_loop.certificate.closure > 0.01
+    ends = plan.trajectory.qd[[0, -1]]
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-6)
+    # What the pseudo-inverse alone does in one loop.
+    drift = open_loop.initial_trajectory.q[-1] - open_loop.initial_trajectory.q[0]
+    assert np.linalg.norm(drift) > 0.01
+    assert plan.report.cost < 1.1 * open_loop.report.cost
+
+
+def test_closed_paths_from_a_free_start(panda_circle: Circle) -> None:
+    problem = panda_circle(constraints=(*LIMITS, sm.ClosedPath()))
+    fixed = sm.plan(problem)
+    free = sm.plan(dataclasses.replace(problem, start=None))
+    assert free.certificate.verified
+    assert free.certificate.closure <= 1e-8
+    assert free.report.cost < fixed.report.cost
+
+
+def test_a_closed_joint_path_needs_a_closed_tool_path(panda: sm.RobotModel) -> None:
+    line = short_line(panda, PANDA_HOME)
+    with pytest.raises(sm.ProblemError, match="needs a closed tool path"):
+        sm.Problem(panda, line, start=PANDA_HOME, constraints=[sm.ClosedPath()])
+
+
+def test_velocity_limits_are_kept_between_samples(panda_circle: Circle) -> None:
+    robot = panda_circle().robot
+    limit = 0.55 * robot.velocity_limit
+    without = sm.plan(panda_circle())
+    assert (np.abs(without.trajectory.qd) / limit).max() > 1.0
+    motion = sm.BSplineNullMotion(8)
+    constraints = (sm.JointPositionLimits(), sm.JointVelocityLimits(limit))
+    plan = sm.plan(panda_circle(null_motion=motion, constraints=constraints))
+    assert plan.certificate.verified
+    t = np.linspace(0, plan.trajectory.duration, 5001)
+    assert (np.abs(plan.trajectory(t, 1)) / limit).max() <= 1.0
+    assert plan.certificate.velocity_ratio.value > 0.9
+
+
+def test_position_limits_are_kept_between_samples(panda_circle: Circle) -> None:
+    free = sm.plan(panda_circle())
+    upper = np.array(free.robot.upper)
+    upper[1] = free.trajectory.q[:, 1].max() - 0.05
+    constraints = (sm.JointPositionLimits(upper=upper), sm.JointVelocityLimits())
+    plan = sm.plan(panda_circle(null_motion=sm.BSplineNullMotion(8), constraints=constraints))
+    assert plan.certificate.verified
+    t = np.linspace(0, plan.trajectory.duration, 5001)
+    assert plan.trajectory(t)[:, 1].max() <= upper[1]
+
+
+def test_end_configuration_is_reached(panda_circle: Circle) -> None:
+    """The start itself, and a configuration further along the self-motion."""
+    problem = panda_circle()
+    robot, task = problem.robot, sm.Task.POSE
+    manifold = FreeStart(robot, problem.path, task, PANDA_HOME)
+    target = manifold.configuration(np.array([0.2]))
+    assert target is not None
+    constraints = (*LIMITS, sm.EndConfiguration(target))
+    plan = sm.plan(panda_circle(constraints=constraints))
+    assert plan.certificate.verified
+    np.testing.assert_allclose(plan.trajectory.q[-1], target, atol=1e-7)
+
+
+def test_unreachable_limits_are_named(panda_circle: Circle) -> None:
+    robot = panda_circle().robot
+    constraints = [sm.JointVelocityLimits(0.1 * robot.velocity_limit)]
+    plan = sm.plan(panda_circle(constraints=constraints))
+    assert not plan.certificate.verified
+    assert "velocity limits: velocity of joint 'panda_joint" in plan.report.message
+    assert "times its limit" in plan.certificate.verdict
+    with pytest.raises(sm.PlanError):
+        plan.require()
+
+
+def test_obstacles_are_avoided_on_the_real_meshes(panda: sm.RobotModel) -> None:
+    """A box in the elbow's way: without the constraint the plan collides, with it it does not."""
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    plain = sm.plan(sm.Problem(panda, path, start=PANDA_HOME))
+    box = sm.Box("box", np.array([0.0, -0.18, 0.62]), [0.1, 0.1, 0.1])
+    model = sm.CollisionModel(panda, (box,))
+    assert model.worst(plain.trajectory.q).value < -0.005
+    clearance = sm.Clearance((box,), 0.005)
+    problem = sm.Problem(
+        panda,
+        path,
+        start=PANDA_HOME,
+        null_motion=sm.BSplineNullMotion(6),
+        constraints=(*LIMITS, clearance),
+    )
+    plan = sm.plan(problem)
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert plan.certificate.clearance is not None
+    assert plan.certificate.clearance.value >= clearance.distance
+    assert model.worst(plan.trajectory(np.linspace(0, 4, 301))).value >= clearance.distance
+
+
+def test_free_start_is_never_worse_and_repeats(panda_circle: Circle) -> None:
+    fixed = sm.plan(panda_circle())
+    free = sm.plan(dataclasses.replace(panda_circle(), start="free"))
+    again = sm.plan(dataclasses.replace(panda_circle(), start=None))
+    assert free.report.cost <= fixed.report.cost
+    assert free.certificate.verified
+    np.testing.assert_array_equal(free.trajectory.q, again.trajectory.q)
+
+
+def test_free_start_stays_on_the_path_and_knows_its_tangent() -> None:
+    for name, task in (("planar_3r", "planar"), ("panda", "pose"), ("ur5", "position")):
+        robot, rows = robot_named(name), sm.Task.of(task)
+        start = start_of(robot, task)
+        path = short_line(robot, start)
+        manifold = FreeStart(robot, path, rows, start)
+        z = 0.2 * np.random.default_rng(4).normal(size=manifold.size)
+        q = manifold.configuration(z)
+        assert q is not None
+        assert max(rows.miss(path.pose(0.0), robot.pose(q))) < 1e-11
+        tangent = manifold.tangent(z)
+        for i in range(manifold.size):
+            ends = []
+            for sign in (1.0, -1.0):
+                shift = np.zeros_like(z)
+                shift[i] = sign * 1e-6
+                moved = manifold.configuration(z + shift)
+                assert moved is not None
+                ends.append(moved)
+            np.testing.assert_allclose(tangent[:, i], (ends[0] - ends[1]) / 2e-6, atol=1e-7)
+    assert manifold.configuration(np.full(manifold.size, 50.0)) is None
+
+
+def test_bad_constraints_are_refused(panda: sm.RobotModel) -> None:
+    path = short_line(panda, PANDA_HOME)
+    for constraint, message in (
+        (sm.JointPositionLimits(lower=np.zeros(3)), "expected one number for each"),
+        (sm.JointPositionLimits(lower=np.full(7, 9.0)), "is not below upper"),
+        (sm.JointVelocityLimits(np.full(7, -1.0)), "must be positive"),
+        (sm.JointVelocityLimits(margin=0.0), "margin is 0.0"),
+        (sm.Clearance(distance=-1.0), "distance is -1.0"),
+    ):
+        problem = sm.Problem(panda, path, start=PANDA_HOME, constraints=[constraint])
+        with pytest.raises(sm.ProblemError, match=message):
+            sm.plan(problem)
+
+
+def test_saved_plans_keep_what_was_required(panda: sm.RobotModel, tmp_path) -> None:
+    path = short_line(panda, PANDA_HOME)
+    box = sm.Box("far", np.array([0.0, 0.0, 2.0]), [0.1, 0.1, 0.1])
+    constraints = (*LIMITS, sm.JointAccelerationLimits(20.0), sm.Clearance((box,), 0.001))
+    plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=constraints))
+    assert plan.certificate.verified
+    plan.save(tmp_path / "plan.npz")
+    loaded = sm.load_plan(tmp_path / "plan.npz")
+    assert loaded.certificate == plan.certificate
+    assert loaded.check() == plan.certificate
+    assert loaded.clearance is not None
+    assert loaded.clearance.obstacles[0].name == "far"
+
+
+def test_broken_motions_fail_what_is_required(panda_circle: Circle) -> None:
+    problem = panda_circle(constraints=(*LIMITS, sm.ClosedPath()))
+    plan = sm.plan(problem)
+    q: Array = plan.trajectory.q.copy()
+    q[-1] += 1e-4
+    broken = dataclasses.replace(plan.trajectory, q=q)
+    certificate = sm.certify(
+        plan.robot, plan.path, plan.task, broken, requirements=plan.requirements
+    )
+    assert "away from the start" in certificate.verdict
+    required = dataclasses.replace(plan.requirements, acceleration=np.full(7, 0.1), end=PANDA_HOME)
+    certificate = sm.certify(
+        plan.robot, plan.path, plan.task, plan.trajectory, requirements=required
+    )
+    assert "accelerates at" in certificate.verdict
+    shifted = dataclasses.replace(required, end=PANDA_HOME + 0.1)
+    certificate = sm.certify(
+        plan.robot, plan.path, plan.task, plan.trajectory, requirements=shifted
+    )
+    assert "away from where it should" in certificate.verdict
