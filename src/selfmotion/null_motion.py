@@ -100,7 +100,7 @@ class BSplineNullMotion:
 
 @dataclass(frozen=True, eq=False)
 class NullMotionTable:
-    """A null motion at S stages, bound to one motion: ε = R E φ.
+    """A null motion at S stages, bound to one motion: ε = ε_0 + R E φ.
 
     Attributes
     ----------
@@ -110,11 +110,14 @@ class NullMotionTable:
         R at the stages; None for the identity.
     rows : int
         Rows of E: r, or n where there is no frame.
+    offset : (S, n) or None
+        ε_0, the null motion of x = 0; None for zero.
     """
 
     functions: Array
     frame: Array | None
     rows: int
+    offset: Array | None = None
 
     @property
     def size(self) -> int:
@@ -124,10 +127,11 @@ class NullMotionTable:
     def epsilon(self, x: Array) -> Array:
         """Return ε at the stages for coefficients `x`, (S, n)."""
         inner: Array = self.functions @ x.reshape(self.rows, -1).T
-        return inner if self.frame is None else np.einsum("snr,sr->sn", self.frame, inner)
+        outer = inner if self.frame is None else np.einsum("snr,sr->sn", self.frame, inner)
+        return outer if self.offset is None else outer + self.offset
 
     def pullback(self, epsilon_gradient: Array) -> Array:
-        """Return ∂F/∂x for ∂F/∂ε (S, n): the transpose of `epsilon`."""
+        """Return ∂F/∂x for ∂F/∂ε (S, n): the transpose of the linear part of `epsilon`."""
         inner = epsilon_gradient
         if self.frame is not None:
             inner = np.einsum("snr,sn->sr", self.frame, inner)
