@@ -20,6 +20,7 @@ from selfmotion.start import FixedStart, FreeStart, Start
 from selfmotion.trajectory import Trajectory
 
 _Result = TypeVar("_Result")
+Guide = Callable[[Array], Array]
 
 # Steps to begin with; halved until the motion at x = 0 drifts off the path by less than this,
 # relative to the extent of the path. Costs are then right to about the same.
@@ -64,6 +65,9 @@ class Session:
         The start.
     free : bool
         Whether the start may move along its self-motion.
+    guide : callable, optional
+        t (S,) → q̇ (S, n) of a motion whose null motion stands for x = 0: where the search found
+        one worth starting from. By default x = 0 has no null motion.
 
     Raises
     ------
@@ -81,10 +85,11 @@ class Session:
         configuration: Array,
         *,
         free: bool,
+        guide: Guide | None = None,
     ) -> None:
         self._problem, self._optimizer, self._callback = problem, optimizer, callback
         self._limit, self._spent = max_evaluations, 0
-        self.counts = counts
+        self.counts, self._guide = counts, guide
         self.history: list[Iteration] = []
         self.violations: tuple[str, ...] = ()
         robot, path, task = problem.robot, problem.path, problem.rows
@@ -214,8 +219,9 @@ class Session:
         rows = problem.rows.rows
         for _ in range(MOST_HALVINGS):
             rollout = Rollout(problem.robot, problem.path, problem.rows, grid)
-            epsilon = np.zeros((len(grid.stage_times), problem.robot.dof))
-            broken = rollout.run(configuration, epsilon)
+            offset = self._offset(grid)
+            idle = np.zeros((len(grid.stage_times), problem.robot.dof))
+            broken = rollout.run(configuration, idle if offset is None else offset)
             self.counts.jacobians += rollout.jacobian_evaluations
             drift = np.abs(rollout.drift[:, rows]) / np.where(rows < 3, extent, 1.0)
             off = ~(drift <= _DRIFT).all(axis=1)
@@ -245,11 +251,14 @@ class Session:
         rows = problem.robot.dof if frame is None else frame.shape[2]
         return Objective(
             Rollout(problem.robot, problem.path, problem.rows, grid),
-            NullMotionTable(functions, frame, rows),
+            NullMotionTable(functions, frame, rows, self._offset(grid)),
             problem.costs,
             self._start,
             conditions,
         )
+
+    def _offset(self, grid: Grid) -> Array | None:
+        return None if self._guide is None else self._guide(grid.stage_times)
 
     def _run_optimizer(self, h: Array | None, round_number: int) -> Minimum:
         # While multipliers are still far off, minimising to the last digit is lost work.
