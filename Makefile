@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench suite clean
+.PHONY: demo test lint format bench suite fuzz clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -37,3 +37,6 @@ $(READY): pyproject.toml constraints.txt
 
 suite: $(READY)  ## path problems made elsewhere, planned and scored
 	$(BIN)/python benchmarks/suite.py
+
+fuzz: $(READY)  ## 200 random paths, judged by an independent checker
+	$(BIN)/python benchmarks/fuzz.py
