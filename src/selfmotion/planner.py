@@ -15,6 +15,11 @@ from selfmotion.search import start_candidates
 from selfmotion.session import MOST_HALVINGS, Counts, Session
 from selfmotion.trajectory import Trajectory
 
+_Settings = tuple[Problem, QuasiNewton, Callback | None, int | None, Counts]
+
+# Where no start leads to a motion that keeps the constraints, this many times more are tried.
+_SECOND_EFFORT = 4
+
 
 def plan(
     problem: Problem,
@@ -76,18 +81,43 @@ def plan(
         best = Session(*settings, problem.given_start, free=False)
         best.minimize(use_metric)
     else:
-        generator = np.random.default_rng(rng)
-        candidates = start_candidates(problem.robot, problem.path, problem.rows, starts, generator)
-        best = _best_start(settings, candidates, finalists, use_metric)
+        best = _search_starts(settings, starts, finalists, rng, use_metric)
     best.refine_until_settled()
     return _finish(problem, best, tolerance or Tolerance(), began)
 
 
-def _best_start(
-    settings: tuple[Problem, QuasiNewton, Callback | None, int | None, Counts],
-    candidates: list[Array],
+def _search_starts(
+    settings: _Settings,
+    starts: int,
     finalists: int,
+    rng: np.random.Generator | int | None,
     use_metric: bool,
+) -> Session:
+    """Return the best session of a free start; more starts where the first ones fall short."""
+    problem = settings[0]
+    generator = np.random.default_rng(rng)
+    best: Session | None = None
+    failure: BreakdownError | None = None
+    for effort in (1, _SECOND_EFFORT):
+        candidates = start_candidates(
+            problem.robot, problem.path, problem.rows, effort * starts, generator
+        )
+        try:
+            found = _best_start(settings, candidates, effort * finalists, use_metric)
+        except BreakdownError as error:
+            failure = error
+            continue
+        if best is None or found.score < best.score:
+            best = found
+        if not best.violations or best.status in (Status.INTERRUPTED, Status.STOPPED):
+            break
+    if best is not None:
+        return best
+    raise failure or ProblemError(f"finalists is {finalists}, expected at least 1")
+
+
+def _best_start(
+    settings: _Settings, candidates: list[Array], finalists: int, use_metric: bool
 ) -> Session:
     """Return the session of the start whose optimised motion is best."""
     sessions, failure = [], None
