@@ -20,15 +20,18 @@ def objective_on(problem: sm.Problem, steps: int) -> Objective:
     grid = Grid.aligned(problem.path.knots, steps)
     rollout = Rollout(problem.robot, problem.path, problem.rows, grid)
     n = problem.robot.dof
+    start = problem.given_start
+    if start is None:
+        start = problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.rows)
     frame, rows = None, n
     if problem.null_motion.space == "null":
-        rollout.run(problem.start_configuration, np.zeros((len(grid.stage_times), n)))
+        rollout.run(start, np.zeros((len(grid.stage_times), n)))
         jacobians = rollout.samples().task_jacobian[grid.node_stages]
         frame = TransportedFrame(grid.nodes, jacobians)(grid.stage_times)
         rows = frame.shape[2]
     functions = problem.null_motion.functions(grid.stage_times, problem.path.duration)
     table = NullMotionTable(functions, frame, rows)
-    return Objective(rollout, table, problem.costs, FixedStart(problem.start_configuration))
+    return Objective(rollout, table, problem.costs, FixedStart(start))
 
 
 class Evaluation:

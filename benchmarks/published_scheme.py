@@ -32,7 +32,7 @@ class PublishedFunction:
         solution = solve_ivp(
             lambda t, q: self._rate(t, q, x)[0],
             (0.0, duration),
-            problem.start_configuration,
+            problem.given_start,
             method="RK23",
             rtol=self._rtol,
             atol=1e-3 * self._rtol,
