@@ -11,6 +11,7 @@
     ├── InverseKinematicsError    no configuration found for a pose
     ├── CollisionError            an obstacle, SRDF or geometry that cannot be checked
     ├── BreakdownError            the motion runs into a singular pose
+    ├── NoSequenceError           no chain of configurations follows the path
     ├── FileFormatError           a file that is not what it should be
     ├── RenderError               no browser to draw a picture of a replay with
     └── PlanError                 a plan without the quality asked for (`Plan.require`)
@@ -98,6 +99,23 @@ class BreakdownError(SelfmotionError):
     def __init__(self, message: str, *, time: float) -> None:
         super().__init__(message)
         self.time = time
+
+
+class NoSequenceError(SelfmotionError):
+    """No chain of configurations follows the path within limits, clearances and step limits.
+
+    Attributes
+    ----------
+    time : float
+        The waypoint [s] that no chain reaches.
+    reason : str
+        Why: no configuration there, joint limits, collisions or the step limit, with names.
+    """
+
+    def __init__(self, message: str, *, time: float, reason: str) -> None:
+        super().__init__(message)
+        self.time = time
+        self.reason = reason
 
 
 class FileFormatError(SelfmotionError):

@@ -42,7 +42,7 @@ def start_candidates(
     """
     pose = path.pose(0.0)
     found: list[Array] = []
-    for seed in _spread(robot, count, rng):
+    for seed in spread(robot, count, rng):
         try:
             q = robot.inverse_kinematics(pose, task, seed=seed, attempts=1)
         except InverseKinematicsError:
@@ -55,7 +55,7 @@ def start_candidates(
     return found
 
 
-def _spread(robot: RobotModel, count: int, rng: np.random.Generator) -> Iterator[Array]:
+def spread(robot: RobotModel, count: int, rng: np.random.Generator) -> Iterator[Array]:
     """Yield configurations that fill the limits evenly.
 
     The additive recurrence with the generalised golden ratio: fractions of k g^-1 … k g^-n, where

@@ -1,0 +1,183 @@
+"""The global search: curves at all waypoints, nodes on them, the shortest chains of nodes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.arrays import Array, read_only
+from selfmotion.collision import CollisionModel
+from selfmotion.errors import NoSequenceError, ProblemError
+from selfmotion.path import Path
+from selfmotion.robot import RobotModel
+from selfmotion.search import spread
+from selfmotion.sequences.chains import Mask, diverse_chains, shortest_chains, unturned
+from selfmotion.sequences.curves import CurveSet, SelfMotion, curves_along, targets
+from selfmotion.sequences.nodes import Bounds, place_nodes
+from selfmotion.sequences.reasons import why_blocked
+from selfmotion.task import Task
+
+# Largest distance of samples along a curve [rad or m], configuration norm.
+_SPACING = 0.06
+# Inverse kinematics starts anew at every so manieth waypoint, from so many seeds.
+_EVERY, _SEEDS = 10, 100
+
+
+@dataclass(frozen=True, eq=False)
+class Sequence:
+    """Configurations along a path.
+
+    Attributes
+    ----------
+    t : (W,)
+        Times of the waypoints [s].
+    q : (W, n)
+        Configurations [rad or m], each with the tool on the path.
+    length : float
+        Σ|Δq| over waypoints and joints [rad or m].
+    """
+
+    t: Array
+    q: Array
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "t", read_only(self.t))
+        object.__setattr__(self, "q", read_only(self.q))
+
+
+def best_sequences(
+    robot: RobotModel,
+    path: Path,
+    task: Task | str,
+    t: npt.ArrayLike,
+    *,
+    lower: npt.ArrayLike,
+    upper: npt.ArrayLike,
+    largest_step: npt.ArrayLike,
+    collision: CollisionModel | None = None,
+    margin: float = 0.0,
+    count: int = 3,
+    rng: np.random.Generator | int = 0,
+) -> list[Sequence]:
+    """Return the shortest joint sequences along a path that are unlike each other.
+
+    At every waypoint all self-motion curves are sampled by numerical continuation, from inverse
+    kinematics at many seeds and from the curves of the neighbouring waypoints. The samples inside
+    the limits and free of collision are the nodes of a graph; dynamic programming finds the chain
+    of least Σ|Δq| with every step within `largest_step`. It is the global optimum over the
+    samples, about 0.06 rad apart: longer than the optimum of the continuous problem, more so where
+    it follows a border. Hence several chains, unlike each other by 0.3 rad in some joint at a
+    tenth of the waypoints: refine them all and keep the best.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    path : Path
+    task : Task or str
+        Must leave redundancy 1.
+    t : (W,)
+        Times of the waypoints [s], increasing, within the path.
+    lower, upper : (n,)
+        Joint limits [rad or m]; ±inf for joints without. An angle is what it is: turns count.
+    largest_step : (n,) or float
+        Largest change of each joint from one waypoint to the next [rad or m].
+    collision : CollisionModel, optional
+        Of `robot`.
+    margin : float
+        Smallest clearance [m] at the waypoints.
+    count : int
+        How many sequences at most.
+    rng : Generator or int
+        Shifts the seeds of the inverse kinematics; the same one gives the same sequences.
+
+    Returns
+    -------
+    list of Sequence
+        Shortest first, at least one.
+
+    Raises
+    ------
+    ProblemError
+        The task does not leave redundancy 1, or an argument has the wrong shape or sign.
+    PathError
+        A time is outside the path.
+    NoSequenceError
+        No chain exists among the samples; tells the waypoint at which the last one ends, and why.
+    """
+    task, times = Task.of(task), _times(t)
+    limits = [
+        _joint_values(robot, values, name)
+        for values, name in ((lower, "lower"), (upper, "upper"), (largest_step, "largest_step"))
+    ]
+    _check(robot, task, limits, count)
+    motion = SelfMotion(robot, task, _SPACING)
+    bounds = Bounds(limits[0], limits[1], motion.revolute, collision, margin)
+    x = targets(path, times)
+    seeds = list(spread(robot, _SEEDS, np.random.default_rng(rng)))
+    curves = curves_along(motion, x, seeds, _EVERY)
+    layers = _layers(motion, x, curves, bounds)
+    chains = shortest_chains(layers, limits[2], bounds.turning)
+    if chains.blocked is not None:
+        i = chains.blocked
+        alive = layers[i - 1][np.isfinite(chains.cost[i - 1])] if i else layers[0][:0]
+        reason = why_blocked(motion, x[i], curves[i], alive, layers[i], bounds, limits[2])
+        raise NoSequenceError(
+            f"{robot.name}: no motion along the path passes t = {times[i]:.6g} s: {reason}",
+            time=float(times[i]),
+            reason=reason,
+        )
+    found = diverse_chains(layers, chains, limits[2], bounds.turning, count)
+    return [_sequence(times, layers, chain, bounds.turning) for chain in found]
+
+
+def _layers(motion: SelfMotion, x: Array, curves: list[CurveSet], bounds: Bounds) -> list[Array]:
+    """Return the nodes at every waypoint, sorted by the first joint."""
+    layers: list[Array] = []
+    samples = np.empty((0, motion.robot.dof))
+    for target, here in zip(x, curves, strict=True):
+        carried = [q for q in (motion.project(s, target) for s in samples) if q is not None]
+        samples = place_nodes(motion, target, here, carried, bounds, _SPACING)
+        nodes = bounds.all_turns(samples)
+        layers.append(np.ascontiguousarray(nodes[np.argsort(nodes[:, 0], kind="stable")]))
+    return layers
+
+
+def _sequence(times: Array, layers: list[Array], chain: list[int], turning: Mask) -> Sequence:
+    q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
+    steps = unturned(np.diff(q, axis=0), turning)
+    # Joints that turn without end go on past π instead of jumping back.
+    turned = np.vstack([q[:1], q[0] + np.cumsum(steps, axis=0)])
+    return Sequence(times, np.where(turning, turned, q), float(np.abs(steps).sum()))
+
+
+def _times(t: npt.ArrayLike) -> Array:
+    times = np.asarray(t, dtype=np.float64)
+    if times.ndim != 1 or len(times) < 2 or not np.all(np.diff(times) > 0):
+        raise ProblemError(f"t has shape {times.shape}, expected at least two increasing times [s]")
+    return times
+
+
+def _joint_values(robot: RobotModel, values: npt.ArrayLike, name: str) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape not in ((), (robot.dof,)) or np.any(np.isnan(array)):
+        raise ProblemError(
+            f"{name} has shape {array.shape}, expected a number for each of {robot.dof} joints"
+        )
+    return np.ascontiguousarray(np.broadcast_to(array, robot.dof))
+
+
+def _check(robot: RobotModel, task: Task, limits: list[Array], count: int) -> None:
+    redundancy = robot.redundancy(task)
+    if redundancy != 1:
+        raise ProblemError(
+            f"{robot.name} has redundancy {redundancy} for task '{task.value}'; the search over "
+            f"self-motion curves needs 1, use multiple starts instead"
+        )
+    if np.any(limits[0] > limits[1]):
+        k = int(np.flatnonzero(limits[0] > limits[1])[0])
+        raise ProblemError(f"joint '{robot.joint_names[k]}' has its lower limit above the upper")
+    if not np.all(limits[2] > 0.0):
+        raise ProblemError("largest_step has numbers that are not positive")
+    if count < 1:
+        raise ProblemError(f"count is {count}, expected at least 1")
