@@ -138,6 +138,7 @@ def plan(problem: PathProblem, seed: int) -> sm.Plan:
             constraints=constraints,
         ),
         starts=48,
+        search="global",
         rng=seed,
     )
 

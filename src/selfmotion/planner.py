@@ -7,7 +7,8 @@ import numpy as np
 
 from selfmotion.arrays import Array, read_only
 from selfmotion.certificate import Certificate, Tolerance, certify
-from selfmotion.errors import BreakdownError, ProblemError
+from selfmotion.errors import BreakdownError, NoSequenceError, ProblemError, SelfmotionError
+from selfmotion.guides import guides
 from selfmotion.plan import Plan, Report
 from selfmotion.problem import Problem
 from selfmotion.quasi_newton import Callback, QuasiNewton, Status
@@ -32,6 +33,7 @@ def plan(
     starts: int = 24,
     finalists: int = 4,
     rng: np.random.Generator | int | None = 0,
+    search: str = "auto",
 ) -> Plan:
     """Plan the joint motion that follows the path exactly and minimises the costs.
 
@@ -55,6 +57,10 @@ def plan(
         motions at x = 0.
     rng : Generator or int
         Where the start is free: shifts the seeds; the same one gives the same plan.
+    search : {"auto", "local", "global"}
+        Where the start is free and the redundancy 1: whether sequences over all self-motions are
+        searched as well (`best_sequences`) and the best of them optimised. ``"auto"``: where no
+        start leads to a motion that keeps the constraints.
 
     Returns
     -------
@@ -73,6 +79,8 @@ def plan(
         raise ProblemError(
             f"initial_metric is '{initial_metric}', expected 'gauss-newton' or 'identity'"
         )
+    if search not in ("auto", "local", "global"):
+        raise ProblemError(f"search is '{search}', expected 'auto', 'local' or 'global'")
     began = time.perf_counter()
     counts = Counts()
     settings = (problem, optimizer or QuasiNewton(), callback, max_evaluations, counts)
@@ -81,9 +89,44 @@ def plan(
         best = Session(*settings, problem.given_start, free=False)
         best.minimize(use_metric)
     else:
-        best = _search_starts(settings, starts, finalists, rng, use_metric)
+        best = _search(settings, starts, finalists, rng, use_metric, search)
     best.refine_until_settled()
     return _finish(problem, best, tolerance or Tolerance(), began)
+
+
+def _search(
+    settings: _Settings,
+    starts: int,
+    finalists: int,
+    rng: np.random.Generator | int | None,
+    use_metric: bool,
+    search: str,
+) -> Session:
+    """Return the best session of a free start: from many starts, and from global sequences."""
+    best: Session | None = None
+    failure: SelfmotionError | None = None
+    try:
+        best = _search_starts(settings, starts, finalists, rng, use_metric)
+    except BreakdownError as error:
+        failure = error
+    problem = settings[0]
+    fell_short = best is None or bool(best.violations)
+    cut_short = best is not None and best.status in (Status.INTERRUPTED, Status.STOPPED)
+    wanted = search == "global" or (search == "auto" and fell_short)
+    if wanted and not cut_short and problem.robot.redundancy(problem.rows) == 1:
+        try:
+            for guide in guides(problem, rng):
+                session = Session(*settings, guide.start, free=True, guide=guide)
+                session.minimize(use_metric)
+                if best is None or session.score < best.score:
+                    best = session
+        except (NoSequenceError, BreakdownError) as error:
+            failure = error
+    if best is None:
+        raise failure or ProblemError(f"finalists is {finalists}, expected at least 1")
+    if best.violations and isinstance(failure, NoSequenceError):
+        best.violations = (*best.violations, f"global search: {failure}")
+    return best
 
 
 def _search_starts(

@@ -1,0 +1,68 @@
+"""Motions worth starting from, found by the global search over self-motions."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from selfmotion.arrays import Array
+from selfmotion.path import Waypoints
+from selfmotion.problem import Problem
+from selfmotion.sequences import Sequence, best_sequences
+
+# Sequences refined; the shortest among the samples is not always that of the best motion.
+_COUNT = 4
+# Waypoints for a path that has none of its own.
+_WAYPOINTS = 200
+# What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
+_MARGIN = 5e-4
+# The jagged chain of samples is smoothed by a spline with this many waypoints per interval.
+_SMOOTHING = 5
+
+
+class Guide:
+    """A sequence as a smooth motion: what `Session` takes as x = 0."""
+
+    def __init__(self, sequence: Sequence) -> None:
+        from scipy.interpolate import make_lsq_spline
+
+        t, q = sequence.t, sequence.q
+        inner = np.linspace(t[0], t[-1], max(len(t) // _SMOOTHING, 2))
+        knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
+        self._rate = make_lsq_spline(t, q, knots).derivative()
+        self.start: Array = q[0]
+
+    def __call__(self, t: Array) -> Array:
+        """Return q̇ at times `t` (S,), (S, n)."""
+        return np.asarray(self._rate(t))
+
+
+def guides(problem: Problem, rng: np.random.Generator | int | None) -> Iterator[Guide]:
+    """Yield guides from the best sequences over the self-motions of redundancy 1.
+
+    Raises
+    ------
+    NoSequenceError
+        No chain of configurations follows the path; says where it ends and why.
+    """
+    robot, path, wanted = problem.robot, problem.path, problem.requirements
+    if isinstance(path, Waypoints):
+        t = path.waypoint_times
+    else:
+        t = np.linspace(0.0, path.duration, _WAYPOINTS)
+    velocity = robot.velocity_limit if wanted.velocity is None else wanted.velocity
+    step = np.minimum(velocity * float(np.diff(t).min()), np.pi)
+    sequences = best_sequences(
+        robot,
+        path,
+        problem.rows,
+        t,
+        lower=robot.lower if wanted.lower is None else wanted.lower,
+        upper=robot.upper if wanted.upper is None else wanted.upper,
+        largest_step=step,
+        collision=wanted.collision,
+        margin=wanted.clearance + _MARGIN,
+        count=_COUNT,
+        rng=0 if rng is None else rng,
+    )
+    for sequence in sequences:
+        yield Guide(sequence)
