@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench suite fuzz clean
+.PHONY: demo test lint format bench bench-peers suite fuzz clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -40,3 +40,6 @@ suite: $(READY)  ## path problems made elsewhere, planned and scored
 
 fuzz: $(READY)  ## 200 random paths, judged by an independent checker
 	$(BIN)/python benchmarks/fuzz.py
+
+bench-peers: $(READY)  ## placo and Drake on the same path, in environments of their own
+	$(BIN)/python benchmarks/peers/run_peers.py

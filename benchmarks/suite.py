@@ -28,7 +28,7 @@ DATA = Path(__file__).parent / "data"
 # Distance planned for, so that the last digits of the check do not decide [m].
 CLEARANCE = 5e-4
 # Share of the largest joint step that is planned for: it must stay strictly below.
-STEP_SHARE = 0.98
+STEP_SHARE = 0.995
 
 
 @dataclass(frozen=True)
@@ -133,11 +133,10 @@ def plan(problem: PathProblem, seed: int) -> sm.Plan:
         sm.Problem(
             problem.robot,
             problem.path,
-            null_motion=sm.BSplineNullMotion(24),
-            costs=[sm.PathLength(smoothing=0.02)],
+            null_motion=sm.BSplineNullMotion(40),
+            costs=[sm.PathLength(smoothing=0.005)],
             constraints=constraints,
         ),
-        starts=48,
         search="global",
         rng=seed,
     )

@@ -17,6 +17,10 @@ class NullMotion(Protocol):
     def space(self) -> str:
         """``"null"``: E is (r, K) in a null-space basis; ``"joint"``: E is (n, K), R = I."""
 
+    @property
+    def fewest_steps(self) -> int:
+        """Steps below which a grid does not resolve the functions."""
+
     def functions(self, t: Array, duration: float) -> Array:
         """Return φ at times `t` (S,) of a motion of length `duration` [s], (S, K)."""
 
@@ -53,6 +57,11 @@ class PolynomialNullMotion:
                 f"null motion: basis is '{self.basis}', expected 'legendre' or 'monomial'"
             )
 
+    @property
+    def fewest_steps(self) -> int:
+        """See `NullMotion.fewest_steps`: four for each coefficient."""
+        return 4 * (self.degree + 1)
+
     def functions(self, t: Array, duration: float) -> Array:
         """See `NullMotion.functions`."""
         if self.basis == "monomial":
@@ -88,6 +97,11 @@ class BSplineNullMotion:
             raise ProblemError(
                 f"null motion: intervals is {self.intervals}, expected a whole number ≥ 1"
             )
+
+    @property
+    def fewest_steps(self) -> int:
+        """See `NullMotion.fewest_steps`: four for each interval."""
+        return 4 * self.intervals
 
     def functions(self, t: Array, duration: float) -> Array:
         """See `NullMotion.functions`."""

@@ -58,9 +58,10 @@ def plan(
     rng : Generator or int
         Where the start is free: shifts the seeds; the same one gives the same plan.
     search : {"auto", "local", "global"}
-        Where the start is free and the redundancy 1: whether sequences over all self-motions are
-        searched as well (`best_sequences`) and the best of them optimised. ``"auto"``: where no
-        start leads to a motion that keeps the constraints.
+        Where the start is free: optimise from many starts (local), or, where the redundancy is 1,
+        from the best sequences over all self-motions (`best_sequences`). ``"auto"``: from many
+        starts first, and from sequences where none of them leads to a motion that keeps the
+        constraints.
 
     Returns
     -------
@@ -102,18 +103,19 @@ def _search(
     use_metric: bool,
     search: str,
 ) -> Session:
-    """Return the best session of a free start: from many starts, and from global sequences."""
+    """Return the best session of a free start: from many starts, or from global sequences."""
+    problem = settings[0]
     best: Session | None = None
     failure: SelfmotionError | None = None
-    try:
-        best = _search_starts(settings, starts, finalists, rng, use_metric)
-    except BreakdownError as error:
-        failure = error
-    problem = settings[0]
+    can_search = problem.robot.redundancy(problem.rows) == 1
+    if search != "global" or not can_search:
+        try:
+            best = _search_starts(settings, starts, finalists, rng, use_metric)
+        except BreakdownError as error:
+            failure = error
     fell_short = best is None or bool(best.violations)
     cut_short = best is not None and best.status in (Status.INTERRUPTED, Status.STOPPED)
-    wanted = search == "global" or (search == "auto" and fell_short)
-    if wanted and not cut_short and problem.robot.redundancy(problem.rows) == 1:
+    if can_search and search != "local" and fell_short and not cut_short:
         try:
             for guide in guides(problem, rng):
                 session = Session(*settings, guide.start, free=True, guide=guide)

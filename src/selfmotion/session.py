@@ -213,7 +213,8 @@ class Session:
     def _reference(self, configuration: Array) -> Rollout:
         """Return the motion at x = 0, on the coarsest grid on which it stays near the path."""
         problem = self._problem
-        grid = Grid.aligned(problem.path.knots, _FEWEST_STEPS)
+        steps = max(_FEWEST_STEPS, problem.null_motion.fewest_steps)
+        grid = Grid.aligned(problem.path.knots, steps)
         target = problem.path.samples(grid.nodes)
         extent = max(float(np.ptp(target.translation, axis=0).max()), 1e-3)
         rows = problem.rows.rows
