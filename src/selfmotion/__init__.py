@@ -48,11 +48,12 @@ from selfmotion.errors import (
 )
 from selfmotion.line_search import LineSearch
 from selfmotion.null_motion import BSplineNullMotion, NullMotion, PolynomialNullMotion
-from selfmotion.path import Circle, Line, Path, TwistPath, Waypoints
+from selfmotion.path import Circle, Line, Path, Retimed, TwistPath, Waypoints
 from selfmotion.plan import Plan, Report, load_plan
 from selfmotion.planner import plan
 from selfmotion.problem import Problem
 from selfmotion.quasi_newton import Iteration, QuasiNewton, Status
+from selfmotion.retiming import retime, slowdown
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.sample import sample_problem
 from selfmotion.task import Task
@@ -110,6 +111,7 @@ __all__ = [
     "RenderError",
     "Report",
     "Requirements",
+    "Retimed",
     "RobotError",
     "RobotModel",
     "SelfmotionError",
@@ -126,5 +128,7 @@ __all__ = [
     "load_plan",
     "load_robot",
     "plan",
+    "retime",
     "sample_problem",
+    "slowdown",
 ]

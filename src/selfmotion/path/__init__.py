@@ -2,6 +2,7 @@
 
 from selfmotion.path.base import Path, PathSamples, as_pose
 from selfmotion.path.files import path_from_dict
+from selfmotion.path.retimed import Retimed
 from selfmotion.path.shapes import Circle, Line
 from selfmotion.path.twist import TwistPath
 from selfmotion.path.waypoints import Waypoints
@@ -11,6 +12,7 @@ __all__ = [
     "Line",
     "Path",
     "PathSamples",
+    "Retimed",
     "TwistPath",
     "Waypoints",
     "as_pose",

@@ -5,6 +5,7 @@ from typing import Any
 
 from selfmotion.errors import FileFormatError
 from selfmotion.path.base import Path
+from selfmotion.path.retimed import Retimed
 from selfmotion.path.shapes import Circle, Line
 from selfmotion.path.twist import TwistPath
 from selfmotion.path.waypoints import Waypoints
@@ -25,6 +26,7 @@ def path_from_dict(description: Mapping[str, Any]) -> Path:
         "circle": Circle,
         "twist": TwistPath._restore,
         "waypoints": Waypoints,
+        "retimed": _retimed,
     }
     if kind not in makers:
         raise FileFormatError(f"path kind is {kind!r}, expected one of: {', '.join(makers)}")
@@ -32,3 +34,7 @@ def path_from_dict(description: Mapping[str, Any]) -> Path:
         return makers[kind](**arguments)  # type: ignore[operator, no-any-return]
     except TypeError as error:
         raise FileFormatError(f"path of kind '{kind}': {error}") from error
+
+
+def _retimed(path: Mapping[str, Any], **arguments: Any) -> Retimed:
+    return Retimed(path_from_dict(path), **arguments)

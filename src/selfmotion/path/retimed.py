@@ -1,0 +1,66 @@
+"""A tool motion run through at another pace."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.arrays import Array, read_only
+from selfmotion.errors import PathError
+from selfmotion.path.base import Path, PathSamples
+
+
+class Retimed(Path):
+    """The same geometric path at another pace: pose(t) is that of the original at σ(t).
+
+    σ is a cubic Hermite spline, non-decreasing at its samples.
+
+    Parameters
+    ----------
+    path : Path
+        The original.
+    t : (N,)
+        New times [s], increasing from 0.
+    sigma : (N,)
+        Original times [s], from 0 to the original's duration.
+    rate : (N,)
+        dσ/dt ≥ 0.
+    """
+
+    def __init__(
+        self, path: Path, t: npt.ArrayLike, sigma: npt.ArrayLike, rate: npt.ArrayLike
+    ) -> None:
+        self._path = path
+        self._t, self._sigma, self._rate = map(read_only, (t, sigma, rate))
+        if not (np.all(np.diff(self._t) > 0) and np.all(np.diff(self._sigma) >= 0)):
+            raise PathError("retimed path: times must increase and σ must not fall")
+        self.duration = float(self._t[-1])
+
+    @property
+    def knots(self) -> Array:
+        """See `Path.knots`."""
+        return self._t
+
+    def pace(self, t: Array) -> tuple[Array, Array]:
+        """Return σ and dσ/dt at times `t` (K,)."""
+        from scipy.interpolate import CubicHermiteSpline
+
+        spline = CubicHermiteSpline(self._t, self._sigma, self._rate)
+        sigma = np.clip(spline(t), 0.0, self._path.duration)
+        return np.asarray(sigma), np.asarray(spline(t, 1))
+
+    def _evaluate(self, t: Array) -> PathSamples:
+        sigma, rate = self.pace(t)
+        original = self._path.samples(sigma)
+        twist = original.twist * rate[:, None]
+        return PathSamples(t, original.translation, original.rotation, twist)
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Path.to_dict`."""
+        return {
+            "kind": "retimed",
+            "path": self._path.to_dict(),
+            "t": self._t.tolist(),
+            "sigma": self._sigma.tolist(),
+            "rate": self._rate.tolist(),
+        }

@@ -1,0 +1,125 @@
+"""The same joint path in the time that velocity and acceleration limits allow."""
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.arrays import Array, read_only
+from selfmotion.certificate import certify
+from selfmotion.errors import PlanError, ProblemError
+from selfmotion.path.retimed import Retimed
+from selfmotion.plan import Plan
+from selfmotion.trajectory import Trajectory
+
+# Share of the limits that is used, so that the certificate between grid points holds as well.
+_SHARE = 0.98
+# Grid points of toppra, and samples of the new motion, per sample of the old one.
+_DENSITY = 4
+
+
+def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
+    """Return by what factor the plan's duration must grow to keep its limits (1: it does).
+
+    At the same pace profile: velocities fall with the factor, accelerations with its square.
+
+    Parameters
+    ----------
+    plan : Plan
+    acceleration : (n,) or float, optional
+        Acceleration limits [rad/s² or m/s²]; by default only velocities count.
+    """
+    factor = max(1.0, plan.certificate.velocity_ratio.value)
+    if acceleration is not None:
+        middle = 0.5 * (plan.trajectory.t[:-1] + plan.trajectory.t[1:])
+        share = np.abs(plan.trajectory(middle, order=2)) / np.asarray(acceleration)
+        factor = max(factor, float(np.sqrt(share.max())))
+    return factor
+
+
+def retime(
+    plan: Plan,
+    acceleration: npt.ArrayLike,
+    velocity: npt.ArrayLike | None = None,
+) -> Plan:
+    """Return the plan's joint path in the shortest time within the limits, from rest to rest.
+
+    Time-optimal path parametrisation by reachability analysis (H. Pham and Q.-C. Pham, IEEE
+    Trans. Robotics 34(3), 2018), by the package toppra. The geometric path of joints and tool
+    stays; the tool motion becomes a `Retimed` one, and the certificate is made anew.
+
+    Parameters
+    ----------
+    plan : Plan
+    acceleration : (n,) or float
+        Limits [rad/s² or m/s²].
+    velocity : (n,), optional
+        Limits [rad/s or m/s]; by default the URDF's.
+
+    Returns
+    -------
+    Plan
+        With the old report.
+
+    Raises
+    ------
+    ProblemError
+        toppra is not installed, or a limit is not positive.
+    PlanError
+        No pace keeps the limits.
+    """
+    n = plan.robot.dof
+    limits = [
+        np.broadcast_to(np.asarray(limit, dtype=np.float64), (n,))
+        for limit in (plan.robot.velocity_limit if velocity is None else velocity, acceleration)
+    ]
+    if not all(np.all(limit > 0.0) for limit in limits):
+        raise ProblemError(f"{plan.robot.name}: limits for retiming must be positive: {limits}")
+    t, sigma, rate = _pace(plan.trajectory, *limits)
+    path = Retimed(plan.path, t, sigma, rate)
+    q, qd = plan.trajectory(sigma), plan.trajectory(sigma, order=1) * rate[:, None]
+    trajectory = Trajectory(t, q, qd, plan.trajectory.joint_names)
+    wanted = replace(
+        plan.requirements, velocity=read_only(limits[0]), acceleration=read_only(limits[1])
+    )
+    checked = replace(
+        plan, path=path, trajectory=trajectory, initial_trajectory=trajectory, requirements=wanted
+    )
+    certificate = certify(plan.robot, path, plan.task, trajectory, requirements=wanted)
+    return replace(checked, certificate=certificate)
+
+
+def _pace(motion: Trajectory, velocity: Array, acceleration: Array) -> tuple[Array, Array, Array]:
+    """Return new times, and σ and dσ/dt there."""
+    count = _DENSITY * (len(motion.t) - 1)
+    grid = np.interp(np.arange(count + 1) / _DENSITY, np.arange(len(motion.t)), motion.t)
+    rates = _toppra(motion, grid, _SHARE * velocity, _SHARE * acceleration)
+    # Between grid points the squared rate is linear in σ, hence σ̈ constant and the times exact.
+    steps = 2.0 * np.diff(grid) / (rates[:-1] + rates[1:])
+    return np.append(0.0, np.cumsum(steps)), grid - grid[0], rates
+
+
+def _toppra(motion: Trajectory, grid: Array, velocity: Array, acceleration: Array) -> Array:
+    """Return the largest dσ/dt at the grid of σ, zero at both ends."""
+    import logging
+
+    try:
+        import toppra
+        from toppra import algorithm, constraint
+    except ImportError:
+        raise ProblemError(
+            "retiming needs the package toppra: pip install 'selfmotion[retime]'"
+        ) from None
+    logging.getLogger("toppra").setLevel(logging.ERROR)
+    solver = algorithm.TOPPRA(
+        [
+            constraint.JointVelocityConstraint(np.stack([-velocity, velocity], axis=1)),
+            constraint.JointAccelerationConstraint(np.stack([-acceleration, acceleration], axis=1)),
+        ],
+        toppra.SplineInterpolator(motion.t, motion.q),
+        gridpoints=grid,
+    )
+    _, rates, _ = solver.compute_parameterization(0.0, 0.0)
+    if rates is None:
+        raise PlanError("no pace keeps the velocity and acceleration limits along this joint path")
+    return np.asarray(rates, dtype=np.float64)

@@ -1,0 +1,53 @@
+"""Retimed plans keep their geometry and the limits."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from conftest import PANDA_HOME, robot_named
+
+ACCELERATION = 6.0
+
+
+@pytest.fixture(scope="module")
+def fast() -> sm.Plan:
+    """A circle in half a second: far too fast for a Panda."""
+    panda = robot_named("panda")
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 0.5, normal=(1.0, 0.0, 0.0))
+    only = (sm.JointPositionLimits(),)
+    return sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=only))
+
+
+# toppra 0.6 still asks NumPy for a name that has another one now.
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_retimed_plans_keep_limits_and_geometry(fast: sm.Plan, tmp_path) -> None:
+    assert not fast.certificate.verified
+    slow = sm.retime(fast, ACCELERATION)
+    assert slow.certificate.verified, slow.certificate.verdict
+    assert slow.certificate.acceleration_ratio is not None
+    assert slow.certificate.acceleration_ratio.value <= 1.0
+    assert slow.trajectory.duration > 2.0 * fast.trajectory.duration
+    np.testing.assert_allclose(slow.trajectory.qd[[0, -1]], 0.0, atol=1e-6)
+    assert isinstance(slow.path, sm.Retimed)
+    sigma, _ = slow.path.pace(slow.trajectory.t)
+    np.testing.assert_allclose(slow.trajectory.q, fast.trajectory(sigma), atol=1e-9)
+    slow.save(tmp_path / "slow.npz")
+    assert sm.load_plan(tmp_path / "slow.npz").check() == slow.certificate
+
+
+def test_the_factor_is_the_one_that_suffices(fast: sm.Plan) -> None:
+    factor = sm.slowdown(fast)
+    assert factor == pytest.approx(fast.certificate.velocity_ratio.value)
+    panda = fast.robot
+    for share, verified in ((1.01, True), (0.9, False)):
+        duration = 0.5 * factor * share
+        path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, duration, normal=(1.0, 0.0, 0.0))
+        only = (sm.JointPositionLimits(),)
+        plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=only))
+        assert plan.certificate.verified is verified
+    assert sm.slowdown(fast, ACCELERATION) > factor
+
+
+def test_bad_limits_are_refused(fast: sm.Plan) -> None:
+    with pytest.raises(sm.ProblemError, match="must be positive"):
+        sm.retime(fast, 0.0)
