@@ -45,9 +45,9 @@ def section(context: Context) -> Section:
     """Return the table for each problem, and the claims about other works."""
     sample = sample_problem()
     tables = [_table("Sample problem (free end)", sample, cyclic=False)]
-    there_and_back = sample_problem(duration=2.0)
-    tables.append(_table("Sample problem, there and back", there_and_back, cyclic=True))
-    if context.scale.panda:
+    if context.scale.closed_paths:
+        there_and_back = sample_problem(duration=2.0)
+        tables.append(_table("Sample problem, there and back", there_and_back, cyclic=True))
         tables.append(_table("Panda, circle of 0.15 m, pose task", panda_circle(), cyclic=True))
     return Section(
         "others",

@@ -39,7 +39,8 @@ def html(study: Study) -> str:
         "<p>“Path planning for redundant manipulators using iterative optimization technique”: "
         "its figures, tables and claims, each from one run of "
         f"<code>selfmotion study</code> ({study.scale}, {study.seconds:.0f} s). "
-        f"{len(claims)} claims tested: {counts}.</p><nav>{links}</nav></header><main>"
+        f"{len(claims)} claims tested: {counts}.</p>"
+        f'<nav><a href="#claims">Claims and verdicts</a>{links}</nav></header><main>'
         f"{_overview(claims)}{''.join(map(_section, study.sections))}</main></body></html>"
     )
 
@@ -54,7 +55,7 @@ def number(value: str | float | int) -> str:
         return "—"
     if value and not 1e-3 <= abs(value) < 1e5:
         return f"{value:.2e}"
-    return f"{value:.5g}" if abs(value) < 10 else f"{value:.6g}"
+    return f"{value:.5g}" if abs(value) < 10 else f"{value:.7g}"
 
 
 def _overview(claims: tuple[Claim, ...]) -> str:

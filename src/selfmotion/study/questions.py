@@ -286,7 +286,7 @@ def _minima(context: Context) -> _Answer:
             Verdict.QUALIFIED if at_zero < 1e-3 and distinct > 1 else Verdict.CONFIRMED,
             f"{reached} of {len(costs)} random starts reach the best, {distinct} different ends",
             f"Local minima are there: ends lie between {best:.4f} and {ordered[-1]:.4g}. But the "
-            f"start x = 0 leads to {context.best.cost:.4f}, which is "
-            f"{100 * at_zero:.3f} % above the best that any start found.",
+            f"start x = 0 leads to {context.best.cost:.4f}, and the best that any random start "
+            f"found differs from that by {100 * abs(at_zero):.3f} %.",
         ),
     )

@@ -100,7 +100,7 @@ def _claim(context: Context, rough: Minimum, smooth: Minimum, conditions: list[f
     falling = bool(np.all(drops > 0.0))
     return Claim(
         "surging_cause",
-        "F surges; it seems that the search is caught in a succession of local minima.",
+        "The surging of F suggests a search caught in a succession of local minima.",
         Verdict.REFUTED if conditioning and falling else Verdict.QUALIFIED,
         f"{len(places)} surges at condition {conditions[0]:.0e}; "
         f"{len(_surge_indices(smooth))} at condition {conditions[-2]:.0f}",

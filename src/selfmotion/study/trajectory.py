@@ -69,7 +69,7 @@ def _figure3(context: Context) -> tuple[Plot, Plot]:
     cost = Curve.of("F", steps, [iteration.cost for iteration in history], marker="o")
     return (
         Plot("figure3", "Figure 3: x against iterations", "iteration", "x", (norm, *entries)),
-        Plot("figure3_cost", "F against iterations", "iteration", "F", (cost,), y_scale="log"),
+        Plot("figure3_cost", "F against iterations", "iteration", "F", (cost,)),
     )
 
 
@@ -146,8 +146,8 @@ def _half_percent(context: Context) -> Claim:
         f"{100 * excess:.2f} % above the optimum over all joint motions",
         f"From x = 0 the published scheme reaches {reached:.4f}, integrated finely; the Lagrangian "
         f"boundary-value problem has {context.lagrangian.report.cost:.5f}. It is better than the "
-        f"paper hopes: its cubic in joint space can express "
-        f"{100 * (context.best.cost / context.lagrangian.report.cost - 1):.4f} % above it.",
+        f"paper hopes: its cubic in joint space can come "
+        f"within {100 * (context.best.cost / context.lagrangian.report.cost - 1):.4f} % of it.",
     )
 
 
