@@ -121,7 +121,7 @@ def test_gradient_projection_tunes_its_gain() -> None:
 
 def test_pose_gradient_is_that_of_the_cost(panda: sm.RobotModel, panda_circle: Circle) -> None:
     problem = panda_circle("pose")
-    q = problem.start_configuration
+    q = problem.given_start
     found = pose_gradient(problem, sm.Manipulability(), 0.0, q)
 
     def negative_w(q: np.ndarray) -> float:
@@ -140,7 +140,7 @@ def test_extended_jacobian_keeps_the_pose_stationary(panda_circle: Circle) -> No
     q = found.trajectory.q[-1]
     null = np.linalg.svd(problem.robot.task_jacobian(q, problem.rows))[2][6:]
     slope = pose_gradient(problem, sm.Manipulability(), 0.0, q)
-    start = pose_gradient(problem, sm.Manipulability(), 0.0, problem.start_configuration)
+    start = pose_gradient(problem, sm.Manipulability(), 0.0, problem.given_start)
     assert np.abs(null @ slope).max() < 1e-6 * np.linalg.norm(start)
 
 

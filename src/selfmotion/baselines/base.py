@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -49,7 +49,11 @@ class Method(Protocol):
     """A way to resolve the redundancy of a problem other than by optimising coefficients."""
 
     def solve(self, problem: Problem) -> Motion:
-        """Return a joint motion along the problem's path, from its start configuration."""
+        """Return a joint motion along the problem's path.
+
+        From the start configuration; from an inverse-kinematics solution where that is free. The
+        problem's constraints are not seen: the certificate says which of them the motion breaks.
+        """
 
 
 def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None) -> Plan:
@@ -100,6 +104,8 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
         coefficients=read_only([]),
         report=report,
         certificate=certificate,
+        requirements=replace(problem.requirements, collision=None),
+        clearance=problem.clearance,
     )
 
 
@@ -135,7 +141,9 @@ def _sampled(
     before = np.inf
     for attempt in range(_MOST_DOUBLINGS + 1):
         trajectory = Trajectory(grid.nodes, *motion.at(grid.nodes), problem.robot.joint_names)
-        certificate = certify(problem.robot, problem.path, problem.rows, trajectory, tolerance)
+        certificate = certify(
+            problem.robot, problem.path, problem.rows, trajectory, tolerance, problem.requirements
+        )
         errors = certificate.position_error.value, certificate.rotation_error.value
         held = errors[0] <= tolerance.position and errors[1] <= tolerance.rotation
         # An error that halving does not change is the motion's own, not that of its samples.

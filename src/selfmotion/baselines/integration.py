@@ -91,6 +91,19 @@ class Run:
     rates: int
 
 
+def start_of(problem: Problem) -> Array:
+    """Return q(0) (n,): the given one, or an inverse-kinematics solution where the start is free.
+
+    Raises
+    ------
+    InverseKinematicsError
+        The start is free and no configuration reaches the start of the path.
+    """
+    if problem.given_start is not None:
+        return problem.given_start
+    return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.rows)
+
+
 def integrate(problem: Problem, rate: Rate) -> Run:
     """Integrate q̇ = rate(t, q) from the problem's start by DOP853, piece by piece of the path.
 
@@ -101,7 +114,7 @@ def integrate(problem: Problem, rate: Rate) -> Run:
     """
     pieces: list[tuple[float, OdeSolution]] = []
     rates = 0
-    q = problem.start_configuration
+    q = start_of(problem)
     fastest = _RUNAWAY / problem.path.duration
 
     def guarded(t: float, configuration: Array) -> Array:

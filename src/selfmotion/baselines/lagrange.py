@@ -9,6 +9,7 @@ from scipy.integrate import solve_bvp, solve_ivp
 
 from selfmotion.arrays import Array, read_only
 from selfmotion.baselines.base import Motion, pseudo_inverse
+from selfmotion.baselines.integration import start_of
 from selfmotion.costs import Cost, JointVelocity
 from selfmotion.costs.base import weight_matrix
 from selfmotion.errors import ProblemError
@@ -91,7 +92,7 @@ class LagrangianOptimum:
         return Motion(at, message, found.niter, flow.jacobian_evaluations, status)
 
     def _end_conditions(self, problem: Problem, flow: "_Flow") -> Callable[[Array, Array], Array]:
-        start, n = problem.start_configuration, flow.n
+        start, n = start_of(problem), flow.n
         rows = problem.robot.task_jacobian(start, problem.rows)
         null = np.linalg.svd(rows)[2][len(rows) :]
 
@@ -201,7 +202,7 @@ def _velocity_weight(problem: Problem) -> Array:
     """Return W; ProblemError where the costs are not ½ q̇ᵀWq̇ + V(q) with W > 0."""
     n, t = problem.robot.dof, problem.path.knots[:1]
     weight = np.zeros((n, n))
-    q = problem.start_configuration[None]
+    q = start_of(problem)[None]
     at_rest = Samples.along(problem.robot, problem.rows, Grid(read_only(t)), q, np.zeros((1, n)))
     for cost in problem.costs:
         if isinstance(cost, JointVelocity):

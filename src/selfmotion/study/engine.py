@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.arrays import Array
+from selfmotion.baselines.integration import start_of
 from selfmotion.grid import Grid
 from selfmotion.line_search import LineSearch
 from selfmotion.null_motion import NullMotionTable, TransportedFrame
@@ -12,6 +13,7 @@ from selfmotion.objective import Objective, inverse_metric
 from selfmotion.problem import Problem
 from selfmotion.quasi_newton import Minimum, QuasiNewton
 from selfmotion.rollout import Rollout
+from selfmotion.start import FixedStart
 
 
 @dataclass(frozen=True)
@@ -60,14 +62,15 @@ def bind(problem: Problem, steps: int = 64) -> Objective:
     rollout = Rollout(robot, path, problem.rows, grid)
     t = grid.stage_times
     functions = problem.null_motion.functions(t, path.duration)
+    start = start_of(problem)
     frame, rows = None, robot.dof
     if problem.null_motion.space == "null":
-        rollout.run(problem.start_configuration, np.zeros((len(t), robot.dof)))
+        rollout.run(start, np.zeros((len(t), robot.dof)))
         jacobians = rollout.samples().task_jacobian[grid.node_stages]
         frame = TransportedFrame(grid.nodes, jacobians)(t)
         rows = frame.shape[2]
     table = NullMotionTable(functions, frame, rows)
-    return Objective(rollout, table, problem.costs, problem.start_configuration)
+    return Objective(rollout, table, problem.costs, FixedStart(start))
 
 
 def optimum(

@@ -7,6 +7,7 @@ import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from selfmotion.arrays import Array, read_only
+from selfmotion.baselines.integration import start_of
 from selfmotion.grid import Grid
 from selfmotion.line_search import LineSearch
 from selfmotion.null_motion import NullMotionTable, PolynomialNullMotion
@@ -98,7 +99,7 @@ class PublishedFunction:
         solution = solve_ivp(
             lambda t, q: self._rate(t, q, x),
             (0.0, problem.path.duration),
-            problem.start_configuration,
+            start_of(problem),
             method="RK23",
             rtol=self._rtol,
             atol=1e-3 * self._rtol,
