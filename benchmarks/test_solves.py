@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from typing import Any
 
@@ -9,9 +10,13 @@ import numpy as np
 import pytest
 from engine import objective_on
 from problems import circle, suite_path
-from published_scheme import PublishedFunction, published_optimizer
 
 import selfmotion as sm
+from selfmotion.study.published import (
+    PublishedFunction,
+    published_null_motion,
+    published_optimizer,
+)
 
 PROBLEMS = {
     "sample problem": sm.sample_problem,
@@ -117,8 +122,8 @@ def test_published_scheme(benchmark: Any, name: str, rtol: float) -> None:
     With ode23's default tolerance, and with one that makes its cost as accurate as ours.
     """
     problem = PROBLEMS[name]()
-    mu = 1.0 if name == "sample problem" else 0.0
-    function = PublishedFunction(problem, mu=mu, rtol=rtol)
+    joint_space = dataclasses.replace(problem, null_motion=published_null_motion())
+    function = PublishedFunction(joint_space, rtol=rtol, delta=1e-5)
     began = time.perf_counter()
     plan = sm.plan(problem)
     seconds = time.perf_counter() - began

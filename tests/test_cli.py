@@ -97,7 +97,7 @@ def test_robots_lists_every_arm() -> None:
     assert "panda_hand_tcp" in result.stdout
 
 
-@pytest.mark.parametrize("command", ["plan", "check", "replay", "robots", "demo"])
+@pytest.mark.parametrize("command", ["plan", "check", "replay", "robots", "demo", "study"])
 def test_help_has_an_example(command: str) -> None:
     result = run(command, "--help")
     assert result.returncode == 0

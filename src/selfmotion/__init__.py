@@ -4,6 +4,15 @@ The tool motion holds by construction; what is optimised is the self-motion, the
 the null space of the task.
 """
 
+from selfmotion.baselines import (
+    DampedLeastSquares,
+    ExtendedJacobian,
+    GradientProjection,
+    LagrangianOptimum,
+    Method,
+    Motion,
+    PseudoInverse,
+)
 from selfmotion.certificate import Certificate, Extreme, Requirements, Tolerance, certify
 from selfmotion.collision import Box, Capsule, CollisionModel, Cylinder, Mesh, Sphere
 from selfmotion.constraints import (
@@ -73,12 +82,15 @@ __all__ = [
     "Constraint",
     "Cost",
     "Cylinder",
+    "DampedLeastSquares",
     "DirectionalManipulability",
     "EndConfiguration",
     "EndVelocity",
+    "ExtendedJacobian",
     "Extreme",
     "FileFormatError",
     "FunctionCost",
+    "GradientProjection",
     "GravityTorque",
     "InverseKinematicsError",
     "InverseManipulability",
@@ -91,10 +103,13 @@ __all__ = [
     "JointVelocity",
     "JointVelocityLimits",
     "KineticEnergy",
+    "LagrangianOptimum",
     "Line",
     "LineSearch",
     "Manipulability",
     "Mesh",
+    "Method",
+    "Motion",
     "NullMotion",
     "Partials",
     "Path",
@@ -106,6 +121,7 @@ __all__ = [
     "Posture",
     "Problem",
     "ProblemError",
+    "PseudoInverse",
     "QuasiNewton",
     "RedundancyError",
     "RenderError",

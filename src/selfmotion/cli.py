@@ -171,6 +171,33 @@ def demo(
     raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
 
 
+@app.command(epilog="Example: selfmotion study --out out/study")
+def study(
+    out: Annotated[Path, typer.Option(help="Folder for the report.")] = Path("out/study"),
+    reduced: Annotated[
+        bool, typer.Option("--reduced", help="Fewer starts, chains and arms: half a minute.")
+    ] = False,
+) -> None:
+    """Re-run the paper: figures, tables and claims, as one HTML page, PNGs and JSON.
+
+    Takes minutes. Needs matplotlib (the extra `plots`).
+    """
+    from selfmotion.study import PARTS, Scale, run, write
+
+    scale = Scale.reduced() if reduced else Scale.full()
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=_console, transient=True) as progress:
+        bar = progress.add_task("", total=len(PARTS))
+
+        def show(part: str) -> None:
+            progress.update(bar, description=part, completed=PARTS.index(part))
+
+        result = run(scale, show)
+    files = write(result, out)
+    report_text.show_claims(result.claims, _console)
+    _console.print(f"wrote {files[0]} and {len(files) - 1} files beside it", markup=False)
+
+
 def _plan_with_progress(problem: sm.Problem, max_evaluations: int | None) -> sm.Plan:
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=_console, transient=True) as progress:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.arrays import Array, read_only
+from selfmotion.baselines import Method, plan_by
 from selfmotion.certificate import Certificate, Tolerance, certify
 from selfmotion.errors import BreakdownError, NoSequenceError, ProblemError, SelfmotionError
 from selfmotion.guides import guides
@@ -34,6 +35,7 @@ def plan(
     finalists: int = 4,
     rng: np.random.Generator | int | None = 0,
     search: str = "auto",
+    method: Method | None = None,
 ) -> Plan:
     """Plan the joint motion that follows the path exactly and minimises the costs.
 
@@ -62,6 +64,9 @@ def plan(
         from the best sequences over all self-motions (`best_sequences`). ``"auto"``: from many
         starts first, and from sequences where none of them leads to a motion that keeps the
         constraints.
+    method : Method, optional
+        Another work's way to resolve the redundancy, instead of the optimisation: then the options
+        of the optimiser have no effect.
 
     Returns
     -------
@@ -76,6 +81,8 @@ def plan(
     InverseKinematicsError
         The start is free and no configuration reaches the start of the path.
     """
+    if method is not None:
+        return plan_by(problem, method, tolerance)
     if initial_metric not in ("gauss-newton", "identity"):
         raise ProblemError(
             f"initial_metric is '{initial_metric}', expected 'gauss-newton' or 'identity'"

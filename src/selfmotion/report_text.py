@@ -1,6 +1,7 @@
 """Plans, certificates and robots as tables for the terminal; legible in a log as well."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from rich import box
 from rich.console import Console
@@ -10,6 +11,9 @@ from selfmotion.certificate import Certificate
 from selfmotion.plan import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
+
+if TYPE_CHECKING:
+    from selfmotion.study.results import Claim
 
 
 def show(plan: Plan, console: Console) -> None:
@@ -75,6 +79,17 @@ def show_robots(robots: Mapping[str, RobotModel], console: Console) -> None:
     for name, robot in robots.items():
         freedom = [_freedom(robot, task) for task in Task]
         table.add_row(name, str(robot.dof), robot.tool, *freedom)
+    console.print(table)
+
+
+def show_claims(claims: Sequence["Claim"], console: Console) -> None:
+    """Print a row per claim of the paper: verdict, and the number that decides."""
+    table = Table(box=box.SIMPLE_HEAD, title="the paper's claims")
+    table.add_column("claim", overflow="fold")
+    table.add_column("verdict", no_wrap=True)
+    table.add_column("decided by", overflow="fold")
+    for claim in claims:
+        table.add_row(claim.statement, claim.verdict.value, claim.number)
     console.print(table)
 
 

@@ -128,6 +128,16 @@ class RobotModel:
         jacobian: Array = pin.getFrameJacobian(self.model, self._data, self.tool_id, _AXES)
         return jacobian
 
+    def kinematics(self, q: Array) -> tuple[Array, Array, Array]:
+        """Return the Jacobian (6, n), rotation (3, 3) and translation (3,) of the tool at `q`.
+
+        One pass for all three, and no check of `q`: for callers that ask thousands of times.
+        """
+        pin.computeJointJacobians(self.model, self._data, q)
+        pose = pin.updateFramePlacement(self.model, self._data, self.tool_id)
+        jacobian: Array = pin.getFrameJacobian(self.model, self._data, self.tool_id, _AXES)
+        return jacobian, pose.rotation.copy(), pose.translation.copy()
+
     def task_jacobian(self, q: npt.ArrayLike, task: Task) -> Array:
         """Return the prescribed rows of the Jacobian at `q`, (m, n)."""
         jacobian = self.jacobian(q)

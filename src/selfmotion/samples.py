@@ -8,6 +8,7 @@ import numpy as np
 from selfmotion import kernels
 from selfmotion.arrays import Array
 from selfmotion.grid import Grid
+from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
 
@@ -39,6 +40,20 @@ class Samples:
     translation: Array
     task: Task
     task_jacobian: Array
+
+    @classmethod
+    def along(cls, robot: RobotModel, task: Task, grid: Grid, q: Array, qd: Array) -> "Samples":
+        """Return the samples of a motion known at the stages of `grid`, q and q̇ (S, n) each."""
+        jacobian = np.empty((len(q), 6, robot.dof))
+        rotation, translation = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
+        for k, configuration in enumerate(q):
+            jacobian[k], rotation[k], translation[k] = robot.kinematics(configuration)
+        rows = jacobian
+        if task.tool_axes:
+            turned = rotation.transpose(0, 2, 1) @ jacobian[:, 3:]
+            rows = np.concatenate([jacobian[:, :3], turned], axis=1)
+        task_jacobian = np.ascontiguousarray(rows[:, task.rows])
+        return cls(grid, q, qd, jacobian, rotation, translation, task, task_jacobian)
 
     @property
     def t(self) -> Array:

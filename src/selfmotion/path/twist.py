@@ -106,6 +106,12 @@ class TwistPath(Path):
         )
         return cast(Callable[[Array], Array], solution.sol)
 
+    def twist(self, t: float) -> Array:
+        """See `Path.twist`; without the pose, which takes most of the time."""
+        if not 0.0 <= t <= self.duration:
+            return super().twist(t)
+        return np.asarray(self._twist(np.array([t]))[0])
+
     def _local(self, t: Array) -> tuple[npt.NDArray[np.intp], Array]:
         k = np.clip(np.searchsorted(self._breaks, t, side="right") - 1, 0, len(self._breaks) - 2)
         left, right = self._breaks[k], self._breaks[k + 1]

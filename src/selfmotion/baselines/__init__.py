@@ -1,0 +1,17 @@
+"""Other works' ways to resolve redundancy, each usable as ``plan(problem, method=…)``."""
+
+from selfmotion.baselines.base import Method, Motion, plan_by
+from selfmotion.baselines.extended import ExtendedJacobian
+from selfmotion.baselines.lagrange import LagrangianOptimum
+from selfmotion.baselines.local import DampedLeastSquares, GradientProjection, PseudoInverse
+
+__all__ = [
+    "DampedLeastSquares",
+    "ExtendedJacobian",
+    "GradientProjection",
+    "LagrangianOptimum",
+    "Method",
+    "Motion",
+    "PseudoInverse",
+    "plan_by",
+]

@@ -1,0 +1,162 @@
+"""Runs that several parts of the study look at, each done once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from selfmotion.arrays import Array
+from selfmotion.baselines import LagrangianOptimum, plan_by
+from selfmotion.costs import Cost, InverseManipulability, JointVelocity
+from selfmotion.null_motion import PolynomialNullMotion
+from selfmotion.plan import Plan
+from selfmotion.planner import plan
+from selfmotion.problem import Problem
+from selfmotion.quasi_newton import Minimum
+from selfmotion.sample import sample_problem
+from selfmotion.study.engine import Scale, bind, optimum
+from selfmotion.study.published import (
+    PublishedFunction,
+    flops_per_rate,
+    published_null_motion,
+    published_optimizer,
+)
+
+# Steps of the Runge-Kutta grid on which all costs of tables are computed: right to seven digits.
+FINE = 256
+
+
+@dataclass(frozen=True, eq=False)
+class PublishedRun:
+    """The published scheme on one problem.
+
+    Attributes
+    ----------
+    minimum : Minimum
+    evaluations, jacobian_evaluations : int
+        Including those of differences.
+    flops : float
+        Floating-point operations, by `flops_per_rate`.
+    """
+
+    problem: Problem
+    minimum: Minimum
+    evaluations: int
+    jacobian_evaluations: int
+
+    @property
+    def flops(self) -> float:
+        """Floating-point operations of the Jacobian evaluations, eq. 4 around them included."""
+        problem = self.problem
+        each = flops_per_rate(problem.robot.dof, problem.rows.dimension, 3)
+        return float(self.jacobian_evaluations * each)
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the optimiser."""
+        return len(self.minimum.history) - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """A motion of the sample problem, integrated finely.
+
+    Attributes
+    ----------
+    terms : dict
+        What each cost contributes.
+    smallest_w : float
+        Least manipulability √det(JJᵀ) on the way [m²].
+    t, q, qd : arrays
+        At the nodes.
+    """
+
+    terms: dict[str, float]
+    smallest_w: float
+    t: Array
+    q: Array
+    qd: Array
+
+    @property
+    def cost(self) -> float:
+        """F."""
+        return sum(self.terms.values())
+
+
+def evaluate(problem: Problem, x: Array) -> Result:
+    """Return the motion of coefficients `x`, on a grid fine enough to be the truth."""
+    objective = bind(problem, FINE)
+    terms = objective.terms(x)
+    samples = objective.rollout.samples()
+    nodes = objective.rollout.grid.node_stages
+    smallest = float(np.sqrt(max(samples.gram_determinant.min(), 0.0)))
+    q, qd = samples.q[nodes].copy(), samples.qd[nodes].copy()
+    return Result(terms, smallest, objective.rollout.grid.nodes, q, qd)
+
+
+def run_published(
+    problem: Problem, *, sigma: float = 0.1, max_iterations: int = 60
+) -> PublishedRun:
+    """Optimise from x = 0 by the scheme as published."""
+    function = PublishedFunction(problem)
+    optimizer = published_optimizer(sigma, max_iterations)
+    minimum = optimizer.minimize(function, np.zeros(function.size))
+    return PublishedRun(problem, minimum, function.evaluations, function.jacobian_evaluations)
+
+
+class Context:
+    """The sample problem and the runs on it that more than one part needs.
+
+    Parameters
+    ----------
+    scale : Scale
+    """
+
+    def __init__(self, scale: Scale) -> None:
+        self.scale = scale
+        self.problem = sample_problem(null_motion=published_null_motion())
+        self._published: dict[float, PublishedRun] = {}
+
+    def with_costs(self, costs: Sequence[Cost], duration: float = 1.0) -> Problem:
+        """Return the sample problem with other costs, or there and back."""
+        base = sample_problem(duration=duration, null_motion=published_null_motion())
+        return replace(base, costs=tuple(costs))
+
+    def published(self, mu: float = 1.0) -> PublishedRun:
+        """Return the published scheme's run on eq. 12 with that μ."""
+        if mu not in self._published:
+            costs = (JointVelocity(), InverseManipulability(mu))
+            self._published[mu] = run_published(self.with_costs(costs))
+        return self._published[mu]
+
+    @cached_property
+    def still(self) -> Result:
+        """The motion at x = 0."""
+        return evaluate(self.problem, np.zeros(12))
+
+    @cached_property
+    def twelve(self) -> Minimum:
+        """The optimum of the paper's 12 coefficients, by exact gradients."""
+        return optimum(self.problem, sigma=0.1)[1]
+
+    @cached_property
+    def best(self) -> Result:
+        """The motion of `twelve`."""
+        return evaluate(self.problem, self.twelve.x)
+
+    @cached_property
+    def plan(self) -> Plan:
+        """Our plan, 4 coefficients."""
+        return plan(sample_problem())
+
+    @cached_property
+    def lagrangian(self) -> Plan:
+        """The optimum over all joint motions, free end."""
+        return plan_by(sample_problem(), LagrangianOptimum(self.plan))
+
+    @cached_property
+    def expansion(self) -> Result:
+        """The optimum of a 32-term expansion of the null motion."""
+        problem = sample_problem(null_motion=PolynomialNullMotion(31))
+        return evaluate(problem, optimum(problem, steps=FINE)[1].x)

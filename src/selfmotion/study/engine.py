@@ -1,0 +1,97 @@
+"""What the parts of the study share: objectives on a given grid, and sizes of the run."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.arrays import Array
+from selfmotion.baselines.integration import start_of
+from selfmotion.grid import Grid
+from selfmotion.line_search import LineSearch
+from selfmotion.null_motion import NullMotionTable, TransportedFrame
+from selfmotion.objective import Objective, inverse_metric
+from selfmotion.problem import Problem
+from selfmotion.quasi_newton import Minimum, QuasiNewton
+from selfmotion.rollout import Rollout
+from selfmotion.start import FixedStart
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How much of the study is run.
+
+    Attributes
+    ----------
+    name : str
+        In the report's head.
+    starts : int
+        Random starts for local and global minima.
+    chains : tuple of int
+        Joints of the planar chains.
+    published_mu : tuple of float
+        μ for which the published scheme runs as well.
+    deltas : tuple of float
+        δ of the differences, smallest last.
+    closed_paths : bool
+        Whether the other works also run there and back, and on a Panda's circle.
+    """
+
+    name: str
+    starts: int
+    chains: tuple[int, ...]
+    published_mu: tuple[float, ...]
+    deltas: tuple[float, ...]
+    closed_paths: bool
+
+    @classmethod
+    def full(cls) -> "Scale":
+        """Return the whole study: minutes."""
+        deltas = tuple(10.0**-k for k in range(2, 11))
+        return cls("full", 64, tuple(range(3, 13)), (1.0, 50.0, 1000.0), deltas, True)
+
+    @classmethod
+    def reduced(cls) -> "Scale":
+        """Return what the tests run: the same claims on less work."""
+        return cls("reduced", 8, (3, 6, 12), (1.0,), (1e-2, 1e-5), False)
+
+
+def bind(problem: Problem, steps: int = 64) -> Objective:
+    """Return the objective of a problem on a grid of about `steps` Runge-Kutta steps."""
+    path, robot = problem.path, problem.robot
+    grid = Grid.aligned(path.knots, steps)
+    rollout = Rollout(robot, path, problem.rows, grid)
+    t = grid.stage_times
+    functions = problem.null_motion.functions(t, path.duration)
+    start = start_of(problem)
+    frame, rows = None, robot.dof
+    if problem.null_motion.space == "null":
+        rollout.run(start, np.zeros((len(t), robot.dof)))
+        jacobians = rollout.samples().task_jacobian[grid.node_stages]
+        frame = TransportedFrame(grid.nodes, jacobians)(t)
+        rows = frame.shape[2]
+    table = NullMotionTable(functions, frame, rows)
+    return Objective(rollout, table, problem.costs, FixedStart(start))
+
+
+def optimum(
+    problem: Problem,
+    x0: Array | None = None,
+    *,
+    metric: bool = True,
+    sigma: float = 0.9,
+    tolerance: float = 1e-12,
+    max_iterations: int = 200,
+    unbounded: float = 1e8,
+    steps: int = 64,
+) -> tuple[Objective, Minimum]:
+    """Minimise with exact gradients from `x0`, with H0 from the Gauss-Newton matrix or = I."""
+    objective = bind(problem, steps)
+    x = np.zeros(objective.size) if x0 is None else x0
+    h = inverse_metric(objective.metric(np.zeros_like(x))) if metric else None
+    optimizer = QuasiNewton(
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+        line_search=LineSearch(sigma=sigma),
+        unbounded=unbounded,
+    )
+    return objective, optimizer.minimize(objective, x, h)

@@ -1,0 +1,292 @@
+"""What the paper leaves open, answered."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from selfmotion.arrays import Array
+from selfmotion.baselines import (
+    DampedLeastSquares,
+    LagrangianOptimum,
+    Method,
+    PseudoInverse,
+    plan_by,
+)
+from selfmotion.errors import BreakdownError
+from selfmotion.null_motion import PolynomialNullMotion
+from selfmotion.path import Line
+from selfmotion.plan import Plan
+from selfmotion.planner import plan
+from selfmotion.problem import Problem
+from selfmotion.robot import load_robot
+from selfmotion.sample import sample_problem
+from selfmotion.study.context import FINE, Context, evaluate
+from selfmotion.study.engine import bind, optimum
+from selfmotion.study.published import ODE23_TOLERANCE, PublishedFunction
+from selfmotion.study.results import Claim, Curve, Plot, Section, Table, Verdict
+
+# A tolerance of the integrator, tight for its order.
+_TIGHT = 1e-6
+
+# Spread of the random starts' coefficients: null motions as fast as the arm itself.
+_SPREAD = 10.0
+
+
+def section(context: Context) -> Section:
+    """Return the answers, a table or plot each."""
+    tables, plots, claims = zip(
+        _specification(context),
+        _differences(context),
+        _accuracy(context),
+        _near_singular(),
+        _cyclic(context),
+        _minima(context),
+        strict=True,
+    )
+    return Section(
+        "questions",
+        "Open questions, answered",
+        tables=tuple(table for table in tables if table is not None),
+        plots=tuple(plot for plot in plots if plot is not None),
+        claims=tuple(claim for claim in claims if claim is not None),
+    )
+
+
+_Answer = tuple[Table | None, Plot | None, Claim | None]
+
+
+def _specification(context: Context) -> _Answer:
+    """Compare coefficients, from the paper's 12 to expansions that leave nothing to gain."""
+    rows: list[tuple[str | float | int, ...]] = []
+    motions = [("the paper's", context.problem.null_motion)]
+    motions += [(f"null space, degree {p}", PolynomialNullMotion(p)) for p in (0, 1, 3, 7, 15)]
+    least = context.lagrangian.report.cost
+    for label, motion in motions:
+        problem = replace(context.problem, null_motion=motion)
+        objective, found = optimum(problem, tolerance=1e-10)
+        cost = evaluate(problem, found.x).cost
+        values = np.linalg.eigvalsh(objective.metric(np.zeros(objective.size)))
+        condition = float(values[-1] / max(values[0], np.finfo(float).tiny))
+        work = (len(found.history) - 1, found.history[-1].evaluations)
+        rows.append((label, objective.size, condition, cost, 100 * (cost / least - 1), *work))
+    rows.append(
+        ("32-term expansion", 32, np.nan, context.expansion.cost, *_nothing(context, least))
+    )
+    rows.append(("Lagrangian optimum", "—", np.nan, least, 0.0, "—", "—"))
+    columns = ("null motion", "coefficients", "condition", "F", "above [%]", "iterations", "evals")
+    table = Table(
+        "How many coefficients, and how far from the optimum over all null motions",
+        columns,
+        tuple(rows),
+    )
+    above = context.best.cost / least - 1.0
+    agree = abs(context.expansion.cost / least - 1.0)
+    claim = Claim(
+        "global_optimum",
+        "Only r(p + 1) entries of ε(t) are needed; exploiting that without loss is open.",
+        Verdict.QUALIFIED,
+        f"4 coefficients {rows[3][4]:.2f} %, 12 coefficients {100 * above:.4f} % above the optimum",
+        f"The Lagrangian optimum ({least:.5f}) and a 32-term expansion "
+        f"({context.expansion.cost:.5f}) agree to {agree:.0e}. A basis of the null space carried "
+        f"along the x = 0 motion needs a third of the coefficients and is well conditioned; the "
+        f"joint-space cubic turns with the null space as the arm moves, which gains the rest.",
+    )
+    return table, None, claim
+
+
+def _nothing(context: Context, least: float) -> tuple[float, str, str]:
+    return 100 * (context.expansion.cost / least - 1.0), "—", "—"
+
+
+def _differences(context: Context) -> _Answer:
+    """Return the error of eq. 13 against the exact gradient, over δ."""
+    x = np.zeros(12)
+    exact = bind(context.problem, FINE).gradient(x)
+    deltas = context.scale.deltas
+    curves, best = [], {}
+    for rtol in (ODE23_TOLERANCE, _TIGHT):
+        errors = []
+        for delta in deltas:
+            gradient = PublishedFunction(context.problem, rtol=rtol, delta=delta).gradient(x)
+            errors.append(float(np.linalg.norm(gradient - exact) / np.linalg.norm(exact)))
+        k = int(np.argmin(errors))
+        best[rtol] = deltas[k], errors[k]
+        label = (
+            "ode23's default tolerance" if rtol == ODE23_TOLERANCE else f"tolerance {_TIGHT:.0e}"
+        )
+        curves.append(Curve.of(label, deltas, errors, marker="o"))
+    plot = Plot(
+        "differences",
+        "Forward differences against exact gradients",
+        "δ",
+        "relative error of ∇F",
+        tuple(curves),
+        "log",
+        "log",
+    )
+    default, fine = best[ODE23_TOLERANCE], best[_TIGHT]
+    return (
+        None,
+        plot,
+        Claim(
+            "delta",
+            "δ balances truncation against rounding, as two large, similar numbers are subtracted.",
+            Verdict.QUALIFIED if default[1] > 10.0 * fine[1] else Verdict.CONFIRMED,
+            f"best error {default[1]:.0e} at δ = {default[0]:.0e}; "
+            f"{fine[1]:.0e} with a tight integrator",
+            "What limits δ from below is not rounding but the adaptive integrator, whose steps "
+            f"change with x and make F jump. A tolerance of {_TIGHT:.0e} takes much of that "
+            "away, at many times the price; exact gradients have no δ.",
+        ),
+    )
+
+
+def _accuracy(context: Context) -> _Answer:
+    """Show how x* and F* depend on integrator and quadrature."""
+    rows: list[tuple[str | float | int, ...]] = []
+    run = context.published()
+    truth = evaluate(context.problem, run.minimum.x).cost
+    for steps in (16, 32, 64, 128):
+        _, found = optimum(context.problem, tolerance=1e-10, steps=steps)
+        fine = evaluate(context.problem, found.x)
+        rows.append(
+            (f"fourth order, {steps} steps", found.cost, fine.cost, _apart(context, fine.q))
+        )
+    moved = _apart(context, evaluate(context.problem, run.minimum.x).q)
+    rows.append(("as published (ode23, 1e-3)", run.minimum.cost, truth, moved))
+    table = Table(
+        "Sensitivity to integration and quadrature",
+        ("integration", "F* as computed", "F of that motion, fine", "q off the optimum's [rad]"),
+        tuple(rows),
+        "The motion found on a coarse grid, integrated finely, is nearly as good as any.",
+    )
+    error = abs(run.minimum.history[0].cost / context.still.cost - 1.0)
+    lost = truth / context.best.cost - 1.0
+    return (
+        table,
+        None,
+        Claim(
+            "crude_quadrature",
+            "As long as its errors are consistent, crude integration does not greatly affect the "
+            "result.",
+            Verdict.CONFIRMED if lost < error else Verdict.QUALIFIED,
+            f"F is {100 * error:.2f} % wrong at x = 0, the motion found {100 * lost:.2f} % above "
+            f"the optimum",
+            f"F* as the scheme sees it is {run.minimum.cost:.4f}; that motion truly costs "
+            f"{truth:.4f}; the optimum of the same coefficients {context.best.cost:.5f}.",
+        ),
+    )
+
+
+def _apart(context: Context, q: Array) -> float:
+    return float(np.abs(q - context.best.q).max())
+
+
+def _near_singular() -> _Answer:
+    """Follow a path that ends at radius 4.99 of an arm that reaches 5."""
+    robot = load_robot("planar_3r")
+    q0 = np.array([-0.5, 0.9, 0.6])
+    start = robot.pose(q0)
+    end = start.copy()
+    end.translation = 4.99 * start.translation / np.linalg.norm(start.translation)
+    problem = Problem(robot, Line(start, end, 1.0), "planar", q0)
+    methods: dict[str, Method] = {
+        "pseudo-inverse": PseudoInverse(),
+        "damped, λ = 0.1": DampedLeastSquares(0.1),
+        "damped, λ = 0.5": DampedLeastSquares(0.5),
+        "damped below σ = 0.5, λ = 0.3": DampedLeastSquares(0.3, threshold=0.5),
+    }
+    plans: dict[str, Plan] = {}
+    rows: list[tuple[str | float | int, ...]] = []
+    for label, method in methods.items():
+        try:
+            plans[label] = plan(problem, method=method)
+        except BreakdownError as error:
+            rows.append((label, np.nan, np.nan, np.nan, f"breaks down at {error.time:.3f} s"))
+    plans["ours"] = plan(problem)
+    for label, found in plans.items():
+        peak = float(np.abs(found.trajectory.qd).max())
+        check = found.certificate
+        path_error = check.position_error.value
+        singular = check.smallest_singular_value.value
+        word = "verified" if check.verified else "off the path"
+        rows.append((label, peak, path_error, singular, word))
+    table = Table(
+        "A line that ends at radius 4.99 m of an arm that reaches 5 m",
+        ("method", "peak speed [rad/s]", "path error [m]", "smallest singular value", "check"),
+        tuple(rows),
+        "Damping buys lower speeds with path error; while the path stays reachable the exact "
+        "inverse holds it, and a damped one can be kept to where singular values are small.",
+    )
+    return table, None, None
+
+
+def _cyclic(context: Context) -> _Answer:
+    """Go there and back: natural end, and the end configuration equal to the start's."""
+    problem = sample_problem(duration=2.0)
+    free = plan(problem)
+    natural = plan_by(problem, LagrangianOptimum(free))
+    closed = plan_by(problem, LagrangianOptimum(free, cyclic=True))
+    rows = tuple(
+        (label, p.report.cost, p.certificate.closure, p.certificate.verdict.split(":")[0])
+        for label, p in (
+            ("x = 0", plan_by(problem, PseudoInverse())),
+            ("ours, 4 coefficients, free end", free),
+            ("Lagrangian, free end", natural),
+            ("Lagrangian, cyclic", closed),
+        )
+    )
+    table = Table("There and back in 2 s", ("motion", "F", "end to start [rad]", "check"), rows)
+    price = closed.report.cost / natural.report.cost - 1.0
+    return (
+        table,
+        None,
+        Claim(
+            "one_boundary",
+            "The algorithm worked quite satisfactorily with only one boundary condition.",
+            Verdict.CONFIRMED if price < 0.1 else Verdict.QUALIFIED,
+            f"closing the cycle costs {100 * price:.2f} %",
+            f"With a free end the arm comes back {natural.certificate.closure:.3f} rad off its "
+            f"start (x = 0: {rows[0][2]:.3f}); the natural end condition needs no second "
+            f"boundary condition. Asking q(T) = q(0) moves the optimum from "
+            f"{natural.report.cost:.4f} to {closed.report.cost:.4f}.",
+        ),
+    )
+
+
+def _minima(context: Context) -> _Answer:
+    """Start at random many times, and see where the searches end."""
+    rng = np.random.default_rng(0)
+    costs = []
+    for _ in range(context.scale.starts):
+        x0 = _SPREAD * rng.normal(size=12)
+        costs.append(optimum(context.problem, x0, tolerance=1e-8)[1].cost)
+    ordered = np.sort(costs)
+    best = float(ordered[0])
+    reached = int(np.sum(ordered < 1.005 * context.best.cost))
+    edges = np.geomspace(10.0, max(100.0, float(ordered[-1]) * 1.01), 25)
+    counts, _ = np.histogram(ordered, edges)
+    middles = np.log10(np.sqrt(edges[1:] * edges[:-1]))
+    plot = Plot(
+        "minima",
+        f"Where {len(costs)} random starts end",
+        "log₁₀ F",
+        "starts",
+        (Curve.of("", middles, counts),),
+        bars=True,
+    )
+    distinct = 1 + int(np.sum(np.diff(ordered) > 1e-3 * ordered[:-1]))
+    at_zero = context.best.cost / best - 1.0
+    return (
+        None,
+        plot,
+        Claim(
+            "minima",
+            "The algorithm does not find a global minimum, just a local one.",
+            Verdict.QUALIFIED if at_zero < 1e-3 and distinct > 1 else Verdict.CONFIRMED,
+            f"{reached} of {len(costs)} random starts reach the best, {distinct} different ends",
+            f"Local minima are there: ends lie between {best:.4f} and {ordered[-1]:.4g}. But the "
+            f"start x = 0 leads to {context.best.cost:.4f}, and the best that any random start "
+            f"found differs from that by {100 * abs(at_zero):.3f} %.",
+        ),
+    )
