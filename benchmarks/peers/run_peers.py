@@ -32,7 +32,9 @@ def main() -> int:
     start = robot.inverse_kinematics(path.pose(0.0), seed=[0, -0.5, 0, -2, 0, 1.6, 0.8])
     given = OUT / "given.json"
     given.write_text(json.dumps({"start": start.tolist(), "urdf": robot.urdf.source}))
-    rows = [ours(robot, path, start)]
+    coarse = ours(robot, path, start, sm.BSplineNullMotion(24), "24 intervals, cubic")
+    fine = ours(robot, path, start, sm.BSplineNullMotion(120, degree=1), "120 intervals, linear")
+    rows = [coarse, fine]
     for program, packages in PEERS.items():
         python = environment(program.split("_")[0], packages)
         command = [str(python), str(HERE / program), str(given)]
@@ -58,9 +60,15 @@ def main() -> int:
     return 0
 
 
-def ours(robot: sm.RobotModel, path: sm.Waypoints, start: np.ndarray) -> dict[str, object]:
+def ours(
+    robot: sm.RobotModel,
+    path: sm.Waypoints,
+    start: np.ndarray,
+    null_motion: sm.NullMotion,
+    settings: str,
+) -> dict[str, object]:
     """Plan to convergence and measure as the peers are measured."""
-    problem = sm.Problem(robot, path, start=start, null_motion=sm.BSplineNullMotion(24))
+    problem = sm.Problem(robot, path, start=start, null_motion=null_motion)
     sm.plan(problem)
     seconds = []
     for _ in range(3):
@@ -71,7 +79,7 @@ def ours(robot: sm.RobotModel, path: sm.Waypoints, start: np.ndarray) -> dict[st
     steps = np.diff(plan.trajectory(t), axis=0)
     return {
         "name": "selfmotion",
-        "settings": "24 intervals, converged, certified between waypoints",
+        "settings": f"{settings}, converged, certified between waypoints",
         "seconds": min(seconds),
         "cost": float(np.sum(0.5 * np.sum(steps**2, axis=1) / np.diff(t))),
         "position_error": plan.certificate.position_error.value,
