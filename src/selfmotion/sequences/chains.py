@@ -14,6 +14,8 @@ Rows = npt.NDArray[np.intp]
 
 # Chains are unlike when some joint differs by this [rad or m] at this share of the waypoints.
 _UNLIKE, _LONG = 0.3, 0.1
+# Mirror images have moved each joint by the same amount, up to this [rad or m].
+_SAME_TRAVEL = 0.2
 # Nodes through which other chains are looked for: at so many waypoints, evenly.
 _STATIONS = 7
 
@@ -76,7 +78,9 @@ def diverse_chains(
 ) -> list[list[int]]:
     """Return up to `count` chains of nodes: the shortest one, then the shortest unlike the others.
 
-    Each is the shortest chain through some node of a few waypoints spread over the motion.
+    Each is the shortest chain through some node of a few waypoints spread over the motion. Mirror
+    images, whose joints move by the same amounts (a wrist turned over), come only where there are
+    too few others.
     """
     reverse = shortest_chains(layers[::-1], largest_step, turning)
     stations = np.unique(np.linspace(0, len(layers) - 1, _STATIONS).round().astype(int))
@@ -86,6 +90,7 @@ def diverse_chains(
         for k in range(len(layers[i]))
     ]
     chosen: list[list[int]] = []
+    mirrored: list[list[int]] = []
     taken: list[Array] = []
     for total, i, node in sorted(through):
         if not np.isfinite(total) or len(chosen) == count:
@@ -95,10 +100,25 @@ def diverse_chains(
             continue
         chain = forward.back(i, node) + reverse.back(len(layers) - 1 - i, node)[-2::-1]
         q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
-        if all(np.mean(_apart(q, other, turning) > _UNLIKE) >= _LONG for other in taken):
-            chosen.append(chain)
+        if all(unlike(q, other, turning) for other in taken):
+            images = any(_mirrors(q, other, turning) for other in taken)
+            (mirrored if images else chosen).append(chain)
             taken.append(q)
-    return chosen
+    return (chosen + mirrored)[:count]
+
+
+def unlike(q: Array, other: Array, turning: Mask) -> bool:
+    """Whether two motions (W, n) differ by much for long."""
+    return bool(np.mean(_apart(q, other, turning) > _UNLIKE) >= _LONG)
+
+
+def _mirrors(q: Array, other: Array, turning: Mask) -> bool:
+    """Whether each joint has moved by about as much in both motions, at all times."""
+    moved, also = (
+        np.cumsum(np.abs(unturned(np.diff(motion, axis=0), turning)), axis=0)
+        for motion in (q, other)
+    )
+    return bool(np.abs(moved - also).max() < _SAME_TRAVEL)
 
 
 def _apart(q: Array, other: Array, turning: Mask) -> Array:

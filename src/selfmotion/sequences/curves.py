@@ -171,9 +171,21 @@ class SelfMotion:
                 return q
         return None
 
+    def tangent(self, q: Array, target: Array) -> Array | None:
+        """Return a unit null vector of J at q, a solution; None where q is singular."""
+        model, data, tool = self.robot.model, self._data, self.robot.tool_id
+        pin.computeJointJacobians(model, data, q)
+        jacobian = pin.getFrameJacobian(model, data, tool, _AXES)
+        pin.updateFramePlacement(model, data, tool)
+        tangent, place = self._direction.copy(), (self._rotation, self._translation)
+        length = kernels.correct(
+            q.copy(), jacobian, *place, target, self._rows, self._kind, tangent, _LONGEST
+        )
+        return tangent if length >= 0.0 and np.all(np.isfinite(tangent)) else None
+
     def trace(self, q: Array, target: Array) -> Curve | None:
         """Return the curve through q, a solution; None where q is singular."""
-        tangent = self._tangent(q, target)
+        tangent = self.tangent(q, target)
         if tangent is None:
             return None
         samples, closed = self._walk(q, tangent, target)
@@ -201,17 +213,6 @@ class SelfMotion:
             if curve is not None:
                 found.add(curve)
         return len(found.curves) > before
-
-    def _tangent(self, q: Array, target: Array) -> Array | None:
-        model, data, tool = self.robot.model, self._data, self.robot.tool_id
-        pin.computeJointJacobians(model, data, q)
-        jacobian = pin.getFrameJacobian(model, data, tool, _AXES)
-        pin.updateFramePlacement(model, data, tool)
-        tangent, place = self._direction.copy(), (self._rotation, self._translation)
-        length = kernels.correct(
-            q.copy(), jacobian, *place, target, self._rows, self._kind, tangent, _LONGEST
-        )
-        return tangent if length >= 0.0 and np.all(np.isfinite(tangent)) else None
 
     def _walk(self, start: Array, tangent: Array, target: Array) -> tuple[Array, bool]:
         """Return the samples (K, n) from `start` on, and whether they lead back to it."""

@@ -74,6 +74,12 @@ class Bounds:
                 free[i] = not self.collision.collides(first[i], self.margin)
         return free
 
+    def keeps(self, q: Array) -> bool:
+        """Whether q (n,) itself, at its own turn, is inside the limits and clear of collisions."""
+        if np.any(q > self.upper) or np.any(q < self.lower):
+            return False
+        return self.collision is None or not self.collision.collides(q, self.margin)
+
     def all_turns(self, q: Array) -> Array:
         """Return q (K, n), inside the limits, at every turn that is inside them, (K', n)."""
         q = self.representative(q)

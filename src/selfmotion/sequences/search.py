@@ -11,10 +11,11 @@ from selfmotion.errors import NoSequenceError, ProblemError
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.search import spread
-from selfmotion.sequences.chains import Mask, diverse_chains, shortest_chains, unturned
+from selfmotion.sequences.chains import Mask, diverse_chains, shortest_chains, unlike, unturned
 from selfmotion.sequences.curves import CurveSet, SelfMotion, curves_along, targets
 from selfmotion.sequences.nodes import Bounds, place_nodes
 from selfmotion.sequences.reasons import why_blocked
+from selfmotion.sequences.tighten import tighten
 from selfmotion.task import Task
 
 # Largest distance of samples along a curve [rad or m], configuration norm.
@@ -65,9 +66,10 @@ def best_sequences(
     At every waypoint all self-motion curves are sampled by numerical continuation, from inverse
     kinematics at many seeds and from the curves of the neighbouring waypoints. The samples inside
     the limits and free of collision are the nodes of a graph; dynamic programming finds the chain
-    of least Σ|Δq| with every step within `largest_step`. It is the global optimum over the
-    samples, about 0.06 rad apart: longer than the optimum of the continuous problem, more so where
-    it follows a border. Hence several chains, unlike each other by 0.3 rad in some joint at a
+    of least Σ|Δq| with every step within `largest_step`: the global optimum over samples about
+    0.06 rad apart. Each is then moved along the curves, locally and with finer samples, to where
+    it is shorter; it stays a few per cent longer than the continuous problem's optimum.
+    Hence several chains, unlike each other by 0.3 rad in some joint at a
     tenth of the waypoints: refine them all and keep the best.
 
     Parameters
@@ -127,8 +129,21 @@ def best_sequences(
             time=float(times[i]),
             reason=reason,
         )
-    found = diverse_chains(layers, chains, limits[2], bounds.turning, count)
-    return [_sequence(times, layers, chain, bounds.turning) for chain in found]
+    # Unlike chains may become the same one when they are tightened.
+    found = diverse_chains(layers, chains, limits[2], bounds.turning, 2 * count)
+    rough = [_configurations(layers, chain, bounds.turning) for chain in found]
+    tight = [tighten(motion, x, q, bounds, limits[2]) for q in rough]
+    return _ranked(times, tight, bounds.turning)[:count]
+
+
+def _ranked(times: Array, motions: list[Array], turning: Mask) -> list[Sequence]:
+    """Return the sequences, shortest first, without those that became like a shorter one."""
+    sequences = [Sequence(times, q, float(np.abs(np.diff(q, axis=0)).sum())) for q in motions]
+    kept: list[Sequence] = []
+    for sequence in sorted(sequences, key=lambda sequence: sequence.length):
+        if all(unlike(sequence.q, other.q, turning) for other in kept):
+            kept.append(sequence)
+    return kept
 
 
 def _layers(motion: SelfMotion, x: Array, curves: list[CurveSet], bounds: Bounds) -> list[Array]:
@@ -143,12 +158,11 @@ def _layers(motion: SelfMotion, x: Array, curves: list[CurveSet], bounds: Bounds
     return layers
 
 
-def _sequence(times: Array, layers: list[Array], chain: list[int], turning: Mask) -> Sequence:
+def _configurations(layers: list[Array], chain: list[int], turning: Mask) -> Array:
+    """Return a chain's configurations (W, n); joints that turn without end do not jump."""
     q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
     steps = unturned(np.diff(q, axis=0), turning)
-    # Joints that turn without end go on past π instead of jumping back.
-    turned = np.vstack([q[:1], q[0] + np.cumsum(steps, axis=0)])
-    return Sequence(times, np.where(turning, turned, q), float(np.abs(steps).sum()))
+    return np.where(turning, np.vstack([q[:1], q[0] + np.cumsum(steps, axis=0)]), q)
 
 
 def _times(t: npt.ArrayLike) -> Array:
