@@ -37,7 +37,7 @@ VERDICTS = {
     "singular_poses": Verdict.REFUTED,
     "surging_cause": Verdict.REFUTED,
     "flops": Verdict.CONFIRMED,
-    "growth": Verdict.QUALIFIED,
+    "growth": Verdict.CONFIRMED,
     "lagrange_cheaper": Verdict.QUALIFIED,
     "global_optimum": Verdict.QUALIFIED,
     "delta": Verdict.QUALIFIED,

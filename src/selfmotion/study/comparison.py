@@ -90,7 +90,7 @@ def _table(title: str, problem: Problem, *, cyclic: bool) -> Table:
             rows.append(_row(label, plan(problem, method=method)))
         except BreakdownError as error:
             broken = ("—",) * (len(_COLUMNS) - 2)
-            rows.append((label, *broken, f"breaks down at {error.time:.3f} s"))
+            rows.append((label, *broken, f"singular at {error.time:.3f} s"))
     return Table(title, _COLUMNS, tuple(rows))
 
 
