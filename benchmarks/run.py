@@ -32,11 +32,20 @@ def main() -> int:
     rows = figures(json.loads(raw.read_text()))
     lines = ["| figure | measured |", "| --- | --- |", *(f"| {a} | {b} |" for a, b in rows)]
     (OUT / "bench.md").write_text("\n".join(lines) + "\n")
+    _put_into_readme(lines)
     table = Table("figure", "measured", box=box.SIMPLE_HEAD)
     for row in rows:
         table.add_row(*row)
     Console().print(table)
     return 0
+
+
+def _put_into_readme(lines: list[str]) -> None:
+    readme = HERE.parent / "README.md"
+    before, rest = readme.read_text().split("<!-- bench -->")
+    after = rest.split("<!-- /bench -->")[1]
+    table = "\n".join(lines)
+    readme.write_text(f"{before}<!-- bench -->\n{table}\n<!-- /bench -->{after}")
 
 
 def figures(report: dict[str, Any]) -> list[tuple[str, str]]:

@@ -77,6 +77,8 @@ def test_unverified_plans_exit_with_1(tmp_path: Path) -> None:
         (("plan", "panda", "--circle", "0.1", "--start", "a"), "error: --start is 'a'"),
         (("plan", "panda", "--line", "1,2"), "error: --line has 2 numbers, expected 3"),
         (("plan", "panda", "--circle", "0.1", "--out", "a.txt"), "--out writes .npz"),
+        (("plan", "panda", "--circle", "0.1", "--mu", "-1"), "mu is -1.0"),
+        (("plan", "panda", "--circle", "0.1", "--max-evaluations", "0"), "max_evaluations is 0"),
         (("check", "no.npz"), "error: no.npz: no such file"),
         (("replay", "no.npz"), "error: no.npz: no such file"),
     ],

@@ -112,5 +112,15 @@ def test_trajectory_interpolates_cubics_exactly() -> None:
     np.testing.assert_allclose(motion(s, 1)[:, 0], 3 * s**2, atol=1e-14)
     np.testing.assert_allclose(motion(s, 2)[:, 0], 6 * s, atol=1e-13)
     assert motion(0.5).shape == (1,)
-    with pytest.raises(ValueError, match="outside the motion"):
-        motion(1.1)
+    for time in (1.1, np.nan):
+        with pytest.raises(ValueError, match="outside the motion"):
+            motion(time)
+    with pytest.raises(ValueError, match="order is 7"):
+        motion(0.5, order=7)
+
+
+def test_a_folder_in_the_way_is_named(plan: sm.Plan, tmp_path: Path) -> None:
+    (tmp_path / "plan.npz").mkdir()
+    with pytest.raises(sm.FileFormatError, match=r"plan\.npz: cannot be written"):
+        plan.save(tmp_path / "plan.npz")
+    assert [path.name for path in tmp_path.iterdir()] == ["plan.npz"]

@@ -151,6 +151,24 @@ def test_gradient_equals_central_differences(case: Case, cost: str) -> None:
     assert np.abs(exact - differences).max() <= GRADIENT * scale
 
 
+def test_panda_gradient_to_seven_digits() -> None:
+    """50 steps, 6 rows; differences extrapolated so that their own error is far below."""
+    robot = robot_named("panda")
+    start = start_of(robot, "pose")
+    path = sm.Circle.around(robot.pose(start), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    rollout = Rollout(robot, path, sm.Task.POSE, Grid.aligned(path.knots, 50))
+    functions = PolynomialNullMotion(3, "joint").functions(rollout.grid.stage_times, 4.0)
+    table = NullMotionTable(functions, None, robot.dof)
+    costs = [sm.JointVelocity(), sm.InverseManipulability(0.01)]
+    objective = Objective(rollout, table, costs, FixedStart(start))
+    x = 0.05 * np.random.default_rng(13).normal(size=objective.size)
+    exact = objective.gradient(x)
+    coarse = central_difference(objective.value, x, 2e-3)
+    fine = central_difference(objective.value, x, 1e-3)
+    differences = (4.0 * fine - coarse) / 3.0
+    assert np.abs(exact - differences).max() <= 1e-7 * np.abs(differences).max()
+
+
 def test_pullback_to_the_start_equals_central_differences(case: Case) -> None:
     """Also off the path, where the pose error and its derivative matter."""
     robot, _, start, _ = case

@@ -71,6 +71,26 @@ def test_without_the_velocity_term_joints_race(sample: sm.Plan) -> None:
     assert plan.report.cost < plan.report.initial_cost
 
 
+@pytest.mark.parametrize("task", [None, "pose", "position", "pointing"])
+def test_evaluations_to_the_optimum(panda_circle: Circle, task: str | None) -> None:
+    """Within 1 % after at most 6 evaluations, within 1e-6 after at most 15, on one grid."""
+    problem = sm.sample_problem() if task is None else panda_circle(task)
+    tight = sm.QuasiNewton(tolerance=1e-13, line_search=sm.LineSearch(sigma=0.1))
+    best = _first_grid(sm.plan(problem, optimizer=tight))[-1].cost
+    history = _first_grid(sm.plan(problem))
+    near = next(i.evaluations for i in history if i.cost <= best * 1.01)
+    converged = next(i.evaluations for i in history if i.cost <= best * (1 + 1e-6))
+    assert near <= 6
+    assert converged <= 15
+
+
+def _first_grid(plan: sm.Plan) -> list[sm.Iteration]:
+    """Return the iterations up to the second grid's start (a record without a step)."""
+    history = plan.report.history
+    end = next((k for k in range(1, len(history)) if history[k].step == 0.0), len(history))
+    return list(history[:end])
+
+
 @pytest.mark.parametrize("task", ["pose", "position", "pointing"])
 def test_panda_circle_is_followed_to_a_micrometre(panda_circle: Circle, task: str) -> None:
     """On a grid of its own, with yourdfpy's kinematics instead of Pinocchio's."""
@@ -209,6 +229,12 @@ def test_planar_pose_with_three_joints_has_no_freedom(planar: sm.RobotModel) -> 
     [
         ({"task": "posture"}, "unknown task 'posture'"),
         ({"costs": ()}, "no cost is given"),
+        ({"costs": ["x"]}, "costs are"),
+        ({"robot": "panda"}, "expected a RobotModel"),
+        ({"path": None}, "expected a Path"),
+        ({"null_motion": "cubic"}, "null_motion is 'cubic'"),
+        ({"constraints": [3]}, "constraints are"),
+        ({"costs": [sm.PathLength(float("inf"))]}, "smoothing is inf"),
         ({"costs": [sm.JointVelocity(), sm.JointVelocity()]}, "two costs are called"),
         ({"costs": [sm.JointVelocity([1.0, 2.0])]}, r"weight has shape \(2,\)"),
         ({"costs": [sm.InverseManipulability(-1.0)]}, "mu is -1.0"),
@@ -236,6 +262,18 @@ def test_bad_null_motions_are_refused(degree: object) -> None:
         sm.PolynomialNullMotion(space="task")
     with pytest.raises(sm.ProblemError, match="basis"):
         sm.PolynomialNullMotion(basis="fourier")
+
+
+def test_one_cost_may_stand_without_a_list(panda_circle: Circle) -> None:
+    assert len(panda_circle(costs=sm.JointVelocity()).costs) == 1
+
+
+@pytest.mark.parametrize("limit", [0, -5])
+def test_bad_limits_and_tolerances_are_refused(limit: int) -> None:
+    with pytest.raises(sm.ProblemError, match="max_evaluations"):
+        sm.plan(sm.sample_problem(), max_evaluations=limit)
+    with pytest.raises(sm.ProblemError, match="tolerance: position"):
+        sm.Tolerance(limit, 1.0)
 
 
 def test_user_function_equals_the_built_in_cost(sample: sm.Plan) -> None:

@@ -11,14 +11,13 @@ README = (ROOT / "README.md").read_text()
 
 
 def test_quickstart_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    code = re.search(r"```python\n(.*?)```", README, re.DOTALL)
-    assert code is not None
-    lines = [line for line in code.group(1).splitlines() if line]
-    assert len(lines) <= 12
+    blocks = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert len([line for line in blocks[0].splitlines() if line]) <= 12
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    exec(code.group(1), names)
-    assert names["plan"].certificate.verified
+    for block in blocks:
+        exec(block, names)
+        assert names["plan"].certificate.verified
     assert (tmp_path / "plan.npz").is_file()
 
 
@@ -26,6 +25,13 @@ def test_quickstart_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_examples_run(example: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(ROOT / "examples" / example), run_name="__main__")
+
+
+def test_performance_table_is_there() -> None:
+    table = re.search(r"<!-- bench -->(.*?)<!-- /bench -->", README, re.DOTALL)
+    assert table is not None
+    assert "| machine |" in table.group(1)
+    assert "rollout + exact gradient" in table.group(1)
 
 
 def test_every_named_file_exists() -> None:

@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from selfmotion.arrays import Array
 from selfmotion.collision import CollisionModel
+from selfmotion.errors import ProblemError
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -33,6 +34,12 @@ class Tolerance:
 
     position: float = 1e-6
     rotation: float = 1e-6
+
+    def __post_init__(self) -> None:
+        for name in ("position", "rotation"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ProblemError(f"tolerance: {name} is {value}, expected a number > 0")
 
 
 @dataclass(frozen=True, eq=False)

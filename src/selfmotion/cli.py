@@ -66,7 +66,9 @@ def plan(
     mu: Annotated[
         float, typer.Option(help="Weight of 1/det(JJᵀ), the distance from singular poses.")
     ] = 0.0,
-    max_evaluations: Annotated[int | None, typer.Option(help="Limit on cost evaluations.")] = None,
+    max_evaluations: Annotated[
+        int | None, typer.Option(help="Limit on cost evaluations while optimising.")
+    ] = None,
     out: Annotated[
         list[Path] | None, typer.Option(help="Write the plan (.npz) or its motion (.csv).")
     ] = None,
@@ -94,7 +96,7 @@ def plan(
             end.translation = pose.translation + _numbers(line or "", "--line", 3)
             motion = sm.Line(pose, end, duration)
     costs: list[sm.Cost] = [sm.JointVelocity()]
-    if mu > 0.0:
+    if mu != 0.0:
         costs.append(sm.InverseManipulability(mu))
     problem = sm.Problem(
         arm, motion, rows, configuration, sm.PolynomialNullMotion(degree), tuple(costs)

@@ -1,4 +1,4 @@
-"""Every exception the package raises.
+"""The exceptions of the package; besides them, ValueError for a time or order out of range.
 
 ::
 

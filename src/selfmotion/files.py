@@ -38,6 +38,8 @@ def write_atomically(file: Path, write: Callable[[IO[bytes]], None]) -> None:
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
         temporary.replace(file)
+    except OSError as error:
+        raise FileFormatError(f"{file}: cannot be written: {error}") from error
     finally:
         temporary.unlink(missing_ok=True)
 
@@ -61,6 +63,8 @@ def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     FileFormatError
         The file is missing or is no such archive.
     """
+    if file.exists() and not zipfile.is_zipfile(file):
+        raise FileFormatError(f"{file}: is no plan written by selfmotion (.npz)")
     try:
         with np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}

@@ -93,7 +93,8 @@ class BSplineNullMotion:
     def __post_init__(self) -> None:
         _check_degree(self.degree)
         _check_space(self.space)
-        if not (isinstance(self.intervals, int) and self.intervals >= 1):
+        whole = isinstance(self.intervals, int | np.integer)
+        if not (whole and not isinstance(self.intervals, bool) and self.intervals >= 1):
             raise ProblemError(
                 f"null motion: intervals is {self.intervals}, expected a whole number ≥ 1"
             )
@@ -197,7 +198,7 @@ def transport(jacobians: Array) -> Array:
 
 
 def _check_degree(degree: int) -> None:
-    if not (isinstance(degree, int) and degree >= 0):
+    if isinstance(degree, bool) or not (isinstance(degree, int | np.integer) and degree >= 0):
         raise ProblemError(f"null motion: degree is {degree}, expected a whole number ≥ 0")
 
 

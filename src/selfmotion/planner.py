@@ -46,7 +46,8 @@ def plan(
     initial_metric : {"gauss-newton", "identity"}
         H0: the inverse Gauss-Newton matrix of the motion at x = 0, or the paper's identity.
     max_evaluations : int, optional
-        Limit on evaluations of the cost while optimising one start.
+        Limit on evaluations of the cost while optimising one start; the finished motion is
+        evaluated a few times more.
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
     tolerance : Tolerance, optional
@@ -87,6 +88,8 @@ def plan(
         raise ProblemError(
             f"initial_metric is '{initial_metric}', expected 'gauss-newton' or 'identity'"
         )
+    if max_evaluations is not None and max_evaluations < 1:
+        raise ProblemError(f"max_evaluations is {max_evaluations}, expected at least 1")
     if search not in ("auto", "local", "global"):
         raise ProblemError(f"search is '{search}', expected 'auto', 'local' or 'global'")
     began = time.perf_counter()

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -72,9 +73,20 @@ class Problem:
     )
 
     def __post_init__(self) -> None:
+        for name, kind in (("robot", RobotModel), ("path", Path)):
+            if not isinstance(getattr(self, name), kind):
+                raise ProblemError(
+                    f"{name} is {getattr(self, name)!r}, expected a {kind.__name__} "
+                    f"(load_robot, Line, Circle, Waypoints, …)"
+                )
         object.__setattr__(self, "task", Task.of(self.task))
-        object.__setattr__(self, "costs", tuple(self.costs))
-        object.__setattr__(self, "constraints", tuple(self.constraints))
+        for name, method in (("costs", "value"), ("constraints", "bind")):
+            object.__setattr__(self, name, _sequence(getattr(self, name), name, method))
+        if not hasattr(self.null_motion, "functions"):
+            raise ProblemError(
+                f"null_motion is {self.null_motion!r}, expected PolynomialNullMotion or "
+                f"BSplineNullMotion"
+            )
         if isinstance(self.start, str):
             if self.start != "free":
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
@@ -165,6 +177,14 @@ class Problem:
                 position_miss=position,
                 rotation_miss=rotation,
             )
+
+
+def _sequence(items: Any, name: str, method: str) -> tuple[Any, ...]:
+    """Return one item or several as a tuple; ProblemError for anything else."""
+    listed = (items,) if hasattr(items, method) else items
+    if not isinstance(listed, list | tuple) or not all(hasattr(item, method) for item in listed):
+        raise ProblemError(f"{name} are {items!r}, expected a list of {name}")
+    return tuple(listed)
 
 
 def _require(wanted: Requirements, item: Constraint, robot: RobotModel) -> Requirements:

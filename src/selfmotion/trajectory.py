@@ -80,7 +80,9 @@ class Trajectory:
             A time is outside the motion, or `order` is not 0, 1 or 2.
         """
         times = np.asarray(t, dtype=np.float64)
-        if np.any(times < self.t[0]) or np.any(times > self.t[-1]):
+        if order not in _HERMITE:
+            raise ValueError(f"order is {order}, expected 0, 1 or 2")
+        if not (np.all(times >= self.t[0]) and np.all(times <= self.t[-1])):
             raise ValueError(
                 f"time {times.min()}..{times.max()} s is outside the motion, "
                 f"{self.t[0]}..{self.t[-1]} s"

@@ -252,7 +252,7 @@ class PathLength:
 
     def check(self, dof: int) -> None:
         """See `Cost.check`."""
-        if not self.smoothing > 0.0:
+        if not (np.isfinite(self.smoothing) and self.smoothing > 0.0):
             raise ProblemError(
                 f"cost '{self.name}': smoothing is {self.smoothing}, expected a number > 0"
             )

@@ -61,6 +61,9 @@ def render_png(
     """
     path = Path(file)
     with _opened(replay_html(plans, **options), size, layers, whole_page, dark) as page:
+        duration = float(page.evaluate("replay.duration"))
+        if not 0.0 <= t <= duration:
+            raise RenderError(f"there is no picture at t = {t} s: the motion lasts {duration} s")
         picture = _shot(page, t, whole_page)
 
     def write(stream: IO[bytes]) -> None:
