@@ -28,7 +28,9 @@ def suite_path(name: str, **options: object) -> sm.Problem:
     description = json.loads((DATA / name / "problem.json").read_text())
     robot = sm.load_robot("panda", tool=description["tip_frame"])
     path = sm.Waypoints.from_csv(DATA / name / "path.csv")
-    return sm.Problem(robot, path, **options)
+    # The start that the peers are given, too.
+    start = robot.inverse_kinematics(path.pose(0.0), seed=[0, -0.5, 0, -2, 0, 1.6, 0.8])
+    return sm.Problem(robot, path, start=start, **options)
 
 
 def chain(joints: int, degree: int = 3) -> sm.Problem:
