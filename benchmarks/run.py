@@ -69,7 +69,8 @@ def figures(report: dict[str, Any]) -> list[tuple[str, str]]:
                 (
                     f"plan: {entry['param']}",
                     f"{seconds(name) * 1e3:.0f} ms, cost {info['initial_cost']:.4f} → "
-                    f"{info['cost']:.4f}, {info['evaluations']} evaluations on all grids",
+                    f"{info['cost']:.4f}{_broken(info)}, {info['evaluations']} evaluations on all "
+                    f"grids",
                 )
             )
     for name, entry in entries.items():
@@ -116,6 +117,11 @@ def figures(report: dict[str, Any]) -> list[tuple[str, str]]:
     slope = np.polyfit(np.log([s["steps"] for s in sizes]), np.log([s["bytes"] for s in sizes]), 1)
     rows.append(("growth of memory in steps", f"exponent {slope[0]:.2f}"))
     return rows
+
+
+def _broken(info: dict[str, Any]) -> str:
+    """Return why a plan costs more than x = 0, where it does."""
+    return " (x = 0 breaks limits)" if info["cost"] > info["initial_cost"] else ""
 
 
 def machine() -> str:
