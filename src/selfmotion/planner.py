@@ -128,11 +128,15 @@ def _search(
     if can_search and search != "local" and fell_short and not cut_short:
         try:
             for guide in guides(problem, rng):
-                session = Session(*settings, guide.start, free=True, guide=guide)
+                try:
+                    session = Session(*settings, guide.start, free=True, guide=guide)
+                except BreakdownError as error:
+                    failure = error
+                    continue
                 session.minimize(use_metric)
                 if best is None or session.score < best.score:
                     best = session
-        except (NoSequenceError, BreakdownError) as error:
+        except NoSequenceError as error:
             failure = error
     if best is None:
         raise failure or ProblemError(f"finalists is {finalists}, expected at least 1")
