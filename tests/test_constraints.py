@@ -46,7 +46,7 @@ def objective_with(
     functions = PolynomialNullMotion(1, "joint").functions(grid.stage_times, path.duration)
     table = NullMotionTable(functions, None, robot.dof)
     conditions = AugmentedLagrangian([constraint.bind(robot, rows, start)], grid)
-    free = FreeStart(robot, path, rows, start)
+    free = FreeStart(robot, rows, start)
     return Objective(rollout, table, [sm.JointVelocity()], free, conditions), conditions
 
 
@@ -160,8 +160,8 @@ def test_end_configuration_is_reached(panda_circle: Circle) -> None:
     """The start itself, and a configuration further along the self-motion."""
     problem = panda_circle()
     robot, task = problem.robot, sm.Task.POSE
-    manifold = FreeStart(robot, problem.path, task, PANDA_HOME)
-    target = manifold.configuration(np.array([0.2]))
+    manifold = FreeStart(robot, task, PANDA_HOME)
+    target = manifold.configuration(np.array([0.2]), problem.path.pose(0.0))
     assert target is not None
     constraints = (*LIMITS, sm.EndConfiguration(target))
     plan = sm.plan(panda_circle(constraints=constraints))
@@ -216,22 +216,23 @@ def test_free_start_stays_on_the_path_and_knows_its_tangent() -> None:
         robot, rows = robot_named(name), sm.Task.of(task)
         start = start_of(robot, task)
         path = short_line(robot, start)
-        manifold = FreeStart(robot, path, rows, start)
+        manifold = FreeStart(robot, rows, start)
+        pose = path.pose(0.0)
         z = 0.2 * np.random.default_rng(4).normal(size=manifold.size)
-        q = manifold.configuration(z)
+        q = manifold.configuration(z, pose)
         assert q is not None
         assert max(rows.miss(path.pose(0.0), robot.pose(q))) < 1e-11
-        tangent = manifold.tangent(z)
+        tangent, _ = manifold.tangent()
         for i in range(manifold.size):
             ends = []
             for sign in (1.0, -1.0):
                 shift = np.zeros_like(z)
                 shift[i] = sign * 1e-6
-                moved = manifold.configuration(z + shift)
+                moved = manifold.configuration(z + shift, pose)
                 assert moved is not None
                 ends.append(moved)
             np.testing.assert_allclose(tangent[:, i], (ends[0] - ends[1]) / 2e-6, atol=1e-7)
-    assert manifold.configuration(np.full(manifold.size, 50.0)) is None
+    assert manifold.configuration(np.full(manifold.size, 50.0), pose) is None
 
 
 def test_bad_constraints_are_refused(panda: sm.RobotModel) -> None:

@@ -62,6 +62,7 @@ from selfmotion.plan import Plan, Report, load_plan
 from selfmotion.planner import plan
 from selfmotion.problem import Problem
 from selfmotion.quasi_newton import Iteration, QuasiNewton, Status
+from selfmotion.relaxation import Relaxation
 from selfmotion.retiming import retime, slowdown
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.sample import sample_problem
@@ -124,6 +125,7 @@ __all__ = [
     "PseudoInverse",
     "QuasiNewton",
     "RedundancyError",
+    "Relaxation",
     "RenderError",
     "Report",
     "Requirements",

@@ -10,6 +10,7 @@ from selfmotion.arrays import Array
 from selfmotion.collision import CollisionModel
 from selfmotion.errors import ProblemError
 from selfmotion.path import Path
+from selfmotion.relaxation import Relaxation, deviation_sizes, excess
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 from selfmotion.trajectory import Trajectory
@@ -62,6 +63,8 @@ class Requirements:
         Bodies to keep apart; without it clearance is not checked.
     clearance : float
         Smallest distance between bodies [m].
+    relaxations : tuple of Relaxation
+        Rows in which the tool may leave the path: only what is beyond them counts as an error.
     """
 
     lower: Array | None = None
@@ -72,6 +75,7 @@ class Requirements:
     closed: bool = False
     collision: CollisionModel | None = None
     clearance: float = 0.0
+    relaxations: tuple[Relaxation, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -99,9 +103,10 @@ class Certificate:
     Attributes
     ----------
     position_error : Extreme
-        Largest distance of the tool from the path, in the prescribed rows [m].
+        Largest distance of the tool from the path, in the prescribed rows and beyond what is
+        relaxed [m].
     rotation_error : Extreme
-        Largest angle from the path's orientation, in the prescribed rows [rad].
+        Largest angle from the path's orientation, likewise [rad].
     limit_margin : Extreme
         Smallest distance of a joint from its position limits [rad or m]; negative beyond them.
     velocity_ratio : Extreme
@@ -118,6 +123,9 @@ class Certificate:
         Number of times looked at.
     failures : tuple of str
         What speaks against the motion; empty for a verified one.
+    deviations : tuple of Extreme
+        For each relaxation the largest deviation of its rows from the path, in its window [m or
+        rad].
     """
 
     position_error: Extreme
@@ -130,6 +138,7 @@ class Certificate:
     closure: float
     samples: int
     failures: tuple[str, ...]
+    deviations: tuple[Extreme, ...] = ()
 
     @property
     def verified(self) -> bool:
@@ -143,6 +152,7 @@ class Certificate:
             return (
                 f"verified: at most {self.position_error.value:.1e} m and "
                 f"{self.rotation_error.value:.1e} rad off the path"
+                f"{', beyond what is relaxed' if self.deviations else ''}"
             )
         return "not verified: " + "; ".join(self.failures)
 
@@ -171,7 +181,10 @@ def certify(
     tolerance, wanted = tolerance or Tolerance(), requirements or Requirements()
     t = _refined(trajectory.t)
     q, qd = trajectory(t), trajectory(t, order=1)
-    distance, angle, singular = _path_errors(robot, path, task, t, q)
+    in_tool_axes = any(item.in_tool_axes for item in wanted.relaxations)
+    deviation, singular = _deviation(robot, path, task, t, q, in_tool_axes)
+    beyond = excess(wanted.relaxations, path.duration, t, deviation)
+    distance, angle = np.linalg.norm(beyond[:, :3], axis=1), np.linalg.norm(beyond[:, 3:], axis=1)
     lower = robot.lower if wanted.lower is None else wanted.lower
     upper = robot.upper if wanted.upper is None else wanted.upper
     limit = robot.velocity_limit if wanted.velocity is None else wanted.velocity
@@ -201,24 +214,39 @@ def certify(
             *_failures(*worst, path, trajectory, tolerance),
             *_unmet(wanted, acceleration, clearance, closure, trajectory),
         ),
+        deviations=tuple(
+            _extreme(size, t, (item.name,), np.argmax)
+            for item, size in zip(
+                wanted.relaxations,
+                deviation_sizes(wanted.relaxations, path.duration, t, deviation),
+                strict=True,
+            )
+        ),
     )
 
 
-def _path_errors(
-    robot: RobotModel, path: Path, task: Task, t: Array, q: Array
-) -> tuple[Array, Array, Array]:
-    """Return distance [m] and angle [rad] off the path, and the smallest singular value, (K,)."""
+def _deviation(
+    robot: RobotModel, path: Path, task: Task, t: Array, q: Array, in_tool_axes: bool
+) -> tuple[Array, Array]:
+    """Return how the tool deviates from the path, (K, 6), and the smallest singular value, (K,).
+
+    Rows x, y, z [m] and rx, ry, rz [rad] as `Relaxation` has them; zero where the task leaves them
+    free.
+    """
     rotation, translation, jacobian = _kinematics(robot, q)
     target = path.samples(t)
     linear = task.rows[task.rows < 3]
-    miss = (target.translation - translation)[:, linear]
-    distance: Array = np.linalg.norm(miss, axis=1).astype(np.float64)
+    miss = np.zeros((len(t), 6))
+    miss[:, linear] = (translation - target.translation)[:, linear]
+    miss[:, 3:] = _turns(task, target.rotation, rotation)
+    if in_tool_axes:
+        miss[:, :3] = np.einsum("kji,kj->ki", target.rotation, miss[:, :3])
     rows = jacobian
     if task.tool_axes:
         turned = rotation.transpose(0, 2, 1) @ jacobian[:, 3:]
         rows = np.concatenate([jacobian[:, :3], turned], axis=1)
     values = np.linalg.svd(rows[:, task.rows], compute_uv=False)
-    return distance, _angles(task, target.rotation, rotation), values[:, -1].astype(np.float64)
+    return miss, values[:, -1].astype(np.float64)
 
 
 def _clearance(model: CollisionModel, t: Array, q: Array) -> Extreme:
@@ -245,25 +273,34 @@ def _kinematics(robot: RobotModel, q: Array) -> tuple[Array, Array, Array]:
     return rotation, translation, jacobian
 
 
-def _angles(task: Task, target: Array, actual: Array) -> Array:
-    """Return the angle between orientations in the rows that count, (K,) [rad]."""
+def _turns(task: Task, target: Array, actual: Array) -> Array:
+    """Return the rotation vectors from target to actual in target's axes, (K, 3) [rad].
+
+    Those of the whole orientation, or of the tool's z axis alone; zero where no angle counts.
+    """
     if not np.any(task.rows >= 3):
-        return np.zeros(len(actual))
+        return np.zeros((len(actual), 3))
+    relative = target.transpose(0, 2, 1) @ actual
     if task.tool_axes:
-        a, b = actual[:, :, 2], target[:, :, 2]
-        sine = np.linalg.norm(np.cross(a, b), axis=1)
-        return np.asarray(np.arctan2(sine, np.einsum("ki,ki->k", a, b)))
-    relative = target @ actual.transpose(0, 2, 1)
-    twice_sine = np.stack(
-        [
-            relative[:, 2, 1] - relative[:, 1, 2],
-            relative[:, 0, 2] - relative[:, 2, 0],
-            relative[:, 1, 0] - relative[:, 0, 1],
-        ],
-        axis=1,
-    )
-    cosine = 0.5 * (np.trace(relative, axis1=1, axis2=2) - 1.0)
-    return np.asarray(np.arctan2(0.5 * np.linalg.norm(twice_sine, axis=1), cosine))
+        # From (0, 0, 1) to the z axis as seen from the target, by the shortest way.
+        axis = relative[:, :, 2]
+        normal = np.stack([-axis[:, 1], axis[:, 0], np.zeros(len(axis))], axis=1)
+        cosine = axis[:, 2]
+    else:
+        normal = 0.5 * np.stack(
+            [
+                relative[:, 2, 1] - relative[:, 1, 2],
+                relative[:, 0, 2] - relative[:, 2, 0],
+                relative[:, 1, 0] - relative[:, 0, 1],
+            ],
+            axis=1,
+        )
+        cosine = 0.5 * (np.trace(relative, axis1=1, axis2=2) - 1.0)
+    sine = np.linalg.norm(normal, axis=1)
+    # Half a turn has no sine to scale; its axis does not matter, its angle does.
+    normal[sine == 0.0] = [1.0, 0.0, 0.0]
+    angle = np.arctan2(sine, cosine)
+    return np.asarray(normal * (angle / np.where(sine > 0.0, sine, 1.0))[:, None])
 
 
 def _extreme(

@@ -58,6 +58,14 @@ def plan(
     duration: Annotated[float, typer.Option(help="Of circle or line (s).")] = 4.0,
     corners: Annotated[Corners, typer.Option(help="At kinks of the waypoints.")] = "blend",
     task: Annotated[TaskName, typer.Option(help="What the path prescribes.")] = "pose",
+    relax: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Rows that may leave the path: ROWS[=BAND][@FROM:TO], rows of x,y,z or of "
+            "rx,ry,rz (tool axes), BAND in m or rad (free without), times in s. Examples: z=0.002, "
+            "rx,ry=0.2 (a cone), rz@1:2.5. Repeatable."
+        ),
+    ] = None,
     start: Annotated[
         str | None, typer.Option(help="q1,q2,… (rad or m); default: one that suits the path.")
     ] = None,
@@ -99,7 +107,13 @@ def plan(
     if mu != 0.0:
         costs.append(sm.InverseManipulability(mu))
     problem = sm.Problem(
-        arm, motion, rows, configuration, sm.PolynomialNullMotion(degree), tuple(costs)
+        arm,
+        motion,
+        rows,
+        configuration,
+        sm.PolynomialNullMotion(degree),
+        tuple(costs),
+        relaxations=[_relaxation(text) for text in relax or []],
     )
     result = _plan_with_progress(problem, max_evaluations)
     report_text.show(result, _console)
@@ -230,6 +244,22 @@ def _check_suffixes(files: list[Path]) -> None:
     for file in files:
         if file.suffix not in (".csv", ".npz"):
             raise sm.FileFormatError(f"{file}: --out writes .npz (the plan) or .csv (its motion)")
+
+
+def _relaxation(text: str) -> sm.Relaxation:
+    rest, _, window = text.partition("@")
+    rows, _, band = rest.partition("=")
+    try:
+        first, last = (float(time) for time in window.split(":")) if window else (0.0, 0.0)
+        return sm.Relaxation(
+            tuple(rows.split(",")),
+            float(band) if band else np.inf,
+            (first, last) if window else None,
+        )
+    except ValueError:
+        raise sm.ProblemError(
+            f"--relax is '{text}', expected ROWS[=BAND][@FROM:TO] like rx,ry=0.2 or rz@1:2.5"
+        ) from None
 
 
 def _numbers(text: str, option: str, count: int | None = None) -> Array:

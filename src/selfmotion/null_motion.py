@@ -141,7 +141,7 @@ class NullMotionTable:
 
     def epsilon(self, x: Array) -> Array:
         """Return ε at the stages for coefficients `x`, (S, n)."""
-        inner: Array = self.functions @ x.reshape(self.rows, -1).T
+        inner: Array = self.functions @ x.reshape(self.rows, self.functions.shape[1]).T
         outer = inner if self.frame is None else np.einsum("snr,sr->sn", self.frame, inner)
         return outer if self.offset is None else outer + self.offset
 
@@ -156,7 +156,7 @@ class NullMotionTable:
         """Return ∂ε/∂x at the stages, (S, n, size)."""
         frame = np.eye(self.rows)[None] if self.frame is None else self.frame
         full = frame[:, :, :, None] * self.functions[:, None, None, :]
-        return np.asarray(full.reshape(len(self.functions), -1, self.size))
+        return np.asarray(full.reshape(len(self.functions), full.shape[1], self.size))
 
 
 class TransportedFrame:

@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
+import pinocchio as pin
 
 from selfmotion.arrays import Array
 from selfmotion.augmented_lagrangian import AugmentedLagrangian
 from selfmotion.constraints import NodeTangents
 from selfmotion.costs import Cost
+from selfmotion.deviation import Deviation
 from selfmotion.null_motion import NullMotionTable
 from selfmotion.rollout import Rollout
 from selfmotion.start import Start
@@ -16,8 +18,9 @@ from selfmotion.start import Start
 class Objective:
     """F = ∫ Σ G(q̇, q, t) dt along the motion of a decision vector, plus its constraints' terms.
 
-    The decision vector is [z | x]: where the start is on its self-motion manifold (nothing for a
-    given start), then the null motion's coefficients.
+    The decision vector is [z | x | c]: where the start is on its self-motion manifold (nothing for
+    a given start), the null motion's coefficients, and those of the tool's deviation from the path
+    (nothing where no row is relaxed).
 
     Parameters
     ----------
@@ -29,6 +32,8 @@ class Objective:
     start : Start
         z → q(0).
     constraints : AugmentedLagrangian, optional
+    deviation : Deviation, optional
+        c → the poses and twists that the tool follows; without it those of the path.
 
     Attributes
     ----------
@@ -43,9 +48,11 @@ class Objective:
         costs: Sequence[Cost],
         start: Start,
         constraints: AugmentedLagrangian | None = None,
+        deviation: Deviation | None = None,
     ) -> None:
         self.rollout, self.null_motion, self.start = rollout, null_motion, start
-        self.constraints = constraints
+        self.constraints, self._deviation = constraints, deviation
+        self._first_pose = rollout.path.pose(0.0)
         self._costs = tuple(costs)
         self.evaluations = 0
         self.gradient_evaluations = 0
@@ -55,7 +62,14 @@ class Objective:
     @property
     def size(self) -> int:
         """Number of decision variables."""
-        return self.start.size + self.null_motion.size
+        deviation = 0 if self._deviation is None else self._deviation.size
+        return self.start.size + self.null_motion.size + deviation
+
+    def parts(self, x: Array) -> tuple[Array, Array, Array]:
+        """Return the parts z, x and c of the decision vector."""
+        first = self.start.size
+        last = first + self.null_motion.size
+        return x[:first], x[first:last], x[last:]
 
     def value(self, x: Array) -> float:
         """Return cost and constraints' terms at x; infinite where the motion breaks down."""
@@ -76,12 +90,14 @@ class Objective:
         self.gradient_evaluations += 1
         if not np.isfinite(sum(self._terms.values())):
             return np.full(self.size, np.nan)
-        by_epsilon, by_start = self.rollout.pullback(*self._cotangents())
-        by_coefficients = self.null_motion.pullback(by_epsilon)
-        if self.start.size == 0:
-            return by_coefficients
-        by_z = by_start @ self.start.tangent(x[: self.start.size])
-        return np.concatenate([by_z, by_coefficients])
+        by_epsilon, by_start, by_target = self.rollout.pullback(*self._cotangents())
+        by_z, by_pose = self.start.tangent()
+        parts = [by_start @ by_z, self.null_motion.pullback(by_epsilon)]
+        if self._deviation is not None:
+            target = self._deviation.matrix(self.parts(x)[2])
+            by_target[0, :6] += by_start @ by_pose
+            parts.append(np.tensordot(by_target, target, 2))
+        return np.concatenate(parts)
 
     def slope(self, x: Array, direction: Array) -> float:
         """Return the derivative of `value` at x along `direction`."""
@@ -137,10 +153,16 @@ class Objective:
         self.evaluations += 1
         self._at = x.copy()
         self._terms = {cost.name: np.inf for cost in self._costs}
-        start = self.start.configuration(x[: self.start.size])
+        z, coefficients, c = self.parts(x)
+        pose = self._first_pose
+        if self._deviation is not None:
+            target = self._deviation.target(c)
+            self.rollout.aim(target)
+            pose = pin.SE3(target.rotation[0], target.translation[0])
+        start = self.start.configuration(z, pose)
         if start is None:
             return
-        epsilon = self.null_motion.epsilon(x[self.start.size :])
+        epsilon = self.null_motion.epsilon(coefficients)
         if self.rollout.run(start, epsilon) is not None:
             return
         samples = self.rollout.samples()
@@ -171,15 +193,21 @@ class Objective:
         return by_q, by_qd
 
     def _sensitivities(self, x: Array) -> tuple[Array, Array]:
-        """Return ∂q/∂[z | x] and ∂q̇/∂[z | x] at the stages, (S, n, size)."""
+        """Return ∂q/∂[z | x | c] and ∂q̇/∂[z | x | c] at the stages, (S, n, size)."""
         by_coefficients = self.null_motion.matrix()
-        free = self.start.size
+        first = self.start.size
+        last = first + self.null_motion.size
         stages, n, _ = by_coefficients.shape
-        epsilon_matrix = np.concatenate([np.zeros((stages, n, free)), by_coefficients], axis=2)
+        epsilon_matrix = np.zeros((stages, n, self.size))
+        epsilon_matrix[:, :, first:last] = by_coefficients
         start_matrix = np.zeros((n, self.size))
-        if free:
-            start_matrix[:, :free] = self.start.tangent(x[:free])
-        return self.rollout.sensitivities(epsilon_matrix, start_matrix)
+        start_matrix[:, :first], by_pose = self.start.tangent()
+        if self._deviation is None:
+            return self.rollout.sensitivities(epsilon_matrix, start_matrix)
+        target_matrix = np.zeros((stages, 12, self.size))
+        target_matrix[:, :, last:] = self._deviation.matrix(x[last:])
+        start_matrix[:, last:] = by_pose @ target_matrix[0, :6, last:]
+        return self.rollout.sensitivities(epsilon_matrix, start_matrix, target_matrix)
 
 
 def inverse_metric(metric: Array, floor: float = 1e-4) -> Array:

@@ -16,6 +16,7 @@ from selfmotion.constraints import Clearance
 from selfmotion.errors import FileFormatError, PlanError
 from selfmotion.path import Path, path_from_dict
 from selfmotion.quasi_newton import Iteration, Status
+from selfmotion.relaxation import Relaxation
 from selfmotion.robot import RobotModel, rebuild_robot
 from selfmotion.task import Task
 from selfmotion.trajectory import Trajectory
@@ -230,6 +231,7 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Plan:
         for key, value in description["certificate"].items()
     }
     certificate["failures"] = tuple(certificate["failures"])
+    certificate["deviations"] = tuple(Extreme(**item) for item in certificate["deviations"])
     return Plan(
         robot=rebuild_robot(**description["robot"]),
         path=path_from_dict(description["path"]),
@@ -254,6 +256,7 @@ def _requirements_to_dict(plan: Plan) -> dict[str, Any]:
     return {
         **arrays,
         "closed": wanted.closed,
+        "relaxations": [item.to_dict() for item in wanted.relaxations],
         "clearance": None
         if clearance is None
         else {
@@ -272,7 +275,9 @@ def _requirements_from_dict(description: Mapping[str, Any]) -> dict[str, Any]:
         obstacles = tuple(obstacle_from_dict(item) for item in stored["obstacles"])
         clearance = Clearance(obstacles, stored["distance"], stored["srdf"])
     closed = values.pop("closed")
+    relaxations = tuple(Relaxation(**item) for item in values.pop("relaxations", ()))
     arrays: dict[str, Any] = {
         name: None if x is None else np.array(x) for name, x in values.items()
     }
-    return {"clearance": clearance, "requirements": Requirements(**arrays, closed=closed)}
+    requirements = Requirements(**arrays, closed=closed, relaxations=relaxations)
+    return {"clearance": clearance, "requirements": requirements}

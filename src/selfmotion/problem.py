@@ -16,6 +16,7 @@ from selfmotion.constraints import (
     ClosedPath,
     Constraint,
     EndConfiguration,
+    EndVelocity,
     JointAccelerationLimits,
     JointPositionLimits,
     JointVelocityLimits,
@@ -24,6 +25,7 @@ from selfmotion.costs import Cost, JointVelocity
 from selfmotion.errors import ProblemError, RedundancyError, StartError
 from selfmotion.null_motion import NullMotion, PolynomialNullMotion
 from selfmotion.path import Path
+from selfmotion.relaxation import Relaxation, check_relaxations
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
@@ -51,15 +53,20 @@ class Problem:
         Their integrals are added up. By default ∫ ½ q̇ᵀq̇ dt.
     constraints : sequence of Constraint
         What the motion must keep. By default the URDF's limits of joint position and velocity.
+    relaxations : sequence of Relaxation
+        Rows in which the tool may leave the path, by how much and when; the deviation is optimised
+        along with the self-motion. By default none. A given start is on the path itself, and so
+        are both ends of a closed path and the end of one with conditions there.
 
     Raises
     ------
     RedundancyError
-        The task leaves no self-motion.
+        The task leaves no self-motion, and no row is relaxed.
     StartError
         `start` is off the path.
     ProblemError
-        The arm cannot move in all the rows, two costs share a name, a cost does not fit the arm.
+        The arm cannot move in all the rows, two costs share a name, a cost does not fit the arm, a
+        relaxation does not fit the path or the task.
     """
 
     robot: RobotModel
@@ -71,6 +78,7 @@ class Problem:
     constraints: Sequence[Constraint] = field(
         default_factory=lambda: (JointPositionLimits(), JointVelocityLimits())
     )
+    relaxations: Sequence[Relaxation] = ()
 
     def __post_init__(self) -> None:
         for name, kind in (("robot", RobotModel), ("path", Path)):
@@ -80,8 +88,10 @@ class Problem:
                     f"(load_robot, Line, Circle, Waypoints, …)"
                 )
         object.__setattr__(self, "task", Task.of(self.task))
-        for name, method in (("costs", "value"), ("constraints", "bind")):
+        listed = (("costs", "value"), ("constraints", "bind"), ("relaxations", "window"))
+        for name, method in listed:
             object.__setattr__(self, name, _sequence(getattr(self, name), name, method))
+        check_relaxations(self.relaxations, self.path, self.rows)
         if not hasattr(self.null_motion, "functions"):
             raise ProblemError(
                 f"null_motion is {self.null_motion!r}, expected PolynomialNullMotion or "
@@ -122,10 +132,29 @@ class Problem:
     @cached_property
     def requirements(self) -> Requirements:
         """What the certificate has to check besides the path."""
-        wanted = Requirements()
+        wanted = Requirements(relaxations=tuple(self.relaxations))
         for item in self.constraints:
             wanted = _require(wanted, item, self.robot)
         return wanted
+
+    @cached_property
+    def knots(self) -> Array:
+        """Times [s] between which path and deviations are smooth; see `Path.knots`."""
+        duration, knots = self.path.duration, list(self.path.knots)
+        for item in self.relaxations:
+            for time in np.linspace(*item.window(duration), item.intervals + 1):
+                # Nearer to each other than rounding, two knots are one.
+                if np.abs(np.array(knots) - time).min() > 1e-9 * duration:
+                    knots.append(time)
+        return read_only(sorted(knots))
+
+    @property
+    def pinned(self) -> tuple[bool, bool]:
+        """Whether the tool has to be on the path itself at its start and at its end."""
+        closed = any(isinstance(item, ClosedPath) for item in self.constraints)
+        ends = (EndConfiguration, EndVelocity)
+        ended = any(isinstance(item, ends) for item in self.constraints)
+        return self.start is not None or closed, closed or ended
 
     def _check_rank(self) -> None:
         robot, task = self.robot, self.rows
@@ -136,11 +165,12 @@ class Problem:
                 f"({', '.join(task.row_names)}), but the arm cannot move '{robot.tool}' freely in "
                 f"all of them; choose another task ('planar' for a planar arm)"
             )
-        if redundancy == 0:
+        if redundancy == 0 and not self.relaxations:
             raise RedundancyError(
                 f"{robot.name}: {robot.dof} joints and task '{task.value}' with "
                 f"{task.dimension} rows leave no self-motion; choose a task with fewer rows "
-                f"('pointing', 'position') or an arm with more joints",
+                f"('pointing', 'position'), relax some (relaxations=), or take an arm with more "
+                f"joints",
                 dof=robot.dof,
                 rows=task.dimension,
             )

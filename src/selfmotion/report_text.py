@@ -58,6 +58,10 @@ def show_certificate(certificate: Certificate, console: Console) -> None:
         if worst is None:
             continue
         table.add_row(name, form.format(worst.value), f"{worst.time:.3f} s", worst.name)
+    for worst in certificate.deviations:
+        unit = "rad" if "r" in worst.name else "m"
+        value, time = f"{worst.value:.4g} {unit}", f"{worst.time:.3f} s"
+        table.add_row(f"relaxed {worst.name}", value, time, "off the path, as allowed")
     table.add_row("end to start", f"{certificate.closure:.4g}", "", "")
     console.print(table)
     style = "green" if certificate.verified else "bold red"

@@ -10,6 +10,7 @@ from selfmotion.certificate import certify
 from selfmotion.errors import PlanError, ProblemError
 from selfmotion.path.retimed import Retimed
 from selfmotion.plan import Plan
+from selfmotion.relaxation import Relaxation
 from selfmotion.trajectory import Trajectory
 
 # Share of the limits that is used, so that the certificate between grid points holds as well.
@@ -80,13 +81,25 @@ def retime(
     q, qd = plan.trajectory(sigma), plan.trajectory(sigma, order=1) * rate[:, None]
     trajectory = Trajectory(t, q, qd, plan.trajectory.joint_names)
     wanted = replace(
-        plan.requirements, velocity=read_only(limits[0]), acceleration=read_only(limits[1])
+        plan.requirements,
+        velocity=read_only(limits[0]),
+        acceleration=read_only(limits[1]),
+        relaxations=tuple(_moved(item, t, sigma) for item in plan.requirements.relaxations),
     )
     checked = replace(
         plan, path=path, trajectory=trajectory, initial_trajectory=trajectory, requirements=wanted
     )
     certificate = certify(plan.robot, path, plan.task, trajectory, requirements=wanted)
     return replace(checked, certificate=certificate)
+
+
+def _moved(item: Relaxation, t: Array, sigma: Array) -> Relaxation:
+    """Return a relaxation with its window at the new times t of σ."""
+    if item.during is None:
+        return item
+    # Near enough: the deviation and two of its derivatives vanish at the ends of a window.
+    first, last = (float(np.interp(time, sigma, t)) for time in item.during)
+    return replace(item, during=(first, last))
 
 
 def _pace(motion: Trajectory, velocity: Array, acceleration: Array) -> tuple[Array, Array, Array]:

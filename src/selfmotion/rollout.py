@@ -6,7 +6,7 @@ import pinocchio as pin
 from selfmotion import kernels
 from selfmotion.arrays import Array
 from selfmotion.grid import Grid
-from selfmotion.path import Path
+from selfmotion.path import Path, PathSamples
 from selfmotion.robot import RobotModel
 from selfmotion.samples import Samples
 from selfmotion.task import Task
@@ -60,12 +60,17 @@ class Rollout:
         self._rotation = parts[8].reshape(-1, 3, 3)
         self._jacobian = parts[10].reshape(-1, 6, n)
         self._task_jacobian = parts[11].reshape(-1, m, n)
-        target = path.samples(times)
+        self._target = translation, rotation, twist
+        self.aim(path.samples(times))
+        step[:, 0] = grid.stage_steps
+        self._q_rows = list(self._q)
+
+    def aim(self, target: PathSamples) -> None:
+        """Follow other poses and twists from now on, given at the stages (S)."""
+        translation, rotation, twist = self._target
         translation[:] = target.translation
         rotation[:] = target.rotation.reshape(-1, 9)
         twist[:] = target.twist
-        step[:, 0] = grid.stage_steps
-        self._q_rows = list(self._q)
 
     def run(self, start: Array, epsilon: Array) -> float | None:
         """Integrate from `start` (n,) under null motion `epsilon` (S, n) at the stage times.
@@ -126,7 +131,9 @@ class Rollout:
         self.jacobian_evaluations += len(here)
         return self.grid.nodes, self._q[here], self._qd[here]
 
-    def sensitivities(self, epsilon_matrix: Array, start_matrix: Array) -> tuple[Array, Array]:
+    def sensitivities(
+        self, epsilon_matrix: Array, start_matrix: Array, target_matrix: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return ∂q/∂x and ∂q̇/∂x at the stages of the last run, (S, n, d) each.
 
         Parameters
@@ -135,7 +142,12 @@ class Rollout:
             ∂ε/∂x at the stages.
         start_matrix : (n, d)
             ∂q(0)/∂x.
+        target_matrix : (S, 12, d), optional
+            That of the path's poses [m, world rotation vector] and twists; without it the path is
+            fixed.
         """
+        if target_matrix is None:
+            target_matrix = np.zeros((0, 12, epsilon_matrix.shape[2]))
         epsilon_matrix = np.ascontiguousarray(epsilon_matrix)
         by_q, by_qd = np.empty_like(epsilon_matrix), np.empty_like(epsilon_matrix)
         kernels.sensitivities(
@@ -145,6 +157,7 @@ class Rollout:
             self._gain,
             epsilon_matrix,
             np.ascontiguousarray(start_matrix),
+            np.ascontiguousarray(target_matrix),
             by_q,
             by_qd,
         )
@@ -173,7 +186,7 @@ class Rollout:
             task_jacobian=self._task_jacobian,
         )
 
-    def pullback(self, q_cotangent: Array, qd_cotangent: Array) -> tuple[Array, Array]:
+    def pullback(self, q_cotangent: Array, qd_cotangent: Array) -> tuple[Array, Array, Array]:
         """Pull a gradient with respect to the last run's stages back to what drove it.
 
         The exact derivative of the discrete scheme: one backward sweep, no finite differences.
@@ -189,8 +202,11 @@ class Rollout:
             ∂F/∂ε at the stages.
         start_gradient : (n,)
             ∂F/∂q(0).
+        target_gradient : (S, 12)
+            With respect to the path's poses [m, world rotation vector] and twists.
         """
         epsilon_gradient = np.empty_like(self._qd)
+        target_gradient = np.empty((len(epsilon_gradient), 12))
         start_gradient = kernels.pullback(
             np.ascontiguousarray(q_cotangent),
             np.ascontiguousarray(qd_cotangent),
@@ -199,8 +215,9 @@ class Rollout:
             self._angle_kind,
             self._gain,
             epsilon_gradient,
+            target_gradient,
         )
-        return epsilon_gradient, start_gradient
+        return epsilon_gradient, start_gradient, target_gradient
 
 
 def _angle_kind(task: Task) -> int:

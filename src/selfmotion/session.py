@@ -8,6 +8,7 @@ import numpy as np
 
 from selfmotion.arrays import Array
 from selfmotion.augmented_lagrangian import AugmentedLagrangian
+from selfmotion.deviation import Deviation
 from selfmotion.errors import BreakdownError
 from selfmotion.grid import Grid
 from selfmotion.null_motion import NullMotionTable, TransportedFrame
@@ -92,9 +93,9 @@ class Session:
         self.counts, self._guide = counts, guide
         self.history: list[Iteration] = []
         self.violations: tuple[str, ...] = ()
-        robot, path, task = problem.robot, problem.path, problem.rows
+        robot, task = problem.robot, problem.rows
         self._start: Start = (
-            FreeStart(robot, path, task, configuration) if free else FixedStart(configuration)
+            FreeStart(robot, task, configuration) if free else FixedStart(configuration)
         )
         reference = self._reference(configuration)
         self._frame = self._null_space(reference)
@@ -113,7 +114,7 @@ class Session:
     @property
     def coefficients(self) -> Array:
         """The null motion's coefficients."""
-        return self._x[self._start.size :]
+        return self._objective.parts(self._x)[1]
 
     @property
     def initial_score(self) -> float:
@@ -214,7 +215,7 @@ class Session:
         """Return the motion at x = 0, on the coarsest grid on which it stays near the path."""
         problem = self._problem
         steps = max(_FEWEST_STEPS, problem.null_motion.fewest_steps)
-        grid = Grid.aligned(problem.path.knots, steps)
+        grid = Grid.aligned(problem.knots, steps)
         target = problem.path.samples(grid.nodes)
         extent = max(float(np.ptp(target.translation, axis=0).max()), 1e-3)
         rows = problem.rows.rows
@@ -238,9 +239,12 @@ class Session:
             time=float(time),
         )
 
-    def _null_space(self, reference: Rollout) -> TransportedFrame | None:
-        if self._problem.null_motion.space == "joint":
+    def _null_space(self, reference: Rollout) -> Callable[[Array], Array] | None:
+        problem = self._problem
+        if problem.null_motion.space == "joint":
             return None
+        if problem.robot.redundancy(problem.rows) == 0:
+            return lambda t: np.zeros((len(t), problem.robot.dof, 0))
         nodes = reference.grid.node_stages
         return TransportedFrame(reference.grid.nodes, reference.samples().task_jacobian[nodes])
 
@@ -256,6 +260,9 @@ class Session:
             problem.costs,
             self._start,
             conditions,
+            Deviation(problem.path, problem.relaxations, t, problem.pinned)
+            if problem.relaxations
+            else None,
         )
 
     def _offset(self, grid: Grid) -> Array | None:

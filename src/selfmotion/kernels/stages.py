@@ -11,6 +11,7 @@ from selfmotion.arrays import Array
 from selfmotion.jit import kernel
 from selfmotion.kernels.algebra import (
     LOGARITHM,
+    NO_ANGLE,
     POINTING,
     add_cross,
     cholesky,
@@ -206,11 +207,13 @@ def pull_stage(
     gain: float,
     epsilon_bar: Array,
     q_bar: Array,
+    target_bar: Array,
 ) -> None:
-    """Pull the cotangent w (n,) on q̇ of one stage back to ε (set) and q (added).
+    """Pull the cotangent w (n,) on q̇ of one stage back to ε (set), q (added) and the path (set).
 
     z = A⁻¹Jw,  ε̄ = w - Jᵀz,  q̄ = ⟨y ε̄ᵀ - z q̇ᵀ, ∂J/∂q⟩ + zᵀS K ∂e/∂q, and where the angular rows
-    are in tool axes, zᵀ ∂S u.
+    are in tool axes, zᵀ ∂S u. The path's cotangent (12,) is that of its pose [m, rad], then Sᵀz of
+    its twist.
     """
     n, m = w.shape[0], rows.shape[0]
     at = layout(n, m)
@@ -247,6 +250,12 @@ def pull_stage(
     # Everything else acts through the tool's own twist J6 ∂q.
     twist_bar = np.zeros(6)
     pull_error(angle_kind, error, rotation, target_rotation, gain * full_z, twist_bar)
+    # Moved together, target and tool turn the error with them: ∂e = ω × e.
+    for i in range(6):
+        target_bar[i] = -twist_bar[i]
+        target_bar[6 + i] = full_z[i]
+    if angle_kind != NO_ANGLE:
+        add_cross(error[3], error[4], error[5], gain * full_z[3:], target_bar[3:6])
     if pointing:
         first, second = np.zeros(3), np.zeros(3)
         for i in range(3):
@@ -270,8 +279,11 @@ def pullback(
     angle_kind: int,
     gain: float,
     epsilon_bar: Array,
+    target_bar: Array,
 ) -> Array:
-    """Reverse the Runge-Kutta recursion: cotangents on all stages → ε (S, n) set, start (n,).
+    """Reverse the Runge-Kutta recursion: cotangents on all stages → start (n,).
+
+    Sets those of ε (S, n) and of the path (S, 12), see `pull_stage`.
 
     A stage's slope acts on the later stages of its step and on the step's end.
     """
@@ -289,7 +301,7 @@ def pullback(
                 if i < 3:
                     slope[k] += chi[i + 1, k] * (h if i == 2 else 0.5 * h)
             q_bar[k] = q_cotangent[s, k]
-        pull_stage(slope, table[s], rows, angle_kind, gain, epsilon_bar[s], q_bar)
+        pull_stage(slope, table[s], rows, angle_kind, gain, epsilon_bar[s], q_bar, target_bar[s])
         chi[i] = q_bar
         if last:
             state[:] = q_bar
@@ -307,27 +319,41 @@ def sensitivities(
     gain: float,
     epsilon_matrix: Array,
     start_matrix: Array,
+    target_matrix: Array,
     q_matrix: Array,
     qd_matrix: Array,
 ) -> None:
     """Set ∂q/∂x and ∂q̇/∂x at all stages, (S, n, d).
 
-    For ∂ε/∂x = `epsilon_matrix` (S, n, d) and ∂q(0)/∂x = `start_matrix` (n, d).
+    For ∂ε/∂x = `epsilon_matrix` (S, n, d), ∂q(0)/∂x = `start_matrix` (n, d) and that of the path's
+    poses and twists, `target_matrix` (S, 12, d), or (0, 12, d) where the path is fixed.
 
-    The tangent of the Runge-Kutta recursion: ∂q̇ = (I - J⁺J) ∂ε + (∂q̇/∂q) ∂q at every stage. The
-    rows of both matrices are pullbacks of the unit vectors.
+    The tangent of the Runge-Kutta recursion: ∂q̇ = (I - J⁺J) ∂ε + (∂q̇/∂q) ∂q + (∂q̇/∂path) ∂path
+    at every stage. The rows of the matrices are pullbacks of the unit vectors.
     """
     stages, n = epsilon_matrix.shape[:2]
     step = layout(n, rows.shape[0])[6]
     projector, slope_by_q, unit = np.empty((n, n)), np.empty((n, n)), np.zeros(n)
+    slope_by_target = np.empty((n, 12))
     state, now = start_matrix.copy(), start_matrix.copy()
     for s in range(stages):
         for k in range(n):
             unit[k] = 1.0
             slope_by_q[k] = 0.0
-            pull_stage(unit, table[s], rows, angle_kind, gain, projector[k], slope_by_q[k])
+            pull_stage(
+                unit,
+                table[s],
+                rows,
+                angle_kind,
+                gain,
+                projector[k],
+                slope_by_q[k],
+                slope_by_target[k],
+            )
             unit[k] = 0.0
         slope = projector @ epsilon_matrix[s] + slope_by_q @ now
+        if len(target_matrix) > 0:
+            slope += slope_by_target @ target_matrix[s]
         q_matrix[s], qd_matrix[s] = now, slope
         i, h = s % 4, table[s, step]
         if i == 3:

@@ -1,0 +1,208 @@
+"""Rows of the tool's motion that need not follow the path exactly, for all of it or a while."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from selfmotion.arrays import Array
+from selfmotion.errors import ProblemError
+from selfmotion.path import Path
+from selfmotion.task import Task
+
+_POSITION, _ROTATION = ("x", "y", "z"), ("rx", "ry", "rz")
+_ROWS = (*_POSITION, *_ROTATION)
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """Rows in which the tool may leave the path, by how much, and when.
+
+    The deviation of the tool from the path has six rows: the position's difference x, y, z [m], in
+    world axes or in those of the path's tool frame; and the rotation vector rx, ry, rz [rad] that
+    takes the path's orientation to the tool's, in the axes of the path's tool frame. Rows that are
+    given together share one band: √(Σ deviation²) ≤ band at any time, so that
+
+    - ``Relaxation("z", 2e-3)`` is ± 2 mm,
+    - ``Relaxation(("x", "y"), 1e-3)`` a disc,
+    - ``Relaxation(("rx", "ry"), 0.2)`` a cone of 0.2 rad around the tool axis,
+    - ``Relaxation("rz", during=(1.0, 2.0))`` leaves the rotation about the tool axis free for a
+      second: the row is switched off and on again.
+
+    The motion enters and leaves a window without a jump in velocity or acceleration.
+
+    Parameters
+    ----------
+    rows : str or sequence of str
+        All of x, y, z or all of rx, ry, rz.
+    band : float
+        Largest deviation [m or rad]; infinite by default, which leaves the rows free.
+    during : (float, float), optional
+        First and last time of the window [s]; by default the whole motion.
+    axes : {"world", "tool"}
+        Of x, y and z; rotations are in tool axes always.
+    intervals : int
+        Pieces of the cubic spline that describes the deviation over the window, ≥ 4.
+
+    Raises
+    ------
+    ProblemError
+        A row is unknown or given twice, rows of position and rotation are mixed, the band is not
+        positive, or the window is empty.
+    """
+
+    rows: tuple[str, ...] | str | Sequence[str]
+    band: float = np.inf
+    during: tuple[float, float] | None = None
+    axes: str = "world"
+    intervals: int = 8
+
+    def __post_init__(self) -> None:
+        rows = (self.rows,) if isinstance(self.rows, str) else tuple(self.rows)
+        object.__setattr__(self, "rows", rows)
+        if not rows or len(set(rows)) != len(rows) or not set(rows) <= set(_ROWS):
+            raise ProblemError(
+                f"relaxation: rows are {rows}, expected some of {', '.join(_ROWS)}, each once"
+            )
+        if not (set(rows) <= set(_POSITION) or set(rows) <= set(_ROTATION)):
+            raise ProblemError(
+                f"relaxation: rows {', '.join(rows)} mix metres and radians, which cannot share a "
+                f"band; give two relaxations"
+            )
+        if not self.band > 0.0:
+            raise ProblemError(f"relaxation {self.name}: band is {self.band}, expected > 0")
+        if self.axes not in ("world", "tool"):
+            raise ProblemError(
+                f"relaxation {self.name}: axes are '{self.axes}', expected 'world' or 'tool'"
+            )
+        if isinstance(self.intervals, bool) or not (
+            isinstance(self.intervals, int | np.integer) and self.intervals >= 4
+        ):
+            raise ProblemError(
+                f"relaxation {self.name}: intervals is {self.intervals}, expected a whole number "
+                f"≥ 4"
+            )
+        if self.during is not None:
+            first, last = (float(time) for time in self.during)
+            if not (np.isfinite(last) and 0.0 <= first < last):
+                raise ProblemError(
+                    f"relaxation {self.name}: during is {self.during}, expected two times "
+                    f"0 ≤ first < last [s]"
+                )
+            object.__setattr__(self, "during", (first, last))
+
+    @property
+    def name(self) -> str:
+        """The rows, for messages."""
+        return f"({', '.join(self.rows)})"
+
+    @property
+    def indices(self) -> list[int]:
+        """Which of the six rows x, y, z, rx, ry, rz."""
+        return [_ROWS.index(row) for row in self.rows]
+
+    @property
+    def angular(self) -> bool:
+        """Whether the rows are those of the rotation."""
+        return self.rows[0] in _ROTATION
+
+    @property
+    def in_tool_axes(self) -> bool:
+        """Whether the rows are positions in the axes of the path's tool frame."""
+        return self.axes == "tool" and not self.angular
+
+    def window(self, duration: float) -> tuple[float, float]:
+        """Return first and last time of the window in a motion of length `duration` [s]."""
+        return (0.0, duration) if self.during is None else self.during
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a JSON-safe description: ``Relaxation(**description)`` restores it."""
+        return {**asdict(self), "rows": list(self.rows)}
+
+
+def check_relaxations(relaxations: Sequence[Relaxation], path: Path, task: Task) -> None:
+    """Check that relaxations fit a path and a task, and each other.
+
+    Raises
+    ------
+    ProblemError
+        A row is not among those the task prescribes, a window ends after the path, two relaxations
+        share a row at the same time, or positions are relaxed in different axes.
+    """
+    prescribed = _prescribed(path, task)
+    for item in relaxations:
+        free = [row for row in item.rows if row not in prescribed]
+        if free:
+            raise ProblemError(
+                f"relaxation {item.name}: task '{task.value}' does not prescribe "
+                f"{', '.join(free)}, only {', '.join(prescribed)}"
+            )
+        if item.in_tool_axes and not set(_POSITION) <= set(prescribed):
+            raise ProblemError(
+                f"relaxation {item.name}: tool axes need a task that prescribes x, y and z, which "
+                f"'{task.value}' does not"
+            )
+        if item.window(path.duration)[1] > path.duration * (1.0 + 1e-9):
+            raise ProblemError(
+                f"relaxation {item.name}: its window ends at {item.window(path.duration)[1]:.6g} "
+                f"s, the path at {path.duration:.6g} s"
+            )
+    for first, second in combinations(relaxations, 2):
+        twice = set(first.rows) & set(second.rows)
+        one, other = first.window(path.duration), second.window(path.duration)
+        if twice and one[0] < other[1] and other[0] < one[1]:
+            raise ProblemError(f"row {', '.join(sorted(twice))} is relaxed twice at the same time")
+    if len({item.in_tool_axes for item in relaxations if not item.angular}) > 1:
+        raise ProblemError("positions are relaxed in world axes and in tool axes; choose one")
+
+
+def excess(relaxations: Sequence[Relaxation], duration: float, t: Array, deviation: Array) -> Array:
+    """Return what deviations are beyond the relaxations, (K, 6) [m, rad].
+
+    Parameters
+    ----------
+    relaxations : sequence of Relaxation
+    duration : float
+        Of the path [s].
+    t : (K,)
+        Times [s].
+    deviation : (K, 6)
+        Rows x, y, z, rx, ry, rz, in the relaxations' axes.
+    """
+    beyond = deviation.copy()
+    for item in relaxations:
+        size = _size(item, duration, t, deviation)
+        share = np.maximum(size - item.band, 0.0) / np.where(size > 0.0, size, 1.0)
+        first, last = item.window(duration)
+        outside = (t < first) | (t > last)
+        beyond[:, item.indices] *= np.where(outside, 1.0, share)[:, None]
+    return beyond
+
+
+def deviation_sizes(
+    relaxations: Sequence[Relaxation], duration: float, t: Array, deviation: Array
+) -> list[Array]:
+    """Return for each relaxation how far its rows are off the path in its window, (K,).
+
+    Zero outside the window. Parameters as in `excess`.
+    """
+    return [_size(item, duration, t, deviation) for item in relaxations]
+
+
+def _size(item: Relaxation, duration: float, t: Array, deviation: Array) -> Array:
+    first, last = item.window(duration)
+    inside = (t >= first) & (t <= last)
+    return np.asarray(np.linalg.norm(deviation[:, item.indices], axis=1) * inside)
+
+
+def _prescribed(path: Path, task: Task) -> list[str]:
+    """Return the rows of the deviation that the task prescribes."""
+    rows = [_ROWS[k] for k in task.rows]
+    if task is Task.PLANAR_POSE:
+        # Its angle is about the world's z axis: only there is rz that angle.
+        axes = path.samples(np.linspace(0.0, path.duration, 9)).rotation[:, :, 2]
+        if not np.allclose(axes, [0.0, 0.0, 1.0]):
+            rows.remove("rz")
+    return rows
