@@ -45,7 +45,7 @@ def objective_with(
     rollout = Rollout(robot, path, rows, grid)
     functions = PolynomialNullMotion(1, "joint").functions(grid.stage_times, path.duration)
     table = NullMotionTable(functions, None, robot.dof)
-    conditions = AugmentedLagrangian([constraint.bind(robot, rows, start)], grid)
+    conditions = AugmentedLagrangian([constraint.bind(robot, rows, start, start)], grid)
     free = FreeStart(robot, rows, start)
     return Objective(rollout, table, [sm.JointVelocity()], free, conditions), conditions
 
@@ -70,7 +70,7 @@ def test_gradients_equal_central_differences(constraint: str, name: str, task: s
 def test_tangents_equal_central_differences(constraint: str) -> None:
     made = CONSTRAINTS[constraint](robot_named("panda"))
     objective, _ = objective_with(made, "panda", "pose")
-    bound = made.bind(robot_named("panda"), sm.Task.POSE, np.zeros(7))
+    bound = made.bind(robot_named("panda"), sm.Task.POSE, np.zeros(7), np.zeros(7))
     x = 0.02 * np.random.default_rng(2).normal(size=objective.size)
     tangents: NodeTangents = objective.node_tangents(x)
     exact = bound.tangents(objective.rollout.samples(), tangents)
@@ -167,6 +167,36 @@ def test_end_configuration_is_reached(panda_circle: Circle) -> None:
     plan = sm.plan(panda_circle(constraints=constraints))
     assert plan.certificate.verified
     np.testing.assert_allclose(plan.trajectory.q[-1], target, atol=1e-7)
+
+
+def test_an_end_velocity_is_reached_and_checked(panda_circle: Circle) -> None:
+    """Rest where the path rests; the velocity of a motion known to be possible where it moves."""
+    rest = sm.plan(panda_circle("pointing", constraints=(*LIMITS, sm.EndVelocity())))
+    assert rest.certificate.verified, rest.certificate.verdict
+    np.testing.assert_allclose(rest.trajectory.qd[-1], 0.0, atol=1e-6)
+    problem = panda_circle("pointing")
+    first = problem.path.pose(0.0)
+    path = sm.Circle.around(first, 0.15, 4.0, normal=(1.0, 0.0, 0.0), time_law="constant")
+    problem = dataclasses.replace(problem, path=path)
+    with pytest.raises(sm.ProblemError, match="cannot end at rest"):
+        dataclasses.replace(problem, constraints=[sm.EndVelocity()])
+    free = sm.plan(problem)
+    end, target = free.trajectory.q[-1], free.trajectory.qd[-1]
+    ends = (sm.EndConfiguration(end), sm.EndVelocity(target))
+    kept = sm.plan(dataclasses.replace(problem, constraints=(*LIMITS, *ends)))
+    assert kept.certificate.verified, kept.certificate.verdict
+    np.testing.assert_allclose(kept.trajectory.qd[-1], target, atol=1e-6)
+    for name in ("end_velocity", "end"):
+        wrong = dataclasses.replace(kept.requirements, **{name: target + 0.1})
+        assert not dataclasses.replace(kept, requirements=wrong).check().verified
+
+
+def test_a_jump_in_velocity_is_refused_where_the_path_repeats(panda_circle: Circle) -> None:
+    plan = sm.plan(panda_circle(constraints=(*LIMITS, sm.ClosedPath(velocity=False))))
+    assert plan.certificate.verified
+    wanted = dataclasses.replace(plan.requirements, closed_velocity=True)
+    check = dataclasses.replace(plan, requirements=wanted).check()
+    assert "off that of the start" in check.verdict
 
 
 def test_unreachable_limits_are_named(panda_circle: Circle) -> None:

@@ -57,8 +57,10 @@ class Requirements:
         Acceleration limits [rad/s² or m/s²]; without them none are checked.
     end : (n,) or None
         q(T) [rad or m].
-    closed : bool
-        Whether q(T) = q(0) is wanted.
+    end_velocity : (n,) or None
+        q̇(T) [rad/s or m/s].
+    closed, closed_velocity : bool
+        Whether q(T) = q(0) is wanted, and q̇(T) = q̇(0).
     collision : CollisionModel or None
         Bodies to keep apart; without it clearance is not checked.
     clearance : float
@@ -72,7 +74,9 @@ class Requirements:
     velocity: Array | None = None
     acceleration: Array | None = None
     end: Array | None = None
+    end_velocity: Array | None = None
     closed: bool = False
+    closed_velocity: bool = False
     collision: CollisionModel | None = None
     clearance: float = 0.0
     relaxations: tuple[Relaxation, ...] = ()
@@ -349,7 +353,7 @@ def _failures(
     return tuple(failures)
 
 
-# What closed paths and end configurations may miss by [rad or m].
+# What closed paths, end configurations and end velocities may miss by [rad or m, per s].
 _ARRIVED = 1e-6
 
 
@@ -374,9 +378,24 @@ def _unmet(
         )
     if wanted.closed and not closure <= _ARRIVED:
         failures.append(f"the end is {closure:.2e} (rad or m) away from the start")
-    if wanted.end is not None:
-        miss = np.abs(trajectory.q[-1] - wanted.end)
+    ends = (
+        ("joint '{}' ends {:.2e} away from where it should", trajectory.q[-1], wanted.end),
+        (
+            "joint '{}' ends with a velocity {:.2e} off the one asked for",
+            trajectory.qd[-1],
+            wanted.end_velocity,
+        ),
+        (
+            "joint '{}' ends with a velocity {:.2e} off that of the start",
+            trajectory.qd[-1],
+            trajectory.qd[0] if wanted.closed_velocity else None,
+        ),
+    )
+    for text, actual, target in ends:
+        if target is None:
+            continue
+        miss = np.abs(actual - target)
         if not miss.max() <= _ARRIVED:
             joint = trajectory.joint_names[int(np.argmax(miss))]
-            failures.append(f"joint '{joint}' ends {miss.max():.2e} away from where it should")
+            failures.append(text.format(joint, miss.max()))
     return tuple(failures)

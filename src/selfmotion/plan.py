@@ -251,11 +251,12 @@ def _requirements_to_dict(plan: Plan) -> dict[str, Any]:
     wanted, clearance = plan.requirements, plan.clearance
     arrays = {
         name: None if getattr(wanted, name) is None else getattr(wanted, name).tolist()
-        for name in ("lower", "upper", "velocity", "acceleration", "end")
+        for name in ("lower", "upper", "velocity", "acceleration", "end", "end_velocity")
     }
     return {
         **arrays,
         "closed": wanted.closed,
+        "closed_velocity": wanted.closed_velocity,
         "relaxations": [item.to_dict() for item in wanted.relaxations],
         "clearance": None
         if clearance is None
@@ -274,10 +275,10 @@ def _requirements_from_dict(description: Mapping[str, Any]) -> dict[str, Any]:
     if stored is not None:
         obstacles = tuple(obstacle_from_dict(item) for item in stored["obstacles"])
         clearance = Clearance(obstacles, stored["distance"], stored["srdf"])
-    closed = values.pop("closed")
-    relaxations = tuple(Relaxation(**item) for item in values.pop("relaxations", ()))
+    switches = {name: values.pop(name) for name in ("closed", "closed_velocity")}
+    relaxations = tuple(Relaxation(**item) for item in values.pop("relaxations"))
     arrays: dict[str, Any] = {
         name: None if x is None else np.array(x) for name, x in values.items()
     }
-    requirements = Requirements(**arrays, closed=closed, relaxations=relaxations)
+    requirements = Requirements(**arrays, **switches, relaxations=relaxations)
     return {"clearance": clearance, "requirements": requirements}

@@ -104,6 +104,7 @@ class Problem:
         self._check_rank()
         self._check_costs()
         self._check_closed()
+        self._check_rest()
         if self.start is not None:
             start = read_only(self.robot.configuration(self.start))
             object.__setattr__(self, "start", start)
@@ -119,9 +120,12 @@ class Problem:
         """The start configuration (n,), or None where it is free."""
         return None if self.start is None else np.asarray(self.start, dtype=np.float64)
 
-    def bind_constraints(self, start: Array) -> tuple[BoundConstraint, ...]:
-        """Return the constraints for this arm and a start configuration (n,)."""
-        return tuple(item.bind(self.robot, self.rows, start) for item in self.constraints)
+    def bind_constraints(self, start: Array, end: Array) -> tuple[BoundConstraint, ...]:
+        """Return the constraints for this arm, given first and last configuration, (n,) each.
+
+        Those of the motion that the optimisation begins with.
+        """
+        return tuple(item.bind(self.robot, self.rows, start, end) for item in self.constraints)
 
     @cached_property
     def clearance(self) -> Clearance | None:
@@ -196,6 +200,21 @@ class Problem:
                 f"and {rotation:.3g} rad from where it began"
             )
 
+    def _check_rest(self) -> None:
+        if not any(isinstance(x, EndVelocity) and not np.any(x.qd) for x in self.constraints):
+            return
+        duration = self.path.duration
+        rotation = self.path.pose(duration).rotation
+        twist = self.rows.select(self.path.twist(duration)[:, None], rotation)
+        speed = float(np.abs(twist).max())
+        # Waypoints and velocity functions end at rest up to their own rounding.
+        if speed > _ON_PATH:
+            raise ProblemError(
+                f"the motion cannot end at rest: the path ends at {speed:.3g} m/s or rad/s; give "
+                f"the path a time law that ends at rest (time_law='minimum_jerk'), or ask for "
+                f"another end velocity"
+            )
+
     def _check_start(self, start: Array) -> None:
         pose = self.path.pose(0.0)
         position, rotation = self.rows.miss(pose, self.robot.pose(start))
@@ -230,8 +249,10 @@ def _require(wanted: Requirements, item: Constraint, robot: RobotModel) -> Requi
         return replace(wanted, acceleration=read_only(limit))
     if isinstance(item, EndConfiguration):
         return replace(wanted, end=read_only(item.q))
+    if isinstance(item, EndVelocity):
+        return replace(wanted, end_velocity=item.target(robot))
     if isinstance(item, ClosedPath):
-        return replace(wanted, closed=True)
+        return replace(wanted, closed=True, closed_velocity=item.velocity)
     if isinstance(item, Clearance):
         return replace(wanted, collision=item.model(robot), clearance=item.distance)
     return wanted

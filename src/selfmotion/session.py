@@ -99,7 +99,8 @@ class Session:
         )
         reference = self._reference(configuration)
         self._frame = self._null_space(reference)
-        conditions = AugmentedLagrangian(problem.bind_constraints(configuration), reference.grid)
+        bound = problem.bind_constraints(configuration, reference.samples().q[-1].copy())
+        conditions = AugmentedLagrangian(bound, reference.grid)
         self._objective = self._bind(reference.grid, conditions)
         self._minimum: Minimum | None = None
         # Whether the last motion kept all constraints: so far none is known to be active.

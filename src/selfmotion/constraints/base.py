@@ -49,8 +49,11 @@ class NodeTangents:
 class Constraint(Protocol):
     """A condition on the motion, not yet bound to an arm."""
 
-    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundConstraint":
-        """Return the constraint for an arm, task and start (n,); ProblemError where it misfits."""
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundConstraint":
+        """Return the constraint for an arm and a task; ProblemError where it misfits.
+
+        `start` and `end` (n,) are those of the motion that the optimisation begins with.
+        """
 
 
 class BoundConstraint(Protocol):

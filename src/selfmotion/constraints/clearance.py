@@ -40,7 +40,7 @@ class Clearance:
         """Return the exact model that the certificate measures with."""
         return CollisionModel(robot, self.obstacles, self.srdf)
 
-    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundClearance":
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundClearance":
         """See `Constraint.bind`."""
         if not self.distance >= 0.0:
             raise ProblemError(f"clearance: distance is {self.distance} m, expected ≥ 0")

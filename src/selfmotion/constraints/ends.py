@@ -2,8 +2,10 @@
 
 The tool's rows of q(T) and q̇(T) are given by the path already. What is left to ask for are the r
 coordinates along the self-motion: h = Nᵀ(x(T) - target), with N an orthonormal null-space basis at
-the target (or at the start). Two configurations on the same pose with equal coordinates are equal,
-near the reference; the residual is free of what the integration leaves of the path error.
+the target configuration, at the start for closed paths, or at the end of the motion that the
+optimisation begins with. Two configurations on the same pose with equal coordinates are equal, near
+the reference, and so are two velocities with the same tool velocity; the residual is free of what
+the integration leaves of the path error.
 """
 
 from dataclasses import dataclass
@@ -33,7 +35,7 @@ class EndConfiguration:
 
     q: npt.ArrayLike
 
-    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundEnd":
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
         """See `Constraint.bind`."""
         target = read_only(robot.configuration(self.q))
         null = null_basis(robot, task, target)
@@ -42,7 +44,9 @@ class EndConfiguration:
 
 @dataclass(frozen=True, eq=False)
 class EndVelocity:
-    """The motion ends with a joint velocity, in the directions that the path leaves free.
+    """The motion ends with a joint velocity; 0 for rest.
+
+    The tool's rows of it have to be those of the path's end: for rest, the path has to end at rest.
 
     Parameters
     ----------
@@ -52,11 +56,14 @@ class EndVelocity:
 
     qd: npt.ArrayLike = 0.0
 
-    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundEnd":
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
         """See `Constraint.bind`."""
+        return BoundEnd("end velocity", (1,), self.target(robot), null_basis(robot, task, end))
+
+    def target(self, robot: RobotModel) -> Array:
+        """Return q̇(T) (n,) for an arm."""
         qd = np.broadcast_to(np.asarray(self.qd, dtype=np.float64), (robot.dof,))
-        target = read_only(robot.configuration(qd))
-        return BoundEnd("end velocity", (1,), target, null_basis(robot, task, start))
+        return read_only(robot.configuration(qd))
 
 
 @dataclass(frozen=True)
@@ -71,7 +78,7 @@ class ClosedPath:
 
     velocity: bool = True
 
-    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundEnd":
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
         """See `Constraint.bind`."""
         orders = (0, 1) if self.velocity else (0,)
         return BoundEnd("closed path", orders, None, null_basis(robot, task, start))

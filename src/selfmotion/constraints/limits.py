@@ -34,7 +34,7 @@ class JointPositionLimits:
     upper: npt.ArrayLike | None = None
     margin: float = 2e-4
 
-    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundLimits":
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
         lower = robot.lower if self.lower is None else read_only(self.lower)
         upper = robot.upper if self.upper is None else read_only(self.upper)
@@ -56,7 +56,7 @@ class JointVelocityLimits:
     limit: npt.ArrayLike | None = None
     margin: float = 2e-3
 
-    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundLimits":
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
         limit = robot.velocity_limit if self.limit is None else read_only(self.limit)
         return BoundLimits.symmetric(robot, "velocity limits", 1, limit, self.margin)
@@ -77,7 +77,7 @@ class JointAccelerationLimits:
     limit: npt.ArrayLike
     margin: float = 1e-2
 
-    def bind(self, robot: RobotModel, task: Task, start: Array) -> "BoundLimits":
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
         limit = np.broadcast_to(np.asarray(self.limit, dtype=np.float64), (robot.dof,))
         return BoundLimits.symmetric(robot, "acceleration limits", 2, limit, self.margin)
