@@ -1,6 +1,7 @@
 """Quadratic forms of the motion and its derivatives, and other costs of the joints alone."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -39,7 +40,33 @@ class _Quadratic:
 
 
 @dataclass(frozen=True, eq=False)
-class JointVelocity(_Quadratic):
+class _Derivative(_Quadratic):
+    """½ xᵀWx for a derivative x of q."""
+
+    _order: ClassVar[int]
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        return half_square(self._w, self._of(samples))
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`: Wx."""
+        return Partials(**{_DERIVATIVES[self._order]: weighted(self._w, self._of(samples))})
+
+    def curvature(self, dof: int) -> dict[int, Array]:
+        """See `Cost.curvature`: W."""
+        return {self._order: weight_matrix(self._w, dof)}
+
+    def _of(self, samples: Samples) -> Array:
+        derivative: Array = getattr(samples, _DERIVATIVES[self._order])
+        return derivative
+
+
+_DERIVATIVES = {1: "qd", 2: "qdd", 3: "qddd"}
+
+
+@dataclass(frozen=True, eq=False)
+class JointVelocity(_Derivative):
     """Joint speed: G = ½ q̇ᵀWq̇ [rad²/s²], the first term of the paper's eq. 11 and 12.
 
     Parameters
@@ -49,22 +76,11 @@ class JointVelocity(_Quadratic):
     """
 
     name: str = "joint velocity"
-
-    def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
-        return half_square(self._w, samples.qd)
-
-    def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: Wq̇."""
-        return Partials(qd=weighted(self._w, samples.qd))
-
-    def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
-        return {1: weight_matrix(self._w, dof)}
+    _order: ClassVar[int] = 1
 
 
 @dataclass(frozen=True, eq=False)
-class JointAcceleration(_Quadratic):
+class JointAcceleration(_Derivative):
     """Joint acceleration: G = ½ q̈ᵀWq̈ [rad²/s⁴], q̈ by five-point differences of q̇.
 
     Parameters
@@ -74,22 +90,11 @@ class JointAcceleration(_Quadratic):
     """
 
     name: str = "joint acceleration"
-
-    def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
-        return half_square(self._w, samples.qdd)
-
-    def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: Wq̈."""
-        return Partials(qdd=weighted(self._w, samples.qdd))
-
-    def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
-        return {2: weight_matrix(self._w, dof)}
+    _order: ClassVar[int] = 2
 
 
 @dataclass(frozen=True, eq=False)
-class JointJerk(_Quadratic):
+class JointJerk(_Derivative):
     """Joint jerk: G = ½ q⃛ᵀWq⃛ [rad²/s⁶], q⃛ by five-point differences of q̇.
 
     Parameters
@@ -99,18 +104,7 @@ class JointJerk(_Quadratic):
     """
 
     name: str = "joint jerk"
-
-    def value(self, samples: Samples) -> Array:
-        """See `Cost.value`."""
-        return half_square(self._w, samples.qddd)
-
-    def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: Wq⃛."""
-        return Partials(qddd=weighted(self._w, samples.qddd))
-
-    def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
-        return {3: weight_matrix(self._w, dof)}
+    _order: ClassVar[int] = 3
 
 
 @dataclass(frozen=True, eq=False)
