@@ -239,6 +239,11 @@ def test_six_joints_and_a_full_pose_with_a_cone() -> None:
         plan = sm.plan(sm.Problem(robot, path, start=given, relaxations=[cone]))
         assert plan.certificate.verified, plan.certificate.verdict
         assert plan.report.cost < 0.99 * plan.report.initial_cost
+    circle = sm.Circle.around(robot.pose(start), 0.05, 2.0, normal=(1.0, 0.0, 0.0))
+    closed = sm.plan(
+        sm.Problem(robot, circle, start=start, relaxations=[cone], constraints=[sm.ClosedPath()])
+    )
+    assert closed.certificate.verified, closed.certificate.verdict
 
 
 def test_closed_paths_begin_and_end_on_the_path(panda_circle: Callable) -> None:

@@ -40,8 +40,7 @@ class _Term:
 
     def excess(self, h: Array) -> float:
         """Return the largest violation."""
-        worst = np.abs(h).max() if self.constraint.equality else h.max()
-        return float(max(worst, 0.0))
+        return float(np.max(np.abs(h) if self.constraint.equality else h, initial=0.0))
 
 
 class AugmentedLagrangian:

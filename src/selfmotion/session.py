@@ -180,7 +180,7 @@ class Session:
         for _ in range(_CLOSING_STEPS):
             tangents = self._counted(lambda: objective.node_tangents(self._x))
             residual, rows = conditions.equalities(objective.rollout.samples(), tangents)
-            if np.abs(residual).max() < _CLOSED:
+            if np.max(np.abs(residual), initial=0.0) < _CLOSED:
                 return
             spread = h @ rows.T
             # Least squares: conditions may depend on each other.
