@@ -1,6 +1,7 @@
 """Distance from obstacles, and of links from each other."""
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -44,7 +45,14 @@ class Clearance:
         """See `Constraint.bind`."""
         if not self.distance >= 0.0:
             raise ProblemError(f"clearance: distance is {self.distance} m, expected ≥ 0")
-        return BoundClearance(ClearanceModel(self.model(robot)), self.distance)
+        return BoundClearance(_clearance_model(self, robot), self.distance)
+
+
+# Each start of a plan binds the constraint anew; fitting the world to the arm takes longer than
+# many a motion. Both arguments are compared by identity.
+@lru_cache(maxsize=4)
+def _clearance_model(clearance: Clearance, robot: RobotModel) -> ClearanceModel:
+    return ClearanceModel(clearance.model(robot))
 
 
 @dataclass(frozen=True, eq=False)
