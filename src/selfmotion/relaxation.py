@@ -64,7 +64,8 @@ class Relaxation:
         object.__setattr__(self, "rows", rows)
         if not rows or len(set(rows)) != len(rows) or not set(rows) <= set(_ROWS):
             raise ProblemError(
-                f"relaxation: rows are {rows}, expected some of {', '.join(_ROWS)}, each once"
+                f"relaxation: rows are '{', '.join(map(str, rows))}', expected some of "
+                f"{', '.join(_ROWS)}, each once"
             )
         if not (set(rows) <= set(_POSITION) or set(rows) <= set(_ROTATION)):
             raise ProblemError(
