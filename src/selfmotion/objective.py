@@ -8,6 +8,7 @@ from selfmotion.arrays import Array
 from selfmotion.augmented_lagrangian import AugmentedLagrangian
 from selfmotion.constraints import NodeTangents
 from selfmotion.costs import Cost
+from selfmotion.damping import PATH_ERROR
 from selfmotion.null_motion import NullMotionTable
 from selfmotion.rollout import Rollout
 from selfmotion.start import Start
@@ -29,6 +30,9 @@ class Objective:
     start : Start
         z → q(0).
     constraints : AugmentedLagrangian, optional
+    path_weight : float
+        w of a further term ∫ ½ w |S e|² dt, e the pose error [m, rad]: for motions that damping
+        takes off the path.
 
     Attributes
     ----------
@@ -43,10 +47,12 @@ class Objective:
         costs: Sequence[Cost],
         start: Start,
         constraints: AugmentedLagrangian | None = None,
+        path_weight: float = 0.0,
     ) -> None:
         self.rollout, self.null_motion, self.start = rollout, null_motion, start
         self.constraints = constraints
         self._costs = tuple(costs)
+        self._path_weight = path_weight
         self.evaluations = 0
         self.gradient_evaluations = 0
         self._at: Array | None = None
@@ -113,6 +119,11 @@ class Objective:
                     tangent = (grid.differentiation(order - 1) @ nodes).reshape(by_qd.shape)
                 weighted = grid.weights[:, None, None] * (weight @ tangent)
                 metric += tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size)
+        if self._path_weight:
+            # ∂(S e) = -J ∂q: nothing on the path, where the self-motion does not move the tool.
+            miss = (self.rollout.samples().task_jacobian @ by_q).reshape(-1, self.size)
+            weights = np.repeat(self._path_weight * grid.weights, self.rollout.task.dimension)
+            metric += (miss.T * weights) @ miss
         if self.constraints is not None:
             tangents = self._at_nodes(by_q, by_qd)
             metric += self.constraints.curvature(self.rollout.samples(), tangents)
@@ -137,6 +148,8 @@ class Objective:
         self.evaluations += 1
         self._at = x.copy()
         self._terms = {cost.name: np.inf for cost in self._costs}
+        if self._path_weight:
+            self._terms[PATH_ERROR] = np.inf
         start = self.start.configuration(x[: self.start.size])
         if start is None:
             return
@@ -146,9 +159,22 @@ class Objective:
         samples = self.rollout.samples()
         for cost in self._costs:
             self._terms[cost.name] = float(samples.weights @ cost.value(samples))
+        if self._path_weight:
+            square = np.sum(self._task_error() ** 2, axis=1)
+            self._terms[PATH_ERROR] = float(samples.weights @ (0.5 * self._path_weight * square))
 
-    def _cotangents(self) -> tuple[Array, Array]:
-        """Return the derivatives of `value` with respect to q and q̇ at the stages."""
+    def _task_error(self) -> Array:
+        """Return the pose error at the stages with 0 in the rows that are free, (S, 6) [m, rad].
+
+        Its length is that of S e also for `Task.POINTING`, whose error has no part about the tool's
+        axis.
+        """
+        task = self.rollout.task
+        counts = np.isin(np.arange(6), task.rows) | (task.tool_axes & (np.arange(6) >= 3))
+        return np.where(counts, self.rollout.error, 0.0)
+
+    def _cotangents(self) -> tuple[Array, Array, Array | None]:
+        """Return the derivatives of `value` with respect to q, q̇ and e at the stages."""
         samples, grid = self.rollout.samples(), self.rollout.grid
         by_q, by_qd = np.zeros_like(samples.q), np.zeros_like(samples.qd)
         weights, nodes = samples.weights[:, None], grid.node_stages
@@ -168,7 +194,8 @@ class Objective:
                 by_qd[nodes] += condition.qd
             if condition.qdd is not None:
                 by_qd[nodes] += grid.differentiation(1)[nodes].T @ condition.qdd
-        return by_q, by_qd
+        by_error = self._path_weight * weights * self._task_error() if self._path_weight else None
+        return by_q, by_qd, by_error
 
     def _sensitivities(self, x: Array) -> tuple[Array, Array]:
         """Return ∂q/∂[z | x] and ∂q̇/∂[z | x] at the stages, (S, n, size)."""

@@ -10,9 +10,10 @@ import numpy as np
 
 from selfmotion import files
 from selfmotion.arrays import Array
-from selfmotion.certificate import Certificate, Extreme, Requirements, certify
+from selfmotion.certificate import Certificate, DampedStretch, Extreme, Requirements, certify
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.constraints import Clearance
+from selfmotion.damping import DampingLaw
 from selfmotion.errors import FileFormatError, PlanError
 from selfmotion.path import Path, path_from_dict
 from selfmotion.quasi_newton import Iteration, Status
@@ -230,6 +231,7 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Plan:
         for key, value in description["certificate"].items()
     }
     certificate["failures"] = tuple(certificate["failures"])
+    certificate["damped"] = tuple(DampedStretch(**item) for item in certificate["damped"])
     return Plan(
         robot=rebuild_robot(**description["robot"]),
         path=path_from_dict(description["path"]),
@@ -254,6 +256,7 @@ def _requirements_to_dict(plan: Plan) -> dict[str, Any]:
     return {
         **arrays,
         "closed": wanted.closed,
+        "damping": None if wanted.damping is None else dataclasses.asdict(wanted.damping),
         "clearance": None
         if clearance is None
         else {
@@ -271,8 +274,10 @@ def _requirements_from_dict(description: Mapping[str, Any]) -> dict[str, Any]:
     if stored is not None:
         obstacles = tuple(obstacle_from_dict(item) for item in stored["obstacles"])
         clearance = Clearance(obstacles, stored["distance"], stored["srdf"])
-    closed = values.pop("closed")
+    closed, damping = values.pop("closed"), values.pop("damping")
+    law = None if damping is None else DampingLaw(**damping)
     arrays: dict[str, Any] = {
         name: None if x is None else np.array(x) for name, x in values.items()
     }
-    return {"clearance": clearance, "requirements": Requirements(**arrays, closed=closed)}
+    wanted = Requirements(**arrays, closed=closed, damping=law)
+    return {"clearance": clearance, "requirements": wanted}

@@ -21,6 +21,7 @@ from selfmotion.constraints import (
     JointVelocityLimits,
 )
 from selfmotion.costs import Cost, JointVelocity
+from selfmotion.damping import PATH_ERROR, Damping, DampingLaw
 from selfmotion.errors import ProblemError, RedundancyError, StartError
 from selfmotion.null_motion import NullMotion, PolynomialNullMotion
 from selfmotion.path import Path
@@ -51,6 +52,10 @@ class Problem:
         Their integrals are added up. By default ∫ ½ q̇ᵀq̇ dt.
     constraints : sequence of Constraint
         What the motion must keep. By default the URDF's limits of joint position and velocity.
+    damping : Damping, optional
+        Go through singular poses, and past the edge of the workspace, at the price of the path: by
+        default the tool stays on the path, and there is no motion through such poses. Adds the
+        cost "path error".
 
     Raises
     ------
@@ -71,6 +76,7 @@ class Problem:
     constraints: Sequence[Constraint] = field(
         default_factory=lambda: (JointPositionLimits(), JointVelocityLimits())
     )
+    damping: Damping | None = None
 
     def __post_init__(self) -> None:
         for name, kind in (("robot", RobotModel), ("path", Path)):
@@ -87,6 +93,8 @@ class Problem:
                 f"null_motion is {self.null_motion!r}, expected PolynomialNullMotion or "
                 f"BSplineNullMotion"
             )
+        if not isinstance(self.damping, Damping | None):
+            raise ProblemError(f"damping is {self.damping!r}, expected a Damping or None")
         if isinstance(self.start, str):
             if self.start != "free":
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
@@ -120,9 +128,17 @@ class Problem:
         return found[0] if found else None
 
     @cached_property
+    def damping_law(self) -> DampingLaw | None:
+        """The damping in numbers [m, rad] for this arm and task."""
+        if self.damping is None:
+            return None
+        best = self.robot.task_jacobian(self.robot.dexterous_configuration(self.rows), self.rows)
+        return self.damping.law(float(np.linalg.svd(best, compute_uv=False)[-1]))
+
+    @cached_property
     def requirements(self) -> Requirements:
         """What the certificate has to check besides the path."""
-        wanted = Requirements()
+        wanted = Requirements(damping=self.damping_law)
         for item in self.constraints:
             wanted = _require(wanted, item, self.robot)
         return wanted
@@ -147,7 +163,9 @@ class Problem:
 
     def _check_costs(self) -> None:
         names = [cost.name for cost in self.costs]
-        if not names:
+        if self.damping is not None:
+            names.append(PATH_ERROR)
+        if not self.costs:
             raise ProblemError("no cost is given, so that nothing tells one motion from another")
         twice = [name for name in names if names.count(name) > 1]
         if twice:
