@@ -11,6 +11,7 @@ import pytest
 import selfmotion as sm
 from conftest import PANDA_HOME, central_difference, robot_named, short_line, start_of
 from selfmotion.arrays import Array
+from selfmotion.damping import DampingLaw
 from selfmotion.deviation import Deviation
 from selfmotion.grid import Grid
 from selfmotion.null_motion import NullMotionTable, PolynomialNullMotion
@@ -51,25 +52,31 @@ def turning_path(robot: sm.RobotModel, start: Array) -> sm.Path:
     return sm.Line(pose, end, 1.5)
 
 
-def objective_with(task: str, name: str, *, free: bool) -> Objective:
+def objective_with(task: str, name: str, *, free: bool, damped: bool) -> Objective:
     robot, rows, relaxations = robot_named("panda"), sm.Task.of(task), TASKS[task][name]
     start = start_of(robot, task)
     path = turning_path(robot, start)
     grid = Grid.aligned(path.knots, 12)
     functions = PolynomialNullMotion(1, "joint").functions(grid.stage_times, path.duration)
+    # Above every singular value on the way: damped throughout, with the path error as a cost.
+    law = DampingLaw(0.5, 0.25) if damped else None
     return Objective(
-        Rollout(robot, path, rows, grid),
+        Rollout(robot, path, rows, grid, damping=law),
         NullMotionTable(functions, None, robot.dof),
         [sm.JointVelocity(), sm.Posture(np.ones(7), posture=PANDA_HOME)],
         FreeStart(robot, rows, start) if free else FixedStart(start),
         deviation=Deviation(path, relaxations, grid.stage_times, (not free, False)),
+        path_weight=100.0 if damped else 0.0,
     )
 
 
+@pytest.mark.parametrize("damped", [False, True])
 @pytest.mark.parametrize("free", [False, True])
 @pytest.mark.parametrize(("task", "name"), CASES)
-def test_gradient_and_tangents_equal_central_differences(task: str, name: str, free: bool) -> None:
-    objective = objective_with(task, name, free=free)
+def test_gradient_and_tangents_equal_central_differences(
+    task: str, name: str, free: bool, damped: bool
+) -> None:
+    objective = objective_with(task, name, free=free, damped=damped)
     x = 0.02 * np.random.default_rng(5).normal(size=objective.size)
     exact = objective.gradient(x)
     approximate = central_difference(objective.value, x)

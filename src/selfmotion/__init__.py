@@ -42,6 +42,7 @@ from selfmotion.costs import (
     Posture,
     SmallestSingularValue,
 )
+from selfmotion.damping import Damping
 from selfmotion.errors import (
     BreakdownError,
     FileFormatError,
@@ -84,6 +85,7 @@ __all__ = [
     "Cost",
     "Cylinder",
     "DampedLeastSquares",
+    "Damping",
     "DirectionalManipulability",
     "EndConfiguration",
     "EndVelocity",

@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from selfmotion.arrays import Array
 from selfmotion.collision import CollisionModel
+from selfmotion.damping import DampingLaw
 from selfmotion.errors import ProblemError
 from selfmotion.path import Path
 from selfmotion.relaxation import Relaxation, deviation_sizes, excess
@@ -67,6 +68,8 @@ class Requirements:
         Smallest distance between bodies [m].
     relaxations : tuple of Relaxation
         Rows in which the tool may leave the path: only what is beyond them counts as an error.
+    damping : DampingLaw or None
+        No requirement: how the motion was damped near singular poses, to tell where and what for.
     """
 
     lower: Array | None = None
@@ -80,6 +83,7 @@ class Requirements:
     collision: CollisionModel | None = None
     clearance: float = 0.0
     relaxations: tuple[Relaxation, ...] = ()
+    damping: DampingLaw | None = None
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,33 @@ class Extreme:
     value: float
     time: float
     name: str
+
+
+@dataclass(frozen=True)
+class DampedStretch:
+    """A stretch of time over which the inverse was damped.
+
+    Attributes
+    ----------
+    start, end : float
+        [s].
+    singular_value : float
+        Smallest singular value σ of the task Jacobian on it [m, rad].
+    factor : float
+        Largest damping λ on it [m, rad].
+    """
+
+    start: float
+    end: float
+    singular_value: float
+    factor: float
+
+    def __str__(self) -> str:
+        """Return the stretch in words."""
+        return (
+            f"{self.start:.3f} to {self.end:.3f} s (smallest singular value "
+            f"{self.singular_value:.3g}, λ up to {self.factor:.3g})"
+        )
 
 
 @dataclass(frozen=True)
@@ -130,6 +161,8 @@ class Certificate:
     deviations : tuple of Extreme
         For each relaxation the largest deviation of its rows from the path, in its window [m or
         rad].
+    damped : tuple of DampedStretch
+        Where the inverse was damped, in order of time.
     """
 
     position_error: Extreme
@@ -143,6 +176,7 @@ class Certificate:
     samples: int
     failures: tuple[str, ...]
     deviations: tuple[Extreme, ...] = ()
+    damped: tuple[DampedStretch, ...] = ()
 
     @property
     def verified(self) -> bool:
@@ -156,9 +190,13 @@ class Certificate:
             return (
                 f"verified: at most {self.position_error.value:.1e} m and "
                 f"{self.rotation_error.value:.1e} rad off the path"
-                f"{', beyond what is relaxed' if self.deviations else ''}"
+                f"{', beyond what is relaxed' if self.deviations else ''}{self._damping_text}"
             )
         return "not verified: " + "; ".join(self.failures)
+
+    @property
+    def _damping_text(self) -> str:
+        return f"; damped {' and '.join(map(str, self.damped))}" if self.damped else ""
 
 
 def certify(
@@ -207,6 +245,7 @@ def certify(
         acceleration = _extreme(share, middle, names, np.argmax)
     clearance = None if wanted.collision is None else _clearance(wanted.collision, t, q)
     closure = float(np.abs(trajectory.q[-1] - trajectory.q[0]).max())
+    damped = () if wanted.damping is None else _damped_stretches(wanted.damping, t, singular)
     return Certificate(
         *worst,
         smallest_singular_value=_extreme(singular, t, tool, np.argmin),
@@ -215,7 +254,7 @@ def certify(
         closure=closure,
         samples=len(t),
         failures=(
-            *_failures(*worst, path, trajectory, tolerance),
+            *_failures(*worst, path, trajectory, tolerance, damped),
             *_unmet(wanted, acceleration, clearance, closure, trajectory),
         ),
         deviations=tuple(
@@ -226,6 +265,7 @@ def certify(
                 strict=True,
             )
         ),
+        damped=damped,
     )
 
 
@@ -251,6 +291,30 @@ def _deviation(
         rows = np.concatenate([jacobian[:, :3], turned], axis=1)
     values = np.linalg.svd(rows[:, task.rows], compute_uv=False)
     return miss, values[:, -1].astype(np.float64)
+
+
+def _damped_stretches(law: DampingLaw, t: Array, singular: Array) -> tuple[DampedStretch, ...]:
+    """Return where the law damps, for smallest singular values (K,) at times (K,)."""
+    factor = law.factor(singular)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], factor > 0.0, [0]])))
+    return tuple(
+        DampedStretch(
+            start=float(t[first]),
+            end=float(t[after - 1]),
+            singular_value=float(singular[first:after].min()),
+            factor=float(factor[first:after].max()),
+        )
+        for first, after in edges.reshape(-1, 2)
+    )
+
+
+def _because(time: float, damped: tuple[DampedStretch, ...]) -> str:
+    """Return what damping has to do with being off the path at a time; "" for nothing."""
+    before = [stretch for stretch in damped if stretch.start <= time]
+    if not before:
+        return ""
+    when = "where" if time <= before[-1].end else "after"
+    return f", {when} damping was active, {before[-1]}"
 
 
 def _clearance(model: CollisionModel, t: Array, q: Array) -> Extreme:
@@ -323,6 +387,7 @@ def _failures(
     path: Path,
     trajectory: Trajectory,
     tolerance: Tolerance,
+    damped: tuple[DampedStretch, ...],
 ) -> tuple[str, ...]:
     failures = []
     # Written so that NaN fails.
@@ -333,12 +398,13 @@ def _failures(
     if not position.value <= tolerance.position:
         failures.append(
             f"'{position.name}' is {position.value:.2e} m off the path at t = {position.time:.3f} "
-            f"s (allowed: {tolerance.position:.0e})"
+            f"s (allowed: {tolerance.position:.0e}){_because(position.time, damped)}"
         )
     if not rotation.value <= tolerance.rotation:
         failures.append(
             f"'{rotation.name}' is {rotation.value:.2e} rad off the path at t = "
             f"{rotation.time:.3f} s (allowed: {tolerance.rotation:.0e})"
+            f"{_because(rotation.time, damped)}"
         )
     if not margin.value >= 0.0:
         failures.append(

@@ -74,6 +74,10 @@ def plan(
     mu: Annotated[
         float, typer.Option(help="Weight of 1/det(JJᵀ), the distance from singular poses.")
     ] = 0.0,
+    damped: Annotated[
+        bool,
+        typer.Option("--damped", help="Go through singular poses, at the price of the path there."),
+    ] = False,
     max_evaluations: Annotated[
         int | None, typer.Option(help="Limit on cost evaluations while optimising.")
     ] = None,
@@ -114,6 +118,7 @@ def plan(
         sm.PolynomialNullMotion(degree),
         tuple(costs),
         relaxations=[_relaxation(text) for text in relax or []],
+        damping=sm.Damping() if damped else None,
     )
     result = _plan_with_progress(problem, max_evaluations)
     report_text.show(result, _console)

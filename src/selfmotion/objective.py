@@ -9,9 +9,11 @@ from selfmotion.arrays import Array
 from selfmotion.augmented_lagrangian import AugmentedLagrangian
 from selfmotion.constraints import NodeTangents
 from selfmotion.costs import Cost
+from selfmotion.damping import PATH_ERROR
 from selfmotion.deviation import Deviation
 from selfmotion.null_motion import NullMotionTable
 from selfmotion.rollout import Rollout
+from selfmotion.samples import Samples
 from selfmotion.start import Start
 
 
@@ -34,6 +36,9 @@ class Objective:
     constraints : AugmentedLagrangian, optional
     deviation : Deviation, optional
         c → the poses and twists that the tool follows; without it those of the path.
+    path_weight : float
+        w of a further term ∫ ½ w |S e|² dt, e the pose error [m, rad]: for motions that damping
+        takes off the path.
 
     Attributes
     ----------
@@ -49,11 +54,13 @@ class Objective:
         start: Start,
         constraints: AugmentedLagrangian | None = None,
         deviation: Deviation | None = None,
+        path_weight: float = 0.0,
     ) -> None:
         self.rollout, self.null_motion, self.start = rollout, null_motion, start
         self.constraints, self._deviation = constraints, deviation
         self._first_pose = rollout.path.pose(0.0)
         self._costs = tuple(costs)
+        self._path_weight = path_weight
         self.evaluations = 0
         self.gradient_evaluations = 0
         self._at: Array | None = None
@@ -129,6 +136,18 @@ class Objective:
                     tangent = (grid.differentiation(order - 1) @ nodes).reshape(by_qd.shape)
                 weighted = grid.weights[:, None, None] * (weight @ tangent)
                 metric += tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size)
+        if self._path_weight:
+            # ∂(S e) = S ∂target - J ∂q: nothing on the path, where the self-motion does not move
+            # the tool.
+            samples = self.rollout.samples()
+            miss = samples.task_jacobian @ by_q
+            if self._deviation is not None:
+                c = self.parts(x)[2]
+                moved = self._deviation.matrix(c)[:, :6]
+                miss[:, :, -len(c) :] -= _task_rows(samples, moved)
+            miss = miss.reshape(-1, self.size)
+            weights = np.repeat(self._path_weight * grid.weights, self.rollout.task.dimension)
+            metric += (miss.T * weights) @ miss
         if self.constraints is not None:
             tangents = self._at_nodes(by_q, by_qd)
             metric += self.constraints.curvature(self.rollout.samples(), tangents)
@@ -153,6 +172,8 @@ class Objective:
         self.evaluations += 1
         self._at = x.copy()
         self._terms = {cost.name: np.inf for cost in self._costs}
+        if self._path_weight:
+            self._terms[PATH_ERROR] = np.inf
         z, coefficients, c = self.parts(x)
         pose = self._first_pose
         if self._deviation is not None:
@@ -168,9 +189,22 @@ class Objective:
         samples = self.rollout.samples()
         for cost in self._costs:
             self._terms[cost.name] = float(samples.weights @ cost.value(samples))
+        if self._path_weight:
+            square = np.sum(self._task_error() ** 2, axis=1)
+            self._terms[PATH_ERROR] = float(samples.weights @ (0.5 * self._path_weight * square))
 
-    def _cotangents(self) -> tuple[Array, Array]:
-        """Return the derivatives of `value` with respect to q and q̇ at the stages."""
+    def _task_error(self) -> Array:
+        """Return the pose error at the stages with 0 in the rows that are free, (S, 6) [m, rad].
+
+        Its length is that of S e also for `Task.POINTING`, whose error has no part about the tool's
+        axis.
+        """
+        task = self.rollout.task
+        counts = np.isin(np.arange(6), task.rows) | (task.tool_axes & (np.arange(6) >= 3))
+        return np.where(counts, self.rollout.error, 0.0)
+
+    def _cotangents(self) -> tuple[Array, Array, Array | None]:
+        """Return the derivatives of `value` with respect to q, q̇ and e at the stages."""
         samples, grid = self.rollout.samples(), self.rollout.grid
         by_q, by_qd = np.zeros_like(samples.q), np.zeros_like(samples.qd)
         weights, nodes = samples.weights[:, None], grid.node_stages
@@ -190,7 +224,8 @@ class Objective:
                 by_qd[nodes] += condition.qd
             if condition.qdd is not None:
                 by_qd[nodes] += grid.differentiation(1)[nodes].T @ condition.qdd
-        return by_q, by_qd
+        by_error = self._path_weight * weights * self._task_error() if self._path_weight else None
+        return by_q, by_qd, by_error
 
     def _sensitivities(self, x: Array) -> tuple[Array, Array]:
         """Return ∂q/∂[z | x | c] and ∂q̇/∂[z | x | c] at the stages, (S, n, size)."""
@@ -208,6 +243,14 @@ class Objective:
         target_matrix[:, :, last:] = self._deviation.matrix(x[last:])
         start_matrix[:, last:] = by_pose @ target_matrix[0, :6, last:]
         return self.rollout.sensitivities(epsilon_matrix, start_matrix, target_matrix)
+
+
+def _task_rows(samples: Samples, twists: Array) -> Array:
+    """Return the prescribed rows of twists (S, 6, k) at the samples, (S, m, k)."""
+    angular = twists[:, 3:]
+    if samples.task.tool_axes:
+        angular = samples.rotation.transpose(0, 2, 1) @ angular
+    return np.concatenate([twists[:, :3], angular], axis=1)[:, samples.task.rows]
 
 
 def inverse_metric(metric: Array, floor: float = 1e-4) -> Array:

@@ -10,9 +10,10 @@ import numpy as np
 
 from selfmotion import files
 from selfmotion.arrays import Array
-from selfmotion.certificate import Certificate, Extreme, Requirements, certify
+from selfmotion.certificate import Certificate, DampedStretch, Extreme, Requirements, certify
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.constraints import Clearance
+from selfmotion.damping import DampingLaw
 from selfmotion.errors import FileFormatError, PlanError
 from selfmotion.path import Path, path_from_dict
 from selfmotion.quasi_newton import Iteration, Status
@@ -232,6 +233,7 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Plan:
     }
     certificate["failures"] = tuple(certificate["failures"])
     certificate["deviations"] = tuple(Extreme(**item) for item in certificate["deviations"])
+    certificate["damped"] = tuple(DampedStretch(**item) for item in certificate["damped"])
     return Plan(
         robot=rebuild_robot(**description["robot"]),
         path=path_from_dict(description["path"]),
@@ -258,6 +260,7 @@ def _requirements_to_dict(plan: Plan) -> dict[str, Any]:
         "closed": wanted.closed,
         "closed_velocity": wanted.closed_velocity,
         "relaxations": [item.to_dict() for item in wanted.relaxations],
+        "damping": None if wanted.damping is None else dataclasses.asdict(wanted.damping),
         "clearance": None
         if clearance is None
         else {
@@ -277,8 +280,10 @@ def _requirements_from_dict(description: Mapping[str, Any]) -> dict[str, Any]:
         clearance = Clearance(obstacles, stored["distance"], stored["srdf"])
     switches = {name: values.pop(name) for name in ("closed", "closed_velocity")}
     relaxations = tuple(Relaxation(**item) for item in values.pop("relaxations"))
+    damping = values.pop("damping")
+    law = None if damping is None else DampingLaw(**damping)
     arrays: dict[str, Any] = {
         name: None if x is None else np.array(x) for name, x in values.items()
     }
-    requirements = Requirements(**arrays, **switches, relaxations=relaxations)
-    return {"clearance": clearance, "requirements": requirements}
+    wanted = Requirements(**arrays, **switches, relaxations=relaxations, damping=law)
+    return {"clearance": clearance, "requirements": wanted}

@@ -202,12 +202,17 @@ def _best_start(
 
 def _finish(problem: Problem, session: Session, tolerance: Tolerance, began: float) -> Plan:
     """Refine the motion until it holds the tolerance, and gather everything."""
+    coarse: Trajectory | None = None
     for _ in range(MOST_HALVINGS):
         terms = session.terms()
         trajectory, certificate = _motion(problem, session, tolerance)
         errors = certificate.position_error.value, certificate.rotation_error.value
-        if errors[0] <= tolerance.position and errors[1] <= tolerance.rotation:
+        if _within(errors, tolerance):
             break
+        # What damping costs stays on any grid: there, the motion stands when the tool does.
+        if coarse is not None and _within(_largest_change(problem, coarse, trajectory), tolerance):
+            break
+        coarse = trajectory if session.damped else None
         session.refine()
     violations = session.violations
     x = session.coefficients
@@ -217,6 +222,8 @@ def _finish(problem: Problem, session: Session, tolerance: Tolerance, began: flo
     message = session.status.message
     if violations:
         message = f"not all constraints could be met: {'; '.join(violations)}"
+    if certificate.damped:
+        message += f"; the inverse was damped {' and '.join(map(str, certificate.damped))}"
     report = Report(
         cost=sum(terms.values()),
         initial_cost=sum(initial_terms.values()),
@@ -244,6 +251,19 @@ def _finish(problem: Problem, session: Session, tolerance: Tolerance, began: flo
         requirements=replace(problem.requirements, collision=None),
         clearance=problem.clearance,
     )
+
+
+def _within(errors: tuple[float, float], tolerance: Tolerance) -> bool:
+    return errors[0] <= tolerance.position and errors[1] <= tolerance.rotation
+
+
+def _largest_change(problem: Problem, coarse: Trajectory, fine: Trajectory) -> tuple[float, float]:
+    """Return how far apart two motions put the tool in the prescribed rows, at most [m, rad]."""
+    robot, task = problem.robot, problem.rows
+    pairs = zip(coarse(fine.t), fine.q, strict=True)
+    misses = np.array([task.miss(robot.pose(first), robot.pose(second)) for first, second in pairs])
+    position, rotation = misses.max(axis=0)
+    return float(position), float(rotation)
 
 
 def _motion(

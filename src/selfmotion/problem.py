@@ -22,6 +22,7 @@ from selfmotion.constraints import (
     JointVelocityLimits,
 )
 from selfmotion.costs import Cost, JointVelocity
+from selfmotion.damping import PATH_ERROR, Damping, DampingLaw
 from selfmotion.errors import ProblemError, RedundancyError, StartError
 from selfmotion.null_motion import NullMotion, PolynomialNullMotion
 from selfmotion.path import Path
@@ -57,6 +58,10 @@ class Problem:
         Rows in which the tool may leave the path, by how much and when; the deviation is optimised
         along with the self-motion. By default none. A given start is on the path itself, and so
         are both ends of a closed path and the end of one with conditions there.
+    damping : Damping, optional
+        Go through singular poses, and past the edge of the workspace, at the price of the path: by
+        default the tool stays on the path, and there is no motion through such poses. Adds the
+        cost "path error".
 
     Raises
     ------
@@ -79,6 +84,7 @@ class Problem:
         default_factory=lambda: (JointPositionLimits(), JointVelocityLimits())
     )
     relaxations: Sequence[Relaxation] = ()
+    damping: Damping | None = None
 
     def __post_init__(self) -> None:
         for name, kind in (("robot", RobotModel), ("path", Path)):
@@ -97,6 +103,8 @@ class Problem:
                 f"null_motion is {self.null_motion!r}, expected PolynomialNullMotion or "
                 f"BSplineNullMotion"
             )
+        if not isinstance(self.damping, Damping | None):
+            raise ProblemError(f"damping is {self.damping!r}, expected a Damping or None")
         if isinstance(self.start, str):
             if self.start != "free":
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
@@ -134,9 +142,17 @@ class Problem:
         return found[0] if found else None
 
     @cached_property
+    def damping_law(self) -> DampingLaw | None:
+        """The damping in numbers [m, rad] for this arm and task."""
+        if self.damping is None:
+            return None
+        best = self.robot.task_jacobian(self.robot.dexterous_configuration(self.rows), self.rows)
+        return self.damping.law(float(np.linalg.svd(best, compute_uv=False)[-1]))
+
+    @cached_property
     def requirements(self) -> Requirements:
         """What the certificate has to check besides the path."""
-        wanted = Requirements(relaxations=tuple(self.relaxations))
+        wanted = Requirements(relaxations=tuple(self.relaxations), damping=self.damping_law)
         for item in self.constraints:
             wanted = _require(wanted, item, self.robot)
         return wanted
@@ -181,7 +197,9 @@ class Problem:
 
     def _check_costs(self) -> None:
         names = [cost.name for cost in self.costs]
-        if not names:
+        if self.damping is not None:
+            names.append(PATH_ERROR)
+        if not self.costs:
             raise ProblemError("no cost is given, so that nothing tells one motion from another")
         twice = [name for name in names if names.count(name) > 1]
         if twice:

@@ -5,6 +5,7 @@ import pinocchio as pin
 
 from selfmotion import kernels
 from selfmotion.arrays import Array
+from selfmotion.damping import DampingLaw
 from selfmotion.grid import Grid
 from selfmotion.path import Path, PathSamples
 from selfmotion.robot import RobotModel
@@ -14,7 +15,7 @@ from selfmotion.task import Task
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 # The pose feedback removes an error e at the rate K e; K times the duration.
-_FEEDBACK = 20.0
+FEEDBACK = 20.0
 
 # A Newton correction this small [rad or m] is rounding; quadratic convergence needs few steps.
 _POLISHED, _POLISHING_STEPS = 1e-13, 4
@@ -25,7 +26,8 @@ class Rollout:
 
     Eq. 4 of the paper with pose feedback: e is the pose error (log on SO(3)), zero for the exact
     solution, so that the feedback only takes out what the integration lets in. J⁺ is Jᵀ(JJᵀ)⁻¹,
-    or Jᵀ(JJᵀ + λ²I)⁻¹ (damped least squares). Classical fourth-order Runge-Kutta.
+    near singular poses Jᵀ(JJᵀ + λ²I)⁻¹ where damping is asked for. Classical fourth-order
+    Runge-Kutta.
 
     One object keeps its tables between runs; what `samples` and `pullback` return is that of the
     last `run`.
@@ -36,18 +38,26 @@ class Rollout:
     path : Path
     task : Task
     grid : Grid
-    damping : float
-        λ [m, rad].
+    damping : DampingLaw, optional
+        Without it, a singular pose ends the motion.
     """
 
     def __init__(
-        self, robot: RobotModel, path: Path, task: Task, grid: Grid, *, damping: float = 0.0
+        self,
+        robot: RobotModel,
+        path: Path,
+        task: Task,
+        grid: Grid,
+        *,
+        damping: DampingLaw | None = None,
     ) -> None:
         self.robot, self.path, self.task, self.grid = robot, path, task, grid
         self.jacobian_evaluations = 0
         self._data = robot.model.createData()
-        self._damping = damping**2
-        self._gain = _FEEDBACK / path.duration
+        self.damping = damping
+        # σ0 and λ0; the kernels take a threshold of 0 for none.
+        self._law = (0.0, 0.0) if damping is None else (damping.threshold, damping.strength)
+        self._gain = FEEDBACK / path.duration
         self._rows = task.rows
         self._angle_kind = _angle_kind(task)
         times, n, m = grid.stage_times, robot.dof, task.dimension
@@ -63,6 +73,7 @@ class Rollout:
         self._target = translation, rotation, twist
         self.aim(path.samples(times))
         step[:, 0] = grid.stage_steps
+        self._fade = parts[14][:, 1]
         self._q_rows = list(self._q)
 
     def aim(self, target: PathSamples) -> None:
@@ -87,7 +98,7 @@ class Rollout:
         # These two are views of Pinocchio's own memory: each `place` refreshes them.
         rotation, translation = data.oMf[tool].rotation, data.oMf[tool].translation
         table, rows, angle_kind = self._table, self._rows, self._angle_kind
-        gain, damping = self._gain, self._damping
+        gain, (threshold, strength) = self._gain, self._law
         self._epsilon[:] = epsilon
         self._q[0] = start
         for stage, q in enumerate(self._q_rows):
@@ -95,7 +106,16 @@ class Rollout:
             jacobian = frame_jacobian(model, data, tool, axes)
             place(model, data, tool)
             if not advance(
-                stage, jacobian, rotation, translation, table, rows, angle_kind, gain, damping
+                stage,
+                jacobian,
+                rotation,
+                translation,
+                table,
+                rows,
+                angle_kind,
+                gain,
+                threshold,
+                strength,
             ):
                 self.jacobian_evaluations += stage + 1
                 return float(self.grid.stage_times[stage])
@@ -106,7 +126,8 @@ class Rollout:
         """Put the nodes of the last run exactly onto the path.
 
         Newton's method q ← q + J⁺e, from errors the size of the integration's; then eq. 4 once
-        more for q̇.
+        more for q̇. A motion that was damped anywhere is returned as it is: it is off the path by
+        more than that, and its nodes do not come back to it one by one without a jump.
 
         Returns
         -------
@@ -115,8 +136,10 @@ class Rollout:
         model, data, tool = self.robot.model, self._data, self.robot.tool_id
         rotation, translation = data.oMf[tool].rotation, data.oMf[tool].translation
         table, rows, kind, n = self._table, self._rows, self._angle_kind, self.robot.dof
-        settings = (table, rows, kind, 0.0, self._damping)
+        settings = (table, rows, kind, 0.0, 0.0, 0.0)
         here = self.grid.node_stages
+        if self.damped:
+            return self.grid.nodes, self._q[here], self._qd[here]
         for stage in here:
             q = self._q_rows[stage]
             for _ in range(_POLISHING_STEPS + 1):
@@ -169,9 +192,22 @@ class Rollout:
         return int(self._table.nbytes)
 
     @property
+    def error(self) -> Array:
+        """Pose error e of the last run at the stages, (S, 6) [m, rad], without copying."""
+        return self._error
+
+    @property
     def drift(self) -> Array:
-        """Pose error of the last run at the nodes, (N + 1, 6) [m, rad]: what integration let in."""
+        """Pose error of the last run at the nodes, (N + 1, 6) [m, rad].
+
+        What integration let in, and damping.
+        """
         return self._error[self.grid.node_stages]
+
+    @property
+    def damped(self) -> bool:
+        """Whether the last run was damped at any stage."""
+        return bool(np.any(self._fade > 0.0))
 
     def samples(self) -> Samples:
         """Return the last run at its stages, without copying: valid until the next run."""
@@ -186,7 +222,9 @@ class Rollout:
             task_jacobian=self._task_jacobian,
         )
 
-    def pullback(self, q_cotangent: Array, qd_cotangent: Array) -> tuple[Array, Array, Array]:
+    def pullback(
+        self, q_cotangent: Array, qd_cotangent: Array, error_cotangent: Array | None = None
+    ) -> tuple[Array, Array, Array]:
         """Pull a gradient with respect to the last run's stages back to what drove it.
 
         The exact derivative of the discrete scheme: one backward sweep, no finite differences.
@@ -195,6 +233,8 @@ class Rollout:
         ----------
         q_cotangent, qd_cotangent : (S, n)
             ∂F/∂q and ∂F/∂q̇ at the stages.
+        error_cotangent : (S, 6), optional
+            ∂F/∂e there, e the pose error; by default 0.
 
         Returns
         -------
@@ -207,9 +247,12 @@ class Rollout:
         """
         epsilon_gradient = np.empty_like(self._qd)
         target_gradient = np.empty((len(epsilon_gradient), 12))
+        if error_cotangent is None:
+            error_cotangent = np.zeros((len(epsilon_gradient), 6))
         start_gradient = kernels.pullback(
             np.ascontiguousarray(q_cotangent),
             np.ascontiguousarray(qd_cotangent),
+            np.ascontiguousarray(error_cotangent),
             self._table,
             self._rows,
             self._angle_kind,

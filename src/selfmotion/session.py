@@ -16,7 +16,7 @@ from selfmotion.objective import Objective, inverse_metric
 from selfmotion.problem import Problem
 from selfmotion.quasi_newton import Callback as IterationCallback
 from selfmotion.quasi_newton import Iteration, Minimum, QuasiNewton, Status
-from selfmotion.rollout import Rollout
+from selfmotion.rollout import FEEDBACK, Rollout
 from selfmotion.start import FixedStart, FreeStart, Start
 from selfmotion.trajectory import Trajectory
 
@@ -139,8 +139,13 @@ class Session:
         """Return what each cost contributes at x = 0, and leave the rollout there."""
         return self._counted(lambda: self._objective.terms(np.zeros_like(self._x)))
 
+    @property
+    def damped(self) -> bool:
+        """Whether the motion that was evaluated last was damped anywhere."""
+        return self._objective.rollout.damped
+
     def trajectory(self) -> Trajectory:
-        """Return the motion that was evaluated last, its nodes put exactly onto the path."""
+        """Return the motion that was evaluated last, its nodes put onto the path unless damped."""
         rollout = self._objective.rollout
         before = rollout.jacobian_evaluations
         trajectory = Trajectory(*rollout.polish(), self._problem.robot.joint_names)
@@ -213,21 +218,29 @@ class Session:
         return conditions
 
     def _reference(self, configuration: Array) -> Rollout:
-        """Return the motion at x = 0, on the coarsest grid on which it stays near the path."""
+        """Return the motion at x = 0, on the coarsest grid on which it stays near the path.
+
+        Damping takes it off the path: there, on the first grid that changes the error no more.
+        """
         problem = self._problem
         steps = max(_FEWEST_STEPS, problem.null_motion.fewest_steps)
         grid = Grid.aligned(problem.knots, steps)
         target = problem.path.samples(grid.nodes)
         extent = max(float(np.ptp(target.translation, axis=0).max()), 1e-3)
         rows = problem.rows.rows
+        coarse: Array | None = None
         for _ in range(MOST_HALVINGS):
-            rollout = Rollout(problem.robot, problem.path, problem.rows, grid)
+            rollout = self._rollout(grid)
             offset = self._offset(grid)
             idle = np.zeros((len(grid.stage_times), problem.robot.dof))
             broken = rollout.run(configuration, idle if offset is None else offset)
             self.counts.jacobians += rollout.jacobian_evaluations
-            drift = np.abs(rollout.drift[:, rows]) / np.where(rows < 3, extent, 1.0)
-            off = ~(drift <= _DRIFT).all(axis=1)
+            drift = rollout.drift[:, rows] / np.where(rows < 3, extent, 1.0)
+            if rollout.damped and coarse is not None:
+                off = ~(np.abs(drift[::2] - coarse) <= _DRIFT).all(axis=1)
+            else:
+                off = ~(np.abs(drift) <= _DRIFT).all(axis=1)
+            coarse = drift
             if broken is None and not off.any():
                 return rollout
             grid = grid.halved()
@@ -256,7 +269,7 @@ class Session:
         frame = None if self._frame is None else self._frame(t)
         rows = problem.robot.dof if frame is None else frame.shape[2]
         return Objective(
-            Rollout(problem.robot, problem.path, problem.rows, grid),
+            self._rollout(grid),
             NullMotionTable(functions, frame, rows, self._offset(grid)),
             problem.costs,
             self._start,
@@ -264,7 +277,20 @@ class Session:
             Deviation(problem.path, problem.relaxations, t, problem.pinned)
             if problem.relaxations
             else None,
+            self._path_weight(),
         )
+
+    def _rollout(self, grid: Grid) -> Rollout:
+        problem = self._problem
+        return Rollout(problem.robot, problem.path, problem.rows, grid, damping=problem.damping_law)
+
+    def _path_weight(self) -> float:
+        """Return the weight of the path error in the cost, see `Damping`; 0 without damping."""
+        damping, law = self._problem.damping, self._problem.damping_law
+        if damping is None or law is None:
+            return 0.0
+        rate = FEEDBACK / self._problem.path.duration
+        return float(damping.path_weight * (rate / law.threshold) ** 2)
 
     def _offset(self, grid: Grid) -> Array | None:
         return None if self._guide is None else self._guide(grid.stage_times)

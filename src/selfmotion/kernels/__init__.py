@@ -2,7 +2,8 @@
 
 Notation, per stage: J6 (6, n) the tool's Jacobian [v; ω] in world axes, S the selection of the
 task's rows, J = S J6 (m, n), ε the null motion, u = S(ẋ_d + K e) the commanded rows with pose
-error e, A = JJᵀ + λ²I = LLᵀ, y = A⁻¹(u - Jε), and eq. 4 in the form that needs one solve:
+error e, A = JJᵀ + λ²I = LLᵀ (λ = 0 except near singular poses, where damping is asked for),
+y = A⁻¹(u - Jε), and eq. 4 in the form that needs one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 

@@ -66,6 +66,38 @@ def solve_cholesky(factor: Array, b: Array) -> None:
 
 
 @kernel
+def damp(gram: Array, threshold: float, strength: float, out: Array) -> None:
+    """Add λ²I to JJᵀ (its lower triangle `gram`) near singular poses; set `out` (3 + m,).
+
+    λ² = λ0² f with f = (1 - σ²/σ0²)² where the smallest singular value σ of J is below the
+    threshold σ0, exactly 0 elsewhere. `out` is λ0², f, df/dσ² and the unit vector v of
+    σ² = vᵀJJᵀv, all 0 where there is no damping.
+    """
+    m = gram.shape[0]
+    out[:] = 0.0
+    square = threshold * threshold
+    full = np.empty((m, m))
+    for i in range(m):
+        for j in range(i + 1):
+            full[i, j] = full[j, i] = gram[i, j]
+    shifted = full - square * np.eye(m)
+    # Mostly σ > σ0, which a Cholesky factor tells at a tenth of the price of eigenvalues. NaN is
+    # left to the factor of `gram` itself.
+    if cholesky(shifted) or not np.isfinite(full.sum()):
+        return
+    values, vectors = np.linalg.eigh(full)
+    rest = 1.0 - max(values[0], 0.0) / square
+    if rest <= 0.0:
+        return
+    out[0] = strength * strength
+    out[1] = rest * rest
+    out[2] = -2.0 * rest / square
+    out[3:] = vectors[:, 0]
+    for i in range(m):
+        gram[i, i] += out[0] * out[1]
+
+
+@kernel
 def rotation_error(target: Array, actual: Array, out: Array) -> None:
     """Set `out` to log(R_target Rᵀ), the rotation vector from actual to target, world axes."""
     r = np.empty((3, 3))

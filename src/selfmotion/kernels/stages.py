@@ -16,6 +16,7 @@ from selfmotion.kernels.algebra import (
     add_cross,
     cholesky,
     contract,
+    damp,
     pointing_error,
     pull_error,
     rotation_error,
@@ -25,7 +26,7 @@ from selfmotion.kernels.algebra import (
 )
 
 Rows = npt.NDArray[np.intp]
-Layout = tuple[int, int, int, int, int, int, int, int, int, int, int, int, int, int, int]
+Layout = tuple[int, int, int, int, int, int, int, int, int, int, int, int, int, int, int, int]
 
 
 @kernel
@@ -33,7 +34,8 @@ def layout(n: int, m: int) -> Layout:
     """Return the first column of each part of a stage's row, and the number of columns.
 
     q, q̇, ε (n each); the path's translation (3), rotation (9) and twist (6); the step length (1);
-    the tool's translation (3) and rotation (9); its pose error (6); J6 (6n); J (mn); L (mm); y (m).
+    the tool's translation (3) and rotation (9); its pose error (6); J6 (6n); J (mn); L (mm); y (m);
+    the damping: λ0², f, df/dσ² and v (3 + m), see `damp`.
     """
     q = 0
     qd = q + n
@@ -49,6 +51,7 @@ def layout(n: int, m: int) -> Layout:
     task_jacobian = jacobian + 6 * n
     factor = task_jacobian + m * n
     y = factor + m * m
+    damping = y + m
     return (
         q,
         qd,
@@ -64,7 +67,8 @@ def layout(n: int, m: int) -> Layout:
         task_jacobian,
         factor,
         y,
-        y + m,
+        damping,
+        damping + 3 + m,
     )
 
 
@@ -78,11 +82,14 @@ def evaluate(
     rows: Rows,
     angle_kind: int,
     gain: float,
-    damping: float,
+    threshold: float,
+    strength: float,
 ) -> bool:
     """Evaluate eq. 4 at stage s: q̇ = J⁺u + (I - J⁺J) ε.
 
-    False where A = JJᵀ + λ²I, λ² = `damping`, is not positive definite (a singular pose, or NaN).
+    With a `threshold` σ0 > 0, A = JJᵀ + λ²I is damped near singular poses, see `damp`, and the pose
+    feedback K fades out as damping fades in: speeds would otherwise grow with an error that the arm
+    cannot take out there. False where A is not positive definite (a singular pose, or NaN).
     """
     n, m = frame_jacobian.shape[1], rows.shape[0]
     at = layout(n, m)
@@ -108,21 +115,25 @@ def evaluate(
     elif pointing:
         pointing_error(target_rotation, rotation, error[3:])
 
+    for k in range(n):
+        select(rows, pointing, rotation, jacobian[:, k], task_jacobian[:, k])
+    for i in range(m):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(n):
+                total += task_jacobian[i, k] * task_jacobian[j, k]
+            factor[i, j] = total
+    if threshold > 0.0:
+        damp(factor, threshold, strength, row[at[14] : at[15]])
+        gain *= 1.0 - row[at[14] + 1]
     # u = S(ẋ_d + K e), then y = A⁻¹(u - Jε)
     command = np.empty(6)
     for i in range(6):
         command[i] = row[at[5] + i] + gain * error[i]
     select(rows, pointing, rotation, command, y)
-    for k in range(n):
-        select(rows, pointing, rotation, jacobian[:, k], task_jacobian[:, k])
     for i in range(m):
         for k in range(n):
             y[i] -= task_jacobian[i, k] * epsilon[k]
-        for j in range(i + 1):
-            total = damping if i == j else 0.0
-            for k in range(n):
-                total += task_jacobian[i, k] * task_jacobian[j, k]
-            factor[i, j] = total
     if not cholesky(factor):
         return False
     solve_cholesky(factor, y)
@@ -144,7 +155,8 @@ def advance(
     rows: Rows,
     angle_kind: int,
     gain: float,
-    damping: float,
+    threshold: float,
+    strength: float,
 ) -> bool:
     """Evaluate eq. 4 at stage s and set the next stage's q; see `evaluate`.
 
@@ -160,7 +172,8 @@ def advance(
         rows,
         angle_kind,
         gain,
-        damping,
+        threshold,
+        strength,
     )
     if sound and s + 1 < table.shape[0]:
         _step(table, s, n, table[s, layout(n, m)[6]])
@@ -205,15 +218,18 @@ def pull_stage(
     rows: Rows,
     angle_kind: int,
     gain: float,
+    error_bar: Array,
     epsilon_bar: Array,
     q_bar: Array,
     target_bar: Array,
 ) -> None:
-    """Pull the cotangent w (n,) on q̇ of one stage back to ε (set), q (added) and the path (set).
+    """Pull the cotangents w (n,) on q̇ and ē (6,) on the pose error back.
 
-    z = A⁻¹Jw,  ε̄ = w - Jᵀz,  q̄ = ⟨y ε̄ᵀ - z q̇ᵀ, ∂J/∂q⟩ + zᵀS K ∂e/∂q, and where the angular rows
-    are in tool axes, zᵀ ∂S u. The path's cotangent (12,) is that of its pose [m, rad], then Sᵀz of
-    its twist.
+    To ε (set), q (added) and the path (set): z = A⁻¹Jw,  ε̄ = w - Jᵀz,
+    q̄ = ⟨y ε̄ᵀ - z q̇ᵀ, ∂J/∂q⟩ + (zᵀS K + ēᵀ) ∂e/∂q, and where the angular rows are in tool axes,
+    zᵀ ∂S u. Damping adds -(λ0² zᵀy + K zᵀS e) ∂f, see `damp`, with ∂f = df/dσ² 2 ⟨v (Jᵀv)ᵀ, ∂J⟩;
+    K is (1 - f) times the `gain`. The path's cotangent (12,) is that of its pose [m, rad], then
+    Sᵀz of its twist.
     """
     n, m = w.shape[0], rows.shape[0]
     at = layout(n, m)
@@ -245,17 +261,22 @@ def pull_stage(
     for i in range(6):
         for k in range(n):
             weights[i, k] = full_y[i] * epsilon_bar[k] - full_z[i] * qd[k]
-    contract(jacobian, weights, q_bar)
-
-    # Everything else acts through the tool's own twist J6 ∂q.
+    # Everything but ∂J6 acts through the tool's own twist J6 ∂q.
     twist_bar = np.zeros(6)
-    pull_error(angle_kind, error, rotation, target_rotation, gain * full_z, twist_bar)
+    fade = row[at[14] + 1]
+    if fade > 0.0:
+        _pull_damping(row, rows, pointing, gain, z, full_z, weights, twist_bar)
+        gain *= 1.0 - fade
+    contract(jacobian, weights, q_bar)
+    by_error, by_twist = gain * full_z + error_bar, np.zeros(6)
+    pull_error(angle_kind, error, rotation, target_rotation, by_error, by_twist)
     # Moved together, target and tool turn the error with them: ∂e = ω × e.
     for i in range(6):
-        target_bar[i] = -twist_bar[i]
+        twist_bar[i] += by_twist[i]
+        target_bar[i] = -by_twist[i]
         target_bar[6 + i] = full_z[i]
     if angle_kind != NO_ANGLE:
-        add_cross(error[3], error[4], error[5], gain * full_z[3:], target_bar[3:6])
+        add_cross(error[3], error[4], error[5], by_error[3:], target_bar[3:6])
     if pointing:
         first, second = np.zeros(3), np.zeros(3)
         for i in range(3):
@@ -271,9 +292,47 @@ def pull_stage(
 
 
 @kernel
+def _pull_damping(
+    row: Array,
+    rows: Rows,
+    pointing: bool,
+    gain: float,
+    z: Array,
+    full_z: Array,
+    weights: Array,
+    twist_bar: Array,
+) -> None:
+    """Add what -(λ0² zᵀy + K zᵀS e) ∂f leaves: on J6 to `weights` (6, n), on S to `twist_bar`."""
+    n, m = weights.shape[1], rows.shape[0]
+    at = layout(n, m)
+    rotation = row[at[8] : at[8] + 9].reshape(3, 3)
+    jacobian = row[at[10] : at[10] + 6 * n].reshape(6, n)
+    task_jacobian = row[at[11] : at[11] + m * n].reshape(m, n)
+    y, v = row[at[13] : at[13] + m], row[at[14] + 3 : at[15]]
+    slope = 0.0
+    for i in range(m):
+        slope += row[at[14]] * z[i] * y[i]
+    for i in range(6):
+        slope += gain * full_z[i] * row[at[9] + i]
+    factor = -2.0 * row[at[14] + 2] * slope
+    left, right, turn = np.empty(6), np.zeros(n), np.zeros(3)
+    unselect(rows, pointing, rotation, v, left)
+    for k in range(n):
+        for i in range(m):
+            right[k] += task_jacobian[i, k] * v[i]
+        for i in range(3):
+            turn[i] += jacobian[3 + i, k] * right[k]
+        for i in range(6):
+            weights[i, k] += factor * left[i] * right[k]
+    if pointing:
+        add_cross(factor * left[3], factor * left[4], factor * left[5], turn, twist_bar[3:])
+
+
+@kernel
 def pullback(
     q_cotangent: Array,
     qd_cotangent: Array,
+    error_cotangent: Array,
     table: Array,
     rows: Rows,
     angle_kind: int,
@@ -301,7 +360,17 @@ def pullback(
                 if i < 3:
                     slope[k] += chi[i + 1, k] * (h if i == 2 else 0.5 * h)
             q_bar[k] = q_cotangent[s, k]
-        pull_stage(slope, table[s], rows, angle_kind, gain, epsilon_bar[s], q_bar, target_bar[s])
+        pull_stage(
+            slope,
+            table[s],
+            rows,
+            angle_kind,
+            gain,
+            error_cotangent[s],
+            epsilon_bar[s],
+            q_bar,
+            target_bar[s],
+        )
         chi[i] = q_bar
         if last:
             state[:] = q_bar
@@ -335,6 +404,7 @@ def sensitivities(
     step = layout(n, rows.shape[0])[6]
     projector, slope_by_q, unit = np.empty((n, n)), np.empty((n, n)), np.zeros(n)
     slope_by_target = np.empty((n, 12))
+    no_error = np.zeros(6)
     state, now = start_matrix.copy(), start_matrix.copy()
     for s in range(stages):
         for k in range(n):
@@ -346,6 +416,7 @@ def sensitivities(
                 rows,
                 angle_kind,
                 gain,
+                no_error,
                 projector[k],
                 slope_by_q[k],
                 slope_by_target[k],
