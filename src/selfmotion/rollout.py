@@ -61,27 +61,29 @@ class Rollout:
         self._rows = task.rows
         self._angle_kind = _angle_kind(task)
         times, n, m = grid.stage_times, robot.dof, task.dimension
-        start, stop = kernels.layout(n, m)[:-1], kernels.layout(n, m)[1:]
-        self._table = np.zeros((len(times), stop[-1]))
-        parts = [self._table[:, a:b] for a, b in zip(start, stop, strict=True)]
-        self._q, self._qd, self._epsilon, translation, rotation, twist, step = parts[:7]
+        at = kernels.layout(n, m)
+        table = self._table = np.zeros((len(times), at.columns))
+        self._q, self._qd = table[:, at.q : at.q + n], table[:, at.qd : at.qd + n]
+        self._epsilon = table[:, at.epsilon : at.epsilon + n]
+        self._target_translation = table[:, at.target_translation : at.target_translation + 3]
+        self._target_twist = table[:, at.target_twist : at.target_twist + 6]
+        self._translation = table[:, at.translation : at.translation + 3]
+        self._error = table[:, at.error : at.error + 6]
+        self._fade = table[:, at.damping + 1]
         # Reshaping splits the last axis of a view, hence shares the table's memory.
-        self._translation, self._error = parts[7], parts[9]
-        self._rotation = parts[8].reshape(-1, 3, 3)
-        self._jacobian = parts[10].reshape(-1, 6, n)
-        self._task_jacobian = parts[11].reshape(-1, m, n)
-        self._target = translation, rotation, twist
+        self._target_rotation = table[:, at.target_rotation : at.target_twist].reshape(-1, 3, 3)
+        self._rotation = table[:, at.rotation : at.error].reshape(-1, 3, 3)
+        self._jacobian = table[:, at.jacobian : at.task_jacobian].reshape(-1, 6, n)
+        self._task_jacobian = table[:, at.task_jacobian : at.factor].reshape(-1, m, n)
         self.aim(path.samples(times))
-        step[:, 0] = grid.stage_steps
-        self._fade = parts[14][:, 1]
+        table[:, at.step] = grid.stage_steps
         self._q_rows = list(self._q)
 
     def aim(self, target: PathSamples) -> None:
         """Follow other poses and twists from now on, given at the stages (S)."""
-        translation, rotation, twist = self._target
-        translation[:] = target.translation
-        rotation[:] = target.rotation.reshape(-1, 9)
-        twist[:] = target.twist
+        self._target_translation[:] = target.translation
+        self._target_rotation[:] = target.rotation
+        self._target_twist[:] = target.twist
 
     def run(self, start: Array, epsilon: Array) -> float | None:
         """Integrate from `start` (n,) under null motion `epsilon` (S, n) at the stage times.

@@ -20,14 +20,9 @@ from selfmotion.kernels.algebra import (
     POINTING,
     contract_task,
 )
-from selfmotion.kernels.stages import (
-    advance,
-    evaluate,
-    layout,
-    newton_step,
-    pullback,
-    sensitivities,
-)
+from selfmotion.kernels.backward import pullback, sensitivities
+from selfmotion.kernels.forward import advance, evaluate, newton_step
+from selfmotion.kernels.table import layout
 
 __all__ = [
     "LOGARITHM",

@@ -1,214 +1,20 @@
-"""One stage of eq. 4 forward, and all stages backward, on one table with a row per stage.
-
-A call from Python costs as much per array argument as a good part of the arithmetic, hence one
-table in place of a dozen. `layout` says which columns hold what; `Rollout` makes views of them.
-"""
+"""All stages of eq. 4 backward: the exact derivative of the discrete scheme."""
 
 import numpy as np
-import numpy.typing as npt
 
 from selfmotion.arrays import Array
 from selfmotion.jit import kernel
 from selfmotion.kernels.algebra import (
-    LOGARITHM,
     NO_ANGLE,
     POINTING,
+    Rows,
     add_cross,
-    cholesky,
     contract,
-    damp,
-    pointing_error,
     pull_error,
-    rotation_error,
-    select,
     solve_cholesky,
     unselect,
 )
-
-Rows = npt.NDArray[np.intp]
-Layout = tuple[int, int, int, int, int, int, int, int, int, int, int, int, int, int, int, int]
-
-
-@kernel
-def layout(n: int, m: int) -> Layout:
-    """Return the first column of each part of a stage's row, and the number of columns.
-
-    q, q̇, ε (n each); the path's translation (3), rotation (9) and twist (6); the step length (1);
-    the tool's translation (3) and rotation (9); its pose error (6); J6 (6n); J (mn); L (mm); y (m);
-    the damping: λ0², f, df/dσ² and v (3 + m), see `damp`.
-    """
-    q = 0
-    qd = q + n
-    epsilon = qd + n
-    target_translation = epsilon + n
-    target_rotation = target_translation + 3
-    target_twist = target_rotation + 9
-    step = target_twist + 6
-    translation = step + 1
-    rotation = translation + 3
-    error = rotation + 9
-    jacobian = error + 6
-    task_jacobian = jacobian + 6 * n
-    factor = task_jacobian + m * n
-    y = factor + m * m
-    damping = y + m
-    return (
-        q,
-        qd,
-        epsilon,
-        target_translation,
-        target_rotation,
-        target_twist,
-        step,
-        translation,
-        rotation,
-        error,
-        jacobian,
-        task_jacobian,
-        factor,
-        y,
-        damping,
-        damping + 3 + m,
-    )
-
-
-@kernel
-def evaluate(
-    s: int,
-    frame_jacobian: Array,
-    frame_rotation: Array,
-    frame_translation: Array,
-    table: Array,
-    rows: Rows,
-    angle_kind: int,
-    gain: float,
-    threshold: float,
-    strength: float,
-) -> bool:
-    """Evaluate eq. 4 at stage s: q̇ = J⁺u + (I - J⁺J) ε.
-
-    With a `threshold` σ0 > 0, A = JJᵀ + λ²I is damped near singular poses, see `damp`, and the pose
-    feedback K fades out as damping fades in: speeds would otherwise grow with an error that the arm
-    cannot take out there. False where A is not positive definite (a singular pose, or NaN).
-    """
-    n, m = frame_jacobian.shape[1], rows.shape[0]
-    at = layout(n, m)
-    row = table[s]
-    epsilon = row[at[2] : at[2] + n]
-    target_rotation = row[at[4] : at[4] + 9].reshape(3, 3)
-    translation = row[at[7] : at[7] + 3]
-    rotation = row[at[8] : at[8] + 9].reshape(3, 3)
-    error = row[at[9] : at[9] + 6]
-    jacobian = row[at[10] : at[10] + 6 * n].reshape(6, n)
-    task_jacobian = row[at[11] : at[11] + m * n].reshape(m, n)
-    factor = row[at[12] : at[12] + m * m].reshape(m, m)
-    y = row[at[13] : at[13] + m]
-    pointing = angle_kind == POINTING
-
-    jacobian[:] = frame_jacobian
-    rotation[:] = frame_rotation
-    translation[:] = frame_translation
-    for i in range(3):
-        error[i] = row[at[3] + i] - translation[i]
-    if angle_kind == LOGARITHM:
-        rotation_error(target_rotation, rotation, error[3:])
-    elif pointing:
-        pointing_error(target_rotation, rotation, error[3:])
-
-    for k in range(n):
-        select(rows, pointing, rotation, jacobian[:, k], task_jacobian[:, k])
-    for i in range(m):
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(n):
-                total += task_jacobian[i, k] * task_jacobian[j, k]
-            factor[i, j] = total
-    if threshold > 0.0:
-        damp(factor, threshold, strength, row[at[14] : at[15]])
-        gain *= 1.0 - row[at[14] + 1]
-    # u = S(ẋ_d + K e), then y = A⁻¹(u - Jε)
-    command = np.empty(6)
-    for i in range(6):
-        command[i] = row[at[5] + i] + gain * error[i]
-    select(rows, pointing, rotation, command, y)
-    for i in range(m):
-        for k in range(n):
-            y[i] -= task_jacobian[i, k] * epsilon[k]
-    if not cholesky(factor):
-        return False
-    solve_cholesky(factor, y)
-    for k in range(n):
-        total = epsilon[k]
-        for i in range(m):
-            total += task_jacobian[i, k] * y[i]
-        row[at[1] + k] = total
-    return True
-
-
-@kernel
-def advance(
-    s: int,
-    frame_jacobian: Array,
-    frame_rotation: Array,
-    frame_translation: Array,
-    table: Array,
-    rows: Rows,
-    angle_kind: int,
-    gain: float,
-    threshold: float,
-    strength: float,
-) -> bool:
-    """Evaluate eq. 4 at stage s and set the next stage's q; see `evaluate`.
-
-    Stages come four to a step, then one for the end.
-    """
-    n, m = frame_jacobian.shape[1], rows.shape[0]
-    sound = evaluate(
-        s,
-        frame_jacobian,
-        frame_rotation,
-        frame_translation,
-        table,
-        rows,
-        angle_kind,
-        gain,
-        threshold,
-        strength,
-    )
-    if sound and s + 1 < table.shape[0]:
-        _step(table, s, n, table[s, layout(n, m)[6]])
-    return sound
-
-
-@kernel
-def newton_step(row: Array, n: int, rows: Rows, angle_kind: int) -> Array:
-    """Return J⁺S e, the smallest correction of q that takes out the pose error e to first order."""
-    m = rows.shape[0]
-    at = layout(n, m)
-    rotation = row[at[8] : at[8] + 9].reshape(3, 3)
-    task_jacobian = row[at[11] : at[11] + m * n].reshape(m, n)
-    factor = row[at[12] : at[12] + m * m].reshape(m, m)
-    z = np.empty(m)
-    select(rows, angle_kind == POINTING, rotation, row[at[9] : at[9] + 6], z)
-    solve_cholesky(factor, z)
-    correction = np.zeros(n)
-    for i in range(m):
-        for k in range(n):
-            correction[k] += task_jacobian[i, k] * z[i]
-    return correction
-
-
-@kernel
-def _step(table: Array, s: int, n: int, h: float) -> None:
-    """Set q of stage s + 1 from the slopes so far (classical fourth-order Runge-Kutta)."""
-    first, i = s - s % 4, s % 4
-    for k in range(n):
-        q, slope = table[first, k], table[s, n + k]
-        if i == 3:
-            slope += table[first, n + k] + 2.0 * (table[first + 1, n + k] + table[s - 1, n + k])
-            table[s + 1, k] = q + h / 6.0 * slope
-        else:
-            table[s + 1, k] = q + (h if i == 2 else 0.5 * h) * slope
+from selfmotion.kernels.table import layout
 
 
 @kernel
@@ -233,14 +39,15 @@ def pull_stage(
     """
     n, m = w.shape[0], rows.shape[0]
     at = layout(n, m)
-    qd = row[at[1] : at[1] + n]
-    target_rotation = row[at[4] : at[4] + 9].reshape(3, 3)
-    rotation = row[at[8] : at[8] + 9].reshape(3, 3)
-    error = row[at[9] : at[9] + 6]
-    jacobian = row[at[10] : at[10] + 6 * n].reshape(6, n)
-    task_jacobian = row[at[11] : at[11] + m * n].reshape(m, n)
-    factor = row[at[12] : at[12] + m * m].reshape(m, m)
-    y = row[at[13] : at[13] + m]
+    qd = row[at.qd : at.qd + n]
+    target_rotation = row[at.target_rotation : at.target_rotation + 9].reshape(3, 3)
+    target_twist = row[at.target_twist : at.target_twist + 6]
+    rotation = row[at.rotation : at.rotation + 9].reshape(3, 3)
+    error = row[at.error : at.error + 6]
+    jacobian = row[at.jacobian : at.jacobian + 6 * n].reshape(6, n)
+    task_jacobian = row[at.task_jacobian : at.task_jacobian + m * n].reshape(m, n)
+    factor = row[at.factor : at.factor + m * m].reshape(m, m)
+    y = row[at.y : at.y + m]
     pointing = angle_kind == POINTING
 
     z = np.zeros(m)
@@ -263,7 +70,7 @@ def pull_stage(
             weights[i, k] = full_y[i] * epsilon_bar[k] - full_z[i] * qd[k]
     # Everything but ∂J6 acts through the tool's own twist J6 ∂q.
     twist_bar = np.zeros(6)
-    fade = row[at[14] + 1]
+    fade = row[at.damping + 1]
     if fade > 0.0:
         _pull_damping(row, rows, pointing, gain, z, full_z, weights, twist_bar)
         gain *= 1.0 - fade
@@ -280,7 +87,7 @@ def pull_stage(
     if pointing:
         first, second = np.zeros(3), np.zeros(3)
         for i in range(3):
-            second[i] = -(row[at[5] + 3 + i] + gain * error[3 + i])
+            second[i] = -(target_twist[3 + i] + gain * error[3 + i])
             for k in range(n):
                 first[i] += jacobian[3 + i, k] * epsilon_bar[k]
                 second[i] += jacobian[3 + i, k] * qd[k]
@@ -305,16 +112,19 @@ def _pull_damping(
     """Add what -(λ0² zᵀy + K zᵀS e) ∂f leaves: on J6 to `weights` (6, n), on S to `twist_bar`."""
     n, m = weights.shape[1], rows.shape[0]
     at = layout(n, m)
-    rotation = row[at[8] : at[8] + 9].reshape(3, 3)
-    jacobian = row[at[10] : at[10] + 6 * n].reshape(6, n)
-    task_jacobian = row[at[11] : at[11] + m * n].reshape(m, n)
-    y, v = row[at[13] : at[13] + m], row[at[14] + 3 : at[15]]
+    rotation = row[at.rotation : at.rotation + 9].reshape(3, 3)
+    error = row[at.error : at.error + 6]
+    jacobian = row[at.jacobian : at.jacobian + 6 * n].reshape(6, n)
+    task_jacobian = row[at.task_jacobian : at.task_jacobian + m * n].reshape(m, n)
+    y = row[at.y : at.y + m]
+    strength, by_square = row[at.damping], row[at.damping + 2]
+    v = row[at.damping + 3 : at.columns]
     slope = 0.0
     for i in range(m):
-        slope += row[at[14]] * z[i] * y[i]
+        slope += strength * z[i] * y[i]
     for i in range(6):
-        slope += gain * full_z[i] * row[at[9] + i]
-    factor = -2.0 * row[at[14] + 2] * slope
+        slope += gain * full_z[i] * error[i]
+    factor = -2.0 * by_square * slope
     left, right, turn = np.empty(6), np.zeros(n), np.zeros(3)
     unselect(rows, pointing, rotation, v, left)
     for k in range(n):
@@ -347,7 +157,7 @@ def pullback(
     A stage's slope acts on the later stages of its step and on the step's end.
     """
     stages, n = q_cotangent.shape
-    step = layout(n, rows.shape[0])[6]
+    step = layout(n, rows.shape[0]).step
     state, q_bar = np.zeros(n), np.zeros(n)
     chi, slope = np.zeros((4, n)), np.empty(n)
     for s in range(stages - 1, -1, -1):
@@ -401,7 +211,7 @@ def sensitivities(
     at every stage. The rows of the matrices are pullbacks of the unit vectors.
     """
     stages, n = epsilon_matrix.shape[:2]
-    step = layout(n, rows.shape[0])[6]
+    step = layout(n, rows.shape[0]).step
     projector, slope_by_q, unit = np.empty((n, n)), np.empty((n, n)), np.zeros(n)
     slope_by_target = np.empty((n, 12))
     no_error = np.zeros(6)
