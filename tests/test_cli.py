@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import selfmotion as sm
@@ -49,7 +50,7 @@ def test_plan_through_waypoints(tmp_path: Path) -> None:
     rows = ["t,x,y,z,qw,qx,qy,qz"]
     for t in np.linspace(0, 2, 9):
         pose = line.pose(t)
-        x, y, z, w = sm.robot.pin.Quaternion(pose.rotation).coeffs()
+        x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
         rows.append(",".join(map(repr, map(float, [t, *pose.translation, w, x, y, z]))))
     file = tmp_path / "path.csv"
     file.write_text("\n".join(rows) + "\n")

@@ -4,6 +4,7 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import selfmotion as sm
@@ -61,8 +62,8 @@ def test_damped_equation_4_at_every_stage(case: Case) -> None:
     factors = law.factor(smallest_singular_values(rollout))
     for s in range(len(samples.t)):
         jacobian, share = samples.task_jacobian[s], (factors[s] / law.strength) ** 2
-        actual = sm.robot.pin.SE3(samples.rotation[s], samples.translation[s])
-        goal = sm.robot.pin.SE3(target.rotation[s], target.translation[s])
+        actual = pin.SE3(samples.rotation[s], samples.translation[s])
+        goal = pin.SE3(target.rotation[s], target.translation[s])
         twist = target.twist[s] + (1.0 - share) * gain * task.twist_error(goal, actual)
         command = task.select(twist[:, None], samples.rotation[s])[:, 0]
         gram = jacobian @ jacobian.T + factors[s] ** 2 * np.eye(task.dimension)

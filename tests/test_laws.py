@@ -1,6 +1,7 @@
 """Laws of the method, on every arm and task."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import selfmotion as sm
@@ -53,8 +54,8 @@ def test_equation_4_at_every_stage(case: Case) -> None:
     gain = 20.0 / case[3].duration
     for s in range(0, len(samples.t), 7):
         jacobian = samples.task_jacobian[s]
-        actual = sm.robot.pin.SE3(samples.rotation[s], samples.translation[s])
-        goal = sm.robot.pin.SE3(target.rotation[s], target.translation[s])
+        actual = pin.SE3(samples.rotation[s], samples.translation[s])
+        goal = pin.SE3(target.rotation[s], target.translation[s])
         twist = target.twist[s] + gain * task.twist_error(goal, actual)
         command = task.select(twist[:, None], samples.rotation[s])[:, 0]
         inverse = np.linalg.pinv(jacobian)

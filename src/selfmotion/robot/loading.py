@@ -1,0 +1,202 @@
+"""Arms from URDF files, or by name."""
+
+import dataclasses
+import importlib.metadata
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from selfmotion.arrays import read_only
+from selfmotion.errors import RobotError
+from selfmotion.robot.model import RobotModel, locked_configuration
+from selfmotion.urdf import Urdf, parse_urdf, read_urdf
+
+
+@dataclass(frozen=True)
+class NamedArm:
+    """An arm that `load_robot` knows by name.
+
+    Attributes
+    ----------
+    urdf : str
+        File below the folder of example-robot-data, or of this package for our own arms.
+    tool : str
+        The usual tool frame.
+    """
+
+    urdf: str
+    tool: str
+
+
+NAMED_ARMS: Mapping[str, NamedArm] = {
+    "planar_3r": NamedArm("planar_3r.urdf", "tool"),
+    "panda": NamedArm("panda_description/urdf/panda.urdf", "panda_hand_tcp"),
+    "xarm7": NamedArm("xarm_description/urdf/xarm7.urdf", "link_eef"),
+    "baxter": NamedArm("baxter_description/urdf/baxter.urdf", "left_gripper"),
+    "tiago": NamedArm("tiago_description/robots/tiago.urdf", "arm_tool_link"),
+    "pr2": NamedArm("pr2_description/urdf/pr2.urdf", "r_gripper_tool_frame"),
+    "ur5": NamedArm("ur_description/urdf/ur5_robot.urdf", "tool0"),
+    "ur10": NamedArm("ur_description/urdf/ur10_robot.urdf", "tool0"),
+    "kinova": NamedArm("kinova_description/robots/kinova.urdf", "j2s6s200_end_effector"),
+    "z1": NamedArm("z1_description/urdf/z1.urdf", "gripperStator"),
+}
+
+
+def load_robot(
+    robot: str | Path,
+    tool: str | None = None,
+    lock: Mapping[str, float] | None = None,
+) -> RobotModel:
+    """Load an arm.
+
+    Parameters
+    ----------
+    robot : str or Path
+        A name from `NAMED_ARMS` (``"panda"``, ``"planar_3r"``, …) or the path of a ``.urdf`` file.
+    tool : str, optional
+        Tool frame (a link). Default: the named arm's usual one; for a file, its only leaf link.
+    lock : dict, optional
+        Joints to hold, with their coordinate [rad or m]. Joints off the chain to the tool are
+        held anyway, at 0 or the nearest limit unless given here.
+
+    Returns
+    -------
+    RobotModel
+
+    Raises
+    ------
+    RobotError
+        The name, file, frame or joint does not exist or cannot be used.
+
+    Examples
+    --------
+    >>> load_robot("panda").dof
+    7
+    """
+    if isinstance(robot, str) and robot in NAMED_ARMS:
+        arm = NAMED_ARMS[robot]
+        return build_robot(_read_named(arm), tool or arm.tool, lock or {})
+    path = Path(robot)
+    if path.suffix != ".urdf":
+        raise RobotError(
+            f"unknown robot '{robot}', expected a .urdf file or one of: {', '.join(NAMED_ARMS)}"
+        )
+    urdf = read_urdf(path)
+    return build_robot(urdf, tool or _only_leaf(urdf), lock or {})
+
+
+def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
+    """Build the chain from the root of a validated URDF to `tool`; see `load_robot`."""
+    if tool not in urdf.links:
+        raise RobotError(
+            f"{urdf.source}: no link '{tool}' to use as tool frame; links: {', '.join(urdf.links)}"
+        )
+    full = pin.buildModelFromXML(urdf.text)
+    _check_lock(urdf, full, lock)
+    chain = [joint for joint in urdf.chain(tool) if joint.kind != "fixed"]
+    for joint in chain:
+        if joint.kind in ("floating", "planar"):
+            raise RobotError(
+                f"{urdf.source}: joint '{joint.name}' is {joint.kind}; an arm's joints are "
+                f"revolute, continuous or prismatic"
+            )
+        if joint.mimics is not None and joint.name not in lock:
+            raise RobotError(
+                f"{urdf.source}: joint '{joint.name}' on the way to '{tool}' mimics "
+                f"'{joint.mimics}'; choose a tool before it, or hold it with lock="
+            )
+    free = [joint.name for joint in chain if joint.name not in lock]
+    if not free:
+        raise RobotError(f"{urdf.source}: no joint is left free between the root and '{tool}'")
+    locked = _locked_joints(full, free, lock)
+    reference, locked_ids = locked_configuration(full, locked)
+    model = pin.buildReducedModel(full, locked_ids, reference)
+    names = tuple(model.names[1:])
+    if model.nq != len(free) or set(names) != set(free):
+        raise RobotError(
+            f"{urdf.source}: the chain to '{tool}' has joints {free}, but Pinocchio built "
+            f"{list(names)}"
+        )
+    continuous = np.array([name in urdf.continuous() for name in names])
+    velocity = np.array(model.velocityLimit, dtype=np.float64)
+    return RobotModel(
+        name=model.name,
+        tool=tool,
+        joint_names=names,
+        lower=read_only(np.where(continuous, -np.inf, model.lowerPositionLimit)),
+        upper=read_only(np.where(continuous, np.inf, model.upperPositionLimit)),
+        velocity_limit=read_only(np.where(velocity > 0, velocity, np.inf)),
+        locked=locked,
+        model=model,
+        tool_id=model.getFrameId(tool, pin.FrameType.BODY),
+        urdf=urdf,
+        _data=model.createData(),
+    )
+
+
+def rebuild_robot(
+    text: str,
+    package_dirs: Sequence[str],
+    source: str,
+    continuous: Sequence[str],
+    tool: str,
+    locked: Mapping[str, float],
+) -> RobotModel:
+    """Build an arm from what a saved plan carries of it."""
+    urdf = parse_urdf(text, source=source, package_dirs=tuple(package_dirs))
+    # The text has the continuous joints as revolute ones already.
+    for name in continuous:
+        urdf.joints[name] = dataclasses.replace(urdf.joints[name], kind="continuous")
+    return build_robot(urdf, tool, locked)
+
+
+def _read_named(arm: NamedArm) -> Urdf:
+    own = Path(__file__).parents[1] / "robots" / arm.urdf
+    if own.is_file():
+        return read_urdf(own)
+    share = _example_robot_data()
+    urdf = read_urdf(share / "robots" / arm.urdf)
+    return Urdf(urdf.source, urdf.text, (str(share.parent), str(share)), urdf.joints)
+
+
+def _example_robot_data() -> Path:
+    """Return the data folder of example-robot-data, which installs no importable module."""
+    for file in importlib.metadata.files("example-robot-data") or []:
+        if file.name == "panda.urdf":
+            return Path(str(file.locate())).resolve().parents[3]
+    raise RobotError("example-robot-data is installed without its robots; reinstall the package")
+
+
+def _only_leaf(urdf: Urdf) -> str:
+    parents = {joint.parent for joint in urdf.joints.values()}
+    leaves = [link for link in urdf.links if link not in parents]
+    if len(leaves) != 1:
+        raise RobotError(
+            f"{urdf.source}: has {len(leaves)} end links ({', '.join(leaves)}); "
+            f"name the tool frame with tool="
+        )
+    return leaves[0]
+
+
+def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:
+    for name, value in lock.items():
+        if not model.existJointName(name):
+            raise RobotError(f"{urdf.source}: lock names joint '{name}', which is not movable here")
+        if not np.isfinite(value):
+            raise RobotError(f"{urdf.source}: lock holds joint '{name}' at {value}, not finite")
+
+
+def _locked_joints(model: Any, free: list[str], lock: Mapping[str, float]) -> dict[str, float]:
+    locked = {}
+    for index in range(1, model.njoints):
+        joint, name = model.joints[index], model.names[index]
+        if name in free or joint.nq != 1:
+            continue
+        lower = model.lowerPositionLimit[joint.idx_q]
+        upper = model.upperPositionLimit[joint.idx_q]
+        locked[name] = float(lock.get(name, np.clip(0.0, lower, upper)))
+    return locked
