@@ -293,6 +293,8 @@ def test_relaxations_survive_saving_and_retiming(panda_circle: Callable, tmp_pat
         ({"rows": "x", "band": np.nan}, "band is nan"),
         ({"rows": "x", "axes": "base"}, "expected 'world' or 'tool'"),
         ({"rows": "x", "during": (2.0, 1.0)}, "0 ≤ first < last"),
+        ({"rows": "x", "during": (1.0,)}, "expected two times"),
+        ({"rows": "x", "during": (0.0, np.inf)}, "expected two times"),
         ({"rows": "x", "intervals": 3}, "≥ 4"),
     ],
 )

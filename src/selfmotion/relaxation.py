@@ -86,13 +86,13 @@ class Relaxation:
                 f"≥ 4"
             )
         if self.during is not None:
-            first, last = (float(time) for time in self.during)
-            if not (np.isfinite(last) and 0.0 <= first < last):
+            times = tuple(float(time) for time in self.during)
+            if not (len(times) == 2 and np.isfinite(times[1]) and 0.0 <= times[0] < times[1]):
                 raise ProblemError(
                     f"relaxation {self.name}: during is {self.during}, expected two times "
                     f"0 ≤ first < last [s]"
                 )
-            object.__setattr__(self, "during", (first, last))
+            object.__setattr__(self, "during", times)
 
     @property
     def name(self) -> str:
