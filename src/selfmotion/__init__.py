@@ -46,6 +46,7 @@ from selfmotion.errors import (
     BreakdownError,
     FileFormatError,
     InverseKinematicsError,
+    NoSequenceError,
     PathError,
     PlanError,
     ProblemError,
@@ -58,7 +59,7 @@ from selfmotion.errors import (
 from selfmotion.line_search import LineSearch
 from selfmotion.null_motion import BSplineNullMotion, NullMotion, PolynomialNullMotion
 from selfmotion.path import Circle, Line, Path, Retimed, TwistPath, Waypoints
-from selfmotion.plan import Plan, Report, load_plan
+from selfmotion.plan import Gap, Plan, Report, load_plan
 from selfmotion.planner import plan
 from selfmotion.problem import Problem
 from selfmotion.quasi_newton import Iteration, QuasiNewton, Status
@@ -90,6 +91,7 @@ __all__ = [
     "Extreme",
     "FileFormatError",
     "FunctionCost",
+    "Gap",
     "GradientProjection",
     "GravityTorque",
     "InverseKinematicsError",
@@ -110,6 +112,7 @@ __all__ = [
     "Mesh",
     "Method",
     "Motion",
+    "NoSequenceError",
     "NullMotion",
     "Partials",
     "Path",
