@@ -26,10 +26,13 @@ WORLD = (
     Cylinder("cylinder", TURNED.inverse(), 0.1, 0.3),
     Capsule("capsule", pin.SE3(TURNED.rotation, np.array([-0.4, 0.5, 0.8])), 0.05, 0.4),
 )
+# Where hulls take the place of capsules, by default [m].
+NEAR = 0.02
 # coal's iterations stop within 1e-6 of the distance.
 GJK = 2e-6
-# Central differences with a step of 1e-6 of distances near 1.
+# Central differences with a step of 1e-6 of distances near 1; of hulls, GJK's over one of 1e-4.
 DIFFERENCE = 1e-7
+HULL_STEP, HULL_DIFFERENCE = 1e-4, 2e-2
 ARMS = [name for name in NAMED_ARMS if name != "planar_3r"]
 
 
@@ -47,16 +50,45 @@ def samples(robot, count: int, seed: int = 1) -> np.ndarray:
 def test_gradient_is_the_central_difference(models) -> None:
     _, model = models
     q = samples(model.robot, 6)
-    step = 1e-6
-    gradient = model.clearances(q).jacobian()
+    clearances = model.clearances(q)
+    # Where the blend is above twice `near`, capsules may be below it.
+    gradient, hulls = clearances.jacobian(), clearances.values < 5.0 * NEAR
     wrong = np.zeros(gradient.shape, dtype=bool)
-    for joint, unit in enumerate(np.eye(model.robot.dof)):
-        ahead = model.clearances(q + step * unit).values
-        behind = model.clearances(q - step * unit).values
-        difference = (ahead - behind) / (2.0 * step)
-        wrong[:, :, joint] = np.abs(difference - gradient[:, :, joint]) > DIFFERENCE
+    for step, tolerance, here in (
+        (1e-6, DIFFERENCE, ~hulls),
+        (HULL_STEP, HULL_DIFFERENCE, hulls),
+    ):
+        for joint, unit in enumerate(np.eye(model.robot.dof)):
+            ahead = model.clearances(q + step * unit).values
+            behind = model.clearances(q - step * unit).values
+            difference = (ahead - behind) / (2.0 * step)
+            far = np.abs(difference - gradient[:, :, joint]) > tolerance
+            wrong[:, :, joint] |= far & here
     # Where the closest points jump within the step there is no derivative to agree with.
-    assert wrong.any(axis=2).mean() < 2e-3
+    assert wrong.any(axis=2).mean() < 5e-3
+
+
+def test_between_capsules_and_hulls_the_distance_is_smooth() -> None:
+    """On the way to a box: continuous in value and slope, from below to the hulls' distance."""
+    robot = load_robot("panda")
+    exact = CollisionModel(robot, [Box("box", [0.6, 0.3, 0.5], [0.1, 0.2, 0.3])])
+    model = ClearanceModel(exact, NEAR)
+    column = model.pairs.index(("panda_hand", "box"))
+    q = (
+        np.array([0.0, 0.2, 0.0, -1.8, 0.0, 1.9, 0.4])
+        + np.linspace(0.0, 0.6, 4001)[:, None] * np.eye(7)[0]
+    )
+    clearances = model.clearances(q)
+    values, slopes = clearances.values[:, column], clearances.jacobian()[:, column, 0]
+    assert values.max() > 2.0 * NEAR
+    assert values.min() < 0.0
+    steps = np.diff(values)
+    expected = 0.5 * (slopes[1:] + slopes[:-1]) * 0.6 / 4000
+    # GJK's noise, and a second derivative of tens of metres over the blend.
+    assert np.abs(steps - expected).max() < 4.0 * GJK
+    alone = ClearanceModel(exact, 1.0).clearances(q).values[:, column]
+    assert np.all(values <= alone + GJK)
+    assert values[values < NEAR] == pytest.approx(alone[values < NEAR], abs=GJK)
 
 
 def test_pullback_is_the_weighted_sum_of_the_gradients(models) -> None:
@@ -121,7 +153,7 @@ def test_a_mesh_counts_as_the_box_around_it(tmp_path: Path) -> None:
     box = ClearanceModel(CollisionModel(robot, [Box("it", offset, [0.2, 0.3, 0.1])]))
     q = samples(robot, 5)
     # STL keeps seven digits.
-    assert mesh.clearances(q).values == pytest.approx(box.clearances(q).values, abs=1e-7)
+    assert mesh.clearances(q).values == pytest.approx(box.clearances(q).values, abs=GJK)
 
 
 def test_an_arm_without_geometry_has_no_pairs() -> None:

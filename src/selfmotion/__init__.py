@@ -47,6 +47,7 @@ from selfmotion.errors import (
     BreakdownError,
     FileFormatError,
     InverseKinematicsError,
+    NoSequenceError,
     PathError,
     PlanError,
     ProblemError,
@@ -59,7 +60,7 @@ from selfmotion.errors import (
 from selfmotion.line_search import LineSearch
 from selfmotion.null_motion import BSplineNullMotion, NullMotion, PolynomialNullMotion
 from selfmotion.path import Circle, Line, Path, Retimed, TwistPath, Waypoints
-from selfmotion.plan import Plan, Report, load_plan
+from selfmotion.plan import Gap, Plan, Report, load_plan
 from selfmotion.planner import plan
 from selfmotion.problem import Problem
 from selfmotion.quasi_newton import Iteration, QuasiNewton, Status
@@ -93,6 +94,7 @@ __all__ = [
     "Extreme",
     "FileFormatError",
     "FunctionCost",
+    "Gap",
     "GradientProjection",
     "GravityTorque",
     "InverseKinematicsError",
@@ -113,6 +115,7 @@ __all__ = [
     "Mesh",
     "Method",
     "Motion",
+    "NoSequenceError",
     "NullMotion",
     "Partials",
     "Path",

@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 import numpy as np
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 import selfmotion as sm
 from selfmotion import report_text
 from selfmotion.arrays import Array
+from selfmotion.stage_display import StageDisplay
 
 app = typer.Typer(
     help="Plan the joint motion of a redundant arm along a tool motion.",
@@ -20,6 +20,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 _console = Console(highlight=False)
+# Apart from the results, so that these can be piped.
+_stages = Console(stderr=True, highlight=False)
 
 VERIFIED, NOT_VERIFIED, BAD_INPUT = 0, 1, 2
 
@@ -206,29 +208,21 @@ def study(
     from selfmotion.study import PARTS, Scale, run, write
 
     scale = Scale.reduced() if reduced else Scale.full()
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=_console, transient=True) as progress:
-        bar = progress.add_task("", total=len(PARTS))
-
-        def show(part: str) -> None:
-            progress.update(bar, description=part, completed=PARTS.index(part))
-
-        result = run(scale, show)
+    with StageDisplay(_stages) as display:
+        result = run(scale, lambda part: display.stage(part, PARTS.index(part) + 1, len(PARTS)))
     files = write(result, out)
     report_text.show_claims(result.claims, _console)
     _console.print(f"wrote {files[0]} and {len(files) - 1} files beside it", markup=False)
 
 
 def _plan_with_progress(problem: sm.Problem, max_evaluations: int | None) -> sm.Plan:
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=_console, transient=True) as progress:
-        bar = progress.add_task("planning", total=None)
-
-        def show(iteration: sm.Iteration) -> None:
-            text = f"cost {iteration.cost:.6g} after {iteration.evaluations} evaluations"
-            progress.update(bar, description=text)
-
-        return sm.plan(problem, max_evaluations=max_evaluations, callback=show)
+    with StageDisplay(_stages) as display:
+        return sm.plan(
+            problem,
+            max_evaluations=max_evaluations,
+            callback=display.iteration,
+            progress=display.stage,
+        )
 
 
 def _write(result: sm.Plan, out: list[Path], html: Path | None) -> None:

@@ -1,12 +1,11 @@
 """Motions worth starting from, found by the global search over self-motions."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from selfmotion.arrays import Array
 from selfmotion.path import Waypoints
 from selfmotion.problem import Problem
+from selfmotion.progress import Progress
 from selfmotion.sequences import Sequence, best_sequences
 
 # Sequences refined; the shortest among the samples is not always that of the best motion.
@@ -20,7 +19,14 @@ _SMOOTHING = 5
 
 
 class Guide:
-    """A sequence as a smooth motion: what `Session` takes as x = 0."""
+    """A sequence as a smooth motion: what `Session` takes as x = 0.
+
+    Attributes
+    ----------
+    sequence : Sequence
+    start : (n,)
+        Its first configuration.
+    """
 
     def __init__(self, sequence: Sequence) -> None:
         from scipy.interpolate import make_lsq_spline
@@ -29,6 +35,7 @@ class Guide:
         inner = np.linspace(t[0], t[-1], max(len(t) // _SMOOTHING, 2))
         knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
         self._rate = make_lsq_spline(t, q, knots).derivative()
+        self.sequence = sequence
         self.start: Array = q[0]
 
     def __call__(self, t: Array) -> Array:
@@ -36,8 +43,10 @@ class Guide:
         return np.asarray(self._rate(t))
 
 
-def guides(problem: Problem, rng: np.random.Generator | int | None) -> Iterator[Guide]:
-    """Yield guides from the best sequences over the self-motions of redundancy 1.
+def guides(
+    problem: Problem, rng: np.random.Generator | int | None, progress: Progress
+) -> list[Guide]:
+    """Return guides from the best sequences over the self-motions of redundancy 1, shortest first.
 
     Raises
     ------
@@ -63,6 +72,6 @@ def guides(problem: Problem, rng: np.random.Generator | int | None) -> Iterator[
         margin=wanted.clearance + _MARGIN,
         count=_COUNT,
         rng=0 if rng is None else rng,
+        progress=progress,
     )
-    for sequence in sequences:
-        yield Guide(sequence)
+    return [Guide(sequence) for sequence in sequences]

@@ -170,10 +170,15 @@ class Objective:
         if self._at is not None and np.array_equal(self._at, x):
             return
         self.evaluations += 1
-        self._at = x.copy()
+        # An interruption on the way must not leave half a motion as that of x.
+        self._at = None
         self._terms = {cost.name: np.inf for cost in self._costs}
         if self._path_weight:
             self._terms[PATH_ERROR] = np.inf
+        self._evaluate(x)
+        self._at = x.copy()
+
+    def _evaluate(self, x: Array) -> None:
         z, coefficients, c = self.parts(x)
         pose = self._first_pose
         if self._deviation is not None:

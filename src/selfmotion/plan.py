@@ -26,6 +26,53 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@dataclass(frozen=True)
+class Gap:
+    """How far a plan is from the global optimum, as far as the search over self-motions knows it.
+
+    No bound: the search sees samples of the self-motions, and joint path lengths. So there are two
+    comparisons, with different strengths. The costs are alike (same cost, same constraints, same
+    optimiser), but that of the search is refined from a few of its sequences only. The lengths
+    are of all sequences there are, but say little where the cost is another one.
+
+    Attributes
+    ----------
+    cost : float
+        F of the plan.
+    best_cost : float or None
+        F of the best motion refined from the sequences that the search found; None where none
+        keeps the constraints.
+    length : float
+        Σ|Δq| of the plan over waypoints and joints [rad or m].
+    best_length : float
+        That of the shortest sequence of configurations within the same limits, clearance and
+        steps.
+    spacing : float
+        Distance of the samples of the self-motions [rad or m], configuration norm.
+    sequences : int
+        How many sequences, unlike each other, were refined.
+    """
+
+    cost: float
+    best_cost: float | None
+    length: float
+    best_length: float
+    spacing: float
+    sequences: int
+
+    @property
+    def cost_excess(self) -> float | None:
+        """The plan's cost above the best one, as a share; negative where the plan is better."""
+        if self.best_cost is None or self.best_cost == 0.0:
+            return None
+        return (self.cost - self.best_cost) / abs(self.best_cost)
+
+    @property
+    def length_excess(self) -> float:
+        """The plan's joint path above the shortest one, as a share."""
+        return self.length / self.best_length - 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class Report:
     """How a plan was found.
@@ -51,6 +98,8 @@ class Report:
         What the status means and what to do about it.
     seconds : float
         Wall time of `plan`.
+    gap : Gap or None
+        Distance from the global optimum, where a global search was made.
     """
 
     cost: float
@@ -66,6 +115,7 @@ class Report:
     status: Status
     message: str
     seconds: float
+    gap: Gap | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +242,7 @@ def _describe(plan: Plan) -> tuple[dict[str, Any], dict[str, Array]]:
             "terms": dict(report.terms),
             "initial_terms": dict(report.initial_terms),
             "status": report.status.value,
+            "gap": None if report.gap is None else dataclasses.asdict(report.gap),
         },
         "history": [
             {
@@ -227,6 +278,7 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Plan:
     )
     report = dict(description["report"])
     report["status"] = Status(report["status"])
+    report["gap"] = None if report["gap"] is None else Gap(**report["gap"])
     certificate: dict[str, Any] = {
         key: Extreme(**value) if isinstance(value, dict) else value
         for key, value in description["certificate"].items()

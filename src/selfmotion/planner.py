@@ -2,25 +2,34 @@
 
 import time
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.arrays import Array, read_only
+from selfmotion.arrays import read_only
 from selfmotion.baselines import Method, plan_by
 from selfmotion.certificate import Certificate, Tolerance, certify
-from selfmotion.errors import BreakdownError, NoSequenceError, ProblemError, SelfmotionError
-from selfmotion.guides import guides
-from selfmotion.plan import Plan, Report
+from selfmotion.errors import ProblemError
+from selfmotion.plan import Gap, Plan, Report
 from selfmotion.problem import Problem
+from selfmotion.progress import Progress, silent
 from selfmotion.quasi_newton import Callback, QuasiNewton, Status
-from selfmotion.search import start_candidates
+from selfmotion.selection import Effort, Selection
+from selfmotion.sequences import SPACING
 from selfmotion.session import MOST_HALVINGS, Counts, Session
 from selfmotion.trajectory import Trajectory
 
-_Settings = tuple[Problem, QuasiNewton, Callback | None, int | None, Counts]
 
-# Where no start leads to a motion that keeps the constraints, this many times more are tried.
-_SECOND_EFFORT = 4
+class _Checked(NamedTuple):
+    """A motion, the one at x = 0 on the same grid, what they cost, and the check."""
+
+    terms: dict[str, float]
+    trajectory: Trajectory
+    certificate: Certificate
+    initial_terms: dict[str, float]
+    initial_trajectory: Trajectory
+    damped: bool
 
 
 def plan(
@@ -35,7 +44,9 @@ def plan(
     finalists: int = 4,
     rng: np.random.Generator | int | None = 0,
     search: str = "auto",
+    compare: bool = False,
     method: Method | None = None,
+    progress: Progress = silent,
 ) -> Plan:
     """Plan the joint motion that follows the path exactly and minimises the costs.
 
@@ -65,15 +76,22 @@ def plan(
         from the best sequences over all self-motions (`best_sequences`). ``"auto"``: from many
         starts first, and from sequences where none of them leads to a motion that keeps the
         constraints.
+    compare : bool
+        Search globally whatever the other search finds, so that `Report.gap` tells how far the
+        plan is from the best motion of all. Needs redundancy 1.
     method : Method, optional
         Another work's way to resolve the redundancy, instead of the optimisation: then the options
         of the optimiser have no effect.
+    progress : callable, optional
+        Told the stage, how much of it has begun, and of how many: ``("start", 3, 24)``. It may
+        raise `KeyboardInterrupt` to stop.
 
     Returns
     -------
     Plan
         Also where the search fell short: `Plan.report` and `Plan.certificate` say so, and
-        `Plan.require` raises.
+        `Plan.require` raises. After an interruption (Ctrl-C) the best plan that was known by then,
+        checked like any other; its status says so.
 
     Raises
     ------
@@ -81,6 +99,10 @@ def plan(
         The motion at x = 0 runs into a singular pose, from every start.
     InverseKinematicsError
         The start is free and no configuration reaches the start of the path.
+    NoSequenceError
+        The global search finds that no motion follows the path; says where it ends and why.
+    KeyboardInterrupt
+        The interruption came before there was a complete motion.
     """
     if method is not None:
         return plan_by(problem, method, tolerance)
@@ -90,167 +112,100 @@ def plan(
         )
     if max_evaluations is not None and max_evaluations < 1:
         raise ProblemError(f"max_evaluations is {max_evaluations}, expected at least 1")
-    if search not in ("auto", "local", "global"):
-        raise ProblemError(f"search is '{search}', expected 'auto', 'local' or 'global'")
     began = time.perf_counter()
-    counts = Counts()
-    settings = (problem, optimizer or QuasiNewton(), callback, max_evaluations, counts)
-    use_metric = initial_metric == "gauss-newton"
-    if problem.given_start is not None:
-        best = Session(*settings, problem.given_start, free=False)
-        best.minimize(use_metric)
-    else:
-        best = _search(settings, starts, finalists, rng, use_metric, search)
-    best.refine_until_settled()
-    return _finish(problem, best, tolerance or Tolerance(), began)
+    selection = Selection(
+        problem,
+        partial(Session, problem, optimizer or QuasiNewton(), callback, max_evaluations, Counts()),
+        initial_metric == "gauss-newton",
+        Effort(starts, finalists, search, compare, rng),
+        progress,
+    )
+    best = selection.run()
+    rival_cost = _settle(best, selection.rival, progress)
+    checked = _checked(problem, best, tolerance or Tolerance(), progress)
+    return _finish(problem, best, checked, _gap(selection, rival_cost, checked), began)
 
 
-def _search(
-    settings: _Settings,
-    starts: int,
-    finalists: int,
-    rng: np.random.Generator | int | None,
-    use_metric: bool,
-    search: str,
-) -> Session:
-    """Return the best session of a free start: from many starts, or from global sequences."""
-    problem = settings[0]
-    best: Session | None = None
-    failure: SelfmotionError | None = None
-    can_search = problem.robot.redundancy(problem.rows) == 1
-    if search != "global" or not can_search:
-        try:
-            best = _search_starts(settings, starts, finalists, rng, use_metric)
-        except BreakdownError as error:
-            failure = error
-    fell_short = best is None or bool(best.violations)
-    cut_short = best is not None and best.status in (Status.INTERRUPTED, Status.STOPPED)
-    if can_search and search != "local" and fell_short and not cut_short:
-        try:
-            for guide in guides(problem, rng):
-                try:
-                    session = Session(*settings, guide.start, free=True, guide=guide)
-                except BreakdownError as error:
-                    failure = error
-                    continue
-                session.minimize(use_metric)
-                if best is None or session.score < best.score:
-                    best = session
-        except NoSequenceError as error:
-            failure = error
-    if best is None:
-        raise failure or ProblemError(f"finalists is {finalists}, expected at least 1")
-    if best.violations and isinstance(failure, NoSequenceError):
-        best.violations = (*best.violations, f"global search: {failure}")
-    return best
+def _settle(best: Session, rival: Session | None, progress: Progress) -> float | None:
+    """Go on to finer grids, also with what the best one is compared with; return its cost."""
+    try:
+        progress("finer grid", 1, 1)
+        best.refine_until_settled()
+        if rival is not None and rival is not best and not best.cut_short:
+            rival.refine_until_settled()
+            return None if rival.violations else rival.score[1]
+    except KeyboardInterrupt:
+        best.end(Status.INTERRUPTED)
+    return None
 
 
-def _search_starts(
-    settings: _Settings,
-    starts: int,
-    finalists: int,
-    rng: np.random.Generator | int | None,
-    use_metric: bool,
-) -> Session:
-    """Return the best session of a free start; more starts where the first ones fall short."""
-    problem = settings[0]
-    generator = np.random.default_rng(rng)
-    best: Session | None = None
-    failure: BreakdownError | None = None
-    for effort in (1, _SECOND_EFFORT):
-        candidates = start_candidates(
-            problem.robot, problem.path, problem.rows, effort * starts, generator
-        )
-        try:
-            found = _best_start(settings, candidates, effort * finalists, use_metric)
-        except BreakdownError as error:
-            failure = error
-            continue
-        if best is None or found.score < best.score:
-            best = found
-        if not best.violations or best.status in (Status.INTERRUPTED, Status.STOPPED):
-            break
-    if best is not None:
-        return best
-    raise failure or ProblemError(f"finalists is {finalists}, expected at least 1")
-
-
-def _best_start(
-    settings: _Settings, candidates: list[Array], finalists: int, use_metric: bool
-) -> Session:
-    """Return the session of the start whose optimised motion is best."""
-    sessions, failure = [], None
-    for candidate in candidates:
-        try:
-            sessions.append(Session(*settings, candidate, free=True))
-        except BreakdownError as error:
-            failure = error
-    if failure is not None and not sessions:
-        raise failure
-    sessions.sort(key=lambda session: session.initial_score)
-    best: Session | None = None
-    for session in sessions[:finalists]:
-        session.minimize(use_metric)
-        if best is None or session.score < best.score:
-            best = session
-        if session.status in (Status.INTERRUPTED, Status.STOPPED):
-            break
-    if best is None:
-        raise ProblemError(f"finalists is {finalists}, expected at least 1")
-    return best
-
-
-def _finish(problem: Problem, session: Session, tolerance: Tolerance, began: float) -> Plan:
-    """Refine the motion until it holds the tolerance, and gather everything."""
-    coarse: Trajectory | None = None
-    for _ in range(MOST_HALVINGS):
-        terms = session.terms()
-        trajectory, certificate = _motion(problem, session, tolerance)
-        errors = certificate.position_error.value, certificate.rotation_error.value
-        if _within(errors, tolerance):
-            break
-        # What damping costs stays on any grid: there, the motion stands when the tool does.
-        if coarse is not None and _within(_largest_change(problem, coarse, trajectory), tolerance):
-            break
-        coarse = trajectory if session.damped else None
-        session.refine()
-    violations = session.violations
-    x = session.coefficients
-    initial_terms = session.initial_terms()
-    initial_trajectory = session.trajectory()
-    counts = session.counts
+def _finish(
+    problem: Problem, session: Session, checked: _Checked, gap: Gap | None, began: float
+) -> Plan:
+    """Gather everything."""
+    terms, violations, counts = checked.terms, session.violations, session.counts
     message = session.status.message
     if violations:
-        message = f"not all constraints could be met: {'; '.join(violations)}"
-    if certificate.damped:
-        message += f"; the inverse was damped {' and '.join(map(str, certificate.damped))}"
+        unmet = f"not all constraints could be met: {'; '.join(violations)}"
+        message = f"{message}; {unmet}" if session.cut_short else unmet
+    if checked.certificate.damped:
+        stretches = " and ".join(map(str, checked.certificate.damped))
+        message += f"; the inverse was damped {stretches}"
     report = Report(
         cost=sum(terms.values()),
-        initial_cost=sum(initial_terms.values()),
+        initial_cost=sum(checked.initial_terms.values()),
         terms=terms,
-        initial_terms=initial_terms,
+        initial_terms=checked.initial_terms,
         evaluations=counts.evaluations,
         gradient_evaluations=counts.gradients,
         jacobian_evaluations=counts.jacobians,
-        steps=len(trajectory.t) - 1,
+        steps=len(checked.trajectory.t) - 1,
         iterations=sum(iteration.step > 0.0 for iteration in session.history),
         history=tuple(session.history),
         status=session.status,
         message=message,
         seconds=time.perf_counter() - began,
+        gap=gap,
     )
     return Plan(
         robot=problem.robot,
         path=problem.path,
         task=problem.rows,
-        trajectory=trajectory,
-        initial_trajectory=initial_trajectory,
-        coefficients=read_only(x),
+        trajectory=checked.trajectory,
+        initial_trajectory=checked.initial_trajectory,
+        coefficients=read_only(session.coefficients),
         report=report,
-        certificate=certificate,
+        certificate=checked.certificate,
         requirements=replace(problem.requirements, collision=None),
         clearance=problem.clearance,
     )
+
+
+def _checked(
+    problem: Problem, session: Session, tolerance: Tolerance, progress: Progress
+) -> _Checked:
+    """Return what there is on the first grid on which the motion holds the tolerance."""
+    checked = coarse = None
+    for _ in range(MOST_HALVINGS):
+        try:
+            progress("checking", 1, 1)
+            checked = _check(problem, session, tolerance)
+            certificate, trajectory = checked.certificate, checked.trajectory
+            errors = certificate.position_error.value, certificate.rotation_error.value
+            if _within(errors, tolerance):
+                break
+            # What damping costs stays on any grid: there, the motion stands when the tool does.
+            if coarse is not None and _within(
+                _largest_change(problem, coarse, trajectory), tolerance
+            ):
+                break
+            coarse = trajectory if checked.damped else None
+            session.refine()
+        except KeyboardInterrupt:
+            session.end(Status.INTERRUPTED)
+            break
+    # No plan goes without a certificate, interrupted or not.
+    return checked or _check(problem, session, tolerance)
 
 
 def _within(errors: tuple[float, float], tolerance: Tolerance) -> bool:
@@ -266,11 +221,29 @@ def _largest_change(problem: Problem, coarse: Trajectory, fine: Trajectory) -> t
     return float(position), float(rotation)
 
 
-def _motion(
-    problem: Problem, session: Session, tolerance: Tolerance
-) -> tuple[Trajectory, Certificate]:
-    trajectory = session.trajectory()
+def _check(problem: Problem, session: Session, tolerance: Tolerance) -> _Checked:
+    terms, trajectory, damped = session.terms(), session.trajectory(), session.damped
     certificate = certify(
         problem.robot, problem.path, problem.rows, trajectory, tolerance, problem.requirements
     )
-    return trajectory, certificate
+    initial_terms = session.initial_terms()
+    initial_trajectory = session.trajectory()
+    return _Checked(terms, trajectory, certificate, initial_terms, initial_trajectory, damped)
+
+
+def _gap(selection: Selection, rival_cost: float | None, checked: _Checked) -> Gap | None:
+    """Compare a plan with what the global search knows; None where it knows nothing."""
+    if not selection.sequences:
+        return None
+    cost, shortest = sum(checked.terms.values()), selection.sequences[0].sequence
+    rival = selection.rival
+    if rival is not None and rival is selection.best and not rival.violations:
+        rival_cost = cost
+    return Gap(
+        cost=cost,
+        best_cost=rival_cost,
+        length=float(np.abs(np.diff(checked.trajectory(shortest.t), axis=0)).sum()),
+        best_length=shortest.length,
+        spacing=SPACING,
+        sequences=len(selection.sequences),
+    )

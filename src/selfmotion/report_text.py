@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from selfmotion.certificate import Certificate
-from selfmotion.plan import Plan
+from selfmotion.plan import Gap, Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
@@ -35,6 +35,8 @@ def show(plan: Plan, console: Console) -> None:
         f"gradient;\n{report.jacobian_evaluations} Jacobians, {report.steps} steps, "
         f"{report.seconds:.2f} s\n{report.status.value}: {report.message}"
     )
+    if report.gap is not None:
+        console.print(_distance(report.gap))
     show_certificate(plan.certificate, console)
 
 
@@ -100,6 +102,18 @@ def show_claims(claims: Sequence["Claim"], console: Console) -> None:
 def _freedom(robot: RobotModel, task: Task) -> str:
     redundancy = robot.redundancy(task)
     return str(redundancy) if robot.can_follow(task) and redundancy > 0 else "-"
+
+
+def _distance(gap: Gap) -> str:
+    """Say how far a plan is from the global optimum."""
+    cost = "none of its motions keeps the constraints"
+    if gap.cost_excess is not None:
+        cost = f"cost {100.0 * gap.cost_excess:+.2f} % from its best motion"
+    return (
+        f"global search over self-motions sampled {gap.spacing:g} rad apart, "
+        f"{gap.sequences} refined:\n{cost}; joint path {gap.length:.4g}, "
+        f"{100.0 * gap.length_excess:+.2f} % from its shortest sequence"
+    )
 
 
 def _compare(before: float, after: float) -> tuple[str, str, str]:

@@ -103,14 +103,28 @@ class Session:
         conditions = AugmentedLagrangian(bound, reference.grid)
         self._objective = self._bind(reference.grid, conditions)
         self._minimum: Minimum | None = None
+        self._ended: Status | None = None
         # Whether the last motion kept all constraints: so far none is known to be active.
         self._feasible = True
         self._x = np.zeros(self._objective.size)
 
     @property
     def status(self) -> Status:
-        """How the last minimisation ended."""
+        """How the last minimisation ended, or what ended the session."""
+        if self._ended is not None:
+            return self._ended
         return Status.STOPPED if self._minimum is None else self._minimum.status
+
+    @property
+    def cut_short(self) -> bool:
+        """Whether the user wants no more."""
+        return self.status in (Status.INTERRUPTED, Status.STOPPED)
+
+    def end(self, status: Status) -> None:
+        """Take the motion as it is; there is no time for another one."""
+        self._ended = status
+        self.terms()
+        self.violations = self._conditions.violated(self._objective.rollout.samples())
 
     @property
     def coefficients(self) -> Array:

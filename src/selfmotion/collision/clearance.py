@@ -77,10 +77,16 @@ class ClearanceModel:
     it is the same outside; inside, minus the depth of the centre line's deepest point. A mesh
     counts as the box around it along its own axes.
 
+    That is quick, and smooth, but a few centimetres too little: where it is below `near`, the
+    distance of the convex hulls (GJK, and EPA where they overlap) takes its place, and from there
+    to twice as far the two are blended.
+
     Parameters
     ----------
     exact : CollisionModel
         Whose robot, obstacles and pairs of links are taken.
+    near : float
+        Capsules nearer than this [m] are replaced by hulls.
 
     Attributes
     ----------
@@ -91,7 +97,7 @@ class ClearanceModel:
 
     Notes
     -----
-    Capsules may overlap where their links do not. Judged over 300 sampled configurations, two
+    Hulls may overlap where their links do not. Judged over 300 sampled configurations, two
     links are not paired when this happens at all though they never meet, or in more than a tenth
     of the samples; a link and an obstacle, when it happens in each. These pairs are left
     to the exact model, so a motion that is clear here still needs its verdict.
@@ -99,8 +105,8 @@ class ClearanceModel:
     Not for use by several threads at once.
     """
 
-    def __init__(self, exact: CollisionModel) -> None:
-        self.robot = exact.robot
+    def __init__(self, exact: CollisionModel, near: float = 0.02) -> None:
+        self.robot, self._exact, self._near = exact.robot, exact, near
         self.capsules = link_capsules(self.robot)
         self._joints = np.array([capsule.joint for capsule in self.capsules], dtype=np.int64)
         self._middles = _rows([capsule.middle for capsule in self.capsules])
@@ -113,18 +119,34 @@ class ClearanceModel:
         moving = list(self._data.oMi)[1:]
         self._rotation_views = [place.rotation for place in moving]
         self._position_views = [place.translation for place in moving]
-        self._self_pairs = _self_pairs(self.capsules, set(exact.pairs))
-        self._world_pairs = np.array(
-            [
-                (i, j)
-                for i, capsule in enumerate(self.capsules)
-                for j in range(len(exact.obstacles))
-                if capsule.joint > 0
-            ],
-            dtype=np.int64,
-        ).reshape(-1, 2)
-        self._drop_overlapping(exact)
-        self.pairs = self._names(exact.obstacles)
+        own = _self_pairs(self.capsules, set(exact.pairs))
+        world = [
+            (i, j)
+            for i, capsule in enumerate(self.capsules)
+            for j in range(len(exact.obstacles))
+            if capsule.joint > 0
+        ]
+        self._pair_capsules(own, np.array(world, dtype=np.int64).reshape(-1, 2))
+        self._drop_overlapping()
+
+    def _pair_capsules(self, own: Ints, world: Ints) -> None:
+        """Set the pairs of capsules, and of capsules and obstacles, and what follows from them."""
+        self._self_pairs, self._world_pairs = own, world
+        links = [capsule.link for capsule in self.capsules]
+        obstacles = [obstacle.name for obstacle in self._exact.obstacles]
+        names = [(links[i], links[j]) for i, j in own]
+        names += [(links[i], obstacles[j]) for i, j in world]
+        self.pairs = tuple(dict.fromkeys(names))
+        column = {pair: k for k, pair in enumerate(self.pairs)}
+        self._group = np.array([column[pair] for pair in names], dtype=np.int64)
+        joints = np.concatenate(
+            [self._joints[own], np.pad(self._joints[world[:, :1]], ((0, 0), (0, 1)))]
+        )
+        self._pair_joints = np.zeros((len(self.pairs), 2), dtype=np.int64)
+        self._pair_joints[self._group] = joints
+        self._hulls = [
+            [k for k, pair in enumerate(self._exact.pairs) if pair == names] for names in self.pairs
+        ]
 
     def clearances(self, q_samples: npt.ArrayLike) -> Clearances:
         """Return the distances at samples (K, n).
@@ -154,8 +176,25 @@ class ClearanceModel:
             self._world_pairs,
             *self._obstacles.arrays(),
         )
+        values, wrenches = kernels.nearest(values, wrenches, self._group, len(self.pairs))
+        self._replace_near(q, values, wrenches)
         values.setflags(write=False)
-        return Clearances(values, wrenches, jacobians, self._pair_joints(), self._parents)
+        return Clearances(values, wrenches, jacobians, self._pair_joints, self._parents)
+
+    def _replace_near(self, q: Array, values: Array, wrenches: Array) -> None:
+        """Put the distances of hulls in the place of small ones of capsules."""
+        for k in np.flatnonzero((values < 2.0 * self._near).any(axis=1)):
+            self._exact.place_hulls(q[k])
+            for pair in np.flatnonzero(values[k] < 2.0 * self._near):
+                distance, normal, point = self._exact.hull_contact(self._hulls[pair])
+                if not np.isfinite(normal).all():
+                    continue  # in touch to the last digit: the capsules are conservative
+                wrench = np.concatenate([normal, np.cross(point, normal)])
+                gap = distance - values[k, pair]
+                share, slope = _blend(values[k, pair] / self._near)
+                wrenches[k, pair] *= 1.0 - share + gap * slope / self._near
+                wrenches[k, pair] += share * wrench
+                values[k, pair] += share * gap
 
     def _kinematics(self, q: Array) -> tuple[Array, Array, Array]:
         count, n = q.shape
@@ -172,39 +211,31 @@ class ClearanceModel:
         shape = (count, n + 1, 3)
         return rotations.reshape(*shape, 3), positions.reshape(shape), jacobians
 
-    def _pair_joints(self) -> Ints:
-        own = self._joints[self._self_pairs]
-        world = self._joints[self._world_pairs[:, :1]]
-        return np.concatenate([own, np.hstack([world, np.zeros_like(world)])])
-
-    def _names(self, obstacles: tuple[Obstacle, ...]) -> tuple[tuple[str, str], ...]:
-        links = [capsule.link for capsule in self.capsules]
-        own = [(links[i], links[j]) for i, j in self._self_pairs]
-        return tuple(own + [(links[i], obstacles[j].name) for i, j in self._world_pairs])
-
-    def _drop_overlapping(self, exact: CollisionModel) -> None:
+    def _drop_overlapping(self) -> None:
         rng = np.random.default_rng(0)
         lower, upper = self.robot.finite_limits()
         q = rng.uniform(lower, upper, (_SAMPLES, self.robot.dof))
         overlap = self.clearances(q).values <= 0.0
         if not overlap.any():
             return
-        truth = exact.overlaps(q)
-        names = self._names(exact.obstacles)
-        world = {obstacle.name for obstacle in exact.obstacles}
-        useful = np.ones(len(names), dtype=bool)
-        for pair in set(names):
-            # All capsules of two links together: part of them would promise what it cannot keep.
-            columns = np.array([name == pair for name in names])
+        truth = self._exact.overlaps(q)
+        world = {obstacle.name for obstacle in self._exact.obstacles}
+        useful = np.ones(len(self.pairs), dtype=bool)
+        for k, pair in enumerate(self.pairs):
             met = truth[pair]
-            wrong = (overlap[:, columns].any(axis=1) & ~met).mean()
+            wrong = (overlap[:, k] & ~met).mean()
             if pair[1] in world:
-                useful[columns] = wrong < 1.0
+                useful[k] = wrong < 1.0
             else:
-                useful[columns] = wrong <= (_FALSE_ALARMS if met.any() else 0.0)
-        own = len(self._self_pairs)
-        self._self_pairs = self._self_pairs[useful[:own]]
-        self._world_pairs = self._world_pairs[useful[own:]]
+                useful[k] = wrong <= (_FALSE_ALARMS if met.any() else 0.0)
+        kept, own = useful[self._group], len(self._self_pairs)
+        self._pair_capsules(self._self_pairs[kept[:own]], self._world_pairs[kept[own:]])
+
+
+def _blend(ratio: float) -> tuple[float, float]:
+    """Return the hulls' share of a distance, and its derivative: 1 below ratio 1, 0 above 2."""
+    s = min(max(2.0 - ratio, 0.0), 1.0)
+    return s * s * (3.0 - 2.0 * s), -6.0 * s * (1.0 - s)
 
 
 @dataclass(frozen=True, eq=False)

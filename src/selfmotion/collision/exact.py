@@ -146,7 +146,7 @@ class CollisionModel:
             return False
         if margin != self._margin:
             self._set_margin(margin)
-        pin.updateGeometryPlacements(self.robot.model, self._data, self._hulls, self._hull_data, q)
+        self.place_hulls(q)
         self._broad_phase.update(False)
         if not pin.computeCollisions(self._broad_phase, True):
             return False
@@ -164,6 +164,30 @@ class CollisionModel:
                 row = found[self._names(int(i))]
                 row[k] = row[k] or self._pair_distance(int(i), 0.0) <= 0.0
         return found
+
+    def place_hulls(self, q: Array) -> None:
+        """Place the convex hulls at `q` (n,), for `hull_contact`."""
+        pin.updateGeometryPlacements(self.robot.model, self._data, self._hulls, self._hull_data, q)
+
+    def hull_contact(self, pairs: Sequence[int]) -> tuple[float, Array, Array]:
+        """Return the smallest distance of some pairs' hulls as they are placed, and where.
+
+        Parameters
+        ----------
+        pairs : sequence of int
+            Indices into `pairs`.
+
+        Returns
+        -------
+        distance : float
+            [m]; minus the depth where they overlap.
+        normal, point : (3,)
+            World axes; from the second body to the first, and a point of the first that is
+            nearest.
+        """
+        contacts = [pin.computeDistance(self._hulls, self._hull_data, pair) for pair in pairs]
+        nearest = min(contacts, key=lambda contact: contact.min_distance)
+        return nearest.min_distance, -nearest.normal, nearest.getNearestPoint1()
 
     def _closest(self, q: Array, best: Clearance, index: int) -> Clearance:
         """Return the smaller of `best` and the distance at `q`."""
@@ -184,7 +208,7 @@ class CollisionModel:
 
     def _place(self, q: Array) -> Array:
         """Place all bodies and return the distances of their hulls, (P,)."""
-        pin.updateGeometryPlacements(self.robot.model, self._data, self._hulls, self._hull_data, q)
+        self.place_hulls(q)
         return self._lower_bounds()
 
     def _lower_bounds(self) -> Array:

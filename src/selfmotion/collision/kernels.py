@@ -125,6 +125,27 @@ def evaluate(
 
 
 @kernel
+def nearest(values: Array, wrenches: Array, group: Ints, count: int) -> tuple[Array, Array]:
+    """Return the smallest of the distances of each group, (K, count), and its wrench.
+
+    Parameters
+    ----------
+    values, wrenches : (K, P), (K, P, 6)
+        What `evaluate` returned.
+    group : (P,)
+        The group of each pair, below `count`.
+    """
+    least = np.full((len(values), count), np.inf)
+    wrench = np.zeros((len(values), count, 6))
+    for k in range(len(values)):
+        for pair in range(len(group)):
+            if values[k, pair] < least[k, group[pair]]:
+                least[k, group[pair]] = values[k, pair]
+                wrench[k, group[pair]] = wrenches[k, pair]
+    return least, wrench
+
+
+@kernel
 def pull_back(
     weights: Array, wrenches: Array, pair_joints: Ints, jacobians: Array, parents: Ints
 ) -> Array:

@@ -1,9 +1,10 @@
 """Distance from obstacles, and of links from each other."""
 
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -20,8 +21,8 @@ from selfmotion.task import Task
 class Clearance:
     """The arm keeps a distance from obstacles and from itself.
 
-    While optimising, links are capsules that contain their meshes; the certificate measures the
-    meshes themselves.
+    While optimising, links are their convex hulls, and far from each other capsules around these;
+    the certificate measures the meshes themselves.
 
     Parameters
     ----------
@@ -38,21 +39,47 @@ class Clearance:
     srdf: str | Path | None = None
 
     def model(self, robot: RobotModel) -> CollisionModel:
-        """Return the exact model that the certificate measures with."""
-        return CollisionModel(robot, self.obstacles, self.srdf)
+        """Return the exact model that the certificate measures with, made once per arm.
+
+        Raises
+        ------
+        ProblemError
+            The arm has no collision geometry.
+        """
+        return self._models(robot).exact
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundClearance":
         """See `Constraint.bind`."""
         if not self.distance >= 0.0:
             raise ProblemError(f"clearance: distance is {self.distance} m, expected ≥ 0")
-        return BoundClearance(_clearance_model(self, robot), self.distance)
+        return BoundClearance(self._models(robot).smooth, self.distance)
+
+    def _models(self, robot: RobotModel) -> "_Models":
+        made = _made.setdefault(self, WeakKeyDictionary())
+        if robot not in made:
+            made[robot] = _Models(self, robot)
+        return made[robot]
 
 
-# Each start of a plan binds the constraint anew; fitting the world to the arm takes longer than
-# many a motion. Both arguments are compared by identity.
-@lru_cache(maxsize=4)
-def _clearance_model(clearance: Clearance, robot: RobotModel) -> ClearanceModel:
-    return ClearanceModel(clearance.model(robot))
+class _Models:
+    """The exact model of a clearance, and the one that the optimiser follows."""
+
+    def __init__(self, wanted: Clearance, robot: RobotModel) -> None:
+        self.exact = CollisionModel(robot, wanted.obstacles, wanted.srdf)
+        self._near = wanted.distance + _NEAR
+        if not self.exact.has_bodies:
+            raise ProblemError(
+                f"{robot.name}: a clearance is asked for, but its URDF has no collision geometry "
+                f"to measure from; add <collision> to its links, or leave the clearance out"
+            )
+
+    @cached_property
+    def smooth(self) -> ClearanceModel:
+        return ClearanceModel(self.exact, self._near)
+
+
+# Models take a good part of a second to make, and each start of a plan needs them.
+_made: WeakKeyDictionary[Clearance, WeakKeyDictionary[RobotModel, _Models]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,10 +123,13 @@ class BoundClearance:
         first, second = self.model.pairs[column]
         value = self.distance + self.margin - self.residual(samples)[row, column] * _METRE
         return (
-            f"capsules of '{first}' and '{second}' are {value * 1e3:.2f} mm apart at t = "
+            f"'{first}' and '{second}' are {value * 1e3:.2f} mm apart at t = "
             f"{samples.grid.nodes[row]:.3f} s, wanted {self.distance * 1e3:.2f} mm"
         )
 
 
+# Beyond the distance asked for, capsules may stand for links where they are this far apart [m]:
+# well outside of where the optimiser feels the constraint.
+_NEAR = 0.02
 # Clearances count in units of this, to weigh about as much as joint angles.
 _METRE = 0.1

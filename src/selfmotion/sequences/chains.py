@@ -16,6 +16,8 @@ Rows = npt.NDArray[np.intp]
 _UNLIKE, _LONG = 0.3, 0.1
 # Mirror images have moved each joint by the same amount, up to this [rad or m].
 _SAME_TRAVEL = 0.2
+# Chains looked at, mirror images included, before these have to do.
+_MOST = 60
 # Nodes through which other chains are looked for: at so many waypoints, evenly.
 _STATIONS = 7
 
@@ -92,11 +94,12 @@ def diverse_chains(
     chosen: list[list[int]] = []
     mirrored: list[list[int]] = []
     taken: list[Array] = []
+    # A chain through a node near a chosen one is rarely unlike it, and another node finds it.
+    covered = {int(i): np.zeros(len(layers[i]), dtype=bool) for i in stations}
     for total, i, node in sorted(through):
-        if not np.isfinite(total) or len(chosen) == count:
+        if not np.isfinite(total) or len(chosen) == count or len(taken) == _MOST:
             break
-        # A chain through a node near a chosen one is rarely unlike it, and another node finds it.
-        if any(_apart(q[i], layers[i][node], turning) <= _UNLIKE for q in taken):
+        if covered[i][node]:
             continue
         chain = forward.back(i, node) + reverse.back(len(layers) - 1 - i, node)[-2::-1]
         q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
@@ -104,6 +107,8 @@ def diverse_chains(
             images = any(_mirrors(q, other, turning) for other in taken)
             (mirrored if images else chosen).append(chain)
             taken.append(q)
+            for station, near in covered.items():
+                near |= _apart(layers[station], q[station], turning) <= _UNLIKE
     return (chosen + mirrored)[:count]
 
 

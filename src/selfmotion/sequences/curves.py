@@ -10,6 +10,7 @@ import pinocchio as pin
 from selfmotion import kernels as task_kernels
 from selfmotion.arrays import Array, read_only
 from selfmotion.path import Path
+from selfmotion.progress import Progress, silent
 from selfmotion.robot import RobotModel
 from selfmotion.sequences import kernels
 from selfmotion.task import Task
@@ -254,7 +255,11 @@ def targets(path: Path, t: Array) -> Array:
 
 
 def curves_along(
-    motion: SelfMotion, target: Array, seeds: Sequence[Array], every: int
+    motion: SelfMotion,
+    target: Array,
+    seeds: Sequence[Array],
+    every: int,
+    progress: Progress = silent,
 ) -> list[CurveSet]:
     """Return the self-motion curves at all waypoints.
 
@@ -268,9 +273,11 @@ def curves_along(
     target : (W, 12)
     seeds : sequence of (n,)
     every : int
+    progress : Progress
     """
     found: list[CurveSet] = []
     for i, x in enumerate(target):
+        progress("search: self-motions at waypoint", i + 1, len(target))
         here = CurveSet(motion.revolute, motion.spacing)
         if i > 0:
             motion.complete(here, x, found[-1].seeds())

@@ -9,6 +9,7 @@ from selfmotion.arrays import Array, read_only
 from selfmotion.collision import CollisionModel
 from selfmotion.errors import NoSequenceError, ProblemError
 from selfmotion.path import Path
+from selfmotion.progress import Progress, silent
 from selfmotion.robot import RobotModel
 from selfmotion.search import spread
 from selfmotion.sequences.chains import Mask, diverse_chains, shortest_chains, unlike, unturned
@@ -19,7 +20,7 @@ from selfmotion.sequences.tighten import tighten
 from selfmotion.task import Task
 
 # Largest distance of samples along a curve [rad or m], configuration norm.
-_SPACING = 0.06
+SPACING = 0.06
 # Inverse kinematics starts anew at every so manieth waypoint, from so many seeds.
 _EVERY, _SEEDS = 10, 100
 
@@ -60,6 +61,7 @@ def best_sequences(
     margin: float = 0.0,
     count: int = 3,
     rng: np.random.Generator | int = 0,
+    progress: Progress = silent,
 ) -> list[Sequence]:
     """Return the shortest joint sequences along a path that are unlike each other.
 
@@ -92,6 +94,8 @@ def best_sequences(
         How many sequences at most.
     rng : Generator or int
         Shifts the seeds of the inverse kinematics; the same one gives the same sequences.
+    progress : Progress
+        Told the waypoint or sequence that is worked on.
 
     Returns
     -------
@@ -113,12 +117,12 @@ def best_sequences(
         for values, name in ((lower, "lower"), (upper, "upper"), (largest_step, "largest_step"))
     ]
     _check(robot, task, limits, count)
-    motion = SelfMotion(robot, task, _SPACING)
+    motion = SelfMotion(robot, task, SPACING)
     bounds = Bounds(limits[0], limits[1], motion.revolute, collision, margin)
     x = targets(path, times)
     seeds = list(spread(robot, _SEEDS, np.random.default_rng(rng)))
-    curves = curves_along(motion, x, seeds, _EVERY)
-    layers = _layers(motion, x, curves, bounds)
+    curves = curves_along(motion, x, seeds, _EVERY, progress)
+    layers = _layers(motion, x, curves, bounds, progress)
     chains = shortest_chains(layers, limits[2], bounds.turning)
     if chains.blocked is not None:
         i = chains.blocked
@@ -132,7 +136,10 @@ def best_sequences(
     # Unlike chains may become the same one when they are tightened.
     found = diverse_chains(layers, chains, limits[2], bounds.turning, 2 * count)
     rough = [_configurations(layers, chain, bounds.turning) for chain in found]
-    tight = [tighten(motion, x, q, bounds, limits[2]) for q in rough]
+    tight = []
+    for number, q in enumerate(rough, 1):
+        progress("search: shortening sequence", number, len(rough))
+        tight.append(tighten(motion, x, q, bounds, limits[2]))
     return _ranked(times, tight, bounds.turning)[:count]
 
 
@@ -146,13 +153,16 @@ def _ranked(times: Array, motions: list[Array], turning: Mask) -> list[Sequence]
     return kept
 
 
-def _layers(motion: SelfMotion, x: Array, curves: list[CurveSet], bounds: Bounds) -> list[Array]:
+def _layers(
+    motion: SelfMotion, x: Array, curves: list[CurveSet], bounds: Bounds, progress: Progress
+) -> list[Array]:
     """Return the nodes at every waypoint, sorted by the first joint."""
     layers: list[Array] = []
     samples = np.empty((0, motion.robot.dof))
-    for target, here in zip(x, curves, strict=True):
+    for number, (target, here) in enumerate(zip(x, curves, strict=True), 1):
+        progress("search: what is free at waypoint", number, len(x))
         carried = [q for q in (motion.project(s, target) for s in samples) if q is not None]
-        samples = place_nodes(motion, target, here, carried, bounds, _SPACING)
+        samples = place_nodes(motion, target, here, carried, bounds, SPACING)
         nodes = bounds.all_turns(samples)
         layers.append(np.ascontiguousarray(nodes[np.argsort(nodes[:, 0], kind="stable")]))
     return layers
