@@ -256,6 +256,7 @@ def _requirements_to_dict(plan: Plan) -> dict[str, Any]:
     return {
         **arrays,
         "closed": wanted.closed,
+        "ending": wanted.ending,
         "damping": None if wanted.damping is None else dataclasses.asdict(wanted.damping),
         "clearance": None
         if clearance is None
@@ -274,10 +275,13 @@ def _requirements_from_dict(description: Mapping[str, Any]) -> dict[str, Any]:
     if stored is not None:
         obstacles = tuple(obstacle_from_dict(item) for item in stored["obstacles"])
         clearance = Clearance(obstacles, stored["distance"], stored["srdf"])
-    closed, damping = values.pop("closed"), values.pop("damping")
-    law = None if damping is None else DampingLaw(**damping)
+    damping = values.pop("damping")
+    plain = {
+        "closed": values.pop("closed"),
+        "ending": values.pop("ending"),
+        "damping": None if damping is None else DampingLaw(**damping),
+    }
     arrays: dict[str, Any] = {
         name: None if x is None else np.array(x) for name, x in values.items()
     }
-    wanted = Requirements(**arrays, closed=closed, damping=law)
-    return {"clearance": clearance, "requirements": wanted}
+    return {"clearance": clearance, "requirements": Requirements(**arrays, **plain)}

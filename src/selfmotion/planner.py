@@ -1,26 +1,32 @@
 """From a problem to a plan."""
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from selfmotion.arrays import Array, read_only
 from selfmotion.baselines import Method, plan_by
-from selfmotion.certificate import Certificate, Tolerance, certify
+from selfmotion.certificate import Tolerance, certify
 from selfmotion.errors import BreakdownError, NoSequenceError, ProblemError, SelfmotionError
+from selfmotion.feasible import Maker, Part, largest_part
 from selfmotion.guides import guides
 from selfmotion.plan import Plan, Report
 from selfmotion.problem import Problem
 from selfmotion.quasi_newton import Callback, QuasiNewton, Status
+from selfmotion.reach import Reach, reachable
 from selfmotion.search import start_candidates
-from selfmotion.session import MOST_HALVINGS, Counts, Session
+from selfmotion.session import MOST_HALVINGS, Counts, Guide, Session
 from selfmotion.trajectory import Trajectory
 
 _Settings = tuple[Problem, QuasiNewton, Callback | None, int | None, Counts]
 
 # Where no start leads to a motion that keeps the constraints, this many times more are tried.
 _SECOND_EFFORT = 4
+# Evaluations of the cost that one motion on a part of the path may take: many are tried.
+_PATIENCE = 400
 
 
 def plan(
@@ -96,13 +102,48 @@ def plan(
     counts = Counts()
     settings = (problem, optimizer or QuasiNewton(), callback, max_evaluations, counts)
     use_metric = initial_metric == "gauss-newton"
-    if problem.given_start is not None:
-        best = Session(*settings, problem.given_start, free=False)
-        best.minimize(use_metric)
-    else:
-        best = _search(settings, starts, finalists, rng, use_metric, search)
+    wanted = tolerance or Tolerance()
+
+    @cache
+    def reach() -> Reach:
+        return reachable(problem, starts, np.random.default_rng(rng))
+
+    def part() -> Plan | None:
+        found = largest_part(problem, reach(), _maker(settings), use_metric)
+        if found is None:
+            return None
+        found.session.refine_until_settled()
+        return _finish(problem, found, wanted, began)
+
+    try:
+        if problem.given_start is not None:
+            best = Session(*settings, problem.given_start, free=False)
+            best.minimize(use_metric)
+        else:
+            best = _search(settings, starts, finalists, rng, use_metric, search, reach)
+    except (BreakdownError, NoSequenceError):
+        shorter = part()
+        if shorter is None:
+            raise
+        return shorter
     best.refine_until_settled()
-    return _finish(problem, best, tolerance or Tolerance(), began)
+    result = _finish(problem, Part(problem, best, ""), wanted, began)
+    cut_short = best.status in (Status.INTERRUPTED, Status.STOPPED, Status.MAX_EVALUATIONS)
+    if result.certificate.limit_margin.value >= 0.0 or cut_short:
+        return result
+    return part() or result
+
+
+def _maker(settings: _Settings) -> Maker:
+    """Return what makes sessions of parts of the problem, with the settings of the whole."""
+    _, optimizer, callback, limit, counts = settings
+    limit = _PATIENCE if limit is None else min(limit, _PATIENCE)
+
+    def make(part: Problem, start: Array, guide: Guide | None) -> Session:
+        free = part.given_start is None
+        return Session(part, optimizer, callback, limit, counts, start, free=free, guide=guide)
+
+    return make
 
 
 def _search(
@@ -112,6 +153,7 @@ def _search(
     rng: np.random.Generator | int | None,
     use_metric: bool,
     search: str,
+    reach: Callable[[], Reach],
 ) -> Session:
     """Return the best session of a free start: from many starts, or from global sequences."""
     problem = settings[0]
@@ -120,8 +162,10 @@ def _search(
     can_search = problem.robot.redundancy(problem.rows) == 1
     if search != "global" or not can_search:
         try:
-            best = _search_starts(settings, starts, finalists, rng, use_metric)
+            best = _search_starts(settings, starts, finalists, rng, use_metric, reach)
         except BreakdownError as error:
+            if reach().reason:
+                raise
             failure = error
     fell_short = best is None or bool(best.violations)
     cut_short = best is not None and best.status in (Status.INTERRUPTED, Status.STOPPED)
@@ -151,6 +195,7 @@ def _search_starts(
     finalists: int,
     rng: np.random.Generator | int | None,
     use_metric: bool,
+    reach: Callable[[], Reach],
 ) -> Session:
     """Return the best session of a free start; more starts where the first ones fall short."""
     problem = settings[0]
@@ -165,6 +210,9 @@ def _search_starts(
             found = _best_start(settings, candidates, effort * finalists, use_metric)
         except BreakdownError as error:
             failure = error
+            if reach().reason:
+                # A pose that is out of reach is so from any start.
+                break
             continue
         if best is None or found.score < best.score:
             best = found
@@ -200,12 +248,17 @@ def _best_start(
     return best
 
 
-def _finish(problem: Problem, session: Session, tolerance: Tolerance, began: float) -> Plan:
+def _finish(problem: Problem, part: Part, tolerance: Tolerance, began: float) -> Plan:
     """Refine the motion until it holds the tolerance, and gather everything."""
+    session = part.session
+    requirements = replace(problem.requirements, ending=part.ending)
     coarse: Trajectory | None = None
     for _ in range(MOST_HALVINGS):
         terms = session.terms()
-        trajectory, certificate = _motion(problem, session, tolerance)
+        trajectory = session.trajectory()
+        certificate = certify(
+            problem.robot, problem.path, problem.rows, trajectory, tolerance, requirements
+        )
         errors = certificate.position_error.value, certificate.rotation_error.value
         if _within(errors, tolerance):
             break
@@ -222,6 +275,8 @@ def _finish(problem: Problem, session: Session, tolerance: Tolerance, began: flo
     message = session.status.message
     if violations:
         message = f"not all constraints could be met: {'; '.join(violations)}"
+    if part.ending:
+        message = f"{part.ending}; {message}"
     if certificate.damped:
         message += f"; the inverse was damped {' and '.join(map(str, certificate.damped))}"
     report = Report(
@@ -248,7 +303,7 @@ def _finish(problem: Problem, session: Session, tolerance: Tolerance, began: flo
         coefficients=read_only(x),
         report=report,
         certificate=certificate,
-        requirements=replace(problem.requirements, collision=None),
+        requirements=replace(requirements, collision=None),
         clearance=problem.clearance,
     )
 
@@ -264,13 +319,3 @@ def _largest_change(problem: Problem, coarse: Trajectory, fine: Trajectory) -> t
     misses = np.array([task.miss(robot.pose(first), robot.pose(second)) for first, second in pairs])
     position, rotation = misses.max(axis=0)
     return float(position), float(rotation)
-
-
-def _motion(
-    problem: Problem, session: Session, tolerance: Tolerance
-) -> tuple[Trajectory, Certificate]:
-    trajectory = session.trajectory()
-    certificate = certify(
-        problem.robot, problem.path, problem.rows, trajectory, tolerance, problem.requirements
-    )
-    return trajectory, certificate
