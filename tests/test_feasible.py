@@ -83,7 +83,7 @@ def test_speed_limits_end_it_earlier_and_are_named(planar: sm.RobotModel) -> Non
     plan = sm.plan(sm.Problem(planar, line, "planar", [0.0, 0.5, 0.5]))
     check_part(plan, time_at(line, 5.0))
     assert plan.certificate.velocity_ratio.value > 0.9
-    for words in ("no motion found goes further: velocity limits", "the pose is out of reach"):
+    for words in ("gets nearer to that: velocity limits", "the pose is out of reach"):
         assert words in plan.certificate.verdict
 
 
@@ -115,6 +115,16 @@ def test_a_panda_beyond_its_reach(task: str, free: bool) -> None:
     check_part(plan, 4.0)
     with pytest.raises(sm.InverseKinematicsError):
         panda.inverse_kinematics(line.pose(1.2 * last), task)
+
+
+def test_limits_that_are_not_asked_for_cut_nothing_off(planar: sm.RobotModel) -> None:
+    """Beyond the URDF's limits the certificate says so, on the whole path."""
+    start = np.array([planar.lower[0] + 0.01, planar.lower[1] + 0.5, planar.lower[2] + 0.5])
+    pose = planar.pose(start)
+    problem = sm.Problem(planar, sm.Circle.around(pose, 1.0, 4.0), "planar", start, constraints=[])
+    plan = sm.plan(problem)
+    assert plan.certificate.limit_margin.value < 0.0
+    assert plan.trajectory.t[-1] == 4.0
 
 
 def test_parts_survive_the_disk_and_stay_parts(overlong: sm.Plan, tmp_path: Path) -> None:

@@ -149,8 +149,9 @@ def _part(problem: Problem, found: _Attempt, reach: Reach, further: str) -> Part
     if found.session is None:
         raise RuntimeError("a part is made of a motion that was found")
     end, whole = found.problem.path.duration, problem.path.duration
-    reasons = [f"no motion found goes further: {further}"] if further else []
-    reasons += [reach.reason] if reach.reason else []
+    nearer = "gets nearer to that" if reach.reason else "goes further"
+    reasons = [reach.reason] if reach.reason else []
+    reasons += [f"no motion found {nearer}: {further}"] if further else []
     ending = f"the motion ends at t = {end:.6g} s of {whole:.6g} s: {'; '.join(reasons)}"
     return Part(found.problem, found.session, ending if end < whole else "")
 

@@ -77,7 +77,7 @@ class Plan:
     path : Path
     task : Task
     trajectory : Trajectory
-        The motion.
+        The motion; shorter than the path where the arm cannot follow it to the end.
     initial_trajectory : Trajectory
         The motion without self-motion (x = 0), for comparison.
     coefficients : (size,)

@@ -25,7 +25,7 @@ _Settings = tuple[Problem, QuasiNewton, Callback | None, int | None, Counts]
 
 # Where no start leads to a motion that keeps the constraints, this many times more are tried.
 _SECOND_EFFORT = 4
-# Evaluations of the cost that one motion on a part of the path may take: many are tried.
+# Evaluations of the cost that a damped motion may take, or one of many on a part of the path.
 _PATIENCE = 400
 
 
@@ -53,7 +53,8 @@ def plan(
         H0: the inverse Gauss-Newton matrix of the motion at x = 0, or the paper's identity.
     max_evaluations : int, optional
         Limit on evaluations of the cost while optimising one start; the finished motion is
-        evaluated a few times more.
+        evaluated a few times more. By default none, but 400 with damping, where limits of joint
+        speed often cannot be met and trying would take minutes.
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
     tolerance : Tolerance, optional
@@ -79,12 +80,15 @@ def plan(
     -------
     Plan
         Also where the search fell short: `Plan.report` and `Plan.certificate` say so, and
-        `Plan.require` raises.
+        `Plan.require` raises. Where the path leaves the workspace, within the joint limits, or no
+        motion passes a singular pose: the motion on the largest part [0, t] that was found, never
+        verified, with t and the reason in its verdict.
 
     Raises
     ------
     BreakdownError
-        The motion at x = 0 runs into a singular pose, from every start.
+        The motion at x = 0 runs into a singular pose, from every start, so early that no part of
+        the path is worth a plan.
     InverseKinematicsError
         The start is free and no configuration reaches the start of the path.
     """
@@ -99,6 +103,8 @@ def plan(
     if search not in ("auto", "local", "global"):
         raise ProblemError(f"search is '{search}', expected 'auto', 'local' or 'global'")
     began = time.perf_counter()
+    if problem.damping is not None and max_evaluations is None:
+        max_evaluations = _PATIENCE
     counts = Counts()
     settings = (problem, optimizer or QuasiNewton(), callback, max_evaluations, counts)
     use_metric = initial_metric == "gauss-newton"
@@ -129,9 +135,11 @@ def plan(
     best.refine_until_settled()
     result = _finish(problem, Part(problem, best, ""), wanted, began)
     cut_short = best.status in (Status.INTERRUPTED, Status.STOPPED, Status.MAX_EVALUATIONS)
-    if result.certificate.limit_margin.value >= 0.0 or cut_short:
-        return result
-    return part() or result
+    out_of_limits = best.violations and result.certificate.limit_margin.value < 0.0
+    # With damping the motion goes on where the path cannot be followed: so it was asked for.
+    if out_of_limits and not cut_short and problem.damping is None:
+        return part() or result
+    return result
 
 
 def _maker(settings: _Settings) -> Maker:

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from selfmotion.arrays import Array
+from selfmotion.arrays import Array, read_only
+from selfmotion.constraints import JointPositionLimits
 from selfmotion.errors import InverseKinematicsError
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
@@ -69,6 +70,9 @@ def reachable(problem: Problem, starts: int, rng: np.random.Generator) -> Reach:
 def _within_limits(problem: Problem) -> RobotModel:
     """Return the arm with the position limits that the motion has to keep."""
     wanted, robot = problem.requirements, problem.robot
+    if not any(isinstance(item, JointPositionLimits) for item in problem.constraints):
+        free = read_only(np.full(robot.dof, np.inf))
+        return replace(robot, lower=read_only(-free), upper=free)
     return replace(
         robot,
         lower=robot.lower if wanted.lower is None else wanted.lower,
