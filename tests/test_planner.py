@@ -299,13 +299,15 @@ def test_user_functions_of_the_wrong_shape_are_named() -> None:
 
 
 def test_breakdown_names_the_time(planar: sm.RobotModel) -> None:
-    start = planar.inverse_kinematics(planar.pose([0.0, 0.5, 0.5]), "planar")
+    """Nearly stretched: what is left of the path is not worth a plan."""
+    start = planar.inverse_kinematics(planar.pose([0.0, 0.05, 0.05]), "planar")
     pose = planar.pose(start)
     end = pose.copy()
     end.translation = pose.translation * 1.5
+    line = sm.Line(pose, end, 1.0, time_law="constant")
     with pytest.raises(sm.BreakdownError, match="singular pose near t =") as caught:
-        sm.plan(sm.Problem(planar, sm.Line(pose, end, 1.0), "planar", start))
-    assert 0.0 < caught.value.time < 1.0
+        sm.plan(sm.Problem(planar, line, "planar", start))
+    assert 0.0 < caught.value.time < 0.01
 
 
 def test_interruption_returns_the_best_so_far() -> None:

@@ -128,7 +128,7 @@ class Plan:
     path : Path
     task : Task
     trajectory : Trajectory
-        The motion.
+        The motion; shorter than the path where the arm cannot follow it to the end.
     initial_trajectory : Trajectory
         The motion without self-motion (x = 0), for comparison.
     coefficients : (size,)
@@ -312,6 +312,7 @@ def _requirements_to_dict(plan: Plan) -> dict[str, Any]:
         "closed": wanted.closed,
         "closed_velocity": wanted.closed_velocity,
         "relaxations": [item.to_dict() for item in wanted.relaxations],
+        "ending": wanted.ending,
         "damping": None if wanted.damping is None else dataclasses.asdict(wanted.damping),
         "clearance": None
         if clearance is None
@@ -330,12 +331,15 @@ def _requirements_from_dict(description: Mapping[str, Any]) -> dict[str, Any]:
     if stored is not None:
         obstacles = tuple(obstacle_from_dict(item) for item in stored["obstacles"])
         clearance = Clearance(obstacles, stored["distance"], stored["srdf"])
-    switches = {name: values.pop(name) for name in ("closed", "closed_velocity")}
-    relaxations = tuple(Relaxation(**item) for item in values.pop("relaxations"))
     damping = values.pop("damping")
-    law = None if damping is None else DampingLaw(**damping)
+    plain: dict[str, Any] = {
+        "closed": values.pop("closed"),
+        "closed_velocity": values.pop("closed_velocity"),
+        "ending": values.pop("ending"),
+        "relaxations": tuple(Relaxation(**item) for item in values.pop("relaxations")),
+        "damping": None if damping is None else DampingLaw(**damping),
+    }
     arrays: dict[str, Any] = {
         name: None if x is None else np.array(x) for name, x in values.items()
     }
-    wanted = Requirements(**arrays, **switches, relaxations=relaxations, damping=law)
-    return {"clearance": clearance, "requirements": wanted}
+    return {"clearance": clearance, "requirements": Requirements(**arrays, **plain)}

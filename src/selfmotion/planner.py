@@ -2,23 +2,28 @@
 
 import time
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.arrays import read_only
+from selfmotion.arrays import Array, read_only
 from selfmotion.baselines import Method, plan_by
-from selfmotion.certificate import Certificate, Tolerance, certify
-from selfmotion.errors import ProblemError
+from selfmotion.certificate import Certificate, Requirements, Tolerance, certify
+from selfmotion.errors import BreakdownError, NoSequenceError, ProblemError
+from selfmotion.feasible import Part, largest_part
 from selfmotion.plan import Gap, Plan, Report
 from selfmotion.problem import Problem
 from selfmotion.progress import Progress, silent
 from selfmotion.quasi_newton import Callback, QuasiNewton, Status
+from selfmotion.reach import Reach, reachable
 from selfmotion.selection import Effort, Selection
 from selfmotion.sequences import SPACING
-from selfmotion.session import MOST_HALVINGS, Counts, Session
+from selfmotion.session import MOST_HALVINGS, Counts, Guide, Session
 from selfmotion.trajectory import Trajectory
+
+# Evaluations of the cost that a damped motion may take, or one of many on a part of the path.
+_PATIENCE = 400
 
 
 class _Checked(NamedTuple):
@@ -58,7 +63,8 @@ def plan(
         H0: the inverse Gauss-Newton matrix of the motion at x = 0, or the paper's identity.
     max_evaluations : int, optional
         Limit on evaluations of the cost while optimising one start; the finished motion is
-        evaluated a few times more.
+        evaluated a few times more. By default none, but 400 with damping, where limits of joint
+        speed often cannot be met and trying would take minutes.
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
     tolerance : Tolerance, optional
@@ -90,13 +96,16 @@ def plan(
     -------
     Plan
         Also where the search fell short: `Plan.report` and `Plan.certificate` say so, and
-        `Plan.require` raises. After an interruption (Ctrl-C) the best plan that was known by then,
-        checked like any other; its status says so.
+        `Plan.require` raises. Where the path leaves the workspace, within the joint limits, or no
+        motion passes a singular pose: the motion on the largest part [0, t] that was found, never
+        verified, with t and the reason in its verdict. After an interruption (Ctrl-C) the best
+        plan that was known by then, checked like any other; its status says so.
 
     Raises
     ------
     BreakdownError
-        The motion at x = 0 runs into a singular pose, from every start.
+        The motion at x = 0 runs into a singular pose, from every start, so early that no part of
+        the path is worth a plan.
     InverseKinematicsError
         The start is free and no configuration reaches the start of the path.
     NoSequenceError
@@ -112,18 +121,72 @@ def plan(
         )
     if max_evaluations is not None and max_evaluations < 1:
         raise ProblemError(f"max_evaluations is {max_evaluations}, expected at least 1")
+    if problem.damping is not None and max_evaluations is None:
+        max_evaluations = _PATIENCE
     began = time.perf_counter()
+    use_metric, wanted = initial_metric == "gauss-newton", tolerance or Tolerance()
+    optimizer, counts = optimizer or QuasiNewton(), Counts()
+
+    @cache
+    def reach() -> Reach:
+        progress("reach", 1, 1)
+        return reachable(problem, starts, np.random.default_rng(rng))
+
+    def part(notes: list[str]) -> Plan | None:
+        progress("largest part", 1, 1)
+        limit = _PATIENCE if max_evaluations is None else min(max_evaluations, _PATIENCE)
+        found = largest_part(
+            problem, reach(), partial(_session, optimizer, callback, limit, counts), use_metric
+        )
+        if found is None:
+            return None
+        _settle(found.session, None, progress)
+        checked = _checked(problem, found, wanted, progress)
+        return _finish(problem, found, checked, None, notes, began)
+
     selection = Selection(
         problem,
-        partial(Session, problem, optimizer or QuasiNewton(), callback, max_evaluations, Counts()),
-        initial_metric == "gauss-newton",
+        partial(Session, problem, optimizer, callback, max_evaluations, counts),
+        use_metric,
         Effort(starts, finalists, search, compare, rng),
         progress,
+        reach,
     )
-    best = selection.run()
+    try:
+        best = selection.run()
+    except (BreakdownError, NoSequenceError):
+        shorter = part(selection.notes)
+        if shorter is None:
+            raise
+        return shorter
     rival_cost = _settle(best, selection.rival, progress)
-    checked = _checked(problem, best, tolerance or Tolerance(), progress)
-    return _finish(problem, best, checked, _gap(selection, rival_cost, checked), began)
+    whole = Part(problem, best, "")
+    checked = _checked(problem, whole, wanted, progress)
+    result = _finish(problem, whole, checked, _gap(selection, rival_cost, checked), [], began)
+    no_more = best.cut_short or best.status is Status.MAX_EVALUATIONS
+    out_of_limits = best.violations and result.certificate.limit_margin.value < 0.0
+    # With damping the motion goes on where the path cannot be followed: so it was asked for.
+    if out_of_limits and not no_more and problem.damping is None:
+        try:
+            return part(selection.notes) or result
+        except KeyboardInterrupt:
+            best.end(Status.INTERRUPTED)
+            return _finish(problem, whole, checked, None, [], began)
+    return result
+
+
+def _session(
+    optimizer: QuasiNewton,
+    callback: Callback | None,
+    limit: int,
+    counts: Counts,
+    part: Problem,
+    start: Array,
+    guide: Guide | None,
+) -> Session:
+    """Return the session of a part of the problem, with the settings of the whole."""
+    free = part.given_start is None
+    return Session(part, optimizer, callback, limit, counts, start, free=free, guide=guide)
 
 
 def _settle(best: Session, rival: Session | None, progress: Progress) -> float | None:
@@ -140,14 +203,21 @@ def _settle(best: Session, rival: Session | None, progress: Progress) -> float |
 
 
 def _finish(
-    problem: Problem, session: Session, checked: _Checked, gap: Gap | None, began: float
+    problem: Problem,
+    part: Part,
+    checked: _Checked,
+    gap: Gap | None,
+    notes: list[str],
+    began: float,
 ) -> Plan:
     """Gather everything."""
+    session = part.session
     terms, violations, counts = checked.terms, session.violations, session.counts
     message = session.status.message
     if violations:
         unmet = f"not all constraints could be met: {'; '.join(violations)}"
         message = f"{message}; {unmet}" if session.cut_short else unmet
+    message = "; ".join(text for text in (part.ending, *notes, message) if text)
     if checked.certificate.damped:
         stretches = " and ".join(map(str, checked.certificate.damped))
         message += f"; the inverse was damped {stretches}"
@@ -176,20 +246,19 @@ def _finish(
         coefficients=read_only(session.coefficients),
         report=report,
         certificate=checked.certificate,
-        requirements=replace(problem.requirements, collision=None),
+        requirements=replace(problem.requirements, collision=None, ending=part.ending),
         clearance=problem.clearance,
     )
 
 
-def _checked(
-    problem: Problem, session: Session, tolerance: Tolerance, progress: Progress
-) -> _Checked:
+def _checked(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress) -> _Checked:
     """Return what there is on the first grid on which the motion holds the tolerance."""
+    session, requirements = part.session, replace(problem.requirements, ending=part.ending)
     checked = coarse = None
     for _ in range(MOST_HALVINGS):
         try:
             progress("checking", 1, 1)
-            checked = _check(problem, session, tolerance)
+            checked = _check(problem, session, tolerance, requirements)
             certificate, trajectory = checked.certificate, checked.trajectory
             errors = certificate.position_error.value, certificate.rotation_error.value
             if _within(errors, tolerance):
@@ -205,7 +274,7 @@ def _checked(
             session.end(Status.INTERRUPTED)
             break
     # No plan goes without a certificate, interrupted or not.
-    return checked or _check(problem, session, tolerance)
+    return checked or _check(problem, session, tolerance, requirements)
 
 
 def _within(errors: tuple[float, float], tolerance: Tolerance) -> bool:
@@ -221,10 +290,12 @@ def _largest_change(problem: Problem, coarse: Trajectory, fine: Trajectory) -> t
     return float(position), float(rotation)
 
 
-def _check(problem: Problem, session: Session, tolerance: Tolerance) -> _Checked:
+def _check(
+    problem: Problem, session: Session, tolerance: Tolerance, requirements: Requirements
+) -> _Checked:
     terms, trajectory, damped = session.terms(), session.trajectory(), session.damped
     certificate = certify(
-        problem.robot, problem.path, problem.rows, trajectory, tolerance, problem.requirements
+        problem.robot, problem.path, problem.rows, trajectory, tolerance, requirements
     )
     initial_terms = session.initial_terms()
     initial_trajectory = session.trajectory()

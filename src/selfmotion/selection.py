@@ -1,6 +1,6 @@
 """The best motion of a problem: from its start, from many starts, from global sequences."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NoReturn, Protocol
 
@@ -12,6 +12,7 @@ from selfmotion.guides import Guide, guides
 from selfmotion.problem import Problem
 from selfmotion.progress import Progress
 from selfmotion.quasi_newton import Status
+from selfmotion.reach import Reach
 from selfmotion.search import start_candidates
 from selfmotion.session import Session
 
@@ -59,6 +60,8 @@ class Selection:
         Whether the optimiser starts with the Gauss-Newton matrix.
     effort : Effort
     progress : Progress
+    reach : callable
+        Returns how far single poses are in reach: what is beyond is so from any start.
 
     Attributes
     ----------
@@ -79,7 +82,9 @@ class Selection:
         use_metric: bool,
         effort: Effort,
         progress: Progress,
+        reach: Callable[[], Reach],
     ) -> None:
+        self._reach = reach
         self._problem, self._session = problem, session
         self._use_metric, self._effort, self._progress = use_metric, effort, progress
         self.best: Session | None = None
@@ -127,6 +132,8 @@ class Selection:
             self._try_starts()
         fell_short = self.best is None or bool(self.best.violations)
         chosen = start is None and effort.search != "local"
+        if self.best is None and self._failure is not None and self._reach().reason:
+            return
         if can_search and (effort.compare or (chosen and fell_short)):
             self._try_sequences(chosen)
 
@@ -135,6 +142,8 @@ class Selection:
         effort, generator = self._effort, np.random.default_rng(self._effort.rng)
         for times in (1, _SECOND_EFFORT):
             self._try_candidates(times * effort.starts, times * effort.finalists, generator)
+            if self.best is None and self._reach().reason:
+                return
             if self.best is not None and not self.best.violations:
                 return
 

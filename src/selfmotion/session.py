@@ -28,6 +28,9 @@ Guide = Callable[[Array], Array]
 _FEWEST_STEPS, _DRIFT = 32, 1e-3
 # Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands.
 _COST_AGREEMENT = 1e-4
+# Trouble that three grids in turn place within this share of the motion, and of which the last has
+# at least half as much as the first, is the motion's own.
+_SAME_PLACE, _SAME_AMOUNT = 1e-3, 0.5
 # The finest grid has 2 to this power times the steps of the first.
 MOST_HALVINGS = 8
 # The first round of the augmented Lagrangian is minimised this much more coarsely.
@@ -243,6 +246,7 @@ class Session:
         extent = max(float(np.ptp(target.translation, axis=0).max()), 1e-3)
         rows = problem.rows.rows
         coarse: Array | None = None
+        troubles: list[tuple[float, float]] = []
         for _ in range(MOST_HALVINGS):
             rollout = self._rollout(grid)
             offset = self._offset(grid)
@@ -257,14 +261,17 @@ class Session:
             coarse = drift
             if broken is None and not off.any():
                 return rollout
+            # Where eq. 4 broke down, or else where it first left the path.
+            time = float(grid.nodes[int(np.argmax(off))]) if broken is None else broken
+            troubles.append((time, np.inf if broken is not None else float(np.abs(drift).max())))
+            if not rollout.damped and _stays(troubles, problem.path.duration):
+                break
             grid = grid.halved()
-        # After the last halving: where eq. 4 broke down, or else where it first left the path.
-        time = rollout.grid.nodes[int(np.argmax(off))] if broken is None else broken
         raise BreakdownError(
             f"{problem.robot.name}: without self-motion the tool reaches a singular pose near "
             f"t = {time:.4g} s; start elsewhere (start=), or keep the path away from the edge "
             f"of the workspace",
-            time=float(time),
+            time=time,
         )
 
     def _null_space(self, reference: Rollout) -> Callable[[Array], Array] | None:
@@ -338,3 +345,12 @@ class Session:
             self._spent += objective.evaluations - before[0]
             self.counts.gradients += objective.gradient_evaluations - before[1]
             self.counts.jacobians += rollout.jacobian_evaluations - before[2]
+
+
+def _stays(troubles: list[tuple[float, float]], duration: float) -> bool:
+    """Return whether trouble (when, how much) does not go away on finer grids."""
+    if len(troubles) < 3:
+        return False
+    times, amounts = zip(*troubles[-3:], strict=True)
+    in_place = max(times) - min(times) <= _SAME_PLACE * duration
+    return bool(in_place and amounts[-1] >= _SAME_AMOUNT * amounts[0])

@@ -4,6 +4,7 @@ from selfmotion.path.base import Path, PathSamples, as_pose
 from selfmotion.path.files import path_from_dict
 from selfmotion.path.retimed import Retimed
 from selfmotion.path.shapes import Circle, Line
+from selfmotion.path.truncated import Truncated
 from selfmotion.path.twist import TwistPath
 from selfmotion.path.waypoints import Waypoints
 
@@ -13,6 +14,7 @@ __all__ = [
     "Path",
     "PathSamples",
     "Retimed",
+    "Truncated",
     "TwistPath",
     "Waypoints",
     "as_pose",

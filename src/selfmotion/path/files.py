@@ -7,6 +7,7 @@ from selfmotion.errors import FileFormatError
 from selfmotion.path.base import Path
 from selfmotion.path.retimed import Retimed
 from selfmotion.path.shapes import Circle, Line
+from selfmotion.path.truncated import Truncated
 from selfmotion.path.twist import TwistPath
 from selfmotion.path.waypoints import Waypoints
 
@@ -27,6 +28,7 @@ def path_from_dict(description: Mapping[str, Any]) -> Path:
         "twist": TwistPath._restore,
         "waypoints": Waypoints,
         "retimed": _retimed,
+        "truncated": _truncated,
     }
     if kind not in makers:
         raise FileFormatError(f"path kind is {kind!r}, expected one of: {', '.join(makers)}")
@@ -38,3 +40,7 @@ def path_from_dict(description: Mapping[str, Any]) -> Path:
 
 def _retimed(path: Mapping[str, Any], **arguments: Any) -> Retimed:
     return Retimed(path_from_dict(path), **arguments)
+
+
+def _truncated(path: Mapping[str, Any], **arguments: Any) -> Truncated:
+    return Truncated(path_from_dict(path), **arguments)

@@ -37,7 +37,9 @@ class _Motion:
         self.ghost = key_frames(robot, plan.initial_trajectory)
         self.shown = curves(plan, plan.trajectory)
         self.start = curves(plan, plan.initial_trajectory)
-        self.target: Array = plan.path.samples(self.shown.t + plan.trajectory.t[0]).translation
+        # The whole path, also where the motion ends before it.
+        times = np.linspace(0.0, plan.path.duration, len(self.shown.t))
+        self.target: Array = plan.path.samples(times).translation
         self.clearance: ClearanceCurve | None = None
         self.obstacles: tuple[Obstacle, ...] = ()
         if plan.clearance is not None:
