@@ -183,18 +183,28 @@ class ClearanceModel:
 
     def _replace_near(self, q: Array, values: Array, wrenches: Array) -> None:
         """Put the distances of hulls in the place of small ones of capsules."""
-        for k in np.flatnonzero((values < 2.0 * self._near).any(axis=1)):
-            self._exact.place_hulls(q[k])
-            for pair in np.flatnonzero(values[k] < 2.0 * self._near):
-                distance, normal, point = self._exact.hull_contact(self._hulls[pair])
-                if not np.isfinite(normal).all():
-                    continue  # in touch to the last digit: the capsules are conservative
-                wrench = np.concatenate([normal, np.cross(point, normal)])
-                gap = distance - values[k, pair]
-                share, slope = _blend(values[k, pair] / self._near)
-                wrenches[k, pair] *= 1.0 - share + gap * slope / self._near
-                wrenches[k, pair] += share * wrench
-                values[k, pair] += share * gap
+        rows, columns = np.nonzero(values < 2.0 * self._near)
+        if not len(rows):
+            return
+        contacts: list[tuple[float, Array, Array]] = []
+        placed = np.intp(-1)
+        for row, column in zip(rows, columns, strict=True):
+            if row != placed:
+                self._exact.place_hulls(q[row])
+                placed = row
+            contacts.append(self._exact.hull_contact(self._hulls[column]))
+        distances = np.array([contact[0] for contact in contacts])
+        normals = np.array([contact[1] for contact in contacts])
+        points = np.array([contact[2] for contact in contacts])
+        # In touch to the last digit there is no normal: the capsules are conservative.
+        known = np.isfinite(normals).all(axis=1)
+        rows, columns, normals = rows[known], columns[known], normals[known]
+        gap = distances[known] - values[rows, columns]
+        share, slope = _blend(values[rows, columns] / self._near)
+        hull = np.concatenate([normals, np.cross(points[known], normals)], axis=1)
+        wrenches[rows, columns] *= (1.0 - share + gap * slope / self._near)[:, None]
+        wrenches[rows, columns] += share[:, None] * hull
+        values[rows, columns] += share * gap
 
     def _kinematics(self, q: Array) -> tuple[Array, Array, Array]:
         count, n = q.shape
@@ -232,9 +242,9 @@ class ClearanceModel:
         self._pair_capsules(self._self_pairs[kept[:own]], self._world_pairs[kept[own:]])
 
 
-def _blend(ratio: float) -> tuple[float, float]:
+def _blend(ratio: Array) -> tuple[Array, Array]:
     """Return the hulls' share of a distance, and its derivative: 1 below ratio 1, 0 above 2."""
-    s = min(max(2.0 - ratio, 0.0), 1.0)
+    s = np.clip(2.0 - ratio, 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s), -6.0 * s * (1.0 - s)
 
 
