@@ -129,6 +129,11 @@ class AugmentedLagrangian:
             term.violation = excess
         return kept
 
+    @property
+    def worst(self) -> float:
+        """Largest violation at the last `update`, as a multiple of its tolerance."""
+        return max((term.violation / term.constraint.tolerance for term in self._terms), default=0)
+
     def equalities(self, samples: Samples, motion: NodeTangents) -> tuple[Array, Array]:
         """Return the residuals of all equalities, (C,), and their derivatives, (C, d)."""
         terms = [term.constraint for term in self._terms if term.constraint.equality]

@@ -35,8 +35,9 @@ _SAME_PLACE, _SAME_AMOUNT = 1e-3, 0.5
 MOST_HALVINGS = 8
 # The first round of the augmented Lagrangian is minimised this much more coarsely.
 _FIRST_SLACK = 1e4
-# Rounds of the augmented Lagrangian.
-_ROUNDS = 12
+# Rounds of the augmented Lagrangian. What has not fallen to this share in so many of them, while
+# penalties grew tenfold in each, does not fall any more.
+_ROUNDS, _STUCK_ROUNDS, _STUCK = 12, 4, 0.9
 # Equalities are met to this [rad, rad/s], which Newton's method needs a few steps for.
 _CLOSED, _CLOSING_STEPS = 1e-11, 12
 # After these the user has no more time to give.
@@ -175,6 +176,7 @@ class Session:
         cost = sum(self.terms().values())
         conditions.start(objective.rollout.samples(), cost)
         h = None if self._minimum is None else self._minimum.inverse_hessian
+        worst: list[float] = []
         for round_number in range(_ROUNDS):
             if use_metric and (round_number > 0 or h is None):
                 h = inverse_metric(self._counted(lambda: objective.metric(self._x)))
@@ -186,6 +188,9 @@ class Session:
             if (kept and self._feasible) or self.status in _CUT_SHORT:
                 break
             self._feasible = kept
+            worst.append(conditions.worst)
+            if round_number >= _STUCK_ROUNDS and worst[-1] > _STUCK * worst[-1 - _STUCK_ROUNDS]:
+                break
         self._close()
         self.violations = conditions.violated(objective.rollout.samples())
 
