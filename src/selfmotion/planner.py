@@ -93,6 +93,11 @@ def plan(
         The start is free and no configuration reaches the start of the path.
     """
     if method is not None:
+        if problem.damping is not None:
+            raise ProblemError(
+                "the problem's damping is for the optimised motion; leave it out with method=, or "
+                "take method=DampedLeastSquares(…)"
+            )
         return plan_by(problem, method, tolerance)
     if initial_metric not in ("gauss-newton", "identity"):
         raise ProblemError(
@@ -127,8 +132,10 @@ def plan(
             best.minimize(use_metric)
         else:
             best = _search(settings, starts, finalists, rng, use_metric, search, reach)
-    except (BreakdownError, NoSequenceError):
-        shorter = part()
+    except (BreakdownError, NoSequenceError) as error:
+        # Chains of configurations end at obstacles and step limits as well: these stay errors.
+        blocked = isinstance(error, NoSequenceError) and not reach().reason
+        shorter = None if blocked else part()
         if shorter is None:
             raise
         return shorter
