@@ -52,11 +52,25 @@ def reachable(problem: Problem, starts: int, rng: np.random.Generator) -> Reach:
     for t in times[1:]:
         found = _solutions(robot, problem, t, known, rng)
         if not found:
-            break
+            known, last = _edge(robot, problem, (last, t), known, rng)
+            # From right before it, a pose that only seemed out of reach is found.
+            found = _solutions(robot, problem, t, known, rng)
+        if not found:
+            beyond = times[times > last]
+            return Reach(last, first, _out_of_reach(problem, robot, last, known[0], beyond))
         known, last = found, float(t)
-    else:
-        return Reach(path.duration, first, "")
-    beyond = float(t)
+    return Reach(path.duration, first, "")
+
+
+def _edge(
+    robot: RobotModel,
+    problem: Problem,
+    interval: tuple[float, float],
+    known: list[Array],
+    rng: np.random.Generator,
+) -> tuple[list[Array], float]:
+    """Return the last time of an interval that solutions go on to, and these."""
+    last, beyond = interval
     for _ in range(_BISECTIONS):
         middle = 0.5 * (last + beyond)
         found = _solutions(robot, problem, middle, known, rng)
@@ -64,7 +78,7 @@ def reachable(problem: Problem, starts: int, rng: np.random.Generator) -> Reach:
             known, last = found, middle
         else:
             beyond = middle
-    return Reach(last, first, _out_of_reach(problem, robot, last, known[0], times[times > last]))
+    return known, last
 
 
 def _within_limits(problem: Problem) -> RobotModel:
