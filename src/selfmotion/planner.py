@@ -53,8 +53,8 @@ def plan(
         H0: the inverse Gauss-Newton matrix of the motion at x = 0, or the paper's identity.
     max_evaluations : int, optional
         Limit on evaluations of the cost while optimising one start; the finished motion is
-        evaluated a few times more. By default none, but 400 with damping, where limits of joint
-        speed often cannot be met and trying would take minutes.
+        evaluated a few times more. By default none, but 400 with damping and on parts of the path,
+        where limits of joint speed often cannot be met and trying would take minutes.
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
     tolerance : Tolerance, optional
@@ -116,11 +116,11 @@ def plan(
     wanted = tolerance or Tolerance()
 
     @cache
-    def reach() -> Reach:
-        return reachable(problem, starts, np.random.default_rng(rng))
+    def reach(suspect: float) -> Reach:
+        return reachable(problem, suspect, starts, np.random.default_rng(rng))
 
-    def part() -> Plan | None:
-        found = largest_part(problem, reach(), _maker(settings), use_metric)
+    def part(suspect: float) -> Plan | None:
+        found = largest_part(problem, reach(suspect), _maker(settings), use_metric)
         if found is None:
             return None
         found.session.refine_until_settled()
@@ -134,25 +134,27 @@ def plan(
             best = _search(settings, starts, finalists, rng, use_metric, search, reach)
     except (BreakdownError, NoSequenceError) as error:
         # Chains of configurations end at obstacles and step limits as well: these stay errors.
-        blocked = isinstance(error, NoSequenceError) and not reach().reason
-        shorter = None if blocked else part()
+        blocked = isinstance(error, NoSequenceError) and not reach(error.time).reason
+        shorter = None if blocked else part(error.time)
         if shorter is None:
             raise
         return shorter
     best.refine_until_settled()
     result = _finish(problem, Part(problem, best, ""), wanted, began)
     cut_short = best.status in (Status.INTERRUPTED, Status.STOPPED, Status.MAX_EVALUATIONS)
-    out_of_limits = best.violations and result.certificate.limit_margin.value < 0.0
+    check = result.certificate
+    out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
+    held = _within((check.position_error.value, check.rotation_error.value), wanted)
     # With damping the motion goes on where the path cannot be followed: so it was asked for.
-    if out_of_limits and not cut_short and problem.damping is None:
-        return part() or result
-    return result
+    if (held and not out_of_limits) or cut_short or problem.damping is not None:
+        return result
+    return part(check.position_error.time) or result
 
 
 def _maker(settings: _Settings) -> Maker:
     """Return what makes sessions of parts of the problem, with the settings of the whole."""
     _, optimizer, callback, limit, counts = settings
-    limit = _PATIENCE if limit is None else min(limit, _PATIENCE)
+    limit = _PATIENCE if limit is None else limit
 
     def make(part: Problem, start: Array, guide: Guide | None) -> Session:
         free = part.given_start is None
@@ -168,7 +170,7 @@ def _search(
     rng: np.random.Generator | int | None,
     use_metric: bool,
     search: str,
-    reach: Callable[[], Reach],
+    reach: Callable[[float], Reach],
 ) -> Session:
     """Return the best session of a free start: from many starts, or from global sequences."""
     problem = settings[0]
@@ -179,7 +181,7 @@ def _search(
         try:
             best = _search_starts(settings, starts, finalists, rng, use_metric, reach)
         except BreakdownError as error:
-            if reach().reason:
+            if reach(error.time).reason:
                 raise
             failure = error
     fell_short = best is None or bool(best.violations)
@@ -210,7 +212,7 @@ def _search_starts(
     finalists: int,
     rng: np.random.Generator | int | None,
     use_metric: bool,
-    reach: Callable[[], Reach],
+    reach: Callable[[float], Reach],
 ) -> Session:
     """Return the best session of a free start; more starts where the first ones fall short."""
     problem = settings[0]
@@ -225,7 +227,7 @@ def _search_starts(
             found = _best_start(settings, candidates, effort * finalists, use_metric)
         except BreakdownError as error:
             failure = error
-            if reach().reason:
+            if reach(error.time).reason:
                 # A pose that is out of reach is so from any start.
                 break
             continue
@@ -268,6 +270,7 @@ def _finish(problem: Problem, part: Part, tolerance: Tolerance, began: float) ->
     session = part.session
     requirements = replace(problem.requirements, ending=part.ending)
     coarse: Trajectory | None = None
+    misses: list[float] = []
     for _ in range(MOST_HALVINGS):
         terms = session.terms()
         trajectory = session.trajectory()
@@ -281,6 +284,10 @@ def _finish(problem: Problem, part: Part, tolerance: Tolerance, began: float) ->
         if coarse is not None and _within(_largest_change(problem, coarse, trajectory), tolerance):
             break
         coarse = trajectory if session.damped else None
+        # What is out of reach is so on any grid.
+        misses.append(sum(errors))
+        if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
+            break
         session.refine()
     violations = session.violations
     x = session.coefficients
