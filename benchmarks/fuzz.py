@@ -70,6 +70,8 @@ class Checker:
     def refuses(self, plan: sm.Plan) -> str:
         """Return what is wrong with a plan at 400 times, or nothing."""
         motion, robot = plan.trajectory, self._robot
+        if motion.duration < (1.0 - CLOSE) * plan.path.duration:
+            return f"the motion ends at t = {motion.duration:.3f} s"
         t = np.linspace(0.0, motion.duration, 400)
         q = motion(t)
         for time_, x in zip(t, q, strict=True):

@@ -129,7 +129,7 @@ def plan(problem: PathProblem, seed: int) -> sm.Plan:
     ]
     if problem.has_meshes and problem.criteria["collision_free"]:
         constraints.append(sm.Clearance(problem.obstacles, CLEARANCE))
-    return sm.plan(
+    found = sm.plan(
         sm.Problem(
             problem.robot,
             problem.path,
@@ -140,6 +140,8 @@ def plan(problem: PathProblem, seed: int) -> sm.Plan:
         search="global",
         rng=seed,
     )
+    # A motion along a part of the path is none along the path.
+    return found.require() if found.requirements.ending else found
 
 
 def judge(problem: PathProblem, q: Array, seconds: float) -> Score:

@@ -112,3 +112,23 @@ def test_demo(tmp_path: Path) -> None:
     assert result.returncode == 0, result.stdout + result.stderr
     names = {f"{name}.{kind}" for name in ("planar", "panda") for kind in ("npz", "csv", "html")}
     assert {file.name for file in (tmp_path / "out").iterdir()} == names
+
+
+def test_a_path_that_leaves_the_workspace_exits_with_1(tmp_path: Path) -> None:
+    file, html = tmp_path / "plan.npz", tmp_path / "a.html"
+    line = ("plan", "planar_3r", "--line", "11,0,0", "--duration", "8", "--task", "planar")
+    planned = run(*line, "--out", file, "--html", html)
+    assert planned.returncode == 1, planned.stderr
+    checked = run("check", file)
+    assert checked.returncode == 1
+    for output in (planned.stdout, checked.stdout):
+        text = " ".join(output.split())
+        assert "not verified: the motion ends at t =" in text
+        assert "the pose is out of reach" in text
+    assert html.stat().st_size > 100_000
+
+    damped = run(*line, "--damped")
+    assert damped.returncode == 1, damped.stderr
+    text = " ".join(damped.stdout.split())
+    assert "path error" in text
+    assert "where damping was active" in text

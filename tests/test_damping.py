@@ -246,3 +246,6 @@ def test_what_damping_refuses(planar: sm.RobotModel) -> None:
     twice = dataclasses.replace(sm.sample_problem(), costs=[sm.JointVelocity(name="path error")])
     with pytest.raises(sm.ProblemError, match="two costs are called 'path error'"):
         dataclasses.replace(twice, damping=sm.Damping())
+    damped = dataclasses.replace(sm.sample_problem(), damping=sm.Damping())
+    with pytest.raises(sm.ProblemError, match="damping is for the optimised motion"):
+        sm.plan(damped, method=sm.PseudoInverse())

@@ -207,3 +207,19 @@ def test_a_truncated_path_is_its_path(planar: sm.RobotModel) -> None:
         assert np.all(np.diff(path.knots) > 0.0)
     with pytest.raises(sm.PathError, match=r"ends at 11\.0 s, expected a time within"):
         Truncated(line, 11.0)
+
+
+def test_an_excursion_between_the_poses_looked_at_is_found(planar: sm.RobotModel) -> None:
+    """A circle that is out of reach for a sixtieth of its time, by 2 mm."""
+    pose = np.eye(4)
+    pose[0, 3] = 4.002
+    centre, axis = np.array([4.502, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    circle = sm.Circle(pose, centre, axis, 4.0, turns=1.013)
+    start = planar.inverse_kinematics(circle.pose(0.0), "planar")
+    plan = sm.plan(sm.Problem(planar, circle, "planar", start))
+    times = np.linspace(0.0, 4.0, 400_001)
+    beyond = np.linalg.norm(circle.samples(times).translation, axis=1) > 5.0
+    edge = float(times[np.argmax(beyond)])
+    check_part(plan, edge)
+    assert plan.trajectory.t[-1] > (1.0 - EDGE) * edge
+    assert "the pose is out of reach" in plan.certificate.verdict

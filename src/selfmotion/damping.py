@@ -20,10 +20,11 @@ class Damping:
 
         λ² = λ0² (1 - σ²/σ0²)²  for σ < σ0,  exactly 0 elsewhere,
 
-    so that q̇ is continuously differentiable: the variable damping of Y. Nakamura and H. Hanafusa
-    (J. Dyn. Sys. Meas. Control 108, 1986) with σ for their manipulability, as A. A. Maciejewski and
-    C. A. Klein (J. Robotic Systems 5, 1988) and S. Chiaverini, B. Siciliano and O. Egeland (IEEE
-    Trans. Control Systems Technology 2, 1994) have it.
+    so that q̇ is continuously differentiable; the pose feedback fades out as λ²/λ0² grows to 1. It
+    is the variable damping of Y. Nakamura and H. Hanafusa (J. Dyn. Sys. Meas. Control 108, 1986)
+    with σ for their manipulability, as A. A. Maciejewski and C. A. Klein (J. Robotic Systems 5,
+    1988) and S. Chiaverini, B. Siciliano and O. Egeland (IEEE Trans. Control Systems Technology 2,
+    1994) have it.
 
     All three parameters are relative to something of the arm's and the path's own, so that one
     default suits arms of any size.

@@ -178,12 +178,13 @@ def _attempt(problem: Problem, candidate: _Candidate, make: Maker, use_metric: b
     except BreakdownError as error:
         reason = f"it runs into a singular pose near t = {error.time:.6g} s"
         return _Attempt(candidate, problem, None, error.time, reason)
-    still = _session_kept_until(problem, session)
     try:
         session.minimize(use_metric)
     except KeyboardInterrupt:
         session.end(Status.INTERRUPTED)
-    until = max(still, _session_kept_until(problem, session))
+    motion = session.trajectory()
+    # Constraints that cannot be met may throw it far off: x = 0 then tells more.
+    until = max(_kept_until(problem, motion.t, motion.q, motion.qd), -_rank(problem, *candidate)[1])
     return _Attempt(candidate, problem, session, until, "; ".join(session.violations))
 
 
@@ -232,13 +233,10 @@ def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, f
     far = min(far, float(grid.nodes[int(np.argmax(off))])) if off.any() else far
     nodes, samples = grid.node_stages, rollout.samples()
     kept = _kept_until(problem, grid.nodes, samples.q[nodes], samples.qd[nodes])
-    return -far, -min(kept, far), float(samples.weights @ np.sum(samples.qd**2, axis=1))
-
-
-def _session_kept_until(problem: Problem, session: Session) -> float:
-    session.terms()
-    motion = session.trajectory()
-    return _kept_until(problem, motion.t, motion.q, motion.qd)
+    # Beyond the place where it broke down, speeds may be anything.
+    arrived = far >= path.duration
+    effort = float(samples.weights @ np.sum(samples.qd**2, axis=1)) if arrived else np.inf
+    return -far, -min(kept, far), effort
 
 
 def _kept_until(problem: Problem, t: Array, q: Array, qd: Array) -> float:

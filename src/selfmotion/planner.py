@@ -63,8 +63,8 @@ def plan(
         H0: the inverse Gauss-Newton matrix of the motion at x = 0, or the paper's identity.
     max_evaluations : int, optional
         Limit on evaluations of the cost while optimising one start; the finished motion is
-        evaluated a few times more. By default none, but 400 with damping, where limits of joint
-        speed often cannot be met and trying would take minutes.
+        evaluated a few times more. By default none, but 400 with damping and on parts of the path,
+        where limits of joint speed often cannot be met and trying would take minutes.
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
     tolerance : Tolerance, optional
@@ -114,6 +114,11 @@ def plan(
         The interruption came before there was a complete motion.
     """
     if method is not None:
+        if problem.damping is not None:
+            raise ProblemError(
+                "the problem's damping is for the optimised motion; leave it out with method=, or "
+                "take method=DampedLeastSquares(…)"
+            )
         return plan_by(problem, method, tolerance)
     if initial_metric not in ("gauss-newton", "identity"):
         raise ProblemError(
@@ -128,16 +133,16 @@ def plan(
     optimizer, counts = optimizer or QuasiNewton(), Counts()
 
     @cache
-    def reach() -> Reach:
+    def reach(suspect: float) -> Reach:
         progress("reach", 1, 1)
-        return reachable(problem, starts, np.random.default_rng(rng))
+        return reachable(problem, suspect, starts, np.random.default_rng(rng))
 
-    def part(notes: list[str]) -> Plan | None:
+    def part(suspect: float, notes: list[str]) -> Plan | None:
+        limit = _PATIENCE if max_evaluations is None else max_evaluations
+        make = partial(_session, optimizer, callback, limit, counts)
+        known = reach(suspect)
         progress("largest part", 1, 1)
-        limit = _PATIENCE if max_evaluations is None else min(max_evaluations, _PATIENCE)
-        found = largest_part(
-            problem, reach(), partial(_session, optimizer, callback, limit, counts), use_metric
-        )
+        found = largest_part(problem, known, make, use_metric)
         if found is None:
             return None
         _settle(found.session, None, progress)
@@ -154,8 +159,10 @@ def plan(
     )
     try:
         best = selection.run()
-    except (BreakdownError, NoSequenceError):
-        shorter = part(selection.notes)
+    except (BreakdownError, NoSequenceError) as error:
+        # Chains of configurations end at obstacles and step limits as well: these stay errors.
+        blocked = isinstance(error, NoSequenceError) and not reach(error.time).reason
+        shorter = None if blocked else part(error.time, selection.notes)
         if shorter is None:
             raise
         return shorter
@@ -164,15 +171,19 @@ def plan(
     checked = _checked(problem, whole, wanted, progress)
     result = _finish(problem, whole, checked, _gap(selection, rival_cost, checked), [], began)
     no_more = best.cut_short or best.status is Status.MAX_EVALUATIONS
-    out_of_limits = best.violations and result.certificate.limit_margin.value < 0.0
+    check = result.certificate
+    out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
+    held = _within((check.position_error.value, check.rotation_error.value), wanted)
     # With damping the motion goes on where the path cannot be followed: so it was asked for.
-    if out_of_limits and not no_more and problem.damping is None:
-        try:
-            return part(selection.notes) or result
-        except KeyboardInterrupt:
-            best.end(Status.INTERRUPTED)
-            return _finish(problem, whole, checked, None, [], began)
-    return result
+    if (held and not out_of_limits) or no_more or problem.damping is not None:
+        return result
+    try:
+        suspect = check.position_error.time
+        # Where single poses are in reach, the constraints that are not met say more than a part.
+        return (part(suspect, selection.notes) if reach(suspect).reason else None) or result
+    except KeyboardInterrupt:
+        best.end(Status.INTERRUPTED)
+        return _finish(problem, whole, checked, None, [], began)
 
 
 def _session(
@@ -255,6 +266,7 @@ def _checked(problem: Problem, part: Part, tolerance: Tolerance, progress: Progr
     """Return what there is on the first grid on which the motion holds the tolerance."""
     session, requirements = part.session, replace(problem.requirements, ending=part.ending)
     checked = coarse = None
+    misses: list[float] = []
     for _ in range(MOST_HALVINGS):
         try:
             progress("checking", 1, 1)
@@ -269,6 +281,10 @@ def _checked(problem: Problem, part: Part, tolerance: Tolerance, progress: Progr
             ):
                 break
             coarse = trajectory if checked.damped else None
+            # What is out of reach is so on any grid.
+            misses.append(sum(errors))
+            if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
+                break
             session.refine()
         except KeyboardInterrupt:
             session.end(Status.INTERRUPTED)

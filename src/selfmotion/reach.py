@@ -14,6 +14,8 @@ from selfmotion.search import start_candidates
 # Poses along the path that are looked at, branches of solutions that are followed from one to the
 # next, restarts where none of them goes on, and bisections of the time at which that happens.
 _POSES, _BRANCHES, _RESTARTS, _BISECTIONS = 64, 3, 12, 16
+# Poses about a time of trouble, in shares of the path's duration.
+_ABOUT = np.array([-1e-3, 0.0, 1e-3, 4e-3])
 # A singular value below this share of the dexterous configuration's counts as stretched or folded,
 # a joint this near to its limit [rad or m] as at it.
 _STRETCHED, _AT_LIMIT = 0.1, 1e-3
@@ -38,25 +40,41 @@ class Reach:
     reason: str
 
 
-def reachable(problem: Problem, starts: int, rng: np.random.Generator) -> Reach:
+def reachable(problem: Problem, suspect: float, starts: int, rng: np.random.Generator) -> Reach:
     """Return how far single poses of the path can be reached, within the joint limits.
 
     Inverse kinematics from the solutions of the pose before, and from elsewhere where these do not
-    go on: a pose that nothing leads to is out of reach, as far as can be told.
+    go on: a pose that nothing leads to is out of reach, as far as can be told. Poses all along the
+    path, and more about the time `suspect` [s], where a motion had trouble.
     """
     robot, path, task = _within_limits(problem), problem.path, problem.rows
     given = problem.given_start
     first = start_candidates(robot, path, task, starts, rng) if given is None else [given]
-    times = np.linspace(0.0, path.duration, _POSES + 1)
+    about = np.clip(suspect / path.duration + _ABOUT, 0.0, 1.0)
+    times = path.duration * np.union1d(np.linspace(0.0, 1.0, _POSES + 1), about)
     known, last = first, 0.0
     for t in times[1:]:
         found = _solutions(robot, problem, t, known, rng)
         if not found:
-            break
+            known, last = _edge(robot, problem, (last, t), known, rng)
+            # From right before it, a pose that only seemed out of reach is found.
+            found = _solutions(robot, problem, t, known, rng)
+        if not found:
+            beyond = times[times > last]
+            return Reach(last, first, _out_of_reach(problem, robot, last, known[0], beyond))
         known, last = found, float(t)
-    else:
-        return Reach(path.duration, first, "")
-    beyond = float(t)
+    return Reach(path.duration, first, "")
+
+
+def _edge(
+    robot: RobotModel,
+    problem: Problem,
+    interval: tuple[float, float],
+    known: list[Array],
+    rng: np.random.Generator,
+) -> tuple[list[Array], float]:
+    """Return the last time of an interval that solutions go on to, and these."""
+    last, beyond = interval
     for _ in range(_BISECTIONS):
         middle = 0.5 * (last + beyond)
         found = _solutions(robot, problem, middle, known, rng)
@@ -64,7 +82,7 @@ def reachable(problem: Problem, starts: int, rng: np.random.Generator) -> Reach:
             known, last = found, middle
         else:
             beyond = middle
-    return Reach(last, first, _out_of_reach(problem, robot, last, known[0], times[times > last]))
+    return known, last
 
 
 def _within_limits(problem: Problem) -> RobotModel:

@@ -61,7 +61,8 @@ class Selection:
     effort : Effort
     progress : Progress
     reach : callable
-        Returns how far single poses are in reach: what is beyond is so from any start.
+        Returns how far single poses are in reach, looking closely at a time [s]: what is beyond is
+        so from any start.
 
     Attributes
     ----------
@@ -82,7 +83,7 @@ class Selection:
         use_metric: bool,
         effort: Effort,
         progress: Progress,
-        reach: Callable[[], Reach],
+        reach: Callable[[float], Reach],
     ) -> None:
         self._reach = reach
         self._problem, self._session = problem, session
@@ -132,7 +133,7 @@ class Selection:
             self._try_starts()
         fell_short = self.best is None or bool(self.best.violations)
         chosen = start is None and effort.search != "local"
-        if self.best is None and self._failure is not None and self._reach().reason:
+        if self._is_out_of_reach():
             return
         if can_search and (effort.compare or (chosen and fell_short)):
             self._try_sequences(chosen)
@@ -142,10 +143,17 @@ class Selection:
         effort, generator = self._effort, np.random.default_rng(self._effort.rng)
         for times in (1, _SECOND_EFFORT):
             self._try_candidates(times * effort.starts, times * effort.finalists, generator)
-            if self.best is None and self._reach().reason:
+            if self._is_out_of_reach():
                 return
             if self.best is not None and not self.best.violations:
                 return
+
+    def _is_out_of_reach(self) -> bool:
+        """Whether no start led anywhere because the path leaves the workspace."""
+        failure = self._failure
+        if self.best is not None or not isinstance(failure, BreakdownError):
+            return False
+        return bool(self._reach(failure.time).reason)
 
     def _try_candidates(self, starts: int, finalists: int, rng: np.random.Generator) -> None:
         problem = self._problem

@@ -28,6 +28,8 @@ Guide = Callable[[Array], Array]
 _FEWEST_STEPS, _DRIFT = 32, 1e-3
 # Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands.
 _COST_AGREEMENT = 1e-4
+# A cost that rises this much on two grids in turn has no limit.
+_RISE, _RISES = 1.5, 2
 # Trouble that three grids in turn place within this share of the motion, and of which the last has
 # at least half as much as the first, is the motion's own.
 _SAME_PLACE, _SAME_AMOUNT = 1e-3, 0.5
@@ -216,14 +218,21 @@ class Session:
 
     def refine_until_settled(self) -> None:
         """Optimise on halved grids until the cost agrees."""
+        rises = 0
         for _ in range(MOST_HALVINGS):
             if self.status in _CUT_SHORT:
                 return
-            before = sum(self.terms().values())
+            before, unmet = sum(self.terms().values()), bool(self.violations)
             self.refine()
-            error = abs(sum(self.terms().values()) - before)
+            after = sum(self.terms().values())
+            error = abs(after - before)
+            # A cost that grows and grows, and what two grids in turn could not meet: the path runs
+            # past the edge of the workspace between their nodes, or limits are too tight.
+            rises = rises + 1 if after > _RISE * abs(before) else 0
+            if rises == _RISES:
+                return
             self.minimize(use_metric=True)
-            if error <= _COST_AGREEMENT * abs(before):
+            if error <= _COST_AGREEMENT * abs(before) or (unmet and self.violations):
                 return
 
     def refine(self) -> None:
