@@ -111,3 +111,14 @@ def test_demo(tmp_path: Path) -> None:
     assert result.returncode == 0, result.stdout + result.stderr
     names = {f"{name}.{kind}" for name in ("planar", "panda") for kind in ("npz", "csv", "html")}
     assert {file.name for file in (tmp_path / "out").iterdir()} == names
+
+
+def test_a_log_names_the_stages_and_the_gap(tmp_path: Path) -> None:
+    planned = run(
+        "plan", "planar_3r", "--circle", "0.3", "--normal", "z", "--task", "planar", "--compare"
+    )
+    assert planned.returncode in (0, 1), planned.stderr
+    assert planned.stderr.splitlines()[-1] == "checking"
+    assert "refining sequence" in planned.stderr
+    assert "\x1b" not in planned.stderr
+    assert "% from its best motion" in planned.stdout

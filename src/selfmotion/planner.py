@@ -122,7 +122,8 @@ def plan(
     best = selection.run()
     rival_cost = _settle(best, selection.rival, progress)
     checked = _checked(problem, best, tolerance or Tolerance(), progress)
-    return _finish(problem, best, checked, _gap(selection, rival_cost, checked), began)
+    gap = _gap(selection, rival_cost, checked)
+    return _finish(problem, best, checked, gap, selection.notes, began)
 
 
 def _settle(best: Session, rival: Session | None, progress: Progress) -> float | None:
@@ -139,14 +140,19 @@ def _settle(best: Session, rival: Session | None, progress: Progress) -> float |
 
 
 def _finish(
-    problem: Problem, session: Session, checked: _Checked, gap: Gap | None, began: float
+    problem: Problem,
+    session: Session,
+    checked: _Checked,
+    gap: Gap | None,
+    notes: list[str],
+    began: float,
 ) -> Plan:
     """Gather everything."""
     terms, violations, counts = checked.terms, session.violations, session.counts
-    message = session.status.message
+    parts = [session.status.message] if session.cut_short or not violations else []
     if violations:
-        unmet = f"not all constraints could be met: {'; '.join(violations)}"
-        message = f"{message}; {unmet}" if session.cut_short else unmet
+        parts.append(f"not all constraints could be met: {'; '.join(violations)}")
+    message = "; ".join([*parts, *notes])
     report = Report(
         cost=sum(terms.values()),
         initial_cost=sum(checked.initial_terms.values()),

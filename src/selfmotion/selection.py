@@ -17,6 +17,8 @@ from selfmotion.session import Session
 
 # Where no start leads to a motion that keeps the constraints, this many times more are tried.
 _SECOND_EFFORT = 4
+# Sequences are not worth refining when longer by this factor than one that keeps all constraints.
+_LONGER = 1.25
 
 
 @dataclass(frozen=True)
@@ -108,8 +110,6 @@ class Selection:
             self._interrupted()
         if self.best is None:
             self._give_up()
-        if self.best.violations:
-            self.best.violations = (*self.best.violations, *self.notes)
         return self.best
 
     def _search(self) -> None:
@@ -169,9 +169,22 @@ class Selection:
             except BreakdownError as error:
                 self._failure = error
                 continue
+            if self._hopeless(guide, session):
+                continue
             self._try(session, chosen=chosen)
             if self.rival is None or session.score < self.rival.score:
                 self.rival = session
+
+    def _hopeless(self, guide: Guide, session: Session) -> bool:
+        """Whether a sequence is much longer than the shortest, and costs more than what there is.
+
+        Optimising gains some percent on a sequence.
+        """
+        rival = self.rival
+        if rival is None or rival.violations:
+            return False
+        longer = guide.sequence.length > _LONGER * self.sequences[0].sequence.length
+        return longer and session.initial_score > rival.score[1]
 
     def _try(self, session: Session, *, chosen: bool = True) -> None:
         """Optimise a session; keep it if it is the best one and may be chosen."""

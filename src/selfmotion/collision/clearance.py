@@ -55,14 +55,15 @@ class Clearances:
         )
 
     def jacobian(self) -> Array:
-        """Return ∂d/∂q, (K, P, n); `pullback` is far cheaper where a sum is wanted."""
-        count, pairs = self.values.shape
-        gradient = np.empty((count, pairs, self._jacobians.shape[2]))
-        for pair in range(pairs):
-            only = np.zeros((count, pairs))
-            only[:, pair] = 1.0
-            gradient[:, pair] = self.pullback(only)
-        return gradient
+        """Return ∂d/∂q, (K, P, n); `pullback` is cheaper where a sum is wanted."""
+        n = self._jacobians.shape[2]
+        # Row b: which joints move body b.
+        moves = np.zeros((n + 1, n))
+        for joint in range(1, n + 1):
+            moves[joint] = moves[self._parents[joint]]
+            moves[joint, joint - 1] = 1.0
+        first, second = self._pair_joints.T
+        return np.asarray((moves[first] - moves[second]) * (self._wrenches @ self._jacobians))
 
 
 class ClearanceModel:
@@ -183,18 +184,26 @@ class ClearanceModel:
 
     def _replace_near(self, q: Array, values: Array, wrenches: Array) -> None:
         """Put the distances of hulls in the place of small ones of capsules."""
-        for k in np.flatnonzero((values < 2.0 * self._near).any(axis=1)):
-            self._exact.place_hulls(q[k])
-            for pair in np.flatnonzero(values[k] < 2.0 * self._near):
-                distance, normal, point = self._exact.hull_contact(self._hulls[pair])
-                if not np.isfinite(normal).all():
-                    continue  # in touch to the last digit: the capsules are conservative
-                wrench = np.concatenate([normal, np.cross(point, normal)])
-                gap = distance - values[k, pair]
-                share, slope = _blend(values[k, pair] / self._near)
-                wrenches[k, pair] *= 1.0 - share + gap * slope / self._near
-                wrenches[k, pair] += share * wrench
-                values[k, pair] += share * gap
+        rows, columns = np.nonzero(values < 2.0 * self._near)
+        if not len(rows):
+            return
+        contacts, placed = np.empty((len(rows), 7)), -1
+        for i, (row, column) in enumerate(zip(rows.tolist(), columns.tolist(), strict=True)):
+            if row != placed:
+                self._exact.place_hulls(q[row])
+                placed = row
+            contacts[i] = self._exact.hull_contact(self._hulls[column])
+        # In touch to the last digit there is no normal, and the capsules, conservative, remain.
+        sound = np.isfinite(contacts).all(axis=1)
+        rows, columns, contacts = rows[sound], columns[sound], contacts[sound]
+        normals, points = contacts[:, 1:4], contacts[:, 4:]
+        hulls = np.hstack([normals, np.cross(points, normals)])
+        capsules = values[rows, columns]
+        gap = contacts[:, 0] - capsules
+        share, slope = _blend(capsules / self._near)
+        wrenches[rows, columns] *= (1.0 - share + gap * slope / self._near)[:, None]
+        wrenches[rows, columns] += share[:, None] * hulls
+        values[rows, columns] += share * gap
 
     def _kinematics(self, q: Array) -> tuple[Array, Array, Array]:
         count, n = q.shape
@@ -232,9 +241,9 @@ class ClearanceModel:
         self._pair_capsules(self._self_pairs[kept[:own]], self._world_pairs[kept[own:]])
 
 
-def _blend(ratio: float) -> tuple[float, float]:
+def _blend(ratio: Array) -> tuple[Array, Array]:
     """Return the hulls' share of a distance, and its derivative: 1 below ratio 1, 0 above 2."""
-    s = min(max(2.0 - ratio, 0.0), 1.0)
+    s = np.clip(2.0 - ratio, 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s), -6.0 * s * (1.0 - s)
 
 

@@ -130,6 +130,6 @@ class BoundClearance:
 
 # Beyond the distance asked for, capsules may stand for links where they are this far apart [m]:
 # well outside of where the optimiser feels the constraint.
-_NEAR = 0.02
+_NEAR = 0.01
 # Clearances count in units of this, to weigh about as much as joint angles.
 _METRE = 0.1
