@@ -267,6 +267,10 @@ class CollisionModel:
         self._data = self.robot.model.createData()
         self._hull_data = self._hulls.createData()
         self._mesh_data = self._meshes.createData()
+        for i in range(len(pairs)):
+            # coal's 1e-6 m would be noise in the gradients that the optimiser sees.
+            request = self._hull_data.distanceRequests[i]
+            request.gjk_tolerance = request.epa_tolerance = _PRECISION
         self._hull_results = [self._hull_data.distanceResults[i] for i in range(len(pairs))]
         self._refined = self._pairs_to_refine()
         self._hulls_decide = all(self._refined.values())
@@ -289,6 +293,8 @@ class CollisionModel:
         }
 
 
+# Of the hulls' distances [m].
+_PRECISION = 1e-9
 # Configurations in which a pair must overlap to count as touching by design.
 _SAMPLES = 500
 

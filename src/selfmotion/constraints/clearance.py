@@ -22,7 +22,8 @@ class Clearance:
     """The arm keeps a distance from obstacles and from itself.
 
     While optimising, links are their convex hulls, and far from each other capsules around these;
-    the certificate measures the meshes themselves.
+    the certificate measures the meshes themselves. Obstacles are not checked against the immovable
+    base: no motion changes that distance, and an arm bolted to a table touches it.
 
     Parameters
     ----------
