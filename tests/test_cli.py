@@ -132,3 +132,14 @@ def test_a_path_that_leaves_the_workspace_exits_with_1(tmp_path: Path) -> None:
     text = " ".join(damped.stdout.split())
     assert "path error" in text
     assert "where damping was active" in text
+
+
+def test_a_log_names_the_stages_and_the_gap(tmp_path: Path) -> None:
+    planned = run(
+        "plan", "planar_3r", "--circle", "0.3", "--normal", "z", "--task", "planar", "--compare"
+    )
+    assert planned.returncode in (0, 1), planned.stderr
+    assert planned.stderr.splitlines()[-1] == "checking"
+    assert "refining sequence" in planned.stderr
+    assert "\x1b" not in planned.stderr
+    assert "% from its best motion" in planned.stdout

@@ -313,3 +313,32 @@ def test_broken_motions_fail_what_is_required(panda_circle: Circle) -> None:
         plan.robot, plan.path, plan.task, plan.trajectory, requirements=shifted
     )
     assert "away from where it should" in certificate.verdict
+
+
+def test_clearance_of_an_arm_without_geometry_is_refused(planar: sm.RobotModel) -> None:
+    start = planar.inverse_kinematics(planar.pose([0.3, 0.8, 0.5]), "planar")
+    path = short_line(planar, start)
+    problem = sm.Problem(planar, path, "planar", start, constraints=[sm.Clearance()])
+    with pytest.raises(sm.ProblemError, match="planar_3r: a clearance is asked for, but its URDF"):
+        sm.plan(problem)
+
+
+def test_a_table_under_the_base_is_no_obstacle_to_it(panda_circle: Circle) -> None:
+    table = sm.Box("table", [0.0, 0.0, -0.05], [0.6, 0.6, 0.1])
+    problem = panda_circle(constraints=[sm.Clearance([table], 1e-3)])
+    assert sm.plan(problem).certificate.verified
+
+
+def test_passing_closer_than_capsules_allow_costs_nothing(panda_circle: Circle) -> None:
+    """A box a centimetre from the hulls on the best motion, well inside the capsules."""
+    free = sm.plan(panda_circle())
+    model = sm.CollisionModel(free.robot)
+    box = None
+    for side in np.linspace(0.12, 0.4, 29):
+        box = sm.Box("near", [0.45, side, 0.75], [0.1, 0.1, 0.1])
+        model = sm.CollisionModel(free.robot, [box])
+        if model.worst(free.trajectory.q).value > 0.01:
+            break
+    plan = sm.plan(panda_circle(constraints=[sm.Clearance([box], 5e-3)]))
+    assert plan.certificate.verified
+    assert plan.report.cost == pytest.approx(free.report.cost, rel=1e-3)

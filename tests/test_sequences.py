@@ -12,6 +12,7 @@ from scipy.integrate import quad
 import selfmotion as sm
 from selfmotion.arrays import Array
 from selfmotion.errors import NoSequenceError, ProblemError
+from selfmotion.guides import search_times
 from selfmotion.sequences import SelfMotion, Sequence, best_sequences, targets
 from selfmotion.sequences.chains import diverse_chains, shortest_chains
 from selfmotion.sequences.nodes import Bounds
@@ -328,3 +329,47 @@ def test_other_redundancies_are_refused(panda: sm.RobotModel) -> None:
     path = sm.Line(panda.pose(np.zeros(7)), panda.pose(np.full(7, 0.1)), 1.0)
     with pytest.raises(ProblemError, match="has redundancy 4 for task 'position'"):
         best_sequences(panda, path, "position", [0.0, 1.0], lower=-1.0, upper=1.0, largest_step=0.1)
+
+
+def test_room_for_several_turns_changes_neither_motion_nor_limits(arm: sm.RobotModel) -> None:
+    """Wide limits: as without any, but put inside as a whole, or counted where that is too much."""
+    free = planar_search(arm, LINE, lower=-np.inf, upper=np.inf)[0]
+    wide = planar_search(arm, LINE, lower=-7.0, upper=7.0)[0]
+    assert wide.length == pytest.approx(free.length, rel=1e-12)
+    assert not faults(arm, LINE, sm.Task.PLANAR, wide, np.full(3, -7.0), np.full(3, 7.0), 0.3)
+    # Just over a turn, placed so that the shortest motion cannot stay inside at any turn.
+    middle = 0.5 * (free.q[:, 0].min() + free.q[:, 0].max())
+    lower, upper = np.full(3, -np.inf), np.full(3, np.inf)
+    lower[0], upper[0] = middle - 0.01, middle + 2 * np.pi
+    shifted = planar_search(arm, LINE, lower=lower, upper=upper)[0]
+    assert shifted.length > free.length
+    assert not faults(arm, LINE, sm.Task.PLANAR, shifted, lower, upper, 0.3)
+
+
+def test_steps_of_their_own_for_each_interval(arm: sm.RobotModel) -> None:
+    times = np.concatenate([np.linspace(0.0, 0.5, 31), np.linspace(0.5, 1.0, 7)[1:]])
+    step = 4.0 * np.diff(times)[:, None] * np.ones(3)
+    found = best_sequences(
+        arm, LINE, "planar", times, lower=-2.9, upper=2.9, largest_step=step, count=1
+    )[0]
+    moved = np.abs(np.diff(found.q, axis=0))
+    assert np.all(moved <= step * (1 + 1e-12))
+    assert moved[30:].max() > step[0, 0]
+    with pytest.raises(ProblemError, match="largest_step has shape"):
+        best_sequences(arm, LINE, "planar", times, lower=-2.9, upper=2.9, largest_step=step[1:])
+
+
+@pytest.mark.parametrize("waypoints", [2, 3, 60, 199, 295, 1000])
+def test_the_search_looks_at_neither_too_few_nor_too_many_times(waypoints: int) -> None:
+    rng = np.random.default_rng(waypoints)
+    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.0, waypoints - 1))])
+    poses = [level(2.0 + 0.5 * time / times[-1], 1.0) for time in times]
+    path = sm.Waypoints.from_poses(times, poses)
+    t = search_times(path)
+    assert (t[0], t[-1]) == (0.0, path.duration)
+    assert 150 <= len(t) <= 402
+    assert np.diff(t).min() > 0.0
+    assert np.diff(t).max() <= path.duration / 150 * (1 + 1e-9)
+    even = sm.Waypoints.from_poses(np.linspace(0.0, 10.0, waypoints), poses)
+    if 200 <= waypoints <= 400:
+        np.testing.assert_array_equal(search_times(even), even.waypoint_times)

@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import typer
@@ -28,6 +28,7 @@ VERIFIED, NOT_VERIFIED, BAD_INPUT = 0, 1, 2
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
 Corners = Literal["blend", "stop"]
 Axis = Literal["x", "y", "z"]
+Search = Literal["auto", "local", "global"]
 
 RobotArgument = Annotated[
     str, typer.Argument(help="Name (see `selfmotion robots`) or path of a .urdf file.")
@@ -83,6 +84,12 @@ def plan(
     max_evaluations: Annotated[
         int | None, typer.Option(help="Limit on cost evaluations while optimising.")
     ] = None,
+    search: Annotated[
+        Search, typer.Option(help="Without --start: from many starts, or over all self-motions.")
+    ] = "auto",
+    compare: Annotated[
+        bool, typer.Option("--compare", help="Tell the distance from the global optimum.")
+    ] = False,
     out: Annotated[
         list[Path] | None, typer.Option(help="Write the plan (.npz) or its motion (.csv).")
     ] = None,
@@ -122,7 +129,9 @@ def plan(
         relaxations=[_relaxation(text) for text in relax or []],
         damping=sm.Damping() if damped else None,
     )
-    result = _plan_with_progress(problem, max_evaluations)
+    result = _plan_with_progress(
+        problem, max_evaluations=max_evaluations, search=search, compare=compare
+    )
     report_text.show(result, _console)
     _write(result, out or [], html)
     raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
@@ -186,7 +195,7 @@ def demo(
     verified = True
     for name, problem in problems.items():
         _console.rule(name)
-        result = _plan_with_progress(problem, None)
+        result = _plan_with_progress(problem)
         report_text.show(result, _console)
         files = [out / f"{name}.npz", out / f"{name}.csv"]
         _write(result, files, out / f"{name}.html")
@@ -215,14 +224,9 @@ def study(
     _console.print(f"wrote {files[0]} and {len(files) - 1} files beside it", markup=False)
 
 
-def _plan_with_progress(problem: sm.Problem, max_evaluations: int | None) -> sm.Plan:
+def _plan_with_progress(problem: sm.Problem, **options: Any) -> sm.Plan:
     with StageDisplay(_stages) as display:
-        return sm.plan(
-            problem,
-            max_evaluations=max_evaluations,
-            callback=display.iteration,
-            progress=display.stage,
-        )
+        return sm.plan(problem, callback=display.iteration, progress=display.stage, **options)
 
 
 def _write(result: sm.Plan, out: list[Path], html: Path | None) -> None:

@@ -1,17 +1,20 @@
 """Motions worth starting from, found by the global search over self-motions."""
 
+import itertools
+
 import numpy as np
 
 from selfmotion.arrays import Array
-from selfmotion.path import Waypoints
+from selfmotion.path import Path, Waypoints
 from selfmotion.problem import Problem
 from selfmotion.progress import Progress
 from selfmotion.sequences import Sequence, best_sequences
 
 # Sequences refined; the shortest among the samples is not always that of the best motion.
 _COUNT = 4
-# Waypoints for a path that has none of its own.
-_WAYPOINTS = 200
+# A search at fewer times than these would not follow the path, at more it would only take longer;
+# in between, the path's own waypoints are taken.
+_FEWEST, _MOST = 150, 400
 # What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
 _MARGIN = 5e-4
 # The jagged chain of samples is smoothed by a spline with this many waypoints per interval.
@@ -54,12 +57,9 @@ def guides(
         No chain of configurations follows the path; says where it ends and why.
     """
     robot, path, wanted = problem.robot, problem.path, problem.requirements
-    if isinstance(path, Waypoints):
-        t = path.waypoint_times
-    else:
-        t = np.linspace(0.0, path.duration, _WAYPOINTS)
+    t = search_times(path)
     velocity = robot.velocity_limit if wanted.velocity is None else wanted.velocity
-    step = np.minimum(velocity * float(np.diff(t).min()), np.pi)
+    step = np.minimum(velocity * np.diff(t)[:, None], np.pi)
     sequences = best_sequences(
         robot,
         path,
@@ -75,3 +75,23 @@ def guides(
         progress=progress,
     )
     return [Guide(sequence) for sequence in sequences]
+
+
+def search_times(path: Path) -> Array:
+    """Return the times (W,) [s] at which configurations are searched for.
+
+    The path's waypoints where it has some: without those that follow too soon upon another one,
+    and with more between those that are far apart.
+    """
+    own = path.waypoint_times if isinstance(path, Waypoints) else np.array([0.0, path.duration])
+    shortest, longest = path.duration / _MOST, path.duration / _FEWEST
+    kept = [0.0]
+    for time in own[1:-1]:
+        if time - kept[-1] >= shortest and path.duration - time >= shortest:
+            kept.append(float(time))
+    kept.append(path.duration)
+    pieces = [
+        np.linspace(first, last, int(np.ceil((last - first) / longest)), endpoint=False)
+        for first, last in itertools.pairwise(kept)
+    ]
+    return np.concatenate([*pieces, kept[-1:]])

@@ -169,7 +169,8 @@ def plan(
     rival_cost = _settle(best, selection.rival, progress)
     whole = Part(problem, best, "")
     checked = _checked(problem, whole, wanted, progress)
-    result = _finish(problem, whole, checked, _gap(selection, rival_cost, checked), [], began)
+    gap = _gap(selection, rival_cost, checked)
+    result = _finish(problem, whole, checked, gap, selection.notes, began)
     no_more = best.cut_short or best.status is Status.MAX_EVALUATIONS
     check = result.certificate
     out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
@@ -183,7 +184,7 @@ def plan(
         return (part(suspect, selection.notes) if reach(suspect).reason else None) or result
     except KeyboardInterrupt:
         best.end(Status.INTERRUPTED)
-        return _finish(problem, whole, checked, None, [], began)
+        return _finish(problem, whole, checked, None, selection.notes, began)
 
 
 def _session(
@@ -224,11 +225,10 @@ def _finish(
     """Gather everything."""
     session = part.session
     terms, violations, counts = checked.terms, session.violations, session.counts
-    message = session.status.message
+    parts = [session.status.message] if session.cut_short or not violations else []
     if violations:
-        unmet = f"not all constraints could be met: {'; '.join(violations)}"
-        message = f"{message}; {unmet}" if session.cut_short else unmet
-    message = "; ".join(text for text in (part.ending, *notes, message) if text)
+        parts.append(f"not all constraints could be met: {'; '.join(violations)}")
+    message = "; ".join(text for text in (part.ending, *parts, *notes) if text)
     if checked.certificate.damped:
         stretches = " and ".join(map(str, checked.certificate.damped))
         message += f"; the inverse was damped {stretches}"

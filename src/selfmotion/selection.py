@@ -16,8 +16,10 @@ from selfmotion.reach import Reach
 from selfmotion.search import start_candidates
 from selfmotion.session import Session
 
-# Where no start leads to a motion that keeps the constraints, this many times more are tried.
+# Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 _SECOND_EFFORT = 4
+# Sequences are not worth refining when longer by this factor than one that keeps all constraints.
+_LONGER = 1.25
 
 
 @dataclass(frozen=True)
@@ -114,8 +116,6 @@ class Selection:
             self._interrupted()
         if self.best is None:
             self._give_up()
-        if self.best.violations:
-            self.best.violations = (*self.best.violations, *self.notes)
         return self.best
 
     def _search(self) -> None:
@@ -127,26 +127,25 @@ class Selection:
                 f"compare: the global search needs redundancy 1, but {problem.robot.name} has "
                 f"{problem.robot.redundancy(problem.rows)} for task '{problem.rows.value}'"
             )
+        starts = start is None and (effort.search != "global" or not can_search)
+        rng = np.random.default_rng(effort.rng)
         if start is not None:
             self._try(self._session(start, free=False))
-        elif effort.search != "global" or not can_search:
-            self._try_starts()
-        fell_short = self.best is None or bool(self.best.violations)
-        chosen = start is None and effort.search != "local"
+        elif starts:
+            self._try_candidates(effort.starts, effort.finalists, rng)
         if self._is_out_of_reach():
             return
-        if can_search and (effort.compare or (chosen and fell_short)):
+        chosen = start is None and effort.search != "local"
+        if can_search and (effort.compare or (chosen and self._fell_short)):
             self._try_sequences(chosen)
+        # Where the search knows that nothing follows the path, more starts do not help.
+        if starts and self._fell_short and not self.notes:
+            more = _SECOND_EFFORT
+            self._try_candidates(more * effort.starts, more * effort.finalists, rng)
 
-    def _try_starts(self) -> None:
-        """Optimise from many starts; from more where the first ones fall short."""
-        effort, generator = self._effort, np.random.default_rng(self._effort.rng)
-        for times in (1, _SECOND_EFFORT):
-            self._try_candidates(times * effort.starts, times * effort.finalists, generator)
-            if self._is_out_of_reach():
-                return
-            if self.best is not None and not self.best.violations:
-                return
+    @property
+    def _fell_short(self) -> bool:
+        return self.best is None or bool(self.best.violations)
 
     def _is_out_of_reach(self) -> bool:
         """Whether no start led anywhere because the path leaves the workspace."""
@@ -186,9 +185,22 @@ class Selection:
             except BreakdownError as error:
                 self._failure = error
                 continue
+            if self._hopeless(guide, session):
+                continue
             self._try(session, chosen=chosen)
             if self.rival is None or session.score < self.rival.score:
                 self.rival = session
+
+    def _hopeless(self, guide: Guide, session: Session) -> bool:
+        """Whether a sequence is much longer than the shortest, and costs more than what there is.
+
+        Optimising gains some percent on a sequence.
+        """
+        rival = self.rival
+        if rival is None or rival.violations:
+            return False
+        longer = guide.sequence.length > _LONGER * self.sequences[0].sequence.length
+        return longer and session.initial_score > rival.score[1]
 
     def _try(self, session: Session, *, chosen: bool = True) -> None:
         """Optimise a session; keep it if it is the best one and may be chosen."""

@@ -55,14 +55,15 @@ class Clearances:
         )
 
     def jacobian(self) -> Array:
-        """Return ∂d/∂q, (K, P, n); `pullback` is far cheaper where a sum is wanted."""
-        count, pairs = self.values.shape
-        gradient = np.empty((count, pairs, self._jacobians.shape[2]))
-        for pair in range(pairs):
-            only = np.zeros((count, pairs))
-            only[:, pair] = 1.0
-            gradient[:, pair] = self.pullback(only)
-        return gradient
+        """Return ∂d/∂q, (K, P, n); `pullback` is cheaper where a sum is wanted."""
+        n = self._jacobians.shape[2]
+        # Row b: which joints move body b.
+        moves = np.zeros((n + 1, n))
+        for joint in range(1, n + 1):
+            moves[joint] = moves[self._parents[joint]]
+            moves[joint, joint - 1] = 1.0
+        first, second = self._pair_joints.T
+        return np.asarray((moves[first] - moves[second]) * (self._wrenches @ self._jacobians))
 
 
 class ClearanceModel:
@@ -186,24 +187,22 @@ class ClearanceModel:
         rows, columns = np.nonzero(values < 2.0 * self._near)
         if not len(rows):
             return
-        contacts: list[tuple[float, Array, Array]] = []
-        placed = np.intp(-1)
-        for row, column in zip(rows, columns, strict=True):
+        contacts, placed = np.empty((len(rows), 7)), -1
+        for i, (row, column) in enumerate(zip(rows.tolist(), columns.tolist(), strict=True)):
             if row != placed:
                 self._exact.place_hulls(q[row])
                 placed = row
-            contacts.append(self._exact.hull_contact(self._hulls[column]))
-        distances = np.array([contact[0] for contact in contacts])
-        normals = np.array([contact[1] for contact in contacts])
-        points = np.array([contact[2] for contact in contacts])
-        # In touch to the last digit there is no normal: the capsules are conservative.
-        known = np.isfinite(normals).all(axis=1)
-        rows, columns, normals = rows[known], columns[known], normals[known]
-        gap = distances[known] - values[rows, columns]
-        share, slope = _blend(values[rows, columns] / self._near)
-        hull = np.concatenate([normals, np.cross(points[known], normals)], axis=1)
+            contacts[i] = self._exact.hull_contact(self._hulls[column])
+        # In touch to the last digit there is no normal, and the capsules, conservative, remain.
+        sound = np.isfinite(contacts).all(axis=1)
+        rows, columns, contacts = rows[sound], columns[sound], contacts[sound]
+        normals, points = contacts[:, 1:4], contacts[:, 4:]
+        hulls = np.hstack([normals, np.cross(points, normals)])
+        capsules = values[rows, columns]
+        gap = contacts[:, 0] - capsules
+        share, slope = _blend(capsules / self._near)
         wrenches[rows, columns] *= (1.0 - share + gap * slope / self._near)[:, None]
-        wrenches[rows, columns] += share[:, None] * hull
+        wrenches[rows, columns] += share[:, None] * hulls
         values[rows, columns] += share * gap
 
     def _kinematics(self, q: Array) -> tuple[Array, Array, Array]:

@@ -169,8 +169,10 @@ class CollisionModel:
         """Place the convex hulls at `q` (n,), for `hull_contact`."""
         pin.updateGeometryPlacements(self.robot.model, self._data, self._hulls, self._hull_data, q)
 
-    def hull_contact(self, pairs: Sequence[int]) -> tuple[float, Array, Array]:
+    def hull_contact(self, pairs: Sequence[int]) -> tuple[float, ...]:
         """Return the smallest distance of some pairs' hulls as they are placed, and where.
+
+        Made for many calls.
 
         Parameters
         ----------
@@ -179,15 +181,18 @@ class CollisionModel:
 
         Returns
         -------
-        distance : float
-            [m]; minus the depth where they overlap.
-        normal, point : (3,)
-            World axes; from the second body to the first, and a point of the first that is
-            nearest.
+        (7,)
+            The distance [m], minus the depth where they overlap; the normal from the second body
+            to the first; a point of the first that is nearest. In world axes.
         """
-        contacts = [pin.computeDistance(self._hulls, self._hull_data, pair) for pair in pairs]
-        nearest = min(contacts, key=lambda contact: contact.min_distance)
-        return nearest.min_distance, -nearest.normal, nearest.getNearestPoint1()
+        model, data = self._hulls, self._hull_data
+        contact = pin.computeDistance(model, data, pairs[0])
+        for pair in pairs[1:]:
+            other = pin.computeDistance(model, data, pair)
+            if other.min_distance < contact.min_distance:
+                contact = other
+        x, y, z = contact.normal.tolist()
+        return (contact.min_distance, -x, -y, -z, *contact.getNearestPoint1().tolist())
 
     def _closest(self, q: Array, best: Clearance, index: int) -> Clearance:
         """Return the smaller of `best` and the distance at `q`."""

@@ -22,7 +22,8 @@ class Clearance:
     """The arm keeps a distance from obstacles and from itself.
 
     While optimising, links are their convex hulls, and far from each other capsules around these;
-    the certificate measures the meshes themselves.
+    the certificate measures the meshes themselves. Obstacles are not checked against the immovable
+    base: no motion changes that distance, and an arm bolted to a table touches it.
 
     Parameters
     ----------
@@ -130,6 +131,6 @@ class BoundClearance:
 
 # Beyond the distance asked for, capsules may stand for links where they are this far apart [m]:
 # well outside of where the optimiser feels the constraint.
-_NEAR = 0.02
+_NEAR = 0.01
 # Clearances count in units of this, to weigh about as much as joint angles.
 _METRE = 0.1

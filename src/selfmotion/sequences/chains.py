@@ -60,16 +60,18 @@ def shortest_chains(layers: list[Array], largest_step: Array, turning: Mask) -> 
     ----------
     layers : list of (N_i, n)
         Nodes at the waypoints, each layer sorted by the first joint.
-    largest_step : (n,)
+    largest_step : (n,) or (W - 1, n)
         No joint may move more between waypoints.
     turning : (n,)
         Joints that count modulo turns.
     """
     cost = [np.zeros(len(layers[0]))]
     parent = [np.full(len(layers[0]), -1, dtype=np.intp)]
-    for before, after in itertools.pairwise(layers):
+    steps = np.broadcast_to(largest_step, (len(layers) - 1, len(turning)))
+    for (before, after), step in zip(itertools.pairwise(layers), steps, strict=True):
         reach, source = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
-        kernels.extend(before, cost[-1], after, largest_step, turning, reach, source)
+        longest = np.ascontiguousarray(step)
+        kernels.extend(before, cost[-1], after, longest, turning, reach, source)
         cost.append(reach)
         parent.append(source)
     return Chains(tuple(cost), tuple(parent))
@@ -84,7 +86,8 @@ def diverse_chains(
     images, whose joints move by the same amounts (a wrist turned over), come only where there are
     too few others.
     """
-    reverse = shortest_chains(layers[::-1], largest_step, turning)
+    backwards = largest_step if largest_step.ndim == 1 else largest_step[::-1]
+    reverse = shortest_chains(layers[::-1], backwards, turning)
     stations = np.unique(np.linspace(0, len(layers) - 1, _STATIONS).round().astype(int))
     through = [
         (float(forward.cost[i][k] + reverse.cost[-1 - i][k]), int(i), k)

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -46,6 +46,34 @@ class Bounds:
         """Joints that turn without end: their angles count modulo turns."""
         free = np.isinf(self.lower) & np.isinf(self.upper)
         return np.asarray(self.revolute & free)
+
+    def without_turns(self) -> "Bounds":
+        """Return bounds in which joints with room for a whole turn turn without end.
+
+        The search is much smaller then: six joints of two turns each make 64 nodes of one.
+        """
+        wide = self.revolute & (self.upper - self.lower >= _TURN)
+        return replace(
+            self,
+            lower=np.where(wide, -np.inf, self.lower),
+            upper=np.where(wide, np.inf, self.upper),
+        )
+
+    def turned_inside(self, q: Array) -> Array:
+        """Return a motion (W, n) with each revolute joint by whole turns nearest to mid-range."""
+        bounded = self.revolute & np.isfinite(self.lower) & np.isfinite(self.upper)
+        lower, upper = np.where(bounded, self.lower, 0.0), np.where(bounded, self.upper, 0.0)
+        off = 0.5 * (lower + upper - q.min(axis=0) - q.max(axis=0))
+        return q + _TURN * np.where(bounded, np.round(off / _TURN), 0.0)
+
+    def beyond(self, q: Array) -> npt.NDArray[np.bool_]:
+        """Return which joints leave their limits in a motion (W, n), (n,)."""
+        return np.asarray(np.any((q < self.lower) | (q > self.upper), axis=0))
+
+    def layer(self, q: Array) -> Array:
+        """Return free samples (K, n) at all their turns, sorted by the first joint, (K', n)."""
+        nodes = self.all_turns(q)
+        return np.ascontiguousarray(nodes[np.argsort(nodes[:, 0], kind="stable")])
 
     def representative(self, q: Array) -> Array:
         """Return q (…, n) with each revolute joint at or above its lower limit by the least turn.

@@ -41,11 +41,14 @@ def why_blocked(
     continued = [q for q in (motion.project(q, target) for q in alive) if q is not None]
     ending = np.array(continued).reshape(-1, motion.robot.dof)
     ending = ending[~bounds.free(ending)]
-    reason = _step(alive, nodes, bounds, largest_step, motion)
-    if len(ending):
-        reason += "; of those that continue what was reached before, "
-        reason += _refusals(ending, bounds, motion)
-    return reason
+    step = _step(alive, nodes, bounds, largest_step, motion)
+    if not len(ending):
+        return step
+    # What ends is the cause; that the others are out of reach only follows.
+    return (
+        f"of the configurations that continue what was reached before, "
+        f"{_refusals(ending, bounds, motion)}; to the others there is {step}"
+    )
 
 
 def _refusals(samples: Array, bounds: Bounds, motion: SelfMotion) -> str:

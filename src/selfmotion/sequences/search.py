@@ -1,6 +1,6 @@
 """The global search: curves at all waypoints, nodes on them, the shortest chains of nodes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -84,7 +84,7 @@ def best_sequences(
         Times of the waypoints [s], increasing, within the path.
     lower, upper : (n,)
         Joint limits [rad or m]; ±inf for joints without. An angle is what it is: turns count.
-    largest_step : (n,) or float
+    largest_step : (n,), (W - 1, n) or float
         Largest change of each joint from one waypoint to the next [rad or m].
     collision : CollisionModel, optional
         Of `robot`.
@@ -113,34 +113,69 @@ def best_sequences(
     """
     task, times = Task.of(task), _times(t)
     limits = [
-        _joint_values(robot, values, name)
-        for values, name in ((lower, "lower"), (upper, "upper"), (largest_step, "largest_step"))
+        _joint_values(robot, values, name, shape)
+        for values, name, shape in (
+            (lower, "lower", (robot.dof,)),
+            (upper, "upper", (robot.dof,)),
+            (largest_step, "largest_step", (len(times) - 1, robot.dof)),
+        )
     ]
     _check(robot, task, limits, count)
+    lower, upper, steps = limits
     motion = SelfMotion(robot, task, SPACING)
-    bounds = Bounds(limits[0], limits[1], motion.revolute, collision, margin)
+    bounds = Bounds(lower, upper, motion.revolute, collision, margin)
     x = targets(path, times)
     seeds = list(spread(robot, _SEEDS, np.random.default_rng(rng)))
     curves = curves_along(motion, x, seeds, _EVERY, progress)
-    layers = _layers(motion, x, curves, bounds, progress)
-    chains = shortest_chains(layers, limits[2], bounds.turning)
-    if chains.blocked is not None:
-        i = chains.blocked
-        alive = layers[i - 1][np.isfinite(chains.cost[i - 1])] if i else layers[0][:0]
-        reason = why_blocked(motion, x[i], curves[i], alive, layers[i], bounds, limits[2])
-        raise NoSequenceError(
-            f"{robot.name}: no motion along the path passes t = {times[i]:.6g} s: {reason}",
-            time=float(times[i]),
-            reason=reason,
-        )
-    # Unlike chains may become the same one when they are tightened.
-    found = diverse_chains(layers, chains, limits[2], bounds.turning, 2 * count)
-    rough = [_configurations(layers, chain, bounds.turning) for chain in found]
+    samples = _free_samples(motion, x, curves, bounds, progress)
+    rough, turning = _rough_motions(motion, x, curves, samples, bounds, steps, times, count)
     tight = []
     for number, q in enumerate(rough, 1):
         progress("search: shortening sequence", number, len(rough))
-        tight.append(tighten(motion, x, q, bounds, limits[2]))
-    return _ranked(times, tight, bounds.turning)[:count]
+        tight.append(tighten(motion, x, q, bounds, steps))
+    return _ranked(times, tight, turning)[:count]
+
+
+def _rough_motions(
+    motion: SelfMotion,
+    x: Array,
+    curves: list[CurveSet],
+    samples: list[Array],
+    bounds: Bounds,
+    steps: Array,
+    times: Array,
+    count: int,
+) -> tuple[list[Array], Mask]:
+    """Return the shortest unlike motions (W, n) over samples, and whose turns did not count.
+
+    Turns of joints with room for several are left out at first, and the motion put inside the
+    limits as a whole; where it does not fit, it is looked for among all turns of these joints.
+    """
+    relaxed = bounds.without_turns()
+    while True:
+        layers, turning = [relaxed.layer(q) for q in samples], relaxed.turning
+        chains = shortest_chains(layers, steps, turning)
+        if chains.blocked is not None:
+            i = chains.blocked
+            alive = layers[i - 1][np.isfinite(chains.cost[i - 1])] if i else layers[0][:0]
+            reason = why_blocked(motion, x[i], curves[i], alive, layers[i], relaxed, steps[i - 1])
+            raise NoSequenceError(
+                f"{motion.robot.name}: no motion along the path passes t = {times[i]:.6g} s: "
+                f"{reason}",
+                time=float(times[i]),
+                reason=reason,
+            )
+        # Unlike chains may become the same one when they are tightened.
+        found = diverse_chains(layers, chains, steps, turning, 2 * count)
+        rough = [bounds.turned_inside(_configurations(layers, q, turning)) for q in found]
+        beyond = bounds.beyond(rough[0])
+        if not np.any(beyond):
+            return [q for q in rough if not np.any(bounds.beyond(q))], turning
+        relaxed = replace(
+            relaxed,
+            lower=np.where(beyond, bounds.lower, relaxed.lower),
+            upper=np.where(beyond, bounds.upper, relaxed.upper),
+        )
 
 
 def _ranked(times: Array, motions: list[Array], turning: Mask) -> list[Sequence]:
@@ -153,19 +188,18 @@ def _ranked(times: Array, motions: list[Array], turning: Mask) -> list[Sequence]
     return kept
 
 
-def _layers(
+def _free_samples(
     motion: SelfMotion, x: Array, curves: list[CurveSet], bounds: Bounds, progress: Progress
 ) -> list[Array]:
-    """Return the nodes at every waypoint, sorted by the first joint."""
-    layers: list[Array] = []
-    samples = np.empty((0, motion.robot.dof))
+    """Return the free samples of the curves at every waypoint, without turns."""
+    found: list[Array] = []
+    before = np.empty((0, motion.robot.dof))
     for number, (target, here) in enumerate(zip(x, curves, strict=True), 1):
         progress("search: what is free at waypoint", number, len(x))
-        carried = [q for q in (motion.project(s, target) for s in samples) if q is not None]
-        samples = place_nodes(motion, target, here, carried, bounds, SPACING)
-        nodes = bounds.all_turns(samples)
-        layers.append(np.ascontiguousarray(nodes[np.argsort(nodes[:, 0], kind="stable")]))
-    return layers
+        carried = [q for q in (motion.project(s, target) for s in before) if q is not None]
+        before = place_nodes(motion, target, here, carried, bounds, SPACING)
+        found.append(before)
+    return found
 
 
 def _configurations(layers: list[Array], chain: list[int], turning: Mask) -> Array:
@@ -182,13 +216,15 @@ def _times(t: npt.ArrayLike) -> Array:
     return times
 
 
-def _joint_values(robot: RobotModel, values: npt.ArrayLike, name: str) -> Array:
+def _joint_values(
+    robot: RobotModel, values: npt.ArrayLike, name: str, shape: tuple[int, ...]
+) -> Array:
     array = np.asarray(values, dtype=np.float64)
-    if array.shape not in ((), (robot.dof,)) or np.any(np.isnan(array)):
+    if array.shape not in ((), (robot.dof,), shape) or np.any(np.isnan(array)):
         raise ProblemError(
             f"{name} has shape {array.shape}, expected a number for each of {robot.dof} joints"
         )
-    return np.ascontiguousarray(np.broadcast_to(array, robot.dof))
+    return np.ascontiguousarray(np.broadcast_to(array, shape))
 
 
 def _check(robot: RobotModel, task: Task, limits: list[Array], count: int) -> None:

@@ -29,7 +29,7 @@ def tighten(motion: SelfMotion, x: Array, q: Array, bounds: Bounds, largest_step
     q : (W, n)
         On the path, within `bounds` and `largest_step`, angles without jumps.
     bounds : Bounds
-    largest_step : (n,)
+    largest_step : (n,) or (W - 1, n)
     """
     fixed = np.zeros(q.shape[1], dtype=bool)
     length = float(np.abs(np.diff(q, axis=0)).sum())
