@@ -20,6 +20,7 @@ STAGES = (
     "search: self-motions at waypoint",
     "search: what is free at waypoint",
     "search: shortening sequence",
+    "search: shortening finalist",
     "refining sequence",
     "finer grid",
     "checking",
@@ -75,7 +76,7 @@ def test_an_interruption_at_any_stage_yields_the_best_so_far(
 def test_without_a_motion_an_interruption_is_one(problem: sm.Problem) -> None:
     with pytest.raises(KeyboardInterrupt):
         plan(problem, progress=interrupt_at("start", 1))
-    for stage in STAGES[2:5]:
+    for stage in STAGES[2:6]:
         with pytest.raises(KeyboardInterrupt):
             plan(problem, search="global", progress=interrupt_at(stage, 1))
 

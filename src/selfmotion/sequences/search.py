@@ -16,7 +16,7 @@ from selfmotion.sequences.chains import Mask, diverse_chains, shortest_chains, u
 from selfmotion.sequences.curves import CurveSet, SelfMotion, curves_along, targets
 from selfmotion.sequences.nodes import Bounds, place_nodes
 from selfmotion.sequences.reasons import why_blocked
-from selfmotion.sequences.tighten import tighten
+from selfmotion.sequences.tighten import FINELY, ROUGHLY, tighten
 from selfmotion.task import Task
 
 # Largest distance of samples along a curve [rad or m], configuration norm.
@@ -129,11 +129,18 @@ def best_sequences(
     curves = curves_along(motion, x, seeds, _EVERY, progress)
     samples = _free_samples(motion, x, curves, bounds, progress)
     rough, turning = _rough_motions(motion, x, curves, samples, bounds, steps, times, count)
-    tight = []
-    for number, q in enumerate(rough, 1):
-        progress("search: shortening sequence", number, len(rough))
-        tight.append(tighten(motion, x, q, bounds, steps))
-    return _ranked(times, tight, turning)[:count]
+    # All of them roughly, to see which are worth the rest.
+    for stage, spacings, kept in (
+        ("search: shortening sequence", ROUGHLY, len(rough)),
+        ("search: shortening finalist", FINELY, count),
+    ):
+        del rough[kept:]
+        for number, q in enumerate(rough):
+            progress(stage, number + 1, len(rough))
+            rough[number] = tighten(motion, x, q, bounds, steps, spacings)
+        ranked = _ranked(times, rough, turning)
+        rough = [np.array(sequence.q) for sequence in ranked]
+    return ranked
 
 
 def _rough_motions(
