@@ -22,8 +22,8 @@ from selfmotion.sequences import SPACING
 from selfmotion.session import MOST_HALVINGS, Counts, Guide, Session
 from selfmotion.trajectory import Trajectory
 
-# Evaluations of the cost that a damped motion may take, or one of many on a part of the path.
-_PATIENCE = 400
+# Evaluations of the cost that a damped motion may take, and each of many on parts of the path.
+_PATIENCE, _PART_PATIENCE = 400, 150
 
 
 class _Checked(NamedTuple):
@@ -63,8 +63,8 @@ def plan(
         H0: the inverse Gauss-Newton matrix of the motion at x = 0, or the paper's identity.
     max_evaluations : int, optional
         Limit on evaluations of the cost while optimising one start; the finished motion is
-        evaluated a few times more. By default none, but 400 with damping and on parts of the path,
-        where limits of joint speed often cannot be met and trying would take minutes.
+        evaluated a few times more. By default none, but 400 with damping and 150 on each part of
+        the path, where limits of joint speed often cannot be met and trying would take minutes.
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
     tolerance : Tolerance, optional
@@ -138,7 +138,7 @@ def plan(
         return reachable(problem, suspect, starts, np.random.default_rng(rng))
 
     def part(suspect: float, notes: list[str]) -> Plan | None:
-        limit = _PATIENCE if max_evaluations is None else max_evaluations
+        limit = _PART_PATIENCE if max_evaluations is None else max_evaluations
         make = partial(_session, optimizer, callback, limit, counts)
         known = reach(suspect)
         progress("largest part", 1, 1)
