@@ -1,0 +1,77 @@
+"""Where a motion takes the tool, by forward kinematics; shares no code with the rollout."""
+
+import numpy as np
+import pinocchio as pin
+
+from selfmotion.arrays import Array
+from selfmotion.path import Path
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
+
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+def deviation_from(
+    robot: RobotModel, path: Path, task: Task, t: Array, q: Array, in_tool_axes: bool
+) -> tuple[Array, Array]:
+    """Return how the tool deviates from the path, (K, 6), and the smallest singular value, (K,).
+
+    Rows x, y, z [m] and rx, ry, rz [rad] as `Relaxation` has them; zero where the task leaves them
+    free.
+    """
+    rotation, translation, jacobian = _kinematics(robot, q)
+    target = path.samples(t)
+    linear = task.rows[task.rows < 3]
+    miss = np.zeros((len(t), 6))
+    miss[:, linear] = (translation - target.translation)[:, linear]
+    miss[:, 3:] = _turns(task, target.rotation, rotation)
+    if in_tool_axes:
+        miss[:, :3] = np.einsum("kji,kj->ki", target.rotation, miss[:, :3])
+    rows = jacobian
+    if task.tool_axes:
+        turned = rotation.transpose(0, 2, 1) @ jacobian[:, 3:]
+        rows = np.concatenate([jacobian[:, :3], turned], axis=1)
+    values = np.linalg.svd(rows[:, task.rows], compute_uv=False)
+    return miss, values[:, -1].astype(np.float64)
+
+
+def _kinematics(robot: RobotModel, q: Array) -> tuple[Array, Array, Array]:
+    model, data, tool = robot.model, robot.model.createData(), robot.tool_id
+    rotation, translation = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
+    jacobian = np.empty((len(q), 6, robot.dof))
+    for k, configuration in enumerate(q):
+        pin.computeJointJacobians(model, data, configuration)
+        pose = pin.updateFramePlacement(model, data, tool)
+        rotation[k], translation[k] = pose.rotation, pose.translation
+        jacobian[k] = pin.getFrameJacobian(model, data, tool, _AXES)
+    return rotation, translation, jacobian
+
+
+def _turns(task: Task, target: Array, actual: Array) -> Array:
+    """Return the rotation vectors from target to actual in target's axes, (K, 3) [rad].
+
+    Those of the whole orientation, or of the tool's z axis alone; zero where no angle counts.
+    """
+    if not np.any(task.rows >= 3):
+        return np.zeros((len(actual), 3))
+    relative = target.transpose(0, 2, 1) @ actual
+    if task.tool_axes:
+        # From (0, 0, 1) to the z axis as seen from the target, by the shortest way.
+        axis = relative[:, :, 2]
+        normal = np.stack([-axis[:, 1], axis[:, 0], np.zeros(len(axis))], axis=1)
+        cosine = axis[:, 2]
+    else:
+        normal = 0.5 * np.stack(
+            [
+                relative[:, 2, 1] - relative[:, 1, 2],
+                relative[:, 0, 2] - relative[:, 2, 0],
+                relative[:, 1, 0] - relative[:, 0, 1],
+            ],
+            axis=1,
+        )
+        cosine = 0.5 * (np.trace(relative, axis1=1, axis2=2) - 1.0)
+    sine = np.linalg.norm(normal, axis=1)
+    # Half a turn has no sine to scale; its axis does not matter, its angle does.
+    normal[sine == 0.0] = [1.0, 0.0, 0.0]
+    angle = np.arctan2(sine, cosine)
+    return np.asarray(normal * (angle / np.where(sine > 0.0, sine, 1.0))[:, None])
