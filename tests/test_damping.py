@@ -188,10 +188,16 @@ def test_a_damped_plan_says_what_damping_cost(overreach: sm.Plan) -> None:
     assert overreach.report.terms["path error"] > 0.0
 
 
-def test_a_damped_plan_within_the_tolerance_is_verified(planar: sm.RobotModel) -> None:
+def test_a_damped_plan_within_the_tolerance_is_verified(
+    planar: sm.RobotModel, tmp_path: Path
+) -> None:
     plan = sm.plan(touching(planar, 5.002), tolerance=sm.Tolerance(position=0.02))
     assert plan.certificate.verified
     assert "m and 0.0e+00 rad off the path; damped" in plan.certificate.verdict
+    plan.save(tmp_path / "plan.npz")
+    loaded = sm.load_plan(tmp_path / "plan.npz")
+    assert loaded.tolerance == plan.tolerance
+    assert loaded.check() == plan.certificate
 
 
 def test_a_damped_plan_is_exact_before_and_smooth_throughout(overreach: sm.Plan) -> None:

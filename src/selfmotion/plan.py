@@ -10,7 +10,14 @@ import numpy as np
 
 from selfmotion import files
 from selfmotion.arrays import Array
-from selfmotion.certificate import Certificate, DampedStretch, Extreme, Requirements, certify
+from selfmotion.certificate import (
+    Certificate,
+    DampedStretch,
+    Extreme,
+    Requirements,
+    Tolerance,
+    certify,
+)
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.constraints import Clearance
 from selfmotion.damping import DampingLaw
@@ -139,6 +146,8 @@ class Plan:
         What the certificate checked besides the path, but for clearance.
     clearance : Clearance or None
         The obstacles and the distance kept from them, where asked for.
+    tolerance : Tolerance
+        What the motion may miss the path by.
     """
 
     robot: RobotModel
@@ -151,14 +160,15 @@ class Plan:
     certificate: Certificate
     requirements: Requirements = field(default_factory=Requirements)
     clearance: Clearance | None = None
+    tolerance: Tolerance = field(default_factory=Tolerance)
 
     def check(self) -> Certificate:
-        """Return a new certificate of the motion, by the same requirements."""
+        """Return a new certificate of the motion, by the same tolerance and requirements."""
         wanted = self.requirements
         if self.clearance is not None:
             model = self.clearance.model(self.robot)
             wanted = dataclasses.replace(wanted, collision=model, clearance=self.clearance.distance)
-        return certify(self.robot, self.path, self.task, self.trajectory, requirements=wanted)
+        return certify(self.robot, self.path, self.task, self.trajectory, self.tolerance, wanted)
 
     def require(self) -> "Plan":
         """Return the plan itself if its certificate is verified.
@@ -256,6 +266,7 @@ def _describe(plan: Plan) -> tuple[dict[str, Any], dict[str, Array]]:
         ],
         "certificate": dataclasses.asdict(plan.certificate),
         "requirements": _requirements_to_dict(plan),
+        "tolerance": dataclasses.asdict(plan.tolerance),
     }
     arrays = {
         "t": plan.trajectory.t,
@@ -298,6 +309,7 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Plan:
         report=Report(history=history, **report),
         certificate=Certificate(**certificate),
         **_requirements_from_dict(description["requirements"]),
+        tolerance=Tolerance(**description["tolerance"]),
     )
 
 

@@ -35,6 +35,7 @@ class _Checked(NamedTuple):
     initial_terms: dict[str, float]
     initial_trajectory: Trajectory
     damped: bool
+    tolerance: Tolerance
 
 
 def plan(
@@ -259,6 +260,7 @@ def _finish(
         certificate=checked.certificate,
         requirements=replace(problem.requirements, collision=None, ending=part.ending),
         clearance=problem.clearance,
+        tolerance=checked.tolerance,
     )
 
 
@@ -315,7 +317,9 @@ def _check(
     )
     initial_terms = session.initial_terms()
     initial_trajectory = session.trajectory()
-    return _Checked(terms, trajectory, certificate, initial_terms, initial_trajectory, damped)
+    return _Checked(
+        terms, trajectory, certificate, initial_terms, initial_trajectory, damped, tolerance
+    )
 
 
 def _gap(selection: Selection, rival_cost: float | None, checked: _Checked) -> Gap | None:

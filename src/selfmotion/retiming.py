@@ -6,7 +6,6 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.arrays import Array, read_only
-from selfmotion.certificate import certify
 from selfmotion.errors import PlanError, ProblemError
 from selfmotion.path.retimed import Retimed
 from selfmotion.plan import Plan
@@ -89,8 +88,7 @@ def retime(
     checked = replace(
         plan, path=path, trajectory=trajectory, initial_trajectory=trajectory, requirements=wanted
     )
-    certificate = certify(plan.robot, path, plan.task, trajectory, requirements=wanted)
-    return replace(checked, certificate=certificate)
+    return replace(checked, certificate=checked.check())
 
 
 def _moved(item: Relaxation, t: Array, sigma: Array) -> Relaxation:

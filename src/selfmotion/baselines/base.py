@@ -76,7 +76,8 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
     found = method.solve(problem)
     seconds = time.perf_counter() - began
     still = pseudo_inverse(problem)
-    trajectory, certificate = _sampled(problem, found, tolerance or Tolerance())
+    tolerance = tolerance or Tolerance()
+    trajectory, certificate = _sampled(problem, found, tolerance)
     grid = Grid(trajectory.t)
     terms, initial_terms = costs(problem, found, grid), costs(problem, still, grid)
     report = Report(
@@ -106,6 +107,7 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
         certificate=certificate,
         requirements=replace(problem.requirements, collision=None),
         clearance=problem.clearance,
+        tolerance=tolerance,
     )
 
 
