@@ -59,7 +59,7 @@ class Rollout:
         self._law = (0.0, 0.0) if damping is None else (damping.threshold, damping.strength)
         self._gain = FEEDBACK / path.duration
         self._rows = task.rows
-        self._angle_kind = _angle_kind(task)
+        self._angle_kind = kernels.angle_kind(task)
         times, n, m = grid.stage_times, robot.dof, task.dimension
         at = kernels.layout(n, m)
         table = self._table = np.zeros((len(times), at.columns))
@@ -263,9 +263,3 @@ class Rollout:
             target_gradient,
         )
         return epsilon_gradient, start_gradient, target_gradient
-
-
-def _angle_kind(task: Task) -> int:
-    if task.tool_axes:
-        return kernels.POINTING
-    return kernels.LOGARITHM if np.any(task.rows >= 3) else kernels.NO_ANGLE

@@ -5,11 +5,20 @@ import numpy.typing as npt
 
 from selfmotion.arrays import Array
 from selfmotion.jit import kernel
+from selfmotion.task import Task
 
 Rows = npt.NDArray[np.intp]
 
 # How a task measures its angular error.
 NO_ANGLE, LOGARITHM, POINTING = 0, 1, 2
+
+
+def angle_kind(task: Task) -> int:
+    """Return how a task measures its angular error."""
+    if task.tool_axes:
+        return POINTING
+    return LOGARITHM if np.any(task.rows >= 3) else NO_ANGLE
+
 
 # Below this angle the closed forms in sin θ lose digits and their series serve.
 _SMALL = 1e-3

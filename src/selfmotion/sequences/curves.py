@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion import kernels as task_kernels
 from selfmotion.arrays import Array, read_only
+from selfmotion.kernels import angle_kind
 from selfmotion.path import Path
 from selfmotion.progress import Progress, silent
 from selfmotion.robot import RobotModel
@@ -126,11 +126,7 @@ class SelfMotion:
         kinds = [robot.urdf.joints[name].kind for name in robot.joint_names]
         self.revolute = np.array([kind != "prismatic" for kind in kinds])
         self._rows = task.rows
-        if task.tool_axes:
-            self._kind = task_kernels.POINTING
-        else:
-            angular = bool(np.any(task.rows >= 3))
-            self._kind = task_kernels.LOGARITHM if angular else task_kernels.NO_ANGLE
+        self._kind = angle_kind(task)
         self._data = robot.model.createData()
         # Views of Pinocchio's own memory: each placement of the frame refreshes them.
         pose = self._data.oMf[robot.tool_id]
