@@ -3,14 +3,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from scipy.integrate import OdeSolution, solve_ivp
 
 from selfmotion.arrays import Array
 from selfmotion.errors import BreakdownError
 from selfmotion.problem import Problem
+
+if TYPE_CHECKING:
+    from scipy.integrate import OdeSolution
 
 Rate = Callable[[float, Array], Array]
 
@@ -112,6 +114,9 @@ def integrate(problem: Problem, rate: Rate) -> Run:
     BreakdownError
         The velocity grows without bound: the field is singular there.
     """
+    # Here, because importing it takes as long as the rest of the package.
+    from scipy.integrate import solve_ivp
+
     pieces: list[tuple[float, OdeSolution]] = []
     rates = 0
     q = start_of(problem)
@@ -144,7 +149,7 @@ def integrate(problem: Problem, rate: Rate) -> Run:
                 time=float(solution.t[-1]),
             )
         rates += solution.nfev
-        pieces.append((float(end), cast(OdeSolution, solution.sol)))
+        pieces.append((float(end), cast("OdeSolution", solution.sol)))
         q = solution.y[:, -1]
     ends = np.array([end for end, _ in pieces])
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.integrate import solve_bvp, solve_ivp
 
 from selfmotion.arrays import Array, read_only
 from selfmotion.baselines.base import Motion, pseudo_inverse
@@ -68,6 +67,8 @@ class LagrangianOptimum:
             A cost is neither a joint velocity nor a function of the pose, W is singular, or the
             path is not closed for a cyclic motion.
         """
+        from scipy.integrate import solve_bvp
+
         first, last = problem.path.pose(0.0), problem.path.pose(problem.path.duration)
         if self.cyclic and max(problem.rows.miss(first, last)) > _CLOSED:
             raise ProblemError("cyclic Lagrangian optimum: the path does not end where it begins")
@@ -125,6 +126,7 @@ class _Flow:
 
     def costates(self, t: Array, q: Array) -> Array:
         """Return costates (n, K) of a motion q (K, n), from p(T) = 0 backwards."""
+        from scipy.integrate import solve_ivp
         from scipy.interpolate import CubicSpline
 
         motion = CubicSpline(t, q)
