@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-peers suite fuzz study clean
+.PHONY: demo test lint format bench bench-peers suite suite-made fuzz study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -40,6 +40,10 @@ $(READY): pyproject.toml constraints.txt
 
 suite: $(READY)  ## path problems made elsewhere, planned and scored
 	$(BIN)/python benchmarks/suite.py
+
+suite-made: $(READY)  ## 12 problems made at random that have a known motion, planned and scored
+	$(BIN)/python benchmarks/made.py --out out/made
+	$(BIN)/python benchmarks/suite.py --folder out/made --out out/suite-made
 
 fuzz: $(READY)  ## 200 random paths, judged by an independent checker
 	$(BIN)/python benchmarks/fuzz.py

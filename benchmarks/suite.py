@@ -224,7 +224,7 @@ def main(
 
 def _table(scores: list[Score]) -> Table:
     table = Table(box=boxes.SIMPLE_HEAD)
-    for name in ("problem", "valid", "length", "published", "clearance", "step", "time"):
+    for name in ("problem", "valid", "length", "reference", "clearance", "step", "time"):
         table.add_column(name, justify="left" if name in ("problem", "valid") else "right")
     for score in scores:
         table.add_row(
