@@ -268,15 +268,67 @@ def test_free_start_stays_on_the_path_and_knows_its_tangent() -> None:
 def test_bad_constraints_are_refused(panda: sm.RobotModel) -> None:
     path = short_line(panda, PANDA_HOME)
     for constraint, message in (
-        (sm.JointPositionLimits(lower=np.zeros(3)), "expected one number for each"),
-        (sm.JointPositionLimits(lower=np.full(7, 9.0)), "is not below upper"),
-        (sm.JointVelocityLimits(np.full(7, -1.0)), "must be positive"),
-        (sm.JointVelocityLimits(margin=0.0), "margin is 0.0"),
-        (sm.Clearance(distance=-1.0), "distance is -1.0"),
+        (lambda: sm.JointPositionLimits(lower=np.zeros(3)), "expected one number for each"),
+        (lambda: sm.JointPositionLimits(lower=np.full(7, 9.0)), "is not below upper"),
+        (lambda: sm.JointVelocityLimits(np.full(7, -1.0)), "expected numbers > 0"),
+        (lambda: sm.JointVelocityLimits(margin=0.0), "margin is 0.0"),
+        (lambda: sm.JointAccelerationLimits([1.0, 2.0, 3.0]), "one for each of the 7 joints"),
+        (lambda: sm.JointAccelerationLimits(np.nan), "expected numbers > 0"),
+        (lambda: sm.EndVelocity([1.0, 2.0, 3.0]), "one for each of the 7 joints"),
+        (lambda: sm.EndConfiguration(PANDA_HOME), "off the end of the path"),
+        (lambda: sm.Clearance(distance=-1.0), "distance is -1.0"),
+        (lambda: sm.Clearance(distance=np.inf), "distance is inf"),
+        (lambda: sm.Clearance(["x"]), "expected Box, Sphere"),
     ):
-        problem = sm.Problem(panda, path, start=PANDA_HOME, constraints=[constraint])
         with pytest.raises(sm.ProblemError, match=message):
-            sm.plan(problem)
+            sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=[constraint()]))
+
+
+@pytest.mark.parametrize(
+    "pair",
+    [
+        (sm.JointAccelerationLimits(0.01), sm.JointAccelerationLimits(100.0)),
+        (sm.ClosedPath(), sm.ClosedPath(velocity=False)),
+        (sm.Clearance(), sm.Clearance(distance=0.1)),
+    ],
+)
+def test_two_constraints_of_a_kind_are_refused(panda_circle: Circle, pair: tuple) -> None:
+    """The certificate would judge by one of them only."""
+    with pytest.raises(sm.ProblemError, match=f"two constraints {type(pair[0]).__name__}"):
+        panda_circle(constraints=pair)
+
+
+def test_end_conditions_that_contradict_each_other_are_named(panda_circle: Circle) -> None:
+    robot, path = panda_circle().robot, panda_circle().path
+    manifold = FreeStart(robot, sm.Task.POSE, PANDA_HOME)
+    end = manifold.configuration(np.array([0.3]), path.pose(0.0))
+    assert end is not None
+    plan = sm.plan(panda_circle(constraints=[sm.ClosedPath(), sm.EndConfiguration(end)]))
+    assert not plan.certificate.verified
+    assert "not all constraints could be met" in plan.report.message
+
+
+def test_a_limit_on_one_side_is_kept(panda_circle: Circle) -> None:
+    free = sm.plan(panda_circle())
+    joint = int(np.argmax(np.ptp(free.trajectory.q, axis=0)))
+    lower, upper = np.full(7, -np.inf), np.full(7, np.inf)
+    upper[joint] = free.trajectory.q[:, joint].max() - 0.02
+    kept = sm.plan(panda_circle("position", constraints=[sm.JointPositionLimits(lower, upper)]))
+    assert kept.certificate.verified, kept.certificate.verdict
+    assert kept.trajectory.q[:, joint].max() < upper[joint]
+
+
+def test_accelerations_are_judged_at_their_extremes(panda_circle: Circle) -> None:
+    """Where a cubic begins or ends, also at t = 0 and T."""
+    plan = sm.plan(panda_circle())
+    times = np.linspace(0.0, 4.0, 100_001)
+    extreme = np.abs(plan.trajectory(times, order=2)).max()
+    found = np.abs(plan.trajectory.accelerations()[1]).max()
+    assert extreme <= found * (1.0 + 1e-9)
+    assert found <= extreme * 1.01
+    wanted = dataclasses.replace(plan.requirements, acceleration=np.full(7, 0.999 * found))
+    check = dataclasses.replace(plan, requirements=wanted).check()
+    assert "accelerates at 1.001 times its limit" in check.verdict
 
 
 def test_saved_plans_keep_what_was_required(panda: sm.RobotModel, tmp_path) -> None:

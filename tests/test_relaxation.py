@@ -253,6 +253,23 @@ def test_six_joints_and_a_full_pose_with_a_cone() -> None:
     assert closed.certificate.verified, closed.certificate.verdict
 
 
+@pytest.mark.parametrize("band", [1e-3, 1e-4, 1e-5])
+def test_a_narrow_band_costs_no_more_than_none(panda_circle: Callable, band: float) -> None:
+    """And no work or acceleration beyond what the plan without it takes, up to small factors."""
+    exact = sm.plan(panda_circle())
+    plan = sm.plan(panda_circle(relaxations=[sm.Relaxation("z", band)]))
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert plan.report.cost <= exact.report.cost * (1.0 + 1e-6)
+    assert plan.report.steps <= 4 * exact.report.steps
+    fastest = [np.abs(each.trajectory.accelerations()[1]).max() for each in (plan, exact)]
+    assert fastest[0] < 2.0 * fastest[1]
+
+
+def test_other_methods_refuse_relaxations(panda_circle: Callable) -> None:
+    with pytest.raises(sm.ProblemError, match="leave the relaxations out"):
+        sm.plan(panda_circle(relaxations=[sm.Relaxation("z", 0.01)]), method=sm.PseudoInverse())
+
+
 def test_closed_paths_begin_and_end_on_the_path(panda_circle: Callable) -> None:
     band = sm.Relaxation("x", 0.01)
     constraints = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.ClosedPath())
@@ -295,6 +312,10 @@ def test_relaxations_survive_saving_and_retiming(panda_circle: Callable, tmp_pat
         ({"rows": "x", "during": (2.0, 1.0)}, "0 ≤ first < last"),
         ({"rows": "x", "during": (1.0,)}, "expected two times"),
         ({"rows": "x", "during": (0.0, np.inf)}, "expected two times"),
+        ({"rows": "x", "during": 1.0}, "expected two times"),
+        ({"rows": "x", "during": "ab"}, "expected two times"),
+        ({"rows": "x", "band": "a"}, "expected a number"),
+        ({"rows": 3}, "expected names of rows"),
         ({"rows": "x", "intervals": 3}, "≥ 4"),
     ],
 )

@@ -49,5 +49,29 @@ def test_the_factor_is_the_one_that_suffices(fast: sm.Plan) -> None:
 
 
 def test_bad_limits_are_refused(fast: sm.Plan) -> None:
-    with pytest.raises(sm.ProblemError, match="must be positive"):
+    with pytest.raises(sm.ProblemError, match="expected numbers > 0"):
         sm.retime(fast, 0.0)
+
+
+def test_a_retimed_plan_keeps_what_the_plan_was_asked_to_keep(panda: sm.RobotModel) -> None:
+    """Clearance and own velocity limits: what was refused before is not verified afterwards."""
+    pose = panda.pose(PANDA_HOME)
+    path = sm.Circle.around(pose, 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    wall = sm.Box("wall", pose.translation + np.array([0.0, 0.0, 0.16]), [0.05, 0.05, 0.05])
+    slow = np.full(7, 0.9)
+    problem = sm.Problem(
+        panda,
+        path,
+        start=PANDA_HOME,
+        constraints=[sm.JointVelocityLimits(slow), sm.Clearance(wall, 0.03)],
+    )
+    plan = sm.plan(problem, max_evaluations=5)
+    retimed = sm.retime(plan, 10.0)
+    assert "wall are" in retimed.certificate.verdict
+    assert retimed.certificate == retimed.check()
+    assert np.abs(retimed.trajectory.qd).max() <= 0.9
+    for bad in (np.nan, 0.0, [1.0, 2.0]):
+        with pytest.raises(sm.ProblemError):
+            sm.slowdown(plan, bad)
+        with pytest.raises(sm.ProblemError):
+            sm.retime(plan, bad)

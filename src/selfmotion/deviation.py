@@ -1,9 +1,10 @@
 """The tool's deviation from the path as a function of decision variables.
 
 In each group of rows that are relaxed together the deviation is δ = g(|s|) s with a cubic spline
-s(t) = Σ c_i B_i(t) and g(r) = sin(r/b) b/r for a band b, or g = 1 without one: |δ| ≤ b holds by
+s(t) = Σ c_i B_i(t) and g(r) = b sin(r)/r for a band b, or g = 1 without one: |δ| ≤ b holds by
 construction at all times, and the optimisation stays unconstrained (the transformation of bounded
-parameters of F. James and M. Roos, "Minuit", Comput. Phys. Commun. 10, 1975). With the path's pose
+parameters of F. James and M. Roos, "Minuit", Comput. Phys. Commun. 10, 1975). s is an angle: in
+metres a step of the optimiser would wind it up many times in a narrow band. With the path's pose
 (p, R) and Q = I or R for positions in world or tool axes, the target is
 
     p + Q δ_v,  R exp(δ_ω),  ẋ_v + Q δ̇_v + Q̇ δ_v,  ω + R Jl(δ_ω) δ̇_ω,
@@ -163,11 +164,11 @@ def _group(item: Relaxation, duration: float, t: Array, pinned: tuple[bool, bool
 
 
 def _squash(s: Array, band: float) -> tuple[Array, Array, Array]:
-    """Return g(r), g'/r and (g'/r)'/r at r = |s|, for g = sin(r/b) b/r; 1, 0, 0 without a band."""
+    """Return g(r), g'/r and (g'/r)'/r at r = |s|, for g = b sin(r)/r; 1, 0, 0 without a band."""
     if not np.isfinite(band):
         return np.ones(len(s)), np.zeros(len(s)), np.zeros(len(s))
-    first, second, third = _sine_series(np.linalg.norm(s, axis=1) / band)
-    return first, second / band**2, third / band**4
+    first, second, third = _sine_series(np.linalg.norm(s, axis=1))
+    return band * first, band * second, band * third
 
 
 def _sine_series(u: Array) -> tuple[Array, Array, Array]:

@@ -120,6 +120,11 @@ def plan(
                 "the problem's damping is for the optimised motion; leave it out with method=, or "
                 "take method=DampedLeastSquares(…)"
             )
+        if problem.relaxations:
+            raise ProblemError(
+                "other works' methods follow the path exactly; leave the relaxations out with "
+                "method="
+            )
         return plan_by(problem, method, tolerance)
     if initial_metric not in ("gauss-newton", "identity"):
         raise ProblemError(
@@ -229,6 +234,9 @@ def _finish(
     parts = [session.status.message] if session.cut_short or not violations else []
     if violations:
         parts.append(f"not all constraints could be met: {'; '.join(violations)}")
+    failures = checked.certificate.failures
+    if failures and not (violations or part.ending):
+        parts.append(f"but {checked.certificate.verdict}")
     message = "; ".join(text for text in (part.ending, *parts, *notes) if text)
     if checked.certificate.damped:
         stretches = " and ".join(map(str, checked.certificate.damped))
@@ -275,7 +283,10 @@ def _checked(problem: Problem, part: Part, tolerance: Tolerance, progress: Progr
             checked = _check(problem, session, tolerance, requirements)
             certificate, trajectory = checked.certificate, checked.trajectory
             errors = certificate.position_error.value, certificate.rotation_error.value
-            if _within(errors, tolerance):
+            # Accelerations of the cubics come near those of the motion as the square of the step.
+            ratio = certificate.acceleration_ratio
+            rough = ratio is not None and ratio.value > 1.0 and not session.violations
+            if _within(errors, tolerance) and not rough:
                 break
             # What damping costs stays on any grid: there, the motion stands when the tool does.
             if coarse is not None and _within(

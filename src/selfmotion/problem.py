@@ -30,6 +30,8 @@ from selfmotion.relaxation import Relaxation, check_relaxations
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
+# An end configuration may be this far off [m, rad]: what the certificate grants it.
+_NEAR_END = 1e-6
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
 
@@ -111,8 +113,10 @@ class Problem:
             object.__setattr__(self, "start", None)
         self._check_rank()
         self._check_costs()
+        self._check_constraints()
         self._check_closed()
         self._check_rest()
+        self._check_end()
         if self.start is not None:
             start = read_only(self.robot.configuration(self.start))
             object.__setattr__(self, "start", start)
@@ -207,6 +211,29 @@ class Problem:
         for cost in self.costs:
             cost.check(self.robot.dof)
 
+    def _check_constraints(self) -> None:
+        kinds = [type(item).__name__ for item in self.constraints]
+        twice = [kind for kind in kinds if kinds.count(kind) > 1]
+        if twice:
+            raise ProblemError(
+                f"there are two constraints {twice[0]}; make one of them, with the tighter limits "
+                f"or with all obstacles"
+            )
+
+    def _check_end(self) -> None:
+        for item in self.constraints:
+            if not isinstance(item, EndConfiguration):
+                continue
+            end = self.path.pose(self.path.duration)
+            actual = self.robot.pose(self.robot.configuration(item.q))
+            position, rotation = self.rows.miss(end, actual)
+            if max(position, rotation) > _NEAR_END:
+                raise ProblemError(
+                    f"{self.robot.name}: the end configuration puts '{self.robot.tool}' "
+                    f"{position:.3g} m and {rotation:.3g} rad off the end of the path; take "
+                    f"robot.inverse_kinematics(path.pose(path.duration), task, seed=q)"
+                )
+
     def _check_closed(self) -> None:
         if not any(isinstance(item, ClosedPath) for item in self.constraints):
             return
@@ -261,10 +288,9 @@ def _require(wanted: Requirements, item: Constraint, robot: RobotModel) -> Requi
         upper = robot.upper if item.upper is None else read_only(item.upper)
         return replace(wanted, lower=lower, upper=upper)
     if isinstance(item, JointVelocityLimits) and item.limit is not None:
-        return replace(wanted, velocity=read_only(item.limit))
+        return replace(wanted, velocity=item.of(robot))
     if isinstance(item, JointAccelerationLimits):
-        limit = np.broadcast_to(np.asarray(item.limit, dtype=np.float64), (robot.dof,))
-        return replace(wanted, acceleration=read_only(limit))
+        return replace(wanted, acceleration=item.of(robot))
     if isinstance(item, EndConfiguration):
         return replace(wanted, end=read_only(item.q))
     if isinstance(item, EndVelocity):

@@ -1,8 +1,9 @@
 """Rows of the tool's motion that need not follow the path exactly, for all of it or a while."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import combinations
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,7 @@ class Relaxation:
     intervals: int = 8
 
     def __post_init__(self) -> None:
+        _check_types(self.rows, self.band, self.during)
         rows = (self.rows,) if isinstance(self.rows, str) else tuple(self.rows)
         object.__setattr__(self, "rows", rows)
         if not rows or len(set(rows)) != len(rows) or not set(rows) <= set(_ROWS):
@@ -121,6 +123,18 @@ class Relaxation:
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe description: ``Relaxation(**description)`` restores it."""
         return {**asdict(self), "rows": list(self.rows)}
+
+
+def _check_types(rows: Any, band: Any, during: Any) -> None:
+    for name, value, kind, wanted in (
+        ("rows", rows, Iterable, "names of rows"),
+        ("band", band, Real, "a number"),
+        ("during", during, list | tuple | None, "two times"),
+    ):
+        if not isinstance(value, kind):
+            raise ProblemError(f"relaxation: {name} is {value!r}, expected {wanted}")
+    if during is not None and not all(isinstance(time, Real) for time in during):
+        raise ProblemError(f"relaxation: during is {during!r}, expected two times")
 
 
 def check_relaxations(relaxations: Sequence[Relaxation], path: Path, task: Task) -> None:

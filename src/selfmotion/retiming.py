@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array, read_only
+from selfmotion.arrays import Array, per_joint
 from selfmotion.errors import PlanError, ProblemError
 from selfmotion.path.retimed import Retimed
 from selfmotion.plan import Plan
@@ -14,8 +14,9 @@ from selfmotion.trajectory import Trajectory
 
 # Share of the limits that is used, so that the certificate between grid points holds as well.
 _SHARE = 0.98
-# Grid points of toppra, and samples of the new motion, per sample of the old one.
-_DENSITY = 4
+# Grid points of toppra, and samples of the new motion, per sample of the old one: the first that
+# keeps the plan's tolerance.
+_DENSITIES = (4, 8, 16)
 
 
 def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
@@ -31,8 +32,9 @@ def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
     """
     factor = max(1.0, plan.certificate.velocity_ratio.value)
     if acceleration is not None:
-        middle = 0.5 * (plan.trajectory.t[:-1] + plan.trajectory.t[1:])
-        share = np.abs(plan.trajectory(middle, order=2)) / np.asarray(acceleration)
+        what = f"{plan.robot.name}: acceleration limits"
+        limit = per_joint(acceleration, plan.robot.dof, what, positive=True)
+        share = np.abs(plan.trajectory.accelerations()[1]) / limit
         factor = max(factor, float(np.sqrt(share.max())))
     return factor
 
@@ -53,8 +55,8 @@ def retime(
     plan : Plan
     acceleration : (n,) or float
         Limits [rad/s² or m/s²].
-    velocity : (n,), optional
-        Limits [rad/s or m/s]; by default the URDF's.
+    velocity : (n,) or float, optional
+        Limits [rad/s or m/s]; by default those that the plan was asked to keep, or the URDF's.
 
     Returns
     -------
@@ -68,21 +70,30 @@ def retime(
     PlanError
         No pace keeps the limits.
     """
-    n = plan.robot.dof
+    robot, wanted = plan.robot, plan.requirements
+    if velocity is None:
+        velocity = robot.velocity_limit if wanted.velocity is None else wanted.velocity
     limits = [
-        np.broadcast_to(np.asarray(limit, dtype=np.float64), (n,))
-        for limit in (plan.robot.velocity_limit if velocity is None else velocity, acceleration)
+        per_joint(limit, robot.dof, f"{robot.name}: {name} limits for retiming", positive=True)
+        for name, limit in (("velocity", velocity), ("acceleration", acceleration))
     ]
-    if not all(np.all(limit > 0.0) for limit in limits):
-        raise ProblemError(f"{plan.robot.name}: limits for retiming must be positive: {limits}")
-    t, sigma, rate = _pace(plan.trajectory, *limits)
+    for density in _DENSITIES:
+        result = _retimed(plan, limits, density)
+        errors = result.certificate.position_error.value, result.certificate.rotation_error.value
+        if errors[0] <= plan.tolerance.position and errors[1] <= plan.tolerance.rotation:
+            break
+    return result
+
+
+def _retimed(plan: Plan, limits: list[Array], density: int) -> Plan:
+    t, sigma, rate = _pace(plan.trajectory, limits[0], limits[1], density)
     path = Retimed(plan.path, t, sigma, rate)
     q, qd = plan.trajectory(sigma), plan.trajectory(sigma, order=1) * rate[:, None]
     trajectory = Trajectory(t, q, qd, plan.trajectory.joint_names)
     wanted = replace(
         plan.requirements,
-        velocity=read_only(limits[0]),
-        acceleration=read_only(limits[1]),
+        velocity=limits[0],
+        acceleration=limits[1],
         relaxations=tuple(_moved(item, t, sigma) for item in plan.requirements.relaxations),
     )
     checked = replace(
@@ -100,10 +111,12 @@ def _moved(item: Relaxation, t: Array, sigma: Array) -> Relaxation:
     return replace(item, during=(first, last))
 
 
-def _pace(motion: Trajectory, velocity: Array, acceleration: Array) -> tuple[Array, Array, Array]:
+def _pace(
+    motion: Trajectory, velocity: Array, acceleration: Array, density: int
+) -> tuple[Array, Array, Array]:
     """Return new times, and σ and dσ/dt there."""
-    count = _DENSITY * (len(motion.t) - 1)
-    grid = np.interp(np.arange(count + 1) / _DENSITY, np.arange(len(motion.t)), motion.t)
+    count = density * (len(motion.t) - 1)
+    grid = np.interp(np.arange(count + 1) / density, np.arange(len(motion.t)), motion.t)
     rates = _toppra(motion, grid, _SHARE * velocity, _SHARE * acceleration)
     # Between grid points the squared rate is linear in σ, hence σ̈ constant and the times exact.
     steps = 2.0 * np.diff(grid) / (rates[:-1] + rates[1:])

@@ -206,14 +206,23 @@ class Session:
         if not conditions.has_equalities or self._minimum is None:
             return
         h = self._minimum.inverse_hessian
+        best, nearest = self._x, np.inf
         for _ in range(_CLOSING_STEPS):
+            if not np.isfinite(sum(self.terms().values())):
+                break
             tangents = self._counted(lambda: objective.node_tangents(self._x))
             residual, rows = conditions.equalities(objective.rollout.samples(), tangents)
-            if np.max(np.abs(residual), initial=0.0) < _CLOSED:
+            miss = float(np.max(np.abs(residual), initial=0.0))
+            if miss < _CLOSED:
                 return
+            # Conditions that contradict each other, or are out of reach, are not met by more steps.
+            if not miss < nearest:
+                break
+            best, nearest = self._x, miss
             spread = h @ rows.T
             # Least squares: conditions may depend on each other.
             self._x = self._x - spread @ np.linalg.lstsq(rows @ spread, residual)[0]
+        self._x = best
         self.terms()
 
     def refine_until_settled(self) -> None:

@@ -60,6 +60,15 @@ class Trajectory:
         """Time from first to last sample [s]."""
         return float(self.t[-1] - self.t[0])
 
+    def accelerations(self) -> tuple[Array, Array]:
+        """Return all extremes of q̈: times (2N - 2,) and q̈ (2N - 2, n) there.
+
+        Between two samples q̈ is linear, so that its extremes are those at both ends.
+        """
+        inner = self.t[1:] - 1e-9 * np.diff(self.t)
+        times = np.stack([self.t[:-1], inner], axis=1).ravel()
+        return times, self(times, order=2)
+
     def __call__(self, t: npt.ArrayLike, order: int = 0) -> Array:
         """Return q (`order` 0), q̇ (1), q̈ (2) at `t`.
 

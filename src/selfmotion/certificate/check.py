@@ -65,10 +65,8 @@ def certify(
     )
     acceleration = None
     if wanted.acceleration is not None:
-        # In the middle between samples the cubic's second derivative is the most accurate.
-        middle = 0.5 * (trajectory.t[:-1] + trajectory.t[1:])
-        share = np.abs(trajectory(middle, order=2)) / wanted.acceleration
-        acceleration = _extreme(share, middle, names, np.argmax)
+        ends, qdd = trajectory.accelerations()
+        acceleration = _extreme(np.abs(qdd) / wanted.acceleration, ends, names, np.argmax)
     clearance = None if wanted.collision is None else _clearance(wanted.collision, t, q)
     closure = float(np.abs(trajectory.q[-1] - trajectory.q[0]).max())
     damped = () if wanted.damping is None else _damped_stretches(wanted.damping, t, singular)
@@ -176,8 +174,8 @@ def _failures(
         )
     if not ratio.value <= 1.0:
         failures.append(
-            f"joint '{ratio.name}' moves at {ratio.value:.3g} times its limit at t = "
-            f"{ratio.time:.3f} s: give it {ratio.value:.3g} times the duration"
+            f"joint '{ratio.name}' moves at {ratio.value:.5g} times its limit at t = "
+            f"{ratio.time:.3f} s: give it {ratio.value:.5g} times the duration"
         )
     return tuple(failures)
 
@@ -196,8 +194,8 @@ def _unmet(
     failures = []
     if acceleration is not None and not acceleration.value <= 1.0:
         failures.append(
-            f"joint '{acceleration.name}' accelerates at {acceleration.value:.3g} times its limit "
-            f"at t = {acceleration.time:.3f} s: give it {acceleration.value**0.5:.3g} times the "
+            f"joint '{acceleration.name}' accelerates at {acceleration.value:.5g} times its limit "
+            f"at t = {acceleration.time:.3f} s: give it {acceleration.value**0.5:.5g} times the "
             f"duration"
         )
     if clearance is not None and not clearance.value >= wanted.clearance:

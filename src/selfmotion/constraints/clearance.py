@@ -27,7 +27,7 @@ class Clearance:
 
     Parameters
     ----------
-    obstacles : sequence of Obstacle
+    obstacles : Obstacle or sequence of Obstacle
         The world.
     distance : float
         Smallest distance [m].
@@ -38,6 +38,20 @@ class Clearance:
     obstacles: tuple[Obstacle, ...] = ()
     distance: float = 5e-3
     srdf: str | Path | None = None
+
+    def __post_init__(self) -> None:
+        given: Any = self.obstacles
+        listed = (given,) if isinstance(given, Obstacle) else given
+        if not (
+            isinstance(listed, list | tuple) and all(isinstance(item, Obstacle) for item in listed)
+        ):
+            raise ProblemError(
+                f"clearance: obstacles are {self.obstacles!r}, expected Box, Sphere, Cylinder, "
+                f"Capsule or Mesh"
+            )
+        object.__setattr__(self, "obstacles", tuple(listed))
+        if not (np.isfinite(self.distance) and self.distance >= 0.0):
+            raise ProblemError(f"clearance: distance is {self.distance} m, expected ≥ 0")
 
     def model(self, robot: RobotModel) -> CollisionModel:
         """Return the exact model that the certificate measures with, made once per arm.
@@ -51,8 +65,6 @@ class Clearance:
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundClearance":
         """See `Constraint.bind`."""
-        if not self.distance >= 0.0:
-            raise ProblemError(f"clearance: distance is {self.distance} m, expected ≥ 0")
         return BoundClearance(self._models(robot).smooth, self.distance)
 
     def _models(self, robot: RobotModel) -> "_Models":

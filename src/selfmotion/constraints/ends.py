@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array, read_only
+from selfmotion.arrays import Array, per_joint, read_only
 from selfmotion.constraints.base import NodePartials, NodeTangents, motion_of_order
 from selfmotion.robot import RobotModel
 from selfmotion.samples import Samples
@@ -62,8 +62,7 @@ class EndVelocity:
 
     def target(self, robot: RobotModel) -> Array:
         """Return q̇(T) (n,) for an arm."""
-        qd = np.broadcast_to(np.asarray(self.qd, dtype=np.float64), (robot.dof,))
-        return read_only(robot.configuration(qd))
+        return per_joint(self.qd, robot.dof, f"{robot.name}: end velocity")
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array, read_only
+from selfmotion.arrays import Array, per_joint, read_only
 from selfmotion.constraints.base import (
     NodePartials,
     NodeTangents,
@@ -27,7 +27,7 @@ class JointPositionLimits:
     lower, upper : (n,), optional
         [rad or m]; by default the URDF's.
     margin : float
-        Distance kept from them [rad or m].
+        Distance aimed to be kept from them [rad or m]; at least half of it is.
     """
 
     lower: npt.ArrayLike | None = None
@@ -47,10 +47,10 @@ class JointVelocityLimits:
 
     Parameters
     ----------
-    limit : (n,), optional
+    limit : (n,) or float, optional
         [rad/s or m/s]; by default the URDF's.
     margin : float
-        Share of the limit that is left unused.
+        Share of the limit that is aimed to be left unused; at least half of it is.
     """
 
     limit: npt.ArrayLike | None = None
@@ -58,8 +58,13 @@ class JointVelocityLimits:
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
-        limit = robot.velocity_limit if self.limit is None else read_only(self.limit)
-        return BoundLimits.symmetric(robot, "velocity limits", 1, limit, self.margin)
+        return BoundLimits.symmetric(robot, "velocity limits", 1, self.of(robot), self.margin)
+
+    def of(self, robot: RobotModel) -> Array:
+        """Return the limits for an arm, (n,)."""
+        if self.limit is None:
+            return robot.velocity_limit
+        return per_joint(self.limit, robot.dof, f"{robot.name}: velocity limits", positive=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +76,7 @@ class JointAccelerationLimits:
     limit : (n,) or float
         [rad/s² or m/s²].
     margin : float
-        Share of the limit that is left unused.
+        Share of the limit that is aimed to be left unused; at least half of it is.
     """
 
     limit: npt.ArrayLike
@@ -79,8 +84,12 @@ class JointAccelerationLimits:
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
-        limit = np.broadcast_to(np.asarray(self.limit, dtype=np.float64), (robot.dof,))
-        return BoundLimits.symmetric(robot, "acceleration limits", 2, limit, self.margin)
+        return BoundLimits.symmetric(robot, "acceleration limits", 2, self.of(robot), self.margin)
+
+    def of(self, robot: RobotModel) -> Array:
+        """Return the limits for an arm, (n,)."""
+        what = f"{robot.name}: acceleration limits"
+        return per_joint(self.limit, robot.dof, what, positive=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +123,7 @@ class BoundLimits:
     def of(
         cls, robot: RobotModel, name: str, order: int, limits: tuple[Array, Array], margin: float
     ) -> "BoundLimits":
-        """Return lower ≤ x ≤ upper for the joints with finite limits."""
+        """Return lower ≤ x ≤ upper for the joints with a finite limit on either side."""
         lower, upper = limits
         for array in limits:
             if array.shape != (robot.dof,) or np.any(np.isnan(array)):
@@ -126,7 +135,7 @@ class BoundLimits:
             raise ProblemError(f"{robot.name}: {name}: lower {lower} is not below upper {upper}")
         if not margin > 0.0:
             raise ProblemError(f"{robot.name}: {name}: margin is {margin}, expected > 0")
-        joints = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
+        joints = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
         scale = np.ones(len(joints)) if order == 0 else upper[joints]
         names = tuple(robot.joint_names[k] for k in joints)
         return cls(name, order, joints, names, lower[joints], upper[joints], scale, margin)
