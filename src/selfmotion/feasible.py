@@ -241,9 +241,6 @@ def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, f
 
 def _kept_until(problem: Problem, t: Array, q: Array, qd: Array) -> float:
     """Return the first of the times t (N,) at which a joint is beyond its limits, or the last."""
-    robot, wanted = problem.robot, problem.requirements
-    lower = robot.lower if wanted.lower is None else wanted.lower
-    upper = robot.upper if wanted.upper is None else wanted.upper
-    speed = robot.velocity_limit if wanted.velocity is None else wanted.velocity
+    lower, upper, speed = problem.requirements.limits(problem.robot)
     beyond = ((q < lower) | (q > upper) | (np.abs(qd) > speed)).any(axis=1)
     return float(t[int(np.argmax(beyond))] if beyond.any() else t[-1])

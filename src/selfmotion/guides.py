@@ -58,15 +58,15 @@ def guides(
     """
     robot, path, wanted = problem.robot, problem.path, problem.requirements
     t = search_times(path)
-    velocity = robot.velocity_limit if wanted.velocity is None else wanted.velocity
+    lower, upper, velocity = wanted.limits(robot)
     step = np.minimum(velocity * np.diff(t)[:, None], np.pi)
     sequences = best_sequences(
         robot,
         path,
         problem.rows,
         t,
-        lower=robot.lower if wanted.lower is None else wanted.lower,
-        upper=robot.upper if wanted.upper is None else wanted.upper,
+        lower=lower,
+        upper=upper,
         largest_step=step,
         collision=wanted.collision,
         margin=wanted.clearance + _MARGIN,

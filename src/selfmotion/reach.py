@@ -91,11 +91,8 @@ def _within_limits(problem: Problem) -> RobotModel:
     if not any(isinstance(item, JointPositionLimits) for item in problem.constraints):
         free = read_only(np.full(robot.dof, np.inf))
         return replace(robot, lower=read_only(-free), upper=free)
-    return replace(
-        robot,
-        lower=robot.lower if wanted.lower is None else wanted.lower,
-        upper=robot.upper if wanted.upper is None else wanted.upper,
-    )
+    lower, upper, _ = wanted.limits(robot)
+    return replace(robot, lower=lower, upper=upper)
 
 
 def _solutions(

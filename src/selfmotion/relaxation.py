@@ -188,7 +188,7 @@ def excess(relaxations: Sequence[Relaxation], duration: float, t: Array, deviati
     """
     beyond = deviation.copy()
     for item in relaxations:
-        size = _size(item, duration, t, deviation)
+        size = deviation_size(item, duration, t, deviation)
         share = np.maximum(size - item.band, 0.0) / np.where(size > 0.0, size, 1.0)
         first, last = item.window(duration)
         outside = (t < first) | (t > last)
@@ -196,17 +196,11 @@ def excess(relaxations: Sequence[Relaxation], duration: float, t: Array, deviati
     return beyond
 
 
-def deviation_sizes(
-    relaxations: Sequence[Relaxation], duration: float, t: Array, deviation: Array
-) -> list[Array]:
-    """Return for each relaxation how far its rows are off the path in its window, (K,).
+def deviation_size(item: Relaxation, duration: float, t: Array, deviation: Array) -> Array:
+    """Return how far the rows of a relaxation are off the path in its window, (K,).
 
     Zero outside the window. Parameters as in `excess`.
     """
-    return [_size(item, duration, t, deviation) for item in relaxations]
-
-
-def _size(item: Relaxation, duration: float, t: Array, deviation: Array) -> Array:
     first, last = item.window(duration)
     inside = (t >= first) & (t <= last)
     return np.asarray(np.linalg.norm(deviation[:, item.indices], axis=1) * inside)

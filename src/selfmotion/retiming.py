@@ -70,9 +70,9 @@ def retime(
     PlanError
         No pace keeps the limits.
     """
-    robot, wanted = plan.robot, plan.requirements
+    robot = plan.robot
     if velocity is None:
-        velocity = robot.velocity_limit if wanted.velocity is None else wanted.velocity
+        velocity = plan.requirements.limits(robot)[2]
     limits = [
         per_joint(limit, robot.dof, f"{robot.name}: {name} limits for retiming", positive=True)
         for name, limit in (("velocity", velocity), ("acceleration", acceleration))

@@ -16,7 +16,7 @@ from selfmotion.certificate.terms import (
 from selfmotion.collision import CollisionModel
 from selfmotion.damping import DampingLaw
 from selfmotion.path import Path
-from selfmotion.relaxation import deviation_sizes, excess
+from selfmotion.relaxation import deviation_size, excess
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 from selfmotion.trajectory import Trajectory
@@ -53,9 +53,7 @@ def certify(
     deviation, singular = deviation_from(robot, path, task, t, q, in_tool_axes)
     beyond = excess(wanted.relaxations, path.duration, t, deviation)
     distance, angle = np.linalg.norm(beyond[:, :3], axis=1), np.linalg.norm(beyond[:, 3:], axis=1)
-    lower = robot.lower if wanted.lower is None else wanted.lower
-    upper = robot.upper if wanted.upper is None else wanted.upper
-    limit = robot.velocity_limit if wanted.velocity is None else wanted.velocity
+    lower, upper, limit = wanted.limits(robot)
     tool, names = (robot.tool,), robot.joint_names
     worst = (
         _extreme(distance, t, tool, np.argmax),
@@ -83,12 +81,8 @@ def certify(
             *_unmet(wanted, acceleration, clearance, closure, trajectory),
         ),
         deviations=tuple(
-            _extreme(size, t, (item.name,), np.argmax)
-            for item, size in zip(
-                wanted.relaxations,
-                deviation_sizes(wanted.relaxations, path.duration, t, deviation),
-                strict=True,
-            )
+            _extreme(deviation_size(item, path.duration, t, deviation), t, (item.name,), np.argmax)
+            for item in wanted.relaxations
         ),
         damped=damped,
     )

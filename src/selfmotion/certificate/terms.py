@@ -9,6 +9,7 @@ from selfmotion.collision import CollisionModel
 from selfmotion.damping import DampingLaw
 from selfmotion.errors import ProblemError
 from selfmotion.relaxation import Relaxation
+from selfmotion.robot import RobotModel
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,14 @@ class Requirements:
     relaxations: tuple[Relaxation, ...] = ()
     damping: DampingLaw | None = None
     ending: str = ""
+
+    def limits(self, robot: RobotModel) -> tuple[Array, Array, Array]:
+        """Return lower and upper position limits and speed limits for an arm, (n,) each."""
+        return (
+            robot.lower if self.lower is None else self.lower,
+            robot.upper if self.upper is None else self.upper,
+            robot.velocity_limit if self.velocity is None else self.velocity,
+        )
 
 
 @dataclass(frozen=True)
