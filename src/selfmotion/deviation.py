@@ -14,6 +14,7 @@ with the left Jacobian Jl of SO(3).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,17 @@ class _Group:
     @property
     def size(self) -> int:
         return len(self.indices) * int(self.values.shape[1])
+
+
+class _Bent(NamedTuple):
+    """A group's s and ṡ (S, k), g, g'/r, (g'/r)'/r and s·ṡ (S,) at the stages."""
+
+    s: Array
+    sd: Array
+    g: Array
+    h: Array
+    third: Array
+    along: Array
 
 
 class Deviation:
@@ -69,7 +81,7 @@ class Deviation:
     def target(self, c: Array) -> PathSamples:
         """Return the poses and twists that the tool follows."""
         nominal = self._nominal
-        rows, rates = self._rows(c)
+        rows, rates = self._rows(self._bent(c))
         rotation, twist = nominal.rotation, nominal.twist.copy()
         twist[:, :3] += self._to_world(rows[:, :3], rates[:, :3])
         turned = rotation @ _exponentials(rows[:, 3:])
@@ -80,13 +92,11 @@ class Deviation:
     def matrix(self, c: Array) -> Array:
         """Return ∂target/∂c, (S, 12, size): [∂p; world rotation vector of ∂R; ∂twist]."""
         stages = len(self._nominal.t)
-        rows, rates = self._rows(c)
+        bent = self._bent(c)
+        rows, rates = self._rows(bent)
         by_rows, by_rates = np.zeros((stages, 6, self.size)), np.zeros((stages, 6, self.size))
         first = 0
-        for group, coefficients in zip(self._groups, self._split(c), strict=True):
-            s, sd = group.values @ coefficients.T, group.rates @ coefficients.T
-            g, h, third = _squash(s, group.band)
-            along = np.einsum("si,si->s", s, sd)
+        for group, (s, sd, g, h, third, along) in zip(self._groups, bent, strict=True):
             # ∂δ/∂s = g I + h s sᵀ, which is ∂δ̇/∂ṡ as well; ∂δ̇/∂s is its derivative in time.
             eye = np.eye(len(group.indices))
             outer, mixed = s[:, :, None] * s[:, None, :], s[:, :, None] * sd[:, None, :]
@@ -111,23 +121,23 @@ class Deviation:
         result[:, 9:12] = rotation @ (turning + jacobian @ by_rates[:, 3:])
         return result
 
-    def _rows(self, c: Array) -> tuple[Array, Array]:
+    def _bent(self, c: Array) -> list[_Bent]:
+        """Return the groups' splines and what the sine makes of them."""
+        bent, first = [], 0
+        for group in self._groups:
+            part = c[first : first + group.size].reshape(len(group.indices), -1)
+            first += group.size
+            s, sd = group.values @ part.T, group.rates @ part.T
+            bent.append(_Bent(s, sd, *_squash(s, group.band), np.einsum("si,si->s", s, sd)))
+        return bent
+
+    def _rows(self, bent: list[_Bent]) -> tuple[Array, Array]:
         """Return δ and δ̇, rows x, y, z, rx, ry, rz, (S, 6) each."""
         rows, rates = np.zeros((len(self._nominal.t), 6)), np.zeros((len(self._nominal.t), 6))
-        for group, coefficients in zip(self._groups, self._split(c), strict=True):
-            s, sd = group.values @ coefficients.T, group.rates @ coefficients.T
-            g, h, _ = _squash(s, group.band)
-            along = np.einsum("si,si->s", s, sd)
+        for group, (s, sd, g, h, _, along) in zip(self._groups, bent, strict=True):
             rows[:, group.indices] += g[:, None] * s
             rates[:, group.indices] += g[:, None] * sd + (h * along)[:, None] * s
         return rows, rates
-
-    def _split(self, c: Array) -> list[Array]:
-        parts, first = [], 0
-        for group in self._groups:
-            parts.append(c[first : first + group.size].reshape(len(group.indices), -1))
-            first += group.size
-        return parts
 
     def _shift(self, delta: Array) -> Array:
         """Return Q δ for δ (S, 3) or (S, 3, k)."""
