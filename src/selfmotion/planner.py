@@ -3,13 +3,13 @@
 import time
 from dataclasses import replace
 from functools import cache, partial
-from typing import NamedTuple
 
 import numpy as np
 
 from selfmotion.arrays import Array, read_only
 from selfmotion.baselines import Method, plan_by
-from selfmotion.certificate import Certificate, Requirements, Tolerance, certify
+from selfmotion.certificate import Tolerance
+from selfmotion.checking import Checked, checked_motion, within
 from selfmotion.errors import BreakdownError, NoSequenceError, ProblemError
 from selfmotion.feasible import Part, largest_part
 from selfmotion.plan import Gap, Plan, Report
@@ -19,23 +19,10 @@ from selfmotion.quasi_newton import Callback, QuasiNewton, Status
 from selfmotion.reach import Reach, reachable
 from selfmotion.selection import Effort, Selection
 from selfmotion.sequences import SPACING
-from selfmotion.session import MOST_HALVINGS, Counts, Guide, Session
-from selfmotion.trajectory import Trajectory
+from selfmotion.session import Counts, Guide, Session
 
 # Evaluations of the cost that a damped motion may take, and each of many on parts of the path.
 _PATIENCE, _PART_PATIENCE = 400, 150
-
-
-class _Checked(NamedTuple):
-    """A motion, the one at x = 0 on the same grid, what they cost, and the check."""
-
-    terms: dict[str, float]
-    trajectory: Trajectory
-    certificate: Certificate
-    initial_terms: dict[str, float]
-    initial_trajectory: Trajectory
-    damped: bool
-    tolerance: Tolerance
 
 
 def plan(
@@ -152,7 +139,7 @@ def plan(
         if found is None:
             return None
         _settle(found.session, None, progress)
-        checked = _checked(problem, found, wanted, progress)
+        checked = checked_motion(problem, found, wanted, progress)
         return _finish(problem, found, checked, None, notes, began)
 
     selection = Selection(
@@ -174,13 +161,13 @@ def plan(
         return shorter
     rival_cost = _settle(best, selection.rival, progress)
     whole = Part(problem, best, "")
-    checked = _checked(problem, whole, wanted, progress)
+    checked = checked_motion(problem, whole, wanted, progress)
     gap = _gap(selection, rival_cost, checked)
     result = _finish(problem, whole, checked, gap, selection.notes, began)
     no_more = best.cut_short or best.status is Status.MAX_EVALUATIONS
     check = result.certificate
     out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
-    held = _within((check.position_error.value, check.rotation_error.value), wanted)
+    held = within((check.position_error.value, check.rotation_error.value), wanted)
     # With damping the motion goes on where the path cannot be followed: so it was asked for.
     if (held and not out_of_limits) or no_more or problem.damping is not None:
         return result
@@ -223,7 +210,7 @@ def _settle(best: Session, rival: Session | None, progress: Progress) -> float |
 def _finish(
     problem: Problem,
     part: Part,
-    checked: _Checked,
+    checked: Checked,
     gap: Gap | None,
     notes: list[str],
     began: float,
@@ -272,68 +259,7 @@ def _finish(
     )
 
 
-def _checked(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress) -> _Checked:
-    """Return what there is on the first grid on which the motion holds the tolerance."""
-    session, requirements = part.session, replace(problem.requirements, ending=part.ending)
-    checked = coarse = None
-    misses: list[float] = []
-    for _ in range(MOST_HALVINGS):
-        try:
-            progress("checking", 1, 1)
-            checked = _check(problem, session, tolerance, requirements)
-            certificate, trajectory = checked.certificate, checked.trajectory
-            errors = certificate.position_error.value, certificate.rotation_error.value
-            # Accelerations of the cubics come near those of the motion as the square of the step.
-            ratio = certificate.acceleration_ratio
-            rough = ratio is not None and ratio.value > 1.0 and not session.violations
-            if _within(errors, tolerance) and not rough:
-                break
-            # What damping costs stays on any grid: there, the motion stands when the tool does.
-            if coarse is not None and _within(
-                _largest_change(problem, coarse, trajectory), tolerance
-            ):
-                break
-            coarse = trajectory if checked.damped else None
-            # What is out of reach is so on any grid.
-            misses.append(sum(errors))
-            if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
-                break
-            session.refine()
-        except KeyboardInterrupt:
-            session.end(Status.INTERRUPTED)
-            break
-    # No plan goes without a certificate, interrupted or not.
-    return checked or _check(problem, session, tolerance, requirements)
-
-
-def _within(errors: tuple[float, float], tolerance: Tolerance) -> bool:
-    return errors[0] <= tolerance.position and errors[1] <= tolerance.rotation
-
-
-def _largest_change(problem: Problem, coarse: Trajectory, fine: Trajectory) -> tuple[float, float]:
-    """Return how far apart two motions put the tool in the prescribed rows, at most [m, rad]."""
-    robot, task = problem.robot, problem.rows
-    pairs = zip(coarse(fine.t), fine.q, strict=True)
-    misses = np.array([task.miss(robot.pose(first), robot.pose(second)) for first, second in pairs])
-    position, rotation = misses.max(axis=0)
-    return float(position), float(rotation)
-
-
-def _check(
-    problem: Problem, session: Session, tolerance: Tolerance, requirements: Requirements
-) -> _Checked:
-    terms, trajectory, damped = session.terms(), session.trajectory(), session.damped
-    certificate = certify(
-        problem.robot, problem.path, problem.rows, trajectory, tolerance, requirements
-    )
-    initial_terms = session.initial_terms()
-    initial_trajectory = session.trajectory()
-    return _Checked(
-        terms, trajectory, certificate, initial_terms, initial_trajectory, damped, tolerance
-    )
-
-
-def _gap(selection: Selection, rival_cost: float | None, checked: _Checked) -> Gap | None:
+def _gap(selection: Selection, rival_cost: float | None, checked: Checked) -> Gap | None:
     """Compare a plan with what the global search knows; None where it knows nothing."""
     if not selection.sequences:
         return None
