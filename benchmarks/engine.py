@@ -8,11 +8,11 @@ import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
-from selfmotion.grid import Grid
-from selfmotion.null_motion import NullMotionTable, TransportedFrame
-from selfmotion.objective import Objective
-from selfmotion.rollout import Rollout
-from selfmotion.start import FixedStart
+from selfmotion.engine.objective import Objective
+from selfmotion.engine.rollout import Rollout
+from selfmotion.engine.start import FixedStart
+from selfmotion.motion.grid import Grid
+from selfmotion.motion.null_motion import NullMotionTable, TransportedFrame
 
 
 def objective_on(problem: sm.Problem, steps: int) -> Objective:

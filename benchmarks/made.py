@@ -18,8 +18,8 @@ from rich.console import Console
 from scipy.interpolate import PchipInterpolator
 
 import selfmotion as sm
-from selfmotion.arrays import Array
-from selfmotion.files import write_csv
+from selfmotion.basics.arrays import Array
+from selfmotion.basics.files import write_csv
 
 DATA = Path(__file__).parent / "data"
 DURATION = 10.0

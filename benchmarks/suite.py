@@ -20,8 +20,8 @@ from rich.console import Console
 from rich.table import Table
 
 import selfmotion as sm
-from selfmotion.arrays import Array
-from selfmotion.files import write_atomically, write_csv
+from selfmotion.basics.arrays import Array
+from selfmotion.basics.files import write_atomically, write_csv
 
 DATA = Path(__file__).parent / "data"
 

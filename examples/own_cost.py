@@ -3,7 +3,7 @@
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.arrays import Array
+from selfmotion.basics.arrays import Array
 
 
 def elbow_down(qd: Array, q: Array, t: Array) -> Array:

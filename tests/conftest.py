@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.arrays import Array
+from selfmotion.basics.arrays import Array
 
 # Arms with a task each, chosen so that every task and redundancy from 1 to 5 occurs.
 CASES = [

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 import trimesh
 
+from selfmotion.basics.errors import RobotError
 from selfmotion.collision import (
     Box,
     Capsule,
@@ -16,7 +17,6 @@ from selfmotion.collision import (
     Mesh,
     Sphere,
 )
-from selfmotion.errors import RobotError
 from selfmotion.robot import NAMED_ARMS, load_robot
 
 TURNED = pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.3, 0.8), np.array([0.5, -0.4, 0.6]))

@@ -9,10 +9,10 @@ import pinocchio as pin
 import pytest
 import trimesh
 
+from selfmotion.basics.errors import CollisionError, RobotError
 from selfmotion.collision import Box, Capsule, CollisionModel, Cylinder, Mesh, Sphere
 from selfmotion.collision.pairs import Body, candidate_pairs
 from selfmotion.collision.shapes import winding_number
-from selfmotion.errors import CollisionError, RobotError
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
 
 BOXES = (

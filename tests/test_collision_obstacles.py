@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from selfmotion.basics.errors import CollisionError
 from selfmotion.collision import (
     Box,
     Capsule,
@@ -16,7 +17,6 @@ from selfmotion.collision import (
     Sphere,
     obstacle_from_dict,
 )
-from selfmotion.errors import CollisionError
 
 POSE = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 1.1), np.array([0.1, 0.2, 0.3]))
 ALL = [

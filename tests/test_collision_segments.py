@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from selfmotion.basics.jit import kernel
 from selfmotion.collision.segments import segment_box, segment_cylinder, segment_segment
-from selfmotion.jit import kernel
 
 BOX = (0.3, 0.2, 0.1)
 RADIUS, HALF = 0.2, 0.3

@@ -8,14 +8,14 @@ import pytest
 
 import selfmotion as sm
 from conftest import PANDA_HOME, central_difference, robot_named, short_line, start_of
-from selfmotion.arrays import Array
-from selfmotion.augmented_lagrangian import AugmentedLagrangian
+from selfmotion.basics.arrays import Array
 from selfmotion.constraints import NodeTangents
-from selfmotion.grid import Grid
-from selfmotion.null_motion import NullMotionTable, PolynomialNullMotion
-from selfmotion.objective import Objective
-from selfmotion.rollout import Rollout
-from selfmotion.start import FreeStart
+from selfmotion.engine.augmented_lagrangian import AugmentedLagrangian
+from selfmotion.engine.objective import Objective
+from selfmotion.engine.rollout import Rollout
+from selfmotion.engine.start import FreeStart
+from selfmotion.motion.grid import Grid
+from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
 
 Circle = Callable[..., sm.Problem]
 

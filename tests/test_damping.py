@@ -9,13 +9,13 @@ import pytest
 
 import selfmotion as sm
 from conftest import central_difference
-from selfmotion.arrays import Array
-from selfmotion.damping import DampingLaw
-from selfmotion.grid import Grid
-from selfmotion.null_motion import NullMotionTable, PolynomialNullMotion
-from selfmotion.objective import Objective
-from selfmotion.rollout import Rollout
-from selfmotion.start import FixedStart
+from selfmotion.basics.arrays import Array
+from selfmotion.engine.objective import Objective
+from selfmotion.engine.rollout import Rollout
+from selfmotion.engine.start import FixedStart
+from selfmotion.motion.grid import Grid
+from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
+from selfmotion.task.damping import DampingLaw
 
 Case = tuple[sm.RobotModel, sm.Task, Array, sm.Path]
 

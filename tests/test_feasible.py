@@ -8,12 +8,12 @@ import pytest
 
 import selfmotion as sm
 from conftest import robot_named
-from selfmotion.arrays import Array
-from selfmotion.grid import Grid
+from selfmotion.basics.arrays import Array
+from selfmotion.engine.rollout import Rollout
+from selfmotion.motion.grid import Grid
 from selfmotion.path import Truncated, path_from_dict
+from selfmotion.planning.session import Counts, Session
 from selfmotion.replay import write_replay
-from selfmotion.rollout import Rollout
-from selfmotion.session import Counts, Session
 
 # The end of a part that only the workspace limits, relative to the closed form.
 EDGE = 1e-3

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion import files
+from selfmotion.basics import files
 
 
 @pytest.fixture(scope="module")

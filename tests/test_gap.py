@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion import report_text
+from selfmotion.cli import tables
 
 # Two optimisers of the same motion agree to the tolerance at which grids are accepted.
 SETTLED = 1e-3
@@ -86,7 +86,7 @@ def test_the_gap_is_saved_and_shown(compared: dict[float, sm.Plan], tmp_path: Pa
     plan.save(tmp_path / "plan.npz")
     assert sm.load_plan(tmp_path / "plan.npz").report.gap == plan.report.gap
     console = Console(file=io.StringIO(), width=120)
-    report_text.show(plan, console)
+    tables.show(plan, console)
     text = console.file.getvalue()
     assert "global search over self-motions sampled 0.06 rad apart" in text
     assert f"{100 * plan.report.gap.cost_excess:+.2f} % from its best motion" in text

@@ -9,9 +9,9 @@ import pytest
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion.arrays import Array
-from selfmotion.rollout import Rollout
-from selfmotion.stage_display import StageDisplay
+from selfmotion.basics.arrays import Array
+from selfmotion.cli.stage_display import StageDisplay
+from selfmotion.engine.rollout import Rollout
 
 # All stages of a plan from a free start, compared with the global search.
 STAGES = (

@@ -7,12 +7,12 @@ import pytest
 import selfmotion as sm
 from conftest import central_difference, robot_named, short_line, start_of
 from selfmotion import kernels
-from selfmotion.arrays import Array
-from selfmotion.grid import Grid
-from selfmotion.null_motion import NullMotionTable, PolynomialNullMotion, transport
-from selfmotion.objective import Objective
-from selfmotion.rollout import Rollout
-from selfmotion.start import FixedStart
+from selfmotion.basics.arrays import Array
+from selfmotion.engine.objective import Objective
+from selfmotion.engine.rollout import Rollout
+from selfmotion.engine.start import FixedStart
+from selfmotion.motion.grid import Grid
+from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion, transport
 
 Case = tuple[sm.RobotModel, sm.Task, Array, sm.Path]
 

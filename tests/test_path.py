@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.arrays import Array
+from selfmotion.basics.arrays import Array
 from selfmotion.path import path_from_dict
 
 # Central differences with a step of 1e-6 of functions of order 1 to 30.

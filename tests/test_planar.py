@@ -6,7 +6,7 @@ import pytest
 import selfmotion as sm
 from conftest import central_difference
 from selfmotion import kernels
-from selfmotion.arrays import Array
+from selfmotion.basics.arrays import Array
 
 LINKS = np.array([2.0, 2.0, 1.0])
 EXACT = 1e-12  # a few roundings of numbers of order 5

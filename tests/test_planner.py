@@ -8,7 +8,7 @@ import pytest
 import yourdfpy
 
 import selfmotion as sm
-from selfmotion.arrays import Array
+from selfmotion.basics.arrays import Array
 
 Circle = Callable[..., sm.Problem]
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.arrays import Array
-from selfmotion.quasi_newton import Minimum
+from selfmotion.basics.arrays import Array
+from selfmotion.optimise.quasi_newton import Minimum
 
 
 class Counted:

@@ -10,15 +10,15 @@ import pytest
 
 import selfmotion as sm
 from conftest import PANDA_HOME, central_difference, robot_named, short_line, start_of
-from selfmotion.arrays import Array
-from selfmotion.damping import DampingLaw
-from selfmotion.deviation import Deviation
-from selfmotion.grid import Grid
-from selfmotion.null_motion import NullMotionTable, PolynomialNullMotion
-from selfmotion.objective import Objective
-from selfmotion.relaxation import check_relaxations
-from selfmotion.rollout import Rollout
-from selfmotion.start import FixedStart, FreeStart
+from selfmotion.basics.arrays import Array
+from selfmotion.engine.deviation import Deviation
+from selfmotion.engine.objective import Objective
+from selfmotion.engine.rollout import Rollout
+from selfmotion.engine.start import FixedStart, FreeStart
+from selfmotion.motion.grid import Grid
+from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
+from selfmotion.task.damping import DampingLaw
+from selfmotion.task.relaxation import check_relaxations
 
 # Exact gradients against central differences, relative to the largest entry.
 GRADIENT = 1e-6

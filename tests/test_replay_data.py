@@ -13,7 +13,7 @@ import pytest
 
 import selfmotion as sm
 from replay_plans import arm_plan, planar_plan
-from selfmotion.errors import RobotError
+from selfmotion.basics.errors import RobotError
 from selfmotion.replay import shapes
 from selfmotion.replay.links import bake
 from selfmotion.replay.meshes import make_mesh, read_meshes, simplify

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from replay_plans import arm_plan, planar_plan
-from selfmotion.errors import FileFormatError, ProblemError
+from selfmotion.basics.errors import FileFormatError, ProblemError
 from selfmotion.replay import notebook_html, replay_html, write_replay
 
 

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from replay_plans import arm_plan, planar_plan
-from selfmotion.errors import RenderError
+from selfmotion.basics.errors import RenderError
 from selfmotion.replay import browser, figure, render_gif, render_png
 
 needs_browser = pytest.mark.skipif(

@@ -10,12 +10,12 @@ import pytest
 from scipy.integrate import quad
 
 import selfmotion as sm
-from selfmotion.arrays import Array
-from selfmotion.errors import NoSequenceError, ProblemError
-from selfmotion.guides import search_times
-from selfmotion.sequences import SelfMotion, Sequence, best_sequences, targets
-from selfmotion.sequences.chains import diverse_chains, shortest_chains
-from selfmotion.sequences.nodes import Bounds
+from selfmotion.basics.arrays import Array
+from selfmotion.basics.errors import NoSequenceError, ProblemError
+from selfmotion.search import SelfMotion, Sequence, best_sequences, targets
+from selfmotion.search.chains import diverse_chains, shortest_chains
+from selfmotion.search.guides import search_times
+from selfmotion.search.nodes import Bounds
 
 SUITE = Path(__file__).parents[1] / "benchmarks" / "data"
 STEP = np.radians(7.0)

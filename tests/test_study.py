@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.grid import Grid
-from selfmotion.samples import Samples
+from selfmotion.costs.samples import Samples
+from selfmotion.motion.grid import Grid
 from selfmotion.study import Claim, Scale, Study, Verdict, run, write
 from selfmotion.study.engine import bind, optimum
 from selfmotion.study.published import (

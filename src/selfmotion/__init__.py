@@ -13,6 +13,20 @@ from selfmotion.baselines import (
     Motion,
     PseudoInverse,
 )
+from selfmotion.basics import (
+    BreakdownError,
+    FileFormatError,
+    InverseKinematicsError,
+    NoSequenceError,
+    PathError,
+    PlanError,
+    ProblemError,
+    RedundancyError,
+    RenderError,
+    RobotError,
+    SelfmotionError,
+    StartError,
+)
 from selfmotion.certificate import Certificate, Extreme, Requirements, Tolerance, certify
 from selfmotion.collision import Box, Capsule, CollisionModel, Cylinder, Mesh, Sphere
 from selfmotion.constraints import (
@@ -42,34 +56,13 @@ from selfmotion.costs import (
     Posture,
     SmallestSingularValue,
 )
-from selfmotion.damping import Damping
-from selfmotion.errors import (
-    BreakdownError,
-    FileFormatError,
-    InverseKinematicsError,
-    NoSequenceError,
-    PathError,
-    PlanError,
-    ProblemError,
-    RedundancyError,
-    RenderError,
-    RobotError,
-    SelfmotionError,
-    StartError,
-)
-from selfmotion.line_search import LineSearch
-from selfmotion.null_motion import BSplineNullMotion, NullMotion, PolynomialNullMotion
+from selfmotion.motion import BSplineNullMotion, NullMotion, PolynomialNullMotion, Trajectory
+from selfmotion.optimise import Iteration, LineSearch, QuasiNewton, Status
 from selfmotion.path import Circle, Line, Path, Retimed, TwistPath, Waypoints
-from selfmotion.plan import Gap, Plan, Report, load_plan
-from selfmotion.planner import plan
-from selfmotion.problem import Problem
-from selfmotion.quasi_newton import Iteration, QuasiNewton, Status
-from selfmotion.relaxation import Relaxation
-from selfmotion.retiming import retime, slowdown
+from selfmotion.planning import plan
+from selfmotion.plans import Gap, Plan, Problem, Report, load_plan, retime, sample_problem, slowdown
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
-from selfmotion.sample import sample_problem
-from selfmotion.task import Task
-from selfmotion.trajectory import Trajectory
+from selfmotion.task import Damping, Relaxation, Task
 
 __all__ = [
     "NAMED_ARMS",

@@ -2,6 +2,7 @@
 
 from selfmotion.baselines.base import Method, Motion, plan_by
 from selfmotion.baselines.extended import ExtendedJacobian
+from selfmotion.baselines.integration import start_of
 from selfmotion.baselines.lagrange import LagrangianOptimum
 from selfmotion.baselines.local import DampedLeastSquares, GradientProjection, PseudoInverse
 
@@ -14,4 +15,5 @@ __all__ = [
     "Motion",
     "PseudoInverse",
     "plan_by",
+    "start_of",
 ]

@@ -7,15 +7,13 @@ from typing import Protocol
 
 import numpy as np
 
-from selfmotion.arrays import Array, read_only
 from selfmotion.baselines.integration import PoseFeedback, Rate, integrate
+from selfmotion.basics import Array, read_only
 from selfmotion.certificate import Certificate, Tolerance, certify
-from selfmotion.grid import Grid
-from selfmotion.plan import Plan, Report
-from selfmotion.problem import Problem
-from selfmotion.quasi_newton import Status
-from selfmotion.samples import Samples
-from selfmotion.trajectory import Trajectory
+from selfmotion.costs import Samples
+from selfmotion.motion import Grid, Trajectory
+from selfmotion.optimise import Status
+from selfmotion.plans import Plan, Problem, Report
 
 # Samples of a motion to begin with; doubled until the cubics between them hold the tolerance.
 _FEWEST_STEPS, _MOST_DOUBLINGS = 64, 6

@@ -4,13 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from selfmotion.arrays import Array
 from selfmotion.baselines.base import Motion, along_rate
 from selfmotion.baselines.integration import PoseFeedback
 from selfmotion.baselines.local import pose_gradient
+from selfmotion.basics import Array, BreakdownError
 from selfmotion.costs import Cost, Manipulability
-from selfmotion.errors import BreakdownError
-from selfmotion.problem import Problem
+from selfmotion.plans import Problem
 
 # The attraction to the stationary pose, times the duration.
 _ATTRACTION = 20.0

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from selfmotion.arrays import Array
-from selfmotion.errors import BreakdownError
-from selfmotion.problem import Problem
+from selfmotion.basics import Array, BreakdownError
+from selfmotion.plans import Problem
 
 if TYPE_CHECKING:
     from scipy.integrate import OdeSolution

@@ -6,17 +6,13 @@ from functools import cached_property
 
 import numpy as np
 
-from selfmotion.arrays import Array, read_only
 from selfmotion.baselines.base import Motion, pseudo_inverse
 from selfmotion.baselines.integration import start_of
-from selfmotion.costs import Cost, JointVelocity
-from selfmotion.costs.base import weight_matrix
-from selfmotion.errors import ProblemError
-from selfmotion.grid import Grid
-from selfmotion.plan import Plan
-from selfmotion.problem import Problem
-from selfmotion.quasi_newton import Status
-from selfmotion.samples import Samples
+from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.costs import Cost, JointVelocity, Samples, weight_matrix
+from selfmotion.motion import Grid
+from selfmotion.optimise import Status
+from selfmotion.plans import Plan, Problem
 
 # The pose feedback removes what collocation lets in at the rate K e; K times the duration.
 _FEEDBACK = 5.0

@@ -4,14 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from selfmotion.arrays import Array, read_only
 from selfmotion.baselines.base import Motion, along_rate, costs, pseudo_inverse
 from selfmotion.baselines.integration import PoseFeedback
-from selfmotion.costs import Cost, Manipulability
-from selfmotion.errors import BreakdownError, ProblemError
-from selfmotion.grid import Grid
-from selfmotion.problem import Problem
-from selfmotion.samples import Samples
+from selfmotion.basics import Array, BreakdownError, ProblemError, read_only
+from selfmotion.costs import Cost, Manipulability, Samples
+from selfmotion.motion import Grid
+from selfmotion.plans import Problem
 
 # Steps of the quadrature that compares gains, and cost evaluations of the search for the best.
 _STEPS, _TRIALS = 64, 16

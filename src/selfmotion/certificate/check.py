@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array
 from selfmotion.certificate.measure import deviation_from
 from selfmotion.certificate.terms import (
     Certificate,
@@ -14,12 +14,10 @@ from selfmotion.certificate.terms import (
     Tolerance,
 )
 from selfmotion.collision import CollisionModel
-from selfmotion.damping import DampingLaw
+from selfmotion.motion import Trajectory
 from selfmotion.path import Path
-from selfmotion.relaxation import deviation_size, excess
 from selfmotion.robot import RobotModel
-from selfmotion.task import Task
-from selfmotion.trajectory import Trajectory
+from selfmotion.task import DampingLaw, Task, deviation_size, excess
 
 # Points per interval of the trajectory's samples: odd, so that none but the samples are symmetric.
 _REFINEMENT = 5

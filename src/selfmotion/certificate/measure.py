@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task

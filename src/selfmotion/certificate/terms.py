@@ -4,12 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array, ProblemError
 from selfmotion.collision import CollisionModel
-from selfmotion.damping import DampingLaw
-from selfmotion.errors import ProblemError
-from selfmotion.relaxation import Relaxation
 from selfmotion.robot import RobotModel
+from selfmotion.task import DampingLaw, Relaxation
 
 
 @dataclass(frozen=True)

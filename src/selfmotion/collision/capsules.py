@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.arrays import Array, read_only
+from selfmotion.basics import Array, read_only
 from selfmotion.collision.outlines import Outline, join, outline
 from selfmotion.robot import RobotModel
 

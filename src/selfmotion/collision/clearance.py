@@ -6,12 +6,11 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array, CollisionError, RobotError
 from selfmotion.collision.capsules import LinkCapsule, link_capsules
 from selfmotion.collision.exact import CollisionModel
 from selfmotion.collision.obstacles import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
 from selfmotion.collision.shapes import obstacle_geometry
-from selfmotion.errors import CollisionError, RobotError
 
 Ints = npt.NDArray[np.int64]
 

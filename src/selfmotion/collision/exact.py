@@ -10,11 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array, CollisionError
 from selfmotion.collision import shapes
 from selfmotion.collision.obstacles import Obstacle
 from selfmotion.collision.pairs import Body, candidate_pairs
-from selfmotion.errors import CollisionError
 from selfmotion.robot import RobotModel
 
 

@@ -5,10 +5,9 @@ import math
 
 import numpy as np
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array, kernel
 from selfmotion.collision.capsules import capsule_volume
 from selfmotion.collision.outlines import Outline, extreme
-from selfmotion.jit import kernel
 
 # A capsule of more than this many times the volume of the convex hull is worth dividing,
 _WASTE = 1.5

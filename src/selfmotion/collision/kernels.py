@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array, kernel
 from selfmotion.collision.segments import (
     Contact,
     Vector,
@@ -13,7 +13,6 @@ from selfmotion.collision.segments import (
     segment_cylinder,
     segment_segment,
 )
-from selfmotion.jit import kernel
 
 Ints = npt.NDArray[np.int64]
 

@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.arrays import Array, read_only
-from selfmotion.errors import CollisionError
+from selfmotion.basics import Array, CollisionError, read_only
 
 # How far a rotation matrix read from a file may be from orthonormal.
 _ROTATION_TOLERANCE = 1e-6

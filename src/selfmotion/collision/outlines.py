@@ -7,9 +7,8 @@ import coal
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array, CollisionError
 from selfmotion.collision.shapes import is_mesh, triangles
-from selfmotion.errors import CollisionError
 
 # Sides of the prism around a cylinder: it is wider than the cylinder by 0.9 %.
 _SIDES = 24

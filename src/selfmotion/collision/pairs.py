@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from selfmotion.errors import CollisionError
-from selfmotion.urdf import Urdf
+from selfmotion.basics import CollisionError
+from selfmotion.robot import Urdf
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ triples of floats: numba keeps them in registers.
 
 import math
 
-from selfmotion.jit import kernel
+from selfmotion.basics import kernel
 
 Vector = tuple[float, float, float]
 Contact = tuple[float, Vector, Vector]

@@ -7,9 +7,8 @@ import coal
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array, CollisionError
 from selfmotion.collision.obstacles import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
-from selfmotion.errors import CollisionError
 
 # A mesh whose hull is larger by less than this share of its volume counts as convex.
 _CONVEX = 1e-3

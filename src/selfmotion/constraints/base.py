@@ -8,9 +8,9 @@ digits of the optimisation stay within the limits themselves.
 from dataclasses import dataclass
 from typing import Protocol
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array
+from selfmotion.costs import Samples
 from selfmotion.robot import RobotModel
-from selfmotion.samples import Samples
 from selfmotion.task import Task
 
 

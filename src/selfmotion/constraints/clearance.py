@@ -8,12 +8,11 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array, ProblemError
 from selfmotion.collision import ClearanceModel, Clearances, CollisionModel, Obstacle
 from selfmotion.constraints.base import NodePartials, NodeTangents, motion_of_order
-from selfmotion.errors import ProblemError
+from selfmotion.costs import Samples
 from selfmotion.robot import RobotModel
-from selfmotion.samples import Samples
 from selfmotion.task import Task
 
 

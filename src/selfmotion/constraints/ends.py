@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array, per_joint, read_only
+from selfmotion.basics import Array, per_joint, read_only
 from selfmotion.constraints.base import NodePartials, NodeTangents, motion_of_order
-from selfmotion.robot import RobotModel
-from selfmotion.samples import Samples
+from selfmotion.costs import Samples
+from selfmotion.robot import RobotModel, null_basis
 from selfmotion.task import Task
 
 # The augmented Lagrangian need only come near [rad, rad/s]: Newton's method then closes the rest.
@@ -129,9 +129,3 @@ class BoundEnd:
         goal = "that of the start" if self.target is None else "the one asked for"
         miss = np.abs(self.residual(samples)).max()
         return f"the {quantity} at the end is {miss:.3g} (rad or m, per s) away from {goal}"
-
-
-def null_basis(robot: RobotModel, task: Task, q: Array) -> Array:
-    """Return an orthonormal basis of the null space of the task Jacobian at q, (n, r)."""
-    _, _, right = np.linalg.svd(robot.task_jacobian(q, task))
-    return np.asarray(right[task.dimension :].T)

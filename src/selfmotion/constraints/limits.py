@@ -5,16 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array, per_joint, read_only
+from selfmotion.basics import Array, ProblemError, per_joint, read_only
 from selfmotion.constraints.base import (
     NodePartials,
     NodeTangents,
     motion_of_order,
     partials_of_order,
 )
-from selfmotion.errors import ProblemError
+from selfmotion.costs import Samples
 from selfmotion.robot import RobotModel
-from selfmotion.samples import Samples
 from selfmotion.task import Task
 
 

@@ -1,6 +1,6 @@
 """What a motion costs: integrands G(q̇, q, t) of F = ∫ G dt, each with exact derivatives."""
 
-from selfmotion.costs.base import Cost, Partials
+from selfmotion.costs.base import Cost, Partials, weight_matrix
 from selfmotion.costs.dynamics import GravityTorque, KineticEnergy
 from selfmotion.costs.function import FunctionCost
 from selfmotion.costs.joints import (
@@ -17,6 +17,7 @@ from selfmotion.costs.manipulability import (
     Manipulability,
     SmallestSingularValue,
 )
+from selfmotion.costs.samples import Samples
 
 __all__ = [
     "Cost",
@@ -33,5 +34,7 @@ __all__ = [
     "Partials",
     "PathLength",
     "Posture",
+    "Samples",
     "SmallestSingularValue",
+    "weight_matrix",
 ]

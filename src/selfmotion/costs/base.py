@@ -6,9 +6,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array, read_only
-from selfmotion.errors import ProblemError
-from selfmotion.samples import Samples
+from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.costs.samples import Samples
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array, ProblemError
 from selfmotion.costs.base import (
     Partials,
     as_weight,
@@ -16,9 +16,8 @@ from selfmotion.costs.base import (
     half_square,
     weighted,
 )
-from selfmotion.errors import ProblemError
+from selfmotion.costs.samples import Samples
 from selfmotion.robot import RobotModel
-from selfmotion.samples import Samples
 
 
 @dataclass(frozen=True, eq=False)

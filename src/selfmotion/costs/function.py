@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array, ProblemError
 from selfmotion.costs.base import Partials
-from selfmotion.errors import ProblemError
-from selfmotion.samples import Samples
+from selfmotion.costs.samples import Samples
 
 Integrand = Callable[[Array, Array, Array], npt.ArrayLike]
 IntegrandGradient = Callable[[Array, Array, Array], tuple[npt.ArrayLike, npt.ArrayLike]]

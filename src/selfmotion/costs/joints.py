@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array, read_only
+from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.costs.base import (
     Partials,
     as_weight,
@@ -16,8 +16,7 @@ from selfmotion.costs.base import (
     weight_matrix,
     weighted,
 )
-from selfmotion.errors import ProblemError
-from selfmotion.samples import Samples
+from selfmotion.costs.samples import Samples
 
 
 @dataclass(frozen=True, eq=False)

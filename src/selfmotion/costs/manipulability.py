@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array, read_only
+from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.costs.base import Partials, check_mu
-from selfmotion.errors import ProblemError
-from selfmotion.samples import Samples
+from selfmotion.costs.samples import Samples
 
 
 @dataclass(frozen=True)

@@ -14,18 +14,35 @@ Column k of J6 is [v_k; ω_k]. On a chain, with ω = 0 for prismatic joints,
 so that ⟨M, ∂J6/∂q_k⟩ needs two running sums of cross products over the columns of M and J6.
 """
 
-from selfmotion.kernels.algebra import angle_kind, contract_task
+from selfmotion.kernels.algebra import (
+    LOGARITHM,
+    POINTING,
+    angle_kind,
+    cholesky,
+    contract_task,
+    pointing_error,
+    rotation_error,
+    select,
+    solve_cholesky,
+)
 from selfmotion.kernels.backward import pullback, sensitivities
 from selfmotion.kernels.forward import advance, evaluate, newton_step
 from selfmotion.kernels.table import layout
 
 __all__ = [
+    "LOGARITHM",
+    "POINTING",
     "advance",
     "angle_kind",
+    "cholesky",
     "contract_task",
     "evaluate",
     "layout",
     "newton_step",
+    "pointing_error",
     "pullback",
+    "rotation_error",
+    "select",
     "sensitivities",
+    "solve_cholesky",
 ]

@@ -3,9 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array
-from selfmotion.jit import kernel
-from selfmotion.task import Task
+from selfmotion.basics import Array, kernel
 
 Rows = npt.NDArray[np.intp]
 
@@ -13,11 +11,11 @@ Rows = npt.NDArray[np.intp]
 NO_ANGLE, LOGARITHM, POINTING = 0, 1, 2
 
 
-def angle_kind(task: Task) -> int:
-    """Return how a task measures its angular error."""
-    if task.tool_axes:
+def angle_kind(rows: Rows, tool_axes: bool) -> int:
+    """Return how a task with these rows of [v, ω] measures its angular error."""
+    if tool_axes:
         return POINTING
-    return LOGARITHM if np.any(task.rows >= 3) else NO_ANGLE
+    return LOGARITHM if np.any(rows >= 3) else NO_ANGLE
 
 
 # Below this angle the closed forms in sin θ lose digits and their series serve.

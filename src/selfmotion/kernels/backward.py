@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from selfmotion.arrays import Array
-from selfmotion.jit import kernel
+from selfmotion.basics import Array, kernel
 from selfmotion.kernels.algebra import (
     NO_ANGLE,
     POINTING,

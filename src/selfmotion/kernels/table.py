@@ -6,7 +6,7 @@ table in place of a dozen arrays.
 
 from typing import NamedTuple
 
-from selfmotion.jit import kernel
+from selfmotion.basics import kernel
 
 
 class Layout(NamedTuple):

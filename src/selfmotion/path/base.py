@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.arrays import Array, read_only
-from selfmotion.errors import PathError
+from selfmotion.basics import Array, PathError, read_only
 
 # Rounding of a last time such as 50 * 0.02 must not count as outside the motion.
 _TIME_SLACK = 1e-9

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from selfmotion.errors import FileFormatError
+from selfmotion.basics import FileFormatError
 from selfmotion.path.base import Path
 from selfmotion.path.retimed import Retimed
 from selfmotion.path.shapes import Circle, Line

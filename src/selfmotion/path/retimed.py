@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array, read_only
-from selfmotion.errors import PathError
+from selfmotion.basics import Array, PathError, read_only
 from selfmotion.path.base import Path, PathSamples
 
 

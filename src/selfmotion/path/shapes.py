@@ -7,8 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.arrays import Array, read_only
-from selfmotion.errors import PathError
+from selfmotion.basics import Array, PathError, read_only
 from selfmotion.path.base import (
     Path,
     PathSamples,

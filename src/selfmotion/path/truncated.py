@@ -4,8 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.arrays import Array, read_only
-from selfmotion.errors import PathError
+from selfmotion.basics import Array, PathError, read_only
 from selfmotion.path.base import Path, PathSamples
 
 # The knots crowd towards the end by halves, down to about this share of the duration.

@@ -9,8 +9,7 @@ import numpy.typing as npt
 import pinocchio as pin
 from numpy.polynomial import chebyshev
 
-from selfmotion.arrays import Array, read_only
-from selfmotion.errors import PathError
+from selfmotion.basics import Array, PathError, read_only
 from selfmotion.path.base import Path, PathSamples, as_pose, check_duration
 
 _DEGREE = 24

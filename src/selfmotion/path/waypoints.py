@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.arrays import Array, read_only
-from selfmotion.errors import FileFormatError, PathError
+from selfmotion.basics import Array, FileFormatError, PathError, read_only
 from selfmotion.path.base import Path, PathSamples, as_pose, unit
 
 _COLUMNS = ("t", "x", "y", "z")

@@ -11,9 +11,8 @@ from typing import IO, Any
 
 import numpy as np
 
-from selfmotion.errors import RenderError
-from selfmotion.files import write_atomically
-from selfmotion.plan import Plan
+from selfmotion.basics import RenderError, write_atomically
+from selfmotion.plans import Plan
 from selfmotion.replay.page import replay_html
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array
 from selfmotion.collision import CollisionModel
-from selfmotion.trajectory import Trajectory
+from selfmotion.motion import Trajectory
 
 # A distance query costs milliseconds, a hundred times one point of the other curves.
 _POINTS = 121

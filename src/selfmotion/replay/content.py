@@ -3,9 +3,9 @@
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array
 from selfmotion.collision import Obstacle
-from selfmotion.plan import Plan
+from selfmotion.plans import Plan
 from selfmotion.replay import links, scene, shapes
 from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
 from selfmotion.replay.facts import describe, table

@@ -3,7 +3,7 @@
 from typing import Any
 
 from selfmotion.certificate import Extreme
-from selfmotion.plan import Plan
+from selfmotion.plans import Plan
 
 # A number and a remark, shown smaller after it.
 Cell = tuple[str, str]

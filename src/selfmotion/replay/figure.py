@@ -4,9 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from selfmotion.arrays import Array
-from selfmotion.errors import RenderError
-from selfmotion.plan import Plan
+from selfmotion.basics import Array, RenderError
+from selfmotion.plans import Plan
 from selfmotion.replay.motion import Curves, curves
 
 if TYPE_CHECKING:

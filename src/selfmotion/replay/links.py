@@ -8,8 +8,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.arrays import Array
-from selfmotion.errors import RobotError
+from selfmotion.basics import Array, RobotError
 from selfmotion.replay import three
 from selfmotion.replay.meshes import Color, Mesh, read_meshes, simplify
 from selfmotion.replay.payload import Json, Payload

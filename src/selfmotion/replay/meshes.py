@@ -13,8 +13,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from selfmotion.arrays import Array
-from selfmotion.errors import RobotError
+from selfmotion.basics import Array, RobotError
 
 _GRID = 65535
 # Edges sharper than this are drawn as edges, flatter ones as part of a smooth surface.

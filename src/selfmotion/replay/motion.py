@@ -7,11 +7,11 @@ import numpy.typing as npt
 import pinocchio as pin
 from scipy.ndimage import maximum_filter1d
 
-from selfmotion.arrays import Array
-from selfmotion.plan import Plan
+from selfmotion.basics import Array
+from selfmotion.motion import Trajectory
+from selfmotion.plans import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
-from selfmotion.trajectory import Trajectory
 
 # Between key frames a page interpolates; it may be off by this much at most [m, and per entry of
 # the rotation matrix]. Below what a screen resolves and half of what our tests ask for.

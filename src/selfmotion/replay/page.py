@@ -14,9 +14,8 @@ from typing import IO, Any
 
 import numpy.typing as npt
 
-from selfmotion.errors import ProblemError
-from selfmotion.files import write_atomically
-from selfmotion.plan import Plan
+from selfmotion.basics import ProblemError, write_atomically
+from selfmotion.plans import Plan
 from selfmotion.replay.content import page_content
 from selfmotion.replay.facts import describe
 from selfmotion.replay.payload import Payload

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array, CollisionError
 from selfmotion.collision import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
-from selfmotion.errors import CollisionError
 from selfmotion.replay import shapes, three
 from selfmotion.replay.links import Arm, safe
 from selfmotion.replay.meshes import read_meshes

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array
 
 # Viridis at nine places: perceptually even, readable without colour vision and in grey.
 COLOR_SCALE = (

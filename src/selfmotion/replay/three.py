@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array
 from selfmotion.replay.shapes import capsule_profile
 
 Json = dict[str, Any]

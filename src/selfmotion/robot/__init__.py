@@ -2,5 +2,15 @@
 
 from selfmotion.robot.loading import NAMED_ARMS, load_robot, rebuild_robot
 from selfmotion.robot.model import RobotModel
+from selfmotion.robot.null_space import null_basis
+from selfmotion.robot.urdf import Urdf, UrdfJoint
 
-__all__ = ["NAMED_ARMS", "RobotModel", "load_robot", "rebuild_robot"]
+__all__ = [
+    "NAMED_ARMS",
+    "RobotModel",
+    "Urdf",
+    "UrdfJoint",
+    "load_robot",
+    "null_basis",
+    "rebuild_robot",
+]

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.arrays import read_only
-from selfmotion.errors import RobotError
+from selfmotion.basics import RobotError, read_only
 from selfmotion.robot.model import RobotModel, locked_configuration
-from selfmotion.urdf import Urdf, parse_urdf, read_urdf
+from selfmotion.robot.urdf import Urdf, parse_urdf, read_urdf
 
 
 @dataclass(frozen=True)
@@ -44,6 +43,10 @@ NAMED_ARMS: Mapping[str, NamedArm] = {
     "kinova": NamedArm("kinova_description/robots/kinova.urdf", "j2s6s200_end_effector"),
     "z1": NamedArm("z1_description/urdf/z1.urdf", "gripperStator"),
 }
+
+
+# Beside this module in an installed package, at the top of the repository in a checkout.
+_OWN_ARMS = (Path(__file__).parent / "arms", Path(__file__).parents[3] / "robots")
 
 
 def load_robot(
@@ -155,9 +158,9 @@ def rebuild_robot(
 
 
 def _read_named(arm: NamedArm) -> Urdf:
-    own = Path(__file__).parents[1] / "robots" / arm.urdf
-    if own.is_file():
-        return read_urdf(own)
+    for folder in _OWN_ARMS:
+        if (folder / arm.urdf).is_file():
+            return read_urdf(folder / arm.urdf)
     share = _example_robot_data()
     urdf = read_urdf(share / "robots" / arm.urdf)
     return Urdf(urdf.source, urdf.text, (str(share.parent), str(share)), urdf.joints)

@@ -8,10 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.arrays import Array
-from selfmotion.errors import InverseKinematicsError, RobotError
+from selfmotion.basics import Array, InverseKinematicsError, RobotError
+from selfmotion.robot.urdf import Urdf
 from selfmotion.task import Task
-from selfmotion.urdf import Urdf
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 

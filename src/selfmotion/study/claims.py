@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array
 from selfmotion.costs import JointVelocity, Manipulability
-from selfmotion.null_motion import PolynomialNullMotion
+from selfmotion.motion import PolynomialNullMotion
 from selfmotion.robot import RobotModel, load_robot
 from selfmotion.study.context import Context, evaluate, run_published
 from selfmotion.study.engine import bind, optimum

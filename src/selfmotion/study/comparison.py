@@ -12,15 +12,13 @@ from selfmotion.baselines import (
     Method,
     PseudoInverse,
 )
+from selfmotion.basics import BreakdownError
 from selfmotion.costs import InverseManipulability, JointVelocity
-from selfmotion.errors import BreakdownError
-from selfmotion.null_motion import PolynomialNullMotion
+from selfmotion.motion import PolynomialNullMotion
 from selfmotion.path import Circle
-from selfmotion.plan import Plan
-from selfmotion.planner import plan
-from selfmotion.problem import Problem
+from selfmotion.planning import plan
+from selfmotion.plans import Plan, Problem, sample_problem
 from selfmotion.robot import load_robot
-from selfmotion.sample import sample_problem
 from selfmotion.study.context import Context
 from selfmotion.study.results import Claim, Section, Table, Verdict
 

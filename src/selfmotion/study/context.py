@@ -6,15 +6,13 @@ from functools import cached_property
 
 import numpy as np
 
-from selfmotion.arrays import Array
 from selfmotion.baselines import LagrangianOptimum, plan_by
+from selfmotion.basics import Array
 from selfmotion.costs import Cost, InverseManipulability, JointVelocity
-from selfmotion.null_motion import PolynomialNullMotion
-from selfmotion.plan import Plan
-from selfmotion.planner import plan
-from selfmotion.problem import Problem
-from selfmotion.quasi_newton import Minimum
-from selfmotion.sample import sample_problem
+from selfmotion.motion import PolynomialNullMotion
+from selfmotion.optimise import Minimum
+from selfmotion.planning import plan
+from selfmotion.plans import Plan, Problem, sample_problem
 from selfmotion.study.engine import Scale, bind, optimum
 from selfmotion.study.published import (
     PublishedFunction,

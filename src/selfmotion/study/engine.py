@@ -4,16 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.arrays import Array
-from selfmotion.baselines.integration import start_of
-from selfmotion.grid import Grid
-from selfmotion.line_search import LineSearch
-from selfmotion.null_motion import NullMotionTable, TransportedFrame
-from selfmotion.objective import Objective, inverse_metric
-from selfmotion.problem import Problem
-from selfmotion.quasi_newton import Minimum, QuasiNewton
-from selfmotion.rollout import Rollout
-from selfmotion.start import FixedStart
+from selfmotion.baselines import start_of
+from selfmotion.basics import Array
+from selfmotion.engine import FixedStart, Objective, Rollout, inverse_metric
+from selfmotion.motion import Grid, NullMotionTable, TransportedFrame
+from selfmotion.optimise import LineSearch, Minimum, QuasiNewton
+from selfmotion.plans import Problem
 
 
 @dataclass(frozen=True)

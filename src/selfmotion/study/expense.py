@@ -8,10 +8,9 @@ import numpy as np
 
 from selfmotion.baselines import LagrangianOptimum, plan_by
 from selfmotion.path import Line
-from selfmotion.planner import plan
-from selfmotion.problem import Problem
+from selfmotion.planning import plan
+from selfmotion.plans import Problem, sample_problem
 from selfmotion.robot import load_robot
-from selfmotion.sample import sample_problem
 from selfmotion.study.context import Context, PublishedRun, run_published
 from selfmotion.study.published import (
     ODE23_TOLERANCE,

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from selfmotion.errors import RenderError
+from selfmotion.basics import RenderError
 from selfmotion.study.results import Plot
 
 if TYPE_CHECKING:

@@ -6,14 +6,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
-from selfmotion.arrays import Array, read_only
-from selfmotion.baselines.integration import start_of
-from selfmotion.grid import Grid
-from selfmotion.line_search import LineSearch
-from selfmotion.null_motion import NullMotionTable, PolynomialNullMotion
-from selfmotion.problem import Problem
-from selfmotion.quasi_newton import QuasiNewton
-from selfmotion.samples import Samples
+from selfmotion.baselines import start_of
+from selfmotion.basics import Array, read_only
+from selfmotion.costs import Samples
+from selfmotion.motion import Grid, NullMotionTable, PolynomialNullMotion
+from selfmotion.optimise import LineSearch, QuasiNewton
+from selfmotion.plans import Problem
 
 # Relative tolerance of MATLAB's ode23 where none is given; its absolute one is a thousandth.
 ODE23_TOLERANCE = 1e-3

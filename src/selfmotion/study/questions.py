@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from selfmotion.arrays import Array
 from selfmotion.baselines import (
     DampedLeastSquares,
     LagrangianOptimum,
@@ -12,14 +11,12 @@ from selfmotion.baselines import (
     PseudoInverse,
     plan_by,
 )
-from selfmotion.errors import BreakdownError
-from selfmotion.null_motion import PolynomialNullMotion
+from selfmotion.basics import Array, BreakdownError
+from selfmotion.motion import PolynomialNullMotion
 from selfmotion.path import Line
-from selfmotion.plan import Plan
-from selfmotion.planner import plan
-from selfmotion.problem import Problem
+from selfmotion.planning import plan
+from selfmotion.plans import Plan, Problem, sample_problem
 from selfmotion.robot import load_robot
-from selfmotion.sample import sample_problem
 from selfmotion.study.context import FINE, Context, evaluate
 from selfmotion.study.engine import bind, optimum
 from selfmotion.study.published import ODE23_TOLERANCE, PublishedFunction

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from selfmotion.null_motion import PolynomialNullMotion
-from selfmotion.quasi_newton import Minimum
+from selfmotion.motion import PolynomialNullMotion
+from selfmotion.optimise import Minimum
 from selfmotion.study.context import Context
 from selfmotion.study.engine import bind, optimum
 from selfmotion.study.published import published_null_motion

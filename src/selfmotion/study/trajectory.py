@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from selfmotion.arrays import Array
+from selfmotion.basics import Array
 from selfmotion.costs import Cost, InverseManipulability, JointVelocity, Manipulability
 from selfmotion.study.context import Context, Result, evaluate
 from selfmotion.study.engine import optimum

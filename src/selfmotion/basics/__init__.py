@@ -1,0 +1,47 @@
+"""What every part of the package stands on: errors, arrays, progress, files, compilation."""
+
+from selfmotion.basics.arrays import Array, per_joint, read_only
+from selfmotion.basics.errors import (
+    BreakdownError,
+    CollisionError,
+    FileFormatError,
+    InverseKinematicsError,
+    NoSequenceError,
+    PathError,
+    PlanError,
+    ProblemError,
+    RedundancyError,
+    RenderError,
+    RobotError,
+    SelfmotionError,
+    StartError,
+)
+from selfmotion.basics.files import read_archive, write_archive, write_atomically, write_csv
+from selfmotion.basics.jit import kernel
+from selfmotion.basics.progress import Progress, silent
+
+__all__ = [
+    "Array",
+    "BreakdownError",
+    "CollisionError",
+    "FileFormatError",
+    "InverseKinematicsError",
+    "NoSequenceError",
+    "PathError",
+    "PlanError",
+    "ProblemError",
+    "Progress",
+    "RedundancyError",
+    "RenderError",
+    "RobotError",
+    "SelfmotionError",
+    "StartError",
+    "kernel",
+    "per_joint",
+    "read_archive",
+    "read_only",
+    "silent",
+    "write_archive",
+    "write_atomically",
+    "write_csv",
+]

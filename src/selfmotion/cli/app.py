@@ -1,0 +1,275 @@
+"""The command line: parse, call, print."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import typer
+from rich.console import Console
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.cli import tables
+from selfmotion.cli.stage_display import StageDisplay
+
+app = typer.Typer(
+    help="Plan the joint motion of a redundant arm along a tool motion.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+_console = Console(highlight=False)
+# Apart from the results, so that these can be piped.
+_stages = Console(stderr=True, highlight=False)
+
+VERIFIED, NOT_VERIFIED, BAD_INPUT = 0, 1, 2
+
+TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
+Corners = Literal["blend", "stop"]
+Axis = Literal["x", "y", "z"]
+Search = Literal["auto", "local", "global"]
+
+RobotArgument = Annotated[
+    str, typer.Argument(help="Name (see `selfmotion robots`) or path of a .urdf file.")
+]
+PlanArgument = Annotated[Path, typer.Argument(help="A plan saved as .npz.")]
+
+
+def main() -> None:
+    """Run the command; exit code 2 and one line for bad input."""
+    try:
+        app()
+    except sm.SelfmotionError as error:
+        Console(stderr=True, highlight=False).print(
+            f"error: {error}", style="red", markup=False, soft_wrap=True
+        )
+        sys.exit(BAD_INPUT)
+
+
+@app.command(
+    epilog="Example: selfmotion plan panda --circle 0.15 --duration 4 --out plan.npz --html a.html"
+)
+def plan(
+    robot: RobotArgument,
+    path: Annotated[
+        Path | None, typer.Option(help="Waypoints: CSV with t,x,y,z,qw,qx,qy,qz (s, m).")
+    ] = None,
+    circle: Annotated[float | None, typer.Option(help="Or a circle of this radius (m).")] = None,
+    line: Annotated[str | None, typer.Option(help="Or a straight line by dx,dy,dz (m).")] = None,
+    normal: Annotated[Axis, typer.Option(help="Axis of the circle.")] = "x",
+    duration: Annotated[float, typer.Option(help="Of circle or line (s).")] = 4.0,
+    corners: Annotated[Corners, typer.Option(help="At kinks of the waypoints.")] = "blend",
+    task: Annotated[TaskName, typer.Option(help="What the path prescribes.")] = "pose",
+    relax: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Rows that may leave the path: ROWS[=BAND][@FROM:TO], rows of x,y,z or of "
+            "rx,ry,rz (tool axes), BAND in m or rad (free without), times in s. Examples: z=0.002, "
+            "rx,ry=0.2 (a cone), rz@1:2.5. Repeatable."
+        ),
+    ] = None,
+    start: Annotated[
+        str | None, typer.Option(help="q1,q2,… (rad or m); default: one that suits the path.")
+    ] = None,
+    tool: Annotated[str | None, typer.Option(help="Tool frame (a link).")] = None,
+    degree: Annotated[int, typer.Option(help="Degree of the null motion's polynomial.")] = 3,
+    mu: Annotated[
+        float, typer.Option(help="Weight of 1/det(JJᵀ), the distance from singular poses.")
+    ] = 0.0,
+    damped: Annotated[
+        bool,
+        typer.Option("--damped", help="Go through singular poses, at the price of the path there."),
+    ] = False,
+    max_evaluations: Annotated[
+        int | None, typer.Option(help="Limit on cost evaluations while optimising.")
+    ] = None,
+    search: Annotated[
+        Search, typer.Option(help="Without --start: from many starts, or over all self-motions.")
+    ] = "auto",
+    compare: Annotated[
+        bool, typer.Option("--compare", help="Tell the distance from the global optimum.")
+    ] = False,
+    out: Annotated[
+        list[Path] | None, typer.Option(help="Write the plan (.npz) or its motion (.csv).")
+    ] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a replay to open in a browser.")] = None,
+) -> None:
+    """Plan a motion, check it, and write it."""
+    _check_suffixes(out or [])
+    arm = sm.load_robot(robot, tool=tool)
+    rows = sm.Task.of(task)
+    configuration = _numbers(start, "--start") if start is not None else None
+    motion: sm.Path
+    if sum(option is not None for option in (path, circle, line)) != 1:
+        raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
+    if path is not None:
+        motion = sm.Waypoints.from_csv(path, corners=corners)
+    else:
+        if configuration is None:
+            configuration = arm.dexterous_configuration(rows)
+        pose = arm.pose(configuration)
+        if circle is not None:
+            axis = np.eye(3)["xyz".index(normal)]
+            motion = sm.Circle.around(pose, circle, duration, normal=axis)
+        else:
+            end = pose.copy()
+            end.translation = pose.translation + _numbers(line or "", "--line", 3)
+            motion = sm.Line(pose, end, duration)
+    costs: list[sm.Cost] = [sm.JointVelocity()]
+    if mu != 0.0:
+        costs.append(sm.InverseManipulability(mu))
+    problem = sm.Problem(
+        arm,
+        motion,
+        rows,
+        configuration,
+        sm.PolynomialNullMotion(degree),
+        tuple(costs),
+        relaxations=[_relaxation(text) for text in relax or []],
+        damping=sm.Damping() if damped else None,
+    )
+    result = _plan_with_progress(
+        problem, max_evaluations=max_evaluations, search=search, compare=compare
+    )
+    tables.show(result, _console)
+    _write(result, out or [], html)
+    raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion check plan.npz")
+def check(plan: PlanArgument) -> None:
+    """Re-check a saved plan by forward kinematics."""
+    saved = sm.load_plan(plan)
+    certificate = saved.check()
+    tables.show_certificate(certificate, _console)
+    raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
+
+
+@app.command(
+    epilog="Example: selfmotion replay plan.npz --html replay.html --png 1.5 --gif motion.gif"
+)
+def replay(
+    plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz, of one robot.")],
+    html: Annotated[Path, typer.Option(help="The page to write.")] = Path("replay.html"),
+    png: Annotated[
+        float | None, typer.Option(help="Also draw the scene at this time (s), beside the page.")
+    ] = None,
+    gif: Annotated[Path | None, typer.Option(help="Also draw the motion as a GIF.")] = None,
+) -> None:
+    """Write a page that replays plans in a browser, offline; several get a switch.
+
+    Pictures need a browser (chromium) on this machine.
+    """
+    from selfmotion.replay import render_gif, render_png, write_replay
+
+    saved = [sm.load_plan(plan) for plan in plans]
+    labels = [plan.stem for plan in plans] if len(plans) > 1 else None
+    written = [write_replay(saved, html, labels=labels)]
+    if png is not None:
+        written.append(render_png(saved[0], html.with_suffix(".png"), t=png))
+    if gif is not None:
+        written.append(render_gif(saved[0], gif))
+    for file in written:
+        _console.print(f"wrote {file}", markup=False)
+
+
+@app.command(epilog="Example: selfmotion robots")
+def robots() -> None:
+    """List the arms known by name: joints, tool frame, and redundancy for each task."""
+    tables.show_robots({name: sm.load_robot(name) for name in sm.NAMED_ARMS}, _console)
+
+
+@app.command(epilog="Example: selfmotion demo --out out")
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder for plans and replays.")] = Path("out"),
+) -> None:
+    """Plan, check and replay the paper's planar arm and a Panda on a circle."""
+    panda = sm.load_robot("panda")
+    start = np.array([0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4])
+    circle = sm.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    problems = {
+        "planar": sm.sample_problem(),
+        "panda": sm.Problem(panda, circle, start=start),
+    }
+    verified = True
+    for name, problem in problems.items():
+        _console.rule(name)
+        result = _plan_with_progress(problem)
+        tables.show(result, _console)
+        files = [out / f"{name}.npz", out / f"{name}.csv"]
+        _write(result, files, out / f"{name}.html")
+        verified = verified and result.certificate.verified
+    raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion study --out out/study")
+def study(
+    out: Annotated[Path, typer.Option(help="Folder for the report.")] = Path("out/study"),
+    reduced: Annotated[
+        bool, typer.Option("--reduced", help="Fewer starts, chains and arms: half a minute.")
+    ] = False,
+) -> None:
+    """Re-run the paper: figures, tables and claims, as one HTML page, PNGs and JSON.
+
+    Takes minutes. Needs matplotlib (the extra `plots`).
+    """
+    from selfmotion.study import PARTS, Scale, run, write
+
+    scale = Scale.reduced() if reduced else Scale.full()
+    with StageDisplay(_stages) as display:
+        result = run(scale, lambda part: display.stage(part, PARTS.index(part) + 1, len(PARTS)))
+    files = write(result, out)
+    tables.show_claims(result.claims, _console)
+    _console.print(f"wrote {files[0]} and {len(files) - 1} files beside it", markup=False)
+
+
+def _plan_with_progress(problem: sm.Problem, **options: Any) -> sm.Plan:
+    with StageDisplay(_stages) as display:
+        return sm.plan(problem, callback=display.iteration, progress=display.stage, **options)
+
+
+def _write(result: sm.Plan, out: list[Path], html: Path | None) -> None:
+    for file in out:
+        if file.suffix == ".csv":
+            result.to_csv(file)
+        else:
+            result.save(file)
+        _console.print(f"wrote {file}", markup=False)
+    if html is not None:
+        from selfmotion.replay import write_replay
+
+        write_replay(result, html)
+        _console.print(f"wrote {html}", markup=False)
+
+
+def _check_suffixes(files: list[Path]) -> None:
+    for file in files:
+        if file.suffix not in (".csv", ".npz"):
+            raise sm.FileFormatError(f"{file}: --out writes .npz (the plan) or .csv (its motion)")
+
+
+def _relaxation(text: str) -> sm.Relaxation:
+    rest, _, window = text.partition("@")
+    rows, _, band = rest.partition("=")
+    try:
+        first, last = (float(time) for time in window.split(":")) if window else (0.0, 0.0)
+        return sm.Relaxation(
+            tuple(rows.split(",")),
+            float(band) if band else np.inf,
+            (first, last) if window else None,
+        )
+    except ValueError:
+        raise sm.ProblemError(
+            f"--relax is '{text}', expected ROWS[=BAND][@FROM:TO] like rx,ry=0.2 or rz@1:2.5"
+        ) from None
+
+
+def _numbers(text: str, option: str, count: int | None = None) -> Array:
+    try:
+        numbers = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        raise sm.ProblemError(f"{option} is '{text}', expected numbers like 0,-0.8,1.6") from None
+    if count is not None and len(numbers) != count:
+        raise sm.ProblemError(f"{option} has {len(numbers)} numbers, expected {count}")
+    return numbers

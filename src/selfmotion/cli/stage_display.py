@@ -1,0 +1,65 @@
+"""Which stage is running: a bar on a terminal, a line per stage in a log."""
+
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from selfmotion.optimise import Iteration
+
+
+class StageDisplay:
+    """Shows what `plan` tells: its `stage` is a progress callback, its `iteration` the other one.
+
+    Parameters
+    ----------
+    console : Console
+    """
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        columns = (
+            SpinnerColumn(),
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            TimeElapsedColumn(),
+        )
+        # A log would get the bar once, when all is over.
+        self._progress = Progress(
+            *columns, console=console, transient=True, disable=not console.is_terminal
+        )
+        self._bar = self._progress.add_task("", total=None)
+        self._stage = self._count = self._cost = ""
+
+    def __enter__(self) -> Self:
+        """Begin to show."""
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Leave the terminal as it was."""
+        self._progress.stop()
+
+    def stage(self, stage: str, done: int, total: int) -> None:
+        """Show that number `done` of `total` in a stage has begun."""
+        if stage != self._stage:
+            self._stage, self._cost = stage, ""
+            if not self._console.is_terminal:
+                self._console.print(f"{stage} (of {total})" if total > 1 else stage, markup=False)
+        self._count = f" {done} of {total}" if total > 1 else ""
+        self._progress.update(self._bar, completed=done - 1, total=total if total > 1 else None)
+        self._describe()
+
+    def iteration(self, iteration: Iteration) -> None:
+        """Show the cost so far."""
+        self._cost = f", cost {iteration.cost:.6g}"
+        self._describe()
+
+    def _describe(self) -> None:
+        self._progress.update(self._bar, description=self._stage + self._count + self._cost)

@@ -1,0 +1,121 @@
+"""Plans, certificates and robots as tables for the terminal; legible in a log as well."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from selfmotion.certificate import Certificate
+from selfmotion.plans import Gap, Plan
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
+
+if TYPE_CHECKING:
+    from selfmotion.study import Claim
+
+
+def show(plan: Plan, console: Console) -> None:
+    """Print the cost of x = 0 against the plan, the work done, and the certificate."""
+    report = plan.report
+    table = Table(box=box.SIMPLE_HEAD, title=f"{plan.robot.name}, task {plan.task.value}")
+    table.add_column("cost")
+    table.add_column("without self-motion", justify="right")
+    table.add_column("plan", justify="right")
+    table.add_column("change", justify="right")
+    for name in report.terms:
+        table.add_row(name, *_compare(report.initial_terms[name], report.terms[name]))
+    if len(report.terms) > 1:
+        table.add_section()
+        table.add_row("total", *_compare(report.initial_cost, report.cost))
+    console.print(table)
+    console.print(
+        f"{report.evaluations} evaluations of the cost, {report.gradient_evaluations} of its "
+        f"gradient;\n{report.jacobian_evaluations} Jacobians, {report.steps} steps, "
+        f"{report.seconds:.2f} s\n{report.status.value}: {report.message}"
+    )
+    if report.gap is not None:
+        console.print(_distance(report.gap))
+    show_certificate(plan.certificate, console)
+
+
+def show_certificate(certificate: Certificate, console: Console) -> None:
+    """Print what forward kinematics found, and the verdict."""
+    table = Table(box=box.SIMPLE_HEAD, title=f"checked at {certificate.samples} times")
+    table.add_column("worst")
+    table.add_column("value", justify="right")
+    table.add_column("at", justify="right")
+    table.add_column("where")
+    rows = (
+        ("position error", certificate.position_error, "{:.2e} m"),
+        ("rotation error", certificate.rotation_error, "{:.2e} rad"),
+        ("margin to joint limits", certificate.limit_margin, "{:.4g}"),
+        ("speed over its limit", certificate.velocity_ratio, "{:.3f}"),
+        ("smallest singular value", certificate.smallest_singular_value, "{:.4g}"),
+        ("acceleration over its limit", certificate.acceleration_ratio, "{:.3f}"),
+        ("clearance", certificate.clearance, "{:.4g} m"),
+    )
+    for name, worst, form in rows:
+        if worst is None:
+            continue
+        table.add_row(name, form.format(worst.value), f"{worst.time:.3f} s", worst.name)
+    for worst in certificate.deviations:
+        unit = "rad" if "r" in worst.name else "m"
+        value, time = f"{worst.value:.4g} {unit}", f"{worst.time:.3f} s"
+        table.add_row(f"relaxed {worst.name}", value, time, "off the path, as allowed")
+    table.add_row("end to start", f"{certificate.closure:.4g}", "", "")
+    console.print(table)
+    style = "green" if certificate.verified else "bold red"
+    console.print(certificate.verdict, style=style, markup=False)
+
+
+def show_robots(robots: Mapping[str, RobotModel], console: Console) -> None:
+    """Print a row per arm: joints, tool frame, and the freedom each task leaves."""
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        caption="n: joints; then the self-motion that each task leaves, - where none",
+    )
+    table.add_column("robot", no_wrap=True)
+    table.add_column("n", justify="right")
+    table.add_column("tool frame", no_wrap=True)
+    for task in Task:
+        table.add_column(task.value.replace("_", "\n"), justify="right")
+    for name, robot in robots.items():
+        freedom = [_freedom(robot, task) for task in Task]
+        table.add_row(name, str(robot.dof), robot.tool, *freedom)
+    console.print(table)
+
+
+def show_claims(claims: Sequence["Claim"], console: Console) -> None:
+    """Print a row per claim of the paper: verdict, and the number that decides."""
+    table = Table(box=box.SIMPLE_HEAD, title="the paper's claims")
+    table.add_column("claim", overflow="fold")
+    table.add_column("verdict", no_wrap=True)
+    table.add_column("decided by", overflow="fold")
+    for claim in claims:
+        table.add_row(claim.statement, claim.verdict.value, claim.number)
+    console.print(table)
+
+
+def _freedom(robot: RobotModel, task: Task) -> str:
+    redundancy = robot.redundancy(task)
+    return str(redundancy) if robot.can_follow(task) and redundancy > 0 else "-"
+
+
+def _distance(gap: Gap) -> str:
+    """Say how far a plan is from the global optimum."""
+    cost = "none of its motions keeps the constraints"
+    if gap.cost_excess is not None:
+        cost = f"cost {100.0 * gap.cost_excess:+.2f} % from its best motion"
+    return (
+        f"global search over self-motions sampled {gap.spacing:g} rad apart, "
+        f"{gap.sequences} refined:\n{cost}; joint path {gap.length:.4g}, "
+        f"{100.0 * gap.length_excess:+.2f} % from its shortest sequence"
+    )
+
+
+def _compare(before: float, after: float) -> tuple[str, str, str]:
+    change = f"{100.0 * (after - before) / abs(before):+.1f} %" if before else ""
+    return f"{before:.6g}", f"{after:.6g}", change

@@ -1,0 +1,264 @@
+"""The tool's deviation from the path as a function of decision variables.
+
+In each group of rows that are relaxed together the deviation is δ = g(|s|) s with a cubic spline
+s(t) = Σ c_i B_i(t) and g(r) = b sin(r)/r for a band b, or g = 1 without one: |δ| ≤ b holds by
+construction at all times, and the optimisation stays unconstrained (the transformation of bounded
+parameters of F. James and M. Roos, "Minuit", Comput. Phys. Commun. 10, 1975). s is an angle: in
+metres a step of the optimiser would wind it up many times in a narrow band. With the path's pose
+(p, R) and Q = I or R for positions in world or tool axes, the target is
+
+    p + Q δ_v,  R exp(δ_ω),  ẋ_v + Q δ̇_v + Q̇ δ_v,  ω + R Jl(δ_ω) δ̇_ω,
+
+with the left Jacobian Jl of SO(3).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.path import Path, PathSamples
+from selfmotion.task import Relaxation
+
+# Below this angle the closed forms lose digits and their series serve.
+_SMALL = 5e-2
+_DEGREE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """The spline of one relaxation at the stages: B and dB/dt, (S, K) each."""
+
+    indices: list[int]
+    band: float
+    values: Array
+    rates: Array
+
+    @property
+    def size(self) -> int:
+        return len(self.indices) * int(self.values.shape[1])
+
+
+class _Bent(NamedTuple):
+    """A group's s and ṡ (S, k), g, g'/r, (g'/r)'/r and s·ṡ (S,) at the stages."""
+
+    s: Array
+    sd: Array
+    g: Array
+    h: Array
+    third: Array
+    along: Array
+
+
+class Deviation:
+    """The path's poses and twists at S times, displaced by c (size,).
+
+    Parameters
+    ----------
+    path : Path
+    relaxations : sequence of Relaxation
+    t : (S,)
+        Times [s], for a Runge-Kutta grid those of its stages.
+    pinned : (bool, bool)
+        Whether the deviation vanishes, with its first two derivatives, at the first and the last
+        time of the path, as it does at all other ends of windows.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        relaxations: Sequence[Relaxation],
+        t: Array,
+        pinned: tuple[bool, bool],
+    ) -> None:
+        self._nominal = path.samples(t)
+        self._groups = [_group(item, path.duration, t, pinned) for item in relaxations]
+        self._in_tool_axes = any(item.in_tool_axes for item in relaxations)
+        self.size = sum(group.size for group in self._groups)
+
+    def target(self, c: Array) -> PathSamples:
+        """Return the poses and twists that the tool follows."""
+        nominal = self._nominal
+        rows, rates = self._rows(self._bent(c))
+        rotation, twist = nominal.rotation, nominal.twist.copy()
+        twist[:, :3] += self._to_world(rows[:, :3], rates[:, :3])
+        turned = rotation @ _exponentials(rows[:, 3:])
+        twist[:, 3:] += _turn(rotation, _left(rows[:, 3:], rates[:, 3:]))
+        translation = nominal.translation + self._shift(rows[:, :3])
+        return PathSamples(nominal.t, translation, turned, twist)
+
+    def matrix(self, c: Array) -> Array:
+        """Return ∂target/∂c, (S, 12, size): [∂p; world rotation vector of ∂R; ∂twist]."""
+        stages = len(self._nominal.t)
+        bent = self._bent(c)
+        rows, rates = self._rows(bent)
+        by_rows, by_rates = np.zeros((stages, 6, self.size)), np.zeros((stages, 6, self.size))
+        first = 0
+        for group, (s, sd, g, h, third, along) in zip(self._groups, bent, strict=True):
+            # ∂δ/∂s = g I + h s sᵀ, which is ∂δ̇/∂ṡ as well; ∂δ̇/∂s is its derivative in time.
+            eye = np.eye(len(group.indices))
+            outer, mixed = s[:, :, None] * s[:, None, :], s[:, :, None] * sd[:, None, :]
+            by_s = g[:, None, None] * eye + h[:, None, None] * outer
+            change = (h * along)[:, None, None] * eye + (third * along)[:, None, None] * outer
+            change += h[:, None, None] * (mixed + mixed.transpose(0, 2, 1))
+            part = slice(first, first + group.size)
+            shape = (stages, len(group.indices), group.size)
+            direct = by_s[:, :, :, None] * group.values[:, None, None, :]
+            moving = by_s[:, :, :, None] * group.rates[:, None, None, :]
+            moving += change[:, :, :, None] * group.values[:, None, None, :]
+            by_rows[:, group.indices, part] = direct.reshape(shape)
+            by_rates[:, group.indices, part] = moving.reshape(shape)
+            first += group.size
+        rotation = self._nominal.rotation
+        result = np.zeros((stages, 12, self.size))
+        result[:, 0:3] = self._shift(by_rows[:, :3])
+        result[:, 6:9] = self._to_world(by_rows[:, :3], by_rates[:, :3])
+        jacobian = _left_matrices(rows[:, 3:])
+        result[:, 3:6] = rotation @ jacobian @ by_rows[:, 3:]
+        turning = _left_derivative(rows[:, 3:], rates[:, 3:]) @ by_rows[:, 3:]
+        result[:, 9:12] = rotation @ (turning + jacobian @ by_rates[:, 3:])
+        return result
+
+    def _bent(self, c: Array) -> list[_Bent]:
+        """Return the groups' splines and what the sine makes of them."""
+        bent, first = [], 0
+        for group in self._groups:
+            part = c[first : first + group.size].reshape(len(group.indices), -1)
+            first += group.size
+            s, sd = group.values @ part.T, group.rates @ part.T
+            bent.append(_Bent(s, sd, *_squash(s, group.band), np.einsum("si,si->s", s, sd)))
+        return bent
+
+    def _rows(self, bent: list[_Bent]) -> tuple[Array, Array]:
+        """Return δ and δ̇, rows x, y, z, rx, ry, rz, (S, 6) each."""
+        rows, rates = np.zeros((len(self._nominal.t), 6)), np.zeros((len(self._nominal.t), 6))
+        for group, (s, sd, g, h, _, along) in zip(self._groups, bent, strict=True):
+            rows[:, group.indices] += g[:, None] * s
+            rates[:, group.indices] += g[:, None] * sd + (h * along)[:, None] * s
+        return rows, rates
+
+    def _shift(self, delta: Array) -> Array:
+        """Return Q δ for δ (S, 3) or (S, 3, k)."""
+        return _turn(self._nominal.rotation, delta) if self._in_tool_axes else delta
+
+    def _to_world(self, delta: Array, rate: Array) -> Array:
+        """Return Q δ̇ + Q̇ δ, Q̇ = [ω]× Q in tool axes."""
+        if not self._in_tool_axes:
+            return rate
+        spin = _skew(self._nominal.twist[:, 3:])
+        return self._shift(rate) + _turn(spin, self._shift(delta))
+
+
+def _group(item: Relaxation, duration: float, t: Array, pinned: tuple[bool, bool]) -> _Group:
+    from scipy.interpolate import BSpline
+
+    start, end = item.window(duration)
+    knots = np.concatenate(
+        [[start] * _DEGREE, np.linspace(start, end, item.intervals + 1), [end] * _DEGREE]
+    )
+    count = item.intervals + _DEGREE
+    # A clamped spline's value and first two derivatives at an end depend on the three functions
+    # nearest to it.
+    slack = 1e-9 * duration
+    keep_first = start <= slack and not pinned[0]
+    keep_last = end >= duration - slack and not pinned[1]
+    kept = slice(0 if keep_first else 3, count if keep_last else count - 3)
+    inside = (t >= start) & (t <= end)
+    spline = BSpline(knots, np.eye(count), _DEGREE, extrapolate=True)
+    values, rates = np.zeros((len(t), count)), np.zeros((len(t), count))
+    values[inside] = spline(t[inside])
+    rates[inside] = spline(t[inside], 1)
+    return _Group(item.indices, item.band, values[:, kept].copy(), rates[:, kept].copy())
+
+
+def _squash(s: Array, band: float) -> tuple[Array, Array, Array]:
+    """Return g(r), g'/r and (g'/r)'/r at r = |s|, for g = b sin(r)/r; 1, 0, 0 without a band."""
+    if not np.isfinite(band):
+        return np.ones(len(s)), np.zeros(len(s)), np.zeros(len(s))
+    first, second, third = _sine_series(np.linalg.norm(s, axis=1))
+    return band * first, band * second, band * third
+
+
+def _sine_series(u: Array) -> tuple[Array, Array, Array]:
+    """Return f = sin u / u, f'/u and (f'/u)'/u."""
+    small = np.abs(u) < _SMALL
+    safe = np.where(small, 1.0, u)
+    sine, cosine = np.sin(safe), np.cos(safe)
+    first = np.where(small, 1.0 - u**2 / 6.0 + u**4 / 120.0, sine / safe)
+    second = np.where(
+        small, -1.0 / 3.0 + u**2 / 30.0 - u**4 / 840.0, (safe * cosine - sine) / safe**3
+    )
+    third = np.where(
+        small,
+        1.0 / 15.0 - u**2 / 210.0 + u**4 / 7560.0,
+        (3.0 * sine - 3.0 * safe * cosine - safe**2 * sine) / safe**5,
+    )
+    return first, second, third
+
+
+def _exponentials(vectors: Array) -> Array:
+    """Return exp([δ]×) for rotation vectors (S, 3), (S, 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(vectors).as_matrix())
+
+
+def _left_weights(vectors: Array) -> tuple[Array, Array, Array, Array]:
+    """Return a = (1 - cos θ)/θ², b = (θ - sin θ)/θ³, a'/θ and b'/θ at θ = |δ|."""
+    angle = np.linalg.norm(vectors, axis=1)
+    small = angle < _SMALL
+    safe = np.where(small, 1.0, angle)
+    sine, cosine = np.sin(safe), np.cos(safe)
+    a = np.where(small, 0.5 - angle**2 / 24.0 + angle**4 / 720.0, (1.0 - cosine) / safe**2)
+    b = np.where(small, 1.0 / 6.0 - angle**2 / 120.0 + angle**4 / 5040.0, (safe - sine) / safe**3)
+    by_a = np.where(
+        small,
+        -1.0 / 12.0 + angle**2 / 180.0 - angle**4 / 6720.0,
+        (safe * sine - 2.0 * (1.0 - cosine)) / safe**4,
+    )
+    by_b = np.where(
+        small,
+        -1.0 / 60.0 + angle**2 / 1260.0 - angle**4 / 60480.0,
+        (3.0 * sine - 2.0 * safe - safe * cosine) / safe**5,
+    )
+    return a, b, by_a, by_b
+
+
+def _left_matrices(vectors: Array) -> Array:
+    """Return Jl(δ) = I + a [δ]× + b [δ]×², (S, 3, 3)."""
+    a, b, _, _ = _left_weights(vectors)
+    skew = _skew(vectors)
+    return np.asarray(np.eye(3) + a[:, None, None] * skew + b[:, None, None] * skew @ skew)
+
+
+def _left(vectors: Array, rates: Array) -> Array:
+    """Return Jl(δ) δ̇: the angular velocity of exp([δ]×), (S, 3)."""
+    return _turn(_left_matrices(vectors), rates)
+
+
+def _left_derivative(vectors: Array, rates: Array) -> Array:
+    """Return ∂(Jl(δ) v)/∂δ at v = δ̇, (S, 3, 3)."""
+    a, b, by_a, by_b = _left_weights(vectors)
+    delta, v = _skew(vectors), _skew(rates)
+    once = _turn(delta, rates)
+    twice = _turn(delta, once)
+    gradient = by_a[:, None] * once + by_b[:, None] * twice
+    # ∂(δ×v) = -[v]× ∂δ and ∂(δ×(δ×v)) = -([δ×v]× + [δ]×[v]×) ∂δ.
+    direct = -a[:, None, None] * v - b[:, None, None] * (_skew(once) + delta @ v)
+    return np.asarray(direct + gradient[:, :, None] * vectors[:, None, :])
+
+
+def _skew(vectors: Array) -> Array:
+    """Return [v]× for vectors (S, 3), (S, 3, 3)."""
+    x, y, z = vectors.T
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+
+
+def _turn(matrices: Array, vectors: Array) -> Array:
+    """Return the products of matrices (S, 3, 3) and vectors (S, 3) or columns (S, 3, k)."""
+    if vectors.ndim == 2:
+        return np.asarray(np.einsum("sij,sj->si", matrices, vectors))
+    return np.asarray(matrices @ vectors)

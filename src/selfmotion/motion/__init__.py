@@ -1,0 +1,21 @@
+"""The nouns of a joint motion over time: grid, trajectory, null motion."""
+
+from selfmotion.motion.grid import Grid
+from selfmotion.motion.null_motion import (
+    BSplineNullMotion,
+    NullMotion,
+    NullMotionTable,
+    PolynomialNullMotion,
+    TransportedFrame,
+)
+from selfmotion.motion.trajectory import Trajectory
+
+__all__ = [
+    "BSplineNullMotion",
+    "Grid",
+    "NullMotion",
+    "NullMotionTable",
+    "PolynomialNullMotion",
+    "Trajectory",
+    "TransportedFrame",
+]

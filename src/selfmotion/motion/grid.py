@@ -1,0 +1,123 @@
+"""The times at which a motion is integrated."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, read_only
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Steps of the classical Runge-Kutta scheme, aligned with a path's knots.
+
+    Stages come four to a step (start, middle, middle, end), then one for the end of the motion, so
+    that S = 4N + 1 for N steps.
+
+    Attributes
+    ----------
+    nodes : (N + 1,)
+        Times at which steps begin and end [s].
+    """
+
+    nodes: Array
+
+    @classmethod
+    def aligned(cls, knots: Array, steps: int) -> "Grid":
+        """Return about `steps` steps, none across a knot, as equal as the knots allow."""
+        longest = (knots[-1] - knots[0]) / steps * (1.0 + 1e-9)
+        pieces = [
+            np.linspace(left, right, int(np.ceil((right - left) / longest)), endpoint=False)
+            for left, right in pairwise(knots)
+        ]
+        return cls(read_only(np.append(np.concatenate(pieces), knots[-1])))
+
+    def differentiation(self, order: int) -> Any:
+        """Return the sparse matrix (S, N + 1) from values at the nodes to a derivative at stages.
+
+        Five-point finite differences (weights of B. Fornberg, Math. Comp. 51, 1988).
+
+        Parameters
+        ----------
+        order : {1, 2}
+            Of the derivative.
+        """
+        if order not in self._operators:
+            self._operators[order] = _differentiation(self.nodes, self.stage_times, order)
+        return self._operators[order]
+
+    @cached_property
+    def _operators(self) -> dict[int, Any]:
+        return {}
+
+    def halved(self) -> "Grid":
+        """Return the grid with every step cut in two."""
+        middles = 0.5 * (self.nodes[:-1] + self.nodes[1:])
+        nodes = np.empty(2 * len(self.nodes) - 1)
+        nodes[0::2], nodes[1::2] = self.nodes, middles
+        return Grid(read_only(nodes))
+
+    @property
+    def steps(self) -> int:
+        """Number N of steps."""
+        return len(self.nodes) - 1
+
+    @cached_property
+    def node_stages(self) -> npt.NDArray[np.intp]:
+        """Indices of the stages that are nodes, (N + 1,)."""
+        return np.arange(len(self.nodes)) * 4
+
+    @cached_property
+    def stage_times(self) -> Array:
+        """Times of the stages [s], (S,)."""
+        start, end = self.nodes[:-1], self.nodes[1:]
+        middle = 0.5 * (start + end)
+        return np.append(np.stack([start, middle, middle, end], axis=1).ravel(), self.nodes[-1])
+
+    @property
+    def stage_steps(self) -> Array:
+        """Length of the step that each stage belongs to [s], (S,); 0 for the last."""
+        return np.append(np.repeat(np.diff(self.nodes), 4), 0.0)
+
+    @cached_property
+    def weights(self) -> Array:
+        """Weights (S,) that integrate a function of the stages over time [s].
+
+        h/6 (1, 2, 2, 1) per step: the integral is one more state of the Runge-Kutta scheme and
+        shares its fourth order.
+        """
+        steps = np.diff(self.nodes)[:, None] / 6.0
+        return np.append((steps * np.array([1.0, 2.0, 2.0, 1.0])).ravel(), 0.0)
+
+
+_STENCIL = 5
+
+
+def _differentiation(nodes: Array, times: Array, order: int) -> Any:
+    from scipy.sparse import csr_array
+
+    count = min(_STENCIL, len(nodes))
+    nearest = np.searchsorted(nodes, times) - count // 2
+    first = np.clip(nearest, 0, len(nodes) - count)
+    columns = first[:, None] + np.arange(count)
+    weights = _fornberg(nodes[columns] - times[:, None], order)
+    rows = np.repeat(np.arange(len(times)), count)
+    shape = (len(times), len(nodes))
+    return csr_array((weights.ravel(), (rows, columns.ravel())), shape=shape)
+
+
+def _fornberg(offsets: Array, order: int) -> Array:
+    """Return weights (S, k) of the derivative at 0 from values at `offsets` (S, k).
+
+    Exact for polynomials of degree < k: a small Vandermonde system, scaled against rounding.
+    """
+    scale = np.abs(offsets).max(axis=1, keepdims=True)
+    powers = np.arange(offsets.shape[1])
+    vandermonde = (offsets / scale)[:, None, :] ** powers[None, :, None]
+    target = np.zeros((len(offsets), len(powers), 1))
+    target[:, order, 0] = float(np.prod(np.arange(1, order + 1))) / scale[:, 0] ** order
+    return np.asarray(np.linalg.solve(vandermonde, target)[:, :, 0])

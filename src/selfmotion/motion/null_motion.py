@@ -1,0 +1,206 @@
+"""The null motion ε(t), linear in the coefficients x that are optimised: ε(t) = R(t) E φ(t)."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from selfmotion.basics import Array, ProblemError
+
+
+class NullMotion(Protocol):
+    """A parameterisation of ε(t): functions φ of time, and the space that E maps them to."""
+
+    @property
+    def space(self) -> str:
+        """``"null"``: E is (r, K) in a null-space basis; ``"joint"``: E is (n, K), R = I."""
+
+    @property
+    def fewest_steps(self) -> int:
+        """Steps below which a grid does not resolve the functions."""
+
+    def functions(self, t: Array, duration: float) -> Array:
+        """Return φ at times `t` (S,) of a motion of length `duration` [s], (S, K)."""
+
+
+@dataclass(frozen=True)
+class PolynomialNullMotion:
+    """ε(t) as a polynomial in time.
+
+    ``space="joint", basis="monomial"`` is the paper's: ε(t) = Σ e_k t^k (eq. 6), with the decision
+    vector [e_00 … e_0p e_10 …] (eq. 8), n(p + 1) entries of which only the null-space part acts.
+    The default has r(p + 1): polynomials in a basis R(t) of the null space, transported along the
+    x = 0 motion. The projector (I - J⁺J) of eq. 4 still acts, so that nothing is lost where the
+    motion leaves that of x = 0.
+
+    Parameters
+    ----------
+    degree : int
+        p ≥ 0.
+    space : {"null", "joint"}
+        Whether E has a row per null-space direction (r) or per joint (n).
+    basis : {"legendre", "monomial"}
+        Legendre polynomials, orthonormal over the motion: ∫ φ_i φ_j dt = δ_ij; or powers t^k [s^k].
+    """
+
+    degree: int = 3
+    space: str = "null"
+    basis: str = "legendre"
+
+    def __post_init__(self) -> None:
+        _check_degree(self.degree)
+        _check_space(self.space)
+        if self.basis not in ("legendre", "monomial"):
+            raise ProblemError(
+                f"null motion: basis is '{self.basis}', expected 'legendre' or 'monomial'"
+            )
+
+    @property
+    def fewest_steps(self) -> int:
+        """See `NullMotion.fewest_steps`: four for each coefficient."""
+        return 4 * (self.degree + 1)
+
+    def functions(self, t: Array, duration: float) -> Array:
+        """See `NullMotion.functions`."""
+        if self.basis == "monomial":
+            return np.asarray(np.vander(t, self.degree + 1, increasing=True))
+        norms = np.sqrt((2.0 * np.arange(self.degree + 1) + 1.0) / duration)
+        return np.asarray(legendre.legvander(2.0 * t / duration - 1.0, self.degree) * norms)
+
+
+@dataclass(frozen=True)
+class BSplineNullMotion:
+    """ε(t) as a B-spline with equal intervals: for long paths, where one polynomial is too stiff.
+
+    Each coefficient acts on degree + 1 intervals only.
+
+    Parameters
+    ----------
+    intervals : int
+        Number of polynomial pieces, ≥ 1.
+    degree : int
+        p ≥ 0; C^(p-1) between pieces.
+    space : {"null", "joint"}
+        As in `PolynomialNullMotion`.
+    """
+
+    intervals: int = 8
+    degree: int = 3
+    space: str = "null"
+
+    def __post_init__(self) -> None:
+        _check_degree(self.degree)
+        _check_space(self.space)
+        whole = isinstance(self.intervals, int | np.integer)
+        if not (whole and not isinstance(self.intervals, bool) and self.intervals >= 1):
+            raise ProblemError(
+                f"null motion: intervals is {self.intervals}, expected a whole number ≥ 1"
+            )
+
+    @property
+    def fewest_steps(self) -> int:
+        """See `NullMotion.fewest_steps`: four for each interval."""
+        return 4 * self.intervals
+
+    def functions(self, t: Array, duration: float) -> Array:
+        """See `NullMotion.functions`."""
+        from scipy.interpolate import BSpline
+
+        inner = np.linspace(0.0, duration, self.intervals + 1)
+        knots = np.concatenate([[0.0] * self.degree, inner, [duration] * self.degree])
+        return np.asarray(BSpline.design_matrix(t, knots, self.degree).toarray())
+
+
+@dataclass(frozen=True, eq=False)
+class NullMotionTable:
+    """A null motion at S stages, bound to one motion: ε = ε_0 + R E φ.
+
+    Attributes
+    ----------
+    functions : (S, K)
+        φ at the stages.
+    frame : (S, n, r) or None
+        R at the stages; None for the identity.
+    rows : int
+        Rows of E: r, or n where there is no frame.
+    offset : (S, n) or None
+        ε_0, the null motion of x = 0; None for zero.
+    """
+
+    functions: Array
+    frame: Array | None
+    rows: int
+    offset: Array | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients."""
+        return self.rows * int(self.functions.shape[1])
+
+    def epsilon(self, x: Array) -> Array:
+        """Return ε at the stages for coefficients `x`, (S, n)."""
+        inner: Array = self.functions @ x.reshape(self.rows, self.functions.shape[1]).T
+        outer = inner if self.frame is None else np.einsum("snr,sr->sn", self.frame, inner)
+        return outer if self.offset is None else outer + self.offset
+
+    def pullback(self, epsilon_gradient: Array) -> Array:
+        """Return ∂F/∂x for ∂F/∂ε (S, n): the transpose of the linear part of `epsilon`."""
+        inner = epsilon_gradient
+        if self.frame is not None:
+            inner = np.einsum("snr,sn->sr", self.frame, inner)
+        return np.asarray((inner.T @ self.functions).ravel())
+
+    def matrix(self) -> Array:
+        """Return ∂ε/∂x at the stages, (S, n, size)."""
+        frame = np.eye(self.rows)[None] if self.frame is None else self.frame
+        full = frame[:, :, :, None] * self.functions[:, None, None, :]
+        return np.asarray(full.reshape(len(self.functions), full.shape[1], self.size))
+
+
+class TransportedFrame:
+    """A null-space basis carried along a motion without turning inside the null space.
+
+    At each node the basis is the orthonormal one nearest to its predecessor (the polar factor of
+    its projection), a discrete parallel transport: continuous whatever the signs and order of the
+    singular vectors do. Between nodes the entries follow a cubic spline.
+
+    Parameters
+    ----------
+    t : (N,)
+        Times of the nodes [s].
+    jacobians : (N, m, n)
+        Task Jacobians there.
+    """
+
+    def __init__(self, t: Array, jacobians: Array) -> None:
+        from scipy.interpolate import CubicSpline
+
+        self._spline = CubicSpline(t, transport(jacobians))
+
+    def __call__(self, t: Array) -> Array:
+        """Return the basis at times `t` (S,), (S, n, r)."""
+        return np.asarray(self._spline(t))
+
+
+def transport(jacobians: Array) -> Array:
+    """Return orthonormal null-space bases of `jacobians` (N, m, n) along a motion, (N, n, r)."""
+    m, n = jacobians.shape[1:]
+    _, _, right = np.linalg.svd(jacobians)
+    null = right[:, m:, :].transpose(0, 2, 1)
+    bases = np.empty((len(jacobians), n, n - m))
+    bases[0] = null[0]
+    for k in range(1, len(jacobians)):
+        u, _, v = np.linalg.svd(null[k].T @ bases[k - 1])
+        bases[k] = null[k] @ (u @ v)
+    return bases
+
+
+def _check_degree(degree: int) -> None:
+    if isinstance(degree, bool) or not (isinstance(degree, int | np.integer) and degree >= 0):
+        raise ProblemError(f"null motion: degree is {degree}, expected a whole number ≥ 0")
+
+
+def _check_space(space: str) -> None:
+    if space not in ("null", "joint"):
+        raise ProblemError(f"null motion: space is '{space}', expected 'null' or 'joint'")

@@ -1,0 +1,280 @@
+"""The Broyden-family quasi-Newton method with Fletcher's switch; knows only x → (F, ∇F)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.optimise.line_search import LineSearch
+
+
+class Function(Protocol):
+    """What is minimised."""
+
+    evaluations: int
+
+    def value(self, x: Array) -> float:
+        """Return F(x), infinite where it is not defined."""
+
+    def gradient(self, x: Array) -> Array:
+        """Return ∇F(x)."""
+
+    def slope(self, x: Array, direction: Array) -> float:
+        """Return the derivative of F at x along `direction`."""
+
+
+class Status(Enum):
+    """How an optimisation ended."""
+
+    CONVERGED = "converged"
+    PRECISION = "precision"
+    MAX_ITERATIONS = "max_iterations"
+    MAX_EVALUATIONS = "max_evaluations"
+    UNBOUNDED = "unbounded"
+    STOPPED = "stopped"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def message(self) -> str:
+        """What it means and what to do about it."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    Status.CONVERGED: "the predicted decrease fell below the tolerance",
+    Status.PRECISION: "no step along the search direction decreases the cost any more: converged "
+    "to the accuracy of its evaluation",
+    Status.MAX_ITERATIONS: "the limit on iterations was reached; raise max_iterations to go on",
+    Status.MAX_EVALUATIONS: "the limit on evaluations was reached; raise max_evaluations to go on",
+    Status.UNBOUNDED: "the coefficients grow without bound: the cost has no minimum; add a "
+    "JointVelocity cost",
+    Status.STOPPED: "the callback asked to stop",
+    Status.INTERRUPTED: "interrupted; this is the best found so far",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Iteration:
+    """One iteration, the first being the start.
+
+    Attributes
+    ----------
+    x : (size,)
+        Where it arrived.
+    cost : float
+        F(x).
+    gradient_norm : float
+        |∇F(x)|.
+    update : str
+        Which formula renewed H afterwards: "bfgs", "dfp", or "none".
+    step : float
+        α of the line search.
+    evaluations : int
+        Evaluations of F so far.
+    """
+
+    x: Array
+    cost: float
+    gradient_norm: float
+    update: str
+    step: float
+    evaluations: int
+
+
+Callback = Callable[[Iteration], bool | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """What `QuasiNewton.minimize` found.
+
+    Attributes
+    ----------
+    x : (size,)
+    cost : float
+    inverse_hessian : (size, size)
+        The last estimate.
+    history : tuple of Iteration
+    status : Status
+    """
+
+    x: Array
+    cost: float
+    inverse_hessian: Array
+    history: tuple[Iteration, ...]
+    status: Status
+
+
+@dataclass(frozen=True)
+class QuasiNewton:
+    """Broyden's family on the inverse Hessian H, with Fletcher's line search.
+
+    With s = Δx and y = Δ∇F, the two ends of the family are
+
+        DFP:   H + ssᵀ/(sᵀy) - Hyyᵀ H/(yᵀHy)
+        BFGS:  DFP + v vᵀ,  v = √(yᵀHy) (s/(sᵀy) - Hy/(yᵀHy))
+
+    and Fletcher's switch takes DFP when sᵀy < yᵀHy, BFGS otherwise (R. Fletcher, "A new approach
+    to variable metric algorithms", Computer Journal 13, 1970).
+
+    Parameters
+    ----------
+    update : {"fletcher", "bfgs", "dfp"}
+    tolerance : float
+        Converged when the decrease that the model predicts, ½ ∇Fᵀ H ∇F, is below this times |F|.
+    max_iterations : int
+    line_search : LineSearch
+    unbounded : float
+        Stops when |x| exceeds this times its scale at the start (1 + |x0|).
+    """
+
+    update: str = "fletcher"
+    tolerance: float = 1e-8
+    max_iterations: int = 200
+    line_search: LineSearch = field(default_factory=LineSearch)
+    unbounded: float = 1e8
+
+    def __post_init__(self) -> None:
+        if self.update not in ("fletcher", "bfgs", "dfp"):
+            raise ProblemError(
+                f"optimiser: update is '{self.update}', expected 'fletcher', 'bfgs' or 'dfp'"
+            )
+        if not self.tolerance > 0.0:
+            raise ProblemError(f"optimiser: tolerance is {self.tolerance}, expected > 0")
+
+    def minimize(
+        self,
+        function: Function,
+        x0: Array,
+        inverse_hessian: Array | None = None,
+        *,
+        max_evaluations: int | None = None,
+        callback: Callback | None = None,
+    ) -> Minimum:
+        """Minimise `function` from `x0`.
+
+        Parameters
+        ----------
+        function : Function
+        x0 : (size,)
+            F(x0) must be finite.
+        inverse_hessian : (size, size), optional
+            H0; the identity by default.
+        max_evaluations : int, optional
+            Limit on evaluations of F.
+        callback : callable, optional
+            Called with each `Iteration`; returning True stops.
+
+        Returns
+        -------
+        Minimum
+            The best point found, also after an interruption from the keyboard.
+        """
+        run = _Run(self, function, x0, inverse_hessian, max_evaluations, callback)
+        try:
+            status = run.until_done()
+        except KeyboardInterrupt:
+            status = Status.INTERRUPTED
+        return run.minimum(status)
+
+
+class _Run:
+    """The state of one minimisation."""
+
+    def __init__(
+        self,
+        method: QuasiNewton,
+        function: Function,
+        x0: Array,
+        inverse_hessian: Array | None,
+        max_evaluations: int | None,
+        callback: Callback | None,
+    ) -> None:
+        self._method, self._function, self._callback = method, function, callback
+        self._limit = np.inf if max_evaluations is None else max_evaluations
+        self._scaled = inverse_hessian is not None
+        self._h = np.eye(len(x0)) if inverse_hessian is None else np.array(inverse_hessian)
+        self._x = np.array(x0, dtype=np.float64)
+        self._bound = method.unbounded * (1.0 + float(np.linalg.norm(x0)))
+        self._cost = function.value(self._x)
+        if not np.isfinite(self._cost):
+            raise ProblemError("optimiser: the cost at the start is not finite")
+        self._gradient = np.zeros_like(self._x)
+        self._history: list[Iteration] = []
+
+    def until_done(self) -> Status:
+        self._gradient = self._function.gradient(self._x)
+        if self._record("none", 0.0):
+            return Status.STOPPED
+        for _ in range(self._method.max_iterations):
+            status = self._iterate()
+            if status is not None:
+                return status
+        return Status.MAX_ITERATIONS
+
+    def minimum(self, status: Status) -> Minimum:
+        return Minimum(read_only(self._x), self._cost, self._h, tuple(self._history), status)
+
+    def _iterate(self) -> Status | None:
+        direction = -self._h @ self._gradient
+        slope = float(self._gradient @ direction)
+        # With an unscaled H0 the model predicts nothing about F; only a zero gradient counts.
+        scale = abs(self._cost) if self._scaled else np.finfo(float).tiny
+        if -0.5 * slope <= self._method.tolerance * max(scale, np.finfo(float).tiny):
+            return Status.CONVERGED
+        if self._function.evaluations >= self._limit:
+            return Status.MAX_EVALUATIONS
+        size = float(np.linalg.norm(direction))
+        found = self._method.line_search.search(
+            lambda alpha: self._function.value(self._x + alpha * direction),
+            lambda alpha: self._function.slope(self._x + alpha * direction, direction),
+            self._cost,
+            slope,
+            first=1.0 if self._scaled else min(1.0, 1.0 / size),
+            longest=2.0 * self._bound / size,
+            more=lambda: self._function.evaluations < self._limit,
+        )
+        if found is None:
+            spent = self._function.evaluations >= self._limit
+            return Status.MAX_EVALUATIONS if spent else Status.PRECISION
+        alpha, self._cost = found
+        s = alpha * direction
+        self._x = self._x + s
+        gradient = self._function.gradient(self._x)
+        update = self._renew(s, gradient - self._gradient)
+        self._gradient = gradient
+        if self._record(update, alpha):
+            return Status.STOPPED
+        return Status.UNBOUNDED if np.linalg.norm(self._x) > self._bound else None
+
+    def _renew(self, s: Array, y: Array) -> str:
+        """Renew H by the formula that the switch chooses; return its name."""
+        hy = self._h @ y
+        sy, yhy = float(s @ y), float(y @ hy)
+        # Without positive curvature along s no update keeps H positive definite.
+        if sy <= 1e-14 * float(np.linalg.norm(s) * np.linalg.norm(y)) or yhy <= 0.0:
+            return "none"
+        self._scaled = True
+        update = self._method.update
+        if update == "fletcher":
+            update = "dfp" if sy < yhy else "bfgs"
+        self._h += np.outer(s, s) / sy - np.outer(hy, hy) / yhy
+        if update == "bfgs":
+            v = s / sy - hy / yhy
+            self._h += yhy * np.outer(v, v)
+        return update
+
+    def _record(self, update: str, step: float) -> bool:
+        iteration = Iteration(
+            read_only(self._x),
+            self._cost,
+            float(np.linalg.norm(self._gradient)),
+            update,
+            step,
+            self._function.evaluations,
+        )
+        self._history.append(iteration)
+        return self._callback is not None and bool(self._callback(iteration))

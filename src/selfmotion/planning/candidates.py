@@ -1,0 +1,235 @@
+"""The best motion of a problem: from its start, from many starts, from global sequences."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NoReturn, Protocol
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    BreakdownError,
+    NoSequenceError,
+    ProblemError,
+    Progress,
+    SelfmotionError,
+)
+from selfmotion.optimise import Status
+from selfmotion.planning.session import Session
+from selfmotion.plans import Problem
+from selfmotion.search import Guide, Reach, guides, start_candidates
+
+# Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
+_SECOND_EFFORT = 4
+# Sequences are not worth refining when longer by this factor than one that keeps all constraints.
+_LONGER = 1.25
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How to search where the start is free; see `plan` for all of them."""
+
+    starts: int
+    finalists: int
+    search: str
+    compare: bool
+    rng: np.random.Generator | int | None
+
+    def __post_init__(self) -> None:
+        for name in ("starts", "finalists"):
+            if getattr(self, name) < 1:
+                raise ProblemError(f"{name} is {getattr(self, name)}, expected at least 1")
+        if self.search not in ("auto", "local", "global"):
+            raise ProblemError(f"search is '{self.search}', expected 'auto', 'local' or 'global'")
+
+
+class MakeSession(Protocol):
+    """Makes the session of a start."""
+
+    def __call__(self, start: Array, *, free: bool, guide: Guide | None = None) -> Session:
+        """Return it; BreakdownError where its motion at x = 0 runs into a singular pose."""
+
+
+class _CutShortError(Exception):
+    """The user wants no more: the best so far has to do."""
+
+
+class Selection:
+    """Optimises motions from several starts and keeps the best.
+
+    Parameters
+    ----------
+    problem : Problem
+    session : MakeSession
+    use_metric : bool
+        Whether the optimiser starts with the Gauss-Newton matrix.
+    effort : Effort
+    progress : Progress
+    reach : callable
+        Returns how far single poses are in reach, looking closely at a time [s]: what is beyond is
+        so from any start.
+
+    Attributes
+    ----------
+    best : Session or None
+    sequences : list of Guide
+        What the global search found; empty where it was not asked for or in vain.
+    rival : Session or None
+        The best motion from these. It is not chosen where the start is given or the search local,
+        and only compared with.
+    notes : list of str
+        Why the global search was in vain.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        session: MakeSession,
+        use_metric: bool,
+        effort: Effort,
+        progress: Progress,
+        reach: Callable[[float], Reach],
+    ) -> None:
+        self._reach = reach
+        self._problem, self._session = problem, session
+        self._use_metric, self._effort, self._progress = use_metric, effort, progress
+        self.best: Session | None = None
+        # Complete motions that are not optimised yet.
+        self._waiting: Sequence[Session] = ()
+        self._failure: SelfmotionError | None = None
+        self.sequences: list[Guide] = []
+        self.rival: Session | None = None
+        self.notes: list[str] = []
+
+    def run(self) -> Session:
+        """Return the best session; where the user interrupts, the best that is known by then.
+
+        Raises
+        ------
+        BreakdownError, InverseKinematicsError, NoSequenceError
+            There is no complete motion.
+        KeyboardInterrupt
+            The user interrupted before there was one.
+        """
+        try:
+            self._search()
+        except _CutShortError:
+            pass
+        except KeyboardInterrupt:
+            self._interrupted()
+        if self.best is None:
+            self._give_up()
+        return self.best
+
+    def _search(self) -> None:
+        problem, effort = self._problem, self._effort
+        start = problem.given_start
+        can_search = problem.robot.redundancy(problem.rows) == 1
+        if effort.compare and not can_search:
+            raise ProblemError(
+                f"compare: the global search needs redundancy 1, but {problem.robot.name} has "
+                f"{problem.robot.redundancy(problem.rows)} for task '{problem.rows.value}'"
+            )
+        starts = start is None and (effort.search != "global" or not can_search)
+        rng = np.random.default_rng(effort.rng)
+        if start is not None:
+            self._try(self._session(start, free=False))
+        elif starts:
+            self._try_candidates(effort.starts, effort.finalists, rng)
+        if self._is_out_of_reach():
+            return
+        chosen = start is None and effort.search != "local"
+        if can_search and (effort.compare or (chosen and self._fell_short)):
+            self._try_sequences(chosen)
+        # Where the search knows that nothing follows the path, more starts do not help.
+        if starts and self._fell_short and not self.notes:
+            more = _SECOND_EFFORT
+            self._try_candidates(more * effort.starts, more * effort.finalists, rng)
+
+    @property
+    def _fell_short(self) -> bool:
+        return self.best is None or bool(self.best.violations)
+
+    def _is_out_of_reach(self) -> bool:
+        """Whether no start led anywhere because the path leaves the workspace."""
+        failure = self._failure
+        if self.best is not None or not isinstance(failure, BreakdownError):
+            return False
+        return bool(self._reach(failure.time).reason)
+
+    def _try_candidates(self, starts: int, finalists: int, rng: np.random.Generator) -> None:
+        problem = self._problem
+        candidates = start_candidates(problem.robot, problem.path, problem.rows, starts, rng)
+        self._waiting = sessions = []
+        for number, candidate in enumerate(candidates, 1):
+            self._progress("start", number, len(candidates))
+            try:
+                sessions.append(self._session(candidate, free=True))
+            except BreakdownError as error:
+                self._failure = error
+        sessions.sort(key=lambda session: session.initial_score)
+        count = min(finalists, len(sessions))
+        for number, session in enumerate(sessions[:count], 1):
+            self._progress("optimising start", number, count)
+            self._try(session)
+        self._waiting = ()
+
+    def _try_sequences(self, chosen: bool) -> None:
+        """Optimise from the best sequences over all self-motions."""
+        try:
+            self.sequences = guides(self._problem, self._effort.rng, self._progress)
+        except NoSequenceError as error:
+            self._failure = error
+            self.notes.append(f"global search: {error}")
+        for number, guide in enumerate(self.sequences, 1):
+            self._progress("refining sequence", number, len(self.sequences))
+            try:
+                session = self._session(guide.start, free=True, guide=guide)
+            except BreakdownError as error:
+                self._failure = error
+                continue
+            if self._hopeless(guide, session):
+                continue
+            self._try(session, chosen=chosen)
+            if self.rival is None or session.score < self.rival.score:
+                self.rival = session
+
+    def _hopeless(self, guide: Guide, session: Session) -> bool:
+        """Whether a sequence is much longer than the shortest, and costs more than what there is.
+
+        Optimising gains some percent on a sequence.
+        """
+        rival = self.rival
+        if rival is None or rival.violations:
+            return False
+        longer = guide.sequence.length > _LONGER * self.sequences[0].sequence.length
+        return longer and session.initial_score > rival.score[1]
+
+    def _try(self, session: Session, *, chosen: bool = True) -> None:
+        """Optimise a session; keep it if it is the best one and may be chosen."""
+        try:
+            session.minimize(self._use_metric)
+        except KeyboardInterrupt:
+            session.end(Status.INTERRUPTED)
+        if chosen:
+            self._consider(session)
+        if session.cut_short and self.best is not None:
+            self.best.end(session.status)
+            raise _CutShortError
+
+    def _consider(self, session: Session) -> None:
+        if self.best is None or session.score < self.best.score:
+            self.best = session
+
+    def _interrupted(self) -> None:
+        """Make the best that is known the outcome; raise KeyboardInterrupt where nothing is."""
+        for session in self._waiting if self.best is None else ():
+            session.end(Status.INTERRUPTED)
+            self._consider(session)
+        if self.best is None:
+            raise KeyboardInterrupt
+        self.best.end(Status.INTERRUPTED)
+
+    def _give_up(self) -> NoReturn:
+        assert self._failure is not None, "each start leads to a motion or to an error"
+        raise self._failure

@@ -1,0 +1,245 @@
+"""The largest part of a path that the arm can follow, where it cannot follow all of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from selfmotion.basics import Array, BreakdownError
+from selfmotion.constraints import ClosedPath, EndConfiguration, EndVelocity
+from selfmotion.engine import Rollout
+from selfmotion.motion import Grid
+from selfmotion.optimise import Status
+from selfmotion.path import Truncated
+from selfmotion.planning.session import Guide, Session
+from selfmotion.plans import Problem
+from selfmotion.robot import null_basis
+from selfmotion.search import Reach
+
+# A problem, a start, and what stands for x = 0 → the session, or BreakdownError.
+Maker = Callable[[Problem, Array, Guide | None], Session]
+_Candidate = tuple[Array, Guide | None]
+
+# Share of the time to the edge of the workspace that is given up, since joint speeds grow without
+# bound towards it.
+_MARGIN = 1e-4
+# The end of the part is found to this share of it, and a part below this share of the path is none.
+_AGREEMENT, _LEAST = 1e-3, 1e-2
+# Ends that are tried, at most.
+_PROBES = 16
+# Motions that are optimised, of all that are followed; these with so many steps, until they are off
+# the path by this share of its extent.
+_FINALISTS, _STEPS, _OFF = 3, 256, 1e-2
+# Constant null motions that stand for x = 0 where that breaks down: joint angles over the path.
+_PUSHES = (0.5, 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A motion along the first part of a path.
+
+    Attributes
+    ----------
+    problem : Problem
+        That of the part.
+    session : Session
+        Optimised.
+    ending : str
+        Why it goes no further; "" where the part is the whole after all.
+    """
+
+    problem: Problem
+    session: Session
+    ending: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    """A candidate on a part: its session unless it broke down, and how far all was kept."""
+
+    candidate: _Candidate
+    problem: Problem
+    session: Session | None
+    kept_until: float
+    reason: str
+
+    @property
+    def arrived(self) -> bool:
+        return self.session is not None and not self.session.violations
+
+    @property
+    def cost(self) -> float:
+        return np.inf if self.session is None else sum(self.session.terms().values())
+
+    @property
+    def cut_short(self) -> bool:
+        """Whether the user ended the optimisation."""
+        return self.session is not None and self.session.cut_short
+
+
+def largest_part(problem: Problem, reach: Reach, make: Maker, use_metric: bool) -> Part | None:
+    """Return an optimised motion along the largest part [0, t] of the path that can be found.
+
+    Motions up to where single poses are in reach, by the same optimiser as any; where none
+    arrives, the end of the part is bisected. Conditions on the end of the motion do not apply to a
+    part.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of the whole path.
+    reach : Reach
+        How far single poses are in reach.
+    make : callable
+        Makes a session.
+    use_metric : bool
+        As `Session.minimize` has it.
+
+    Returns
+    -------
+    Part or None
+        None where nothing worth the name is left.
+    """
+    goal = reach.time * (1.0 - _MARGIN) if reach.reason else reach.time
+    if goal < _LEAST * problem.path.duration:
+        return None
+    first = _until(problem, goal)
+    attempts = []
+    for candidate in _candidates(first, reach.starts)[:_FINALISTS]:
+        attempts.append(_attempt(first, candidate, make, use_metric))
+        if attempts[-1].cut_short:
+            return _part(problem, attempts[-1], reach, "")
+    arrived = [attempt for attempt in attempts if attempt.arrived]
+    if arrived:
+        return _part(problem, min(arrived, key=lambda attempt: attempt.cost), reach, "")
+    furthest = max(attempts, key=lambda attempt: attempt.kept_until)
+    return _bisect(problem, furthest, reach, make, use_metric)
+
+
+def _bisect(
+    problem: Problem, failed: _Attempt, reach: Reach, make: Maker, use_metric: bool
+) -> Part | None:
+    """Return the candidate's motion on the largest part on which it arrives."""
+    arrived: _Attempt | None = None
+    low, high = 0.0, failed.problem.path.duration
+    back = _AGREEMENT
+    for _ in range(_PROBES):
+        if arrived is None:
+            # What was kept until then is a good guess; where it is not, further and further back.
+            probe = max(min(failed.kept_until, high * (1.0 - back)), 0.5 * high)
+            back *= 2.0
+        else:
+            probe = 0.5 * (low + high)
+        if probe < _LEAST * problem.path.duration or high - low < _AGREEMENT * high:
+            break
+        attempt = _attempt(_until(problem, probe), failed.candidate, make, use_metric)
+        if attempt.arrived or attempt.cut_short:
+            arrived, low = attempt, probe
+        else:
+            failed, high = attempt, probe
+        if attempt.cut_short:
+            break
+    return None if arrived is None else _part(problem, arrived, reach, failed.reason)
+
+
+def _part(problem: Problem, found: _Attempt, reach: Reach, further: str) -> Part:
+    """Return the part, with the reason why nothing goes `further` in words."""
+    if found.session is None:
+        raise RuntimeError("a part is made of a motion that was found")
+    end, whole = found.problem.path.duration, problem.path.duration
+    nearer = "gets nearer to that" if reach.reason else "goes further"
+    reasons = [reach.reason] if reach.reason else []
+    reasons += [f"no motion found {nearer}: {further}"] if further else []
+    ending = f"the motion ends at t = {end:.6g} s of {whole:.6g} s: {'; '.join(reasons)}"
+    return Part(found.problem, found.session, ending if end < whole else "")
+
+
+def _until(problem: Problem, time: float) -> Problem:
+    """Return the problem on [0, time], without conditions on the end."""
+    if time >= problem.path.duration:
+        return problem
+    ends = (ClosedPath, EndConfiguration, EndVelocity)
+    kept = [item for item in problem.constraints if not isinstance(item, ends)]
+    relaxations = [
+        item if item.during is None else replace(item, during=(first, min(last, time)))
+        for item in problem.relaxations
+        for first, last in [item.window(problem.path.duration)]
+        if first < time
+    ]
+    return replace(
+        problem, path=Truncated(problem.path, time), constraints=kept, relaxations=relaxations
+    )
+
+
+def _attempt(problem: Problem, candidate: _Candidate, make: Maker, use_metric: bool) -> _Attempt:
+    try:
+        session = make(problem, *candidate)
+    except BreakdownError as error:
+        reason = f"it runs into a singular pose near t = {error.time:.6g} s"
+        return _Attempt(candidate, problem, None, error.time, reason)
+    try:
+        session.minimize(use_metric)
+    except KeyboardInterrupt:
+        session.end(Status.INTERRUPTED)
+    motion = session.trajectory()
+    # Constraints that cannot be met may throw it far off: x = 0 then tells more.
+    until = max(_kept_until(problem, motion.t, motion.q, motion.qd), -_rank(problem, *candidate)[1])
+    return _Attempt(candidate, problem, session, until, "; ".join(session.violations))
+
+
+def _candidates(problem: Problem, starts: list[Array]) -> list[_Candidate]:
+    """Return starts, and null motions in place of x = 0 where that breaks down; the best first."""
+    ranked = sorted(((start, None) for start in starts), key=lambda each: _rank(problem, *each))
+    furthest = ranked[0][0]
+    if -_rank(problem, furthest, None)[0] >= problem.path.duration:
+        return list(ranked)
+    pushed: list[_Candidate] = [*ranked, *((furthest, push) for push in _pushes(problem, furthest))]
+    return sorted(pushed, key=lambda each: _rank(problem, *each))
+
+
+class _Push:
+    """A constant rate as the null motion that stands for x = 0."""
+
+    def __init__(self, rate: Array) -> None:
+        self._rate = rate
+
+    def __call__(self, t: Array) -> Array:
+        """Return the rate at times `t` (S,), (S, n)."""
+        return np.tile(self._rate, (len(t), 1))
+
+
+def _pushes(problem: Problem, start: Array) -> list[Guide]:
+    """Return null motions to either side: x = 0 may keep to a plane that has no way on."""
+    basis = null_basis(problem.robot, problem.rows, start) / problem.path.duration
+    angles = [sign * angle for angle in _PUSHES for sign in (1.0, -1.0)]
+    return [_Push(angle * direction) for direction in basis.T for angle in angles]
+
+
+def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, float, float]:
+    """Return how far a candidate stays on the path and within its limits [-s], and its effort.
+
+    The smaller, the better.
+    """
+    path, rows = problem.path, problem.rows.rows
+    grid = Grid.aligned(path.knots, _STEPS)
+    rollout = Rollout(problem.robot, path, problem.rows, grid, damping=problem.damping_law)
+    idle = np.zeros((len(grid.stage_times), problem.robot.dof))
+    broken = rollout.run(start, idle if guide is None else guide(grid.stage_times))
+    extent = max(float(np.ptp(path.samples(grid.nodes).translation, axis=0).max()), 1e-3)
+    drift = np.abs(rollout.drift[:, rows]) / np.where(rows < 3, extent, 1.0)
+    off = ~(drift <= _OFF).all(axis=1) & (grid.nodes <= (np.inf if broken is None else broken))
+    far = path.duration if broken is None else broken
+    far = min(far, float(grid.nodes[int(np.argmax(off))])) if off.any() else far
+    nodes, samples = grid.node_stages, rollout.samples()
+    kept = _kept_until(problem, grid.nodes, samples.q[nodes], samples.qd[nodes])
+    # Beyond the place where it broke down, speeds may be anything.
+    arrived = far >= path.duration
+    effort = float(samples.weights @ np.sum(samples.qd**2, axis=1)) if arrived else np.inf
+    return -far, -min(kept, far), effort
+
+
+def _kept_until(problem: Problem, t: Array, q: Array, qd: Array) -> float:
+    """Return the first of the times t (N,) at which a joint is beyond its limits, or the last."""
+    lower, upper, speed = problem.requirements.limits(problem.robot)
+    beyond = ((q < lower) | (q > upper) | (np.abs(qd) > speed)).any(axis=1)
+    return float(t[int(np.argmax(beyond))] if beyond.any() else t[-1])

@@ -1,0 +1,17 @@
+"""What to plan, and what came of it."""
+
+from selfmotion.plans.paper_problem import sample_problem
+from selfmotion.plans.plan import Gap, Plan, Report, load_plan
+from selfmotion.plans.problem import Problem
+from selfmotion.plans.retiming import retime, slowdown
+
+__all__ = [
+    "Gap",
+    "Plan",
+    "Problem",
+    "Report",
+    "load_plan",
+    "retime",
+    "sample_problem",
+    "slowdown",
+]

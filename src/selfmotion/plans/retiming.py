@@ -1,0 +1,148 @@
+"""The same joint path in the time that velocity and acceleration limits allow."""
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, PlanError, ProblemError, per_joint
+from selfmotion.motion import Trajectory
+from selfmotion.path import Retimed
+from selfmotion.plans.plan import Plan
+from selfmotion.task import Relaxation
+
+# Share of the limits that is used, so that the certificate between grid points holds as well.
+_SHARE = 0.98
+# Grid points of toppra, and samples of the new motion, per sample of the old one: the first that
+# keeps the plan's tolerance.
+_DENSITIES = (4, 8, 16)
+
+
+def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
+    """Return by what factor the plan's duration must grow to keep its limits (1: it does).
+
+    At the same pace profile: velocities fall with the factor, accelerations with its square.
+
+    Parameters
+    ----------
+    plan : Plan
+    acceleration : (n,) or float, optional
+        Acceleration limits [rad/s² or m/s²]; by default only velocities count.
+    """
+    factor = max(1.0, plan.certificate.velocity_ratio.value)
+    if acceleration is not None:
+        what = f"{plan.robot.name}: acceleration limits"
+        limit = per_joint(acceleration, plan.robot.dof, what, positive=True)
+        share = np.abs(plan.trajectory.accelerations()[1]) / limit
+        factor = max(factor, float(np.sqrt(share.max())))
+    return factor
+
+
+def retime(
+    plan: Plan,
+    acceleration: npt.ArrayLike,
+    velocity: npt.ArrayLike | None = None,
+) -> Plan:
+    """Return the plan's joint path in the shortest time within the limits, from rest to rest.
+
+    Time-optimal path parametrisation by reachability analysis (H. Pham and Q.-C. Pham, IEEE
+    Trans. Robotics 34(3), 2018), by the package toppra. The geometric path of joints and tool
+    stays; the tool motion becomes a `Retimed` one, and the certificate is made anew.
+
+    Parameters
+    ----------
+    plan : Plan
+    acceleration : (n,) or float
+        Limits [rad/s² or m/s²].
+    velocity : (n,) or float, optional
+        Limits [rad/s or m/s]; by default those that the plan was asked to keep, or the URDF's.
+
+    Returns
+    -------
+    Plan
+        With the old report.
+
+    Raises
+    ------
+    ProblemError
+        toppra is not installed, or a limit is not positive.
+    PlanError
+        No pace keeps the limits.
+    """
+    robot = plan.robot
+    if velocity is None:
+        velocity = plan.requirements.limits(robot)[2]
+    limits = [
+        per_joint(limit, robot.dof, f"{robot.name}: {name} limits for retiming", positive=True)
+        for name, limit in (("velocity", velocity), ("acceleration", acceleration))
+    ]
+    for density in _DENSITIES:
+        result = _retimed(plan, limits, density)
+        errors = result.certificate.position_error.value, result.certificate.rotation_error.value
+        if errors[0] <= plan.tolerance.position and errors[1] <= plan.tolerance.rotation:
+            break
+    return result
+
+
+def _retimed(plan: Plan, limits: list[Array], density: int) -> Plan:
+    t, sigma, rate = _pace(plan.trajectory, limits[0], limits[1], density)
+    path = Retimed(plan.path, t, sigma, rate)
+    q, qd = plan.trajectory(sigma), plan.trajectory(sigma, order=1) * rate[:, None]
+    trajectory = Trajectory(t, q, qd, plan.trajectory.joint_names)
+    wanted = replace(
+        plan.requirements,
+        velocity=limits[0],
+        acceleration=limits[1],
+        relaxations=tuple(_moved(item, t, sigma) for item in plan.requirements.relaxations),
+    )
+    checked = replace(
+        plan, path=path, trajectory=trajectory, initial_trajectory=trajectory, requirements=wanted
+    )
+    return replace(checked, certificate=checked.check())
+
+
+def _moved(item: Relaxation, t: Array, sigma: Array) -> Relaxation:
+    """Return a relaxation with its window at the new times t of σ."""
+    if item.during is None:
+        return item
+    # Near enough: the deviation and two of its derivatives vanish at the ends of a window.
+    first, last = (float(np.interp(time, sigma, t)) for time in item.during)
+    return replace(item, during=(first, last))
+
+
+def _pace(
+    motion: Trajectory, velocity: Array, acceleration: Array, density: int
+) -> tuple[Array, Array, Array]:
+    """Return new times, and σ and dσ/dt there."""
+    count = density * (len(motion.t) - 1)
+    grid = np.interp(np.arange(count + 1) / density, np.arange(len(motion.t)), motion.t)
+    rates = _toppra(motion, grid, _SHARE * velocity, _SHARE * acceleration)
+    # Between grid points the squared rate is linear in σ, hence σ̈ constant and the times exact.
+    steps = 2.0 * np.diff(grid) / (rates[:-1] + rates[1:])
+    return np.append(0.0, np.cumsum(steps)), grid - grid[0], rates
+
+
+def _toppra(motion: Trajectory, grid: Array, velocity: Array, acceleration: Array) -> Array:
+    """Return the largest dσ/dt at the grid of σ, zero at both ends."""
+    import logging
+
+    try:
+        import toppra
+        from toppra import algorithm, constraint
+    except ImportError:
+        raise ProblemError(
+            "retiming needs the package toppra: pip install 'selfmotion[retime]'"
+        ) from None
+    logging.getLogger("toppra").setLevel(logging.ERROR)
+    solver = algorithm.TOPPRA(
+        [
+            constraint.JointVelocityConstraint(np.stack([-velocity, velocity], axis=1)),
+            constraint.JointAccelerationConstraint(np.stack([-acceleration, acceleration], axis=1)),
+        ],
+        toppra.SplineInterpolator(motion.t, motion.q),
+        gridpoints=grid,
+    )
+    _, rates, _ = solver.compute_parameterization(0.0, 0.0)
+    if rates is None:
+        raise PlanError("no pace keeps the velocity and acceleration limits along this joint path")
+    return np.asarray(rates, dtype=np.float64)

@@ -1,0 +1,243 @@
+"""Reading a URDF: yourdfpy parses it, this module refuses what Pinocchio would accept silently.
+
+Pinocchio loads a zero joint axis, reversed limits or a link with two parents without a word, and
+gives continuous joints two coordinates. Here such files are refused with a message that names the
+joint or link, and continuous joints become single-angle joints without limits.
+"""
+
+import contextlib
+import hashlib
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import RobotError
+
+_SINGLE_COORDINATE = ("revolute", "prismatic", "continuous")
+_KNOWN_TYPES = (*_SINGLE_COORDINATE, "fixed", "floating", "planar")
+# A limit that no motion reaches; Pinocchio wants finite numbers for a revolute joint.
+_UNLIMITED = 1e6
+
+
+@dataclass(frozen=True)
+class UrdfJoint:
+    """One joint as the URDF declares it.
+
+    Attributes
+    ----------
+    name, kind, parent, child : str
+        Names of joint and links; `kind` is the URDF type.
+    mimics : str or None
+        The joint it copies, where it has a ``<mimic>`` tag.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    mimics: str | None
+
+
+@dataclass(frozen=True)
+class Urdf:
+    """A validated URDF, ready for Pinocchio.
+
+    Attributes
+    ----------
+    source : str
+        Path of the file, or what the text came from; used in messages.
+    text : str
+        XML with continuous joints turned into revolute ones and mesh files made absolute or
+        left as ``package://``.
+    package_dirs : tuple of str
+        Folders in which ``package://`` addresses are looked up.
+    joints : dict
+        Joint name → `UrdfJoint`.
+    """
+
+    source: str
+    text: str
+    package_dirs: tuple[str, ...]
+    joints: dict[str, UrdfJoint]
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of all links, in file order."""
+        root = ElementTree.fromstring(self.text)
+        return tuple(link.get("name", "") for link in root.findall("link"))
+
+    @property
+    def sha256(self) -> str:
+        """Digest of the text; two robots with the same digest have the same kinematics."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    def continuous(self) -> set[str]:
+        """Return the names of joints that the file declares continuous."""
+        return {joint.name for joint in self.joints.values() if joint.kind == "continuous"}
+
+    def chain(self, link: str) -> list[UrdfJoint]:
+        """Return the joints from the root to `link`, root first, fixed ones included."""
+        by_child = {joint.child: joint for joint in self.joints.values()}
+        chain = []
+        while link in by_child:
+            chain.append(by_child[link])
+            link = by_child[link].parent
+        return chain[::-1]
+
+
+def read_urdf(path: Path) -> Urdf:
+    """Read and validate a URDF file.
+
+    Parameters
+    ----------
+    path : Path
+        The file. Mesh addresses ``package://NAME/…`` are looked up in the folders above it.
+
+    Returns
+    -------
+    Urdf
+
+    Raises
+    ------
+    RobotError
+        The file is missing, is xacro, is not XML, or describes no arm (two parents, a zero axis,
+        reversed limits, a negative mass, an unknown joint type, …).
+    """
+    if not path.is_file():
+        raise RobotError(f"{path}: no such URDF file")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RobotError(f"{path}: cannot be read as text: {error}") from error
+    folder = path.resolve().parent
+    package_dirs = tuple(str(parent) for parent in (folder, *folder.parents) if parent.parts[1:])
+    return parse_urdf(text, source=str(path), package_dirs=package_dirs, mesh_folder=folder)
+
+
+def parse_urdf(
+    text: str, *, source: str, package_dirs: tuple[str, ...], mesh_folder: Path | None = None
+) -> Urdf:
+    """Validate URDF text; see `read_urdf`. Relative mesh names are taken from `mesh_folder`."""
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise RobotError(f"{source}: is not well-formed XML: {error}") from error
+    if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
+        raise RobotError(f"{source}: is a xacro file; expand it first: `xacro {source} > arm.urdf`")
+    if root.tag != "robot":
+        raise RobotError(f"{source}: the root element is <{root.tag}>, expected <robot>")
+    parsed = _parse_with_yourdfpy(text, source)
+    joints = {joint.name: joint for joint in map(_joint, parsed.joints)}
+    _check_names(parsed, source)
+    for joint in parsed.joints:
+        _check_joint(joint, source)
+    for link in parsed.links:
+        _check_inertia(link, source)
+    _check_tree(parsed, source)
+    _single_angle(root)
+    if mesh_folder is not None:
+        _absolute_meshes(root, mesh_folder)
+    return Urdf(source, ElementTree.tostring(root, encoding="unicode"), package_dirs, joints)
+
+
+def _parse_with_yourdfpy(text: str, source: str) -> Any:
+    import io
+    import logging
+
+    import yourdfpy
+
+    logging.getLogger("yourdfpy").setLevel(logging.ERROR)
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            return yourdfpy.URDF.load(
+                io.BytesIO(text.encode()), load_meshes=False, build_scene_graph=False
+            ).robot
+    except (ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
+        raise RobotError(f"{source}: is not a valid URDF: {error}") from error
+
+
+def _joint(joint: Any) -> UrdfJoint:
+    mimics = joint.mimic.joint if joint.mimic is not None else None
+    return UrdfJoint(joint.name, joint.type, joint.parent, joint.child, mimics)
+
+
+def _check_names(parsed: Any, source: str) -> None:
+    for kind, items in (("link", parsed.links), ("joint", parsed.joints)):
+        names = [item.name for item in items]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise RobotError(f"{source}: {kind} name '{twice[0]}' is used more than once")
+    links = {link.name for link in parsed.links}
+    for joint in parsed.joints:
+        for end in (joint.parent, joint.child):
+            if end not in links:
+                raise RobotError(
+                    f"{source}: joint '{joint.name}' refers to link '{end}', which does not exist"
+                )
+
+
+def _check_joint(joint: Any, source: str) -> None:
+    where = f"{source}: joint '{joint.name}'"
+    if joint.type not in _KNOWN_TYPES:
+        raise RobotError(f"{where} has type '{joint.type}', expected one of {_KNOWN_TYPES}")
+    if joint.type not in _SINGLE_COORDINATE:
+        return
+    axis = np.asarray(joint.axis, dtype=float)
+    if not (np.all(np.isfinite(axis)) and np.linalg.norm(axis) > 1e-6):
+        raise RobotError(f"{where} has axis {axis.tolist()}, expected a direction of length > 0")
+    if joint.type == "continuous":
+        return
+    limit = joint.limit
+    if limit is None or limit.lower is None or limit.upper is None:
+        raise RobotError(
+            f"{where} is {joint.type} without lower and upper limits; add them, or make it "
+            f"continuous"
+        )
+    if not limit.lower <= limit.upper:
+        raise RobotError(
+            f"{where} has reversed limits: lower {limit.lower} is above upper {limit.upper}"
+        )
+    if limit.velocity is not None and limit.velocity < 0:
+        raise RobotError(f"{where} has a negative velocity limit {limit.velocity}")
+
+
+def _check_inertia(link: Any, source: str) -> None:
+    mass = link.inertial.mass if link.inertial is not None else None
+    if mass is not None and mass < 0:
+        raise RobotError(f"{source}: link '{link.name}' has a negative mass {mass} kg")
+
+
+def _check_tree(parsed: Any, source: str) -> None:
+    parent_of: dict[str, str] = {}
+    for joint in parsed.joints:
+        if joint.child in parent_of:
+            raise RobotError(
+                f"{source}: link '{joint.child}' has two parents, "
+                f"'{parent_of[joint.child]}' and '{joint.parent}'"
+            )
+        parent_of[joint.child] = joint.parent
+    roots = [link.name for link in parsed.links if link.name not in parent_of]
+    if len(roots) != 1:
+        found = ", ".join(roots) if roots else "none (the joints form a loop)"
+        raise RobotError(f"{source}: expected one root link, found: {found}")
+
+
+def _single_angle(root: ElementTree.Element) -> None:
+    for joint in root.findall("joint"):
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            limit = joint.find("limit")
+            if limit is None:
+                limit = ElementTree.SubElement(joint, "limit", effort="0", velocity="0")
+            limit.set("lower", str(-_UNLIMITED))
+            limit.set("upper", str(_UNLIMITED))
+
+
+def _absolute_meshes(root: ElementTree.Element, folder: Path) -> None:
+    for mesh in root.iter("mesh"):
+        name = mesh.get("filename", "")
+        if "://" not in name and not Path(name).is_absolute():
+            mesh.set("filename", str(folder / name))

@@ -1,0 +1,140 @@
+"""Dynamic programming over the waypoints: the shortest chains of nodes, and others unlike them."""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array
+from selfmotion.search import kernels
+
+Mask = npt.NDArray[np.bool_]
+Rows = npt.NDArray[np.intp]
+
+# Chains are unlike when some joint differs by this [rad or m] at this share of the waypoints.
+_UNLIKE, _LONG = 0.3, 0.1
+# Mirror images have moved each joint by the same amount, up to this [rad or m].
+_SAME_TRAVEL = 0.2
+# Chains looked at, mirror images included, before these have to do.
+_MOST = 60
+# Nodes through which other chains are looked for: at so many waypoints, evenly.
+_STATIONS = 7
+
+
+@dataclass(frozen=True, eq=False)
+class Chains:
+    """Shortest chains to every node, or from every node when made backwards.
+
+    Attributes
+    ----------
+    cost : tuple of (N_i,)
+        Least Σ|Δq| from the first waypoint; inf where no chain arrives.
+    parent : tuple of (N_i,)
+        The node before on that chain, -1 where there is none.
+    """
+
+    cost: tuple[Array, ...]
+    parent: tuple[Rows, ...]
+
+    @property
+    def blocked(self) -> int | None:
+        """The first waypoint that no chain reaches."""
+        for i, cost in enumerate(self.cost):
+            if not np.any(np.isfinite(cost)):
+                return i
+        return None
+
+    def back(self, waypoint: int, node: int) -> list[int]:
+        """Return the nodes of the chain that arrives at a node, first to last."""
+        chain = [node]
+        for i in range(waypoint, 0, -1):
+            chain.append(int(self.parent[i][chain[-1]]))
+        return chain[::-1]
+
+
+def shortest_chains(layers: list[Array], largest_step: Array, turning: Mask) -> Chains:
+    """Return the shortest chains from the first layer on (Bellman's recursion, exact).
+
+    Parameters
+    ----------
+    layers : list of (N_i, n)
+        Nodes at the waypoints, each layer sorted by the first joint.
+    largest_step : (n,) or (W - 1, n)
+        No joint may move more between waypoints.
+    turning : (n,)
+        Joints that count modulo turns.
+    """
+    cost = [np.zeros(len(layers[0]))]
+    parent = [np.full(len(layers[0]), -1, dtype=np.intp)]
+    steps = np.broadcast_to(largest_step, (len(layers) - 1, len(turning)))
+    for (before, after), step in zip(itertools.pairwise(layers), steps, strict=True):
+        reach, source = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
+        longest = np.ascontiguousarray(step)
+        kernels.extend(before, cost[-1], after, longest, turning, reach, source)
+        cost.append(reach)
+        parent.append(source)
+    return Chains(tuple(cost), tuple(parent))
+
+
+def diverse_chains(
+    layers: list[Array], forward: Chains, largest_step: Array, turning: Mask, count: int
+) -> list[list[int]]:
+    """Return up to `count` chains of nodes: the shortest one, then the shortest unlike the others.
+
+    Each is the shortest chain through some node of a few waypoints spread over the motion. Mirror
+    images, whose joints move by the same amounts (a wrist turned over), come only where there are
+    too few others.
+    """
+    backwards = largest_step if largest_step.ndim == 1 else largest_step[::-1]
+    reverse = shortest_chains(layers[::-1], backwards, turning)
+    stations = np.unique(np.linspace(0, len(layers) - 1, _STATIONS).round().astype(int))
+    through = [
+        (float(forward.cost[i][k] + reverse.cost[-1 - i][k]), int(i), k)
+        for i in stations
+        for k in range(len(layers[i]))
+    ]
+    chosen: list[list[int]] = []
+    mirrored: list[list[int]] = []
+    taken: list[Array] = []
+    # A chain through a node near a chosen one is rarely unlike it, and another node finds it.
+    covered = {int(i): np.zeros(len(layers[i]), dtype=bool) for i in stations}
+    for total, i, node in sorted(through):
+        if not np.isfinite(total) or len(chosen) == count or len(taken) == _MOST:
+            break
+        if covered[i][node]:
+            continue
+        chain = forward.back(i, node) + reverse.back(len(layers) - 1 - i, node)[-2::-1]
+        q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
+        if all(unlike(q, other, turning) for other in taken):
+            images = any(_mirrors(q, other, turning) for other in taken)
+            (mirrored if images else chosen).append(chain)
+            taken.append(q)
+            for station, near in covered.items():
+                near |= _apart(layers[station], q[station], turning) <= _UNLIKE
+    return (chosen + mirrored)[:count]
+
+
+def unlike(q: Array, other: Array, turning: Mask) -> bool:
+    """Whether two motions (W, n) differ by much for long."""
+    return bool(np.mean(_apart(q, other, turning) > _UNLIKE) >= _LONG)
+
+
+def _mirrors(q: Array, other: Array, turning: Mask) -> bool:
+    """Whether each joint has moved by about as much in both motions, at all times."""
+    moved, also = (
+        np.cumsum(np.abs(unturned(np.diff(motion, axis=0), turning)), axis=0)
+        for motion in (q, other)
+    )
+    return bool(np.abs(moved - also).max() < _SAME_TRAVEL)
+
+
+def _apart(q: Array, other: Array, turning: Mask) -> Array:
+    """Return the largest difference of any joint, (…,)."""
+    return np.asarray(np.abs(unturned(q - other, turning)).max(axis=-1))
+
+
+def unturned(difference: Array, turning: Mask) -> Array:
+    """Return differences (…, n) modulo turns in the joints that turn without end."""
+    turn = 2.0 * np.pi
+    return np.where(turning, difference - turn * np.round(difference / turn), difference)

@@ -1,0 +1,284 @@
+"""Self-motion curves: all configurations with the tool in a given pose, for redundancy 1."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from selfmotion.basics import Array, Progress, read_only, silent
+from selfmotion.kernels import angle_kind
+from selfmotion.path import Path
+from selfmotion.robot import RobotModel
+from selfmotion.search import kernels
+from selfmotion.task import Task
+
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+# Newton's method from a sample of the neighbouring waypoint, and from anywhere.
+_NEAR_STEPS, _FAR_STEPS = 8, 40
+# Longest single correction [rad or m]: a far start wanders where J is nearly singular.
+_LONGEST = 0.5
+# A configuration this near [rad or m] to a curve's polyline is on the curve.
+ON_CURVE = 0.02
+_MOST_SAMPLES = 5000
+# Of the samples of a curve, every so manieth looks for the curve at the next waypoint.
+_STRIDE = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One self-motion curve as a polyline.
+
+    Attributes
+    ----------
+    q : (K, n)
+        Configurations [rad or m] in order, revolute joints without wrapping, joint limits not
+        regarded. Of a closed curve the last one is the first one modulo turns.
+    closed : bool
+        False where it ends in a singular configuration.
+    arc : (K,)
+        Arc length from the first sample, in the configuration norm.
+    """
+
+    q: Array
+    closed: bool
+    arc: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", read_only(self.q))
+        steps = np.linalg.norm(np.diff(self.q, axis=0), axis=1)
+        object.__setattr__(self, "arc", read_only(np.concatenate([[0.0], np.cumsum(steps)])))
+
+    @property
+    def length(self) -> float:
+        """Arc length of the whole curve."""
+        return float(self.arc[-1])
+
+    def at(self, arc: Array) -> Array:
+        """Return the polyline's points at arc lengths (K,), (K, n)."""
+        i = np.clip(np.searchsorted(self.arc, arc), 1, len(self.arc) - 1)
+        share = (arc - self.arc[i - 1]) / (self.arc[i] - self.arc[i - 1])
+        return np.asarray(self.q[i - 1] + share[:, None] * (self.q[i] - self.q[i - 1]))
+
+
+class CurveSet:
+    """The curves found for one pose of the tool."""
+
+    def __init__(self, revolute: npt.NDArray[np.bool_], spacing: float) -> None:
+        self.curves: list[Curve] = []
+        self._revolute = revolute
+        # Segments are at most 1.2 spacings long.
+        self._near = 1.5 * spacing + ON_CURVE
+        self._samples = np.empty((0, len(revolute)))
+        self._curve = np.empty(0, dtype=np.intp)
+        self._first: list[int] = []
+
+    def add(self, curve: Curve) -> None:
+        """Add a curve."""
+        index = np.full(len(curve.q), len(self.curves))
+        self._first.append(len(self._samples))
+        self.curves.append(curve)
+        self._samples = np.vstack([self._samples, curve.q])
+        self._curve = np.concatenate([self._curve, index])
+
+    def locate(self, q: Array) -> tuple[int, float] | None:
+        """Return the curve that q is on and the arc length there; None when it is on no curve."""
+        if not self.curves:
+            return None
+        i, share, distance = kernels.locate(
+            q, self._samples, self._curve, self._revolute, self._near
+        )
+        if not distance < ON_CURVE:
+            return None
+        index = int(self._curve[i])
+        i -= self._first[index]
+        arc = self.curves[index].arc
+        return index, float(arc[i] + share * (arc[i + 1] - arc[i]))
+
+    def seeds(self) -> Iterable[Array]:
+        """Yield configurations from which to find these curves at a pose nearby."""
+        for curve in self.curves:
+            yield from curve.q[::_STRIDE]
+
+
+class SelfMotion:
+    """Newton's method and continuation on {q : F(q) = x}.
+
+    Continuation along the null vector of J (predictor) with Newton corrections q ← q + J⁺e, in
+    steps of at most `spacing` in the configuration norm, halved where the curve bends or the
+    corrections do not converge (E. Allgower, K. Georg, "Numerical Continuation Methods", 1990).
+    Joint limits and collisions are not regarded: the curves of revolute arms are closed then.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    task : Task
+        Leaves redundancy 1.
+    spacing : float
+        Largest distance of neighbouring samples [rad or m].
+    """
+
+    def __init__(self, robot: RobotModel, task: Task, spacing: float) -> None:
+        self.robot, self.spacing = robot, spacing
+        kinds = [robot.urdf.joints[name].kind for name in robot.joint_names]
+        self.revolute = np.array([kind != "prismatic" for kind in kinds])
+        self._rows = task.rows
+        self._kind = angle_kind(task.rows, task.tool_axes)
+        self._data = robot.model.createData()
+        # Views of Pinocchio's own memory: each placement of the frame refreshes them.
+        pose = self._data.oMf[robot.tool_id]
+        self._rotation, self._translation = pose.rotation, pose.translation
+        # Any direction that is not a row of the Jacobian gives the tangent by projection.
+        self._direction = np.random.default_rng(0).normal(size=robot.dof)
+
+    def project(self, q: Array, target: Array, *, far: bool = False) -> Array | None:
+        """Return the configuration that Newton's method reaches from q, None where it does not.
+
+        Parameters
+        ----------
+        q : (n,)
+        target : (12,)
+            The tool's translation and rotation (see `targets`).
+        far : bool
+            Whether q is any configuration instead of one near the solution.
+        """
+        q, unused = q.copy(), self._direction.copy()
+        model, data, tool = self.robot.model, self._data, self.robot.tool_id
+        for _ in range(_FAR_STEPS if far else _NEAR_STEPS):
+            pin.computeJointJacobians(model, data, q)
+            jacobian = pin.getFrameJacobian(model, data, tool, _AXES)
+            pin.updateFramePlacement(model, data, tool)
+            length = kernels.correct(
+                q,
+                jacobian,
+                self._rotation,
+                self._translation,
+                target,
+                self._rows,
+                self._kind,
+                unused,
+                _LONGEST,
+            )
+            if length < 0.0:
+                return None
+            if length < kernels.CONVERGED:
+                return q
+        return None
+
+    def tangent(self, q: Array, target: Array) -> Array | None:
+        """Return a unit null vector of J at q, a solution; None where q is singular."""
+        model, data, tool = self.robot.model, self._data, self.robot.tool_id
+        pin.computeJointJacobians(model, data, q)
+        jacobian = pin.getFrameJacobian(model, data, tool, _AXES)
+        pin.updateFramePlacement(model, data, tool)
+        tangent, place = self._direction.copy(), (self._rotation, self._translation)
+        length = kernels.correct(
+            q.copy(), jacobian, *place, target, self._rows, self._kind, tangent, _LONGEST
+        )
+        return tangent if length >= 0.0 and np.all(np.isfinite(tangent)) else None
+
+    def trace(self, q: Array, target: Array) -> Curve | None:
+        """Return the curve through q, a solution; None where q is singular."""
+        tangent = self.tangent(q, target)
+        if tangent is None:
+            return None
+        samples, closed = self._walk(q, tangent, target)
+        if not closed:
+            back, _ = self._walk(q, -tangent, target)
+            samples = np.vstack([back[:0:-1], samples])
+        return Curve(samples, closed) if len(samples) > 1 else None
+
+    def curves(self, target: Array, seeds: Iterable[Array]) -> CurveSet:
+        """Return the curves that Newton's method reaches from `seeds`, each once."""
+        found = CurveSet(self.revolute, self.spacing)
+        self.complete(found, target, seeds, far=True)
+        return found
+
+    def complete(
+        self, found: CurveSet, target: Array, seeds: Iterable[Array], *, far: bool = False
+    ) -> bool:
+        """Add to `found` the curves it lacks; return whether there was one."""
+        before = len(found.curves)
+        for seed in seeds:
+            q = self.project(seed, target, far=far)
+            if q is None or found.locate(q) is not None:
+                continue
+            curve = self.trace(q, target)
+            if curve is not None:
+                found.add(curve)
+        return len(found.curves) > before
+
+    def _walk(self, start: Array, tangent: Array, target: Array) -> tuple[Array, bool]:
+        """Return the samples (K, n) from `start` on, and whether they lead back to it."""
+        model, data, tool = self.robot.model, self._data, self.robot.tool_id
+        jacobians, frame_jacobian = pin.computeJointJacobians, pin.getFrameJacobian
+        place, trace, rows, kind = pin.updateFramePlacement, kernels.trace, self._rows, self._kind
+        rotation, translation, revolute = self._rotation, self._translation, self.revolute
+        samples = np.empty((_MOST_SAMPLES, self.robot.dof))
+        samples[0] = start
+        tangents = np.array([tangent, tangent, tangent])
+        state = np.array([self.spacing, 0.0, 1.0, self.spacing])
+        q, code = start + self.spacing * tangent, kernels.GOING
+        while code == kernels.GOING:
+            jacobians(model, data, q)
+            jacobian = frame_jacobian(model, data, tool, _AXES)
+            place(model, data, tool)
+            code = trace(
+                q,
+                jacobian,
+                rotation,
+                translation,
+                target,
+                rows,
+                kind,
+                revolute,
+                samples,
+                tangents,
+                state,
+            )
+        return samples[: int(state[2])].copy(), code == kernels.CLOSED
+
+
+def targets(path: Path, t: Array) -> Array:
+    """Return the tool's translation and rotation at times t (W,), in rows (W, 12)."""
+    samples = path.samples(t)
+    return np.ascontiguousarray(
+        np.hstack([samples.translation, samples.rotation.reshape(len(samples.t), 9)])
+    )
+
+
+def curves_along(
+    motion: SelfMotion,
+    target: Array,
+    seeds: Sequence[Array],
+    every: int,
+    progress: Progress = silent,
+) -> list[CurveSet]:
+    """Return the self-motion curves at all waypoints.
+
+    Curves of one waypoint are looked for at the next and then, from the last waypoint back, at the
+    previous one; `seeds` are tried at every `every`-th waypoint and at the last one. So a curve is
+    missed only when it lives between two such waypoints alone, or no seed leads to it.
+
+    Parameters
+    ----------
+    motion : SelfMotion
+    target : (W, 12)
+    seeds : sequence of (n,)
+    every : int
+    progress : Progress
+    """
+    found: list[CurveSet] = []
+    for i, x in enumerate(target):
+        progress("search: self-motions at waypoint", i + 1, len(target))
+        here = CurveSet(motion.revolute, motion.spacing)
+        if i > 0:
+            motion.complete(here, x, found[-1].seeds())
+        if i % every == 0 or i == len(target) - 1:
+            motion.complete(here, x, seeds, far=True)
+        found.append(here)
+    for i in range(len(target) - 2, -1, -1):
+        motion.complete(found[i], target[i], found[i + 1].seeds())
+    return found

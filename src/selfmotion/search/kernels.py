@@ -1,0 +1,250 @@
+"""What numba compiles for self-motion curves: Newton's corrector, continuation, nearest segment."""
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, kernel
+from selfmotion.kernels import (
+    LOGARITHM,
+    POINTING,
+    cholesky,
+    pointing_error,
+    rotation_error,
+    select,
+    solve_cholesky,
+)
+
+Rows = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
+
+# What `trace` says of a curve.
+GOING, CLOSED, ENDED = 0, 1, 2
+
+# A Newton correction of this size [rad or m] leaves an error of its square.
+CONVERGED = 1e-6
+_CORRECTIONS = 6
+# Neighbours whose tangents differ by more than acos of this are too far apart to be trusted to
+# lie on the same branch.
+_ALIGNED = 0.93
+# Steps are halved no further than this share of the largest.
+_SMALLEST_STEP = 1.0 / 64.0
+
+
+@kernel
+def wrapped(difference: float, revolute: bool) -> float:
+    """Return the difference of two coordinates, modulo a turn where the joint is revolute."""
+    if revolute:
+        turns = np.floor(difference / (2.0 * np.pi) + 0.5)
+        return float(difference - 2.0 * np.pi * turns)
+    return difference
+
+
+@kernel
+def correct(
+    q: Array,
+    frame_jacobian: Array,
+    rotation: Array,
+    translation: Array,
+    target: Array,
+    rows: Rows,
+    angle_kind: int,
+    tangent: Array,
+    longest: float,
+) -> float:
+    """Add J⁺e to q, no longer than `longest`, and project `tangent` onto the null space of J.
+
+    `target` is the tool's translation (3) and rotation (9). Returns the norm of the correction
+    before it was shortened; -1 where J has no full rank.
+    """
+    n, m = frame_jacobian.shape[1], rows.shape[0]
+    error, z, along = np.zeros(6), np.empty(m), np.zeros(m)
+    jacobian, factor = np.empty((m, n)), np.empty((m, m))
+    for i in range(3):
+        error[i] = target[i] - translation[i]
+    pointing = angle_kind == POINTING
+    if angle_kind == LOGARITHM:
+        rotation_error(target[3:12].reshape(3, 3), rotation, error[3:])
+    elif pointing:
+        pointing_error(target[3:12].reshape(3, 3), rotation, error[3:])
+    select(rows, pointing, rotation, error, z)
+    for k in range(n):
+        select(rows, pointing, rotation, frame_jacobian[:, k], jacobian[:, k])
+    for i in range(m):
+        for k in range(n):
+            along[i] += jacobian[i, k] * tangent[k]
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(n):
+                total += jacobian[i, k] * jacobian[j, k]
+            factor[i, j] = total
+    if not cholesky(factor):
+        return -1.0
+    solve_cholesky(factor, z)
+    solve_cholesky(factor, along)
+    length, norm = 0.0, 0.0
+    step = np.zeros(n)
+    for k in range(n):
+        for i in range(m):
+            step[k] += jacobian[i, k] * z[i]
+            tangent[k] -= jacobian[i, k] * along[i]
+        length += step[k] ** 2
+        norm += tangent[k] ** 2
+    length, norm = np.sqrt(length), np.sqrt(norm)
+    scale = longest / length if length > longest else 1.0
+    for k in range(n):
+        q[k] += scale * step[k]
+        tangent[k] /= norm
+    return float(length)
+
+
+@kernel
+def trace(
+    q: Array,
+    frame_jacobian: Array,
+    rotation: Array,
+    translation: Array,
+    target: Array,
+    rows: Rows,
+    angle_kind: int,
+    revolute: Mask,
+    samples: Array,
+    tangents: Array,
+    state: Array,
+) -> int:
+    """Advance the continuation of a self-motion curve by one evaluation of the Jacobian.
+
+    q is the iterate at which the Jacobian was taken, and on return the one to take it at next.
+    `samples` (K, n) receives the curve. `tangents` (3, n): at the last sample, at the iterate, at
+    the start. `state`: step, corrections so far, samples so far, largest step.
+    """
+    n, count = q.shape[0], int(state[2])
+    last = samples[count - 1]
+    length = correct(
+        q, frame_jacobian, rotation, translation, target, rows, angle_kind, tangents[1], state[3]
+    )
+    state[1] += 1
+    if length > CONVERGED and state[1] < _CORRECTIONS:
+        return GOING
+    moved, cosine = 0.0, 0.0
+    for k in range(n):
+        moved += (q[k] - last[k]) ** 2
+        cosine += tangents[0, k] * tangents[1, k]
+    moved = np.sqrt(moved)
+    # NaN fails these comparisons, too.
+    sound = 0.0 <= length <= CONVERGED and cosine > _ALIGNED
+    if sound and 0.3 * state[0] < moved < 1.2 * state[0]:
+        samples[count] = q
+        state[2] = count + 1
+        if count >= 3 and _passes_start(samples, count, revolute, tangents):
+            return CLOSED
+        if count + 1 == samples.shape[0]:
+            return ENDED
+        tangents[0] = tangents[1]
+        state[0] = min(state[3], 1.5 * state[0])
+        last = samples[count]
+    else:
+        state[0] *= 0.5
+        if state[0] < _SMALLEST_STEP * state[3]:
+            return ENDED
+        tangents[1] = tangents[0]
+    state[1] = 0
+    for k in range(n):
+        q[k] = last[k] + state[0] * tangents[0, k]
+    return GOING
+
+
+@kernel
+def _passes_start(samples: Array, count: int, revolute: Mask, tangents: Array) -> bool:
+    """Whether the last segment passes the start, modulo turns; then it is made to end there."""
+    n = samples.shape[1]
+    square, dot, cosine = 0.0, 0.0, 0.0
+    home = np.empty(n)
+    for k in range(n):
+        home[k] = wrapped(samples[0, k] - samples[count - 1, k], revolute[k])
+        segment = samples[count, k] - samples[count - 1, k]
+        square += segment**2
+        dot += segment * home[k]
+        cosine += tangents[1, k] * tangents[2, k]
+    share = dot / square
+    if cosine < 0.5 or share < -0.05 or share > 1.05:
+        return False
+    distance = 0.0
+    for k in range(n):
+        segment = samples[count, k] - samples[count - 1, k]
+        distance += (home[k] - share * segment) ** 2
+    if distance > 0.0625 * square:
+        return False
+    for k in range(n):
+        samples[count, k] = samples[count - 1, k] + home[k]
+    return True
+
+
+@kernel
+def locate(
+    q: Array, samples: Array, curve: Rows, revolute: Mask, near: float
+) -> tuple[int, float, float]:
+    """Return the nearest segment's first sample, the share along it, and the distance to q.
+
+    `samples` (K, n) are polylines one after the other, `curve` (K,) says which one each is of.
+    Only segments that start within `near` of q in each coordinate count; -1 when there is none.
+    """
+    n, count = samples.shape[1], samples.shape[0]
+    best, best_share, best_square = -1, 0.0, np.inf
+    offset, segment = np.empty(n), np.empty(n)
+    for i in range(count - 1):
+        if curve[i] != curve[i + 1]:
+            continue
+        dot, square, total, far = 0.0, 0.0, 0.0, False
+        for k in range(n):
+            offset[k] = wrapped(q[k] - samples[i, k], revolute[k])
+            if abs(offset[k]) > near:
+                far = True
+                break
+            segment[k] = samples[i + 1, k] - samples[i, k]
+            dot += offset[k] * segment[k]
+            square += segment[k] ** 2
+        if far:
+            continue
+        share = min(1.0, max(0.0, dot / square)) if square > 0.0 else 0.0
+        for k in range(n):
+            total += (offset[k] - share * segment[k]) ** 2
+            if total > best_square:
+                break
+        if total < best_square:
+            best, best_share, best_square = i, share, total
+    return best, best_share, np.sqrt(best_square)
+
+
+@kernel
+def extend(
+    before: Array,
+    cost: Array,
+    after: Array,
+    largest_step: Array,
+    turning: Mask,
+    reach: Array,
+    parent: Rows,
+) -> None:
+    """Set `reach` (M,), the least cost at `after` (M, n) over steps from `before` (N, n).
+
+    The cost of a step is Σ|Δq|; `turning` joints count modulo turns. `before` is sorted by its
+    first joint unless that one turns. `parent` is -1 where no step is short enough.
+    """
+    n, many = after.shape[1], before.shape[0]
+    for j in range(after.shape[0]):
+        reach[j], parent[j] = np.inf, -1
+        first = 0
+        if not turning[0]:
+            first = int(np.searchsorted(before[:, 0], after[j, 0] - largest_step[0]))
+        for i in range(first, many):
+            if not turning[0] and before[i, 0] > after[j, 0] + largest_step[0]:
+                break
+            total = cost[i]
+            for k in range(n):
+                step = abs(wrapped(after[j, k] - before[i, k], turning[k]))
+                total += step
+                if step > largest_step[k] or total >= reach[j]:
+                    total = np.inf
+                    break
+            if total < reach[j]:
+                reach[j], parent[j] = total, i

@@ -1,0 +1,220 @@
+"""Nodes of the search: samples of self-motion curves inside the limits and free of collision."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array
+from selfmotion.collision import CollisionModel
+from selfmotion.search.curves import Curve, CurveSet, SelfMotion
+
+_TURN = 2.0 * np.pi
+# Where samples are free or not by turns, the border is enclosed to this share of the spacing.
+_BORDER = 0.25
+# Carried samples nearer to each other than this share of the spacing are merged.
+_MERGE = 0.4
+# Samples outside the limits by more than this [rad or m] before Newton's correction stay outside.
+_SURELY_OUTSIDE = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """What a node must keep.
+
+    Attributes
+    ----------
+    lower, upper : (n,)
+        Joint limits [rad or m], ±inf where there is none.
+    revolute : (n,)
+        Whether a turn leads to the same pose.
+    collision : CollisionModel or None
+    margin : float
+        Smallest clearance [m].
+    """
+
+    lower: Array
+    upper: Array
+    revolute: npt.NDArray[np.bool_]
+    collision: CollisionModel | None
+    margin: float
+
+    @property
+    def turning(self) -> npt.NDArray[np.bool_]:
+        """Joints that turn without end: their angles count modulo turns."""
+        free = np.isinf(self.lower) & np.isinf(self.upper)
+        return np.asarray(self.revolute & free)
+
+    def without_turns(self) -> "Bounds":
+        """Return bounds in which joints with room for a whole turn turn without end.
+
+        The search is much smaller then: six joints of two turns each make 64 nodes of one.
+        """
+        wide = self.revolute & (self.upper - self.lower >= _TURN)
+        return replace(
+            self,
+            lower=np.where(wide, -np.inf, self.lower),
+            upper=np.where(wide, np.inf, self.upper),
+        )
+
+    def turned_inside(self, q: Array) -> Array:
+        """Return a motion (W, n) with each revolute joint by whole turns nearest to mid-range."""
+        bounded = self.revolute & np.isfinite(self.lower) & np.isfinite(self.upper)
+        lower, upper = np.where(bounded, self.lower, 0.0), np.where(bounded, self.upper, 0.0)
+        off = 0.5 * (lower + upper - q.min(axis=0) - q.max(axis=0))
+        return q + _TURN * np.where(bounded, np.round(off / _TURN), 0.0)
+
+    def beyond(self, q: Array) -> npt.NDArray[np.bool_]:
+        """Return which joints leave their limits in a motion (W, n), (n,)."""
+        return np.asarray(np.any((q < self.lower) | (q > self.upper), axis=0))
+
+    def layer(self, q: Array) -> Array:
+        """Return free samples (K, n) at all their turns, sorted by the first joint, (K', n)."""
+        nodes = self.all_turns(q)
+        return np.ascontiguousarray(nodes[np.argsort(nodes[:, 0], kind="stable")])
+
+    def representative(self, q: Array) -> Array:
+        """Return q (…, n) with each revolute joint at or above its lower limit by the least turn.
+
+        Angles without lower limit are brought into [-π, π), or to the first turn below the upper
+        limit.
+        """
+        below = np.where(np.isfinite(self.upper), self.upper - _TURN, -np.pi)
+        base = np.where(np.isfinite(self.lower), self.lower, below)
+        return np.where(self.revolute, base + np.mod(q - base, _TURN), q)
+
+    def excess(self, q: Array) -> Array:
+        """Return by how much q (…, n) is outside the limits, at the nearest turn, (…, n)."""
+        first = self.representative(q)
+        above = np.maximum(first - self.upper, 0.0)
+        below = np.maximum(self.lower - first, 0.0)
+        turned = np.where(self.revolute, np.maximum(self.lower - (first - _TURN), 0.0), np.inf)
+        return np.maximum(np.minimum(above, turned), below)
+
+    def free(self, q: Array) -> npt.NDArray[np.bool_]:
+        """Whether each of q (K, n) is inside the limits at some turn, and clear of collisions."""
+        first = self.representative(q)
+        free = np.asarray(np.all((first <= self.upper) & (first >= self.lower), axis=-1))
+        if self.collision is not None:
+            for i in np.flatnonzero(free):
+                free[i] = not self.collision.collides(first[i], self.margin)
+        return free
+
+    def keeps(self, q: Array) -> bool:
+        """Whether q (n,) itself, at its own turn, is inside the limits and clear of collisions."""
+        if np.any(q > self.upper) or np.any(q < self.lower):
+            return False
+        return self.collision is None or not self.collision.collides(q, self.margin)
+
+    def all_turns(self, q: Array) -> Array:
+        """Return q (K, n), inside the limits, at every turn that is inside them, (K', n)."""
+        q = self.representative(q)
+        for k in np.flatnonzero(self.revolute & np.isfinite(self.lower) & np.isfinite(self.upper)):
+            turns = [q]
+            for count in range(1, int((self.upper[k] - self.lower[k]) / _TURN) + 1):
+                more = q.copy()
+                more[:, k] += count * _TURN
+                turns.append(more[more[:, k] <= self.upper[k]])
+            q = np.concatenate(turns)
+        return q
+
+
+def place_nodes(
+    motion: SelfMotion,
+    target: Array,
+    curves: CurveSet,
+    carried: Sequence[Array],
+    bounds: Bounds,
+    spacing: float,
+) -> Array:
+    """Return the free samples of the curves of one waypoint, (K, n), without turns.
+
+    Samples carried from the waypoint before keep their place: chains can follow them without
+    changing along the curve from sample to sample, which would add to their length. Gaps between
+    them are filled to `spacing`, and halved where free samples begin or end.
+
+    Parameters
+    ----------
+    motion : SelfMotion
+    target : (12,)
+    curves : CurveSet
+    carried : sequence of (n,)
+        Configurations on the curves.
+    bounds : Bounds
+    spacing : float
+        Largest gap in the configuration norm.
+    """
+    located: list[list[tuple[float, Array]]] = [[] for _ in curves.curves]
+    for q in carried:
+        place = curves.locate(q)
+        if place is not None:
+            located[place[0]].append((place[1], q))
+    nodes = [np.empty((0, motion.robot.dof))]
+    for curve, found in zip(curves.curves, located, strict=True):
+        sampler = _CurveSampler(motion, target, curve, bounds, spacing)
+        nodes += sampler.nodes(sorted(found, key=lambda item: item[0]))
+    return np.vstack(nodes)
+
+
+@dataclass(frozen=True, eq=False)
+class _CurveSampler:
+    """Samples one curve between and at carried samples."""
+
+    motion: SelfMotion
+    target: Array
+    curve: Curve
+    bounds: Bounds
+    spacing: float
+
+    def nodes(self, carried: Sequence[tuple[float, Array]]) -> list[Array]:
+        """Return the free samples in pieces (K, n); `carried` is sorted by arc length."""
+        kept: list[tuple[float, Array]] = []
+        for arc, q in carried:
+            if not kept or arc - kept[-1][0] > _MERGE * self.spacing:
+                kept.append((arc, q))
+        gaps = _between([arc for arc, _ in kept], self.curve.length, self.spacing)
+        arcs = np.concatenate([[arc for arc, _ in kept], gaps])
+        q = np.vstack([*[q for _, q in kept], self.curve.at(gaps)])
+        near = np.all(self.bounds.excess(q) < _SURELY_OUTSIDE, axis=1)
+        for i in np.flatnonzero(near[len(kept) :]) + len(kept):
+            solution = self.motion.project(q[i], self.target)
+            if solution is None:
+                near[i] = False
+            else:
+                q[i] = solution
+        free = near.copy()
+        free[near] = self.bounds.free(q[near])
+        order = np.argsort(arcs, kind="stable")
+        return [q[free], *self._borders(arcs[order], free[order])]
+
+    def _borders(self, arcs: Array, free: npt.NDArray[np.bool_]) -> list[Array]:
+        """Return free samples (1, n) nearer to where the curve begins or ends to be free."""
+        nodes: list[Array] = []
+        if self.curve.closed:
+            arcs, free = np.append(arcs, arcs[0] + self.curve.length), np.append(free, free[0])
+        for i in np.flatnonzero(free[1:] != free[:-1]):
+            inside, outside = (arcs[i], arcs[i + 1]) if free[i] else (arcs[i + 1], arcs[i])
+            while abs(outside - inside) > _BORDER * self.spacing:
+                middle = 0.5 * (inside + outside)
+                guess = self.curve.at(np.array([middle % self.curve.length]))[0]
+                q = self.motion.project(guess, self.target)
+                if q is not None and self.bounds.free(q[None])[0]:
+                    nodes.append(q[None])
+                    inside = middle
+                else:
+                    outside = middle
+        return nodes
+
+
+def _between(arcs: Sequence[float], length: float, spacing: float) -> Array:
+    """Return arc lengths that fill the gaps between sorted `arcs`, the start included."""
+    fill: list[float] = []
+    if not arcs or arcs[0] > _MERGE * spacing:
+        fill.append(0.0)
+    stops = [0.0, *arcs, length]
+    for first, last in itertools.pairwise(stops):
+        pieces = int(np.ceil((last - first) / spacing))
+        fill += [first + (last - first) * k / pieces for k in range(1, pieces)]
+    return np.array(fill)

@@ -1,0 +1,149 @@
+"""How far along a path the arm can reach at all, pose by pose."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from selfmotion.basics import Array, InverseKinematicsError, read_only
+from selfmotion.constraints import JointPositionLimits
+from selfmotion.plans import Problem
+from selfmotion.robot import RobotModel
+from selfmotion.search.starts import start_candidates
+
+# Poses along the path that are looked at, branches of solutions that are followed from one to the
+# next, restarts where none of them goes on, and bisections of the time at which that happens.
+_POSES, _BRANCHES, _RESTARTS, _BISECTIONS = 64, 3, 12, 16
+# Poses about a time of trouble, in shares of the path's duration.
+_ABOUT = np.array([-1e-3, 0.0, 1e-3, 4e-3])
+# A singular value below this share of the dexterous configuration's counts as stretched or folded,
+# a joint this near to its limit [rad or m] as at it.
+_STRETCHED, _AT_LIMIT = 0.1, 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """How far along the path single poses can be reached at all.
+
+    Attributes
+    ----------
+    time : float
+        The last time up to which every pose has a configuration within the limits [s].
+    starts : list of (n,)
+        Configurations at the start of the path.
+    reason : str
+        What is beyond; "" where nothing is.
+    """
+
+    time: float
+    starts: list[Array]
+    reason: str
+
+
+def reachable(problem: Problem, suspect: float, starts: int, rng: np.random.Generator) -> Reach:
+    """Return how far single poses of the path can be reached, within the joint limits.
+
+    Inverse kinematics from the solutions of the pose before, and from elsewhere where these do not
+    go on: a pose that nothing leads to is out of reach, as far as can be told. Poses all along the
+    path, and more about the time `suspect` [s], where a motion had trouble.
+    """
+    robot, path, task = _within_limits(problem), problem.path, problem.rows
+    given = problem.given_start
+    first = start_candidates(robot, path, task, starts, rng) if given is None else [given]
+    about = np.clip(suspect / path.duration + _ABOUT, 0.0, 1.0)
+    times = path.duration * np.union1d(np.linspace(0.0, 1.0, _POSES + 1), about)
+    known, last = first, 0.0
+    for t in times[1:]:
+        found = _solutions(robot, problem, t, known, rng)
+        if not found:
+            known, last = _edge(robot, problem, (last, t), known, rng)
+            # From right before it, a pose that only seemed out of reach is found.
+            found = _solutions(robot, problem, t, known, rng)
+        if not found:
+            beyond = times[times > last]
+            return Reach(last, first, _out_of_reach(problem, robot, last, known[0], beyond))
+        known, last = found, float(t)
+    return Reach(path.duration, first, "")
+
+
+def _edge(
+    robot: RobotModel,
+    problem: Problem,
+    interval: tuple[float, float],
+    known: list[Array],
+    rng: np.random.Generator,
+) -> tuple[list[Array], float]:
+    """Return the last time of an interval that solutions go on to, and these."""
+    last, beyond = interval
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (last + beyond)
+        found = _solutions(robot, problem, middle, known, rng)
+        if found:
+            known, last = found, middle
+        else:
+            beyond = middle
+    return known, last
+
+
+def _within_limits(problem: Problem) -> RobotModel:
+    """Return the arm with the position limits that the motion has to keep."""
+    wanted, robot = problem.requirements, problem.robot
+    if not any(isinstance(item, JointPositionLimits) for item in problem.constraints):
+        free = read_only(np.full(robot.dof, np.inf))
+        return replace(robot, lower=read_only(-free), upper=free)
+    lower, upper, _ = wanted.limits(robot)
+    return replace(robot, lower=lower, upper=upper)
+
+
+def _solutions(
+    robot: RobotModel, problem: Problem, t: float, seeds: list[Array], rng: np.random.Generator
+) -> list[Array]:
+    """Return configurations for the pose at t from those of a pose nearby; [] where none is."""
+    pose = problem.path.pose(t)
+    found = []
+    for seed in seeds[:_BRANCHES]:
+        try:
+            found.append(robot.inverse_kinematics(pose, problem.rows, seed=seed, attempts=1))
+        except InverseKinematicsError:
+            continue
+    if found:
+        return found
+    try:
+        return [robot.inverse_kinematics(pose, problem.rows, rng=rng, attempts=_RESTARTS)]
+    except InverseKinematicsError:
+        return []
+
+
+def _out_of_reach(problem: Problem, robot: RobotModel, time: float, q: Array, beyond: Array) -> str:
+    """Return in words that later poses are out of reach, by how much, and what the arm looks like.
+
+    q (n,) is its configuration at `time`, the last one; `beyond` are later times.
+    """
+    misses = []
+    for t in beyond:
+        try:
+            robot.inverse_kinematics(problem.path.pose(t), problem.rows, seed=q, attempts=1)
+        except InverseKinematicsError as error:
+            misses.append((error.position_miss, error.rotation_miss, float(t)))
+    position, rotation, when = max(misses, key=lambda miss: miss[0] + miss[1])
+    turned = f" and {rotation:.2g} rad" if np.any(problem.rows.rows >= 3) else ""
+    return (
+        f"from t = {time:.6g} s on the pose is out of reach{_cause(problem, robot, q)}: the "
+        f"nearest configuration found misses it by up to {1e3 * position:.3g} mm{turned}, at "
+        f"t = {when:.4g} s"
+    )
+
+
+def _cause(problem: Problem, robot: RobotModel, q: Array) -> str:
+    """Return what keeps the arm from reaching further at q; "" where nothing shows."""
+    task, causes = problem.rows, []
+    near = np.minimum(q - robot.lower, robot.upper - q) < _AT_LIMIT
+    if np.any(near):
+        names = ", ".join(f"'{robot.joint_names[k]}'" for k in np.flatnonzero(near))
+        causes.append(f"at its limit: joint {names}")
+    here, best = (
+        float(np.linalg.svd(robot.task_jacobian(x, task), compute_uv=False)[-1])
+        for x in (q, robot.dexterous_configuration(task))
+    )
+    if here < _STRETCHED * best:
+        causes.append(f"arm stretched or folded, smallest singular value {here:.2g}")
+    return f" ({'; '.join(causes)})" if causes else ""

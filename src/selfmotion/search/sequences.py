@@ -1,0 +1,248 @@
+"""The global search: curves at all waypoints, nodes on them, the shortest chains of nodes."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, NoSequenceError, ProblemError, Progress, read_only, silent
+from selfmotion.collision import CollisionModel
+from selfmotion.path import Path
+from selfmotion.robot import RobotModel
+from selfmotion.search.chains import Mask, diverse_chains, shortest_chains, unlike, unturned
+from selfmotion.search.curves import CurveSet, SelfMotion, curves_along, targets
+from selfmotion.search.nodes import Bounds, place_nodes
+from selfmotion.search.reasons import why_blocked
+from selfmotion.search.starts import spread
+from selfmotion.search.tighten import FINELY, ROUGHLY, tighten
+from selfmotion.task import Task
+
+# Largest distance of samples along a curve [rad or m], configuration norm.
+SPACING = 0.06
+# Inverse kinematics starts anew at every so manieth waypoint, from so many seeds.
+_EVERY, _SEEDS = 10, 100
+
+
+@dataclass(frozen=True, eq=False)
+class Sequence:
+    """Configurations along a path.
+
+    Attributes
+    ----------
+    t : (W,)
+        Times of the waypoints [s].
+    q : (W, n)
+        Configurations [rad or m], each with the tool on the path.
+    length : float
+        Σ|Δq| over waypoints and joints [rad or m].
+    """
+
+    t: Array
+    q: Array
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "t", read_only(self.t))
+        object.__setattr__(self, "q", read_only(self.q))
+
+
+def best_sequences(
+    robot: RobotModel,
+    path: Path,
+    task: Task | str,
+    t: npt.ArrayLike,
+    *,
+    lower: npt.ArrayLike,
+    upper: npt.ArrayLike,
+    largest_step: npt.ArrayLike,
+    collision: CollisionModel | None = None,
+    margin: float = 0.0,
+    count: int = 3,
+    rng: np.random.Generator | int = 0,
+    progress: Progress = silent,
+) -> list[Sequence]:
+    """Return the shortest joint sequences along a path that are unlike each other.
+
+    At every waypoint all self-motion curves are sampled by numerical continuation, from inverse
+    kinematics at many seeds and from the curves of the neighbouring waypoints. The samples inside
+    the limits and free of collision are the nodes of a graph; dynamic programming finds the chain
+    of least Σ|Δq| with every step within `largest_step`: the global optimum over samples about
+    0.06 rad apart. Each is then moved along the curves, locally and with finer samples, to where
+    it is shorter; it stays a few per cent longer than the continuous problem's optimum.
+    Hence several chains, unlike each other by 0.3 rad in some joint at a
+    tenth of the waypoints: refine them all and keep the best.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    path : Path
+    task : Task or str
+        Must leave redundancy 1.
+    t : (W,)
+        Times of the waypoints [s], increasing, within the path.
+    lower, upper : (n,)
+        Joint limits [rad or m]; ±inf for joints without. An angle is what it is: turns count.
+    largest_step : (n,), (W - 1, n) or float
+        Largest change of each joint from one waypoint to the next [rad or m].
+    collision : CollisionModel, optional
+        Of `robot`.
+    margin : float
+        Smallest clearance [m] at the waypoints.
+    count : int
+        How many sequences at most.
+    rng : Generator or int
+        Shifts the seeds of the inverse kinematics; the same one gives the same sequences.
+    progress : Progress
+        Told the waypoint or sequence that is worked on.
+
+    Returns
+    -------
+    list of Sequence
+        Shortest first, at least one.
+
+    Raises
+    ------
+    ProblemError
+        The task does not leave redundancy 1, or an argument has the wrong shape or sign.
+    PathError
+        A time is outside the path.
+    NoSequenceError
+        No chain exists among the samples; tells the waypoint at which the last one ends, and why.
+    """
+    task, times = Task.of(task), _times(t)
+    limits = [
+        _joint_values(robot, values, name, shape)
+        for values, name, shape in (
+            (lower, "lower", (robot.dof,)),
+            (upper, "upper", (robot.dof,)),
+            (largest_step, "largest_step", (len(times) - 1, robot.dof)),
+        )
+    ]
+    _check(robot, task, limits, count)
+    lower, upper, steps = limits
+    motion = SelfMotion(robot, task, SPACING)
+    bounds = Bounds(lower, upper, motion.revolute, collision, margin)
+    x = targets(path, times)
+    seeds = list(spread(robot, _SEEDS, np.random.default_rng(rng)))
+    curves = curves_along(motion, x, seeds, _EVERY, progress)
+    samples = _free_samples(motion, x, curves, bounds, progress)
+    rough, turning = _rough_motions(motion, x, curves, samples, bounds, steps, times, count)
+    # All of them roughly, to see which are worth the rest.
+    for stage, spacings, kept in (
+        ("search: shortening sequence", ROUGHLY, len(rough)),
+        ("search: shortening finalist", FINELY, count),
+    ):
+        del rough[kept:]
+        for number, q in enumerate(rough):
+            progress(stage, number + 1, len(rough))
+            rough[number] = tighten(motion, x, q, bounds, steps, spacings)
+        ranked = _ranked(times, rough, turning)
+        rough = [np.array(sequence.q) for sequence in ranked]
+    return ranked
+
+
+def _rough_motions(
+    motion: SelfMotion,
+    x: Array,
+    curves: list[CurveSet],
+    samples: list[Array],
+    bounds: Bounds,
+    steps: Array,
+    times: Array,
+    count: int,
+) -> tuple[list[Array], Mask]:
+    """Return the shortest unlike motions (W, n) over samples, and whose turns did not count.
+
+    Turns of joints with room for several are left out at first, and the motion put inside the
+    limits as a whole; where it does not fit, it is looked for among all turns of these joints.
+    """
+    relaxed = bounds.without_turns()
+    while True:
+        layers, turning = [relaxed.layer(q) for q in samples], relaxed.turning
+        chains = shortest_chains(layers, steps, turning)
+        if chains.blocked is not None:
+            i = chains.blocked
+            alive = layers[i - 1][np.isfinite(chains.cost[i - 1])] if i else layers[0][:0]
+            reason = why_blocked(motion, x[i], curves[i], alive, layers[i], relaxed, steps[i - 1])
+            raise NoSequenceError(
+                f"{motion.robot.name}: no motion along the path passes t = {times[i]:.6g} s: "
+                f"{reason}",
+                time=float(times[i]),
+                reason=reason,
+            )
+        # Unlike chains may become the same one when they are tightened.
+        found = diverse_chains(layers, chains, steps, turning, 2 * count)
+        rough = [bounds.turned_inside(_configurations(layers, q, turning)) for q in found]
+        beyond = bounds.beyond(rough[0])
+        if not np.any(beyond):
+            return [q for q in rough if not np.any(bounds.beyond(q))], turning
+        relaxed = replace(
+            relaxed,
+            lower=np.where(beyond, bounds.lower, relaxed.lower),
+            upper=np.where(beyond, bounds.upper, relaxed.upper),
+        )
+
+
+def _ranked(times: Array, motions: list[Array], turning: Mask) -> list[Sequence]:
+    """Return the sequences, shortest first, without those that became like a shorter one."""
+    sequences = [Sequence(times, q, float(np.abs(np.diff(q, axis=0)).sum())) for q in motions]
+    kept: list[Sequence] = []
+    for sequence in sorted(sequences, key=lambda sequence: sequence.length):
+        if all(unlike(sequence.q, other.q, turning) for other in kept):
+            kept.append(sequence)
+    return kept
+
+
+def _free_samples(
+    motion: SelfMotion, x: Array, curves: list[CurveSet], bounds: Bounds, progress: Progress
+) -> list[Array]:
+    """Return the free samples of the curves at every waypoint, without turns."""
+    found: list[Array] = []
+    before = np.empty((0, motion.robot.dof))
+    for number, (target, here) in enumerate(zip(x, curves, strict=True), 1):
+        progress("search: what is free at waypoint", number, len(x))
+        carried = [q for q in (motion.project(s, target) for s in before) if q is not None]
+        before = place_nodes(motion, target, here, carried, bounds, SPACING)
+        found.append(before)
+    return found
+
+
+def _configurations(layers: list[Array], chain: list[int], turning: Mask) -> Array:
+    """Return a chain's configurations (W, n); joints that turn without end do not jump."""
+    q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
+    steps = unturned(np.diff(q, axis=0), turning)
+    return np.where(turning, np.vstack([q[:1], q[0] + np.cumsum(steps, axis=0)]), q)
+
+
+def _times(t: npt.ArrayLike) -> Array:
+    times = np.asarray(t, dtype=np.float64)
+    if times.ndim != 1 or len(times) < 2 or not np.all(np.diff(times) > 0):
+        raise ProblemError(f"t has shape {times.shape}, expected at least two increasing times [s]")
+    return times
+
+
+def _joint_values(
+    robot: RobotModel, values: npt.ArrayLike, name: str, shape: tuple[int, ...]
+) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape not in ((), (robot.dof,), shape) or np.any(np.isnan(array)):
+        raise ProblemError(
+            f"{name} has shape {array.shape}, expected a number for each of {robot.dof} joints"
+        )
+    return np.ascontiguousarray(np.broadcast_to(array, shape))
+
+
+def _check(robot: RobotModel, task: Task, limits: list[Array], count: int) -> None:
+    redundancy = robot.redundancy(task)
+    if redundancy != 1:
+        raise ProblemError(
+            f"{robot.name} has redundancy {redundancy} for task '{task.value}'; the search over "
+            f"self-motion curves needs 1, use multiple starts instead"
+        )
+    if np.any(limits[0] > limits[1]):
+        k = int(np.flatnonzero(limits[0] > limits[1])[0])
+        raise ProblemError(f"joint '{robot.joint_names[k]}' has its lower limit above the upper")
+    if not np.all(limits[2] > 0.0):
+        raise ProblemError("largest_step has numbers that are not positive")
+    if count < 1:
+        raise ProblemError(f"count is {count}, expected at least 1")
