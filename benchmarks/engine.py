@@ -8,33 +8,20 @@ import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
-from selfmotion.engine.objective import Objective
-from selfmotion.engine.rollout import Rollout
-from selfmotion.engine.start import FixedStart
-from selfmotion.motion.grid import Grid
-from selfmotion.motion.null_motion import NullMotionTable, TransportedFrame
+from selfmotion.engine import Objective, StillMotion
+from selfmotion.motion import Grid
 
 
 def objective_on(problem: sm.Problem, steps: int) -> Objective:
     """Return the objective of `problem` on a grid of `steps` steps."""
-    grid = Grid.aligned(problem.path.knots, steps)
-    rollout = Rollout(problem.robot, problem.path, problem.rows, grid)
-    n = problem.robot.dof
     start = problem.given_start
     if start is None:
         start = problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.rows)
-    frame, rows = None, n
-    if problem.null_motion.space == "null":
-        rollout.run(start, np.zeros((len(grid.stage_times), n)))
-        jacobians = rollout.samples().task_jacobian[grid.node_stages]
-        frame = TransportedFrame(grid.nodes, jacobians)(grid.stage_times)
-        rows = frame.shape[2]
-    functions = problem.null_motion.functions(grid.stage_times, problem.path.duration)
-    table = NullMotionTable(functions, frame, rows)
-    return Objective(rollout, table, problem.costs, FixedStart(start))
+    still = StillMotion.on(problem, start, Grid.aligned(problem.path.knots, steps))
+    return Objective.of(problem, still)
 
 
-class Evaluation:
+class Measured:
     """Evaluates F, or F and ∇F, at a new point each time, so that nothing is remembered."""
 
     def __init__(self, objective: Objective, *, gradient: bool) -> None:
@@ -53,8 +40,7 @@ def pinocchio_loop(objective: Objective) -> Any:
     robot = objective.rollout.robot
     model, data, tool = robot.model, robot.model.createData(), robot.tool_id
     axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    objective.value(np.zeros(objective.size))
-    configurations = list(objective.rollout.samples().q.copy())
+    configurations = list(objective.samples(np.zeros(objective.size)).q.copy())
 
     def loop() -> None:
         for q in configurations:

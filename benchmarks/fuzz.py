@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.progress import track
 
 import selfmotion as sm
-from selfmotion.basics.arrays import Array
+from selfmotion.basics import Array
 
 # The checker's own tolerances: the plan's, and what yourdfpy and Pinocchio differ by.
 POSITION, ROTATION, CLOSE = 1.1e-6, 1.5e-6, 1e-9

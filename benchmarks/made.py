@@ -18,8 +18,7 @@ from rich.console import Console
 from scipy.interpolate import PchipInterpolator
 
 import selfmotion as sm
-from selfmotion.basics.arrays import Array
-from selfmotion.basics.files import write_csv
+from selfmotion.basics import Array, write_csv
 
 DATA = Path(__file__).parent / "data"
 DURATION = 10.0

@@ -20,8 +20,7 @@ from rich.console import Console
 from rich.table import Table
 
 import selfmotion as sm
-from selfmotion.basics.arrays import Array
-from selfmotion.basics.files import write_atomically, write_csv
+from selfmotion.basics import Array, write_atomically, write_csv
 
 DATA = Path(__file__).parent / "data"
 
@@ -137,11 +136,10 @@ def plan(problem: PathProblem, seed: int) -> sm.Plan:
             costs=[sm.PathLength(smoothing=0.005)],
             constraints=constraints,
         ),
-        search="global",
-        rng=seed,
+        search=sm.Search(mode="global", rng=seed),
     )
     # A motion along a part of the path is none along the path.
-    return found.require() if found.requirements.ending else found
+    return found.require() if found.report.ending else found
 
 
 def judge(problem: PathProblem, q: Array, seconds: float) -> Score:

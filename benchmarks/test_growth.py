@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from engine import Evaluation, objective_on
+from engine import Measured, objective_on
 from problems import chain
 
 
@@ -13,7 +13,7 @@ from problems import chain
 @pytest.mark.parametrize("joints", [3, 6, 12, 24, 48])
 def test_joints(benchmark: Any, joints: int) -> None:
     benchmark.extra_info["joints"] = joints
-    benchmark(Evaluation(objective_on(chain(joints), 50), gradient=True))
+    benchmark(Measured(objective_on(chain(joints), 50), gradient=True))
 
 
 @pytest.mark.benchmark(group="growth in steps")
@@ -22,11 +22,11 @@ def test_steps(benchmark: Any, steps: int) -> None:
     objective = objective_on(chain(7), steps)
     benchmark.extra_info["steps"] = steps
     benchmark.extra_info["bytes"] = objective.rollout.table_bytes
-    benchmark(Evaluation(objective, gradient=True))
+    benchmark(Measured(objective, gradient=True))
 
 
 @pytest.mark.benchmark(group="growth in degree")
 @pytest.mark.parametrize("degree", [1, 3, 7, 15])
 def test_degree(benchmark: Any, degree: int) -> None:
     benchmark.extra_info["degree"] = degree
-    benchmark(Evaluation(objective_on(chain(7, degree), 50), gradient=True))
+    benchmark(Measured(objective_on(chain(7, degree), 50), gradient=True))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from engine import Evaluation, objective_on, pinocchio_loop
+from engine import Measured, objective_on, pinocchio_loop
 from problems import circle
 
 
@@ -21,9 +21,9 @@ def test_pinocchio_loop(benchmark: Any, objective: Any) -> None:
 
 @pytest.mark.benchmark(group="kernels")
 def test_rollout(benchmark: Any, objective: Any) -> None:
-    benchmark(Evaluation(objective, gradient=False))
+    benchmark(Measured(objective, gradient=False))
 
 
 @pytest.mark.benchmark(group="kernels")
 def test_rollout_and_gradient(benchmark: Any, objective: Any) -> None:
-    benchmark(Evaluation(objective, gradient=True))
+    benchmark(Measured(objective, gradient=True))

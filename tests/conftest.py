@@ -1,13 +1,17 @@
 """Arms, tasks and paths that the laws are checked on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.basics.arrays import Array
+from selfmotion.basics import Array
+from selfmotion.engine import Counts, Deviation, Objective, Rollout
+from selfmotion.engine.augmented_lagrangian import AugmentedLagrangian
+from selfmotion.engine.start import Start
+from selfmotion.motion import NullMotionTable
 
 # Arms with a task each, chosen so that every task and redundancy from 1 to 5 occurs.
 CASES = [
@@ -84,6 +88,28 @@ def panda_circle(panda: sm.RobotModel) -> Callable[[str], sm.Problem]:
     """Return a maker of the problem: Panda on a vertical circle of 0.15 m in 4 s."""
     path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     return lambda task="pose", **options: sm.Problem(panda, path, task, PANDA_HOME, **options)
+
+
+def objective_of(
+    rollout: Rollout,
+    table: NullMotionTable,
+    costs: Sequence[sm.Cost],
+    start: Start,
+    *,
+    deviation: Deviation | None = None,
+    constraints: Sequence[sm.BoundConstraint] = (),
+) -> Objective:
+    """Return an objective of parts, for laws that hold whatever problem they come from."""
+    grid, path = rollout.grid, rollout.path
+    return Objective(
+        rollout,
+        table,
+        costs,
+        start,
+        deviation or Deviation(path, (), grid.stage_times, (False, False)),
+        AugmentedLagrangian(constraints, grid),
+        Counts(),
+    )
 
 
 def central_difference(function: Callable[[Array], float], x: Array, step: float = 1e-6) -> Array:

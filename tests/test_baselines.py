@@ -25,12 +25,12 @@ def ours() -> sm.Plan:
 
 @pytest.fixture(scope="module")
 def lagrangian(ours: sm.Plan) -> sm.Plan:
-    return sm.plan(sm.sample_problem(), method=sm.LagrangianOptimum(ours))
+    return sm.plan_by(sm.sample_problem(), sm.LagrangianOptimum(ours))
 
 
 def test_pseudo_inverse_is_x_0(ours: sm.Plan) -> None:
     """Two integrators, one of fixed steps and one of controlled error, on the same equation."""
-    found = sm.plan(sm.sample_problem(), method=sm.PseudoInverse())
+    found = sm.plan_by(sm.sample_problem(), sm.PseudoInverse())
     assert found.certificate.verified
     assert found.report.cost == pytest.approx(ours.report.initial_cost, rel=1e-6)
     assert found.report.cost == pytest.approx(15.500547, abs=1e-5)
@@ -44,15 +44,15 @@ def test_lagrangian_optimum_agrees_with_ours(ours: sm.Plan, lagrangian: sm.Plan)
 
 
 def test_lagrangian_optimum_needs_no_guess(lagrangian: sm.Plan) -> None:
-    alone = sm.plan(sm.sample_problem(), method=sm.LagrangianOptimum())
+    alone = sm.plan_by(sm.sample_problem(), sm.LagrangianOptimum())
     assert alone.report.cost == pytest.approx(lagrangian.report.cost, rel=1e-6)
 
 
 def test_cyclic_optimum_closes_and_costs_more() -> None:
     problem = sm.sample_problem(duration=2.0)
     free = sm.plan(problem)
-    natural = sm.plan(problem, method=sm.LagrangianOptimum(free))
-    closed = sm.plan(problem, method=sm.LagrangianOptimum(free, cyclic=True))
+    natural = sm.plan_by(problem, sm.LagrangianOptimum(free))
+    closed = sm.plan_by(problem, sm.LagrangianOptimum(free, cyclic=True))
     assert natural.certificate.closure > 0.1
     assert closed.certificate.closure < 1e-6
     assert closed.certificate.verified
@@ -65,7 +65,7 @@ def test_lagrangian_optimum_on_a_panda(panda_circle: Circle, task: str) -> None:
     """Redundancy 1, 2 and 4; ours has the cubic's cost, hence is a little above."""
     problem = panda_circle(task)
     ours = sm.plan(problem)
-    best = sm.plan(problem, method=sm.LagrangianOptimum(ours, tolerance=1e-5))
+    best = sm.plan_by(problem, sm.LagrangianOptimum(ours, tolerance=1e-5))
     assert best.certificate.verified
     assert best.report.cost <= ours.report.cost * (1.0 + 1e-6)
     assert best.report.cost == pytest.approx(ours.report.cost, rel=5e-3)
@@ -101,8 +101,8 @@ def test_hamiltonian_flow(panda_circle: Circle, task: str) -> None:
 
 def test_gradient_projection_climbs(panda_circle: Circle) -> None:
     problem = panda_circle("position")
-    still = sm.plan(problem, method=sm.PseudoInverse())
-    moving = sm.plan(problem, method=sm.GradientProjection(gain=1.0))
+    still = sm.plan_by(problem, sm.PseudoInverse())
+    moving = sm.plan_by(problem, sm.GradientProjection(gain=1.0))
     end = still.trajectory.q[-1], moving.trajectory.q[-1]
     w = [np.prod(np.linalg.svd(problem.robot.task_jacobian(q, problem.rows))[1]) for q in end]
     assert w[1] > w[0]
@@ -112,10 +112,10 @@ def test_gradient_projection_climbs(panda_circle: Circle) -> None:
 def test_gradient_projection_tunes_its_gain() -> None:
     """The tuned gain is no worse than others, and better than none."""
     problem = sm.sample_problem()
-    tuned = sm.plan(problem, method=sm.GradientProjection())
+    tuned = sm.plan_by(problem, sm.GradientProjection())
     assert tuned.report.cost < 0.75 * tuned.report.initial_cost
     for gain in (0.5, 1.0, 2.0):
-        fixed = sm.plan(problem, method=sm.GradientProjection(gain=gain))
+        fixed = sm.plan_by(problem, sm.GradientProjection(gain=gain))
         assert tuned.report.cost <= fixed.report.cost + 1e-6
 
 
@@ -135,7 +135,7 @@ def test_pose_gradient_is_that_of_the_cost(panda: sm.RobotModel, panda_circle: C
 
 def test_extended_jacobian_keeps_the_pose_stationary(panda_circle: Circle) -> None:
     problem = panda_circle("pose")
-    found = sm.plan(problem, method=sm.ExtendedJacobian())
+    found = sm.plan_by(problem, sm.ExtendedJacobian())
     assert found.certificate.verified
     q = found.trajectory.q[-1]
     null = np.linalg.svd(problem.robot.task_jacobian(q, problem.rows))[2][6:]
@@ -146,21 +146,21 @@ def test_extended_jacobian_keeps_the_pose_stationary(panda_circle: Circle) -> No
 
 def test_extended_jacobian_breaks_down_by_name() -> None:
     with pytest.raises(sm.BreakdownError, match=r"without bound|singular") as caught:
-        sm.plan(sm.sample_problem(), method=sm.ExtendedJacobian())
+        sm.plan_by(sm.sample_problem(), sm.ExtendedJacobian())
     assert 0.0 < caught.value.time < 1.0
 
 
 def test_damping_costs_path_and_certificates_say_so() -> None:
-    found = sm.plan(sm.sample_problem(), method=sm.DampedLeastSquares(0.3))
+    found = sm.plan_by(sm.sample_problem(), sm.DampedLeastSquares(0.3))
     assert not found.certificate.verified
     assert found.certificate.position_error.value > 1e-3
     assert "off the path" in found.certificate.verdict
-    far = sm.plan(sm.sample_problem(), method=sm.DampedLeastSquares(0.3, threshold=1e-6))
+    far = sm.plan_by(sm.sample_problem(), sm.DampedLeastSquares(0.3, threshold=1e-6))
     assert far.certificate.verified
 
 
 def test_plans_by_a_method_are_plans_like_any(tmp_path: Path) -> None:
-    found = sm.plan(sm.sample_problem(), method=sm.PseudoInverse())
+    found = sm.plan_by(sm.sample_problem(), sm.PseudoInverse())
     assert write_replay(found, tmp_path / "replay.html").is_file()
     file = tmp_path / "plan.npz"
     found.save(file)
@@ -186,7 +186,7 @@ def test_the_lagrangian_method_refuses_what_it_cannot_solve() -> None:
     def solve(*costs: sm.Cost, cyclic: bool = False) -> None:
         base = sm.sample_problem()
         problem = sm.Problem(base.robot, base.path, base.task, base.start, costs=costs)
-        sm.plan(problem, method=sm.LagrangianOptimum(cyclic=cyclic))
+        sm.plan_by(problem, sm.LagrangianOptimum(cyclic=cyclic))
 
     with pytest.raises(sm.ProblemError, match="'joint acceleration' is neither"):
         solve(sm.JointVelocity(), sm.JointAcceleration())
@@ -196,4 +196,4 @@ def test_the_lagrangian_method_refuses_what_it_cannot_solve() -> None:
         solve(sm.JointVelocity(), cyclic=True)
     problem, climb = sm.sample_problem(), sm.GradientProjection(sm.JointVelocity(), gain=1.0)
     with pytest.raises(sm.ProblemError, match="does not depend on the pose"):
-        sm.plan(problem, method=climb)
+        sm.plan_by(problem, climb)

@@ -8,9 +8,9 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from conftest import central_difference
+from conftest import central_difference, objective_of
 from selfmotion.basics.arrays import Array
-from selfmotion.engine.objective import Objective
+from selfmotion.costs import PathError
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart
 from selfmotion.motion.grid import Grid
@@ -84,7 +84,7 @@ def test_damping_out_of_reach_changes_no_bit(case: Case) -> None:
     assert not damped.damped
     np.testing.assert_array_equal(damped.samples().q, free.samples().q)
     np.testing.assert_array_equal(damped.samples().qd, free.samples().qd)
-    for mine, plain in zip(damped.polish(), free.polish(), strict=True):
+    for mine, plain in zip(damped.polished(), free.polished(), strict=True):
         np.testing.assert_array_equal(mine, plain)
 
 
@@ -93,8 +93,9 @@ def test_damped_gradient_equals_central_differences(case: Case) -> None:
     start = case[2]
     rollout = partly_damped(case)
     table = table_of(rollout)
-    costs = [sm.JointVelocity(), sm.Manipulability(0.7)]
-    objective = Objective(rollout, table, costs, FixedStart(start), path_weight=1e3)
+    away = PathError(1e3, case[1].dimension)
+    costs = [sm.JointVelocity(), sm.Manipulability(0.7), away]
+    objective = objective_of(rollout, table, costs, FixedStart(start))
     x = 0.1 * np.random.default_rng(7).normal(size=objective.size)
     exact = objective.gradient(x)
     assert rollout.damped
@@ -219,7 +220,7 @@ def test_a_damped_plan_survives_the_disk(overreach: sm.Plan, tmp_path: Path) -> 
     again = sm.load_plan(file)
     assert again.certificate == overreach.certificate
     assert again.check() == overreach.certificate
-    assert again.requirements.damping == overreach.requirements.damping
+    assert again.problem.damping == overreach.problem.damping
 
 
 def test_damping_that_never_acts_leaves_the_plan(planar: sm.RobotModel) -> None:
@@ -254,4 +255,4 @@ def test_what_damping_refuses(planar: sm.RobotModel) -> None:
         dataclasses.replace(twice, damping=sm.Damping())
     damped = dataclasses.replace(sm.sample_problem(), damping=sm.Damping())
     with pytest.raises(sm.ProblemError, match="damping is for the optimised motion"):
-        sm.plan(damped, method=sm.PseudoInverse())
+        sm.plan_by(damped, sm.PseudoInverse())

@@ -8,11 +8,11 @@ import pytest
 
 import selfmotion as sm
 from conftest import robot_named
+from selfmotion.basics import restore
 from selfmotion.basics.arrays import Array
-from selfmotion.engine.rollout import Rollout
+from selfmotion.engine import Rollout, settled_still_motion
 from selfmotion.motion.grid import Grid
-from selfmotion.path import Truncated, path_from_dict
-from selfmotion.planning.session import Counts, Session
+from selfmotion.path import Truncated
 from selfmotion.replay import write_replay
 
 # The end of a part that only the workspace limits, relative to the closed form.
@@ -154,7 +154,7 @@ def test_another_null_motion_where_x_0_breaks_down(planar: sm.RobotModel) -> Non
     line = sm.Line(inner, outer, 4.0)
     problem = sm.Problem(planar, line, "planar", start)
     with pytest.raises(sm.BreakdownError):
-        Session(problem, sm.QuasiNewton(), None, None, Counts(), start, free=False)
+        settled_still_motion(problem, start)
     plan = sm.plan(problem)
     assert plan.certificate.verified
     assert plan.trajectory.t[-1] == line.duration
@@ -196,7 +196,7 @@ def test_conditions_on_the_end_do_not_bind_a_part(planar: sm.RobotModel) -> None
 def test_a_truncated_path_is_its_path(planar: sm.RobotModel) -> None:
     line = outward(planar, 1.5)
     part = Truncated(line, 3.0)
-    again = path_from_dict(part.to_dict())
+    again = restore(sm.Path, part.to_dict())
     times: Array = np.linspace(0.0, 3.0, 7)
     for path in (part, again):
         assert path.duration == 3.0

@@ -85,7 +85,7 @@ def test_files_that_are_no_plans_are_named(plan: sm.Plan, tmp_path: Path) -> Non
     with pytest.raises(sm.FileFormatError, match=r"other\.npz: is no plan"):
         sm.load_plan(tmp_path / "other.npz")
     files.write_archive(tmp_path / "empty.npz", {}, {})
-    with pytest.raises(sm.FileFormatError, match="of another version"):
+    with pytest.raises(sm.FileFormatError, match="has no format number"):
         sm.load_plan(tmp_path / "empty.npz")
 
 

@@ -41,13 +41,13 @@ def given(free: sm.Problem, elbow: float) -> sm.Problem:
 
 @pytest.fixture(scope="module")
 def compared(free: sm.Problem) -> dict[float, sm.Plan]:
-    return {elbow: sm.plan(given(free, elbow), compare=True) for elbow in ELBOWS}
+    return {elbow: sm.plan(given(free, elbow), search=sm.Search(compare=True)) for elbow in ELBOWS}
 
 
 def test_a_plan_in_the_worse_family_is_told_how_much_worse(
     free: sm.Problem, compared: dict[float, sm.Plan]
 ) -> None:
-    best = sm.plan(free, search="global").report
+    best = sm.plan(free, search=sm.Search(mode="global")).report
     assert best.gap is not None
     assert best.gap.cost_excess == 0.0
     for plan in compared.values():
@@ -74,7 +74,8 @@ def test_path_lengths_are_compared_like_with_like(free: sm.Problem) -> None:
     costs = [sm.PathLength(smoothing=0.005)]
     motion = sm.BSplineNullMotion(20)
     gap = sm.plan(
-        dataclasses.replace(free, costs=costs, null_motion=motion), search="global"
+        dataclasses.replace(free, costs=costs, null_motion=motion),
+        search=sm.Search(mode="global"),
     ).report.gap
     assert gap is not None
     # A sequence is samples, no closer than 3e-3 rad to the optimum at each waypoint.
@@ -96,4 +97,4 @@ def test_other_redundancies_are_refused(panda: sm.RobotModel) -> None:
     start = panda.dexterous_configuration()
     path = sm.Line(panda.pose(start), panda.pose(start + 0.05), 1.0)
     with pytest.raises(sm.ProblemError, match="compare: the global search needs redundancy 1"):
-        sm.plan(sm.Problem(panda, path, "position", start=start), compare=True)
+        sm.plan(sm.Problem(panda, path, "position", start=start), search=sm.Search(compare=True))

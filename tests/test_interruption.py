@@ -39,9 +39,13 @@ def problem(planar: sm.RobotModel) -> sm.Problem:
     return sm.Problem(planar, path, "planar")
 
 
+SEARCH = sm.Search(starts=6, finalists=3, compare=True)
+GLOBAL = dataclasses.replace(SEARCH, mode="global")
+
+
 def plan(problem: sm.Problem, **options: object) -> sm.Plan:
-    settings = {"starts": 6, "finalists": 3, "compare": True} | options
-    return sm.plan(problem, **settings)
+    options.setdefault("search", SEARCH)
+    return sm.plan(problem, **options)
 
 
 def interrupt_at(stage: str, number: int) -> Callable[[str, int, int], None]:
@@ -78,14 +82,14 @@ def test_without_a_motion_an_interruption_is_one(problem: sm.Problem) -> None:
         plan(problem, progress=interrupt_at("start", 1))
     for stage in STAGES[2:6]:
         with pytest.raises(KeyboardInterrupt):
-            plan(problem, search="global", progress=interrupt_at(stage, 1))
+            plan(problem, search=GLOBAL, progress=interrupt_at(stage, 1))
 
 
 def test_an_interruption_among_guides_keeps_the_first_one(problem: sm.Problem) -> None:
-    whole = plan(problem, search="global")
+    whole = plan(problem, search=GLOBAL)
     assert whole.report.gap is not None
     assert whole.report.gap.sequences > 1
-    found = plan(problem, search="global", progress=interrupt_at("refining sequence", 2))
+    found = plan(problem, search=GLOBAL, progress=interrupt_at("refining sequence", 2))
     assert found.report.status is sm.Status.INTERRUPTED
     assert found.certificate.verified
 

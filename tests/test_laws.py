@@ -5,10 +5,9 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from conftest import central_difference, robot_named, short_line, start_of
+from conftest import central_difference, objective_of, robot_named, short_line, start_of
 from selfmotion import kernels
 from selfmotion.basics.arrays import Array
-from selfmotion.engine.objective import Objective
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart
 from selfmotion.motion.grid import Grid
@@ -143,7 +142,7 @@ def test_gradient_equals_central_differences(case: Case, cost: str) -> None:
     rollout = rollout_of(case, 8)
     functions = PolynomialNullMotion(2, "joint").functions(rollout.grid.stage_times, path.duration)
     table = NullMotionTable(functions, None, robot.dof)
-    objective = Objective(rollout, table, [COSTS[cost](robot, task)], FixedStart(start))
+    objective = objective_of(rollout, table, [COSTS[cost](robot, task)], FixedStart(start))
     x = 0.1 * np.random.default_rng(7).normal(size=objective.size)
     exact = objective.gradient(x)
     differences = central_difference(objective.value, x, 1e-5)
@@ -161,7 +160,7 @@ def test_panda_gradient_to_seven_digits() -> None:
     functions = PolynomialNullMotion(3, "joint").functions(rollout.grid.stage_times, 4.0)
     table = NullMotionTable(functions, None, robot.dof)
     costs = [sm.JointVelocity(), sm.InverseManipulability(0.01)]
-    objective = Objective(rollout, table, costs, FixedStart(start))
+    objective = objective_of(rollout, table, costs, FixedStart(start))
     x = 0.05 * np.random.default_rng(13).normal(size=objective.size)
     exact = objective.gradient(x)
     coarse = central_difference(objective.value, x, 2e-3)
@@ -261,7 +260,7 @@ def test_breakdown_is_reported_not_raised(planar: sm.RobotModel) -> None:
     rollout = Rollout(planar, path, sm.Task.PLANAR, Grid.aligned(path.knots, 10))
     assert rollout.run(start, np.zeros((41, 3))) == 0.0
     table = NullMotionTable(np.ones((41, 1)), None, 3)
-    objective = Objective(rollout, table, [sm.JointVelocity()], FixedStart(start))
+    objective = objective_of(rollout, table, [sm.JointVelocity()], FixedStart(start))
     assert objective.value(np.zeros(3)) == np.inf
     assert np.isnan(objective.gradient(np.zeros(3))).all()
     assert rollout.run(np.array([0.3, 1.0, np.nan]), np.zeros((41, 3))) is not None

@@ -8,8 +8,8 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.basics import restore
 from selfmotion.basics.arrays import Array
-from selfmotion.path import path_from_dict
 
 # Central differences with a step of 1e-6 of functions of order 1 to 30.
 DIFFERENCE = 2e-8
@@ -61,7 +61,7 @@ def test_rotations_are_rotations(path: sm.Path) -> None:
 
 
 def test_description_restores_the_path_exactly(path: sm.Path) -> None:
-    restored = path_from_dict(json.loads(json.dumps(path.to_dict())))
+    restored = restore(sm.Path, json.loads(json.dumps(path.to_dict())))
     t = np.linspace(0, path.duration, 17)
     for name in ("translation", "rotation", "twist"):
         np.testing.assert_array_equal(
@@ -196,8 +196,8 @@ def test_bad_csv_is_named(tmp_path: Path, text: str, message: str) -> None:
         (lambda: sm.Circle.around(pose(1), -0.1, 1.0), "radius is -0.1"),
         (lambda: sm.Waypoints([0, 1], [[0, 0, 0]]), "positions has shape"),
         (lambda: sm.Waypoints([0, 1], [[0, 0, 0]] * 2, corners="cut"), "corners is 'cut'"),
-        (lambda: path_from_dict({"kind": "spiral"}), "path kind is 'spiral'"),
-        (lambda: path_from_dict({"kind": "line", "begin": 1}), "path of kind 'line'"),
+        (lambda: restore(sm.Path, {"kind": "spiral"}), "path kind is 'spiral'"),
+        (lambda: restore(sm.Path, {"kind": "line", "begin": 1}), "path of kind 'line'"),
     ],
 )
 def test_bad_paths_are_refused(call, message: str) -> None:

@@ -10,6 +10,9 @@ import yourdfpy
 import selfmotion as sm
 from selfmotion.basics.arrays import Array
 
+# Of a few additions of numbers of order 1.
+ROUNDING = 1e-12
+
 Circle = Callable[..., sm.Problem]
 
 
@@ -42,7 +45,9 @@ def test_the_papers_twelve_coefficients() -> None:
     plan = sm.plan(sm.sample_problem(null_motion=motion))
     assert plan.coefficients.shape == (12,)
     assert plan.report.cost <= 10.4855
-    identity = sm.plan(sm.sample_problem(null_motion=motion), initial_metric="identity")
+    identity = sm.plan(
+        sm.sample_problem(null_motion=motion), optimizer=sm.QuasiNewton(initial_metric="identity")
+    )
     assert identity.report.cost <= 10.4900
     default = sm.plan(sm.sample_problem())
     assert default.report.evaluations < 0.5 * identity.report.evaluations
@@ -136,8 +141,9 @@ def test_certificate_equals_an_independent_recomputation(
     assert certificate.position_error.value == pytest.approx(position, abs=1e-12)
     assert certificate.rotation_error.value == pytest.approx(rotation, abs=1e-9)
     assert certificate.smallest_singular_value.value == pytest.approx(min(singular), rel=1e-6)
-    assert certificate.limit_margin.value == pytest.approx(min(margins), abs=1e-12)
-    assert certificate.velocity_ratio.value == pytest.approx(max(ratios), rel=1e-12)
+    # Limits are judged between these times as well: never milder than here, and hardly stricter.
+    assert min(margins) - 1e-5 <= certificate.limit_margin.value <= min(margins) + ROUNDING
+    assert max(ratios) - ROUNDING <= certificate.velocity_ratio.value <= max(ratios) * (1 + 1e-3)
     assert certificate.samples == len(t)
     assert certificate.position_error.value <= 1e-6
     assert certificate.rotation_error.value <= 1e-6
@@ -229,11 +235,11 @@ def test_planar_pose_with_three_joints_has_no_freedom(planar: sm.RobotModel) -> 
     [
         ({"task": "posture"}, "unknown task 'posture'"),
         ({"costs": ()}, "no cost is given"),
-        ({"costs": ["x"]}, "costs are"),
+        ({"costs": ["x"]}, "costs: 'x' is no Cost"),
         ({"robot": "panda"}, "expected a RobotModel"),
         ({"path": None}, "expected a Path"),
         ({"null_motion": "cubic"}, "null_motion is 'cubic'"),
-        ({"constraints": [3]}, "constraints are"),
+        ({"constraints": [3]}, "constraints: 3 is no Constraint"),
         ({"costs": [sm.PathLength(float("inf"))]}, "smoothing is inf"),
         ({"costs": [sm.JointVelocity(), sm.JointVelocity()]}, "two costs are called"),
         ({"costs": [sm.JointVelocity([1.0, 2.0])]}, r"weight has shape \(2,\)"),

@@ -9,16 +9,17 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from conftest import PANDA_HOME, central_difference, robot_named, short_line, start_of
+from conftest import PANDA_HOME, central_difference, objective_of, robot_named, short_line, start_of
 from selfmotion.basics.arrays import Array
+from selfmotion.costs import PathError
 from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.objective import Objective
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart
 from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
+from selfmotion.plans.relaxed_rows import check_relaxations
 from selfmotion.task.damping import DampingLaw
-from selfmotion.task.relaxation import check_relaxations
 
 # Exact gradients against central differences, relative to the largest entry.
 GRADIENT = 1e-6
@@ -60,13 +61,13 @@ def objective_with(task: str, name: str, *, free: bool, damped: bool) -> Objecti
     functions = PolynomialNullMotion(1, "joint").functions(grid.stage_times, path.duration)
     # Above every singular value on the way: damped throughout, with the path error as a cost.
     law = DampingLaw(0.5, 0.25) if damped else None
-    return Objective(
+    costs: list[sm.Cost] = [sm.JointVelocity(), sm.Posture(np.ones(7), posture=PANDA_HOME)]
+    return objective_of(
         Rollout(robot, path, rows, grid, damping=law),
         NullMotionTable(functions, None, robot.dof),
-        [sm.JointVelocity(), sm.Posture(np.ones(7), posture=PANDA_HOME)],
+        [*costs, PathError(100.0, rows.dimension)] if damped else costs,
         FreeStart(robot, rows, start) if free else FixedStart(start),
         deviation=Deviation(path, relaxations, grid.stage_times, (not free, False)),
-        path_weight=100.0 if damped else 0.0,
     )
 
 
@@ -85,8 +86,8 @@ def test_gradient_and_tangents_equal_central_differences(
     direction = np.random.default_rng(6).normal(size=objective.size)
     ends = []
     for sign in (1.0, -1.0):
-        objective.run(x + sign * 1e-6 * direction)
-        ends.append(objective.rollout.samples().qd[objective.rollout.grid.node_stages].copy())
+        samples = objective.samples(x + sign * 1e-6 * direction)
+        ends.append(samples.qd[samples.nodes].copy())
     expected = (ends[0] - ends[1]) / 2e-6
     scale = np.abs(expected).max()
     np.testing.assert_allclose(tangents.qd @ direction, expected, atol=1e-6 * scale)
@@ -179,8 +180,8 @@ def test_a_cone_lowers_the_cost_and_is_kept(panda_circle: Callable, free: bool) 
         angles.append(np.arccos(np.clip(actual.rotation[:, 2] @ target.rotation[:, 2], -1, 1)))
     assert 0.05 < max(angles) <= 0.2 + 1e-6
     # Without the relaxation the same motion is refused.
-    wanted = dataclasses.replace(plan.requirements, relaxations=())
-    assert not dataclasses.replace(plan, requirements=wanted).check().verified
+    exact = dataclasses.replace(plan.problem, relaxations=())
+    assert not dataclasses.replace(plan, problem=exact).check().verified
 
 
 def test_a_band_is_used_and_a_smaller_one_is_refused(planar: sm.RobotModel) -> None:
@@ -198,8 +199,8 @@ def test_a_band_is_used_and_a_smaller_one_is_refused(planar: sm.RobotModel) -> N
     np.testing.assert_allclose(x, target[:, 0], atol=1e-6)
     assert 0.02 < np.abs(y - target[:, 1]).max() <= 0.05 + 1e-6
     narrower = (sm.Relaxation("y", 0.02),)
-    wanted = dataclasses.replace(plan.requirements, relaxations=narrower)
-    check = dataclasses.replace(plan, requirements=wanted).check()
+    asked = dataclasses.replace(plan.problem, relaxations=narrower)
+    check = dataclasses.replace(plan, problem=asked).check()
     assert not check.verified
     largest = np.abs(y - target[:, 1]).max()
     assert check.position_error.value == pytest.approx(largest - 0.02, abs=1e-4)
@@ -261,13 +262,13 @@ def test_a_narrow_band_costs_no_more_than_none(panda_circle: Callable, band: flo
     assert plan.certificate.verified, plan.certificate.verdict
     assert plan.report.cost <= exact.report.cost * (1.0 + 1e-6)
     assert plan.report.steps <= 4 * exact.report.steps
-    fastest = [np.abs(each.trajectory.accelerations()[1]).max() for each in (plan, exact)]
+    fastest = [np.abs(each.trajectory.extremes(2)[1]).max() for each in (plan, exact)]
     assert fastest[0] < 2.0 * fastest[1]
 
 
 def test_other_methods_refuse_relaxations(panda_circle: Callable) -> None:
     with pytest.raises(sm.ProblemError, match="leave the relaxations out"):
-        sm.plan(panda_circle(relaxations=[sm.Relaxation("z", 0.01)]), method=sm.PseudoInverse())
+        sm.plan_by(panda_circle(relaxations=[sm.Relaxation("z", 0.01)]), sm.PseudoInverse())
 
 
 def test_closed_paths_begin_and_end_on_the_path(panda_circle: Callable) -> None:
@@ -292,11 +293,11 @@ def test_relaxations_survive_saving_and_retiming(panda_circle: Callable, tmp_pat
     plan = sm.plan(panda_circle(relaxations=relaxations))
     plan.save(tmp_path / "plan.npz")
     loaded = sm.load_plan(tmp_path / "plan.npz")
-    assert loaded.requirements.relaxations == tuple(relaxations)
+    assert loaded.problem.relaxations == tuple(relaxations)
     assert loaded.check().verified
     slower = sm.retime(plan, acceleration=5.0)
     assert slower.certificate.verified, slower.certificate.verdict
-    assert slower.requirements.relaxations[0].during != (1.0, 3.0)
+    assert slower.problem.relaxations[0].during != (1.0, 3.0)
 
 
 @pytest.mark.parametrize(

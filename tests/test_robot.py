@@ -13,7 +13,7 @@ from selfmotion.robot import NAMED_ARMS
 # Two independent implementations of the same products of rotations.
 FORWARD_KINEMATICS = 1e-9
 
-PLANAR = Path(sm.__file__).parent / "robots" / "planar_3r.urdf"
+PLANAR = Path(sm.load_robot("planar_3r").urdf.source)
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")

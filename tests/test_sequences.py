@@ -15,7 +15,7 @@ from selfmotion.basics.errors import NoSequenceError, ProblemError
 from selfmotion.search import SelfMotion, Sequence, best_sequences, targets
 from selfmotion.search.chains import diverse_chains, shortest_chains
 from selfmotion.search.guides import search_times
-from selfmotion.search.nodes import Bounds
+from selfmotion.search.nodes import Admissible
 
 SUITE = Path(__file__).parents[1] / "benchmarks" / "data"
 STEP = np.radians(7.0)
@@ -78,8 +78,7 @@ def flappy_sequences(flappy_bird) -> list[Sequence]:
         lower=robot.lower,
         upper=robot.upper,
         largest_step=STEP,
-        collision=collision,
-        margin=MARGIN,
+        bodies=[] if collision is None else [(collision, MARGIN)],
         count=1,
     )
 
@@ -233,11 +232,11 @@ def test_angles_of_turning_joints_count_modulo_turns() -> None:
 
 
 def test_bounds_count_every_turn() -> None:
-    bounds = Bounds(np.array([-7.0]), np.array([7.0]), np.array([True]), None, 0.0)
+    bounds = Admissible(np.array([-7.0]), np.array([7.0]), np.array([True]), ())
     assert sorted(bounds.all_turns(np.array([[0.5]]))[:, 0]) == pytest.approx(
         [0.5 - 2 * np.pi, 0.5, 0.5 + 2 * np.pi]
     )
-    narrow = Bounds(np.array([-1.0]), np.array([1.0]), np.array([True]), None, 0.0)
+    narrow = Admissible(np.array([-1.0]), np.array([1.0]), np.array([True]), ())
     assert list(narrow.free(np.array([[0.9], [1.1], [0.9 - 4 * np.pi]]))) == [True, False, True]
     assert narrow.excess(np.array([[1.2], [-1.3], [0.3]]))[:, 0] == pytest.approx([0.2, 0.3, 0.0])
 
@@ -306,7 +305,7 @@ def test_a_box_in_the_way_is_named(panda: sm.RobotModel) -> None:
             lower=panda.lower,
             upper=panda.upper,
             largest_step=0.2,
-            collision=sm.CollisionModel(panda, [box]),
+            bodies=[(sm.CollisionModel(panda, [box]), 0.0)],
         )
     assert 0.1 < error.value.time < 0.8
 

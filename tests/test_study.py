@@ -11,12 +11,11 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.costs.samples import Samples
-from selfmotion.motion.grid import Grid
+from selfmotion.motion import Sampling
 from selfmotion.study import Claim, Scale, Study, Verdict, run, write
 from selfmotion.study.engine import bind, optimum
 from selfmotion.study.published import (
     PublishedFunction,
-    SolverPoints,
     flops_per_rate,
     published_null_motion,
 )
@@ -168,9 +167,9 @@ def test_equations_13_and_14_count_and_agree(joint_space: sm.Problem) -> None:
 
 
 def test_solver_points_integrate_straight_lines(planar: sm.RobotModel) -> None:
-    points = SolverPoints(np.array([0.0, 0.1, 0.5, 1.0]))
-    assert points.weights @ (3.0 * points.stage_times + 1.0) == pytest.approx(2.5)
-    assert points.weights @ points.stage_times**2 > 1.0 / 3.0
+    points = Sampling.trapezoidal(np.array([0.0, 0.1, 0.5, 1.0]))
+    assert points.weights @ (3.0 * points.t + 1.0) == pytest.approx(2.5)
+    assert points.weights @ points.t**2 > 1.0 / 3.0
     q = np.random.default_rng(0).normal(size=(4, 3))
     samples = Samples.along(planar, sm.Task.PLANAR, points, q, np.zeros_like(q))
     for k in range(4):
@@ -182,10 +181,8 @@ def test_samples_along_are_those_of_the_rollout(panda: sm.RobotModel) -> None:
     start = panda.dexterous_configuration("pointing")
     path = sm.Circle.around(panda.pose(start), 0.1, 2.0)
     objective = bind(sm.Problem(panda, path, "pointing", start), 8)
-    objective.value(np.zeros(objective.size))
-    ours = objective.rollout.samples()
-    grid = Grid(objective.rollout.grid.nodes)
-    again = Samples.along(panda, sm.Task.POINTING, grid, ours.q, ours.qd)
+    ours = objective.samples(np.zeros(objective.size))
+    again = Samples.along(panda, sm.Task.POINTING, ours.sampling, ours.q, ours.qd)
     # Two orders of the same rotations' products.
     np.testing.assert_allclose(again.task_jacobian, ours.task_jacobian, atol=1e-12)
 

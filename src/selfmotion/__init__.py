@@ -4,6 +4,8 @@ The tool motion holds by construction; what is optimised is the self-motion, the
 the null space of the task.
 """
 
+from typing import TYPE_CHECKING
+
 from selfmotion.baselines import (
     DampedLeastSquares,
     ExtendedJacobian,
@@ -12,9 +14,11 @@ from selfmotion.baselines import (
     Method,
     Motion,
     PseudoInverse,
+    plan_by,
 )
 from selfmotion.basics import (
     BreakdownError,
+    CollisionError,
     FileFormatError,
     InverseKinematicsError,
     NoSequenceError,
@@ -27,17 +31,37 @@ from selfmotion.basics import (
     SelfmotionError,
     StartError,
 )
-from selfmotion.certificate import Certificate, Extreme, Requirements, Tolerance, certify
-from selfmotion.collision import Box, Capsule, CollisionModel, Cylinder, Mesh, Sphere
+from selfmotion.certificate import (
+    Certificate,
+    Extreme,
+    Finding,
+    FinishedMotion,
+    Requirement,
+    Tolerance,
+    certify,
+)
+from selfmotion.collision import (
+    Box,
+    Capsule,
+    CollisionModel,
+    Cylinder,
+    Mesh,
+    Obstacle,
+    Sphere,
+)
 from selfmotion.constraints import (
+    BoundConstraint,
     Clearance,
     ClosedPath,
     Constraint,
     EndConfiguration,
     EndVelocity,
+    Envelope,
     JointAccelerationLimits,
     JointPositionLimits,
     JointVelocityLimits,
+    NodePartials,
+    NodeTangents,
 )
 from selfmotion.costs import (
     Cost,
@@ -54,19 +78,65 @@ from selfmotion.costs import (
     Partials,
     PathLength,
     Posture,
+    Samples,
     SmallestSingularValue,
 )
-from selfmotion.motion import BSplineNullMotion, NullMotion, PolynomialNullMotion, Trajectory
-from selfmotion.optimise import Iteration, LineSearch, QuasiNewton, Status
-from selfmotion.path import Circle, Line, Path, Retimed, TwistPath, Waypoints
-from selfmotion.planning import plan
-from selfmotion.plans import Gap, Plan, Problem, Report, load_plan, retime, sample_problem, slowdown
-from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
-from selfmotion.task import Damping, Relaxation, Task
+from selfmotion.motion import (
+    BSplineNullMotion,
+    NullMotion,
+    PolynomialNullMotion,
+    Trajectory,
+)
+from selfmotion.optimise import (
+    Function,
+    Iteration,
+    LineSearch,
+    Minimum,
+    Optimizer,
+    QuasiNewton,
+    Status,
+)
+from selfmotion.path import (
+    Circle,
+    Line,
+    Path,
+    PathSamples,
+    Retimed,
+    TwistPath,
+    Waypoints,
+)
+from selfmotion.planning import (
+    Search,
+    plan,
+)
+from selfmotion.plans import (
+    Gap,
+    Plan,
+    Problem,
+    Report,
+    load_plan,
+    retime,
+    sample_problem,
+    slowdown,
+)
+from selfmotion.robot import (
+    NAMED_ARMS,
+    RobotModel,
+    load_robot,
+)
+from selfmotion.task import (
+    Damping,
+    Relaxation,
+    Task,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = [
     "NAMED_ARMS",
     "BSplineNullMotion",
+    "BoundConstraint",
     "Box",
     "BreakdownError",
     "Capsule",
@@ -74,6 +144,7 @@ __all__ = [
     "Circle",
     "Clearance",
     "ClosedPath",
+    "CollisionError",
     "CollisionModel",
     "Constraint",
     "Cost",
@@ -83,9 +154,13 @@ __all__ = [
     "DirectionalManipulability",
     "EndConfiguration",
     "EndVelocity",
+    "Envelope",
     "ExtendedJacobian",
     "Extreme",
     "FileFormatError",
+    "Finding",
+    "FinishedMotion",
+    "Function",
     "FunctionCost",
     "Gap",
     "GradientProjection",
@@ -107,13 +182,19 @@ __all__ = [
     "Manipulability",
     "Mesh",
     "Method",
+    "Minimum",
     "Motion",
     "NoSequenceError",
+    "NodePartials",
+    "NodeTangents",
     "NullMotion",
+    "Obstacle",
+    "Optimizer",
     "Partials",
     "Path",
     "PathError",
     "PathLength",
+    "PathSamples",
     "Plan",
     "PlanError",
     "PolynomialNullMotion",
@@ -126,10 +207,12 @@ __all__ = [
     "Relaxation",
     "RenderError",
     "Report",
-    "Requirements",
+    "Requirement",
     "Retimed",
     "RobotError",
     "RobotModel",
+    "Samples",
+    "Search",
     "SelfmotionError",
     "SmallestSingularValue",
     "Sphere",
@@ -144,7 +227,25 @@ __all__ = [
     "load_plan",
     "load_robot",
     "plan",
+    "plan_by",
     "retime",
     "sample_problem",
     "slowdown",
 ]
+
+
+class _Views:
+    """Shows plans by the replay, which is imported when the first one is shown."""
+
+    def notebook_html(self, plan: Plan) -> str:
+        from selfmotion.replay import notebook_html
+
+        return notebook_html(plan)
+
+    def figure(self, plan: Plan) -> "Figure":
+        from selfmotion.replay import figure
+
+        return figure(plan)
+
+
+Plan.views = _Views()

@@ -2,14 +2,14 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from selfmotion.baselines.integration import PoseFeedback, Rate, integrate
-from selfmotion.basics import Array, read_only
-from selfmotion.certificate import Certificate, Tolerance, certify
+from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.certificate import Certificate, Tolerance
 from selfmotion.costs import Samples
 from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
@@ -64,12 +64,26 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
     method : Method
     tolerance : Tolerance, optional
 
+    Raises
+    ------
+    ProblemError
+        The problem is damped, or relaxes rows: these are for the optimised motion.
+
     Returns
     -------
     Plan
         Without coefficients. `initial_trajectory` and `initial_cost` are those of the
         pseudo-inverse, as for every plan.
     """
+    if problem.damping is not None:
+        raise ProblemError(
+            "the problem's damping is for the optimised motion; leave it out, or take "
+            "plan_by(problem, DampedLeastSquares(…))"
+        )
+    if problem.relaxations:
+        raise ProblemError(
+            "other works' methods follow the path exactly; leave the relaxations out"
+        )
     began = time.perf_counter()
     found = method.solve(problem)
     seconds = time.perf_counter() - began
@@ -95,16 +109,12 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
     )
     names = problem.robot.joint_names
     return Plan(
-        robot=problem.robot,
-        path=problem.path,
-        task=problem.rows,
+        problem=problem,
         trajectory=trajectory,
         initial_trajectory=Trajectory(grid.nodes, *still.at(grid.nodes), names),
         coefficients=read_only([]),
         report=report,
         certificate=certificate,
-        requirements=replace(problem.requirements, collision=None),
-        clearance=problem.clearance,
         tolerance=tolerance,
     )
 
@@ -112,7 +122,7 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
 def costs(problem: Problem, motion: Motion, grid: Grid) -> dict[str, float]:
     """Return what each cost of the problem contributes to F along a motion."""
     q, qd = motion.at(grid.stage_times)
-    samples = Samples.along(problem.robot, problem.rows, grid, q, qd)
+    samples = Samples.along(problem.robot, problem.rows, grid.sampling, q, qd)
     return {cost.name: float(samples.weights @ cost.value(samples)) for cost in problem.costs}
 
 
@@ -141,9 +151,7 @@ def _sampled(
     before = np.inf
     for attempt in range(_MOST_DOUBLINGS + 1):
         trajectory = Trajectory(grid.nodes, *motion.at(grid.nodes), problem.robot.joint_names)
-        certificate = certify(
-            problem.robot, problem.path, problem.rows, trajectory, tolerance, problem.requirements
-        )
+        certificate = problem.certify(trajectory, tolerance)
         errors = certificate.position_error.value, certificate.rotation_error.value
         held = errors[0] <= tolerance.position and errors[1] <= tolerance.rotation
         # An error that halving does not change is the motion's own, not that of its samples.

@@ -9,14 +9,12 @@ import numpy as np
 
 from selfmotion.basics import Array, BreakdownError
 from selfmotion.plans import Problem
+from selfmotion.task import feedback_rate
 
 if TYPE_CHECKING:
     from scipy.integrate import OdeSolution
 
 Rate = Callable[[float, Array], Array]
-
-# The pose feedback removes an error e at the rate K e; K times the duration.
-_FEEDBACK = 20.0
 
 # Of the integrator: far below what a certificate accepts.
 _TOLERANCE = 1e-9
@@ -56,7 +54,7 @@ class PoseFeedback:
 
     def __init__(self, problem: Problem) -> None:
         self._robot, self._path, self._task = problem.robot, problem.path, problem.rows
-        self._gain = _FEEDBACK / problem.path.duration
+        self._gain = feedback_rate(problem.path.duration)
 
     def __call__(self, t: float, q: Array) -> Here:
         """Return the kinematics at time `t` [s] and configuration `q` (n,)."""

@@ -2,15 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from selfmotion.baselines.base import Motion, pseudo_inverse
 from selfmotion.baselines.integration import start_of
-from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.basics import Array, ProblemError
 from selfmotion.costs import Cost, JointVelocity, Samples, weight_matrix
-from selfmotion.motion import Grid
+from selfmotion.motion import Sampling
 from selfmotion.optimise import Status
 from selfmotion.plans import Plan, Problem
 
@@ -139,8 +138,8 @@ class _Flow:
     def _samples(self, t: Array, q: Array) -> Samples:
         self.jacobian_evaluations += len(t)
         problem = self._problem
-        grid = _Moments(read_only(t))
-        return Samples.along(problem.robot, problem.rows, grid, q, np.zeros_like(q))
+        moments = Sampling.trapezoidal(t)
+        return Samples.along(problem.robot, problem.rows, moments, q, np.zeros_like(q))
 
     def _hamilton(self, samples: Samples, p: Array) -> tuple[Array, Array]:
         """Return q̇ and ṗ, (K, n) each."""
@@ -187,21 +186,13 @@ class _Flow:
         return command, target.twist[:, 3:]
 
 
-class _Moments(Grid):
-    """Times on their own: no steps, no quadrature."""
-
-    @cached_property
-    def stage_times(self) -> Array:
-        """See `Grid.stage_times`."""
-        return self.nodes
-
-
 def _velocity_weight(problem: Problem) -> Array:
     """Return W; ProblemError where the costs are not ½ q̇ᵀWq̇ + V(q) with W > 0."""
     n, t = problem.robot.dof, problem.path.knots[:1]
     weight = np.zeros((n, n))
     q = start_of(problem)[None]
-    at_rest = Samples.along(problem.robot, problem.rows, Grid(read_only(t)), q, np.zeros((1, n)))
+    moment = Sampling.trapezoidal(t)
+    at_rest = Samples.along(problem.robot, problem.rows, moment, q, np.zeros((1, n)))
     for cost in problem.costs:
         if isinstance(cost, JointVelocity):
             weight += weight_matrix(np.asarray(cost.weight), n)

@@ -6,9 +6,9 @@ import numpy as np
 
 from selfmotion.baselines.base import Motion, along_rate, costs, pseudo_inverse
 from selfmotion.baselines.integration import PoseFeedback
-from selfmotion.basics import Array, BreakdownError, ProblemError, read_only
+from selfmotion.basics import Array, BreakdownError, ProblemError
 from selfmotion.costs import Cost, Manipulability, Samples
-from selfmotion.motion import Grid
+from selfmotion.motion import Grid, Sampling
 from selfmotion.plans import Problem
 
 # Steps of the quadrature that compares gains, and cost evaluations of the search for the best.
@@ -163,7 +163,7 @@ class GradientProjection:
 
 def pose_gradient(problem: Problem, criterion: Cost, t: float, q: Array) -> Array:
     """Return ∂h/∂q (n,) of a cost of the pose at one configuration."""
-    moment = Grid(read_only([t]))
+    moment = Sampling.trapezoidal(np.array([t]))
     rest = np.zeros((1, len(q)))
     samples = Samples.along(problem.robot, problem.rows, moment, q[None], rest)
     partials = criterion.gradient(samples)

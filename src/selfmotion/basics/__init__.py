@@ -19,6 +19,7 @@ from selfmotion.basics.errors import (
 from selfmotion.basics.files import read_archive, write_archive, write_atomically, write_csv
 from selfmotion.basics.jit import kernel
 from selfmotion.basics.progress import Progress, silent
+from selfmotion.basics.saved import Saved, is_known, restore
 
 __all__ = [
     "Array",
@@ -34,12 +35,15 @@ __all__ = [
     "RedundancyError",
     "RenderError",
     "RobotError",
+    "Saved",
     "SelfmotionError",
     "StartError",
+    "is_known",
     "kernel",
     "per_joint",
     "read_archive",
     "read_only",
+    "restore",
     "silent",
     "write_archive",
     "write_atomically",

@@ -1,12 +1,26 @@
-"""Re-checks finished motions."""
+"""Re-checks finished motions: the path, and each requirement."""
 
+from selfmotion.certificate.apart import KeepsApart
 from selfmotion.certificate.check import certify
-from selfmotion.certificate.terms import (
-    Certificate,
-    DampedStretch,
-    Extreme,
-    Requirements,
-    Tolerance,
-)
+from selfmotion.certificate.ends import ClosedMotion, EndState
+from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
+from selfmotion.certificate.limits import LIMIT_NAMES, JointLimits, arm_limits
+from selfmotion.certificate.requirement import FinishedMotion, Requirement
+from selfmotion.certificate.verdict import Certificate
 
-__all__ = ["Certificate", "DampedStretch", "Extreme", "Requirements", "Tolerance", "certify"]
+__all__ = [
+    "LIMIT_NAMES",
+    "Certificate",
+    "ClosedMotion",
+    "DampedStretch",
+    "EndState",
+    "Extreme",
+    "Finding",
+    "FinishedMotion",
+    "JointLimits",
+    "KeepsApart",
+    "Requirement",
+    "Tolerance",
+    "arm_limits",
+    "certify",
+]

@@ -1,35 +1,32 @@
 """Re-checks a finished trajectory by forward kinematics; shares no code with the rollout."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.certificate.measure import deviation_from
-from selfmotion.certificate.terms import (
-    Certificate,
-    DampedStretch,
-    Extreme,
-    Requirements,
-    Tolerance,
-)
-from selfmotion.collision import CollisionModel
+from selfmotion.certificate.deviation import deviation_from, deviation_size, excess
+from selfmotion.certificate.findings import DampedStretch, Extreme, Tolerance
+from selfmotion.certificate.limits import arm_limits
+from selfmotion.certificate.requirement import FinishedMotion, Requirement
+from selfmotion.certificate.verdict import Certificate
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
-from selfmotion.task import DampingLaw, Task, deviation_size, excess
-
-# Points per interval of the trajectory's samples: odd, so that none but the samples are symmetric.
-_REFINEMENT = 5
+from selfmotion.task import DampingLaw, Relaxation, Task
 
 
 def certify(
     robot: RobotModel,
     path: Path,
-    task: Task,
+    task: Task | str,
     trajectory: Trajectory,
     tolerance: Tolerance | None = None,
-    requirements: Requirements | None = None,
+    requirements: Sequence[Requirement] = (),
+    *,
+    relaxations: Sequence[Relaxation] = (),
+    damping: DampingLaw | None = None,
+    ending: str = "",
 ) -> Certificate:
     """Check a motion against its path, the arm's limits and what else is required.
 
@@ -38,49 +35,50 @@ def certify(
     robot, path, task, trajectory
         The motion and what it should do; times of the trajectory are those of the path.
     tolerance : Tolerance, optional
-    requirements : Requirements, optional
+        What the motion may miss the path by.
+    requirements : sequence of Requirement
+        What it must keep besides. The arm's own limits of position and velocity are always judged,
+        unless these contain `JointLimits` of the same order.
+    relaxations : sequence of Relaxation
+        Rows in which the tool may leave the path: only what is beyond them counts as an error.
+    damping : DampingLaw, optional
+        No requirement: how the motion was damped near singular poses, to tell where and what for.
+    ending : str
+        Why the motion ends before its path does, where it is known to; such a motion is never
+        verified.
 
     Returns
     -------
     Certificate
     """
-    tolerance, wanted = tolerance or Tolerance(), requirements or Requirements()
-    t = _refined(trajectory.t)
-    q, qd = trajectory(t), trajectory(t, order=1)
-    in_tool_axes = any(item.in_tool_axes for item in wanted.relaxations)
-    deviation, singular = deviation_from(robot, path, task, t, q, in_tool_axes)
-    beyond = excess(wanted.relaxations, path.duration, t, deviation)
+    tolerance, task = tolerance or Tolerance(), Task.of(task)
+    motion = FinishedMotion(robot, trajectory)
+    t = motion.t
+    in_tool_axes = any(item.in_tool_axes for item in relaxations)
+    deviation, singular = deviation_from(robot, path, task, t, motion.q, in_tool_axes)
+    beyond = excess(relaxations, path.duration, t, deviation)
     distance, angle = np.linalg.norm(beyond[:, :3], axis=1), np.linalg.norm(beyond[:, 3:], axis=1)
-    lower, upper, limit = wanted.limits(robot)
-    tool, names = (robot.tool,), robot.joint_names
-    worst = (
-        _extreme(distance, t, tool, np.argmax),
-        _extreme(angle, t, tool, np.argmax),
-        _extreme(np.minimum(q - lower, upper - q), t, names, np.argmin),
-        _extreme(np.abs(qd) / limit, t, names, np.argmax),
+    position = _extreme(distance, t, robot.tool, np.argmax)
+    rotation = _extreme(angle, t, robot.tool, np.argmax)
+    damped = () if damping is None else _damped_stretches(damping, t, singular)
+    findings = tuple(
+        item.judge(motion) for item in (*arm_limits(robot, requirements), *requirements)
     )
-    acceleration = None
-    if wanted.acceleration is not None:
-        ends, qdd = trajectory.accelerations()
-        acceleration = _extreme(np.abs(qdd) / wanted.acceleration, ends, names, np.argmax)
-    clearance = None if wanted.collision is None else _clearance(wanted.collision, t, q)
-    closure = float(np.abs(trajectory.q[-1] - trajectory.q[0]).max())
-    damped = () if wanted.damping is None else _damped_stretches(wanted.damping, t, singular)
     return Certificate(
-        *worst,
-        smallest_singular_value=_extreme(singular, t, tool, np.argmin),
-        acceleration_ratio=acceleration,
-        clearance=clearance,
-        closure=closure,
+        position,
+        rotation,
+        smallest_singular_value=_extreme(singular, t, robot.tool, np.argmin),
+        closure=float(np.abs(trajectory.q[-1] - trajectory.q[0]).max()),
         samples=len(t),
+        findings=findings,
         failures=(
-            *_cut_short(wanted.ending, path, trajectory),
-            *_failures(*worst, tolerance, damped),
-            *_unmet(wanted, acceleration, clearance, closure, trajectory),
+            *_cut_short(ending, path, trajectory),
+            *_off_path(position, rotation, tolerance, damped),
+            *(item.text for item in findings if not item.kept),
         ),
         deviations=tuple(
-            _extreme(deviation_size(item, path.duration, t, deviation), t, (item.name,), np.argmax)
-            for item in wanted.relaxations
+            _extreme(deviation_size(item, path.duration, t, deviation), t, item.name, np.argmax)
+            for item in relaxations
         ),
         damped=damped,
     )
@@ -110,24 +108,9 @@ def _because(time: float, damped: tuple[DampedStretch, ...]) -> str:
     return f", {when} damping was active, {before[-1]}"
 
 
-def _clearance(model: CollisionModel, t: Array, q: Array) -> Extreme:
-    closest = model.worst(q)
-    names = f"{closest.first} - {closest.second}" if closest.first else "nothing"
-    return Extreme(closest.value, float(t[closest.index]), names)
-
-
-def _refined(t: Array) -> Array:
-    fractions = np.arange(_REFINEMENT) / _REFINEMENT
-    inner = t[:-1, None] + np.diff(t)[:, None] * fractions
-    return np.append(inner.ravel(), t[-1])
-
-
-def _extreme(
-    values: Array, t: Array, names: tuple[str, ...], choose: Callable[[Array], np.intp]
-) -> Extreme:
-    table = values.reshape(len(t), -1)
-    row, column = np.unravel_index(int(choose(table)), table.shape)
-    return Extreme(float(table[row, column]), float(t[row]), names[int(column)])
+def _extreme(values: Array, t: Array, name: str, choose: Callable[[Array], np.intp]) -> Extreme:
+    worst = int(choose(values))
+    return Extreme(float(values[worst]), float(t[worst]), name)
 
 
 def _cut_short(ending: str, path: Path, trajectory: Trajectory) -> tuple[str, ...]:
@@ -138,13 +121,8 @@ def _cut_short(ending: str, path: Path, trajectory: Trajectory) -> tuple[str, ..
     return (f"the motion lasts {trajectory.duration:.6g} s, the path {path.duration:.6g} s",)
 
 
-def _failures(
-    position: Extreme,
-    rotation: Extreme,
-    margin: Extreme,
-    ratio: Extreme,
-    tolerance: Tolerance,
-    damped: tuple[DampedStretch, ...],
+def _off_path(
+    position: Extreme, rotation: Extreme, tolerance: Tolerance, damped: tuple[DampedStretch, ...]
 ) -> tuple[str, ...]:
     failures = []
     # Written so that NaN fails.
@@ -159,62 +137,4 @@ def _failures(
             f"{rotation.time:.3f} s (allowed: {tolerance.rotation:.0e})"
             f"{_because(rotation.time, damped)}"
         )
-    if not margin.value >= 0.0:
-        failures.append(
-            f"joint '{margin.name}' is {-margin.value:.3g} beyond its limit at t = "
-            f"{margin.time:.3f} s"
-        )
-    if not ratio.value <= 1.0:
-        failures.append(
-            f"joint '{ratio.name}' moves at {ratio.value:.5g} times its limit at t = "
-            f"{ratio.time:.3f} s: give it {ratio.value:.5g} times the duration"
-        )
-    return tuple(failures)
-
-
-# What closed paths, end configurations and end velocities may miss by [rad or m, per s].
-_ARRIVED = 1e-6
-
-
-def _unmet(
-    wanted: Requirements,
-    acceleration: Extreme | None,
-    clearance: Extreme | None,
-    closure: float,
-    trajectory: Trajectory,
-) -> tuple[str, ...]:
-    failures = []
-    if acceleration is not None and not acceleration.value <= 1.0:
-        failures.append(
-            f"joint '{acceleration.name}' accelerates at {acceleration.value:.5g} times its limit "
-            f"at t = {acceleration.time:.3f} s: give it {acceleration.value**0.5:.5g} times the "
-            f"duration"
-        )
-    if clearance is not None and not clearance.value >= wanted.clearance:
-        failures.append(
-            f"{clearance.name} are {clearance.value * 1e3:.2f} mm apart at t = "
-            f"{clearance.time:.3f} s (wanted: {wanted.clearance * 1e3:.2f} mm)"
-        )
-    if wanted.closed and not closure <= _ARRIVED:
-        failures.append(f"the end is {closure:.2e} (rad or m) away from the start")
-    ends = (
-        ("joint '{}' ends {:.2e} away from where it should", trajectory.q[-1], wanted.end),
-        (
-            "joint '{}' ends with a velocity {:.2e} off the one asked for",
-            trajectory.qd[-1],
-            wanted.end_velocity,
-        ),
-        (
-            "joint '{}' ends with a velocity {:.2e} off that of the start",
-            trajectory.qd[-1],
-            trajectory.qd[0] if wanted.closed_velocity else None,
-        ),
-    )
-    for text, actual, target in ends:
-        if target is None:
-            continue
-        miss = np.abs(actual - target)
-        if not miss.max() <= _ARRIVED:
-            joint = trajectory.joint_names[int(np.argmax(miss))]
-            failures.append(text.format(joint, miss.max()))
     return tuple(failures)

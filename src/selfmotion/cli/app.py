@@ -28,7 +28,7 @@ VERIFIED, NOT_VERIFIED, BAD_INPUT = 0, 1, 2
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
 Corners = Literal["blend", "stop"]
 Axis = Literal["x", "y", "z"]
-Search = Literal["auto", "local", "global"]
+SearchMode = Literal["auto", "local", "global"]
 
 RobotArgument = Annotated[
     str, typer.Argument(help="Name (see `selfmotion robots`) or path of a .urdf file.")
@@ -85,8 +85,12 @@ def plan(
         int | None, typer.Option(help="Limit on cost evaluations while optimising.")
     ] = None,
     search: Annotated[
-        Search, typer.Option(help="Without --start: from many starts, or over all self-motions.")
-    ] = "auto",
+        SearchMode | None,
+        typer.Option(
+            help="Without --start: from many starts (local), over all self-motions (global), or "
+            "the one after the other (auto, the default)."
+        ),
+    ] = None,
     compare: Annotated[
         bool, typer.Option("--compare", help="Tell the distance from the global optimum.")
     ] = False,
@@ -130,7 +134,7 @@ def plan(
         damping=sm.Damping() if damped else None,
     )
     result = _plan_with_progress(
-        problem, max_evaluations=max_evaluations, search=search, compare=compare
+        problem, max_evaluations=max_evaluations, search=_search(search, compare)
     )
     tables.show(result, _console)
     _write(result, out or [], html)
@@ -263,6 +267,13 @@ def _relaxation(text: str) -> sm.Relaxation:
         raise sm.ProblemError(
             f"--relax is '{text}', expected ROWS[=BAND][@FROM:TO] like rx,ry=0.2 or rz@1:2.5"
         ) from None
+
+
+def _search(mode: SearchMode | None, compare: bool) -> sm.Search | None:
+    """Return how to search where the user says something about it."""
+    if mode is None and not compare:
+        return None
+    return sm.Search(mode=mode or "auto", compare=compare)
 
 
 def _numbers(text: str, option: str, count: int | None = None) -> Array:

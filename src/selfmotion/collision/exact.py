@@ -18,7 +18,7 @@ from selfmotion.robot import RobotModel
 
 
 @dataclass(frozen=True)
-class Clearance:
+class Closest:
     """The smallest distance found, and where.
 
     Attributes
@@ -37,7 +37,7 @@ class Clearance:
     index: int = 0
 
 
-_NO_PAIR = Clearance(math.inf, "", "")
+_NO_PAIR = Closest(math.inf, "", "")
 
 
 class CollisionModel:
@@ -104,7 +104,7 @@ class CollisionModel:
         """Names of the bodies that are checked; a link of several pieces appears repeatedly."""
         return tuple((self._bodies[i].name, self._bodies[j].name) for i, j in self._index_pairs)
 
-    def distance(self, q: npt.ArrayLike) -> Clearance:
+    def distance(self, q: npt.ArrayLike) -> Closest:
         """Return the smallest distance over all pairs at `q`.
 
         Raises
@@ -114,7 +114,7 @@ class CollisionModel:
         """
         return self._closest(self.robot.configuration(q), _NO_PAIR, 0)
 
-    def worst(self, q_samples: npt.ArrayLike) -> Clearance:
+    def worst(self, q_samples: npt.ArrayLike) -> Closest:
         """Return the smallest distance over a motion (K, n); its `index` is the row.
 
         Raises
@@ -193,7 +193,7 @@ class CollisionModel:
         x, y, z = contact.normal.tolist()
         return (contact.min_distance, -x, -y, -z, *contact.getNearestPoint1().tolist())
 
-    def _closest(self, q: Array, best: Clearance, index: int) -> Clearance:
+    def _closest(self, q: Array, best: Closest, index: int) -> Closest:
         """Return the smaller of `best` and the distance at `q`."""
         if not self._index_pairs:
             return best
@@ -203,7 +203,7 @@ class CollisionModel:
                 break
             value = self._pair_distance(int(i), float(lower[i]))
             if value < best.value:
-                best = Clearance(value, *self._names(int(i)), index)
+                best = Closest(value, *self._names(int(i)), index)
         return best
 
     def _names(self, pair: int) -> tuple[str, str]:

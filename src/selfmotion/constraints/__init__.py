@@ -3,6 +3,7 @@
 from selfmotion.constraints.base import BoundConstraint, Constraint, NodePartials, NodeTangents
 from selfmotion.constraints.clearance import Clearance
 from selfmotion.constraints.ends import ClosedPath, EndConfiguration, EndVelocity
+from selfmotion.constraints.envelope import Envelope
 from selfmotion.constraints.limits import (
     JointAccelerationLimits,
     JointPositionLimits,
@@ -16,6 +17,7 @@ __all__ = [
     "Constraint",
     "EndConfiguration",
     "EndVelocity",
+    "Envelope",
     "JointAccelerationLimits",
     "JointPositionLimits",
     "JointVelocityLimits",

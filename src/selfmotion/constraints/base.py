@@ -5,11 +5,15 @@ A constraint is written down without an arm (`Constraint`) and bound to one when
 digits of the optimisation stay within the limits themselves.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Saved
+from selfmotion.certificate import Requirement
+from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
+from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
@@ -46,14 +50,43 @@ class NodeTangents:
         return (self.q, self.qd, self.qdd)[order]
 
 
-class Constraint(Protocol):
-    """A condition on the motion, not yet bound to an arm."""
+class Constraint(Saved, ABC, family="constraint"):
+    """Something that a motion must keep, not yet bound to an arm.
 
+    It says so twice: `bind` tells the optimiser, and `requirement` the certificate, which measures
+    the finished motion on its own. A constraint of one's own gives both; what else there is has
+    defaults. `selfmotion.testing.check_constraint` checks it.
+
+    Attributes
+    ----------
+    pins : (bool, bool)
+        Whether the tool has to be on the path itself, not only within what is relaxed, at the start
+        and at the end of the motion.
+    """
+
+    pins: ClassVar[tuple[bool, bool]] = (False, False)
+
+    @abstractmethod
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundConstraint":
-        """Return the constraint for an arm and a task; ProblemError where it misfits.
+        """Return the conditions on the motion of an arm; ProblemError where it misfits.
 
         `start` and `end` (n,) are those of the motion that the optimisation begins with.
         """
+
+    @abstractmethod
+    def requirement(self, robot: RobotModel) -> Requirement:
+        """Return what the certificate judges; ProblemError where it misfits the arm."""
+
+    def check(self, robot: RobotModel, path: Path, task: Task) -> None:
+        """Raise ProblemError where it does not fit an arm, a path or a task."""
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """Return what it asks of single configurations and velocities; by default nothing."""
+        return Envelope.unbounded(robot.dof)
+
+    def on_part(self) -> "Constraint | None":
+        """Return what it asks of a motion along the first part of the path; None for nothing."""
+        return self
 
 
 class BoundConstraint(Protocol):
@@ -87,7 +120,7 @@ class BoundConstraint(Protocol):
 def motion_of_order(samples: Samples, order: int) -> Array:
     """Return q (0), q̇ (1) or q̈ (2) at the nodes, (N + 1, n)."""
     table = (samples.q, samples.qd)[order] if order < 2 else samples.qdd
-    nodes: Array = table[samples.grid.node_stages]
+    nodes: Array = table[samples.nodes]
     return nodes
 
 

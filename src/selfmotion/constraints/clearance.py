@@ -1,6 +1,7 @@
 """Distance from obstacles, and of links from each other."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
@@ -9,15 +10,23 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
-from selfmotion.collision import ClearanceModel, Clearances, CollisionModel, Obstacle
-from selfmotion.constraints.base import NodePartials, NodeTangents, motion_of_order
+from selfmotion.certificate import KeepsApart
+from selfmotion.collision import (
+    ClearanceModel,
+    Clearances,
+    CollisionModel,
+    Obstacle,
+    obstacle_from_dict,
+)
+from selfmotion.constraints.base import Constraint, NodePartials, NodeTangents, motion_of_order
+from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
-class Clearance:
+class Clearance(Constraint):
     """The arm keeps a distance from obstacles and from itself.
 
     While optimising, links are their convex hulls, and far from each other capsules around these;
@@ -65,6 +74,29 @@ class Clearance:
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundClearance":
         """See `Constraint.bind`."""
         return BoundClearance(self._models(robot).smooth, self.distance)
+
+    def requirement(self, robot: RobotModel) -> KeepsApart:
+        """See `Constraint.requirement`."""
+        return KeepsApart(self.model(robot), self.distance)
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return replace(Envelope.unbounded(robot.dof), bodies=((self.model(robot), self.distance),))
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Clearance":
+        """See `Saved.from_dict`."""
+        obstacles = tuple(obstacle_from_dict(item) for item in values["obstacles"])
+        return cls(**{**values, "obstacles": obstacles})
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Saved.to_dict`."""
+        return {
+            "kind": self.kind,
+            "obstacles": [obstacle.to_dict() for obstacle in self.obstacles],
+            "distance": self.distance,
+            "srdf": None if self.srdf is None else str(self.srdf),
+        }
 
     def _models(self, robot: RobotModel) -> "_Models":
         made = _made.setdefault(self, WeakKeyDictionary())
@@ -136,7 +168,7 @@ class BoundClearance:
         value = self.distance + self.margin - self.residual(samples)[row, column] * _METRE
         return (
             f"'{first}' and '{second}' are {value * 1e3:.2f} mm apart at t = "
-            f"{samples.grid.nodes[row]:.3f} s, wanted {self.distance * 1e3:.2f} mm"
+            f"{samples.sampling.node_times[row]:.3f} s, wanted {self.distance * 1e3:.2f} mm"
         )
 
 

@@ -9,22 +9,29 @@ the integration leaves of the path error.
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, per_joint, read_only
-from selfmotion.constraints.base import NodePartials, NodeTangents, motion_of_order
+from selfmotion.basics import Array, ProblemError, per_joint, read_only
+from selfmotion.certificate import ClosedMotion, EndState
+from selfmotion.constraints.base import Constraint, NodePartials, NodeTangents, motion_of_order
 from selfmotion.costs import Samples
+from selfmotion.path import Path
 from selfmotion.robot import RobotModel, null_basis
 from selfmotion.task import Task
 
 # The augmented Lagrangian need only come near [rad, rad/s]: Newton's method then closes the rest.
 _NEAR = 1e-4
+# An end configuration may be this far off [m, rad]: what the certificate grants it.
+_NEAR_END = 1e-6
+# Poses and speeds nearer than this are the same: far above rounding, far below any tolerance.
+_SAME_POSE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class EndConfiguration:
+class EndConfiguration(Constraint):
     """The motion ends in a configuration that puts the tool on the end of the path.
 
     Parameters
@@ -32,6 +39,8 @@ class EndConfiguration:
     q : (n,)
         q(T) [rad or m].
     """
+
+    pins: ClassVar[tuple[bool, bool]] = (False, True)
 
     q: npt.ArrayLike
 
@@ -41,9 +50,27 @@ class EndConfiguration:
         null = null_basis(robot, task, target)
         return BoundEnd("end configuration", (0,), target, null)
 
+    def requirement(self, robot: RobotModel) -> EndState:
+        """See `Constraint.requirement`."""
+        return EndState(0, read_only(robot.configuration(self.q)))
+
+    def check(self, robot: RobotModel, path: Path, task: Task) -> None:
+        """See `Constraint.check`: it has to put the tool on the end of the path."""
+        actual = robot.pose(robot.configuration(self.q))
+        position, rotation = task.miss(path.pose(path.duration), actual)
+        if max(position, rotation) > _NEAR_END:
+            raise ProblemError(
+                f"{robot.name}: the end configuration puts '{robot.tool}' {position:.3g} m and "
+                f"{rotation:.3g} rad off the end of the path; take "
+                f"robot.inverse_kinematics(path.pose(path.duration), task, seed=q)"
+            )
+
+    def on_part(self) -> None:
+        """See `Constraint.on_part`: the part ends elsewhere."""
+
 
 @dataclass(frozen=True, eq=False)
-class EndVelocity:
+class EndVelocity(Constraint):
     """The motion ends with a joint velocity; 0 for rest.
 
     The tool's rows of it have to be those of the path's end: for rest, the path has to end at rest.
@@ -54,11 +81,35 @@ class EndVelocity:
         q̇(T) [rad/s or m/s].
     """
 
+    pins: ClassVar[tuple[bool, bool]] = (False, True)
+
     qd: npt.ArrayLike = 0.0
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
         """See `Constraint.bind`."""
         return BoundEnd("end velocity", (1,), self.target(robot), null_basis(robot, task, end))
+
+    def requirement(self, robot: RobotModel) -> EndState:
+        """See `Constraint.requirement`."""
+        return EndState(1, self.target(robot))
+
+    def check(self, robot: RobotModel, path: Path, task: Task) -> None:
+        """See `Constraint.check`: a motion ends at rest only where its path does."""
+        if np.any(self.target(robot)):
+            return
+        rotation = path.pose(path.duration).rotation
+        twist = task.select(path.twist(path.duration)[:, None], rotation)
+        speed = float(np.abs(twist).max())
+        # Waypoints and velocity functions end at rest up to their own rounding.
+        if speed > _SAME_POSE:
+            raise ProblemError(
+                f"the motion cannot end at rest: the path ends at {speed:.3g} m/s or rad/s; give "
+                f"the path a time law that ends at rest (time_law='minimum_jerk'), or ask for "
+                f"another end velocity"
+            )
+
+    def on_part(self) -> None:
+        """See `Constraint.on_part`: the part ends elsewhere."""
 
     def target(self, robot: RobotModel) -> Array:
         """Return q̇(T) (n,) for an arm."""
@@ -66,7 +117,7 @@ class EndVelocity:
 
 
 @dataclass(frozen=True)
-class ClosedPath:
+class ClosedPath(Constraint):
     """The motion ends as it began, so that it can be repeated: q(T) = q(0).
 
     Parameters
@@ -75,12 +126,30 @@ class ClosedPath:
         Also q̇(T) = q̇(0), for repetition without a jump in speed.
     """
 
+    pins: ClassVar[tuple[bool, bool]] = (True, True)
+
     velocity: bool = True
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
         """See `Constraint.bind`."""
         orders = (0, 1) if self.velocity else (0,)
         return BoundEnd("closed path", orders, None, null_basis(robot, task, start))
+
+    def requirement(self, robot: RobotModel) -> ClosedMotion:
+        """See `Constraint.requirement`."""
+        return ClosedMotion(self.velocity)
+
+    def check(self, robot: RobotModel, path: Path, task: Task) -> None:
+        """See `Constraint.check`: the tool's path has to be closed as well."""
+        position, rotation = task.miss(path.pose(0.0), path.pose(path.duration))
+        if max(position, rotation) > _SAME_POSE:
+            raise ProblemError(
+                f"a closed joint path needs a closed tool path, but the tool ends {position:.3g} m "
+                f"and {rotation:.3g} rad from where it began"
+            )
+
+    def on_part(self) -> None:
+        """See `Constraint.on_part`: a part of a loop is not closed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +176,7 @@ class BoundEnd:
         n, r = self.null.shape
         tables = {}
         for k, order in enumerate(self.orders):
-            table = np.zeros((len(samples.grid.nodes), n))
+            table = np.zeros((len(samples.nodes), n))
             table[-1] = self.null @ weights[0, k * r : (k + 1) * r]
             if self.target is None:
                 table[0] = -table[-1]

@@ -6,68 +6,107 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, per_joint, read_only
+from selfmotion.certificate import LIMIT_NAMES, JointLimits
 from selfmotion.constraints.base import (
+    Constraint,
     NodePartials,
     NodeTangents,
     motion_of_order,
     partials_of_order,
 )
+from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
-class JointPositionLimits:
+class JointPositionLimits(Constraint):
     """Joint coordinates stay within limits.
 
     Parameters
     ----------
     lower, upper : (n,), optional
-        [rad or m]; by default the URDF's.
+        [rad or m]; ±inf for none. By default only the URDF's.
     margin : float
         Distance aimed to be kept from them [rad or m]; at least half of it is.
+    replace : bool
+        Whether these stand in place of the URDF's limits. By default both are kept.
     """
 
     lower: npt.ArrayLike | None = None
     upper: npt.ArrayLike | None = None
     margin: float = 2e-4
+    replace: bool = False
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
-        lower = robot.lower if self.lower is None else read_only(self.lower)
-        upper = robot.upper if self.upper is None else read_only(self.upper)
-        return BoundLimits.of(robot, "joint limits", 0, (lower, upper), self.margin)
+        return BoundLimits.of(robot, LIMIT_NAMES[0], 0, self.limits(robot), self.margin)
+
+    def requirement(self, robot: RobotModel) -> JointLimits:
+        """See `Constraint.requirement`."""
+        return JointLimits(0, *self.limits(robot))
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return Envelope.of_limits(self.requirement(robot))
+
+    def limits(self, robot: RobotModel) -> tuple[Array, Array]:
+        """Return lower and upper limits of an arm, (n,) each [rad or m]."""
+        own = []
+        for given, arm, tighter in (
+            (self.lower, robot.lower, np.maximum),
+            (self.upper, robot.upper, np.minimum),
+        ):
+            if given is None:
+                own.append(arm)
+                continue
+            values = per_joint(given, robot.dof, f"{robot.name}: {LIMIT_NAMES[0]}")
+            own.append(values if self.replace else read_only(tighter(values, arm)))
+        return own[0], own[1]
 
 
 @dataclass(frozen=True, eq=False)
-class JointVelocityLimits:
+class JointVelocityLimits(Constraint):
     """Joint speeds stay below limits.
 
     Parameters
     ----------
     limit : (n,) or float, optional
-        [rad/s or m/s]; by default the URDF's.
+        [rad/s or m/s]; by default only the URDF's.
     margin : float
         Share of the limit that is aimed to be left unused; at least half of it is.
+    replace : bool
+        Whether these stand in place of the URDF's limits. By default both are kept.
     """
 
     limit: npt.ArrayLike | None = None
     margin: float = 2e-3
+    replace: bool = False
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
-        return BoundLimits.symmetric(robot, "velocity limits", 1, self.of(robot), self.margin)
+        return BoundLimits.symmetric(robot, LIMIT_NAMES[1], 1, self.of(robot), self.margin)
+
+    def requirement(self, robot: RobotModel) -> JointLimits:
+        """See `Constraint.requirement`."""
+        limit = self.of(robot)
+        return JointLimits(1, -limit, limit)
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return Envelope.of_limits(self.requirement(robot))
 
     def of(self, robot: RobotModel) -> Array:
-        """Return the limits for an arm, (n,)."""
+        """Return the limits for an arm, (n,) [rad/s or m/s]."""
         if self.limit is None:
             return robot.velocity_limit
-        return per_joint(self.limit, robot.dof, f"{robot.name}: velocity limits", positive=True)
+        own = per_joint(self.limit, robot.dof, f"{robot.name}: {LIMIT_NAMES[1]}", positive=True)
+        return own if self.replace else read_only(np.minimum(own, robot.velocity_limit))
 
 
 @dataclass(frozen=True, eq=False)
-class JointAccelerationLimits:
+class JointAccelerationLimits(Constraint):
     """Joint accelerations stay below limits (URDFs give none).
 
     Parameters
@@ -83,11 +122,20 @@ class JointAccelerationLimits:
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
-        return BoundLimits.symmetric(robot, "acceleration limits", 2, self.of(robot), self.margin)
+        return BoundLimits.symmetric(robot, LIMIT_NAMES[2], 2, self.of(robot), self.margin)
+
+    def requirement(self, robot: RobotModel) -> JointLimits:
+        """See `Constraint.requirement`."""
+        limit = self.of(robot)
+        return JointLimits(2, -limit, limit)
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return Envelope.of_limits(self.requirement(robot))
 
     def of(self, robot: RobotModel) -> Array:
-        """Return the limits for an arm, (n,)."""
-        what = f"{robot.name}: acceleration limits"
+        """Return the limits for an arm, (n,) [rad/s² or m/s²]."""
+        what = f"{robot.name}: {LIMIT_NAMES[2]}"
         return per_joint(self.limit, robot.dof, what, positive=True)
 
 
@@ -124,14 +172,14 @@ class BoundLimits:
     ) -> "BoundLimits":
         """Return lower ≤ x ≤ upper for the joints with a finite limit on either side."""
         lower, upper = limits
-        for array in limits:
-            if array.shape != (robot.dof,) or np.any(np.isnan(array)):
-                raise ProblemError(
-                    f"{robot.name}: {name} have shape {array.shape}, expected one number for each "
-                    f"of the {robot.dof} joints"
-                )
-        if not np.all(lower < upper):
-            raise ProblemError(f"{robot.name}: {name}: lower {lower} is not below upper {upper}")
+        wrong = np.flatnonzero(~(lower < upper))
+        if wrong.size:
+            k = int(wrong[0])
+            raise ProblemError(
+                f"{robot.name}: {name}: joint '{robot.joint_names[k]}': lower {lower[k]:.6g} is "
+                f"not below upper {upper[k]:.6g}; the arm's own limits count as well, unless "
+                f"replace=True"
+            )
         if not margin > 0.0:
             raise ProblemError(f"{robot.name}: {name}: margin is {margin}, expected > 0")
         joints = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
@@ -171,5 +219,5 @@ class BoundLimits:
         quantity = ("position", "velocity", "acceleration")[self.order]
         return (
             f"{quantity} of joint '{self.joint_names[joint]}' is {value:.4g} at t = "
-            f"{samples.grid.nodes[row]:.3f} s, limit {limit:.4g}"
+            f"{samples.sampling.node_times[row]:.3f} s, limit {limit:.4g}"
         )

@@ -1,8 +1,8 @@
 """What a motion costs: integrands G(q̇, q, t) of F = ∫ G dt, each with exact derivatives."""
 
-from selfmotion.costs.base import Cost, Partials, weight_matrix
+from selfmotion.costs.base import ERROR, Cost, Partials, weight_matrix
 from selfmotion.costs.dynamics import GravityTorque, KineticEnergy
-from selfmotion.costs.function import FunctionCost
+from selfmotion.costs.function import FunctionCost, LostCost, cost_from_dict
 from selfmotion.costs.joints import (
     JointAcceleration,
     JointJerk,
@@ -17,9 +17,11 @@ from selfmotion.costs.manipulability import (
     Manipulability,
     SmallestSingularValue,
 )
+from selfmotion.costs.path_error import PathError
 from selfmotion.costs.samples import Samples
 
 __all__ = [
+    "ERROR",
     "Cost",
     "DirectionalManipulability",
     "FunctionCost",
@@ -30,11 +32,14 @@ __all__ = [
     "JointLimitDistance",
     "JointVelocity",
     "KineticEnergy",
+    "LostCost",
     "Manipulability",
     "Partials",
+    "PathError",
     "PathLength",
     "Posture",
     "Samples",
     "SmallestSingularValue",
+    "cost_from_dict",
     "weight_matrix",
 ]

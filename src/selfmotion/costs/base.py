@@ -1,13 +1,18 @@
 """What a cost is: an integrand G of samples, with its derivatives."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.basics import Array, ProblemError, Saved, read_only
 from selfmotion.costs.samples import Samples
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
+
+# In place of an order of derivative: the pose error e, in the rows of the task.
+ERROR = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,36 +23,48 @@ class Partials:
     ----------
     q, qd, qdd, qddd : (S, n) or None
         ∂G/∂q, ∂G/∂q̇, ∂G/∂q̈ and ∂G/∂q⃛.
+    error : (S, 6) or None
+        ∂G/∂e, e the pose error.
     """
 
     q: Array | None = None
     qd: Array | None = None
     qdd: Array | None = None
     qddd: Array | None = None
+    error: Array | None = None
 
 
-class Cost(Protocol):
-    """An integrand G of the cost F = ∫ G dt. It sees samples, never coefficients."""
+class Cost(Saved, ABC, family="cost"):
+    """An integrand G of the cost F = ∫ G dt. It sees samples, never coefficients.
 
-    @property
-    def name(self) -> str:
-        """What to call the cost in reports."""
+    A cost of one's own gives `value` and `gradient`; `selfmotion.testing.check_cost` checks it.
 
+    Attributes
+    ----------
+    name : str
+        What to call the cost in reports.
+    """
+
+    name: str
+
+    @abstractmethod
     def value(self, samples: Samples) -> Array:
         """Return G at the samples, (S,)."""
 
+    @abstractmethod
     def gradient(self, samples: Samples) -> Partials:
         """Return the derivatives of G at the samples."""
 
     def curvature(self, dof: int) -> dict[int, Array]:
         """Return W (n, n) by order of derivative, where G is ½ xᵀWx of q (0), q̇ (1), q̈ (2), q⃛ (3).
 
-        The Gauss-Newton matrix that starts the optimiser is made of these; {} where G is no
-        quadratic form.
+        The Gauss-Newton matrix that starts the optimiser is made of these; {} (the default) where G
+        is no quadratic form.
         """
+        return {}
 
-    def check(self, dof: int) -> None:
-        """Raise ProblemError where the cost does not fit an arm of `dof` joints."""
+    def check(self, robot: RobotModel, task: Task) -> None:
+        """Raise ProblemError where the cost does not fit an arm and a task; nothing by default."""
 
 
 def as_weight(weight: float | npt.ArrayLike, name: str) -> Array:

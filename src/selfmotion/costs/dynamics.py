@@ -1,7 +1,7 @@
 """Costs of the arm's dynamics, by Pinocchio's mass matrix and gravity torques."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, ProblemError
 from selfmotion.costs.base import (
+    Cost,
     Partials,
     as_weight,
     check_mu,
@@ -18,10 +19,11 @@ from selfmotion.costs.base import (
 )
 from selfmotion.costs.samples import Samples
 from selfmotion.robot import RobotModel
+from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
-class KineticEnergy:
+class KineticEnergy(Cost):
     """Kinetic energy of the arm: G = μ ½ q̇ᵀM(q)q̇ [J].
 
     The integral of it is the action of the arm without gravity: its optimum moves the arm as if
@@ -34,6 +36,8 @@ class KineticEnergy:
     mu : float
         μ ≥ 0.
     """
+
+    context: ClassVar[tuple[str, ...]] = ("robot",)
 
     robot: RobotModel
     mu: float = 1.0
@@ -74,14 +78,14 @@ class KineticEnergy:
         mass = np.triu(pin.crba(self._model, self._model.createData(), 0.5 * (lower + upper)))
         return {1: self.mu * (mass + np.triu(mass, 1).T)}
 
-    def check(self, dof: int) -> None:
+    def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
         check_mu(self.mu, self.name)
-        _check_robot(self.robot, dof, self.name)
+        _check_robot(self.robot, robot, self.name)
 
 
 @dataclass(frozen=True, eq=False)
-class GravityTorque:
+class GravityTorque(Cost):
     """Torque that holds the arm against gravity: G = ½ gᵀWg [N²m²].
 
     Parameters
@@ -91,6 +95,8 @@ class GravityTorque:
     weight : float, (n,) or (n, n)
         W; for example 1 / robot torque limit² as a diagonal.
     """
+
+    context: ClassVar[tuple[str, ...]] = ("robot",)
 
     robot: RobotModel
     weight: float | npt.ArrayLike = 1.0
@@ -117,18 +123,18 @@ class GravityTorque:
             by_q[s] = weighted(np.asarray(self.weight), torque[None])[0] @ derivative
         return Partials(q=by_q)
 
-    def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
-        return {}
-
-    def check(self, dof: int) -> None:
+    def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
-        check_weight(np.asarray(self.weight), dof, self.name)
-        _check_robot(self.robot, dof, self.name)
+        check_weight(np.asarray(self.weight), robot.dof, self.name)
+        _check_robot(self.robot, robot, self.name)
 
 
-def _check_robot(robot: RobotModel, dof: int, name: str) -> None:
-    if robot.dof != dof:
-        raise ProblemError(f"cost '{name}' is made for {robot.name} with {robot.dof} joints")
+def _check_robot(made_for: RobotModel, robot: RobotModel, name: str) -> None:
+    if made_for.joint_names != robot.joint_names:
+        raise ProblemError(
+            f"cost '{name}' is made for {made_for.name} with joints "
+            f"{', '.join(made_for.joint_names)}, but the problem's arm is {robot.name} with "
+            f"{', '.join(robot.joint_names)}"
+        )
     if not any(inertia.mass > 0 for inertia in robot.model.inertias):
         raise ProblemError(f"cost '{name}': the URDF of {robot.name} gives no inertias")

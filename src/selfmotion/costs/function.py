@@ -1,21 +1,23 @@
 """Any integrand that a user can write down."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError
-from selfmotion.costs.base import Partials
+from selfmotion.basics import Array, ProblemError, is_known, restore
+from selfmotion.costs.base import Cost, Partials
 from selfmotion.costs.samples import Samples
+from selfmotion.robot import RobotModel
 
 Integrand = Callable[[Array, Array, Array], npt.ArrayLike]
 IntegrandGradient = Callable[[Array, Array, Array], tuple[npt.ArrayLike, npt.ArrayLike]]
 
 
 @dataclass(frozen=True)
-class FunctionCost:
+class FunctionCost(Cost):
     """Any integrand G(q̇, q, t), the paper's general form.
 
     Parameters
@@ -52,12 +54,9 @@ class FunctionCost:
             qd=self._difference(qd, lambda shifted: self._call(shifted, q, t)),
         )
 
-    def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
-        return {}
-
-    def check(self, dof: int) -> None:
-        """See `Cost.check`."""
+    def to_dict(self) -> dict[str, Any]:
+        """See `Saved.to_dict`: a file carries no function, only that there was one."""
+        return {"kind": LostCost.kind, "name": self.name, "was": self.kind}
 
     def _call(self, qd: Array, q: Array, t: Array) -> Array:
         value = np.asarray(self.g(qd, q, t), dtype=np.float64)
@@ -79,3 +78,41 @@ class FunctionCost:
             below[:, i] -= step
             gradient[:, i] = (function(above) - function(below)) / (above[:, i] - below[:, i])
         return gradient
+
+
+@dataclass(frozen=True)
+class LostCost(Cost):
+    """A cost of a saved plan that was a function, or a class that is not imported here.
+
+    A plan file carries no code. The motion can be checked and shown without it; planning again
+    needs the cost itself.
+
+    Parameters
+    ----------
+    name : str
+    was : str
+        Kind of the cost that was saved.
+    """
+
+    name: str
+    was: str
+
+    def value(self, samples: Samples) -> Array:
+        """Raise ProblemError: what the cost was is not known."""
+        raise ProblemError(
+            f"cost '{self.name}' was a {self.was}, which the plan's file does not carry; give it "
+            f"again: dataclasses.replace(problem, costs=[…])"
+        )
+
+    def gradient(self, samples: Samples) -> Partials:
+        """Raise ProblemError, as `value` does."""
+        raise ProblemError(f"cost '{self.name}' was a {self.was}, which is not known here")
+
+
+def cost_from_dict(description: Mapping[str, Any], robot: RobotModel) -> Cost:
+    """Return the cost that `Cost.to_dict` described; a `LostCost` where the code is not here."""
+    if not is_known(Cost, description):
+        kind = str(description.get("kind"))
+        return LostCost(str(description.get("name", kind)), kind)
+    cost: Cost = restore(Cost, description, robot=robot)
+    return cost

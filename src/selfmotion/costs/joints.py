@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.costs.base import (
+    Cost,
     Partials,
     as_weight,
     check_mu,
@@ -17,10 +18,12 @@ from selfmotion.costs.base import (
     weighted,
 )
 from selfmotion.costs.samples import Samples
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
-class _Quadratic:
+class _Quadratic(Cost):
     """What the quadratic costs share: the weight W."""
 
     weight: float | npt.ArrayLike = 1.0
@@ -33,9 +36,9 @@ class _Quadratic:
     def _w(self) -> Array:
         return np.asarray(self.weight)
 
-    def check(self, dof: int) -> None:
+    def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
-        check_weight(self._w, dof, self.name)
+        check_weight(self._w, robot.dof, self.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,18 +140,18 @@ class Posture(_Quadratic):
         """See `Cost.curvature`."""
         return {0: weight_matrix(self._w, dof)}
 
-    def check(self, dof: int) -> None:
+    def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
-        super().check(dof)
+        super().check(robot, task)
         posture = np.asarray(self.posture)
-        if posture.shape != (dof,) or not np.all(np.isfinite(posture)):
+        if posture.shape != (robot.dof,) or not np.all(np.isfinite(posture)):
             raise ProblemError(
-                f"cost '{self.name}': posture is {posture}, expected {dof} finite numbers"
+                f"cost '{self.name}': posture is {posture}, expected {robot.dof} finite numbers"
             )
 
 
 @dataclass(frozen=True, eq=False)
-class JointLimitDistance:
+class JointLimitDistance(Cost):
     """Distance from the joint limits: G = μ Σ_i ((q_i - c_i) / h_i)^p.
 
     c is the middle and h half the width of the range: 0 in the middle, μ at a limit, steep beyond.
@@ -189,17 +192,13 @@ class JointLimitDistance:
         relative = self._relative(samples) ** (self.power - 1)
         return Partials(q=self.mu * self.power * relative * self._scale[1])
 
-    def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
-        return {}
-
-    def check(self, dof: int) -> None:
+    def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
         check_mu(self.mu, self.name)
-        if np.asarray(self.lower).shape != (dof,):
+        if np.asarray(self.lower).shape != (robot.dof,):
             raise ProblemError(
                 f"cost '{self.name}': limits for {np.asarray(self.lower).shape} joints, "
-                f"expected ({dof},)"
+                f"expected ({robot.dof},)"
             )
 
     @property
@@ -216,7 +215,7 @@ class JointLimitDistance:
 
 
 @dataclass(frozen=True)
-class PathLength:
+class PathLength(Cost):
     """Length of the joint path, joint by joint: G = Σ_i √(q̇_i² + δ²) - δ [rad/s].
 
     Its integral is Σ_i ∫ |q̇_i| dt, the sum over joints of what each travels, but smooth where a
@@ -239,11 +238,7 @@ class PathLength:
         """See `Cost.gradient`: q̇_i / √(q̇_i² + δ²)."""
         return Partials(qd=samples.qd / np.hypot(samples.qd, self.smoothing))
 
-    def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
-        return {}
-
-    def check(self, dof: int) -> None:
+    def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
         if not (np.isfinite(self.smoothing) and self.smoothing > 0.0):
             raise ProblemError(

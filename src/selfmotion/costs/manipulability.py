@@ -6,12 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, read_only
-from selfmotion.costs.base import Partials, check_mu
+from selfmotion.costs.base import Cost, Partials, check_mu
 from selfmotion.costs.samples import Samples
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
 
 
 @dataclass(frozen=True)
-class InverseManipulability:
+class InverseManipulability(Cost):
     """Distance from singular poses, as used by the paper: G = μ / det(JJᵀ), eq. 12.
 
     J is the task Jacobian; the unit is that of 1/det(JJᵀ), so μ weighs metres against radians.
@@ -33,17 +35,13 @@ class InverseManipulability:
         """See `Cost.gradient`: ∂G = -G ∂log det(JJᵀ)."""
         return Partials(q=-self.value(samples)[:, None] * samples.log_determinant_gradient)
 
-    def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
-        return {}
-
-    def check(self, dof: int) -> None:
+    def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
         check_mu(self.mu, self.name)
 
 
 @dataclass(frozen=True)
-class Manipulability:
+class Manipulability(Cost):
     """Yoshikawa's manipulability, to be large: G = -μ w with w = √det(JJᵀ), eq. 9 to 11.
 
     Without a velocity term the optimum does not exist: coefficients grow without bound.
@@ -65,17 +63,13 @@ class Manipulability:
         """See `Cost.gradient`: ∂w = ½ w ∂log det(JJᵀ)."""
         return Partials(q=0.5 * self.value(samples)[:, None] * samples.log_determinant_gradient)
 
-    def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
-        return {}
-
-    def check(self, dof: int) -> None:
+    def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
         check_mu(self.mu, self.name)
 
 
 @dataclass(frozen=True, eq=False)
-class DirectionalManipulability:
+class DirectionalManipulability(Cost):
     """Ease of motion along one direction: G = μ uᵀ(JJᵀ)⁻¹u.
 
     (uᵀ(JJᵀ)⁻¹u)^-½ is the velocity transmission ratio, the length of the manipulability ellipsoid
@@ -112,28 +106,24 @@ class DirectionalManipulability:
         back = np.einsum("sm,smn->sn", a, samples.task_jacobian)
         return Partials(q=samples.contract(-2.0 * self.mu * a[:, :, None] * back[:, None, :]))
 
-    def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
-        return {}
-
-    def check(self, dof: int) -> None:
+    def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
         check_mu(self.mu, self.name)
+        rows = task.dimension
+        if len(np.asarray(self.direction)) != rows:
+            raise ProblemError(
+                f"cost '{self.name}': direction has {len(np.asarray(self.direction))} entries, "
+                f"expected one per row of task '{task.value}' ({rows})"
+            )
 
     def _solved(self, samples: Samples) -> Array:
         direction = np.asarray(self.direction)
-        rows = samples.task.dimension
-        if len(direction) != rows:
-            raise ProblemError(
-                f"cost '{self.name}': direction has {len(direction)} entries, expected one per "
-                f"row of task '{samples.task.value}' ({rows})"
-            )
-        stacked = np.broadcast_to(direction[:, None], (len(samples.t), rows, 1))
+        stacked = np.broadcast_to(direction[:, None], (len(samples.t), len(direction), 1))
         return np.asarray(np.linalg.solve(samples.gram, stacked)[:, :, 0])
 
 
 @dataclass(frozen=True)
-class SmallestSingularValue:
+class SmallestSingularValue(Cost):
     """Distance from the nearest singular pose: G = μ (Σ σ_i^-2p)^(1/2p), about μ / σ_min.
 
     The p-norm is smooth where singular values meet, unlike σ_min itself; it is above 1/σ_min by at
@@ -165,11 +155,7 @@ class SmallestSingularValue:
         weights = -scale[:, None, None] * (inverse @ samples.task_jacobian)
         return Partials(q=samples.contract(weights))
 
-    def curvature(self, dof: int) -> dict[int, Array]:
-        """See `Cost.curvature`."""
-        return {}
-
-    def check(self, dof: int) -> None:
+    def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
         check_mu(self.mu, self.name)
         if not self.power >= 1:

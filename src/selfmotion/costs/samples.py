@@ -4,76 +4,95 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from selfmotion import kernels
 from selfmotion.basics import Array
-from selfmotion.motion import Grid
+from selfmotion.motion import Sampling
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
+
+_ARRAYS = ("q", "qd", "jacobian", "rotation", "translation", "error", "task_jacobian")
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
     """A joint motion at S times, with the tool's kinematics there.
 
+    The arrays refuse to be written to.
+
     Attributes
     ----------
-    grid : Grid
-        Whose stages the samples are.
+    sampling : Sampling
+        When the samples are taken.
     q, qd : (S, n)
         Joint coordinates and velocities.
     jacobian : (S, 6, n)
         The tool's Jacobian [v, ω], world axes.
     rotation, translation : (S, 3, 3), (S, 3)
         The tool's pose.
+    error : (S, 6)
+        Pose error e, from the tool to the path [m, rad], world axes; see `Task.twist_error`.
     task : Task
         The rows the path prescribes.
     task_jacobian : (S, m, n)
         Those rows of the Jacobian.
     """
 
-    grid: Grid
+    sampling: Sampling
     q: Array
     qd: Array
     jacobian: Array
     rotation: Array
     translation: Array
+    error: Array
     task: Task
     task_jacobian: Array
 
+    def __post_init__(self) -> None:
+        for name in _ARRAYS:
+            # A view of its own: the owner may go on writing, whoever is shown it may not.
+            view = getattr(self, name).view()
+            view.setflags(write=False)
+            object.__setattr__(self, name, view)
+
     @classmethod
-    def along(cls, robot: RobotModel, task: Task, grid: Grid, q: Array, qd: Array) -> "Samples":
-        """Return the samples of a motion known at the stages of `grid`, q and q̇ (S, n) each."""
+    def along(
+        cls, robot: RobotModel, task: Task, sampling: Sampling, q: Array, qd: Array
+    ) -> "Samples":
+        """Return the samples of a motion on its path, q and q̇ (S, n) each."""
         jacobian = np.empty((len(q), 6, robot.dof))
         rotation, translation = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
         for k, configuration in enumerate(q):
             jacobian[k], rotation[k], translation[k] = robot.kinematics(configuration)
-        rows = jacobian
-        if task.tool_axes:
-            turned = rotation.transpose(0, 2, 1) @ jacobian[:, 3:]
-            rows = np.concatenate([jacobian[:, :3], turned], axis=1)
-        task_jacobian = np.ascontiguousarray(rows[:, task.rows])
-        return cls(grid, q, qd, jacobian, rotation, translation, task, task_jacobian)
+        rows = task.select_along(jacobian, rotation)
+        error = np.zeros((len(q), 6))
+        return cls(sampling, q, qd, jacobian, rotation, translation, error, task, rows)
 
     @property
     def t(self) -> Array:
         """Times [s], (S,)."""
-        return self.grid.stage_times
+        return self.sampling.t
 
     @property
     def weights(self) -> Array:
         """Quadrature weights [s]: ∫ G dt ≈ weights · G, (S,)."""
-        return self.grid.weights
+        return self.sampling.weights
+
+    @property
+    def nodes(self) -> npt.NDArray[np.intp]:
+        """Indices of the samples that are nodes, (N + 1,)."""
+        return self.sampling.nodes
 
     @cached_property
     def qdd(self) -> Array:
         """Joint accelerations, (S, n): differences of q̇ over the nodes."""
-        return np.asarray(self.grid.differentiation(1) @ self.qd[self.grid.node_stages])
+        return np.asarray(self.sampling.differentiation(1) @ self.qd[self.nodes])
 
     @cached_property
     def qddd(self) -> Array:
         """Joint jerks, (S, n)."""
-        return np.asarray(self.grid.differentiation(2) @ self.qd[self.grid.node_stages])
+        return np.asarray(self.sampling.differentiation(2) @ self.qd[self.nodes])
 
     @cached_property
     def gram(self) -> Array:

@@ -1,19 +1,22 @@
 """From a decision vector to the motion, its cost, and the gradient."""
 
-from selfmotion.engine.augmented_lagrangian import AugmentedLagrangian
+from selfmotion.engine.counts import Counts
 from selfmotion.engine.deviation import Deviation
-from selfmotion.engine.objective import Objective, inverse_metric
-from selfmotion.engine.rollout import FEEDBACK, Rollout
-from selfmotion.engine.start import FixedStart, FreeStart, Start
+from selfmotion.engine.objective import Evaluation, Objective
+from selfmotion.engine.rollout import Rollout
+from selfmotion.engine.start import FixedStart, FreeStart
+from selfmotion.engine.still import MOST_HALVINGS, Guide, StillMotion, settled_still_motion
 
 __all__ = [
-    "FEEDBACK",
-    "AugmentedLagrangian",
+    "MOST_HALVINGS",
+    "Counts",
     "Deviation",
+    "Evaluation",
     "FixedStart",
     "FreeStart",
+    "Guide",
     "Objective",
     "Rollout",
-    "Start",
-    "inverse_metric",
+    "StillMotion",
+    "settled_still_motion",
 ]

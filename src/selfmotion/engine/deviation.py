@@ -14,6 +14,7 @@ with the left Jacobian Jl of SO(3).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -73,10 +74,14 @@ class Deviation:
         t: Array,
         pinned: tuple[bool, bool],
     ) -> None:
-        self._nominal = path.samples(t)
+        self._path, self._t = path, t
         self._groups = [_group(item, path.duration, t, pinned) for item in relaxations]
         self._in_tool_axes = any(item.in_tool_axes for item in relaxations)
         self.size = sum(group.size for group in self._groups)
+
+    @cached_property
+    def _nominal(self) -> PathSamples:
+        return self._path.samples(self._t)
 
     def target(self, c: Array) -> PathSamples:
         """Return the poses and twists that the tool follows."""

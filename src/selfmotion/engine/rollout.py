@@ -9,12 +9,9 @@ from selfmotion.costs import Samples
 from selfmotion.motion import Grid
 from selfmotion.path import Path, PathSamples
 from selfmotion.robot import RobotModel
-from selfmotion.task import DampingLaw, Task
+from selfmotion.task import DampingLaw, Task, feedback_rate
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-
-# The pose feedback removes an error e at the rate K e; K times the duration.
-FEEDBACK = 20.0
 
 # A Newton correction this small [rad or m] is rounding; quadratic convergence needs few steps.
 _POLISHED, _POLISHING_STEPS = 1e-13, 4
@@ -56,7 +53,7 @@ class Rollout:
         self.damping = damping
         # σ0 and λ0; the kernels take a threshold of 0 for none.
         self._law = (0.0, 0.0) if damping is None else (damping.threshold, damping.strength)
-        self._gain = FEEDBACK / path.duration
+        self._gain = feedback_rate(path.duration)
         self._rows = task.rows
         self._angle_kind = kernels.angle_kind(task.rows, task.tool_axes)
         times, n, m = grid.stage_times, robot.dof, task.dimension
@@ -123,8 +120,8 @@ class Rollout:
         self.jacobian_evaluations += len(self._q_rows)
         return None
 
-    def polish(self) -> tuple[Array, Array, Array]:
-        """Put the nodes of the last run exactly onto the path.
+    def polished(self) -> tuple[Array, Array, Array]:
+        """Return the nodes of the last run, put exactly onto the path.
 
         Newton's method q ← q + J⁺e, from errors the size of the integration's; then eq. 4 once
         more for q̇. A motion that was damped anywhere is returned as it is: it is off the path by
@@ -134,26 +131,28 @@ class Rollout:
         -------
         t, q, qd : (N + 1,), (N + 1, n), (N + 1, n)
         """
-        model, data, tool = self.robot.model, self._data, self.robot.tool_id
-        rotation, translation = data.oMf[tool].rotation, data.oMf[tool].translation
-        table, rows, kind, n = self._table, self._rows, self._angle_kind, self.robot.dof
-        settings = (table, rows, kind, 0.0, 0.0, 0.0)
-        here = self.grid.node_stages
+        here, n = self.grid.node_stages, self.robot.dof
         if self.damped:
             return self.grid.nodes, self._q[here], self._qd[here]
-        for stage in here:
-            q = self._q_rows[stage]
+        model, data, tool = self.robot.model, self._data, self.robot.tool_id
+        rotation, translation = data.oMf[tool].rotation, data.oMf[tool].translation
+        # A table of its own: the last run stays as it is.
+        table, rows, kind = self._table[here], self._rows, self._angle_kind
+        q, qd = table[:, :n].copy(), table[:, n : 2 * n]
+        for node in range(len(here)):
             for _ in range(_POLISHING_STEPS + 1):
-                pin.computeJointJacobians(model, data, q)
+                pin.computeJointJacobians(model, data, q[node])
                 jacobian = pin.getFrameJacobian(model, data, tool, _AXES)
                 pin.updateFramePlacement(model, data, tool)
-                sound = kernels.evaluate(stage, jacobian, rotation, translation, *settings)
-                step = kernels.newton_step(table[stage], n, rows, kind)
+                sound = kernels.evaluate(
+                    node, jacobian, rotation, translation, table, rows, kind, 0.0, 0.0, 0.0
+                )
+                step = kernels.newton_step(table[node], n, rows, kind)
                 if not sound or np.abs(step).max() < _POLISHED:
                     break
-                q += step
+                q[node] += step
         self.jacobian_evaluations += len(here)
-        return self.grid.nodes, self._q[here], self._qd[here]
+        return self.grid.nodes, q, qd
 
     def sensitivities(
         self, epsilon_matrix: Array, start_matrix: Array, target_matrix: Array | None = None
@@ -213,12 +212,13 @@ class Rollout:
     def samples(self) -> Samples:
         """Return the last run at its stages, without copying: valid until the next run."""
         return Samples(
-            grid=self.grid,
+            sampling=self.grid.sampling,
             q=self._q,
             qd=self._qd,
             jacobian=self._jacobian,
             rotation=self._rotation,
             translation=self._translation,
+            error=self._error,
             task=self.task,
             task_jacobian=self._task_jacobian,
         )

@@ -8,6 +8,7 @@ from selfmotion.motion.null_motion import (
     PolynomialNullMotion,
     TransportedFrame,
 )
+from selfmotion.motion.sampling import Sampling
 from selfmotion.motion.trajectory import Trajectory
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "NullMotion",
     "NullMotionTable",
     "PolynomialNullMotion",
+    "Sampling",
     "Trajectory",
     "TransportedFrame",
 ]

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, read_only
+from selfmotion.motion.sampling import Sampling
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,24 +35,6 @@ class Grid:
             for left, right in pairwise(knots)
         ]
         return cls(read_only(np.append(np.concatenate(pieces), knots[-1])))
-
-    def differentiation(self, order: int) -> Any:
-        """Return the sparse matrix (S, N + 1) from values at the nodes to a derivative at stages.
-
-        Five-point finite differences (weights of B. Fornberg, Math. Comp. 51, 1988).
-
-        Parameters
-        ----------
-        order : {1, 2}
-            Of the derivative.
-        """
-        if order not in self._operators:
-            self._operators[order] = _differentiation(self.nodes, self.stage_times, order)
-        return self._operators[order]
-
-    @cached_property
-    def _operators(self) -> dict[int, Any]:
-        return {}
 
     def halved(self) -> "Grid":
         """Return the grid with every step cut in two."""
@@ -84,6 +66,11 @@ class Grid:
         return np.append(np.repeat(np.diff(self.nodes), 4), 0.0)
 
     @cached_property
+    def sampling(self) -> Sampling:
+        """The stages as samples of a motion."""
+        return Sampling(self.stage_times, self.weights, self.node_stages)
+
+    @cached_property
     def weights(self) -> Array:
         """Weights (S,) that integrate a function of the stages over time [s].
 
@@ -92,32 +79,3 @@ class Grid:
         """
         steps = np.diff(self.nodes)[:, None] / 6.0
         return np.append((steps * np.array([1.0, 2.0, 2.0, 1.0])).ravel(), 0.0)
-
-
-_STENCIL = 5
-
-
-def _differentiation(nodes: Array, times: Array, order: int) -> Any:
-    from scipy.sparse import csr_array
-
-    count = min(_STENCIL, len(nodes))
-    nearest = np.searchsorted(nodes, times) - count // 2
-    first = np.clip(nearest, 0, len(nodes) - count)
-    columns = first[:, None] + np.arange(count)
-    weights = _fornberg(nodes[columns] - times[:, None], order)
-    rows = np.repeat(np.arange(len(times)), count)
-    shape = (len(times), len(nodes))
-    return csr_array((weights.ravel(), (rows, columns.ravel())), shape=shape)
-
-
-def _fornberg(offsets: Array, order: int) -> Array:
-    """Return weights (S, k) of the derivative at 0 from values at `offsets` (S, k).
-
-    Exact for polynomials of degree < k: a small Vandermonde system, scaled against rounding.
-    """
-    scale = np.abs(offsets).max(axis=1, keepdims=True)
-    powers = np.arange(offsets.shape[1])
-    vandermonde = (offsets / scale)[:, None, :] ** powers[None, :, None]
-    target = np.zeros((len(offsets), len(powers), 1))
-    target[:, order, 0] = float(np.prod(np.arange(1, order + 1))) / scale[:, 0] ** order
-    return np.asarray(np.linalg.solve(vandermonde, target)[:, :, 0])

@@ -1,31 +1,39 @@
 """The null motion ε(t), linear in the coefficients x that are optimised: ε(t) = R(t) E φ(t)."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.polynomial import legendre
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array, ProblemError, Saved
 
 
-class NullMotion(Protocol):
-    """A parameterisation of ε(t): functions φ of time, and the space that E maps them to."""
+class NullMotion(Saved, ABC, family="null motion"):
+    """A parameterisation of ε(t): functions φ of time, and the space that E maps them to.
+
+    One of your own gives `functions`; `selfmotion.testing.check_null_motion` checks it.
+
+    Attributes
+    ----------
+    space : {"null", "joint"}
+        ``"null"``: E is (r, K) in a null-space basis; ``"joint"``: E is (n, K), R = I.
+    """
+
+    space: str = "null"
 
     @property
-    def space(self) -> str:
-        """``"null"``: E is (r, K) in a null-space basis; ``"joint"``: E is (n, K), R = I."""
-
-    @property
+    @abstractmethod
     def fewest_steps(self) -> int:
         """Steps below which a grid does not resolve the functions."""
 
+    @abstractmethod
     def functions(self, t: Array, duration: float) -> Array:
         """Return φ at times `t` (S,) of a motion of length `duration` [s], (S, K)."""
 
 
 @dataclass(frozen=True)
-class PolynomialNullMotion:
+class PolynomialNullMotion(NullMotion):
     """ε(t) as a polynomial in time.
 
     ``space="joint", basis="monomial"`` is the paper's: ε(t) = Σ e_k t^k (eq. 6), with the decision
@@ -70,7 +78,7 @@ class PolynomialNullMotion:
 
 
 @dataclass(frozen=True)
-class BSplineNullMotion:
+class BSplineNullMotion(NullMotion):
     """ε(t) as a B-spline with equal intervals: for long paths, where one polynomial is too stiff.
 
     Each coefficient acts on degree + 1 intervals only.

@@ -59,14 +59,31 @@ class Trajectory:
         """Time from first to last sample [s]."""
         return float(self.t[-1] - self.t[0])
 
-    def accelerations(self) -> tuple[Array, Array]:
-        """Return all extremes of q̈: times (2N - 2,) and q̈ (2N - 2, n) there.
+    def extremes(self, order: int) -> tuple[Array, Array]:
+        """Return the least and the largest value of each joint over the whole motion.
 
-        Between two samples q̈ is linear, so that its extremes are those at both ends.
+        Exact: of each cubic at both its ends and where its next derivative is 0.
+
+        Parameters
+        ----------
+        order : {0, 1, 2}
+            Of q (0), q̇ (1) or q̈ (2).
+
+        Returns
+        -------
+        t, values : (2, n)
+            When, and what: the least in the first row, the largest in the second.
         """
-        inner = self.t[1:] - 1e-9 * np.diff(self.t)
-        times = np.stack([self.t[:-1], inner], axis=1).ravel()
-        return times, self(times, order=2)
+        s = _stationary(self, order)
+        h, start = np.diff(self.t)[:, None, None], self.t[:-1, None, None]
+        weights = _HERMITE[order](s, h)
+        ends = (self.q[:-1], self.q[1:], self.qd[:-1], self.qd[1:])
+        values = sum(weight * end[:, None] for weight, end in zip(weights, ends, strict=True))
+        times = np.broadcast_to(start + h * s, np.shape(values))
+        flat, when = np.reshape(values, (-1, self.q.shape[1])), times.reshape(-1, self.q.shape[1])
+        rows = np.stack([np.argmin(flat, axis=0), np.argmax(flat, axis=0)])
+        joints = np.arange(flat.shape[1])
+        return when[rows, joints], flat[rows, joints]
 
     def __call__(self, t: npt.ArrayLike, order: int = 0) -> Array:
         """Return q (`order` 0), q̇ (1), q̈ (2) at `t`.
@@ -105,6 +122,31 @@ class Trajectory:
             + start_slope[..., None] * self.qd[k]
             + end_slope[..., None] * self.qd[k + 1]
         )
+
+
+def _stationary(motion: Trajectory, order: int) -> Array:
+    """Return where in [0, 1] each cubic may have an extreme, (N - 1, 2 + k, n): ends, and inside.
+
+    With q(s) = q0 + a s + b s² + c s³, the zeros of a + 2bs + 3cs² for q and of b + 3cs for q̇; q̈ is
+    linear.
+    """
+    if order not in _HERMITE:
+        raise ValueError(f"order is {order}, expected 0, 1 or 2")
+    h, rise = np.diff(motion.t)[:, None], np.diff(motion.q, axis=0)
+    a, z = h * motion.qd[:-1], h * motion.qd[1:]
+    b, c = 3.0 * rise - 2.0 * a - z, a + z - 2.0 * rise
+    ends = [np.zeros_like(rise), np.ones_like(rise)]
+    inner: list[Array] = []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if order == 1:
+            inner = [-b / (3.0 * c)]
+        elif order == 0:
+            # Without cancellation, also where the cubic is nearly a parabola.
+            u = -(b + np.copysign(np.sqrt(np.maximum(b * b - 3.0 * a * c, 0.0)), b))
+            inner = [u / (3.0 * c), a / u]
+    # NaN and what is outside stand at an end, which is looked at anyway.
+    inside = [np.where((s > 0.0) & (s < 1.0), s, 0.0) for s in inner]
+    return np.stack([*ends, *inside], axis=1)
 
 
 _Weights = tuple[Array, Array, Array, Array]

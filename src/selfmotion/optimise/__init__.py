@@ -1,14 +1,16 @@
 """Minimisation; knows only numbers."""
 
-from selfmotion.optimise.line_search import LineSearch
-from selfmotion.optimise.quasi_newton import (
+from selfmotion.optimise.base import (
     Callback,
     Function,
     Iteration,
     Minimum,
-    QuasiNewton,
+    Optimizer,
     Status,
+    inverse_metric,
 )
+from selfmotion.optimise.line_search import LineSearch
+from selfmotion.optimise.quasi_newton import QuasiNewton
 
 __all__ = [
     "Callback",
@@ -16,6 +18,8 @@ __all__ = [
     "Iteration",
     "LineSearch",
     "Minimum",
+    "Optimizer",
     "QuasiNewton",
     "Status",
+    "inverse_metric",
 ]

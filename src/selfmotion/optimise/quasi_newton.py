@@ -1,111 +1,19 @@
 """The Broyden-family quasi-Newton method with Fletcher's switch; knows only x → (F, ∇F)."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from enum import Enum
-from typing import Protocol
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.optimise.base import (
+    Callback,
+    Function,
+    Iteration,
+    Minimum,
+    Status,
+    inverse_metric,
+)
 from selfmotion.optimise.line_search import LineSearch
-
-
-class Function(Protocol):
-    """What is minimised."""
-
-    evaluations: int
-
-    def value(self, x: Array) -> float:
-        """Return F(x), infinite where it is not defined."""
-
-    def gradient(self, x: Array) -> Array:
-        """Return ∇F(x)."""
-
-    def slope(self, x: Array, direction: Array) -> float:
-        """Return the derivative of F at x along `direction`."""
-
-
-class Status(Enum):
-    """How an optimisation ended."""
-
-    CONVERGED = "converged"
-    PRECISION = "precision"
-    MAX_ITERATIONS = "max_iterations"
-    MAX_EVALUATIONS = "max_evaluations"
-    UNBOUNDED = "unbounded"
-    STOPPED = "stopped"
-    INTERRUPTED = "interrupted"
-
-    @property
-    def message(self) -> str:
-        """What it means and what to do about it."""
-        return _MESSAGES[self]
-
-
-_MESSAGES = {
-    Status.CONVERGED: "the predicted decrease fell below the tolerance",
-    Status.PRECISION: "no step along the search direction decreases the cost any more: converged "
-    "to the accuracy of its evaluation",
-    Status.MAX_ITERATIONS: "the limit on iterations was reached; raise max_iterations to go on",
-    Status.MAX_EVALUATIONS: "the limit on evaluations was reached; raise max_evaluations to go on",
-    Status.UNBOUNDED: "the coefficients grow without bound: the cost has no minimum; add a "
-    "JointVelocity cost",
-    Status.STOPPED: "the callback asked to stop",
-    Status.INTERRUPTED: "interrupted; this is the best found so far",
-}
-
-
-@dataclass(frozen=True, eq=False)
-class Iteration:
-    """One iteration, the first being the start.
-
-    Attributes
-    ----------
-    x : (size,)
-        Where it arrived.
-    cost : float
-        F(x).
-    gradient_norm : float
-        |∇F(x)|.
-    update : str
-        Which formula renewed H afterwards: "bfgs", "dfp", or "none".
-    step : float
-        α of the line search.
-    evaluations : int
-        Evaluations of F so far.
-    """
-
-    x: Array
-    cost: float
-    gradient_norm: float
-    update: str
-    step: float
-    evaluations: int
-
-
-Callback = Callable[[Iteration], bool | None]
-
-
-@dataclass(frozen=True, eq=False)
-class Minimum:
-    """What `QuasiNewton.minimize` found.
-
-    Attributes
-    ----------
-    x : (size,)
-    cost : float
-    inverse_hessian : (size, size)
-        The last estimate.
-    history : tuple of Iteration
-    status : Status
-    """
-
-    x: Array
-    cost: float
-    inverse_hessian: Array
-    history: tuple[Iteration, ...]
-    status: Status
 
 
 @dataclass(frozen=True)
@@ -123,6 +31,9 @@ class QuasiNewton:
     Parameters
     ----------
     update : {"fletcher", "bfgs", "dfp"}
+    initial_metric : {"gauss-newton", "identity"}
+        H0 where none is given: the inverse of the function's Gauss-Newton matrix at the start, or
+        the paper's identity.
     tolerance : float
         Converged when the decrease that the model predicts, ½ ∇Fᵀ H ∇F, is below this times |F|.
     max_iterations : int
@@ -136,11 +47,17 @@ class QuasiNewton:
     max_iterations: int = 200
     line_search: LineSearch = field(default_factory=LineSearch)
     unbounded: float = 1e8
+    initial_metric: str = "gauss-newton"
 
     def __post_init__(self) -> None:
         if self.update not in ("fletcher", "bfgs", "dfp"):
             raise ProblemError(
                 f"optimiser: update is '{self.update}', expected 'fletcher', 'bfgs' or 'dfp'"
+            )
+        if self.initial_metric not in ("gauss-newton", "identity"):
+            raise ProblemError(
+                f"optimiser: initial_metric is '{self.initial_metric}', expected 'gauss-newton' or "
+                f"'identity'"
             )
         if not self.tolerance > 0.0:
             raise ProblemError(f"optimiser: tolerance is {self.tolerance}, expected > 0")
@@ -151,10 +68,11 @@ class QuasiNewton:
         x0: Array,
         inverse_hessian: Array | None = None,
         *,
+        coarseness: float = 1.0,
         max_evaluations: int | None = None,
         callback: Callback | None = None,
     ) -> Minimum:
-        """Minimise `function` from `x0`.
+        """Minimise `function` from `x0`; see `Optimizer.minimize`.
 
         Parameters
         ----------
@@ -162,9 +80,11 @@ class QuasiNewton:
         x0 : (size,)
             F(x0) must be finite.
         inverse_hessian : (size, size), optional
-            H0; the identity by default.
+            H0; by default that of `initial_metric`.
+        coarseness : float
+            Factor on the tolerance.
         max_evaluations : int, optional
-            Limit on evaluations of F.
+            Limit on `Function.evaluations`.
         callback : callable, optional
             Called with each `Iteration`; returning True stops.
 
@@ -173,7 +93,10 @@ class QuasiNewton:
         Minimum
             The best point found, also after an interruption from the keyboard.
         """
-        run = _Run(self, function, x0, inverse_hessian, max_evaluations, callback)
+        if inverse_hessian is None and self.initial_metric == "gauss-newton":
+            inverse_hessian = inverse_metric(function.metric(x0))
+        method = replace(self, tolerance=self.tolerance * coarseness)
+        run = _Run(method, function, x0, inverse_hessian, max_evaluations, callback)
         try:
             status = run.until_done()
         except KeyboardInterrupt:

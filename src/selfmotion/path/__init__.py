@@ -1,7 +1,6 @@
 """Tool motion over time: what the tool frame is to do, as pose and twist at any time."""
 
 from selfmotion.path.base import Path, PathSamples, as_pose
-from selfmotion.path.files import path_from_dict
 from selfmotion.path.retimed import Retimed
 from selfmotion.path.shapes import Circle, Line
 from selfmotion.path.truncated import Truncated
@@ -18,5 +17,4 @@ __all__ = [
     "TwistPath",
     "Waypoints",
     "as_pose",
-    "path_from_dict",
 ]

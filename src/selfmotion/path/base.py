@@ -4,13 +4,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, PathError, read_only
+from selfmotion.basics import Array, PathError, Saved, read_only
 
 # Rounding of a last time such as 50 * 0.02 must not count as outside the motion.
 _TIME_SLACK = 1e-9
@@ -38,11 +37,12 @@ class PathSamples:
     twist: Array
 
 
-class Path(ABC):
+class Path(Saved, ABC, family="path"):
     """A tool motion over [0, duration]; poses and twists in world axes.
 
-    Subclasses give `duration`, `_evaluate` and `to_dict`; the twist must be the time derivative
-    of the pose.
+    A path of one's own gives `duration` and `evaluate`, and `knots` where it is not smooth
+    throughout; `selfmotion.testing.check_path` checks it. As a dataclass it saves and loads like
+    ours.
 
     Attributes
     ----------
@@ -58,12 +58,11 @@ class Path(ABC):
         return read_only([0.0, self.duration])
 
     @abstractmethod
-    def _evaluate(self, t: Array) -> PathSamples:
-        """Return the motion at times (K,) known to lie in [0, duration]."""
+    def evaluate(self, t: Array) -> PathSamples:
+        """Return the motion at times (K,) known to lie in [0, duration].
 
-    @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
-        """Return a JSON-safe description from which `path_from_dict` restores the path."""
+        The twist must be the time derivative of the pose.
+        """
 
     def samples(self, t: npt.ArrayLike) -> PathSamples:
         """Return the motion at times `t` (K,) [s].
@@ -79,7 +78,7 @@ class Path(ABC):
             raise PathError(
                 f"time {times.min()}..{times.max()} s is outside the path, 0..{self.duration} s"
             )
-        return self._evaluate(np.clip(times, 0.0, self.duration))
+        return self.evaluate(np.clip(times, 0.0, self.duration))
 
     def pose(self, t: float) -> pin.SE3:
         """Return the tool's pose at time `t` [s]."""

@@ -1,15 +1,16 @@
 """A tool motion run through at another pace."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, PathError, read_only
+from selfmotion.basics import Array, PathError, read_only, restore
 from selfmotion.path.base import Path, PathSamples
 
 
-class Retimed(Path):
+class Retimed(Path, kind="retimed"):
     """The same geometric path at another pace: pose(t) is that of the original at σ(t).
 
     σ is a cubic Hermite spline, non-decreasing at its samples.
@@ -48,18 +49,24 @@ class Retimed(Path):
         sigma = np.clip(spline(t), 0.0, self._path.duration)
         return np.asarray(sigma), np.asarray(spline(t, 1))
 
-    def _evaluate(self, t: Array) -> PathSamples:
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
         sigma, rate = self.pace(t)
         original = self._path.samples(sigma)
         twist = original.twist * rate[:, None]
         return PathSamples(t, original.translation, original.rotation, twist)
 
     def to_dict(self) -> dict[str, Any]:
-        """See `Path.to_dict`."""
+        """See `Saved.to_dict`."""
         return {
-            "kind": "retimed",
+            "kind": self.kind,
             "path": self._path.to_dict(),
             "t": self._t.tolist(),
             "sigma": self._sigma.tolist(),
             "rate": self._rate.tolist(),
         }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Retimed":
+        """See `Saved.from_dict`."""
+        return cls(**{**values, "path": restore(Path, values["path"])})

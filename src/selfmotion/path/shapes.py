@@ -21,7 +21,7 @@ from selfmotion.path.base import (
 
 
 @dataclass(frozen=True, eq=False)
-class Line(Path):
+class Line(Path, kind="line"):
     """A straight line; the orientation turns about one fixed axis.
 
     Parameters
@@ -45,7 +45,8 @@ class Line(Path):
         object.__setattr__(self, "duration", check_duration(self.duration))
         object.__setattr__(self, "time_law", TimeLaw.of(self.time_law))
 
-    def _evaluate(self, t: Array) -> PathSamples:
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
         s, speed = TimeLaw.of(self.time_law)(t / self.duration)
         offset = self.end.translation - self.start.translation
         turn = pin.log3(self.end.rotation @ self.start.rotation.T)
@@ -58,19 +59,9 @@ class Line(Path):
             (speed / self.duration)[:, None] * np.concatenate([offset, turn]),
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """See `Path.to_dict`."""
-        return {
-            "kind": "line",
-            "start": self.start.homogeneous.tolist(),
-            "end": self.end.homogeneous.tolist(),
-            "duration": self.duration,
-            "time_law": TimeLaw.of(self.time_law).value,
-        }
-
 
 @dataclass(frozen=True, eq=False)
-class Circle(Path):
+class Circle(Path, kind="circle"):
     """A circle, or an arc, about an axis.
 
     Parameters
@@ -147,7 +138,8 @@ class Circle(Path):
     def _arm(self) -> Array:
         return np.asarray(self.start.translation - self.center)
 
-    def _evaluate(self, t: Array) -> PathSamples:
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
         s, speed = TimeLaw.of(self.time_law)(t / self.duration)
         angle = 2.0 * np.pi * self.turns
         turned = rotations_about(self.normal, angle * s)
@@ -160,16 +152,3 @@ class Circle(Path):
             angular = np.zeros_like(omega)
         twist = np.hstack([np.cross(omega, arms), angular])
         return PathSamples(t, self.center + arms, rotation, twist)
-
-    def to_dict(self) -> dict[str, Any]:
-        """See `Path.to_dict`."""
-        return {
-            "kind": "circle",
-            "start": self.start.homogeneous.tolist(),
-            "center": self.center.tolist(),
-            "normal": self.normal.tolist(),
-            "duration": self.duration,
-            "turns": self.turns,
-            "turn_tool": self.turn_tool,
-            "time_law": TimeLaw.of(self.time_law).value,
-        }

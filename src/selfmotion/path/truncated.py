@@ -1,10 +1,11 @@
 """The first part of a tool motion."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, PathError, read_only
+from selfmotion.basics import Array, PathError, read_only, restore
 from selfmotion.path.base import Path, PathSamples
 
 # The knots crowd towards the end by halves, down to about this share of the duration.
@@ -13,7 +14,7 @@ _GRADES = 14
 _CLOSE = 1e-3
 
 
-class Truncated(Path):
+class Truncated(Path, kind="truncated"):
     """A tool motion up to a time, for what the arm can follow of it.
 
     Its knots crowd towards the end: a motion that ends near a singular pose changes there faster
@@ -45,9 +46,15 @@ class Truncated(Path):
         graded = self.duration - rest[gaps > _CLOSE * rest]
         return read_only([0.0, *np.union1d(inner, graded), self.duration])
 
-    def _evaluate(self, t: Array) -> PathSamples:
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
         return self._path.samples(t)
 
     def to_dict(self) -> dict[str, Any]:
-        """See `Path.to_dict`."""
-        return {"kind": "truncated", "path": self._path.to_dict(), "duration": self.duration}
+        """See `Saved.to_dict`."""
+        return {"kind": self.kind, "path": self._path.to_dict(), "duration": self.duration}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Truncated":
+        """See `Saved.from_dict`."""
+        return cls(**{**values, "path": restore(Path, values["path"])})

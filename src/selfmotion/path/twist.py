@@ -1,6 +1,6 @@
 """A tool motion given by its velocity."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, cast
 
@@ -18,7 +18,7 @@ _TAIL = 1e-13
 _SHORTEST = 2.0**-12
 
 
-class TwistPath(Path):
+class TwistPath(Path, kind="twist"):
     """A start pose and a velocity function.
 
     The function is represented by piecewise Chebyshev polynomials to 13 digits; positions are
@@ -48,9 +48,10 @@ class TwistPath(Path):
         self._set(as_pose(start), *_resolve(velocity, check_duration(duration)))
 
     @classmethod
-    def _restore(cls, start: npt.ArrayLike, breaks: Any, coefficients: Any) -> "TwistPath":
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "TwistPath":
+        """See `Saved.from_dict`: the polynomials, not the function."""
         path = cls.__new__(cls)
-        path._set(as_pose(start), breaks, coefficients)
+        path._set(as_pose(values["start"]), values["breaks"], values["coefficients"])
         return path
 
     def _set(self, start: pin.SE3, breaks: npt.ArrayLike, coefficients: npt.ArrayLike) -> None:
@@ -122,7 +123,8 @@ class TwistPath(Path):
         twist: Array = np.einsum("kd,kdi->ki", basis, self._coefficients[k])
         return twist
 
-    def _evaluate(self, t: Array) -> PathSamples:
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
         k, s = self._local(t)
         integrals, offsets = self._displacements
         basis = chebyshev.chebvander(s, integrals.shape[1] - 1)
@@ -138,9 +140,9 @@ class TwistPath(Path):
         return np.asarray(Rotation.from_quat(self._orientation(t).T).as_matrix())
 
     def to_dict(self) -> dict[str, Any]:
-        """See `Path.to_dict`."""
+        """See `Saved.to_dict`."""
         return {
-            "kind": "twist",
+            "kind": self.kind,
             "start": self._start.homogeneous.tolist(),
             "breaks": self._breaks.tolist(),
             "coefficients": self._coefficients.tolist(),

@@ -17,7 +17,7 @@ _COLUMNS = ("t", "x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
 
 
-class Waypoints(Path):
+class Waypoints(Path, kind="waypoints"):
     """Poses with times, joined smoothly in position and on SO(3), exact at each waypoint.
 
     Positions follow a cubic spline (C², not-a-knot), orientations scipy's `RotationSpline` (C²).
@@ -161,7 +161,8 @@ class Waypoints(Path):
         slope = a + u**2 * (3 * c3 + u * (4 * c4 + 5 * u * c5))
         return self._t[k] + h * tau, slope
 
-    def _evaluate(self, t: Array) -> PathSamples:
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
         tau, slope = self._warp(t)
         starts, splines = self._pieces
         piece = np.searchsorted(self._t[starts], tau, side="right") - 1
@@ -179,9 +180,9 @@ class Waypoints(Path):
         return PathSamples(t, position, rotation, twist * slope[:, None])
 
     def to_dict(self) -> dict[str, Any]:
-        """See `Path.to_dict`."""
+        """See `Saved.to_dict`."""
         return {
-            "kind": "waypoints",
+            "kind": self.kind,
             "t": self._t.tolist(),
             "positions": self._points.tolist(),
             "quaternions": self._turns.tolist(),

@@ -1,7 +1,6 @@
 """From a problem to a plan."""
 
 from selfmotion.planning.run import plan
+from selfmotion.planning.settings import Search
 
-__all__ = [
-    "plan",
-]
+__all__ = ["Search", "plan"]

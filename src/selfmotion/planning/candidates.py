@@ -1,8 +1,7 @@
 """The best motion of a problem: from its start, from many starts, from global sequences."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import NoReturn, Protocol
+from typing import NoReturn
 
 import numpy as np
 
@@ -15,9 +14,10 @@ from selfmotion.basics import (
     SelfmotionError,
 )
 from selfmotion.optimise import Status
-from selfmotion.planning.session import Session
+from selfmotion.planning.session import Effort, Session
+from selfmotion.planning.settings import Search
 from selfmotion.plans import Problem
-from selfmotion.search import Guide, Reach, guides, start_candidates
+from selfmotion.search import Reach, SequenceGuide, guides, start_candidates
 
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 _SECOND_EFFORT = 4
@@ -25,45 +25,19 @@ _SECOND_EFFORT = 4
 _LONGER = 1.25
 
 
-@dataclass(frozen=True)
-class Effort:
-    """How to search where the start is free; see `plan` for all of them."""
-
-    starts: int
-    finalists: int
-    search: str
-    compare: bool
-    rng: np.random.Generator | int | None
-
-    def __post_init__(self) -> None:
-        for name in ("starts", "finalists"):
-            if getattr(self, name) < 1:
-                raise ProblemError(f"{name} is {getattr(self, name)}, expected at least 1")
-        if self.search not in ("auto", "local", "global"):
-            raise ProblemError(f"search is '{self.search}', expected 'auto', 'local' or 'global'")
-
-
-class MakeSession(Protocol):
-    """Makes the session of a start."""
-
-    def __call__(self, start: Array, *, free: bool, guide: Guide | None = None) -> Session:
-        """Return it; BreakdownError where its motion at x = 0 runs into a singular pose."""
-
-
 class _CutShortError(Exception):
     """The user wants no more: the best so far has to do."""
 
 
-class Selection:
+class Candidates:
     """Optimises motions from several starts and keeps the best.
 
     Parameters
     ----------
     problem : Problem
-    session : MakeSession
-    use_metric : bool
-        Whether the optimiser starts with the Gauss-Newton matrix.
     effort : Effort
+        What the sessions share.
+    search : Search
     progress : Progress
     reach : callable
         Returns how far single poses are in reach, looking closely at a time [s]: what is beyond is
@@ -72,7 +46,7 @@ class Selection:
     Attributes
     ----------
     best : Session or None
-    sequences : list of Guide
+    sequences : list of SequenceGuide
         What the global search found; empty where it was not asked for or in vain.
     rival : Session or None
         The best motion from these. It is not chosen where the start is given or the search local,
@@ -84,20 +58,19 @@ class Selection:
     def __init__(
         self,
         problem: Problem,
-        session: MakeSession,
-        use_metric: bool,
         effort: Effort,
+        search: Search,
         progress: Progress,
         reach: Callable[[float], Reach],
     ) -> None:
         self._reach = reach
-        self._problem, self._session = problem, session
-        self._use_metric, self._effort, self._progress = use_metric, effort, progress
+        self._problem, self._effort = problem, effort
+        self._settings, self._progress = search, progress
         self.best: Session | None = None
         # Complete motions that are not optimised yet.
         self._waiting: Sequence[Session] = ()
         self._failure: SelfmotionError | None = None
-        self.sequences: list[Guide] = []
+        self.sequences: list[SequenceGuide] = []
         self.rival: Session | None = None
         self.notes: list[str] = []
 
@@ -122,29 +95,32 @@ class Selection:
         return self.best
 
     def _search(self) -> None:
-        problem, effort = self._problem, self._effort
+        problem, search = self._problem, self._settings
         start = problem.given_start
         can_search = problem.robot.redundancy(problem.rows) == 1
-        if effort.compare and not can_search:
+        if search.compare and not can_search:
             raise ProblemError(
                 f"compare: the global search needs redundancy 1, but {problem.robot.name} has "
                 f"{problem.robot.redundancy(problem.rows)} for task '{problem.rows.value}'"
             )
-        starts = start is None and (effort.search != "global" or not can_search)
-        rng = np.random.default_rng(effort.rng)
+        starts = start is None and (search.mode != "global" or not can_search)
+        rng = np.random.default_rng(search.rng)
         if start is not None:
-            self._try(self._session(start, free=False))
+            self._try(self._begin(start, free=False))
         elif starts:
-            self._try_candidates(effort.starts, effort.finalists, rng)
+            self._try_candidates(search.starts, search.finalists, rng)
         if self._is_out_of_reach():
             return
-        chosen = start is None and effort.search != "local"
-        if can_search and (effort.compare or (chosen and self._fell_short)):
+        chosen = start is None and search.mode != "local"
+        if can_search and (search.compare or (chosen and self._fell_short)):
             self._try_sequences(chosen)
         # Where the search knows that nothing follows the path, more starts do not help.
         if starts and self._fell_short and not self.notes:
             more = _SECOND_EFFORT
-            self._try_candidates(more * effort.starts, more * effort.finalists, rng)
+            self._try_candidates(more * search.starts, more * search.finalists, rng)
+
+    def _begin(self, start: Array, *, free: bool, guide: SequenceGuide | None = None) -> Session:
+        return Session.begin(self._problem, self._effort, start, free=free, guide=guide)
 
     @property
     def _fell_short(self) -> bool:
@@ -164,10 +140,10 @@ class Selection:
         for number, candidate in enumerate(candidates, 1):
             self._progress("start", number, len(candidates))
             try:
-                sessions.append(self._session(candidate, free=True))
+                sessions.append(self._begin(candidate, free=True))
             except BreakdownError as error:
                 self._failure = error
-        sessions.sort(key=lambda session: session.initial_score)
+        sessions.sort(key=Session.initial_score)
         count = min(finalists, len(sessions))
         for number, session in enumerate(sessions[:count], 1):
             self._progress("optimising start", number, count)
@@ -177,24 +153,24 @@ class Selection:
     def _try_sequences(self, chosen: bool) -> None:
         """Optimise from the best sequences over all self-motions."""
         try:
-            self.sequences = guides(self._problem, self._effort.rng, self._progress)
+            self.sequences = guides(self._problem, self._settings.rng, self._progress)
         except NoSequenceError as error:
             self._failure = error
             self.notes.append(f"global search: {error}")
         for number, guide in enumerate(self.sequences, 1):
             self._progress("refining sequence", number, len(self.sequences))
             try:
-                session = self._session(guide.start, free=True, guide=guide)
+                session = self._begin(guide.start, free=True, guide=guide)
             except BreakdownError as error:
                 self._failure = error
                 continue
             if self._hopeless(guide, session):
                 continue
             self._try(session, chosen=chosen)
-            if self.rival is None or session.score < self.rival.score:
+            if self.rival is None or session.score() < self.rival.score():
                 self.rival = session
 
-    def _hopeless(self, guide: Guide, session: Session) -> bool:
+    def _hopeless(self, guide: SequenceGuide, session: Session) -> bool:
         """Whether a sequence is much longer than the shortest, and costs more than what there is.
 
         Optimising gains some percent on a sequence.
@@ -203,12 +179,12 @@ class Selection:
         if rival is None or rival.violations:
             return False
         longer = guide.sequence.length > _LONGER * self.sequences[0].sequence.length
-        return longer and session.initial_score > rival.score[1]
+        return longer and session.initial_score() > rival.score()[1]
 
     def _try(self, session: Session, *, chosen: bool = True) -> None:
         """Optimise a session; keep it if it is the best one and may be chosen."""
         try:
-            session.minimize(self._use_metric)
+            session.minimize()
         except KeyboardInterrupt:
             session.end(Status.INTERRUPTED)
         if chosen:
@@ -218,7 +194,7 @@ class Selection:
             raise _CutShortError
 
     def _consider(self, session: Session) -> None:
-        if self.best is None or session.score < self.best.score:
+        if self.best is None or session.score() < self.best.score():
             self.best = session
 
     def _interrupted(self) -> None:
@@ -231,5 +207,6 @@ class Selection:
         self.best.end(Status.INTERRUPTED)
 
     def _give_up(self) -> NoReturn:
-        assert self._failure is not None, "each start leads to a motion or to an error"
+        if self._failure is None:
+            raise RuntimeError("each start leads to a motion or to an error")
         raise self._failure

@@ -1,23 +1,19 @@
 """The largest part of a path that the arm can follow, where it cannot follow all of it."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError
-from selfmotion.constraints import ClosedPath, EndConfiguration, EndVelocity
-from selfmotion.engine import Rollout
-from selfmotion.motion import Grid
+from selfmotion.engine import Evaluation, Guide, StillMotion
+from selfmotion.motion import Grid, Sampling
 from selfmotion.optimise import Status
 from selfmotion.path import Truncated
-from selfmotion.planning.session import Guide, Session
+from selfmotion.planning.session import Effort, Session
 from selfmotion.plans import Problem
 from selfmotion.robot import null_basis
 from selfmotion.search import Reach
 
-# A problem, a start, and what stands for x = 0 → the session, or BreakdownError.
-Maker = Callable[[Problem, Array, Guide | None], Session]
 _Candidate = tuple[Array, Guide | None]
 
 # Share of the time to the edge of the workspace that is given up, since joint speeds grow without
@@ -61,7 +57,8 @@ class _Attempt:
     problem: Problem
     session: Session | None
     kept_until: float
-    reason: str
+    found: Evaluation | None
+    trouble: str = ""
 
     @property
     def arrived(self) -> bool:
@@ -69,7 +66,11 @@ class _Attempt:
 
     @property
     def cost(self) -> float:
-        return np.inf if self.session is None else sum(self.session.terms().values())
+        return np.inf if self.found is None else self.found.cost
+
+    @property
+    def reason(self) -> str:
+        return self.trouble if self.session is None else "; ".join(self.session.violations)
 
     @property
     def cut_short(self) -> bool:
@@ -77,7 +78,7 @@ class _Attempt:
         return self.session is not None and self.session.cut_short
 
 
-def largest_part(problem: Problem, reach: Reach, make: Maker, use_metric: bool) -> Part | None:
+def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
     """Return an optimised motion along the largest part [0, t] of the path that can be found.
 
     Motions up to where single poses are in reach, by the same optimiser as any; where none
@@ -90,10 +91,8 @@ def largest_part(problem: Problem, reach: Reach, make: Maker, use_metric: bool) 
         Of the whole path.
     reach : Reach
         How far single poses are in reach.
-    make : callable
-        Makes a session.
-    use_metric : bool
-        As `Session.minimize` has it.
+    effort : Effort
+        What the sessions share.
 
     Returns
     -------
@@ -106,19 +105,17 @@ def largest_part(problem: Problem, reach: Reach, make: Maker, use_metric: bool) 
     first = _until(problem, goal)
     attempts = []
     for candidate in _candidates(first, reach.starts)[:_FINALISTS]:
-        attempts.append(_attempt(first, candidate, make, use_metric))
+        attempts.append(_attempt(first, candidate, effort))
         if attempts[-1].cut_short:
             return _part(problem, attempts[-1], reach, "")
     arrived = [attempt for attempt in attempts if attempt.arrived]
     if arrived:
         return _part(problem, min(arrived, key=lambda attempt: attempt.cost), reach, "")
     furthest = max(attempts, key=lambda attempt: attempt.kept_until)
-    return _bisect(problem, furthest, reach, make, use_metric)
+    return _bisect(problem, furthest, reach, effort)
 
 
-def _bisect(
-    problem: Problem, failed: _Attempt, reach: Reach, make: Maker, use_metric: bool
-) -> Part | None:
+def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) -> Part | None:
     """Return the candidate's motion on the largest part on which it arrives."""
     arrived: _Attempt | None = None
     low, high = 0.0, failed.problem.path.duration
@@ -132,7 +129,7 @@ def _bisect(
             probe = 0.5 * (low + high)
         if probe < _LEAST * problem.path.duration or high - low < _AGREEMENT * high:
             break
-        attempt = _attempt(_until(problem, probe), failed.candidate, make, use_metric)
+        attempt = _attempt(_until(problem, probe), failed.candidate, effort)
         if attempt.arrived or attempt.cut_short:
             arrived, low = attempt, probe
         else:
@@ -158,8 +155,8 @@ def _until(problem: Problem, time: float) -> Problem:
     """Return the problem on [0, time], without conditions on the end."""
     if time >= problem.path.duration:
         return problem
-    ends = (ClosedPath, EndConfiguration, EndVelocity)
-    kept = [item for item in problem.constraints if not isinstance(item, ends)]
+    asked = (item.on_part() for item in problem.constraints)
+    kept = [item for item in asked if item is not None]
     relaxations = [
         item if item.during is None else replace(item, during=(first, min(last, time)))
         for item in problem.relaxations
@@ -171,20 +168,23 @@ def _until(problem: Problem, time: float) -> Problem:
     )
 
 
-def _attempt(problem: Problem, candidate: _Candidate, make: Maker, use_metric: bool) -> _Attempt:
+def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attempt:
     try:
-        session = make(problem, *candidate)
+        start, guide = candidate
+        free = problem.given_start is None
+        session = Session.begin(problem, effort, start, free=free, guide=guide)
     except BreakdownError as error:
         reason = f"it runs into a singular pose near t = {error.time:.6g} s"
-        return _Attempt(candidate, problem, None, error.time, reason)
+        return _Attempt(candidate, problem, None, error.time, None, reason)
     try:
-        session.minimize(use_metric)
+        session.minimize()
     except KeyboardInterrupt:
         session.end(Status.INTERRUPTED)
-    motion = session.trajectory()
+    found = session.motion()
+    motion = found.trajectory
     # Constraints that cannot be met may throw it far off: x = 0 then tells more.
     until = max(_kept_until(problem, motion.t, motion.q, motion.qd), -_rank(problem, *candidate)[1])
-    return _Attempt(candidate, problem, session, until, "; ".join(session.violations))
+    return _Attempt(candidate, problem, session, until, found)
 
 
 def _candidates(problem: Problem, starts: list[Array]) -> list[_Candidate]:
@@ -220,26 +220,18 @@ def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, f
 
     The smaller, the better.
     """
-    path, rows = problem.path, problem.rows.rows
-    grid = Grid.aligned(path.knots, _STEPS)
-    rollout = Rollout(problem.robot, path, problem.rows, grid, damping=problem.damping_law)
-    idle = np.zeros((len(grid.stage_times), problem.robot.dof))
-    broken = rollout.run(start, idle if guide is None else guide(grid.stage_times))
-    extent = max(float(np.ptp(path.samples(grid.nodes).translation, axis=0).max()), 1e-3)
-    drift = np.abs(rollout.drift[:, rows]) / np.where(rows < 3, extent, 1.0)
-    off = ~(drift <= _OFF).all(axis=1) & (grid.nodes <= (np.inf if broken is None else broken))
-    far = path.duration if broken is None else broken
-    far = min(far, float(grid.nodes[int(np.argmax(off))])) if off.any() else far
-    nodes, samples = grid.node_stages, rollout.samples()
-    kept = _kept_until(problem, grid.nodes, samples.q[nodes], samples.qd[nodes])
+    path = problem.path
+    still = StillMotion.on(problem, start, Grid.aligned(path.knots, _STEPS), guide)
+    trouble = still.off_path(_OFF)
+    far = path.duration if trouble is None else trouble
+    kept = _kept_until(problem, still.grid.nodes, still.q, still.qd)
     # Beyond the place where it broke down, speeds may be anything.
-    arrived = far >= path.duration
-    effort = float(samples.weights @ np.sum(samples.qd**2, axis=1)) if arrived else np.inf
+    weights = Sampling.trapezoidal(still.grid.nodes).weights
+    effort = float(weights @ np.sum(still.qd**2, axis=1)) if trouble is None else np.inf
     return -far, -min(kept, far), effort
 
 
 def _kept_until(problem: Problem, t: Array, q: Array, qd: Array) -> float:
     """Return the first of the times t (N,) at which a joint is beyond its limits, or the last."""
-    lower, upper, speed = problem.requirements.limits(problem.robot)
-    beyond = ((q < lower) | (q > upper) | (np.abs(qd) > speed)).any(axis=1)
-    return float(t[int(np.argmax(beyond))] if beyond.any() else t[-1])
+    kept = problem.envelope.keeps(q, qd)
+    return float(t[-1] if kept.all() else t[int(np.argmin(kept))])

@@ -2,13 +2,11 @@
 
 import time
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
-from selfmotion.baselines import Method, plan_by
 from selfmotion.basics import (
-    Array,
     BreakdownError,
     NoSequenceError,
     ProblemError,
@@ -17,11 +15,13 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.optimise import Callback, QuasiNewton, Status
-from selfmotion.planning.candidates import Effort, Selection
-from selfmotion.planning.finish import Checked, checked_motion, within
+from selfmotion.engine import Counts
+from selfmotion.optimise import Callback, Optimizer, QuasiNewton, Status
+from selfmotion.planning.candidates import Candidates
+from selfmotion.planning.finish import Finished, finish, path_errors, within
 from selfmotion.planning.largest_part import Part, largest_part
-from selfmotion.planning.session import Counts, Guide, Session
+from selfmotion.planning.session import Effort, Session
+from selfmotion.planning.settings import Search
 from selfmotion.plans import Gap, Plan, Problem, Report
 from selfmotion.search import SPACING, Reach, reachable
 
@@ -32,17 +32,11 @@ _PATIENCE, _PART_PATIENCE = 400, 150
 def plan(
     problem: Problem,
     *,
-    optimizer: QuasiNewton | None = None,
-    initial_metric: str = "gauss-newton",
+    optimizer: Optimizer | None = None,
+    search: Search | None = None,
+    tolerance: Tolerance | None = None,
     max_evaluations: int | None = None,
     callback: Callback | None = None,
-    tolerance: Tolerance | None = None,
-    starts: int = 24,
-    finalists: int = 4,
-    rng: np.random.Generator | int | None = 0,
-    search: str = "auto",
-    compare: bool = False,
-    method: Method | None = None,
     progress: Progress = silent,
 ) -> Plan:
     """Plan the joint motion that follows the path exactly and minimises the costs.
@@ -50,36 +44,19 @@ def plan(
     Parameters
     ----------
     problem : Problem
-    optimizer : QuasiNewton, optional
-    initial_metric : {"gauss-newton", "identity"}
-        H0: the inverse Gauss-Newton matrix of the motion at x = 0, or the paper's identity.
+    optimizer : Optimizer, optional
+        By default `QuasiNewton`.
+    search : Search, optional
+        How to search where the start is free, and whether to compare with a global search.
+    tolerance : Tolerance, optional
+        What the motion may miss the path by, between samples as well. The number of steps
+        follows from it.
     max_evaluations : int, optional
         Limit on evaluations of the cost while optimising one start; the finished motion is
         evaluated a few times more. By default none, but 400 with damping and 150 on each part of
         the path, where limits of joint speed often cannot be met and trying would take minutes.
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
-    tolerance : Tolerance, optional
-        What the motion may miss the path by, between samples as well. The number of steps
-        follows from it.
-    starts : int
-        Where the start is free: seeds of the inverse kinematics.
-    finalists : int
-        Where the start is free: how many of the starts found are optimised, those of the best
-        motions at x = 0.
-    rng : Generator or int
-        Where the start is free: shifts the seeds; the same one gives the same plan.
-    search : {"auto", "local", "global"}
-        Where the start is free: optimise from many starts (local), or, where the redundancy is 1,
-        from the best sequences over all self-motions (`best_sequences`). ``"auto"``: from many
-        starts first, and from sequences where none of them leads to a motion that keeps the
-        constraints.
-    compare : bool
-        Search globally whatever the other search finds, so that `Report.gap` tells how far the
-        plan is from the best motion of all. Needs redundancy 1.
-    method : Method, optional
-        Another work's way to resolve the redundancy, instead of the optimisation: then the options
-        of the optimiser have no effect.
     progress : callable, optional
         Told the stage, how much of it has begun, and of how many: ``("start", 3, 24)``. It may
         raise `KeyboardInterrupt` to stop.
@@ -102,180 +79,175 @@ def plan(
         The start is free and no configuration reaches the start of the path.
     NoSequenceError
         The global search finds that no motion follows the path; says where it ends and why.
+    ProblemError
+        An argument is not what it should be, or has no effect on this problem.
     KeyboardInterrupt
         The interruption came before there was a complete motion.
     """
-    if method is not None:
-        if problem.damping is not None:
-            raise ProblemError(
-                "the problem's damping is for the optimised motion; leave it out with method=, or "
-                "take method=DampedLeastSquares(…)"
-            )
-        if problem.relaxations:
-            raise ProblemError(
-                "other works' methods follow the path exactly; leave the relaxations out with "
-                "method="
-            )
-        return plan_by(problem, method, tolerance)
-    if initial_metric not in ("gauss-newton", "identity"):
+    _check(problem, search, max_evaluations)
+    if problem.damping is not None and max_evaluations is None:
+        max_evaluations = _PATIENCE
+    effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, Counts())
+    run = _Run(problem, effort, search or Search(), tolerance or Tolerance(), progress)
+    return run.plan()
+
+
+def _check(problem: Problem, search: Search | None, max_evaluations: int | None) -> None:
+    if search is not None and not isinstance(search, Search):
+        raise ProblemError(f"search is {search!r}, expected Search(mode=…, starts=…, …)")
+    if search is not None and problem.given_start is not None and not search.compare:
         raise ProblemError(
-            f"initial_metric is '{initial_metric}', expected 'gauss-newton' or 'identity'"
+            "search= has no effect, since the problem's start is given; leave one of them out, or "
+            "ask for Search(compare=True)"
         )
     if max_evaluations is not None and max_evaluations < 1:
         raise ProblemError(f"max_evaluations is {max_evaluations}, expected at least 1")
-    if problem.damping is not None and max_evaluations is None:
-        max_evaluations = _PATIENCE
-    began = time.perf_counter()
-    use_metric, wanted = initial_metric == "gauss-newton", tolerance or Tolerance()
-    optimizer, counts = optimizer or QuasiNewton(), Counts()
 
-    @cache
-    def reach(suspect: float) -> Reach:
-        progress("reach", 1, 1)
-        return reachable(problem, suspect, starts, np.random.default_rng(rng))
 
-    def part(suspect: float, notes: list[str]) -> Plan | None:
-        limit = _PART_PATIENCE if max_evaluations is None else max_evaluations
-        make = partial(_session, optimizer, callback, limit, counts)
-        known = reach(suspect)
-        progress("largest part", 1, 1)
-        found = largest_part(problem, known, make, use_metric)
+class _Run:
+    """What the stages of one plan share."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        effort: Effort,
+        search: Search,
+        tolerance: Tolerance,
+        progress: Progress,
+    ) -> None:
+        self._problem, self._effort, self._search = problem, effort, search
+        self._tolerance, self._progress = tolerance, progress
+        self._began = time.perf_counter()
+        self._reach = cache(self._reachable)
+        self._candidates = Candidates(problem, effort, search, progress, self._reach)
+
+    def plan(self) -> Plan:
+        """Return the plan of the whole path, or of the largest part of it."""
+        candidates = self._candidates
+        try:
+            best = candidates.run()
+        except (BreakdownError, NoSequenceError) as error:
+            # Chains of configurations end at obstacles and step limits as well: these stay errors.
+            blocked = isinstance(error, NoSequenceError) and not self._reach(error.time).reason
+            shorter = None if blocked else self._part(error.time)
+            if shorter is None:
+                raise
+            return shorter
+        rival_cost = self._settle(best, candidates.rival)
+        whole = Part(self._problem, best, "")
+        finished = finish(self._problem, whole, self._tolerance, self._progress)
+        result = self._gather(whole, finished, self._gap(rival_cost, finished))
+        if self._stands(best, finished):
+            return result
+        try:
+            suspect = finished.certificate.position_error.time
+            # Where single poses are in reach, constraints that are not met say more than a part.
+            return (self._part(suspect) if self._reach(suspect).reason else None) or result
+        except KeyboardInterrupt:
+            best.end(Status.INTERRUPTED)
+            return self._gather(whole, finished, None)
+
+    def _stands(self, best: Session, finished: Finished) -> bool:
+        """Whether a part of the path is no better answer than this motion along all of it."""
+        check = finished.certificate
+        no_more = best.cut_short or best.status is Status.MAX_EVALUATIONS
+        out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
+        held = within(path_errors(check), self._tolerance)
+        # With damping the motion goes on where the path cannot be followed: so it was asked for.
+        return (held and not out_of_limits) or no_more or self._problem.damping is not None
+
+    def _reachable(self, suspect: float) -> Reach:
+        self._progress("reach", 1, 1)
+        rng = np.random.default_rng(self._search.rng)
+        return reachable(self._problem, suspect, self._search.starts, rng)
+
+    def _part(self, suspect: float) -> Plan | None:
+        """Return the plan of the largest part, looking closely at a time [s]; None for none."""
+        effort = self._effort
+        if effort.max_evaluations is None:
+            effort = replace(effort, max_evaluations=_PART_PATIENCE)
+        known = self._reach(suspect)
+        self._progress("largest part", 1, 1)
+        found = largest_part(self._problem, known, effort)
         if found is None:
             return None
-        _settle(found.session, None, progress)
-        checked = checked_motion(problem, found, wanted, progress)
-        return _finish(problem, found, checked, None, notes, began)
+        self._settle(found.session, None)
+        finished = finish(self._problem, found, self._tolerance, self._progress)
+        return self._gather(found, finished, None)
 
-    selection = Selection(
-        problem,
-        partial(Session, problem, optimizer, callback, max_evaluations, counts),
-        use_metric,
-        Effort(starts, finalists, search, compare, rng),
-        progress,
-        reach,
-    )
-    try:
-        best = selection.run()
-    except (BreakdownError, NoSequenceError) as error:
-        # Chains of configurations end at obstacles and step limits as well: these stay errors.
-        blocked = isinstance(error, NoSequenceError) and not reach(error.time).reason
-        shorter = None if blocked else part(error.time, selection.notes)
-        if shorter is None:
-            raise
-        return shorter
-    rival_cost = _settle(best, selection.rival, progress)
-    whole = Part(problem, best, "")
-    checked = checked_motion(problem, whole, wanted, progress)
-    gap = _gap(selection, rival_cost, checked)
-    result = _finish(problem, whole, checked, gap, selection.notes, began)
-    no_more = best.cut_short or best.status is Status.MAX_EVALUATIONS
-    check = result.certificate
-    out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
-    held = within((check.position_error.value, check.rotation_error.value), wanted)
-    # With damping the motion goes on where the path cannot be followed: so it was asked for.
-    if (held and not out_of_limits) or no_more or problem.damping is not None:
-        return result
-    try:
-        suspect = check.position_error.time
-        # Where single poses are in reach, the constraints that are not met say more than a part.
-        return (part(suspect, selection.notes) if reach(suspect).reason else None) or result
-    except KeyboardInterrupt:
-        best.end(Status.INTERRUPTED)
-        return _finish(problem, whole, checked, None, selection.notes, began)
+    def _settle(self, best: Session, rival: Session | None) -> float | None:
+        """Go on to finer grids, also with what the best one is compared with; return its cost."""
+        try:
+            self._progress("finer grid", 1, 1)
+            best.refine_until_settled()
+            if rival is not None and rival is not best and not best.cut_short:
+                rival.refine_until_settled()
+                violated, cost = rival.score()
+                return None if violated else cost
+        except KeyboardInterrupt:
+            best.end(Status.INTERRUPTED)
+        return None
 
+    def _gather(self, part: Part, finished: Finished, gap: Gap | None) -> Plan:
+        session, motion, still = part.session, finished.motion, finished.still
+        counts = session.counts
+        report = Report(
+            cost=motion.cost,
+            initial_cost=still.cost,
+            terms=motion.terms,
+            initial_terms=still.terms,
+            evaluations=counts.evaluations,
+            gradient_evaluations=counts.gradients,
+            jacobian_evaluations=counts.jacobians,
+            steps=len(motion.trajectory.t) - 1,
+            iterations=sum(iteration.step > 0.0 for iteration in session.history),
+            history=tuple(session.history),
+            status=session.status,
+            message=_message(part, finished, self._candidates.notes),
+            seconds=time.perf_counter() - self._began,
+            gap=gap,
+            ending=part.ending,
+        )
+        return Plan(
+            problem=self._problem,
+            trajectory=motion.trajectory,
+            initial_trajectory=still.trajectory,
+            coefficients=read_only(session.coefficients),
+            report=report,
+            certificate=finished.certificate,
+            tolerance=self._tolerance,
+        )
 
-def _session(
-    optimizer: QuasiNewton,
-    callback: Callback | None,
-    limit: int,
-    counts: Counts,
-    part: Problem,
-    start: Array,
-    guide: Guide | None,
-) -> Session:
-    """Return the session of a part of the problem, with the settings of the whole."""
-    free = part.given_start is None
-    return Session(part, optimizer, callback, limit, counts, start, free=free, guide=guide)
-
-
-def _settle(best: Session, rival: Session | None, progress: Progress) -> float | None:
-    """Go on to finer grids, also with what the best one is compared with; return its cost."""
-    try:
-        progress("finer grid", 1, 1)
-        best.refine_until_settled()
-        if rival is not None and rival is not best and not best.cut_short:
-            rival.refine_until_settled()
-            return None if rival.violations else rival.score[1]
-    except KeyboardInterrupt:
-        best.end(Status.INTERRUPTED)
-    return None
+    def _gap(self, rival_cost: float | None, finished: Finished) -> Gap | None:
+        """Compare a plan with what the global search knows; None where it knows nothing."""
+        candidates, motion = self._candidates, finished.motion
+        if not candidates.sequences:
+            return None
+        shortest = candidates.sequences[0].sequence
+        rival = candidates.rival
+        if rival is not None and rival is candidates.best and not rival.violations:
+            rival_cost = motion.cost
+        return Gap(
+            cost=motion.cost,
+            best_cost=rival_cost,
+            length=float(np.abs(np.diff(motion.trajectory(shortest.t), axis=0)).sum()),
+            best_length=shortest.length,
+            spacing=SPACING,
+            sequences=len(candidates.sequences),
+        )
 
 
-def _finish(
-    problem: Problem,
-    part: Part,
-    checked: Checked,
-    gap: Gap | None,
-    notes: list[str],
-    began: float,
-) -> Plan:
-    """Gather everything."""
-    session = part.session
-    terms, violations, counts = checked.terms, session.violations, session.counts
+def _message(part: Part, finished: Finished, notes: list[str]) -> str:
+    """Return in words how the optimisation ended, and what came of it."""
+    session, violations = part.session, part.session.violations
+    certificate = finished.certificate
     parts = [session.status.message] if session.cut_short or not violations else []
     if violations:
         parts.append(f"not all constraints could be met: {'; '.join(violations)}")
-    failures = checked.certificate.failures
-    if failures and not (violations or part.ending):
-        parts.append(f"but {checked.certificate.verdict}")
+    if certificate.failures and not (violations or part.ending):
+        parts.append(f"but {certificate.verdict}")
     message = "; ".join(text for text in (part.ending, *parts, *notes) if text)
-    if checked.certificate.damped:
-        stretches = " and ".join(map(str, checked.certificate.damped))
+    if certificate.damped:
+        stretches = " and ".join(map(str, certificate.damped))
         message += f"; the inverse was damped {stretches}"
-    report = Report(
-        cost=sum(terms.values()),
-        initial_cost=sum(checked.initial_terms.values()),
-        terms=terms,
-        initial_terms=checked.initial_terms,
-        evaluations=counts.evaluations,
-        gradient_evaluations=counts.gradients,
-        jacobian_evaluations=counts.jacobians,
-        steps=len(checked.trajectory.t) - 1,
-        iterations=sum(iteration.step > 0.0 for iteration in session.history),
-        history=tuple(session.history),
-        status=session.status,
-        message=message,
-        seconds=time.perf_counter() - began,
-        gap=gap,
-    )
-    return Plan(
-        robot=problem.robot,
-        path=problem.path,
-        task=problem.rows,
-        trajectory=checked.trajectory,
-        initial_trajectory=checked.initial_trajectory,
-        coefficients=read_only(session.coefficients),
-        report=report,
-        certificate=checked.certificate,
-        requirements=replace(problem.requirements, collision=None, ending=part.ending),
-        clearance=problem.clearance,
-        tolerance=checked.tolerance,
-    )
-
-
-def _gap(selection: Selection, rival_cost: float | None, checked: Checked) -> Gap | None:
-    """Compare a plan with what the global search knows; None where it knows nothing."""
-    if not selection.sequences:
-        return None
-    cost, shortest = sum(checked.terms.values()), selection.sequences[0].sequence
-    rival = selection.rival
-    if rival is not None and rival is selection.best and not rival.violations:
-        rival_cost = cost
-    return Gap(
-        cost=cost,
-        best_cost=rival_cost,
-        length=float(np.abs(np.diff(checked.trajectory(shortest.t), axis=0)).sum()),
-        best_length=shortest.length,
-        spacing=SPACING,
-        sequences=len(selection.sequences),
-    )
+    return message

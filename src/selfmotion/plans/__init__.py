@@ -1,8 +1,9 @@
 """What to plan, and what came of it."""
 
 from selfmotion.plans.paper_problem import sample_problem
-from selfmotion.plans.plan import Gap, Plan, Report, load_plan
+from selfmotion.plans.plan import Plan, Views, load_plan
 from selfmotion.plans.problem import Problem
+from selfmotion.plans.report import Gap, Report
 from selfmotion.plans.retiming import retime, slowdown
 
 __all__ = [
@@ -10,6 +11,7 @@ __all__ = [
     "Plan",
     "Problem",
     "Report",
+    "Views",
     "load_plan",
     "retime",
     "sample_problem",

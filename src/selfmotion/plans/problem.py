@@ -1,35 +1,30 @@
 """What to plan: an arm, a tool motion, the rows that count, and what to minimise."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, reduce
+from operator import and_
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, RedundancyError, StartError, read_only
-from selfmotion.certificate import Requirements
+from selfmotion.certificate import Certificate, Requirement, Tolerance, arm_limits, certify
 from selfmotion.constraints import (
     BoundConstraint,
-    Clearance,
-    ClosedPath,
     Constraint,
-    EndConfiguration,
-    EndVelocity,
-    JointAccelerationLimits,
+    Envelope,
     JointPositionLimits,
     JointVelocityLimits,
 )
-from selfmotion.costs import Cost, JointVelocity
-from selfmotion.motion import NullMotion, PolynomialNullMotion
+from selfmotion.costs import Cost, JointVelocity, PathError
+from selfmotion.motion import NullMotion, PolynomialNullMotion, Trajectory
 from selfmotion.path import Path
 from selfmotion.plans.relaxed_rows import check_relaxations
 from selfmotion.robot import RobotModel
-from selfmotion.task import PATH_ERROR, Damping, DampingLaw, Relaxation, Task
+from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 
-# An end configuration may be this far off [m, rad]: what the certificate grants it.
-_NEAR_END = 1e-6
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
 
@@ -53,7 +48,8 @@ class Problem:
     costs : sequence of Cost
         Their integrals are added up. By default ∫ ½ q̇ᵀq̇ dt.
     constraints : sequence of Constraint
-        What the motion must keep. By default the URDF's limits of joint position and velocity.
+        What the motion must keep, each judged by the certificate. By default the URDF's limits of
+        joint position and velocity.
     relaxations : sequence of Relaxation
         Rows in which the tool may leave the path, by how much and when; the deviation is optimised
         along with the self-motion. By default none. A given start is on the path itself, and so
@@ -70,8 +66,8 @@ class Problem:
     StartError
         `start` is off the path.
     ProblemError
-        The arm cannot move in all the rows, two costs share a name, a cost does not fit the arm, a
-        relaxation does not fit the path or the task.
+        The arm cannot move in all the rows, two costs share a name, a cost, constraint or
+        relaxation does not fit the arm, the path or the task.
     """
 
     robot: RobotModel
@@ -87,34 +83,23 @@ class Problem:
     damping: Damping | None = None
 
     def __post_init__(self) -> None:
-        for name, kind in (("robot", RobotModel), ("path", Path)):
+        for name, kind in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 raise ProblemError(
-                    f"{name} is {getattr(self, name)!r}, expected a {kind.__name__} "
-                    f"(load_robot, Line, Circle, Waypoints, …)"
+                    f"{name} is {getattr(self, name)!r}, expected a {_EXAMPLES[name]}"
                 )
         object.__setattr__(self, "task", Task.of(self.task))
-        listed = (("costs", "value"), ("constraints", "bind"), ("relaxations", "window"))
-        for name, method in listed:
-            object.__setattr__(self, name, _sequence(getattr(self, name), name, method))
+        for name, each in _SEQUENCES.items():
+            object.__setattr__(self, name, _sequence(getattr(self, name), name, each))
         check_relaxations(self.relaxations, self.path, self.rows)
-        if not hasattr(self.null_motion, "functions"):
-            raise ProblemError(
-                f"null_motion is {self.null_motion!r}, expected PolynomialNullMotion or "
-                f"BSplineNullMotion"
-            )
-        if not isinstance(self.damping, Damping | None):
-            raise ProblemError(f"damping is {self.damping!r}, expected a Damping or None")
         if isinstance(self.start, str):
             if self.start != "free":
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
             object.__setattr__(self, "start", None)
         self._check_rank()
         self._check_costs()
-        self._check_constraints()
-        self._check_closed()
-        self._check_rest()
-        self._check_end()
+        for item in self.constraints:
+            item.check(self.robot, self.path, self.rows)
         if self.start is not None:
             start = read_only(self.robot.configuration(self.start))
             object.__setattr__(self, "start", start)
@@ -130,18 +115,21 @@ class Problem:
         """The start configuration (n,), or None where it is free."""
         return None if self.start is None else np.asarray(self.start, dtype=np.float64)
 
+    @cached_property
+    def all_costs(self) -> tuple[Cost, ...]:
+        """The costs, with that of being off the path where the problem is damped."""
+        if self.damping is None or self.damping_law is None:
+            return tuple(self.costs)
+        rate = feedback_rate(self.path.duration)
+        weight = self.damping.path_weight * (rate / self.damping_law.threshold) ** 2
+        return (*self.costs, PathError(float(weight), self.rows.dimension))
+
     def bind_constraints(self, start: Array, end: Array) -> tuple[BoundConstraint, ...]:
         """Return the constraints for this arm, given first and last configuration, (n,) each.
 
         Those of the motion that the optimisation begins with.
         """
         return tuple(item.bind(self.robot, self.rows, start, end) for item in self.constraints)
-
-    @cached_property
-    def clearance(self) -> Clearance | None:
-        """The clearance asked for."""
-        found = [item for item in self.constraints if isinstance(item, Clearance)]
-        return found[0] if found else None
 
     @cached_property
     def damping_law(self) -> DampingLaw | None:
@@ -152,12 +140,44 @@ class Problem:
         return self.damping.law(float(np.linalg.svd(best, compute_uv=False)[-1]))
 
     @cached_property
-    def requirements(self) -> Requirements:
-        """What the certificate has to check besides the path."""
-        wanted = Requirements(relaxations=tuple(self.relaxations), damping=self.damping_law)
-        for item in self.constraints:
-            wanted = _require(wanted, item, self.robot)
+    def requirements(self) -> tuple[Requirement, ...]:
+        """What the certificate has to judge besides the path: one of each constraint."""
+        wanted = tuple(item.requirement(self.robot) for item in self.constraints)
+        for item, found in zip(self.constraints, wanted, strict=True):
+            if not isinstance(found, Requirement):
+                raise ProblemError(
+                    f"constraint {type(item).__name__}: requirement() returned {found!r}, expected "
+                    f"a Requirement; without one nothing judges whether a motion keeps it"
+                )
         return wanted
+
+    @cached_property
+    def asked_envelope(self) -> Envelope:
+        """What the constraints ask of single configurations and velocities."""
+        free = Envelope.unbounded(self.robot.dof)
+        return reduce(and_, (item.envelope(self.robot) for item in self.constraints), free)
+
+    @cached_property
+    def envelope(self) -> Envelope:
+        """The same, with the arm's own limits where the certificate judges these."""
+        own = (Envelope.of_limits(item) for item in arm_limits(self.robot, self.requirements))
+        return reduce(and_, own, self.asked_envelope)
+
+    def certify(
+        self, trajectory: Trajectory, tolerance: Tolerance | None = None, ending: str = ""
+    ) -> Certificate:
+        """Return the certificate of a motion, by all that the problem asks for; see `certify`."""
+        return certify(
+            self.robot,
+            self.path,
+            self.rows,
+            trajectory,
+            tolerance,
+            self.requirements,
+            relaxations=self.relaxations,
+            damping=self.damping_law,
+            ending=ending,
+        )
 
     @cached_property
     def knots(self) -> Array:
@@ -173,10 +193,12 @@ class Problem:
     @property
     def pinned(self) -> tuple[bool, bool]:
         """Whether the tool has to be on the path itself at its start and at its end."""
-        closed = any(isinstance(item, ClosedPath) for item in self.constraints)
-        ends = (EndConfiguration, EndVelocity)
-        ended = any(isinstance(item, ends) for item in self.constraints)
-        return self.start is not None or closed, closed or ended
+        starts, ends = zip((self.start is not None, False), *self._pins, strict=True)
+        return any(starts), any(ends)
+
+    @property
+    def _pins(self) -> list[tuple[bool, bool]]:
+        return [item.pins for item in self.constraints]
 
     def _check_rank(self) -> None:
         robot, task = self.robot, self.rows
@@ -198,65 +220,14 @@ class Problem:
             )
 
     def _check_costs(self) -> None:
-        names = [cost.name for cost in self.costs]
-        if self.damping is not None:
-            names.append(PATH_ERROR)
         if not self.costs:
             raise ProblemError("no cost is given, so that nothing tells one motion from another")
+        names = [cost.name for cost in self.all_costs]
         twice = [name for name in names if names.count(name) > 1]
         if twice:
             raise ProblemError(f"two costs are called '{twice[0]}'; give one another name=")
         for cost in self.costs:
-            cost.check(self.robot.dof)
-
-    def _check_constraints(self) -> None:
-        kinds = [type(item).__name__ for item in self.constraints]
-        twice = [kind for kind in kinds if kinds.count(kind) > 1]
-        if twice:
-            raise ProblemError(
-                f"there are two constraints {twice[0]}; make one of them, with the tighter limits "
-                f"or with all obstacles"
-            )
-
-    def _check_end(self) -> None:
-        for item in self.constraints:
-            if not isinstance(item, EndConfiguration):
-                continue
-            end = self.path.pose(self.path.duration)
-            actual = self.robot.pose(self.robot.configuration(item.q))
-            position, rotation = self.rows.miss(end, actual)
-            if max(position, rotation) > _NEAR_END:
-                raise ProblemError(
-                    f"{self.robot.name}: the end configuration puts '{self.robot.tool}' "
-                    f"{position:.3g} m and {rotation:.3g} rad off the end of the path; take "
-                    f"robot.inverse_kinematics(path.pose(path.duration), task, seed=q)"
-                )
-
-    def _check_closed(self) -> None:
-        if not any(isinstance(item, ClosedPath) for item in self.constraints):
-            return
-        first, last = self.path.pose(0.0), self.path.pose(self.path.duration)
-        position, rotation = self.rows.miss(first, last)
-        if max(position, rotation) > _ON_PATH:
-            raise ProblemError(
-                f"a closed joint path needs a closed tool path, but the tool ends {position:.3g} m "
-                f"and {rotation:.3g} rad from where it began"
-            )
-
-    def _check_rest(self) -> None:
-        if not any(isinstance(x, EndVelocity) and not np.any(x.qd) for x in self.constraints):
-            return
-        duration = self.path.duration
-        rotation = self.path.pose(duration).rotation
-        twist = self.rows.select(self.path.twist(duration)[:, None], rotation)
-        speed = float(np.abs(twist).max())
-        # Waypoints and velocity functions end at rest up to their own rounding.
-        if speed > _ON_PATH:
-            raise ProblemError(
-                f"the motion cannot end at rest: the path ends at {speed:.3g} m/s or rad/s; give "
-                f"the path a time law that ends at rest (time_law='minimum_jerk'), or ask for "
-                f"another end velocity"
-            )
+            cost.check(self.robot, self.rows)
 
     def _check_start(self, start: Array) -> None:
         pose = self.path.pose(0.0)
@@ -271,30 +242,31 @@ class Problem:
             )
 
 
-def _sequence(items: Any, name: str, method: str) -> tuple[Any, ...]:
+_KINDS: dict[str, Any] = {
+    "robot": RobotModel,
+    "path": Path,
+    "null_motion": NullMotion,
+    "damping": Damping | None,
+}
+_EXAMPLES = {
+    "robot": "RobotModel (load_robot)",
+    "path": "Path (Line, Circle, Waypoints, TwistPath, …, or a class derived from Path)",
+    "null_motion": "NullMotion (PolynomialNullMotion, BSplineNullMotion, or a class derived "
+    "from NullMotion)",
+    "damping": "Damping or None",
+}
+_SEQUENCES = {"costs": Cost, "constraints": Constraint, "relaxations": Relaxation}
+
+
+def _sequence(items: Any, name: str, kind: type) -> tuple[Any, ...]:
     """Return one item or several as a tuple; ProblemError for anything else."""
-    listed = (items,) if hasattr(items, method) else items
-    if not isinstance(listed, list | tuple) or not all(hasattr(item, method) for item in listed):
+    listed = (items,) if isinstance(items, kind) else items
+    if not isinstance(listed, list | tuple):
         raise ProblemError(f"{name} are {items!r}, expected a list of {name}")
+    for item in listed:
+        if not isinstance(item, kind):
+            raise ProblemError(
+                f"{name}: {item!r} is no {kind.__name__}; derive a class of your own from "
+                f"selfmotion.{kind.__name__}, which says what it has to give"
+            )
     return tuple(listed)
-
-
-def _require(wanted: Requirements, item: Constraint, robot: RobotModel) -> Requirements:
-    """Return the requirements with those of one constraint."""
-    if isinstance(item, JointPositionLimits):
-        lower = robot.lower if item.lower is None else read_only(item.lower)
-        upper = robot.upper if item.upper is None else read_only(item.upper)
-        return replace(wanted, lower=lower, upper=upper)
-    if isinstance(item, JointVelocityLimits) and item.limit is not None:
-        return replace(wanted, velocity=item.of(robot))
-    if isinstance(item, JointAccelerationLimits):
-        return replace(wanted, acceleration=item.of(robot))
-    if isinstance(item, EndConfiguration):
-        return replace(wanted, end=read_only(item.q))
-    if isinstance(item, EndVelocity):
-        return replace(wanted, end_velocity=item.target(robot))
-    if isinstance(item, ClosedPath):
-        return replace(wanted, closed=True, closed_velocity=item.velocity)
-    if isinstance(item, Clearance):
-        return replace(wanted, collision=item.model(robot), clearance=item.distance)
-    return wanted

@@ -1,14 +1,24 @@
 """The same joint path in the time that velocity and acceleration limits allow."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
+from operator import and_
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, PlanError, ProblemError, per_joint
+from selfmotion.constraints import (
+    Constraint,
+    Envelope,
+    JointAccelerationLimits,
+    JointVelocityLimits,
+)
 from selfmotion.motion import Trajectory
 from selfmotion.path import Retimed
 from selfmotion.plans.plan import Plan
+from selfmotion.robot import RobotModel
 from selfmotion.task import Relaxation
 
 # Share of the limits that is used, so that the certificate between grid points holds as well.
@@ -33,7 +43,7 @@ def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
     if acceleration is not None:
         what = f"{plan.robot.name}: acceleration limits"
         limit = per_joint(acceleration, plan.robot.dof, what, positive=True)
-        share = np.abs(plan.trajectory.accelerations()[1]) / limit
+        share = np.abs(plan.trajectory.extremes(2)[1]) / limit
         factor = max(factor, float(np.sqrt(share.max())))
     return factor
 
@@ -69,36 +79,42 @@ def retime(
     PlanError
         No pace keeps the limits.
     """
-    robot = plan.robot
-    if velocity is None:
-        velocity = plan.requirements.limits(robot)[2]
-    limits = [
-        per_joint(limit, robot.dof, f"{robot.name}: {name} limits for retiming", positive=True)
-        for name, limit in (("velocity", velocity), ("acceleration", acceleration))
+    robot, asked = plan.robot, plan.problem.envelope
+    velocity = asked.speed if velocity is None else velocity
+    wanted = [
+        JointVelocityLimits(_positive(robot, velocity, "velocity")),
+        JointAccelerationLimits(_positive(robot, acceleration, "acceleration")),
     ]
+    # The problem's own limits stay: the tighter of both is kept.
+    kept = reduce(and_, (item.envelope(robot) for item in wanted), asked)
     for density in _DENSITIES:
-        result = _retimed(plan, limits, density)
+        result = _retimed(plan, wanted, kept, density)
         errors = result.certificate.position_error.value, result.certificate.rotation_error.value
         if errors[0] <= plan.tolerance.position and errors[1] <= plan.tolerance.rotation:
             break
     return result
 
 
-def _retimed(plan: Plan, limits: list[Array], density: int) -> Plan:
-    t, sigma, rate = _pace(plan.trajectory, limits[0], limits[1], density)
-    path = Retimed(plan.path, t, sigma, rate)
+def _positive(robot: RobotModel, limit: npt.ArrayLike, name: str) -> Array:
+    what = f"{robot.name}: {name} limits for retiming"
+    return per_joint(limit, robot.dof, what, positive=True)
+
+
+def _retimed(plan: Plan, wanted: Sequence[Constraint], kept: Envelope, density: int) -> Plan:
+    t, sigma, rate = _pace(plan.trajectory, kept.speed, kept.acceleration, density)
     q, qd = plan.trajectory(sigma), plan.trajectory(sigma, order=1) * rate[:, None]
     trajectory = Trajectory(t, q, qd, plan.trajectory.joint_names)
-    wanted = replace(
-        plan.requirements,
-        velocity=limits[0],
-        acceleration=limits[1],
-        relaxations=tuple(_moved(item, t, sigma) for item in plan.requirements.relaxations),
+    old = plan.problem
+    # What asks for something of the end asks for it of the whole motion.
+    asked = (item.on_part() if plan.report.ending else item for item in old.constraints)
+    problem = replace(
+        old,
+        path=Retimed(plan.path, t, sigma, rate),
+        constraints=(*(item for item in asked if item is not None), *wanted),
+        relaxations=[_moved(item, t, sigma) for item in old.relaxations],
     )
-    checked = replace(
-        plan, path=path, trajectory=trajectory, initial_trajectory=trajectory, requirements=wanted
-    )
-    return replace(checked, certificate=checked.check())
+    retimed = replace(plan, problem=problem, trajectory=trajectory, initial_trajectory=trajectory)
+    return replace(retimed, certificate=retimed.check())
 
 
 def _moved(item: Relaxation, t: Array, sigma: Array) -> Relaxation:

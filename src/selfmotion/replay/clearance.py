@@ -1,5 +1,6 @@
 """The closest pair of bodies over time, for a page."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,13 +32,19 @@ class ClearanceCurve:
     pairs: tuple[tuple[str, str], ...]
 
 
-def clearance_curve(trajectory: Trajectory, collision: CollisionModel) -> ClearanceCurve | None:
+def clearance_curve(
+    trajectory: Trajectory, models: Sequence[CollisionModel]
+) -> ClearanceCurve | None:
     """Return the clearance along a motion, or None where there is no pair of bodies to check."""
-    if not collision.pairs:
+    watched = [model for model in models if model.pairs]
+    if not watched:
         return None
     times = np.linspace(0.0, trajectory.duration, _POINTS)
     clock = np.minimum(trajectory.t[0] + times, trajectory.t[-1])
-    found = [collision.distance(q) for q in trajectory(clock)]
+    found = [
+        min((model.distance(q) for model in watched), key=lambda closest: closest.value)
+        for q in trajectory(clock)
+    ]
     return ClearanceCurve(
         times,
         np.array([each.value for each in found]),

@@ -4,7 +4,6 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array
-from selfmotion.collision import Obstacle
 from selfmotion.plans import Plan
 from selfmotion.replay import links, scene, shapes
 from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
@@ -40,11 +39,9 @@ class _Motion:
         # The whole path, also where the motion ends before it.
         times = np.linspace(0.0, plan.path.duration, len(self.shown.t))
         self.target: Array = plan.path.samples(times).translation
-        self.clearance: ClearanceCurve | None = None
-        self.obstacles: tuple[Obstacle, ...] = ()
-        if plan.clearance is not None:
-            self.obstacles = plan.clearance.obstacles
-            self.clearance = clearance_curve(plan.trajectory, plan.clearance.model(robot))
+        self.obstacles = plan.obstacles
+        models = [model for model, _ in plan.problem.envelope.bodies]
+        self.clearance = clearance_curve(plan.trajectory, models)
 
 
 def page_content(
@@ -64,7 +61,7 @@ def page_content(
         [frames for motion in motions for frames in (motion.frames, motion.ghost)],
         [points for motion in motions for points in (motion.shown.tool, motion.target)],
     )
-    box = scene.Bounds(hull.min(axis=0), hull.max(axis=0))
+    box = scene.Extent(hull.min(axis=0), hull.max(axis=0))
     scale = _scale(motions)
     longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
     return {

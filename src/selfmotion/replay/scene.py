@@ -23,7 +23,7 @@ _INSIDE = 1
 
 
 @dataclass(frozen=True, eq=False)
-class Bounds:
+class Extent:
     """An axis-aligned box in world axes [m].
 
     Attributes
@@ -80,7 +80,7 @@ def camera(hull: Array, tool: Array) -> Json:
     }
 
 
-def stage_commands(box: Bounds) -> list[Json]:
+def stage_commands(box: Extent) -> list[Json]:
     """Return the commands for light, shadow and a ground grid, in place of meshcat's own."""
     center, reach = box.center, max(box.radius, 0.1)
     far = float(np.linalg.norm(center)) + 4.0 * reach

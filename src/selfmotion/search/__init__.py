@@ -1,7 +1,7 @@
 """Where to begin: start configurations, self-motion curves, chains over them, reach."""
 
 from selfmotion.search.curves import Curve, CurveSet, SelfMotion, targets
-from selfmotion.search.guides import Guide, guides
+from selfmotion.search.guides import SequenceGuide, guides
 from selfmotion.search.reach import Reach, reachable
 from selfmotion.search.sequences import SPACING, Sequence, best_sequences
 from selfmotion.search.starts import spread, start_candidates
@@ -10,10 +10,10 @@ __all__ = [
     "SPACING",
     "Curve",
     "CurveSet",
-    "Guide",
     "Reach",
     "SelfMotion",
     "Sequence",
+    "SequenceGuide",
     "best_sequences",
     "guides",
     "reachable",

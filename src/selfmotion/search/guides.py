@@ -20,7 +20,7 @@ _MARGIN = 5e-4
 _SMOOTHING = 5
 
 
-class Guide:
+class SequenceGuide:
     """A sequence as a smooth motion: what `Session` takes as x = 0.
 
     Attributes
@@ -47,7 +47,7 @@ class Guide:
 
 def guides(
     problem: Problem, rng: np.random.Generator | int | None, progress: Progress
-) -> list[Guide]:
+) -> list[SequenceGuide]:
     """Return guides from the best sequences over the self-motions of redundancy 1, shortest first.
 
     Raises
@@ -55,25 +55,23 @@ def guides(
     NoSequenceError
         No chain of configurations follows the path; says where it ends and why.
     """
-    robot, path, wanted = problem.robot, problem.path, problem.requirements
+    robot, path, asked = problem.robot, problem.path, problem.envelope
     t = search_times(path)
-    lower, upper, velocity = wanted.limits(robot)
-    step = np.minimum(velocity * np.diff(t)[:, None], np.pi)
+    step = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
     sequences = best_sequences(
         robot,
         path,
         problem.rows,
         t,
-        lower=lower,
-        upper=upper,
+        lower=asked.lower,
+        upper=asked.upper,
         largest_step=step,
-        collision=wanted.collision,
-        margin=wanted.clearance + _MARGIN,
+        bodies=[(model, distance + _MARGIN) for model, distance in asked.bodies],
         count=_COUNT,
         rng=0 if rng is None else rng,
         progress=progress,
     )
-    return [Guide(sequence) for sequence in sequences]
+    return [SequenceGuide(sequence) for sequence in sequences]
 
 
 def search_times(path: Path) -> Array:

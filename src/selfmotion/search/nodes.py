@@ -21,7 +21,7 @@ _SURELY_OUTSIDE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Bounds:
+class Admissible:
     """What a node must keep.
 
     Attributes
@@ -30,16 +30,14 @@ class Bounds:
         Joint limits [rad or m], ±inf where there is none.
     revolute : (n,)
         Whether a turn leads to the same pose.
-    collision : CollisionModel or None
-    margin : float
-        Smallest clearance [m].
+    bodies : tuple of (CollisionModel, float)
+        Bodies to keep apart, and the distance [m].
     """
 
     lower: Array
     upper: Array
     revolute: npt.NDArray[np.bool_]
-    collision: CollisionModel | None
-    margin: float
+    bodies: tuple[tuple[CollisionModel, float], ...]
 
     @property
     def turning(self) -> npt.NDArray[np.bool_]:
@@ -47,7 +45,7 @@ class Bounds:
         free = np.isinf(self.lower) & np.isinf(self.upper)
         return np.asarray(self.revolute & free)
 
-    def without_turns(self) -> "Bounds":
+    def without_turns(self) -> "Admissible":
         """Return bounds in which joints with room for a whole turn turn without end.
 
         The search is much smaller then: six joints of two turns each make 64 nodes of one.
@@ -97,16 +95,18 @@ class Bounds:
         """Whether each of q (K, n) is inside the limits at some turn, and clear of collisions."""
         first = self.representative(q)
         free = np.asarray(np.all((first <= self.upper) & (first >= self.lower), axis=-1))
-        if self.collision is not None:
-            for i in np.flatnonzero(free):
-                free[i] = not self.collision.collides(first[i], self.margin)
+        for i in np.flatnonzero(free) if self.bodies else ():
+            free[i] = self._clear(first[i])
         return free
 
     def keeps(self, q: Array) -> bool:
         """Whether q (n,) itself, at its own turn, is inside the limits and clear of collisions."""
         if np.any(q > self.upper) or np.any(q < self.lower):
             return False
-        return self.collision is None or not self.collision.collides(q, self.margin)
+        return self._clear(q)
+
+    def _clear(self, q: Array) -> bool:
+        return not any(model.collides(q, distance) for model, distance in self.bodies)
 
     def all_turns(self, q: Array) -> Array:
         """Return q (K, n), inside the limits, at every turn that is inside them, (K', n)."""
@@ -126,7 +126,7 @@ def place_nodes(
     target: Array,
     curves: CurveSet,
     carried: Sequence[Array],
-    bounds: Bounds,
+    bounds: Admissible,
     spacing: float,
 ) -> Array:
     """Return the free samples of the curves of one waypoint, (K, n), without turns.
@@ -142,7 +142,7 @@ def place_nodes(
     curves : CurveSet
     carried : sequence of (n,)
         Configurations on the curves.
-    bounds : Bounds
+    bounds : Admissible
     spacing : float
         Largest gap in the configuration norm.
     """
@@ -165,7 +165,7 @@ class _CurveSampler:
     motion: SelfMotion
     target: Array
     curve: Curve
-    bounds: Bounds
+    bounds: Admissible
     spacing: float
 
     def nodes(self, carried: Sequence[tuple[float, Array]]) -> list[Array]:

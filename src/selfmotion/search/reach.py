@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from selfmotion.basics import Array, InverseKinematicsError, read_only
-from selfmotion.constraints import JointPositionLimits
+from selfmotion.basics import Array, InverseKinematicsError
 from selfmotion.plans import Problem
 from selfmotion.robot import RobotModel
 from selfmotion.search.starts import start_candidates
@@ -85,13 +84,9 @@ def _edge(
 
 
 def _within_limits(problem: Problem) -> RobotModel:
-    """Return the arm with the position limits that the motion has to keep."""
-    wanted, robot = problem.requirements, problem.robot
-    if not any(isinstance(item, JointPositionLimits) for item in problem.constraints):
-        free = read_only(np.full(robot.dof, np.inf))
-        return replace(robot, lower=read_only(-free), upper=free)
-    lower, upper, _ = wanted.limits(robot)
-    return replace(robot, lower=lower, upper=upper)
+    """Return the arm with the position limits that the motion was asked to keep."""
+    asked = problem.asked_envelope
+    return replace(problem.robot, lower=asked.lower, upper=asked.upper)
 
 
 def _solutions(

@@ -3,9 +3,10 @@
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.collision import Closest, CollisionModel
 from selfmotion.search.chains import unturned
 from selfmotion.search.curves import CurveSet, SelfMotion
-from selfmotion.search.nodes import Bounds
+from selfmotion.search.nodes import Admissible
 
 
 def why_blocked(
@@ -14,7 +15,7 @@ def why_blocked(
     curves: CurveSet,
     alive: Array,
     nodes: Array,
-    bounds: Bounds,
+    bounds: Admissible,
     largest_step: Array,
 ) -> str:
     """Return why no chain reaches a waypoint.
@@ -30,7 +31,7 @@ def why_blocked(
         Nodes of the waypoint before that chains reach; empty at the first waypoint.
     nodes : (N, n)
         Nodes at the waypoint.
-    bounds : Bounds
+    bounds : Admissible
     largest_step : (n,)
     """
     if not curves.curves:
@@ -51,7 +52,7 @@ def why_blocked(
     )
 
 
-def _refusals(samples: Array, bounds: Bounds, motion: SelfMotion) -> str:
+def _refusals(samples: Array, bounds: Admissible, motion: SelfMotion) -> str:
     """Say what excludes configurations: the joint or the pair nearest to allowing one."""
     excess = bounds.excess(samples)
     outside = excess.max(axis=1) > 0.0
@@ -64,19 +65,27 @@ def _refusals(samples: Array, bounds: Bounds, motion: SelfMotion) -> str:
             f"by {least.max():.3g} in joint '{joint}'"
         )
     inside = samples[~outside]
-    if len(inside) and bounds.collision is not None:
-        clearances = [bounds.collision.distance(q) for q in bounds.representative(inside)]
-        best = max(clearances, key=lambda clearance: clearance.value)
+    if len(inside) and bounds.bodies:
+        configurations = bounds.representative(inside)
+        distance, best = min(
+            ((asked, _roomiest(model, configurations)) for model, asked in bounds.bodies),
+            key=lambda found: found[1].value - found[0],
+        )
         parts.append(
             f"{len(inside)} of {len(samples)} are in collision or nearer than "
-            f"{1e3 * bounds.margin:.3g} mm, at best '{best.first}' and '{best.second}' with "
+            f"{1e3 * distance:.3g} mm, at best '{best.first}' and '{best.second}' with "
             f"{1e3 * best.value:.3g} mm"
         )
     return "; ".join(parts)
 
 
+def _roomiest(model: CollisionModel, configurations: Array) -> Closest:
+    """Return the closest pair of the configuration (of K, n) where that pair is farthest apart."""
+    return max((model.distance(q) for q in configurations), key=lambda closest: closest.value)
+
+
 def _step(
-    alive: Array, nodes: Array, bounds: Bounds, largest_step: Array, motion: SelfMotion
+    alive: Array, nodes: Array, bounds: Admissible, largest_step: Array, motion: SelfMotion
 ) -> str:
     """Name the joint whose step limit keeps the nearest node away."""
     steps = np.abs(unturned(nodes[None] - alive[:, None], bounds.turning))

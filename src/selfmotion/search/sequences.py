@@ -1,5 +1,6 @@
 """The global search: curves at all waypoints, nodes on them, the shortest chains of nodes."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.search.chains import Mask, diverse_chains, shortest_chains, unlike, unturned
 from selfmotion.search.curves import CurveSet, SelfMotion, curves_along, targets
-from selfmotion.search.nodes import Bounds, place_nodes
+from selfmotion.search.nodes import Admissible, place_nodes
 from selfmotion.search.reasons import why_blocked
 from selfmotion.search.starts import spread
 from selfmotion.search.tighten import FINELY, ROUGHLY, tighten
@@ -55,8 +56,7 @@ def best_sequences(
     lower: npt.ArrayLike,
     upper: npt.ArrayLike,
     largest_step: npt.ArrayLike,
-    collision: CollisionModel | None = None,
-    margin: float = 0.0,
+    bodies: Iterable[tuple[CollisionModel, float]] = (),
     count: int = 3,
     rng: np.random.Generator | int = 0,
     progress: Progress = silent,
@@ -84,10 +84,8 @@ def best_sequences(
         Joint limits [rad or m]; ±inf for joints without. An angle is what it is: turns count.
     largest_step : (n,), (W - 1, n) or float
         Largest change of each joint from one waypoint to the next [rad or m].
-    collision : CollisionModel, optional
-        Of `robot`.
-    margin : float
-        Smallest clearance [m] at the waypoints.
+    bodies : sequence of (CollisionModel, float)
+        Bodies to keep apart at the waypoints, and the distance [m].
     count : int
         How many sequences at most.
     rng : Generator or int
@@ -121,7 +119,7 @@ def best_sequences(
     _check(robot, task, limits, count)
     lower, upper, steps = limits
     motion = SelfMotion(robot, task, SPACING)
-    bounds = Bounds(lower, upper, motion.revolute, collision, margin)
+    bounds = Admissible(lower, upper, motion.revolute, tuple(bodies))
     x = targets(path, times)
     seeds = list(spread(robot, _SEEDS, np.random.default_rng(rng)))
     curves = curves_along(motion, x, seeds, _EVERY, progress)
@@ -146,7 +144,7 @@ def _rough_motions(
     x: Array,
     curves: list[CurveSet],
     samples: list[Array],
-    bounds: Bounds,
+    bounds: Admissible,
     steps: Array,
     times: Array,
     count: int,
@@ -194,7 +192,7 @@ def _ranked(times: Array, motions: list[Array], turning: Mask) -> list[Sequence]
 
 
 def _free_samples(
-    motion: SelfMotion, x: Array, curves: list[CurveSet], bounds: Bounds, progress: Progress
+    motion: SelfMotion, x: Array, curves: list[CurveSet], bounds: Admissible, progress: Progress
 ) -> list[Array]:
     """Return the free samples of the curves at every waypoint, without turns."""
     found: list[Array] = []

@@ -5,7 +5,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.search.chains import shortest_chains
 from selfmotion.search.curves import SelfMotion
-from selfmotion.search.nodes import Bounds
+from selfmotion.search.nodes import Admissible
 
 # Distances of neighbouring samples [rad or m], each a third of the last, from half of that of the
 # search on. A chain's excess length is about in proportion to the finest: 3 to 6 % at 0.01, 1 % at
@@ -21,7 +21,7 @@ def tighten(
     motion: SelfMotion,
     x: Array,
     q: Array,
-    bounds: Bounds,
+    bounds: Admissible,
     largest_step: Array,
     spacings: tuple[float, ...] = ROUGHLY + FINELY,
 ) -> Array:
@@ -38,7 +38,7 @@ def tighten(
         The tool at the waypoints.
     q : (W, n)
         On the path, within `bounds` and `largest_step`, angles without jumps.
-    bounds : Bounds
+    bounds : Admissible
     largest_step : (n,) or (W - 1, n)
     spacings : tuple of float
         Of the samples [rad or m], one after the other.
@@ -66,7 +66,7 @@ class _Strip:
     """Samples of one waypoint's curve about a configuration, made when asked for and kept."""
 
     def __init__(
-        self, motion: SelfMotion, target: Array, q: Array, bounds: Bounds, spacing: float
+        self, motion: SelfMotion, target: Array, q: Array, bounds: Admissible, spacing: float
     ) -> None:
         self._motion, self._target, self._bounds = motion, target, bounds
         self._spacing = spacing

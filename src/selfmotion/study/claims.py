@@ -8,7 +8,7 @@ from selfmotion.basics import Array
 from selfmotion.costs import JointVelocity, Manipulability
 from selfmotion.motion import PolynomialNullMotion
 from selfmotion.robot import RobotModel, load_robot
-from selfmotion.study.context import Context, evaluate, run_published
+from selfmotion.study.context import Context, finely, run_published
 from selfmotion.study.engine import bind, optimum
 from selfmotion.study.results import Claim, Curve, Plot, Section, Verdict
 from selfmotion.task import Task
@@ -77,8 +77,8 @@ def _norm(x: Array) -> float:
 def _least_squares(context: Context) -> Claim:
     problem = context.with_costs([JointVelocity()])
     _, found = optimum(problem)
-    before = evaluate(problem, np.zeros(12)).cost
-    after = evaluate(problem, found.x).cost
+    before = finely(problem, np.zeros(12)).cost
+    after = finely(problem, found.x).cost
     return Claim(
         "least_squares",
         "The x = 0 case minimises the integral of q̇ᵀq̇.",
@@ -97,7 +97,7 @@ def _different_starts(context: Context) -> Claim:
     ]
     near = [m for m in found if m.cost < context.best.cost * 1.002]
     x = np.array([m.x for m in near])
-    motions = np.array([evaluate(context.problem, m.x).q for m in near])
+    motions = np.array([finely(context.problem, m.x).q for m in near])
     spread_x = float(np.linalg.norm(x - x.mean(axis=0), axis=1).max())
     spread_q = float(np.abs(motions - motions.mean(axis=0)).max())
     holds = spread_x > 1.0 and spread_q < 0.2

@@ -11,6 +11,7 @@ from selfmotion.baselines import (
     LagrangianOptimum,
     Method,
     PseudoInverse,
+    plan_by,
 )
 from selfmotion.basics import BreakdownError
 from selfmotion.costs import InverseManipulability, JointVelocity
@@ -85,7 +86,7 @@ def _table(title: str, problem: Problem, *, cyclic: bool) -> Table:
     rows = [_row("ours, cubic", ours), _row("ours, degree 15", finer)]
     for label, method in methods.items():
         try:
-            rows.append(_row(label, plan(problem, method=method)))
+            rows.append(_row(label, plan_by(problem, method)))
         except BreakdownError as error:
             broken = ("—",) * (len(_COLUMNS) - 2)
             rows.append((label, *broken, f"singular at {error.time:.3f} s"))

@@ -82,7 +82,7 @@ class Result:
         return sum(self.terms.values())
 
 
-def evaluate(problem: Problem, x: Array) -> Result:
+def finely(problem: Problem, x: Array) -> Result:
     """Return the motion of coefficients `x`, on a grid fine enough to be the truth."""
     objective = bind(problem, FINE)
     terms = objective.terms(x)
@@ -131,7 +131,7 @@ class Context:
     @cached_property
     def still(self) -> Result:
         """The motion at x = 0."""
-        return evaluate(self.problem, np.zeros(12))
+        return finely(self.problem, np.zeros(12))
 
     @cached_property
     def twelve(self) -> Minimum:
@@ -141,7 +141,7 @@ class Context:
     @cached_property
     def best(self) -> Result:
         """The motion of `twelve`."""
-        return evaluate(self.problem, self.twelve.x)
+        return finely(self.problem, self.twelve.x)
 
     @cached_property
     def plan(self) -> Plan:
@@ -157,4 +157,4 @@ class Context:
     def expansion(self) -> Result:
         """The optimum of a 32-term expansion of the null motion."""
         problem = sample_problem(null_motion=PolynomialNullMotion(31))
-        return evaluate(problem, optimum(problem, steps=FINE)[1].x)
+        return finely(problem, optimum(problem, steps=FINE)[1].x)

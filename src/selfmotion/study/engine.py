@@ -6,9 +6,9 @@ import numpy as np
 
 from selfmotion.baselines import start_of
 from selfmotion.basics import Array
-from selfmotion.engine import FixedStart, Objective, Rollout, inverse_metric
-from selfmotion.motion import Grid, NullMotionTable, TransportedFrame
-from selfmotion.optimise import LineSearch, Minimum, QuasiNewton
+from selfmotion.engine import Objective, StillMotion
+from selfmotion.motion import Grid
+from selfmotion.optimise import LineSearch, Minimum, QuasiNewton, inverse_metric
 from selfmotion.plans import Problem
 
 
@@ -53,20 +53,8 @@ class Scale:
 
 def bind(problem: Problem, steps: int = 64) -> Objective:
     """Return the objective of a problem on a grid of about `steps` Runge-Kutta steps."""
-    path, robot = problem.path, problem.robot
-    grid = Grid.aligned(path.knots, steps)
-    rollout = Rollout(robot, path, problem.rows, grid)
-    t = grid.stage_times
-    functions = problem.null_motion.functions(t, path.duration)
-    start = start_of(problem)
-    frame, rows = None, robot.dof
-    if problem.null_motion.space == "null":
-        rollout.run(start, np.zeros((len(t), robot.dof)))
-        jacobians = rollout.samples().task_jacobian[grid.node_stages]
-        frame = TransportedFrame(grid.nodes, jacobians)(t)
-        rows = frame.shape[2]
-    table = NullMotionTable(functions, frame, rows)
-    return Objective(rollout, table, problem.costs, FixedStart(start))
+    grid = Grid.aligned(problem.path.knots, steps)
+    return Objective.of(problem, StillMotion.on(problem, start_of(problem), grid))
 
 
 def optimum(
@@ -82,12 +70,14 @@ def optimum(
 ) -> tuple[Objective, Minimum]:
     """Minimise with exact gradients from `x0`, with H0 from the Gauss-Newton matrix or = I."""
     objective = bind(problem, steps)
-    x = np.zeros(objective.size) if x0 is None else x0
-    h = inverse_metric(objective.metric(np.zeros_like(x))) if metric else None
+    x = np.zeros(objective.size)
+    # The matrix is that of the motion at x = 0, wherever the search begins.
+    h = inverse_metric(objective.metric(x)) if metric else None
     optimizer = QuasiNewton(
         tolerance=tolerance,
         max_iterations=max_iterations,
         line_search=LineSearch(sigma=sigma),
         unbounded=unbounded,
+        initial_metric="gauss-newton" if metric else "identity",
     )
-    return objective, optimizer.minimize(objective, x, h)
+    return objective, optimizer.minimize(objective, x if x0 is None else x0, h)

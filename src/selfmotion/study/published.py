@@ -1,15 +1,12 @@
 """The method exactly as published: section 2 of the paper, with its crude and costly steps."""
 
-from functools import cached_property
-
 import numpy as np
-import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from selfmotion.baselines import start_of
-from selfmotion.basics import Array, read_only
+from selfmotion.basics import Array
 from selfmotion.costs import Samples
-from selfmotion.motion import Grid, NullMotionTable, PolynomialNullMotion
+from selfmotion.motion import NullMotionTable, PolynomialNullMotion, Sampling
 from selfmotion.optimise import LineSearch, QuasiNewton
 from selfmotion.plans import Problem
 
@@ -18,26 +15,6 @@ ODE23_TOLERANCE = 1e-3
 
 # δ_G "was determined more or less empirically" and is not given; the report sweeps it.
 DIFFERENCE = 1e-4
-
-
-class SolverPoints(Grid):
-    """The points at which an adaptive solver stopped: each one sample, trapezoidal weights."""
-
-    @cached_property
-    def node_stages(self) -> npt.NDArray[np.intp]:
-        """See `Grid.node_stages`."""
-        return np.arange(len(self.nodes))
-
-    @cached_property
-    def stage_times(self) -> Array:
-        """See `Grid.stage_times`."""
-        return self.nodes
-
-    @cached_property
-    def weights(self) -> Array:
-        """Weights (S,) of the trapezoidal rule [s]: straight lines between the solver's points."""
-        steps = np.diff(self.nodes)
-        return np.asarray(0.5 * (np.append(steps, 0.0) + np.append(0.0, steps)))
 
 
 class PublishedFunction:
@@ -106,9 +83,9 @@ class PublishedFunction:
         if not solution.success or not np.all(np.isfinite(q)):
             return None
         qd = np.array([self._rate(t, row, x) for t, row in zip(solution.t, q, strict=True)])
-        return Samples.along(
-            problem.robot, problem.rows, SolverPoints(read_only(solution.t)), q, qd
-        )
+        # Straight lines between the solver's points.
+        points = Sampling.trapezoidal(solution.t)
+        return Samples.along(problem.robot, problem.rows, points, q, qd)
 
     def gradient(self, x: Array) -> Array:
         """Return ∇F(x) by forward differences, n(p + 1) + 1 evaluations (eq. 13)."""
@@ -121,6 +98,10 @@ class PublishedFunction:
         length = float(np.linalg.norm(direction))
         ahead = self.value(x + direction * self._delta / length)
         return (ahead - self.value(x)) / self._delta * length
+
+    def metric(self, x: Array) -> Array:
+        """Return the identity: the paper knows no metric."""
+        return np.eye(self.size)
 
     def _rate(self, t: float, q: Array, x: Array) -> Array:
         """Return q̇ of eq. 4."""
@@ -143,7 +124,10 @@ def published_null_motion(degree: int = 3) -> PolynomialNullMotion:
 def published_optimizer(sigma: float = 0.1, max_iterations: int = 60) -> QuasiNewton:
     """Return the paper's optimiser: Broyden family, Fletcher's switch and line search."""
     return QuasiNewton(
-        "fletcher", line_search=LineSearch(sigma=sigma), max_iterations=max_iterations
+        "fletcher",
+        line_search=LineSearch(sigma=sigma),
+        max_iterations=max_iterations,
+        initial_metric="identity",
     )
 
 

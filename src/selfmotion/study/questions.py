@@ -17,7 +17,7 @@ from selfmotion.path import Line
 from selfmotion.planning import plan
 from selfmotion.plans import Plan, Problem, sample_problem
 from selfmotion.robot import load_robot
-from selfmotion.study.context import FINE, Context, evaluate
+from selfmotion.study.context import FINE, Context, finely
 from selfmotion.study.engine import bind, optimum
 from selfmotion.study.published import ODE23_TOLERANCE, PublishedFunction
 from selfmotion.study.results import Claim, Curve, Plot, Section, Table, Verdict
@@ -61,7 +61,7 @@ def _specification(context: Context) -> _Answer:
     for label, motion in motions:
         problem = replace(context.problem, null_motion=motion)
         objective, found = optimum(problem, tolerance=1e-10)
-        cost = evaluate(problem, found.x).cost
+        cost = finely(problem, found.x).cost
         values = np.linalg.eigvalsh(objective.metric(np.zeros(objective.size)))
         condition = float(values[-1] / max(values[0], np.finfo(float).tiny))
         work = (len(found.history) - 1, found.history[-1].evaluations)
@@ -146,14 +146,14 @@ def _accuracy(context: Context) -> _Answer:
     """Show how x* and F* depend on integrator and quadrature."""
     rows: list[tuple[str | float | int, ...]] = []
     run = context.published()
-    truth = evaluate(context.problem, run.minimum.x).cost
+    truth = finely(context.problem, run.minimum.x).cost
     for steps in (16, 32, 64, 128):
         _, found = optimum(context.problem, tolerance=1e-10, steps=steps)
-        fine = evaluate(context.problem, found.x)
+        fine = finely(context.problem, found.x)
         rows.append(
             (f"fourth order, {steps} steps", found.cost, fine.cost, _apart(context, fine.q))
         )
-    moved = _apart(context, evaluate(context.problem, run.minimum.x).q)
+    moved = _apart(context, finely(context.problem, run.minimum.x).q)
     rows.append(("as published (ode23, 1e-3)", run.minimum.cost, truth, moved))
     table = Table(
         "Sensitivity to integration and quadrature",
@@ -201,7 +201,7 @@ def _near_singular() -> _Answer:
     rows: list[tuple[str | float | int, ...]] = []
     for label, method in methods.items():
         try:
-            plans[label] = plan(problem, method=method)
+            plans[label] = plan_by(problem, method)
         except BreakdownError as error:
             rows.append((label, np.nan, np.nan, np.nan, f"breaks down at {error.time:.3f} s"))
     plans["ours"] = plan(problem)

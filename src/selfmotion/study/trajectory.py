@@ -4,7 +4,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.costs import Cost, InverseManipulability, JointVelocity, Manipulability
-from selfmotion.study.context import Context, Result, evaluate
+from selfmotion.study.context import Context, Result, finely
 from selfmotion.study.engine import optimum
 from selfmotion.study.results import Claim, Curve, Plot, Section, Table, Verdict
 
@@ -39,7 +39,7 @@ def section(context: Context) -> Section:
             f"({np.abs(still.qd).max():.2f} to {np.abs(best.qd).max():.2f} rad/s).",
             f"The published scheme, started at x = 0, ends after {run.iterations} iterations and "
             f"{run.evaluations} evaluations of F at a motion of cost "
-            f"{evaluate(context.problem, run.minimum.x).cost:.4f}; our default takes "
+            f"{finely(context.problem, run.minimum.x).cost:.4f}; our default takes "
             f"{context.plan.report.evaluations} evaluations for {context.plan.report.cost:.4f} "
             f"with four coefficients.",
         ),
@@ -129,7 +129,7 @@ def _row(
     context: Context, costs: list[Cost], duration: float, x: Array
 ) -> tuple[float, float, float, float, float]:
     problem = context.with_costs(costs, duration)
-    before, after = evaluate(problem, np.zeros_like(x)), evaluate(problem, x)
+    before, after = finely(problem, np.zeros_like(x)), finely(problem, x)
     velocity = after.terms.get("joint velocity", np.nan)
     pose = after.cost - (velocity if np.isfinite(velocity) else 0.0)
     return before.cost, after.cost, velocity, pose, after.smallest_w
@@ -137,7 +137,7 @@ def _row(
 
 def _half_percent(context: Context) -> Claim:
     run = context.published()
-    reached = evaluate(context.problem, run.minimum.x).cost
+    reached = finely(context.problem, run.minimum.x).cost
     excess = reached / context.lagrangian.report.cost - 1.0
     return Claim(
         "useful",
@@ -155,7 +155,7 @@ def _mu(context: Context) -> Claim:
     pose = {}
     for mu in (1.0, 50.0, 1000.0):
         problem = context.with_costs((JointVelocity(), InverseManipulability(mu)))
-        motion = evaluate(problem, optimum(problem, tolerance=1e-10)[1].x)
+        motion = finely(problem, optimum(problem, tolerance=1e-10)[1].x)
         pose[mu] = motion.terms["inverse manipulability"] / mu, motion
     change = pose[50.0][0] / pose[1.0][0] - 1.0
     change_more = pose[1000.0][0] / pose[1.0][0] - 1.0

@@ -6,9 +6,6 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError
 
-# The name of the cost of being off the path.
-PATH_ERROR = "path error"
-
 
 @dataclass(frozen=True)
 class Damping:

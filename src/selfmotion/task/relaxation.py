@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import ProblemError
 
 POSITION_ROWS, _ROTATION = ("x", "y", "z"), ("rx", "ry", "rz")
 ROW_NAMES = (*POSITION_ROWS, *_ROTATION)
@@ -131,36 +131,3 @@ def _check_types(rows: Any, band: Any, during: Any) -> None:
             raise ProblemError(f"relaxation: {name} is {value!r}, expected {wanted}")
     if during is not None and not all(isinstance(time, Real) for time in during):
         raise ProblemError(f"relaxation: during is {during!r}, expected two times")
-
-
-def excess(relaxations: Sequence[Relaxation], duration: float, t: Array, deviation: Array) -> Array:
-    """Return what deviations are beyond the relaxations, (K, 6) [m, rad].
-
-    Parameters
-    ----------
-    relaxations : sequence of Relaxation
-    duration : float
-        Of the path [s].
-    t : (K,)
-        Times [s].
-    deviation : (K, 6)
-        Rows x, y, z, rx, ry, rz, in the relaxations' axes.
-    """
-    beyond = deviation.copy()
-    for item in relaxations:
-        size = deviation_size(item, duration, t, deviation)
-        share = np.maximum(size - item.band, 0.0) / np.where(size > 0.0, size, 1.0)
-        first, last = item.window(duration)
-        outside = (t < first) | (t > last)
-        beyond[:, item.indices] *= np.where(outside, 1.0, share)[:, None]
-    return beyond
-
-
-def deviation_size(item: Relaxation, duration: float, t: Array, deviation: Array) -> Array:
-    """Return how far the rows of a relaxation are off the path in its window, (K,).
-
-    Zero outside the window. Parameters as in `excess`.
-    """
-    first, last = item.window(duration)
-    inside = (t >= first) & (t <= last)
-    return np.asarray(np.linalg.norm(deviation[:, item.indices], axis=1) * inside)

@@ -89,6 +89,13 @@ class Task(Enum):
             twists = np.vstack([twists[:3], rotation.T @ twists[3:]])
         return twists[self.rows]
 
+    def select_along(self, twists: Array, rotations: Array) -> Array:
+        """Return `select` of twists (S, 6, k) at orientations (S, 3, 3), (S, m, k)."""
+        if self.tool_axes:
+            turned = rotations.transpose(0, 2, 1) @ twists[:, 3:]
+            twists = np.concatenate([twists[:, :3], turned], axis=1)
+        return np.ascontiguousarray(twists[:, self.rows])
+
     def twist_error(self, target: pin.SE3, actual: pin.SE3) -> Array:
         """Return the twist that takes `actual` to `target` in unit time, world axes, (6,) [m, rad].
 

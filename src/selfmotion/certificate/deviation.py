@@ -1,12 +1,14 @@
 """Where a motion takes the tool, by forward kinematics; shares no code with the rollout."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
-from selfmotion.task import Task
+from selfmotion.task import Relaxation, Task
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -27,11 +29,7 @@ def deviation_from(
     miss[:, 3:] = _turns(task, target.rotation, rotation)
     if in_tool_axes:
         miss[:, :3] = np.einsum("kji,kj->ki", target.rotation, miss[:, :3])
-    rows = jacobian
-    if task.tool_axes:
-        turned = rotation.transpose(0, 2, 1) @ jacobian[:, 3:]
-        rows = np.concatenate([jacobian[:, :3], turned], axis=1)
-    values = np.linalg.svd(rows[:, task.rows], compute_uv=False)
+    values = np.linalg.svd(task.select_along(jacobian, rotation), compute_uv=False)
     return miss, values[:, -1].astype(np.float64)
 
 
@@ -75,3 +73,36 @@ def _turns(task: Task, target: Array, actual: Array) -> Array:
     normal[sine == 0.0] = [1.0, 0.0, 0.0]
     angle = np.arctan2(sine, cosine)
     return np.asarray(normal * (angle / np.where(sine > 0.0, sine, 1.0))[:, None])
+
+
+def excess(relaxations: Sequence[Relaxation], duration: float, t: Array, deviation: Array) -> Array:
+    """Return what deviations are beyond the relaxations, (K, 6) [m, rad].
+
+    Parameters
+    ----------
+    relaxations : sequence of Relaxation
+    duration : float
+        Of the path [s].
+    t : (K,)
+        Times [s].
+    deviation : (K, 6)
+        Rows x, y, z, rx, ry, rz, in the relaxations' axes.
+    """
+    beyond = deviation.copy()
+    for item in relaxations:
+        size = deviation_size(item, duration, t, deviation)
+        share = np.maximum(size - item.band, 0.0) / np.where(size > 0.0, size, 1.0)
+        first, last = item.window(duration)
+        outside = (t < first) | (t > last)
+        beyond[:, item.indices] *= np.where(outside, 1.0, share)[:, None]
+    return beyond
+
+
+def deviation_size(item: Relaxation, duration: float, t: Array, deviation: Array) -> Array:
+    """Return how far the rows of a relaxation are off the path in its window, (K,).
+
+    Zero outside the window. Parameters as in `excess`.
+    """
+    first, last = item.window(duration)
+    inside = (t >= first) & (t <= last)
+    return np.asarray(np.linalg.norm(deviation[:, item.indices], axis=1) * inside)

@@ -1,0 +1,110 @@
+"""What a certificate is made of: tolerances, and what was found."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import ProblemError
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """What a verified motion may miss the path by, at any time.
+
+    Attributes
+    ----------
+    position : float
+        [m].
+    rotation : float
+        [rad].
+    """
+
+    position: float = 1e-6
+    rotation: float = 1e-6
+
+    def __post_init__(self) -> None:
+        for name in ("position", "rotation"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise ProblemError(f"tolerance: {name} is {value}, expected a number > 0")
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """The worst value of a quantity along a motion.
+
+    Attributes
+    ----------
+    value : float
+    time : float
+        When [s].
+    name : str
+        Of what: a joint, a frame, a pair of bodies.
+    """
+
+    value: float
+    time: float
+    name: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one requirement found on a motion.
+
+    Attributes
+    ----------
+    requirement : str
+        Its name.
+    subject : str
+        What it is about at the worst place: a joint, a pair of bodies.
+    time : float
+        When that is [s].
+    amount : float
+        What was found there.
+    allowed : float
+        What is allowed.
+    kept : bool
+        Whether the requirement is kept at all times.
+    text : str
+        In words: who, how much, when, what was wanted, and what to do about it.
+    """
+
+    requirement: str
+    subject: str
+    time: float
+    amount: float
+    allowed: float
+    kept: bool
+    text: str
+
+    @property
+    def extreme(self) -> Extreme:
+        """The worst value, when, and of what."""
+        return Extreme(self.amount, self.time, self.subject)
+
+
+@dataclass(frozen=True)
+class DampedStretch:
+    """A stretch of time over which the inverse was damped.
+
+    Attributes
+    ----------
+    start, end : float
+        [s].
+    singular_value : float
+        Smallest singular value σ of the task Jacobian on it [m, rad].
+    factor : float
+        Largest damping λ on it [m, rad].
+    """
+
+    start: float
+    end: float
+    singular_value: float
+    factor: float
+
+    def __str__(self) -> str:
+        """Return the stretch in words."""
+        return (
+            f"{self.start:.3f} to {self.end:.3f} s (smallest singular value "
+            f"{self.singular_value:.3g}, λ up to {self.factor:.3g})"
+        )

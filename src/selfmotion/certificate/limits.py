@@ -1,0 +1,86 @@
+"""Limits of joint position, velocity and acceleration, judged at all times."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.certificate.findings import Finding
+from selfmotion.certificate.requirement import FinishedMotion, Requirement
+from selfmotion.robot import RobotModel
+
+LIMIT_NAMES = ("joint position limits", "joint velocity limits", "joint acceleration limits")
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimits(Requirement):
+    """lower ≤ x ≤ upper for x = q (order 0), q̇ (1) or q̈ (2) of each joint, at all times.
+
+    Attributes
+    ----------
+    order : {0, 1, 2}
+    lower, upper : (n,)
+        [rad or m] per s^order, ±inf where there is none; symmetric for order 1 and 2.
+    """
+
+    order: int
+    lower: Array
+    upper: Array
+
+    @property
+    def name(self) -> str:  # type: ignore[override]  # it follows from the order
+        """See `Requirement.name`."""
+        return LIMIT_NAMES[self.order]
+
+    def judge(self, motion: FinishedMotion) -> Finding:
+        """See `Requirement.judge`: a margin (order 0), or the share of the limit that is used."""
+        times, values = motion.trajectory.extremes(self.order)
+        if self.order == 0:
+            margins = np.stack([values[0] - self.lower, self.upper - values[1]])
+            side, joint = np.unravel_index(int(np.argmin(margins)), margins.shape)
+            amount, allowed = float(margins[side, joint]), 0.0
+            kept = bool(amount >= 0.0)
+        else:
+            shares = values / np.stack([self.lower, self.upper])
+            side, joint = np.unravel_index(int(np.argmax(shares)), shares.shape)
+            amount, allowed = float(shares[side, joint]), 1.0
+            kept = bool(amount <= 1.0)
+        time = float(times[side, joint])
+        name = motion.robot.joint_names[int(joint)]
+        text = _TEXTS[self.order](name, amount, time)
+        return Finding(self.name, name, time, amount, allowed, kept, text)
+
+
+def arm_limits(robot: RobotModel, requirements: Sequence[Requirement]) -> tuple[JointLimits, ...]:
+    """Return the arm's own limits of position and velocity, but for orders that others speak of.
+
+    Limits of one's own contain the arm's, or are meant to replace them.
+    """
+    taken = {item.order for item in requirements if isinstance(item, JointLimits)}
+    own = (
+        JointLimits(0, robot.lower, robot.upper),
+        JointLimits(1, -robot.velocity_limit, robot.velocity_limit),
+    )
+    return tuple(item for item in own if item.order not in taken)
+
+
+def _position(name: str, amount: float, time: float) -> str:
+    return f"joint '{name}' is {-amount:.3g} beyond its limit at t = {time:.3f} s"
+
+
+def _velocity(name: str, amount: float, time: float) -> str:
+    return (
+        f"joint '{name}' moves at {amount:.5g} times its limit at t = {time:.3f} s: give it "
+        f"{amount:.5g} times the duration"
+    )
+
+
+def _acceleration(name: str, amount: float, time: float) -> str:
+    return (
+        f"joint '{name}' accelerates at {amount:.5g} times its limit at t = {time:.3f} s: give it "
+        f"{max(amount, 0.0) ** 0.5:.5g} times the duration"
+    )
+
+
+_TEXTS = (_position, _velocity, _acceleration)

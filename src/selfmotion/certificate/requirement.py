@@ -1,0 +1,74 @@
+"""What a requirement is: something that a finished motion must keep, and that judges whether."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.certificate.findings import Finding
+from selfmotion.collision import Obstacle
+from selfmotion.motion import Trajectory
+from selfmotion.robot import RobotModel
+
+# Points per interval of the trajectory's samples: odd, so that none but the samples are symmetric.
+_REFINEMENT = 5
+
+
+@dataclass(frozen=True, eq=False)
+class FinishedMotion:
+    """A motion as requirements see it.
+
+    Attributes
+    ----------
+    robot : RobotModel
+    trajectory : Trajectory
+        Known at all times, with its exact extremes.
+    """
+
+    robot: RobotModel
+    trajectory: Trajectory
+
+    @cached_property
+    def t(self) -> Array:
+        """Times [s] on a grid finer than the trajectory's samples, (K,)."""
+        samples = self.trajectory.t
+        fractions = np.arange(_REFINEMENT) / _REFINEMENT
+        inner = samples[:-1, None] + np.diff(samples)[:, None] * fractions
+        return np.append(inner.ravel(), samples[-1])
+
+    @cached_property
+    def q(self) -> Array:
+        """Joint coordinates at `t`, (K, n) [rad or m]."""
+        return self.trajectory(self.t)
+
+    @cached_property
+    def qd(self) -> Array:
+        """Joint velocities at `t`, (K, n) [rad/s or m/s]."""
+        return self.trajectory(self.t, order=1)
+
+
+class Requirement(ABC):
+    """Something that a finished motion must keep besides its path.
+
+    The certificate asks each requirement, and a motion is verified only when all are kept. One of
+    your own gives `name` and `judge`; it is made by `Constraint.requirement`, or handed to
+    `certify`. `selfmotion.testing.check_constraint` shows that it refuses what its constraint does.
+
+    Attributes
+    ----------
+    name : str
+        What to call it in findings.
+    """
+
+    name: str
+
+    @abstractmethod
+    def judge(self, motion: FinishedMotion) -> Finding:
+        """Return what there is to say about a motion, on its worst place."""
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """The bodies of the world that it is about, for whoever draws them."""
+        return ()

@@ -1,0 +1,96 @@
+"""What is known about a finished motion, and the verdict."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from selfmotion.certificate.findings import DampedStretch, Extreme, Finding
+from selfmotion.certificate.limits import LIMIT_NAMES
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What forward kinematics says about a finished motion, on a grid finer than its samples.
+
+    Attributes
+    ----------
+    position_error : Extreme
+        Largest distance of the tool from the path, in the prescribed rows and beyond what is
+        relaxed [m].
+    rotation_error : Extreme
+        Largest angle from the path's orientation, likewise [rad].
+    smallest_singular_value : Extreme
+        Of the task Jacobian: distance from singular poses.
+    closure : float
+        max |q(T) - q(0)| [rad or m].
+    samples : int
+        Number of times looked at.
+    findings : tuple of Finding
+        What each requirement found, the arm's own limits first.
+    failures : tuple of str
+        What speaks against the motion; empty for a verified one.
+    deviations : tuple of Extreme
+        For each relaxation the largest deviation of its rows from the path, in its window [m or
+        rad].
+    damped : tuple of DampedStretch
+        Where the inverse was damped, in order of time.
+    """
+
+    position_error: Extreme
+    rotation_error: Extreme
+    smallest_singular_value: Extreme
+    closure: float
+    samples: int
+    findings: tuple[Finding, ...]
+    failures: tuple[str, ...]
+    deviations: tuple[Extreme, ...] = ()
+    damped: tuple[DampedStretch, ...] = ()
+
+    @property
+    def limit_margin(self) -> Extreme:
+        """Smallest distance of a joint from its position limits [rad or m]; negative beyond."""
+        return self._required(LIMIT_NAMES[0], min)
+
+    @property
+    def velocity_ratio(self) -> Extreme:
+        """Largest |q̇| relative to the joint's limit; above 1 it is exceeded."""
+        return self._required(LIMIT_NAMES[1], max)
+
+    @property
+    def acceleration_ratio(self) -> Extreme | None:
+        """Largest |q̈| relative to the limits asked for; None without any."""
+        return self._worst(LIMIT_NAMES[2], max)
+
+    @property
+    def clearance(self) -> Extreme | None:
+        """Smallest distance between bodies [m], with their names; None where not asked for."""
+        return self._worst("clearance", min)
+
+    @property
+    def verified(self) -> bool:
+        """Whether the motion follows the path within tolerance and keeps what is required."""
+        return not self.failures
+
+    @property
+    def verdict(self) -> str:
+        """One line: verified, or what is wrong."""
+        if self.verified:
+            return (
+                f"verified: at most {self.position_error.value:.1e} m and "
+                f"{self.rotation_error.value:.1e} rad off the path"
+                f"{', beyond what is relaxed' if self.deviations else ''}{self._damping_text}"
+            )
+        return "not verified: " + "; ".join(self.failures)
+
+    @property
+    def _damping_text(self) -> str:
+        return f"; damped {' and '.join(map(str, self.damped))}" if self.damped else ""
+
+    def _worst(self, name: str, choose: Callable[..., Finding]) -> Extreme | None:
+        found = [item for item in self.findings if item.requirement == name]
+        return choose(found, key=lambda item: item.amount).extreme if found else None
+
+    def _required(self, name: str, choose: Callable[..., Finding]) -> Extreme:
+        worst = self._worst(name, choose)
+        if worst is None:
+            raise RuntimeError(f"a certificate always judges {name}")
+        return worst

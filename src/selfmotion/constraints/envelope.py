@@ -1,0 +1,66 @@
+"""What single configurations and single steps must keep, for searches that see no whole motion."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from selfmotion.basics import Array, read_only
+from selfmotion.certificate import JointLimits
+from selfmotion.collision import CollisionModel
+
+
+@dataclass(frozen=True, eq=False)
+class Envelope:
+    """The part of constraints that can be told of a configuration or a velocity alone.
+
+    Attributes
+    ----------
+    lower, upper : (n,)
+        Position limits [rad or m]; ±inf where there is none.
+    speed, acceleration : (n,)
+        Limits of |q̇| and |q̈|; inf where there is none.
+    bodies : tuple of (CollisionModel, float)
+        Bodies to keep apart, and the distance [m].
+    """
+
+    lower: Array
+    upper: Array
+    speed: Array
+    acceleration: Array
+    bodies: tuple[tuple[CollisionModel, float], ...] = ()
+
+    @classmethod
+    def unbounded(cls, dof: int) -> "Envelope":
+        """Return the envelope of n joints that allows everything."""
+        free = read_only(np.full(dof, np.inf))
+        return cls(read_only(-free), free, free, free)
+
+    @classmethod
+    def of_limits(cls, limits: JointLimits) -> "Envelope":
+        """Return the envelope of limits of q, q̇ or q̈."""
+        own = cls.unbounded(len(limits.lower))
+        if limits.order == 0:
+            return replace(own, lower=limits.lower, upper=limits.upper)
+        if limits.order == 1:
+            return replace(own, speed=limits.upper)
+        return replace(own, acceleration=limits.upper)
+
+    def __and__(self, other: "Envelope") -> "Envelope":
+        """Return the envelope of what both allow."""
+        return Envelope(
+            read_only(np.maximum(self.lower, other.lower)),
+            read_only(np.minimum(self.upper, other.upper)),
+            read_only(np.minimum(self.speed, other.speed)),
+            read_only(np.minimum(self.acceleration, other.acceleration)),
+            (*self.bodies, *other.bodies),
+        )
+
+    @property
+    def limited(self) -> bool:
+        """Whether any position is limited."""
+        return bool(np.any(np.isfinite(self.lower)) or np.any(np.isfinite(self.upper)))
+
+    def keeps(self, q: Array, qd: Array) -> Array:
+        """Return whether q and q̇ (N, n) are within the limits, bodies not looked at, (N,) bool."""
+        inside = (q >= self.lower) & (q <= self.upper) & (np.abs(qd) <= self.speed)
+        return np.asarray(inside.all(axis=1))

@@ -1,0 +1,161 @@
+"""What is minimised, what minimises it, and what comes of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+
+from selfmotion.basics import Array
+
+
+class Function(Protocol):
+    """What is minimised."""
+
+    @property
+    def evaluations(self) -> int:
+        """How often F was computed so far."""
+
+    def value(self, x: Array) -> float:
+        """Return F(x), infinite where it is not defined."""
+
+    def gradient(self, x: Array) -> Array:
+        """Return ∇F(x)."""
+
+    def slope(self, x: Array, direction: Array) -> float:
+        """Return the derivative of F at x along `direction`."""
+
+    def metric(self, x: Array) -> Array:
+        """Return the Gauss-Newton matrix at x, (size, size): what is known of the Hessian."""
+
+
+class Status(Enum):
+    """How an optimisation ended."""
+
+    CONVERGED = "converged"
+    PRECISION = "precision"
+    MAX_ITERATIONS = "max_iterations"
+    MAX_EVALUATIONS = "max_evaluations"
+    UNBOUNDED = "unbounded"
+    STOPPED = "stopped"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def message(self) -> str:
+        """What it means and what to do about it."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    Status.CONVERGED: "the predicted decrease fell below the tolerance",
+    Status.PRECISION: "no step along the search direction decreases the cost any more: converged "
+    "to the accuracy of its evaluation",
+    Status.MAX_ITERATIONS: "the limit on iterations was reached; raise max_iterations to go on",
+    Status.MAX_EVALUATIONS: "the limit on evaluations was reached; raise max_evaluations to go on",
+    Status.UNBOUNDED: "the coefficients grow without bound: the cost has no minimum; add a "
+    "JointVelocity cost",
+    Status.STOPPED: "the callback asked to stop",
+    Status.INTERRUPTED: "interrupted; this is the best found so far",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Iteration:
+    """One iteration, the first being the start.
+
+    Attributes
+    ----------
+    x : (size,)
+        Where it arrived.
+    cost : float
+        F(x).
+    gradient_norm : float
+        |∇F(x)|.
+    update : str
+        Which formula renewed H afterwards: "bfgs", "dfp", or "none".
+    step : float
+        α of the line search.
+    evaluations : int
+        Evaluations of F so far.
+    """
+
+    x: Array
+    cost: float
+    gradient_norm: float
+    update: str
+    step: float
+    evaluations: int
+
+
+Callback = Callable[[Iteration], bool | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """What `QuasiNewton.minimize` found.
+
+    Attributes
+    ----------
+    x : (size,)
+    cost : float
+    inverse_hessian : (size, size)
+        The last estimate.
+    history : tuple of Iteration
+    status : Status
+    """
+
+    x: Array
+    cost: float
+    inverse_hessian: Array
+    history: tuple[Iteration, ...]
+    status: Status
+
+
+class Optimizer(Protocol):
+    """Whatever minimises a function of some variables; `QuasiNewton` is ours.
+
+    One of your own is handed to `plan` as ``optimizer=``; `selfmotion.testing.check_optimizer`
+    checks it.
+    """
+
+    def minimize(
+        self,
+        function: Function,
+        x0: Array,
+        inverse_hessian: Array | None = None,
+        *,
+        coarseness: float = 1.0,
+        max_evaluations: int | None = None,
+        callback: Callback | None = None,
+    ) -> Minimum:
+        """Return the best point found from `x0`, where F is finite; never worse than `x0`.
+
+        Parameters
+        ----------
+        function : Function
+        x0 : (size,)
+        inverse_hessian : (size, size), optional
+            An estimate of the inverse Hessian from a function much like this one. Without it the
+            optimiser begins as it likes.
+        coarseness : float
+            How many times more coarsely than usual to minimise, ≥ 1: far from the end of a
+            sequence of minimisations, the last digits are lost work.
+        max_evaluations : int, optional
+            Limit on `Function.evaluations`.
+        callback : callable, optional
+            To be called with each `Iteration`; returning True stops.
+        """
+
+
+def inverse_metric(metric: Array, floor: float = 1e-4) -> Array:
+    """Return the inverse of a positive semidefinite matrix.
+
+    Directions without curvature (coefficients that do not act, as in the over-specified joint
+    space) are given that of `floor` times the largest.
+    """
+    if not len(metric):
+        return metric
+    values, vectors = np.linalg.eigh(metric)
+    values = np.maximum(values, floor * max(values[-1], np.finfo(float).tiny))
+    return np.asarray((vectors / values) @ vectors.T)

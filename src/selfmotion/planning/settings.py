@@ -1,0 +1,53 @@
+"""How to search where the start is free."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import ProblemError
+
+_MODES = ("auto", "local", "global")
+
+
+@dataclass(frozen=True)
+class Search:
+    """Where motions begin, when the start is free.
+
+    Parameters
+    ----------
+    starts : int
+        Seeds of the inverse kinematics.
+    finalists : int
+        How many of the starts found are optimised, those of the best motions at x = 0.
+    mode : {"auto", "local", "global"}
+        Optimise from many starts (local), or, where the redundancy is 1, from the best sequences
+        over all self-motions (`best_sequences`). ``"auto"``: from many starts first, and from
+        sequences where none of them leads to a motion that keeps the constraints.
+    compare : bool
+        Search globally whatever the other search finds, also where the start is given, so that
+        `Report.gap` tells how far the plan is from the best motion of all. Needs redundancy 1.
+    rng : Generator or int
+        Shifts the seeds; the same one gives the same plan.
+
+    Raises
+    ------
+    ProblemError
+        A number is below 1, or the mode unknown.
+    """
+
+    starts: int = 24
+    finalists: int = 4
+    mode: str = "auto"
+    compare: bool = False
+    rng: np.random.Generator | int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("starts", "finalists"):
+            value = getattr(self, name)
+            whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+            if not (whole and value >= 1):
+                raise ProblemError(f"search: {name} is {value}, expected a whole number ≥ 1")
+        if self.mode not in _MODES:
+            raise ProblemError(
+                f"search: mode is '{self.mode}', expected one of: {', '.join(_MODES)}"
+            )

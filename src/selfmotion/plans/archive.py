@@ -1,0 +1,179 @@
+"""Plans as files: a description in JSON and arrays, in one ``.npz``."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path as FilePath
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    read_archive,
+    restore,
+    write_archive,
+)
+from selfmotion.certificate import Certificate, DampedStretch, Extreme, Finding, Tolerance
+from selfmotion.constraints import Constraint
+from selfmotion.costs import cost_from_dict
+from selfmotion.motion import NullMotion, Trajectory
+from selfmotion.optimise import Iteration, Status
+from selfmotion.path import Path
+from selfmotion.plans.problem import Problem
+from selfmotion.plans.report import Gap, Report
+from selfmotion.robot import rebuild_robot
+from selfmotion.task import Damping, Relaxation
+
+# Raised with every change that older versions cannot read.
+FORMAT = 2
+
+
+class Archive(NamedTuple):
+    """What a plan's file holds, in the order of `Plan`."""
+
+    problem: Problem
+    trajectory: Trajectory
+    initial_trajectory: Trajectory
+    coefficients: Array
+    report: Report
+    certificate: Certificate
+    tolerance: Tolerance
+
+    def write(self, file: FilePath) -> None:
+        """Write the file, atomically."""
+        history = self.report.history
+        description = {
+            "format": FORMAT,
+            "problem": _problem_to_dict(self.problem),
+            "joint_names": list(self.trajectory.joint_names),
+            "report": _report_to_dict(self.report),
+            "history": [_without(iteration, "x") for iteration in history],
+            "certificate": dataclasses.asdict(self.certificate),
+            "tolerance": dataclasses.asdict(self.tolerance),
+        }
+        arrays = {
+            "t": self.trajectory.t,
+            "q": self.trajectory.q,
+            "qd": self.trajectory.qd,
+            "initial_t": self.initial_trajectory.t,
+            "initial_q": self.initial_trajectory.q,
+            "initial_qd": self.initial_trajectory.qd,
+            "coefficients": self.coefficients,
+            "history_x": np.array([iteration.x for iteration in history]),
+        }
+        write_archive(file, description, arrays)
+
+    @classmethod
+    def read(cls, file: FilePath) -> "Archive":
+        """Read a file; FileFormatError where it is none, or of another version."""
+        description, arrays = read_archive(file)
+        _check_format(file, description)
+        try:
+            return _restore(description, arrays)
+        except (KeyError, TypeError, ValueError) as error:
+            raise FileFormatError(f"{file}: is no plan, or a damaged one: {error!r}") from error
+
+
+def _check_format(file: FilePath, description: Mapping[str, Any]) -> None:
+    found = description.get("format")
+    if found == FORMAT:
+        return
+    if isinstance(found, int) and found > FORMAT:
+        raise FileFormatError(
+            f"{file}: has format {found}, this version of selfmotion reads format {FORMAT}; "
+            f"install a newer one"
+        )
+    raise FileFormatError(
+        f"{file}: has no format number, or one before {FORMAT}: it was written by an earlier "
+        f"version of selfmotion, or is no plan; plan anew"
+    )
+
+
+def _problem_to_dict(problem: Problem) -> dict[str, Any]:
+    robot, start = problem.robot, problem.given_start
+    return {
+        "robot": {
+            "text": robot.urdf.text,
+            "package_dirs": list(robot.urdf.package_dirs),
+            "source": robot.urdf.source,
+            "continuous": sorted(robot.urdf.continuous()),
+            "tool": robot.tool,
+            "locked": dict(robot.locked),
+        },
+        "path": problem.path.to_dict(),
+        "task": problem.rows.value,
+        "start": None if start is None else start.tolist(),
+        "null_motion": problem.null_motion.to_dict(),
+        "costs": [cost.to_dict() for cost in problem.costs],
+        "constraints": [item.to_dict() for item in problem.constraints],
+        "relaxations": [item.to_dict() for item in problem.relaxations],
+        "damping": None if problem.damping is None else dataclasses.asdict(problem.damping),
+    }
+
+
+def _problem_from_dict(values: Mapping[str, Any]) -> Problem:
+    robot = rebuild_robot(**values["robot"])
+    damping = values["damping"]
+    return Problem(
+        robot,
+        restore(Path, values["path"]),
+        values["task"],
+        values["start"],
+        restore(NullMotion, values["null_motion"]),
+        tuple(cost_from_dict(item, robot) for item in values["costs"]),
+        tuple(restore(Constraint, item) for item in values["constraints"]),
+        tuple(Relaxation(**item) for item in values["relaxations"]),
+        None if damping is None else Damping(**damping),
+    )
+
+
+def _without(value: Any, *names: str) -> dict[str, Any]:
+    """Return a dataclass's fields but some."""
+    return {
+        field.name: getattr(value, field.name)
+        for field in dataclasses.fields(value)
+        if field.name not in names
+    }
+
+
+def _report_to_dict(report: Report) -> dict[str, Any]:
+    return {
+        **_without(report, "history"),
+        "terms": dict(report.terms),
+        "initial_terms": dict(report.initial_terms),
+        "status": report.status.value,
+        "gap": None if report.gap is None else dataclasses.asdict(report.gap),
+    }
+
+
+def _certificate_from_dict(values: Mapping[str, Any]) -> Certificate:
+    several = {"findings": Finding, "deviations": Extreme, "damped": DampedStretch}
+    restored: dict[str, Any] = {
+        key: Extreme(**value) if isinstance(value, dict) else value for key, value in values.items()
+    }
+    for key, kind in several.items():
+        restored[key] = tuple(kind(**item) for item in restored[key])
+    return Certificate(**{**restored, "failures": tuple(restored["failures"])})
+
+
+def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archive:
+    names = tuple(description["joint_names"])
+    history = tuple(
+        Iteration(x=x, **record)
+        for x, record in zip(arrays["history_x"], description["history"], strict=True)
+    )
+    report = dict(description["report"])
+    report["status"] = Status(report["status"])
+    report["gap"] = None if report["gap"] is None else Gap(**report["gap"])
+    return Archive(
+        problem=_problem_from_dict(description["problem"]),
+        trajectory=Trajectory(arrays["t"], arrays["q"], arrays["qd"], names),
+        initial_trajectory=Trajectory(
+            arrays["initial_t"], arrays["initial_q"], arrays["initial_qd"], names
+        ),
+        coefficients=arrays["coefficients"],
+        report=Report(history=history, **report),
+        certificate=_certificate_from_dict(description["certificate"]),
+        tolerance=Tolerance(**description["tolerance"]),
+    )

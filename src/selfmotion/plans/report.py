@@ -1,0 +1,101 @@
+"""How a plan was found, and how far it may be from the best."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from selfmotion.optimise import Iteration, Status
+
+
+@dataclass(frozen=True)
+class Gap:
+    """How far a plan is from the global optimum, as far as the search over self-motions knows it.
+
+    No bound: the search sees samples of the self-motions, and joint path lengths. So there are two
+    comparisons, with different strengths. The costs are alike (same cost, same constraints, same
+    optimiser), but that of the search is refined from a few of its sequences only. The lengths
+    are of all sequences there are, but say little where the cost is another one.
+
+    Attributes
+    ----------
+    cost : float
+        F of the plan.
+    best_cost : float or None
+        F of the best motion refined from the sequences that the search found; None where none
+        keeps the constraints.
+    length : float
+        Σ|Δq| of the plan over waypoints and joints [rad or m].
+    best_length : float
+        That of the shortest sequence of configurations within the same limits, clearance and
+        steps.
+    spacing : float
+        Distance of the samples of the self-motions [rad or m], configuration norm.
+    sequences : int
+        How many sequences, unlike each other, were refined.
+    """
+
+    cost: float
+    best_cost: float | None
+    length: float
+    best_length: float
+    spacing: float
+    sequences: int
+
+    @property
+    def cost_excess(self) -> float | None:
+        """The plan's cost above the best one, as a share; negative where the plan is better."""
+        if self.best_cost is None or self.best_cost == 0.0:
+            return None
+        return (self.cost - self.best_cost) / abs(self.best_cost)
+
+    @property
+    def length_excess(self) -> float:
+        """The plan's joint path above the shortest one, as a share."""
+        return self.length / self.best_length - 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """How a plan was found.
+
+    Attributes
+    ----------
+    cost, initial_cost : float
+        F of the plan, and of the motion without self-motion (x = 0).
+    terms, initial_terms : dict
+        What each cost contributes to them.
+    evaluations, gradient_evaluations : int
+        How often F and ∇F were computed, on all grids.
+    jacobian_evaluations : int
+        How often Pinocchio was asked for the frame Jacobian.
+    steps : int
+        Runge-Kutta steps of the finest grid.
+    iterations : int
+        Of the optimiser.
+    history : tuple of Iteration
+        One per iteration, each grid's first being its start.
+    status : Status
+    message : str
+        What the status means and what to do about it.
+    seconds : float
+        Wall time of `plan`.
+    gap : Gap or None
+        Distance from the global optimum, where a global search was made.
+    ending : str
+        Why the motion ends before its path does; "" where it does not.
+    """
+
+    cost: float
+    initial_cost: float
+    terms: Mapping[str, float]
+    initial_terms: Mapping[str, float]
+    evaluations: int
+    gradient_evaluations: int
+    jacobian_evaluations: int
+    steps: int
+    iterations: int
+    history: tuple[Iteration, ...]
+    status: Status
+    message: str
+    seconds: float
+    gap: Gap | None = None
+    ending: str = ""
