@@ -16,7 +16,7 @@ def objective_on(problem: sm.Problem, steps: int) -> Objective:
     """Return the objective of `problem` on a grid of `steps` steps."""
     start = problem.given_start
     if start is None:
-        start = problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.rows)
+        start = problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task)
     still = StillMotion.on(problem, start, Grid.aligned(problem.path.knots, steps))
     return Objective.of(problem, still)
 

@@ -12,7 +12,7 @@ import selfmotion as sm
 from selfmotion.study.expense import chain as planar_chain
 
 DATA = Path(__file__).parent / "data"
-PANDA_HOME = np.array([0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4])
+PANDA_HOME = np.array(sm.NAMED_ARMS["panda"].home)
 
 
 def circle(name: str, task: str, **options: object) -> sm.Problem:

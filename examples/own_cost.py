@@ -1,27 +1,43 @@
-"""A cost of one's own: keep the elbow of a Panda up, and its joints slow."""
+"""Costs of one's own: a function for a first try, a class with its exact gradient to keep."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
 import selfmotion as sm
-from selfmotion.basics.arrays import Array
+from selfmotion.testing import check_cost
 
 
-def elbow_down(qd: Array, q: Array, t: Array) -> Array:
-    """Return G = 5 (1 + cos of the elbow's roll): large when joints 1 and 3 swing it down."""
+def elbow_down(qd, q, t):
+    """Return G = 5 (1 - cos q3): large when joint 3 swings the elbow down."""
     return 5.0 * (1.0 - np.cos(q[:, 2]))
 
 
+@dataclass(frozen=True)
+class ElbowDown(sm.Cost):
+    """G = μ (1 - cos q3), with its gradient: faster, and saved with a plan."""
+
+    mu: float = 5.0
+    name: str = "elbow"
+
+    def value(self, samples):
+        return self.mu * (1.0 - np.cos(samples.q[:, 2]))
+
+    def gradient(self, samples):
+        by_q = np.zeros_like(samples.q)
+        by_q[:, 2] = self.mu * np.sin(samples.q[:, 2])
+        return sm.Partials(q=by_q)
+
+
+check_cost(ElbowDown())
 panda = sm.load_robot("panda")
 start = panda.dexterous_configuration()
 line_end = panda.pose(start)
 line_end.translation = line_end.translation + np.array([0.0, 0.1, -0.05])
-problem = sm.Problem(
-    panda,
-    sm.Line(panda.pose(start), line_end, 3.0),
-    start=start,
-    costs=[sm.JointVelocity(), sm.FunctionCost(elbow_down, name="elbow")],
-)
-plan = sm.plan(problem)
-for name, before in plan.report.initial_terms.items():
-    print(f"{name}: {before:.4f} → {plan.report.terms[name]:.4f}")
-print(plan.certificate.verdict)
+line = sm.Line(panda.pose(start), line_end, 3.0)
+for cost in (sm.FunctionCost(elbow_down, name="elbow"), ElbowDown()):
+    problem = sm.Problem(panda, line, start=start, costs=[sm.JointVelocity(), cost])
+    plan = sm.plan(problem).require()
+    for name, before in plan.report.initial_terms.items():
+        print(f"{name}: {before:.4f} → {plan.report.terms[name]:.4f}")
+    print(plan.certificate.verdict)

@@ -80,7 +80,7 @@ def planar() -> sm.RobotModel:
     return robot_named("planar_3r")
 
 
-PANDA_HOME = np.array([0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4])
+PANDA_HOME = np.array(sm.NAMED_ARMS["panda"].home)
 
 
 @pytest.fixture

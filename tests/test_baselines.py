@@ -82,9 +82,9 @@ def test_hamiltonian_flow(panda_circle: Circle, task: str) -> None:
     manipulability = problem.costs[1]
 
     def hamiltonian(q: np.ndarray) -> float:
-        jacobian = problem.robot.task_jacobian(q, problem.rows)
+        jacobian = problem.robot.task_jacobian(q, problem.task)
         rotation = problem.robot.pose(q).rotation
-        command = problem.rows.select(problem.path.twist(t)[:, None], rotation)[:, 0]
+        command = problem.task.select(problem.path.twist(t)[:, None], rotation)[:, 0]
         y = np.linalg.solve(jacobian @ jacobian.T, command + jacobian @ p)
         qd = jacobian.T @ y - p
         determinant = np.linalg.det(jacobian @ jacobian.T)
@@ -104,7 +104,7 @@ def test_gradient_projection_climbs(panda_circle: Circle) -> None:
     still = sm.plan_by(problem, sm.PseudoInverse())
     moving = sm.plan_by(problem, sm.GradientProjection(gain=1.0))
     end = still.trajectory.q[-1], moving.trajectory.q[-1]
-    w = [np.prod(np.linalg.svd(problem.robot.task_jacobian(q, problem.rows))[1]) for q in end]
+    w = [np.prod(np.linalg.svd(problem.robot.task_jacobian(q, problem.task))[1]) for q in end]
     assert w[1] > w[0]
     assert moving.certificate.verified
 
@@ -125,7 +125,7 @@ def test_pose_gradient_is_that_of_the_cost(panda: sm.RobotModel, panda_circle: C
     found = pose_gradient(problem, sm.Manipulability(), 0.0, q)
 
     def negative_w(q: np.ndarray) -> float:
-        jacobian = panda.task_jacobian(q, problem.rows)
+        jacobian = panda.task_jacobian(q, problem.task)
         return -float(np.sqrt(np.linalg.det(jacobian @ jacobian.T)))
 
     step = 1e-6
@@ -138,7 +138,7 @@ def test_extended_jacobian_keeps_the_pose_stationary(panda_circle: Circle) -> No
     found = sm.plan_by(problem, sm.ExtendedJacobian())
     assert found.certificate.verified
     q = found.trajectory.q[-1]
-    null = np.linalg.svd(problem.robot.task_jacobian(q, problem.rows))[2][6:]
+    null = np.linalg.svd(problem.robot.task_jacobian(q, problem.task))[2][6:]
     slope = pose_gradient(problem, sm.Manipulability(), 0.0, q)
     start = pose_gradient(problem, sm.Manipulability(), 0.0, problem.given_start)
     assert np.abs(null @ slope).max() < 1e-6 * np.linalg.norm(start)

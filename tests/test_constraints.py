@@ -379,9 +379,8 @@ def test_broken_motions_fail_what_is_required(panda_circle: Circle) -> None:
 def test_clearance_of_an_arm_without_geometry_is_refused(planar: sm.RobotModel) -> None:
     start = planar.inverse_kinematics(planar.pose([0.3, 0.8, 0.5]), "planar")
     path = short_line(planar, start)
-    problem = sm.Problem(planar, path, "planar", start, constraints=[sm.Clearance()])
     with pytest.raises(sm.ProblemError, match="planar_3r: a clearance is asked for, but its URDF"):
-        sm.plan(problem)
+        sm.Problem(planar, path, "planar", start, constraints=[sm.Clearance()])
 
 
 def test_a_table_under_the_base_is_no_obstacle_to_it(panda_circle: Circle) -> None:

@@ -291,7 +291,7 @@ def test_limits_that_exclude_everything_name_the_joint(arm: sm.RobotModel) -> No
 
 
 def test_a_box_in_the_way_is_named(panda: sm.RobotModel) -> None:
-    home = np.array([0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4])
+    home = np.array(sm.NAMED_ARMS["panda"].home)
     start = panda.pose(home)
     end = pin.SE3(start.rotation, start.translation + np.array([0.0, 0.3, 0.0]))
     path = sm.Line(start, end, 1.0)

@@ -115,14 +115,13 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
         coefficients=read_only([]),
         report=report,
         certificate=certificate,
-        tolerance=tolerance,
     )
 
 
 def costs(problem: Problem, motion: Motion, grid: Grid) -> dict[str, float]:
     """Return what each cost of the problem contributes to F along a motion."""
     q, qd = motion.at(grid.stage_times)
-    samples = Samples.along(problem.robot, problem.rows, grid.sampling, q, qd)
+    samples = Samples.along(problem.robot, problem.task, grid.sampling, q, qd)
     return {cost.name: float(samples.weights @ cost.value(samples)) for cost in problem.costs}
 
 
@@ -153,9 +152,8 @@ def _sampled(
         trajectory = Trajectory(grid.nodes, *motion.at(grid.nodes), problem.robot.joint_names)
         certificate = problem.certify(trajectory, tolerance)
         errors = certificate.position_error.value, certificate.rotation_error.value
-        held = errors[0] <= tolerance.position and errors[1] <= tolerance.rotation
         # An error that halving does not change is the motion's own, not that of its samples.
-        if held or attempt == _MOST_DOUBLINGS or sum(errors) > 0.5 * before:
+        if certificate.on_path or attempt == _MOST_DOUBLINGS or sum(errors) > 0.5 * before:
             break
         before = sum(errors)
         grid = grid.halved()

@@ -10,6 +10,7 @@ from selfmotion.baselines.local import pose_gradient
 from selfmotion.basics import Array, BreakdownError
 from selfmotion.costs import Cost, Manipulability
 from selfmotion.plans import Problem
+from selfmotion.robot import null_space
 
 # The attraction to the stationary pose, times the duration.
 _ATTRACTION = 20.0
@@ -41,7 +42,7 @@ class ExtendedJacobian:
 
     def solve(self, problem: Problem) -> Motion:
         """See `Method.solve`."""
-        feedback, m = PoseFeedback(problem), problem.rows.dimension
+        feedback = PoseFeedback(problem)
         attraction = self.attraction
         if attraction is None:
             attraction = _ATTRACTION / problem.path.duration
@@ -57,7 +58,7 @@ class ExtendedJacobian:
 
         def rate(t: float, q: Array) -> Array:
             here = feedback(t, q)
-            null = np.linalg.svd(here.jacobian)[2][m:]
+            null = null_space(here.jacobian).T
             shifts = _DIFFERENCE * np.eye(len(q))
             change = np.array([projected(t, q + s) - projected(t, q - s) for s in shifts]).T
             square = np.vstack([here.jacobian, null @ change / (2.0 * _DIFFERENCE)])

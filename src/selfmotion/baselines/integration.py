@@ -53,7 +53,7 @@ class PoseFeedback:
     """t, q → `Here`: what the arm must do at that time to stay on, or return to, the path."""
 
     def __init__(self, problem: Problem) -> None:
-        self._robot, self._path, self._task = problem.robot, problem.path, problem.rows
+        self._robot, self._path, self._task = problem.robot, problem.path, problem.task
         self._gain = feedback_rate(problem.path.duration)
 
     def __call__(self, t: float, q: Array) -> Here:
@@ -100,7 +100,7 @@ def start_of(problem: Problem) -> Array:
     """
     if problem.given_start is not None:
         return problem.given_start
-    return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.rows)
+    return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task)
 
 
 def integrate(problem: Problem, rate: Rate) -> Run:

@@ -12,6 +12,7 @@ from selfmotion.costs import Cost, JointVelocity, Samples, weight_matrix
 from selfmotion.motion import Sampling
 from selfmotion.optimise import Status
 from selfmotion.plans import Plan, Problem
+from selfmotion.robot import null_space
 
 # The pose feedback removes what collocation lets in at the rate K e; K times the duration.
 _FEEDBACK = 5.0
@@ -65,7 +66,7 @@ class LagrangianOptimum:
         from scipy.integrate import solve_bvp
 
         first, last = problem.path.pose(0.0), problem.path.pose(problem.path.duration)
-        if self.cyclic and max(problem.rows.miss(first, last)) > _CLOSED:
+        if self.cyclic and max(problem.task.miss(first, last)) > _CLOSED:
             raise ProblemError("cyclic Lagrangian optimum: the path does not end where it begins")
         flow = _Flow(problem)
         t = np.linspace(0.0, problem.path.duration, _MESH)
@@ -89,8 +90,8 @@ class LagrangianOptimum:
 
     def _end_conditions(self, problem: Problem, flow: "_Flow") -> Callable[[Array, Array], Array]:
         start, n = start_of(problem), flow.n
-        rows = problem.robot.task_jacobian(start, problem.rows)
-        null = np.linalg.svd(rows)[2][len(rows) :]
+        rows = problem.robot.task_jacobian(start, problem.task)
+        null = null_space(rows).T
 
         def conditions(first: Array, last: Array) -> Array:
             if self.cyclic:
@@ -139,7 +140,7 @@ class _Flow:
         self.jacobian_evaluations += len(t)
         problem = self._problem
         moments = Sampling.trapezoidal(t)
-        return Samples.along(problem.robot, problem.rows, moments, q, np.zeros_like(q))
+        return Samples.along(problem.robot, problem.task, moments, q, np.zeros_like(q))
 
     def _hamilton(self, samples: Samples, p: Array) -> tuple[Array, Array]:
         """Return q̇ and ṗ, (K, n) each."""
@@ -152,11 +153,11 @@ class _Flow:
         multipliers = np.linalg.solve(jacobian @ inverse @ transpose, wanted[:, :, None])[:, :, 0]
         qd = np.einsum("kmn,km->kn", jacobian, multipliers) @ inverse - free
         pd = samples.contract(multipliers[:, :, None] * qd[:, None, :])
-        if problem.rows.tool_axes:
+        if problem.task.tool_axes:
             # ẋ in tool axes turns with the tool: λᵀ ∂(Rᵀω)/∂q = λᵀRᵀ[ω]× J_ω.
             world = np.zeros_like(omega)
-            angular = problem.rows.rows >= 3
-            world[:, problem.rows.rows[angular] - 3] = multipliers[:, angular]
+            angular = problem.task.rows >= 3
+            world[:, problem.task.rows[angular] - 3] = multipliers[:, angular]
             world = np.einsum("kij,kj->ki", samples.rotation, world)
             pd -= np.einsum("ki,kin->kn", np.cross(world, omega), samples.jacobian[:, 3:])
         for cost in problem.costs:
@@ -170,7 +171,7 @@ class _Flow:
         """Return ẋ + K e (K, m), and the path's angular velocity (K, 3)."""
         import pinocchio as pin
 
-        task = self._problem.rows
+        task = self._problem.task
         target = self._problem.path.samples(samples.t)
         command = np.empty((len(samples.t), task.dimension))
         for k, twist in enumerate(target.twist):
@@ -192,7 +193,7 @@ def _velocity_weight(problem: Problem) -> Array:
     weight = np.zeros((n, n))
     q = start_of(problem)[None]
     moment = Sampling.trapezoidal(t)
-    at_rest = Samples.along(problem.robot, problem.rows, moment, q, np.zeros((1, n)))
+    at_rest = Samples.along(problem.robot, problem.task, moment, q, np.zeros((1, n)))
     for cost in problem.costs:
         if isinstance(cost, JointVelocity):
             weight += weight_matrix(np.asarray(cost.weight), n)

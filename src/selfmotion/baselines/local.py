@@ -56,7 +56,7 @@ class DampedLeastSquares:
     def solve(self, problem: Problem) -> Motion:
         """See `Method.solve`."""
         feedback = PoseFeedback(problem)
-        identity = np.eye(problem.rows.dimension)
+        identity = np.eye(problem.task.dimension)
 
         def rate(t: float, q: Array) -> Array:
             here = feedback(t, q)
@@ -165,7 +165,7 @@ def pose_gradient(problem: Problem, criterion: Cost, t: float, q: Array) -> Arra
     """Return ∂h/∂q (n,) of a cost of the pose at one configuration."""
     moment = Sampling.trapezoidal(np.array([t]))
     rest = np.zeros((1, len(q)))
-    samples = Samples.along(problem.robot, problem.rows, moment, q[None], rest)
+    samples = Samples.along(problem.robot, problem.task, moment, q[None], rest)
     partials = criterion.gradient(samples)
     if partials.q is None:
         raise ProblemError(f"cost '{criterion.name}' does not depend on the pose")

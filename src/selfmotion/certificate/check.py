@@ -70,6 +70,7 @@ def certify(
         smallest_singular_value=_extreme(singular, t, robot.tool, np.argmin),
         closure=float(np.abs(trajectory.q[-1] - trajectory.q[0]).max()),
         samples=len(t),
+        tolerance=tolerance,
         findings=findings,
         failures=(
             *_cut_short(ending, path, trajectory),

@@ -34,6 +34,10 @@ def deviation_from(
 
 
 def _kinematics(robot: RobotModel, q: Array) -> tuple[Array, Array, Array]:
+    """Return rotations, translations and Jacobians of the tool at q (K, n).
+
+    By calls of its own: what checks a motion must not share a fault with what made it.
+    """
     model, data, tool = robot.model, robot.model.createData(), robot.tool_id
     rotation, translation = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
     jacobian = np.empty((len(q), 6, robot.dof))

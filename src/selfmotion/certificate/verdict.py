@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from selfmotion.certificate.findings import DampedStretch, Extreme, Finding
+from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import LIMIT_NAMES
 
 
@@ -24,6 +24,8 @@ class Certificate:
         max |q(T) - q(0)| [rad or m].
     samples : int
         Number of times looked at.
+    tolerance : Tolerance
+        What the path may be missed by.
     findings : tuple of Finding
         What each requirement found, the arm's own limits first.
     failures : tuple of str
@@ -40,6 +42,7 @@ class Certificate:
     smallest_singular_value: Extreme
     closure: float
     samples: int
+    tolerance: Tolerance
     findings: tuple[Finding, ...]
     failures: tuple[str, ...]
     deviations: tuple[Extreme, ...] = ()
@@ -64,6 +67,13 @@ class Certificate:
     def clearance(self) -> Extreme | None:
         """Smallest distance between bodies [m], with their names; None where not asked for."""
         return self._worst("clearance", min)
+
+    @property
+    def on_path(self) -> bool:
+        """Whether the tool follows the path within the tolerance, beyond what is relaxed."""
+        # Written so that NaN fails.
+        position = self.position_error.value <= self.tolerance.position
+        return position and self.rotation_error.value <= self.tolerance.rotation
 
     @property
     def verified(self) -> bool:

@@ -190,7 +190,7 @@ def demo(
 ) -> None:
     """Plan, check and replay the paper's planar arm and a Panda on a circle."""
     panda = sm.load_robot("panda")
-    start = np.array([0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4])
+    start = np.array(sm.NAMED_ARMS["panda"].home)
     circle = sm.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     problems = {
         "planar": sm.sample_problem(),

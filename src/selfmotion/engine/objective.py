@@ -119,7 +119,7 @@ class Objective:
             The same, with the multipliers of a coarser grid, in place of `constraints`.
         counts : Counts, optional
         """
-        robot, task, grid = problem.robot, problem.rows, grid or still.grid
+        robot, task, grid = problem.robot, problem.task, grid or still.grid
         t = grid.stage_times
         frame = still.frame(t)
         table = NullMotionTable(

@@ -67,11 +67,11 @@ class StillMotion:
     ) -> "StillMotion":
         """Integrate from a start configuration (n,) on one grid."""
         rollout = Rollout(
-            problem.robot, problem.path, problem.rows, grid, damping=problem.damping_law
+            problem.robot, problem.path, problem.task, grid, damping=problem.damping_law
         )
         idle = np.zeros((len(grid.stage_times), problem.robot.dof))
         broken = rollout.run(configuration, idle if guide is None else guide(grid.stage_times))
-        samples, rows = rollout.samples(), problem.rows.rows
+        samples, rows = rollout.samples(), problem.task.rows
         target = problem.path.samples(grid.nodes).translation
         extent = max(float(np.ptp(target, axis=0).max()), _SHORTEST)
         drift = rollout.drift[:, rows] / np.where(rows < 3, extent, 1.0)
@@ -119,7 +119,7 @@ class StillMotion:
         problem = self.problem
         if problem.null_motion.space == "joint":
             return None
-        if problem.robot.redundancy(problem.rows) == 0:
+        if problem.robot.redundancy(problem.task) == 0:
             return np.zeros((len(t), problem.robot.dof, 0))
         return TransportedFrame(self.grid.nodes, self.jacobians)(t)
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from selfmotion.basics import Array, ProblemError, Saved
+from selfmotion.robot import null_space
 
 
 class NullMotion(Saved, ABC, family="null motion"):
@@ -193,10 +194,8 @@ class TransportedFrame:
 
 def transport(jacobians: Array) -> Array:
     """Return orthonormal null-space bases of `jacobians` (N, m, n) along a motion, (N, n, r)."""
-    m, n = jacobians.shape[1:]
-    _, _, right = np.linalg.svd(jacobians)
-    null = right[:, m:, :].transpose(0, 2, 1)
-    bases = np.empty((len(jacobians), n, n - m))
+    null = null_space(jacobians)
+    bases = np.empty_like(null)
     bases[0] = null[0]
     for k in range(1, len(jacobians)):
         u, _, v = np.linalg.svd(null[k].T @ bases[k - 1])

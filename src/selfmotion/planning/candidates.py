@@ -97,11 +97,11 @@ class Candidates:
     def _search(self) -> None:
         problem, search = self._problem, self._settings
         start = problem.given_start
-        can_search = problem.robot.redundancy(problem.rows) == 1
+        can_search = problem.robot.redundancy(problem.task) == 1
         if search.compare and not can_search:
             raise ProblemError(
                 f"compare: the global search needs redundancy 1, but {problem.robot.name} has "
-                f"{problem.robot.redundancy(problem.rows)} for task '{problem.rows.value}'"
+                f"{problem.robot.redundancy(problem.task)} for task '{problem.task.value}'"
             )
         starts = start is None and (search.mode != "global" or not can_search)
         rng = np.random.default_rng(search.rng)
@@ -135,7 +135,7 @@ class Candidates:
 
     def _try_candidates(self, starts: int, finalists: int, rng: np.random.Generator) -> None:
         problem = self._problem
-        candidates = start_candidates(problem.robot, problem.path, problem.rows, starts, rng)
+        candidates = start_candidates(problem.robot, problem.path, problem.task, starts, rng)
         self._waiting = sessions = []
         for number, candidate in enumerate(candidates, 1):
             self._progress("start", number, len(candidates))

@@ -22,14 +22,11 @@ class Finished:
     ----------
     motion, still : Evaluation
     certificate : Certificate
-    tolerance : Tolerance
-        What it was checked with.
     """
 
     motion: Evaluation
     still: Evaluation
     certificate: Certificate
-    tolerance: Tolerance
 
 
 def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress) -> Finished:
@@ -46,13 +43,12 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
                 break
             trajectory = finished.motion.trajectory
             # What damping costs stays on any grid: there, the motion stands when the tool does.
-            if coarse is not None and within(
-                _largest_change(problem, coarse, trajectory), tolerance
-            ):
+            if coarse is not None and _same(problem, coarse, trajectory, tolerance):
                 break
             coarse = trajectory if finished.motion.damped else None
             # What is out of reach is so on any grid.
-            misses.append(sum(path_errors(finished.certificate)))
+            check = finished.certificate
+            misses.append(check.position_error.value + check.rotation_error.value)
             if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
                 break
             session.refine()
@@ -63,34 +59,24 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
     return finished or _check(problem, session, tolerance, part.ending)
 
 
-def within(errors: tuple[float, float], tolerance: Tolerance) -> bool:
-    """Return whether errors [m, rad] are within a tolerance."""
-    return errors[0] <= tolerance.position and errors[1] <= tolerance.rotation
-
-
-def path_errors(certificate: Certificate) -> tuple[float, float]:
-    """Return the largest errors of position [m] and rotation [rad]."""
-    return certificate.position_error.value, certificate.rotation_error.value
-
-
 def _stands(finished: Finished, session: Session) -> bool:
     """Whether a finer grid is not needed."""
     # Accelerations of the cubics come near those of the motion as the square of the step.
     ratio = finished.certificate.acceleration_ratio
     rough = ratio is not None and ratio.value > 1.0 and not session.violations
-    return within(path_errors(finished.certificate), finished.tolerance) and not rough
+    return finished.certificate.on_path and not rough
 
 
-def _largest_change(problem: Problem, coarse: Trajectory, fine: Trajectory) -> tuple[float, float]:
-    """Return how far apart two motions put the tool in the prescribed rows, at most [m, rad]."""
-    robot, task = problem.robot, problem.rows
+def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tolerance) -> bool:
+    """Whether two motions put the tool in the same place in the prescribed rows."""
+    robot, task = problem.robot, problem.task
     pairs = zip(coarse(fine.t), fine.q, strict=True)
     misses = np.array([task.miss(robot.pose(first), robot.pose(second)) for first, second in pairs])
     position, rotation = misses.max(axis=0)
-    return float(position), float(rotation)
+    return bool(position <= tolerance.position and rotation <= tolerance.rotation)
 
 
 def _check(problem: Problem, session: Session, tolerance: Tolerance, ending: str) -> Finished:
     motion = session.motion()
     certificate = problem.certify(motion.trajectory, tolerance, ending)
-    return Finished(motion, session.still_motion(), certificate, tolerance)
+    return Finished(motion, session.still_motion(), certificate)

@@ -210,7 +210,7 @@ class _Push:
 
 def _pushes(problem: Problem, start: Array) -> list[Guide]:
     """Return null motions to either side: x = 0 may keep to a plane that has no way on."""
-    basis = null_basis(problem.robot, problem.rows, start) / problem.path.duration
+    basis = null_basis(problem.robot, problem.task, start) / problem.path.duration
     angles = [sign * angle for angle in _PUSHES for sign in (1.0, -1.0)]
     return [_Push(angle * direction) for direction in basis.T for angle in angles]
 

@@ -18,7 +18,7 @@ from selfmotion.certificate import Tolerance
 from selfmotion.engine import Counts
 from selfmotion.optimise import Callback, Optimizer, QuasiNewton, Status
 from selfmotion.planning.candidates import Candidates
-from selfmotion.planning.finish import Finished, finish, path_errors, within
+from selfmotion.planning.finish import Finished, finish
 from selfmotion.planning.largest_part import Part, largest_part
 from selfmotion.planning.session import Effort, Session
 from selfmotion.planning.settings import Search
@@ -152,9 +152,8 @@ class _Run:
         check = finished.certificate
         no_more = best.cut_short or best.status is Status.MAX_EVALUATIONS
         out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
-        held = within(path_errors(check), self._tolerance)
         # With damping the motion goes on where the path cannot be followed: so it was asked for.
-        return (held and not out_of_limits) or no_more or self._problem.damping is not None
+        return (check.on_path and not out_of_limits) or no_more or self._problem.damping is not None
 
     def _reachable(self, suspect: float) -> Reach:
         self._progress("reach", 1, 1)
@@ -215,7 +214,6 @@ class _Run:
             coefficients=read_only(session.coefficients),
             report=report,
             certificate=finished.certificate,
-            tolerance=self._tolerance,
         )
 
     def _gap(self, rival_cost: float | None, finished: Finished) -> Gap | None:

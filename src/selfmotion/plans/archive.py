@@ -38,7 +38,6 @@ class Archive(NamedTuple):
     coefficients: Array
     report: Report
     certificate: Certificate
-    tolerance: Tolerance
 
     def write(self, file: FilePath) -> None:
         """Write the file, atomically."""
@@ -50,7 +49,6 @@ class Archive(NamedTuple):
             "report": _report_to_dict(self.report),
             "history": [_without(iteration, "x") for iteration in history],
             "certificate": dataclasses.asdict(self.certificate),
-            "tolerance": dataclasses.asdict(self.tolerance),
         }
         arrays = {
             "t": self.trajectory.t,
@@ -102,7 +100,7 @@ def _problem_to_dict(problem: Problem) -> dict[str, Any]:
             "locked": dict(robot.locked),
         },
         "path": problem.path.to_dict(),
-        "task": problem.rows.value,
+        "task": problem.task.value,
         "start": None if start is None else start.tolist(),
         "null_motion": problem.null_motion.to_dict(),
         "costs": [cost.to_dict() for cost in problem.costs],
@@ -150,10 +148,13 @@ def _report_to_dict(report: Report) -> dict[str, Any]:
 def _certificate_from_dict(values: Mapping[str, Any]) -> Certificate:
     several = {"findings": Finding, "deviations": Extreme, "damped": DampedStretch}
     restored: dict[str, Any] = {
-        key: Extreme(**value) if isinstance(value, dict) else value for key, value in values.items()
+        key: Extreme(**value) if isinstance(value, dict) else value
+        for key, value in values.items()
+        if key != "tolerance"
     }
     for key, kind in several.items():
         restored[key] = tuple(kind(**item) for item in restored[key])
+    restored["tolerance"] = Tolerance(**values["tolerance"])
     return Certificate(**{**restored, "failures": tuple(restored["failures"])})
 
 
@@ -175,5 +176,4 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archiv
         coefficients=arrays["coefficients"],
         report=Report(history=history, **report),
         certificate=_certificate_from_dict(description["certificate"]),
-        tolerance=Tolerance(**description["tolerance"]),
     )

@@ -1,6 +1,6 @@
 """A finished plan: the motion, the problem it solves, how it was found, and what the check says."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
@@ -47,8 +47,6 @@ class Plan:
         x, the null motion's coefficients.
     report : Report
     certificate : Certificate
-    tolerance : Tolerance
-        What the motion may miss the path by.
     """
 
     views: ClassVar[Views | None] = None
@@ -59,7 +57,6 @@ class Plan:
     coefficients: Array
     report: Report
     certificate: Certificate
-    tolerance: Tolerance = field(default_factory=Tolerance)
 
     @property
     def robot(self) -> RobotModel:
@@ -74,7 +71,12 @@ class Plan:
     @property
     def task(self) -> Task:
         """The rows of it that are prescribed."""
-        return self.problem.rows
+        return self.problem.task
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """What the motion may miss the path by."""
+        return self.certificate.tolerance
 
     @property
     def requirements(self) -> tuple[Requirement, ...]:
@@ -116,7 +118,6 @@ class Plan:
             self.coefficients,
             self.report,
             self.certificate,
-            self.tolerance,
         ).write(FilePath(file))
 
     def to_csv(self, file: str | FilePath) -> None:

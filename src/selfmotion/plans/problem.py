@@ -29,6 +29,17 @@ from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 _ON_PATH = 1e-7
 
 
+class _TaskField:
+    """A task that may be given by its name."""
+
+    def __get__(self, problem: Any, owner: Any = None) -> Task:
+        # Asked of the class, it is the default.
+        return Task.POSE if problem is None else problem.__dict__["_task"]
+
+    def __set__(self, problem: Any, task: Task | str) -> None:
+        problem.__dict__["_task"] = Task.of(task)
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """A planning problem.
@@ -72,7 +83,7 @@ class Problem:
 
     robot: RobotModel
     path: Path
-    task: Task | str = Task.POSE
+    task: _TaskField = _TaskField()  # a descriptor, meant to be shared
     start: npt.ArrayLike | str | None = None
     null_motion: NullMotion = field(default_factory=PolynomialNullMotion)
     costs: Sequence[Cost] = field(default_factory=lambda: (JointVelocity(),))
@@ -88,10 +99,9 @@ class Problem:
                 raise ProblemError(
                     f"{name} is {getattr(self, name)!r}, expected a {_EXAMPLES[name]}"
                 )
-        object.__setattr__(self, "task", Task.of(self.task))
         for name, each in _SEQUENCES.items():
             object.__setattr__(self, name, _sequence(getattr(self, name), name, each))
-        check_relaxations(self.relaxations, self.path, self.rows)
+        check_relaxations(self.relaxations, self.path, self.task)
         if isinstance(self.start, str):
             if self.start != "free":
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
@@ -99,16 +109,13 @@ class Problem:
         self._check_rank()
         self._check_costs()
         for item in self.constraints:
-            item.check(self.robot, self.path, self.rows)
+            item.check(self.robot, self.path, self.task)
+        # What nothing judges is refused now, not when the motion is finished.
+        self.requirements  # noqa: B018
         if self.start is not None:
             start = read_only(self.robot.configuration(self.start))
             object.__setattr__(self, "start", start)
             self._check_start(start)
-
-    @property
-    def rows(self) -> Task:
-        """The task."""
-        return Task.of(self.task)
 
     @property
     def given_start(self) -> Array | None:
@@ -122,21 +129,21 @@ class Problem:
             return tuple(self.costs)
         rate = feedback_rate(self.path.duration)
         weight = self.damping.path_weight * (rate / self.damping_law.threshold) ** 2
-        return (*self.costs, PathError(float(weight), self.rows.dimension))
+        return (*self.costs, PathError(float(weight), self.task.dimension))
 
     def bind_constraints(self, start: Array, end: Array) -> tuple[BoundConstraint, ...]:
         """Return the constraints for this arm, given first and last configuration, (n,) each.
 
         Those of the motion that the optimisation begins with.
         """
-        return tuple(item.bind(self.robot, self.rows, start, end) for item in self.constraints)
+        return tuple(item.bind(self.robot, self.task, start, end) for item in self.constraints)
 
     @cached_property
     def damping_law(self) -> DampingLaw | None:
         """The damping in numbers [m, rad] for this arm and task."""
         if self.damping is None:
             return None
-        best = self.robot.task_jacobian(self.robot.dexterous_configuration(self.rows), self.rows)
+        best = self.robot.task_jacobian(self.robot.dexterous_configuration(self.task), self.task)
         return self.damping.law(float(np.linalg.svd(best, compute_uv=False)[-1]))
 
     @cached_property
@@ -170,7 +177,7 @@ class Problem:
         return certify(
             self.robot,
             self.path,
-            self.rows,
+            self.task,
             trajectory,
             tolerance,
             self.requirements,
@@ -201,7 +208,7 @@ class Problem:
         return [item.pins for item in self.constraints]
 
     def _check_rank(self) -> None:
-        robot, task = self.robot, self.rows
+        robot, task = self.robot, self.task
         redundancy = robot.redundancy(task)
         if not robot.can_follow(task):
             raise ProblemError(
@@ -227,11 +234,11 @@ class Problem:
         if twice:
             raise ProblemError(f"two costs are called '{twice[0]}'; give one another name=")
         for cost in self.costs:
-            cost.check(self.robot, self.rows)
+            cost.check(self.robot, self.task)
 
     def _check_start(self, start: Array) -> None:
         pose = self.path.pose(0.0)
-        position, rotation = self.rows.miss(pose, self.robot.pose(start))
+        position, rotation = self.task.miss(pose, self.robot.pose(start))
         if max(position, rotation) > _ON_PATH:
             raise StartError(
                 f"{self.robot.name}: the start configuration puts '{self.robot.tool}' "

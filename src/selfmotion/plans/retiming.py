@@ -89,8 +89,7 @@ def retime(
     kept = reduce(and_, (item.envelope(robot) for item in wanted), asked)
     for density in _DENSITIES:
         result = _retimed(plan, wanted, kept, density)
-        errors = result.certificate.position_error.value, result.certificate.rotation_error.value
-        if errors[0] <= plan.tolerance.position and errors[1] <= plan.tolerance.rotation:
+        if result.certificate.on_path:
             break
     return result
 

@@ -1,16 +1,19 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
+from selfmotion.robot.kinematics import ToolKinematics
 from selfmotion.robot.loading import NAMED_ARMS, load_robot, rebuild_robot
 from selfmotion.robot.model import RobotModel
-from selfmotion.robot.null_space import null_basis
+from selfmotion.robot.null_space import null_basis, null_space
 from selfmotion.robot.urdf import Urdf, UrdfJoint
 
 __all__ = [
     "NAMED_ARMS",
     "RobotModel",
+    "ToolKinematics",
     "Urdf",
     "UrdfJoint",
     "load_robot",
     "null_basis",
+    "null_space",
     "rebuild_robot",
 ]

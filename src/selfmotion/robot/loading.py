@@ -25,15 +25,22 @@ class NamedArm:
         File below the folder of example-robot-data, or of this package for our own arms.
     tool : str
         The usual tool frame.
+    home : tuple of float or None
+        The configuration that its maker calls ready [rad], where there is one.
     """
 
     urdf: str
     tool: str
+    home: tuple[float, ...] | None = None
 
 
 NAMED_ARMS: Mapping[str, NamedArm] = {
     "planar_3r": NamedArm("planar_3r.urdf", "tool"),
-    "panda": NamedArm("panda_description/urdf/panda.urdf", "panda_hand_tcp"),
+    "panda": NamedArm(
+        "panda_description/urdf/panda.urdf",
+        "panda_hand_tcp",
+        home=(0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4),
+    ),
     "xarm7": NamedArm("xarm_description/urdf/xarm7.urdf", "link_eef"),
     "baxter": NamedArm("baxter_description/urdf/baxter.urdf", "left_gripper"),
     "tiago": NamedArm("tiago_description/robots/tiago.urdf", "arm_tool_link"),
@@ -137,7 +144,6 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
         model=model,
         tool_id=model.getFrameId(tool, pin.FrameType.BODY),
         urdf=urdf,
-        _data=model.createData(),
     )
 
 

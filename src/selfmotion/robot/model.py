@@ -1,5 +1,6 @@
 """The arm as a chain with one coordinate per joint, on Pinocchio's model of it."""
 
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,10 +10,9 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion.basics import Array, InverseKinematicsError, RobotError
+from selfmotion.robot.kinematics import ToolKinematics
 from selfmotion.robot.urdf import Urdf
 from selfmotion.task import Task
-
-_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,14 @@ class RobotModel:
     model: Any = field(repr=False)
     tool_id: int = field(repr=False)
     urdf: Urdf = field(repr=False)
-    _data: Any = field(repr=False)
+    _per_thread: threading.local = field(default_factory=threading.local, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in self.__dict__.items() if key != "_per_thread"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # What belongs to a thread does not travel to another process.
+        self.__dict__.update(state, _per_thread=threading.local())
 
     @property
     def dof(self) -> int:
@@ -80,35 +87,42 @@ class RobotModel:
             raise RobotError(f"joint '{self.joint_names[bad[0]]}' is {array[bad[0]]}, not finite")
         return array
 
+    @property
+    def _kinematics(self) -> ToolKinematics:
+        """That of this thread alone: a robot may be shared by threads."""
+        own: ToolKinematics | None = getattr(self._per_thread, "kinematics", None)
+        if own is None:
+            own = self._per_thread.kinematics = self.tool_kinematics()
+        return own
+
+    def tool_kinematics(self) -> ToolKinematics:
+        """Return the kinematics of the tool with data of their own, for whoever asks often."""
+        return ToolKinematics(self.model, self.tool_id)
+
     def pose(self, q: npt.ArrayLike) -> pin.SE3:
         """Return the tool's pose at `q`."""
-        pin.forwardKinematics(self.model, self._data, self.configuration(q))
-        return pin.SE3(pin.updateFramePlacement(self.model, self._data, self.tool_id))
+        return self._kinematics.place(self.configuration(q))
 
     def jacobian(self, q: npt.ArrayLike) -> Array:
         """Return the tool's Jacobian at `q`, (6, n): rows [v, ω] in world axes.
 
         v is the velocity of the tool frame's origin (Pinocchio's LOCAL_WORLD_ALIGNED).
         """
-        pin.computeJointJacobians(self.model, self._data, self.configuration(q))
-        jacobian: Array = pin.getFrameJacobian(self.model, self._data, self.tool_id, _AXES)
-        return jacobian
+        return self._kinematics.at(self.configuration(q))
 
     def kinematics(self, q: Array) -> tuple[Array, Array, Array]:
         """Return the Jacobian (6, n), rotation (3, 3) and translation (3,) of the tool at `q`.
 
         One pass for all three, and no check of `q`: for callers that ask thousands of times.
         """
-        pin.computeJointJacobians(self.model, self._data, q)
-        pose = pin.updateFramePlacement(self.model, self._data, self.tool_id)
-        jacobian: Array = pin.getFrameJacobian(self.model, self._data, self.tool_id, _AXES)
-        return jacobian, pose.rotation.copy(), pose.translation.copy()
+        here = self._kinematics
+        return here.at(q), here.rotation.copy(), here.translation.copy()
 
     def task_jacobian(self, q: npt.ArrayLike, task: Task) -> Array:
         """Return the prescribed rows of the Jacobian at `q`, (m, n)."""
-        jacobian = self.jacobian(q)
-        pose = pin.updateFramePlacement(self.model, self._data, self.tool_id)
-        return task.select(jacobian, pose.rotation)
+        here = self._kinematics
+        jacobian = here.at(self.configuration(q))
+        return task.select(jacobian, here.rotation)
 
     def redundancy(self, task: Task | str) -> int:
         """Return n - rank J of the task at generic configurations (0: no self-motion)."""

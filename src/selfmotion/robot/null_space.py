@@ -7,7 +7,16 @@ from selfmotion.robot.model import RobotModel
 from selfmotion.task import Task
 
 
+def null_space(jacobians: Array) -> Array:
+    """Return orthonormal null-space bases of matrices (…, m, n) of rank m ≤ n, (…, n, n - m).
+
+    The last right singular vectors; their signs and order are arbitrary.
+    """
+    rows = jacobians.shape[-2]
+    _, _, right = np.linalg.svd(jacobians)
+    return np.asarray(np.swapaxes(right[..., rows:, :], -1, -2))
+
+
 def null_basis(robot: RobotModel, task: Task, q: Array) -> Array:
     """Return an orthonormal basis of the null space of the task Jacobian at q, (n, r)."""
-    _, _, right = np.linalg.svd(robot.task_jacobian(q, task))
-    return np.asarray(right[task.dimension :].T)
+    return null_space(robot.task_jacobian(q, task))

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array, Progress, read_only, silent
 from selfmotion.kernels import angle_kind
@@ -13,8 +12,6 @@ from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.search import kernels
 from selfmotion.task import Task
-
-_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 # Newton's method from a sample of the neighbouring waypoint, and from anywhere.
 _NEAR_STEPS, _FAR_STEPS = 8, 40
@@ -126,10 +123,7 @@ class SelfMotion:
         self.revolute = np.array([kind != "prismatic" for kind in kinds])
         self._rows = task.rows
         self._kind = angle_kind(task.rows, task.tool_axes)
-        self._data = robot.model.createData()
-        # Views of Pinocchio's own memory: each placement of the frame refreshes them.
-        pose = self._data.oMf[robot.tool_id]
-        self._rotation, self._translation = pose.rotation, pose.translation
+        self._tool = robot.tool_kinematics()
         # Any direction that is not a row of the Jacobian gives the tangent by projection.
         self._direction = np.random.default_rng(0).normal(size=robot.dof)
 
@@ -145,16 +139,14 @@ class SelfMotion:
             Whether q is any configuration instead of one near the solution.
         """
         q, unused = q.copy(), self._direction.copy()
-        model, data, tool = self.robot.model, self._data, self.robot.tool_id
+        tool = self._tool
         for _ in range(_FAR_STEPS if far else _NEAR_STEPS):
-            pin.computeJointJacobians(model, data, q)
-            jacobian = pin.getFrameJacobian(model, data, tool, _AXES)
-            pin.updateFramePlacement(model, data, tool)
+            jacobian = tool.at(q)
             length = kernels.correct(
                 q,
                 jacobian,
-                self._rotation,
-                self._translation,
+                tool.rotation,
+                tool.translation,
                 target,
                 self._rows,
                 self._kind,
@@ -169,11 +161,8 @@ class SelfMotion:
 
     def tangent(self, q: Array, target: Array) -> Array | None:
         """Return a unit null vector of J at q, a solution; None where q is singular."""
-        model, data, tool = self.robot.model, self._data, self.robot.tool_id
-        pin.computeJointJacobians(model, data, q)
-        jacobian = pin.getFrameJacobian(model, data, tool, _AXES)
-        pin.updateFramePlacement(model, data, tool)
-        tangent, place = self._direction.copy(), (self._rotation, self._translation)
+        jacobian = self._tool.at(q)
+        tangent, place = self._direction.copy(), (self._tool.rotation, self._tool.translation)
         length = kernels.correct(
             q.copy(), jacobian, *place, target, self._rows, self._kind, tangent, _LONGEST
         )
@@ -212,19 +201,16 @@ class SelfMotion:
 
     def _walk(self, start: Array, tangent: Array, target: Array) -> tuple[Array, bool]:
         """Return the samples (K, n) from `start` on, and whether they lead back to it."""
-        model, data, tool = self.robot.model, self._data, self.robot.tool_id
-        jacobians, frame_jacobian = pin.computeJointJacobians, pin.getFrameJacobian
-        place, trace, rows, kind = pin.updateFramePlacement, kernels.trace, self._rows, self._kind
-        rotation, translation, revolute = self._rotation, self._translation, self.revolute
+        jacobian_at, trace, rows, kind = self._tool.at, kernels.trace, self._rows, self._kind
+        rotation, translation = self._tool.rotation, self._tool.translation
+        revolute = self.revolute
         samples = np.empty((_MOST_SAMPLES, self.robot.dof))
         samples[0] = start
         tangents = np.array([tangent, tangent, tangent])
         state = np.array([self.spacing, 0.0, 1.0, self.spacing])
         q, code = start + self.spacing * tangent, kernels.GOING
         while code == kernels.GOING:
-            jacobians(model, data, q)
-            jacobian = frame_jacobian(model, data, tool, _AXES)
-            place(model, data, tool)
+            jacobian = jacobian_at(q)
             code = trace(
                 q,
                 jacobian,

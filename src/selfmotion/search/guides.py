@@ -61,7 +61,7 @@ def guides(
     sequences = best_sequences(
         robot,
         path,
-        problem.rows,
+        problem.task,
         t,
         lower=asked.lower,
         upper=asked.upper,

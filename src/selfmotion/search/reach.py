@@ -45,7 +45,7 @@ def reachable(problem: Problem, suspect: float, starts: int, rng: np.random.Gene
     go on: a pose that nothing leads to is out of reach, as far as can be told. Poses all along the
     path, and more about the time `suspect` [s], where a motion had trouble.
     """
-    robot, path, task = _within_limits(problem), problem.path, problem.rows
+    robot, path, task = _within_limits(problem), problem.path, problem.task
     given = problem.given_start
     first = start_candidates(robot, path, task, starts, rng) if given is None else [given]
     about = np.clip(suspect / path.duration + _ABOUT, 0.0, 1.0)
@@ -97,13 +97,13 @@ def _solutions(
     found = []
     for seed in seeds[:_BRANCHES]:
         try:
-            found.append(robot.inverse_kinematics(pose, problem.rows, seed=seed, attempts=1))
+            found.append(robot.inverse_kinematics(pose, problem.task, seed=seed, attempts=1))
         except InverseKinematicsError:
             continue
     if found:
         return found
     try:
-        return [robot.inverse_kinematics(pose, problem.rows, rng=rng, attempts=_RESTARTS)]
+        return [robot.inverse_kinematics(pose, problem.task, rng=rng, attempts=_RESTARTS)]
     except InverseKinematicsError:
         return []
 
@@ -116,11 +116,11 @@ def _out_of_reach(problem: Problem, robot: RobotModel, time: float, q: Array, be
     misses = []
     for t in beyond:
         try:
-            robot.inverse_kinematics(problem.path.pose(t), problem.rows, seed=q, attempts=1)
+            robot.inverse_kinematics(problem.path.pose(t), problem.task, seed=q, attempts=1)
         except InverseKinematicsError as error:
             misses.append((error.position_miss, error.rotation_miss, float(t)))
     position, rotation, when = max(misses, key=lambda miss: miss[0] + miss[1])
-    turned = f" and {rotation:.2g} rad" if np.any(problem.rows.rows >= 3) else ""
+    turned = f" and {rotation:.2g} rad" if np.any(problem.task.rows >= 3) else ""
     return (
         f"from t = {time:.6g} s on the pose is out of reach{_cause(problem, robot, q)}: the "
         f"nearest configuration found misses it by up to {1e3 * position:.3g} mm{turned}, at "
@@ -130,7 +130,7 @@ def _out_of_reach(problem: Problem, robot: RobotModel, time: float, q: Array, be
 
 def _cause(problem: Problem, robot: RobotModel, q: Array) -> str:
     """Return what keeps the arm from reaching further at q; "" where nothing shows."""
-    task, causes = problem.rows, []
+    task, causes = problem.task, []
     near = np.minimum(q - robot.lower, robot.upper - q) < _AT_LIMIT
     if np.any(near):
         names = ", ".join(f"'{robot.joint_names[k]}'" for k in np.flatnonzero(near))

@@ -19,7 +19,7 @@ from selfmotion.motion import PolynomialNullMotion
 from selfmotion.path import Circle
 from selfmotion.planning import plan
 from selfmotion.plans import Plan, Problem, sample_problem
-from selfmotion.robot import load_robot
+from selfmotion.robot import NAMED_ARMS, load_robot
 from selfmotion.study.context import Context
 from selfmotion.study.results import Claim, Section, Table, Verdict
 
@@ -65,7 +65,7 @@ def section(context: Context) -> Section:
 def panda_circle() -> Problem:
     """Return a Panda on a vertical circle of 0.15 m in 4 s, all six rows prescribed."""
     robot = load_robot("panda")
-    start = np.array([0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4])
+    start = np.array(NAMED_ARMS["panda"].home)
     path = Circle.around(robot.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     costs = (JointVelocity(), InverseManipulability(1e-3))
     return Problem(robot, path, "pose", start, costs=costs)

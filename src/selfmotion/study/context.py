@@ -47,7 +47,7 @@ class PublishedRun:
     def flops(self) -> float:
         """Floating-point operations of the Jacobian evaluations, eq. 4 around them included."""
         problem = self.problem
-        each = flops_per_rate(problem.robot.dof, problem.rows.dimension, 3)
+        each = flops_per_rate(problem.robot.dof, problem.task.dimension, 3)
         return float(self.jacobian_evaluations * each)
 
     @property

@@ -85,7 +85,7 @@ class PublishedFunction:
         qd = np.array([self._rate(t, row, x) for t, row in zip(solution.t, q, strict=True)])
         # Straight lines between the solver's points.
         points = Sampling.trapezoidal(solution.t)
-        return Samples.along(problem.robot, problem.rows, points, q, qd)
+        return Samples.along(problem.robot, problem.task, points, q, qd)
 
     def gradient(self, x: Array) -> Array:
         """Return ∇F(x) by forward differences, n(p + 1) + 1 evaluations (eq. 13)."""
@@ -110,8 +110,8 @@ class PublishedFunction:
         functions = problem.null_motion.functions(np.array([t]), problem.path.duration)
         epsilon = NullMotionTable(functions, None, problem.robot.dof).epsilon(x)[0]
         jacobian, rotation, _ = problem.robot.kinematics(q)
-        rows = problem.rows.select(jacobian, rotation)
-        command = problem.rows.select(problem.path.twist(t)[:, None], rotation)[:, 0]
+        rows = problem.task.select(jacobian, rotation)
+        command = problem.task.select(problem.path.twist(t)[:, None], rotation)[:, 0]
         y = np.linalg.solve(rows @ rows.T, command - rows @ epsilon)
         return np.asarray(rows.T @ y + epsilon)
 
