@@ -108,10 +108,7 @@ class Problem:
             object.__setattr__(self, "start", None)
         self._check_rank()
         self._check_costs()
-        for item in self.constraints:
-            item.check(self.robot, self.path, self.task)
-        # What nothing judges is refused now, not when the motion is finished.
-        self.requirements  # noqa: B018
+        self._check_constraints()
         if self.start is not None:
             start = read_only(self.robot.configuration(self.start))
             object.__setattr__(self, "start", start)
@@ -149,14 +146,7 @@ class Problem:
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:
         """What the certificate has to judge besides the path: one of each constraint."""
-        wanted = tuple(item.requirement(self.robot) for item in self.constraints)
-        for item, found in zip(self.constraints, wanted, strict=True):
-            if not isinstance(found, Requirement):
-                raise ProblemError(
-                    f"constraint {type(item).__name__}: requirement() returned {found!r}, expected "
-                    f"a Requirement; without one nothing judges whether a motion keeps it"
-                )
-        return wanted
+        return tuple(item.requirement(self.robot) for item in self.constraints)
 
     @cached_property
     def asked_envelope(self) -> Envelope:
@@ -235,6 +225,17 @@ class Problem:
             raise ProblemError(f"two costs are called '{twice[0]}'; give one another name=")
         for cost in self.costs:
             cost.check(self.robot, self.task)
+
+    def _check_constraints(self) -> None:
+        for item in self.constraints:
+            item.check(self.robot, self.path, self.task)
+        # Now, not when the motion is finished: without a requirement nothing judges it.
+        for item, found in zip(self.constraints, self.requirements, strict=True):
+            if not isinstance(found, Requirement):
+                raise ProblemError(
+                    f"constraint {type(item).__name__}: requirement() returned {found!r}, expected "
+                    f"a Requirement; without one nothing judges whether a motion keeps it"
+                )
 
     def _check_start(self, start: Array) -> None:
         pose = self.path.pose(0.0)
