@@ -316,13 +316,6 @@ def test_a_notebook_frame_works_in_its_sandbox(browser, tmp_path):
     context.close()
 
 
-def test_simplified_meshes_are_admitted(open_page, files, tmp_path):
-    cut = write_replay(arm_plan("xarm7"), tmp_path / "cut.html", triangle_budget=10_000)
-    row = open_page(cut).locator("#numbers tr", has_text="meshes")
-    assert "simplified from 41096" in row.inner_text()
-    assert open_page(files["planar"]).locator("#numbers tr", has_text="meshes").count() == 0
-
-
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_telephone_shows_it_whole(open_page, files, scheme):
     size = {"width": 390, "height": 780}

@@ -16,7 +16,7 @@ from replay_plans import arm_plan, planar_plan
 from selfmotion.basics.errors import RobotError
 from selfmotion.replay import shapes
 from selfmotion.replay.links import bake
-from selfmotion.replay.meshes import make_mesh, read_meshes, simplify
+from selfmotion.replay.meshes import make_mesh, read_meshes
 from selfmotion.replay.motion import curves, key_frames
 from selfmotion.replay.payload import Payload, face_codes, grid_codes
 from selfmotion.robot import NAMED_ARMS, load_robot
@@ -112,14 +112,6 @@ def test_coal_stands_in_where_trimesh_fails():
     (part,) = read_meshes("/nowhere/base.stl", item.name, item.geometry, 0.5)
     assert len(part.faces) == len(expected.faces)
     np.testing.assert_allclose(np.ptp(part.vertices, axis=0), 2 * np.ptp(expected.vertices, axis=0))
-
-
-def test_simplified_meshes_stay_close():
-    vertices, faces = shapes.tube(np.linspace([0, 0, 0], [1, 0, 0], 200), 0.1, sides=64)
-    mesh = make_mesh(vertices, faces)
-    fewer = simplify(mesh, 50)
-    assert 0 < len(fewer.faces) < 0.3 * len(mesh.faces)
-    np.testing.assert_allclose(np.linalg.norm(fewer.vertices[:, 1:], axis=1), 0.1, atol=1e-5)
 
 
 def test_a_budget_is_kept_and_otherwise_nothing_is_dropped():

@@ -50,11 +50,10 @@ def page_content(
     payload: Payload,
     *,
     triads: int | npt.ArrayLike,
-    triangle_budget: int,
 ) -> Json:
     """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`."""
     robot = plans[0].robot
-    arm = links.bake(robot, payload, triangle_budget)
+    arm = links.bake(robot, payload)
     motions = [_Motion(plan) for plan in plans]
     hull = scene.outline(
         arm,
@@ -82,16 +81,8 @@ def page_content(
             _plan(motion, name, f"/selfmotion/plan{k}", payload, scale, triads, box.radius)
             for k, (motion, name) in enumerate(zip(motions, names, strict=True))
         ],
-        "table": [*table(plans), *_simplified(arm, len(plans))],
+        "table": table(plans),
     }
-
-
-def _simplified(arm: links.Arm, columns: int) -> list[Json]:
-    """Return a row of the table that admits to simplified meshes, where they are."""
-    if arm.drawn == arm.triangles:
-        return []
-    cell = (f"{arm.drawn} triangles", f"simplified from {arm.triangles}")
-    return [{"label": "meshes", "cells": [cell] * columns}]
 
 
 def _scale(motions: list[_Motion]) -> Json:

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, RobotError
 from selfmotion.replay import three
-from selfmotion.replay.meshes import Color, DrawnMesh, read_meshes, simplify
+from selfmotion.replay.meshes import Color, DrawnMesh, read_meshes
 from selfmotion.replay.payload import Json, Payload
 from selfmotion.robot import RobotModel
 
@@ -61,19 +61,13 @@ class Arm:
         Pieces of all links.
     meshes : list of dict
         The meshes they share, packed.
-    triangles : int
-        How many triangles the mesh files have that are used.
-    drawn : int
-        How many of them are in the page: fewer when a budget was exceeded.
     """
 
     visuals: tuple[Visual, ...]
     meshes: list[Json]
-    triangles: int
-    drawn: int
 
 
-def bake(robot: RobotModel, payload: Payload, triangle_budget: int) -> Arm:
+def bake(robot: RobotModel, payload: Payload) -> Arm:
     """Read every visual of `robot` into `payload`, each mesh file once.
 
     Parameters
@@ -82,8 +76,6 @@ def bake(robot: RobotModel, payload: Payload, triangle_budget: int) -> Arm:
         The arm.
     payload : Payload
         Takes the meshes.
-    triangle_budget : int
-        Meshes are simplified only when all files together have more triangles than this.
 
     Raises
     ------
@@ -97,10 +89,6 @@ def bake(robot: RobotModel, payload: Payload, triangle_budget: int) -> Arm:
             files[item.meshPath] = read_meshes(
                 item.meshPath, f"visual '{item.name}'", item.geometry, _scale(item)
             )
-    triangles = sum(len(mesh.faces) for group in files.values() for mesh in group)
-    if triangles > triangle_budget:
-        share = triangle_budget / triangles
-        files = {path: [_within(mesh, share) for mesh in group] for path, group in files.items()}
     meshes: list[Json] = []
     numbers: dict[str, list[int]] = {}
     for path, group in files.items():
@@ -116,16 +104,7 @@ def bake(robot: RobotModel, payload: Payload, triangle_budget: int) -> Arm:
             numbers.get(item.meshPath, []),
         )
     ]
-    drawn = sum(len(mesh.faces) for group in files.values() for mesh in group)
-    return Arm(tuple(visuals), meshes, triangles, drawn)
-
-
-def _within(mesh: DrawnMesh, share: float) -> DrawnMesh:
-    """Simplify until at most `share` of the triangles are left."""
-    cells, most = 256, share * len(mesh.faces)
-    while len(mesh.faces) > most and cells > 2:
-        mesh, cells = simplify(mesh, cells), cells * 3 // 4
-    return mesh
+    return Arm(tuple(visuals), meshes)
 
 
 def _is_mesh(item: Any) -> bool:

@@ -114,26 +114,6 @@ def _split_creases(points: Array, faces: npt.NDArray[np.int64]) -> npt.NDArray[n
     return np.asarray(labels, dtype=np.int64)
 
 
-def simplify(mesh: DrawnMesh, cells: int) -> DrawnMesh:
-    """Merge vertices that share a cell of a grid with `cells` cells along the longest side.
-
-    Triangles that collapse are dropped. For meshes beyond a page's budget only.
-    """
-    vertices = mesh.vertices
-    size = float(np.ptp(vertices, axis=0).max()) / cells
-    _, first, merged = np.unique(
-        np.floor((vertices - mesh.origin) / size).astype(np.int64),
-        axis=0,
-        return_index=True,
-        return_inverse=True,
-    )
-    faces = merged.reshape(-1)[mesh.faces]
-    kept = faces[
-        (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    ]
-    return make_mesh(vertices[first], kept, mesh.color)
-
-
 def read_meshes(
     path: str, owner: str, loaded: Any = None, scale: Array | float = 1.0
 ) -> list[DrawnMesh]:

@@ -20,8 +20,6 @@ from selfmotion.replay.content import page_content
 from selfmotion.replay.facts import describe
 from selfmotion.replay.payload import Payload
 
-# All arms in example-robot-data stay below this; beyond it a page would take seconds to open.
-TRIANGLE_BUDGET = 600_000
 _TRIADS = 7
 _VIEWER = "meshcat/viewer/dist/main.min.js"
 _SCRIPTS = ("payload.js", "stage.js", "plots.js", "page.js")
@@ -33,7 +31,6 @@ def replay_html(
     title: str | None = None,
     labels: Sequence[str] | None = None,
     triads: int | npt.ArrayLike = _TRIADS,
-    triangle_budget: int = TRIANGLE_BUDGET,
 ) -> str:
     """Return a page that replays plans: complete, offline, the same bytes for the same plans.
 
@@ -49,8 +46,6 @@ def replay_html(
         Names of the plans on the switch. Default: A, B, C, …
     triads : int or array of float
         Where the tool's axes are drawn: how many, evenly spaced in time, or at which times [s].
-    triangle_budget : int
-        Meshes are simplified only when the arm has more triangles than this.
 
     Raises
     ------
@@ -67,7 +62,6 @@ def replay_html(
         names,
         payload,
         triads=triads,
-        triangle_budget=triangle_budget,
     )
     heading = title or f"{shown[0].robot.name}, {shown[0].task.value} task"
     sentences = [describe(plan) for plan in shown]
