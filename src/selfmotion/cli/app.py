@@ -2,15 +2,14 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion.basics import Array
-from selfmotion.cli import tables
+from selfmotion.cli import options, tables
 from selfmotion.cli.stage_display import StageDisplay
 
 app = typer.Typer(
@@ -24,16 +23,6 @@ _console = Console(highlight=False)
 _stages = Console(stderr=True, highlight=False)
 
 VERIFIED, NOT_VERIFIED, BAD_INPUT = 0, 1, 2
-
-TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
-Corners = Literal["blend", "stop"]
-Axis = Literal["x", "y", "z"]
-SearchMode = Literal["auto", "local", "global"]
-
-RobotArgument = Annotated[
-    str, typer.Argument(help="Name (see `selfmotion robots`) or path of a .urdf file.")
-]
-PlanArgument = Annotated[Path, typer.Argument(help="A plan saved as .npz.")]
 
 
 def main() -> None:
@@ -51,59 +40,31 @@ def main() -> None:
     epilog="Example: selfmotion plan panda --circle 0.15 --duration 4 --out plan.npz --html a.html"
 )
 def plan(
-    robot: RobotArgument,
-    path: Annotated[
-        Path | None, typer.Option(help="Waypoints: CSV with t,x,y,z,qw,qx,qy,qz (s, m).")
-    ] = None,
-    circle: Annotated[float | None, typer.Option(help="Or a circle of this radius (m).")] = None,
-    line: Annotated[str | None, typer.Option(help="Or a straight line by dx,dy,dz (m).")] = None,
-    normal: Annotated[Axis, typer.Option(help="Axis of the circle.")] = "x",
-    duration: Annotated[float, typer.Option(help="Of circle or line (s).")] = 4.0,
-    corners: Annotated[Corners, typer.Option(help="At kinks of the waypoints.")] = "blend",
-    task: Annotated[TaskName, typer.Option(help="What the path prescribes.")] = "pose",
-    relax: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Rows that may leave the path: ROWS[=BAND][@FROM:TO], rows of x,y,z or of "
-            "rx,ry,rz (tool axes), BAND in m or rad (free without), times in s. Examples: z=0.002, "
-            "rx,ry=0.2 (a cone), rz@1:2.5. Repeatable."
-        ),
-    ] = None,
-    start: Annotated[
-        str | None, typer.Option(help="q1,q2,… (rad or m); default: one that suits the path.")
-    ] = None,
-    tool: Annotated[str | None, typer.Option(help="Tool frame (a link).")] = None,
-    degree: Annotated[int, typer.Option(help="Degree of the null motion's polynomial.")] = 3,
-    mu: Annotated[
-        float, typer.Option(help="Weight of 1/det(JJᵀ), the distance from singular poses.")
-    ] = 0.0,
-    damped: Annotated[
-        bool,
-        typer.Option("--damped", help="Go through singular poses, at the price of the path there."),
-    ] = False,
-    max_evaluations: Annotated[
-        int | None, typer.Option(help="Limit on cost evaluations while optimising.")
-    ] = None,
-    search: Annotated[
-        SearchMode | None,
-        typer.Option(
-            help="Without --start: from many starts (local), over all self-motions (global), or "
-            "the one after the other (auto, the default)."
-        ),
-    ] = None,
-    compare: Annotated[
-        bool, typer.Option("--compare", help="Tell the distance from the global optimum.")
-    ] = False,
-    out: Annotated[
-        list[Path] | None, typer.Option(help="Write the plan (.npz) or its motion (.csv).")
-    ] = None,
-    html: Annotated[Path | None, typer.Option(help="Write a replay to open in a browser.")] = None,
+    robot: options.RobotArgument,
+    path: options.PathOption = None,
+    circle: options.CircleOption = None,
+    line: options.LineOption = None,
+    normal: options.NormalOption = "x",
+    duration: options.DurationOption = 4.0,
+    corners: options.CornersOption = "blend",
+    task: options.TaskOption = "pose",
+    relax: options.RelaxOption = None,
+    start: options.StartOption = None,
+    tool: options.ToolOption = None,
+    degree: options.DegreeOption = 3,
+    mu: options.MuOption = 0.0,
+    damped: options.DampedOption = False,
+    max_evaluations: options.LimitOption = None,
+    search: options.SearchOption = None,
+    compare: options.CompareOption = False,
+    out: options.OutOption = None,
+    html: options.HtmlOption = None,
 ) -> None:
     """Plan a motion, check it, and write it."""
     _check_suffixes(out or [])
     arm = sm.load_robot(robot, tool=tool)
     rows = sm.Task.of(task)
-    configuration = _numbers(start, "--start") if start is not None else None
+    configuration = options.numbers(start, "--start") if start is not None else None
     motion: sm.Path
     if sum(option is not None for option in (path, circle, line)) != 1:
         raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
@@ -118,7 +79,7 @@ def plan(
             motion = sm.Circle.around(pose, circle, duration, normal=axis)
         else:
             end = pose.copy()
-            end.translation = pose.translation + _numbers(line or "", "--line", 3)
+            end.translation = pose.translation + options.numbers(line or "", "--line", 3)
             motion = sm.Line(pose, end, duration)
     costs: list[sm.Cost] = [sm.JointVelocity()]
     if mu != 0.0:
@@ -130,11 +91,11 @@ def plan(
         configuration,
         sm.PolynomialNullMotion(degree),
         tuple(costs),
-        relaxations=[_relaxation(text) for text in relax or []],
+        relaxations=[options.relaxation(text) for text in relax or []],
         damping=sm.Damping() if damped else None,
     )
     result = _plan_with_progress(
-        problem, max_evaluations=max_evaluations, search=_search(search, compare)
+        problem, max_evaluations=max_evaluations, search=options.search_settings(search, compare)
     )
     tables.show(result, _console)
     _write(result, out or [], html)
@@ -142,7 +103,7 @@ def plan(
 
 
 @app.command(epilog="Example: selfmotion check plan.npz")
-def check(plan: PlanArgument) -> None:
+def check(plan: options.PlanArgument) -> None:
     """Re-check a saved plan by forward kinematics."""
     saved = sm.load_plan(plan)
     certificate = saved.check()
@@ -251,36 +212,3 @@ def _check_suffixes(files: list[Path]) -> None:
     for file in files:
         if file.suffix not in (".csv", ".npz"):
             raise sm.FileFormatError(f"{file}: --out writes .npz (the plan) or .csv (its motion)")
-
-
-def _relaxation(text: str) -> sm.Relaxation:
-    rest, _, window = text.partition("@")
-    rows, _, band = rest.partition("=")
-    try:
-        first, last = (float(time) for time in window.split(":")) if window else (0.0, 0.0)
-        return sm.Relaxation(
-            tuple(rows.split(",")),
-            float(band) if band else np.inf,
-            (first, last) if window else None,
-        )
-    except ValueError:
-        raise sm.ProblemError(
-            f"--relax is '{text}', expected ROWS[=BAND][@FROM:TO] like rx,ry=0.2 or rz@1:2.5"
-        ) from None
-
-
-def _search(mode: SearchMode | None, compare: bool) -> sm.Search | None:
-    """Return how to search where the user says something about it."""
-    if mode is None and not compare:
-        return None
-    return sm.Search(mode=mode or "auto", compare=compare)
-
-
-def _numbers(text: str, option: str, count: int | None = None) -> Array:
-    try:
-        numbers = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        raise sm.ProblemError(f"{option} is '{text}', expected numbers like 0,-0.8,1.6") from None
-    if count is not None and len(numbers) != count:
-        raise sm.ProblemError(f"{option} has {len(numbers)} numbers, expected {count}")
-    return numbers

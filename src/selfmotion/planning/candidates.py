@@ -1,7 +1,7 @@
 """The best motion of a problem: from its start, from many starts, from global sequences."""
 
 from collections.abc import Callable, Sequence
-from typing import NoReturn
+from typing import NoReturn, Protocol
 
 import numpy as np
 
@@ -13,8 +13,9 @@ from selfmotion.basics import (
     Progress,
     SelfmotionError,
 )
+from selfmotion.engine import Guide
 from selfmotion.optimise import Status
-from selfmotion.planning.session import Effort, Session
+from selfmotion.planning.session import Session
 from selfmotion.planning.settings import Search
 from selfmotion.plans import Problem
 from selfmotion.search import Reach, SequenceGuide, guides, start_candidates
@@ -23,6 +24,13 @@ from selfmotion.search import Reach, SequenceGuide, guides, start_candidates
 _SECOND_EFFORT = 4
 # Sequences are not worth refining when longer by this factor than one that keeps all constraints.
 _LONGER = 1.25
+
+
+class Begin(Protocol):
+    """Begins the session of a start."""
+
+    def __call__(self, start: Array, *, free: bool, guide: Guide | None = None) -> Session:
+        """Return it; BreakdownError where its motion at x = 0 runs into a singular pose."""
 
 
 class _CutShortError(Exception):
@@ -35,8 +43,8 @@ class Candidates:
     Parameters
     ----------
     problem : Problem
-    effort : Effort
-        What the sessions share.
+    begin : callable
+        Begins the session of a start: `Session.begin` for this problem.
     search : Search
     progress : Progress
     reach : callable
@@ -58,13 +66,13 @@ class Candidates:
     def __init__(
         self,
         problem: Problem,
-        effort: Effort,
+        begin: Begin,
         search: Search,
         progress: Progress,
         reach: Callable[[float], Reach],
     ) -> None:
         self._reach = reach
-        self._problem, self._effort = problem, effort
+        self._problem, self._begin = problem, begin
         self._settings, self._progress = search, progress
         self.best: Session | None = None
         # Complete motions that are not optimised yet.
@@ -118,9 +126,6 @@ class Candidates:
         if starts and self._fell_short and not self.notes:
             more = _SECOND_EFFORT
             self._try_candidates(more * search.starts, more * search.finalists, rng)
-
-    def _begin(self, start: Array, *, free: bool, guide: SequenceGuide | None = None) -> Session:
-        return Session.begin(self._problem, self._effort, start, free=free, guide=guide)
 
     @property
     def _fell_short(self) -> bool:

@@ -2,7 +2,7 @@
 
 import time
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -119,7 +119,8 @@ class _Run:
         self._tolerance, self._progress = tolerance, progress
         self._began = time.perf_counter()
         self._reach = cache(self._reachable)
-        self._candidates = Candidates(problem, effort, search, progress, self._reach)
+        begin = partial(Session.begin, problem, effort)
+        self._candidates = Candidates(problem, begin, search, progress, self._reach)
 
     def plan(self) -> Plan:
         """Return the plan of the whole path, or of the largest part of it."""
