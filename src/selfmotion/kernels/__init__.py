@@ -7,25 +7,26 @@ y = A⁻¹(u - Jε), and eq. 4 in the form that needs one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 
-Column k of J6 is [v_k; ω_k]. On a chain, with ω = 0 for prismatic joints,
-
-    ∂J6_i/∂q_k = [ω_k × v_i; ω_k × ω_i]  for k ≤ i,   [ω_i × v_k; 0]  for k > i,
-
-so that ⟨M, ∂J6/∂q_k⟩ needs two running sums of cross products over the columns of M and J6.
+The kernels that Python calls are `advance`, `pullback`, `sensitivities` and `contract_task`. Each is
+made of small ones, which LLVM inlines. A kernel is compiled for what it is given: damping, or a path
+that moves, costs no one a compilation who has neither.
 """
 
-from selfmotion.kernels.algebra import angle_kind, contract_task
 from selfmotion.kernels.backward import pullback, sensitivities
-from selfmotion.kernels.forward import advance, evaluate, newton_step
-from selfmotion.kernels.table import layout
+from selfmotion.kernels.contraction import contract_task
+from selfmotion.kernels.damping import Law
+from selfmotion.kernels.forward import advance
+from selfmotion.kernels.table import Stage, columns, stages
+from selfmotion.kernels.tool import angle_kind
 
 __all__ = [
+    "Law",
+    "Stage",
     "advance",
     "angle_kind",
+    "columns",
     "contract_task",
-    "evaluate",
-    "layout",
-    "newton_step",
     "pullback",
     "sensitivities",
+    "stages",
 ]

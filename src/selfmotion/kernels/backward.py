@@ -1,141 +1,106 @@
 """All stages of eq. 4 backward: the exact derivative of the discrete scheme."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from selfmotion.arrays import Array
 from selfmotion.jit import kernel
-from selfmotion.kernels.algebra import (
-    NO_ANGLE,
-    POINTING,
-    Rows,
-    add_cross,
-    contract,
-    pull_error,
-    solve_cholesky,
-    unselect,
-)
-from selfmotion.kernels.table import layout
+from selfmotion.kernels.algebra import column, cross, plus, put, respond, vector
+from selfmotion.kernels.contraction import contract
+from selfmotion.kernels.damping import Law, pull_damping
+from selfmotion.kernels.table import Stage, stage
+from selfmotion.kernels.tool import NO_ANGLE, POINTING, Rows, pull_error, unselect
+
+
+class Space(NamedTuple):
+    """What `pull_stage` works in, kept from stage to stage: vectors by their own length.
+
+    z (m,); Sᵀy and Sᵀz (6,); cotangents of the pose error and of the tool's twist (6,); M (6, n).
+    """
+
+    z: Array
+    full_y: Array
+    full_z: Array
+    by_error: Array
+    twist: Array
+    weights: Array
+
+
+@kernel
+def workspace(n: int, m: int) -> Space:
+    """Return the workspace for n joints and m rows."""
+    return Space(
+        np.empty(m), np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty((6, n))
+    )
 
 
 @kernel
 def pull_stage(
     w: Array,
-    row: Array,
+    at: Stage,
     rows: Rows,
     angle_kind: int,
     gain: float,
+    law: Law | None,
     error_bar: Array,
     epsilon_bar: Array,
     q_bar: Array,
     target_bar: Array,
+    space: Space,
 ) -> None:
     """Pull the cotangents w (n,) on q̇ and ē (6,) on the pose error back.
 
-    To ε (set), q (added) and the path (set): z = A⁻¹Jw,  ε̄ = w - Jᵀz,
-    q̄ = ⟨y ε̄ᵀ - z q̇ᵀ, ∂J/∂q⟩ + (zᵀS K + ēᵀ) ∂e/∂q, and where the angular rows are in tool axes,
-    zᵀ ∂S u. Damping adds -(λ0² zᵀy + K zᵀS e) ∂f, see `damp`, with ∂f = df/dσ² 2 ⟨v (Jᵀv)ᵀ, ∂J⟩;
-    K is (1 - f) times the `gain`. The path's cotangent (12,) is that of its pose [m, rad], then
-    Sᵀz of its twist.
+    To ε (set), q (added) and the path (set): z = -A⁻¹Jw, ε̄ = w + Jᵀz (eq. 4 itself, for ε = w and
+    u = 0), q̄ = ⟨y ε̄ᵀ + z q̇ᵀ, ∂J/∂q⟩ + (ēᵀ - zᵀS K) ∂e/∂q, and where the angular rows are in tool
+    axes, -zᵀ ∂S u. Damping adds (λ0² zᵀy + K zᵀS e) ∂f, see `pull_damping`; K is (1 - f) times the
+    `gain`. The path's cotangent (12,) is that of its pose [m, rad], then -Sᵀz of its twist.
     """
     n, m = w.shape[0], rows.shape[0]
-    at = layout(n, m)
-    qd = row[at.qd : at.qd + n]
-    target_rotation = row[at.target_rotation : at.target_rotation + 9].reshape(3, 3)
-    target_twist = row[at.target_twist : at.target_twist + 6]
-    rotation = row[at.rotation : at.rotation + 9].reshape(3, 3)
-    error = row[at.error : at.error + 6]
-    jacobian = row[at.jacobian : at.jacobian + 6 * n].reshape(6, n)
-    task_jacobian = row[at.task_jacobian : at.task_jacobian + m * n].reshape(m, n)
-    factor = row[at.factor : at.factor + m * m].reshape(m, m)
-    y = row[at.y : at.y + m]
     pointing = angle_kind == POINTING
-
-    z = np.zeros(m)
     for i in range(m):
-        for k in range(n):
-            z[i] += task_jacobian[i, k] * w[k]
-    solve_cholesky(factor, z)
-    for k in range(n):
-        total = w[k]
-        for i in range(m):
-            total -= task_jacobian[i, k] * z[i]
-        epsilon_bar[k] = total
-
-    full_y, full_z = np.empty(6), np.empty(6)
-    unselect(rows, pointing, rotation, y, full_y)
-    unselect(rows, pointing, rotation, z, full_z)
-    weights = np.empty((6, n))
+        space.z[i] = 0.0
+    respond(at.task_jacobian, at.factor, space.z, w, epsilon_bar)
+    unselect(rows, pointing, at.rotation, at.y, space.full_y)
+    unselect(rows, pointing, at.rotation, space.z, space.full_z)
     for i in range(6):
         for k in range(n):
-            weights[i, k] = full_y[i] * epsilon_bar[k] - full_z[i] * qd[k]
+            space.weights[i, k] = (
+                space.full_y[i] * epsilon_bar[k] + space.full_z[i] * at.qd[k]
+            )
+    fade = 0.0 if law is None else at.damping[1]
+    for i in range(6):
+        space.by_error[i] = error_bar[i] - (1.0 - fade) * gain * space.full_z[i]
     # Everything but ∂J6 acts through the tool's own twist J6 ∂q.
-    twist_bar = np.zeros(6)
-    fade = row[at.damping + 1]
-    if fade > 0.0:
-        _pull_damping(row, rows, pointing, gain, z, full_z, weights, twist_bar)
-        gain *= 1.0 - fade
-    contract(jacobian, weights, q_bar)
-    by_error, by_twist = gain * full_z + error_bar, np.zeros(6)
-    pull_error(angle_kind, error, rotation, target_rotation, by_error, by_twist)
+    pull_error(
+        angle_kind, at.error, at.rotation, at.target_rotation, space.by_error, space.twist
+    )
     # Moved together, target and tool turn the error with them: ∂e = ω × e.
     for i in range(6):
-        twist_bar[i] += by_twist[i]
-        target_bar[i] = -by_twist[i]
-        target_bar[6 + i] = full_z[i]
+        target_bar[i], target_bar[6 + i] = -space.twist[i], -space.full_z[i]
     if angle_kind != NO_ANGLE:
-        add_cross(error[3], error[4], error[5], by_error[3:], target_bar[3:6])
+        turned = cross(vector(at.error, 3), vector(space.by_error, 3))
+        put(plus(vector(target_bar, 3), 1.0, turned), target_bar, 3)
     if pointing:
-        first, second = np.zeros(3), np.zeros(3)
-        for i in range(3):
-            second[i] = -(target_twist[3 + i] + gain * error[3 + i])
-            for k in range(n):
-                first[i] += jacobian[3 + i, k] * epsilon_bar[k]
-                second[i] += jacobian[3 + i, k] * qd[k]
-        add_cross(full_y[3], full_y[4], full_y[5], first, twist_bar[3:])
-        add_cross(-full_z[3], -full_z[4], -full_z[5], second, twist_bar[3:])
-    for k in range(n):
-        for i in range(6):
-            q_bar[k] += jacobian[i, k] * twist_bar[i]
+        pull_axes(at, epsilon_bar, space)
+    if law is not None and fade > 0.0:
+        pull_damping(
+            at, rows, pointing, gain, space.z, space.full_z, space.weights, space.twist
+        )
+    contract(at.jacobian, space.weights, space.twist, q_bar)
 
 
 @kernel
-def _pull_damping(
-    row: Array,
-    rows: Rows,
-    pointing: bool,
-    gain: float,
-    z: Array,
-    full_z: Array,
-    weights: Array,
-    twist_bar: Array,
-) -> None:
-    """Add what -(λ0² zᵀy + K zᵀS e) ∂f leaves: on J6 to `weights` (6, n), on S to `twist_bar`."""
-    n, m = weights.shape[1], rows.shape[0]
-    at = layout(n, m)
-    rotation = row[at.rotation : at.rotation + 9].reshape(3, 3)
-    error = row[at.error : at.error + 6]
-    jacobian = row[at.jacobian : at.jacobian + 6 * n].reshape(6, n)
-    task_jacobian = row[at.task_jacobian : at.task_jacobian + m * n].reshape(m, n)
-    y = row[at.y : at.y + m]
-    strength, by_square = row[at.damping], row[at.damping + 2]
-    v = row[at.damping + 3 : at.columns]
-    slope = 0.0
-    for i in range(m):
-        slope += strength * z[i] * y[i]
-    for i in range(6):
-        slope += gain * full_z[i] * error[i]
-    factor = -2.0 * by_square * slope
-    left, right, turn = np.empty(6), np.zeros(n), np.zeros(3)
-    unselect(rows, pointing, rotation, v, left)
-    for k in range(n):
-        for i in range(m):
-            right[k] += task_jacobian[i, k] * v[i]
-        for i in range(3):
-            turn[i] += jacobian[3 + i, k] * right[k]
-        for i in range(6):
-            weights[i, k] += factor * left[i] * right[k]
-    if pointing:
-        add_cross(factor * left[3], factor * left[4], factor * left[5], turn, twist_bar[3:])
+def pull_axes(at: Stage, epsilon_bar: Array, space: Space) -> None:
+    """Add what turning the tool's axes, ∂S, does to J and u, to the twist's cotangent."""
+    by_y, by_z = (0.0, 0.0, 0.0), vector(at.command, 3)
+    by_z = -by_z[0], -by_z[1], -by_z[2]
+    for k in range(epsilon_bar.shape[0]):
+        turning = column(at.jacobian, 3, k)
+        by_y = plus(by_y, epsilon_bar[k], turning)
+        by_z = plus(by_z, at.qd[k], turning)
+    moment = plus(vector(space.twist, 3), 1.0, cross(vector(space.full_y, 3), by_y))
+    put(plus(moment, 1.0, cross(vector(space.full_z, 3), by_z)), space.twist, 3)
 
 
 @kernel
@@ -147,6 +112,7 @@ def pullback(
     rows: Rows,
     angle_kind: int,
     gain: float,
+    law: Law | None,
     epsilon_bar: Array,
     target_bar: Array,
 ) -> Array:
@@ -156,13 +122,13 @@ def pullback(
 
     A stage's slope acts on the later stages of its step and on the step's end.
     """
-    stages, n = q_cotangent.shape
-    step = layout(n, rows.shape[0]).step
-    state, q_bar = np.zeros(n), np.zeros(n)
-    chi, slope = np.zeros((4, n)), np.empty(n)
-    for s in range(stages - 1, -1, -1):
-        i, h = s % 4, table[s, step]
-        last = s == stages - 1
+    count, n = q_cotangent.shape
+    m = rows.shape[0]
+    space = workspace(n, m)
+    state, q_bar, slope, chi = np.zeros(n), np.zeros(n), np.empty(n), np.zeros((4, n))
+    for s in range(count - 1, -1, -1):
+        at = stage(table[s], n, m)
+        i, h, last = s % 4, at.step[0], s == count - 1
         for k in range(n):
             slope[k] = qd_cotangent[s, k]
             if not last:
@@ -172,20 +138,22 @@ def pullback(
             q_bar[k] = q_cotangent[s, k]
         pull_stage(
             slope,
-            table[s],
+            at,
             rows,
             angle_kind,
             gain,
+            law,
             error_cotangent[s],
             epsilon_bar[s],
             q_bar,
             target_bar[s],
+            space,
         )
-        chi[i] = q_bar
-        if last:
-            state[:] = q_bar
-        elif i == 0:
-            for k in range(n):
+        for k in range(n):
+            chi[i, k] = q_bar[k]
+            if last:
+                state[k] = q_bar[k]
+            elif i == 0:
                 state[k] += chi[0, k] + chi[1, k] + chi[2, k] + chi[3, k]
     return state
 
@@ -196,50 +164,63 @@ def sensitivities(
     rows: Rows,
     angle_kind: int,
     gain: float,
+    law: Law | None,
     epsilon_matrix: Array,
     start_matrix: Array,
-    target_matrix: Array,
+    target_matrix: Array | None,
     q_matrix: Array,
     qd_matrix: Array,
 ) -> None:
     """Set ∂q/∂x and ∂q̇/∂x at all stages, (S, n, d).
 
     For ∂ε/∂x = `epsilon_matrix` (S, n, d), ∂q(0)/∂x = `start_matrix` (n, d) and that of the path's
-    poses and twists, `target_matrix` (S, 12, d), or (0, 12, d) where the path is fixed.
+    poses and twists, `target_matrix` (S, 12, d), or None where the path is fixed.
 
     The tangent of the Runge-Kutta recursion: ∂q̇ = (I - J⁺J) ∂ε + (∂q̇/∂q) ∂q + (∂q̇/∂path) ∂path
     at every stage. The rows of the matrices are pullbacks of the unit vectors.
     """
-    stages, n = epsilon_matrix.shape[:2]
-    step = layout(n, rows.shape[0]).step
-    projector, slope_by_q, unit = np.empty((n, n)), np.empty((n, n)), np.zeros(n)
-    slope_by_target = np.empty((n, 12))
-    no_error = np.zeros(6)
-    state, now = start_matrix.copy(), start_matrix.copy()
-    for s in range(stages):
-        for k in range(n):
-            unit[k] = 1.0
-            slope_by_q[k] = 0.0
+    count, n, d = epsilon_matrix.shape
+    m = rows.shape[0]
+    space, no_error, unit = workspace(n, m), np.zeros(6), np.zeros(n)
+    by_epsilon, by_q, by_target = np.empty(n), np.empty(n), np.empty(12)
+    for j in range(n):
+        for x in range(d):
+            q_matrix[0, j, x] = start_matrix[j, x]
+    for s in range(count):
+        at = stage(table[s], n, m)
+        now, slope = q_matrix[s], qd_matrix[s]
+        for j in range(n):
+            for k in range(n):
+                unit[k], by_q[k] = 1.0 if k == j else 0.0, 0.0
             pull_stage(
                 unit,
-                table[s],
+                at,
                 rows,
                 angle_kind,
                 gain,
+                law,
                 no_error,
-                projector[k],
-                slope_by_q[k],
-                slope_by_target[k],
+                by_epsilon,
+                by_q,
+                by_target,
+                space,
             )
-            unit[k] = 0.0
-        slope = projector @ epsilon_matrix[s] + slope_by_q @ now
-        if len(target_matrix) > 0:
-            slope += slope_by_target @ target_matrix[s]
-        q_matrix[s], qd_matrix[s] = now, slope
-        i, h = s % 4, table[s, step]
-        if i == 3:
-            before = qd_matrix[s - 3] + 2.0 * (qd_matrix[s - 2] + qd_matrix[s - 1])
-            state += h / 6.0 * (before + slope)
-            now[:] = state
-        else:
-            now[:] = state + (h if i == 2 else 0.5 * h) * slope
+            for x in range(d):
+                slope[j, x] = 0.0
+            for k in range(n):
+                for x in range(d):
+                    slope[j, x] += by_epsilon[k] * epsilon_matrix[s, k, x] + by_q[k] * now[k, x]
+            if target_matrix is not None:
+                for k in range(12):
+                    for x in range(d):
+                        slope[j, x] += by_target[k] * target_matrix[s, k, x]
+        if s + 1 < count:
+            i, h = s % 4, at.step[0]
+            for j in range(n):
+                for x in range(d):
+                    total = slope[j, x]
+                    if i == 3:
+                        total += qd_matrix[s - 3, j, x]
+                        total += 2.0 * (qd_matrix[s - 2, j, x] + qd_matrix[s - 1, j, x])
+                    share = h / 6.0 if i == 3 else (h if i == 2 else 0.5 * h)
+                    q_matrix[s + 1, j, x] = q_matrix[s - i, j, x] + share * total

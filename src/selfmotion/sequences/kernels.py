@@ -5,17 +5,10 @@ import numpy.typing as npt
 
 from selfmotion.arrays import Array
 from selfmotion.jit import kernel
-from selfmotion.kernels.algebra import (
-    LOGARITHM,
-    POINTING,
-    cholesky,
-    pointing_error,
-    rotation_error,
-    select,
-    solve_cholesky,
-)
+from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
+from selfmotion.kernels.table import part
+from selfmotion.kernels.tool import POINTING, Rows, pose_error, select, task_rows
 
-Rows = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
 # What `trace` says of a curve.
@@ -60,24 +53,16 @@ def correct(
     n, m = frame_jacobian.shape[1], rows.shape[0]
     error, z, along = np.zeros(6), np.empty(m), np.zeros(m)
     jacobian, factor = np.empty((m, n)), np.empty((m, m))
-    for i in range(3):
-        error[i] = target[i] - translation[i]
     pointing = angle_kind == POINTING
-    if angle_kind == LOGARITHM:
-        rotation_error(target[3:12].reshape(3, 3), rotation, error[3:])
-    elif pointing:
-        pointing_error(target[3:12].reshape(3, 3), rotation, error[3:])
+    pose_error(
+        angle_kind, part(target, 0, (3,)), part(target, 3, (3, 3)), translation, rotation, error
+    )
     select(rows, pointing, rotation, error, z)
-    for k in range(n):
-        select(rows, pointing, rotation, frame_jacobian[:, k], jacobian[:, k])
+    task_rows(rows, pointing, rotation, frame_jacobian, jacobian)
     for i in range(m):
         for k in range(n):
             along[i] += jacobian[i, k] * tangent[k]
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(n):
-                total += jacobian[i, k] * jacobian[j, k]
-            factor[i, j] = total
+    gram(jacobian, factor)
     if not cholesky(factor):
         return -1.0
     solve_cholesky(factor, z)
