@@ -3,7 +3,7 @@
 from math import sqrt
 
 from selfmotion.arrays import Array
-from selfmotion.jit import kernel
+from selfmotion.jit import inlined
 
 Vector = tuple[float, float, float]
 
@@ -13,25 +13,32 @@ _SINGULAR = 1e-13
 _SWEEPS, _ROTATED = 30, 1e-32
 
 
-@kernel
-def vector(a: Array, first: int) -> Vector:
-    """Return three entries of a from `first` on."""
-    return a[first], a[first + 1], a[first + 2]
+@inlined
+def linear(a: Array, k: int) -> Vector:
+    """Return the first three entries of column k."""
+    return a[0, k], a[1, k], a[2, k]
 
 
-@kernel
-def column(a: Array, first: int, k: int) -> Vector:
-    """Return three entries of column k of a, from row `first` on."""
-    return a[first, k], a[first + 1, k], a[first + 2, k]
+@inlined
+def angular(a: Array, k: int) -> Vector:
+    """Return the last three of the six entries of column k."""
+    return a[3, k], a[4, k], a[5, k]
 
 
-@kernel
-def put(a: Vector, out: Array, first: int) -> None:
-    """Set three entries of `out` from `first` on to a."""
-    out[first], out[first + 1], out[first + 2] = a
+@inlined
+def angular_part(twist: Array) -> Vector:
+    """Return the last three entries of a (6,)."""
+    return twist[3], twist[4], twist[5]
 
 
-@kernel
+@inlined
+def add_angular(twist: Array, s: float, a: Vector) -> None:
+    """Add s a to the last three entries of a (6,)."""
+    for i in range(3):
+        twist[3 + i] += s * a[i]
+
+
+@inlined
 def cross(a: Vector, b: Vector) -> Vector:
     """Return a × b."""
     return (
@@ -41,26 +48,26 @@ def cross(a: Vector, b: Vector) -> Vector:
     )
 
 
-@kernel
+@inlined
 def dot(a: Vector, b: Vector) -> float:
     """Return a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel
+@inlined
 def plus(a: Vector, s: float, b: Vector) -> Vector:
     """Return a + s b."""
     return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
 
 
-@kernel
+@inlined
 def add_scaled(a: Array, s: float, b: Array, out: Array) -> None:
     """Set `out` to a + s b."""
     for i in range(a.shape[0]):
         out[i] = a[i] + s * b[i]
 
 
-@kernel
+@inlined
 def gram(jacobian: Array, out: Array) -> None:
     """Set the lower triangle of `out` to JJᵀ."""
     m, n = jacobian.shape
@@ -72,7 +79,7 @@ def gram(jacobian: Array, out: Array) -> None:
             out[i, j] = total
 
 
-@kernel
+@inlined
 def cholesky(a: Array) -> bool:
     """Replace the lower triangle of `a` by its Cholesky factor L; False where it is not positive.
 
@@ -94,7 +101,7 @@ def cholesky(a: Array) -> bool:
     return True
 
 
-@kernel
+@inlined
 def solve_cholesky(factor: Array, b: Array) -> None:
     """Replace `b` by A⁻¹b, given what `cholesky` made of A."""
     m = b.shape[0]
@@ -110,7 +117,7 @@ def solve_cholesky(factor: Array, b: Array) -> None:
         b[i] = total * factor[i, i]
 
 
-@kernel
+@inlined
 def respond(jacobian: Array, factor: Array, y: Array, epsilon: Array, qd: Array) -> None:
     """Solve eq. 4: replace y = u by A⁻¹(u - Jε), and set q̇ = Jᵀy + ε."""
     m, n = jacobian.shape
@@ -125,7 +132,7 @@ def respond(jacobian: Array, factor: Array, y: Array, epsilon: Array, qd: Array)
         qd[k] = total
 
 
-@kernel
+@inlined
 def smallest_eigenvector(a: Array, vectors: Array, out: Array) -> float:
     """Return the smallest eigenvalue of the symmetric a (m, m); set `out` (m,) to its unit vector.
 
@@ -156,7 +163,7 @@ def smallest_eigenvector(a: Array, vectors: Array, out: Array) -> float:
     return float(a[least, least])
 
 
-@kernel
+@inlined
 def _rotate(a: Array, vectors: Array, i: int, j: int) -> None:
     """Make the entries (i, j) and (j, i) of a 0 by a plane rotation, and turn `vectors` by it."""
     if a[i, j] == 0.0:

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.arrays import Array
-from selfmotion.jit import kernel
-from selfmotion.kernels.algebra import column, cross, plus, put, respond, vector
+from selfmotion.jit import inlined, kernel
+from selfmotion.kernels.algebra import add_angular, angular, angular_part, cross, plus, respond
 from selfmotion.kernels.contraction import contract
 from selfmotion.kernels.damping import Law, pull_damping
 from selfmotion.kernels.table import Stage, stage
@@ -27,7 +27,7 @@ class Space(NamedTuple):
     weights: Array
 
 
-@kernel
+@inlined
 def workspace(n: int, m: int) -> Space:
     """Return the workspace for n joints and m rows."""
     return Space(
@@ -35,7 +35,7 @@ def workspace(n: int, m: int) -> Space:
     )
 
 
-@kernel
+@inlined
 def pull_stage(
     w: Array,
     at: Stage,
@@ -79,8 +79,8 @@ def pull_stage(
     for i in range(6):
         target_bar[i], target_bar[6 + i] = -space.twist[i], -space.full_z[i]
     if angle_kind != NO_ANGLE:
-        turned = cross(vector(at.error, 3), vector(space.by_error, 3))
-        put(plus(vector(target_bar, 3), 1.0, turned), target_bar, 3)
+        turned = cross(angular_part(at.error), angular_part(space.by_error))
+        add_angular(target_bar, 1.0, turned)
     if pointing:
         pull_axes(at, epsilon_bar, space)
     if law is not None and fade > 0.0:
@@ -90,17 +90,17 @@ def pull_stage(
     contract(at.jacobian, space.weights, space.twist, q_bar)
 
 
-@kernel
+@inlined
 def pull_axes(at: Stage, epsilon_bar: Array, space: Space) -> None:
     """Add what turning the tool's axes, ∂S, does to J and u, to the twist's cotangent."""
-    by_y, by_z = (0.0, 0.0, 0.0), vector(at.command, 3)
+    by_y, by_z = (0.0, 0.0, 0.0), angular_part(at.command)
     by_z = -by_z[0], -by_z[1], -by_z[2]
     for k in range(epsilon_bar.shape[0]):
-        turning = column(at.jacobian, 3, k)
+        turning = angular(at.jacobian, k)
         by_y = plus(by_y, epsilon_bar[k], turning)
         by_z = plus(by_z, at.qd[k], turning)
-    moment = plus(vector(space.twist, 3), 1.0, cross(vector(space.full_y, 3), by_y))
-    put(plus(moment, 1.0, cross(vector(space.full_z, 3), by_z)), space.twist, 3)
+    add_angular(space.twist, 1.0, cross(angular_part(space.full_y), by_y))
+    add_angular(space.twist, 1.0, cross(angular_part(space.full_z), by_z))
 
 
 @kernel

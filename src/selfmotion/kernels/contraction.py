@@ -8,12 +8,20 @@ Column k of J6 is [v_k; ω_k]. On a chain, with ω = 0 for prismatic joints,
 import numpy as np
 
 from selfmotion.arrays import Array
-from selfmotion.jit import kernel
-from selfmotion.kernels.algebra import column, cross, dot, plus, put, vector
+from selfmotion.jit import inlined, kernel
+from selfmotion.kernels.algebra import (
+    add_angular,
+    angular,
+    angular_part,
+    cross,
+    dot,
+    linear,
+    plus,
+)
 from selfmotion.kernels.tool import Rows, unselect
 
 
-@kernel
+@inlined
 def contract(jacobian: Array, weights: Array, twist: Array, out: Array) -> None:
     """Add ⟨M, ∂J6/∂q_k⟩ + twist·J6_k to out[k], for M = `weights` (6, n) and `twist` (6,).
 
@@ -21,17 +29,17 @@ def contract(jacobian: Array, weights: Array, twist: Array, out: Array) -> None:
     """
     n = jacobian.shape[1]
     # Σ_{i ≥ k} v_i × M_v,i + ω_i × M_ω,i
-    outer = vector(twist, 3)
+    outer = angular_part(twist)
     for k in range(n - 1, -1, -1):
-        v, w = column(jacobian, 0, k), column(jacobian, 3, k)
-        outer = plus(outer, 1.0, cross(v, column(weights, 0, k)))
-        outer = plus(outer, 1.0, cross(w, column(weights, 3, k)))
+        v, w = linear(jacobian, k), angular(jacobian, k)
+        outer = plus(outer, 1.0, cross(v, linear(weights, k)))
+        outer = plus(outer, 1.0, cross(w, angular(weights, k)))
         out[k] += dot(w, outer)
     # Σ_{i < k} M_v,i × ω_i
-    inner = vector(twist, 0)
+    inner = (twist[0], twist[1], twist[2])
     for k in range(n):
-        out[k] += dot(column(jacobian, 0, k), inner)
-        inner = plus(inner, 1.0, cross(column(weights, 0, k), column(jacobian, 3, k)))
+        out[k] += dot(linear(jacobian, k), inner)
+        inner = plus(inner, 1.0, cross(linear(weights, k), angular(jacobian, k)))
 
 
 @kernel
@@ -59,7 +67,7 @@ def contract_task(
             for i in range(6):
                 here[i, k], full[i, k] = jacobian[s, i, k], moment[i]
             if pointing:
-                turning = cross(vector(moment, 3), column(here, 3, k))
-                put(plus(vector(twist, 3), 1.0, turning), twist, 3)
+                turning = cross(angular_part(moment), angular(here, k))
+                add_angular(twist, 1.0, turning)
         contract(here, full, twist, out[s])
     return out

@@ -5,15 +5,15 @@ from math import isfinite
 import numpy as np
 
 from selfmotion.arrays import Array
-from selfmotion.jit import kernel
+from selfmotion.jit import inlined
 from selfmotion.kernels.algebra import (
+    add_angular,
+    angular,
+    angular_part,
     cholesky,
-    column,
     cross,
     plus,
-    put,
     smallest_eigenvector,
-    vector,
 )
 from selfmotion.kernels.table import Stage, part
 from selfmotion.kernels.tool import Rows, unselect
@@ -22,7 +22,7 @@ from selfmotion.kernels.tool import Rows, unselect
 Law = tuple[float, float]
 
 
-@kernel
+@inlined
 def damp(gram: Array, law: Law, out: Array) -> float:
     """Add λ²I to JJᵀ (its lower triangle `gram`) near singular poses; return 1 - f.
 
@@ -56,7 +56,7 @@ def damp(gram: Array, law: Law, out: Array) -> float:
     return 1.0 - out[1]
 
 
-@kernel
+@inlined
 def pull_damping(
     at: Stage,
     rows: Rows,
@@ -85,8 +85,8 @@ def pull_damping(
         right = 0.0
         for i in range(m):
             right += at.task_jacobian[i, k] * v[i]
-        turn = plus(turn, right, column(at.jacobian, 3, k))
+        turn = plus(turn, right, angular(at.jacobian, k))
         for i in range(6):
             weights[i, k] += factor * left[i] * right
     if pointing:
-        put(plus(vector(twist, 3), factor, cross(vector(left, 3), turn)), twist, 3)
+        add_angular(twist, factor, cross(angular_part(left), turn))

@@ -3,8 +3,17 @@
 from math import isfinite
 
 from selfmotion.arrays import Array
-from selfmotion.jit import kernel
-from selfmotion.kernels.algebra import add_scaled, cholesky, column, cross, gram, plus, respond
+from selfmotion.jit import inlined, kernel
+from selfmotion.kernels.algebra import (
+    add_scaled,
+    angular,
+    cholesky,
+    cross,
+    gram,
+    linear,
+    plus,
+    respond,
+)
 from selfmotion.kernels.damping import Law, damp
 from selfmotion.kernels.table import Stage, q_of, qd_of, stage
 from selfmotion.kernels.tool import POINTING, Rows, pose_error, select, task_rows
@@ -53,23 +62,24 @@ def advance(
     return True
 
 
-@kernel
+@inlined
 def observe(world_jacobian: Array, rotation: Array, translation: Array, at: Stage) -> None:
     """Set the tool's pose and its Jacobian J6 at a stage."""
     for i in range(3):
         at.translation[i] = translation[i]
         for j in range(3):
             at.rotation[i, j] = rotation[i, j]
+    for i in range(6):
+        for k in range(at.q.shape[0]):
+            at.jacobian[i, k] = world_jacobian[i, k]
+    # The velocity of the tool's origin is v = v_0 + ω × x.
     x = (translation[0], translation[1], translation[2])
     for k in range(at.q.shape[0]):
-        # The velocity of the tool's origin: v = v_0 + ω × x.
-        turning = column(world_jacobian, 3, k)
-        v = plus(column(world_jacobian, 0, k), 1.0, cross(turning, x))
-        for i in range(3):
-            at.jacobian[i, k], at.jacobian[3 + i, k] = v[i], turning[i]
+        v = plus(linear(at.jacobian, k), 1.0, cross(angular(at.jacobian, k), x))
+        at.jacobian[0, k], at.jacobian[1, k], at.jacobian[2, k] = v
 
 
-@kernel
+@inlined
 def finite(a: Array) -> bool:
     """Whether all numbers are."""
     total = 0.0
@@ -78,7 +88,7 @@ def finite(a: Array) -> bool:
     return isfinite(total)
 
 
-@kernel
+@inlined
 def step(table: Array, s: int, n: int, h: float) -> None:
     """Set q of stage s + 1 from the slopes so far (classical fourth-order Runge-Kutta).
 

@@ -13,7 +13,7 @@ from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import make_array, populate_array
 
 from selfmotion.arrays import Array
-from selfmotion.jit import kernel
+from selfmotion.jit import inlined
 
 
 def part(row: Array, first: int, shape: tuple[int, ...]) -> Array:
@@ -121,16 +121,16 @@ def stages(table: Array, n: int, m: int) -> Stage:
     )
 
 
-stage = kernel(stages)
+stage = inlined(stages)
 
 
-@kernel
+@inlined
 def q_of(table: Array, s: int, n: int) -> Array:
     """Return q of stage s, as `stage` has it."""
     return part(table[s], 0, (n,))
 
 
-@kernel
+@inlined
 def qd_of(table: Array, s: int, n: int) -> Array:
     """Return q̇ of stage s, as `stage` has it."""
     return part(table[s], n, (n,))

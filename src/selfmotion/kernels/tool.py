@@ -6,8 +6,17 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.arrays import Array
-from selfmotion.jit import kernel
-from selfmotion.kernels.algebra import Vector, column, cross, dot, plus, put, vector
+from selfmotion.jit import inlined
+from selfmotion.kernels.algebra import (
+    Vector,
+    add_angular,
+    angular,
+    angular_part,
+    cross,
+    dot,
+    linear,
+    plus,
+)
 from selfmotion.task import Task
 
 Rows = npt.NDArray[np.intp]
@@ -26,7 +35,7 @@ def angle_kind(task: Task) -> int:
     return LOGARITHM if np.any(task.rows >= 3) else NO_ANGLE
 
 
-@kernel
+@inlined
 def pose_error(
     angle_kind: int,
     target_translation: Array,
@@ -43,31 +52,37 @@ def pose_error(
     for i in range(3):
         out[i] = target_translation[i] - translation[i]
     if angle_kind == LOGARITHM:
-        put(rotation_error(target_rotation, rotation), out, 3)
+        out[3], out[4], out[5] = rotation_error(target_rotation, rotation)
     elif angle_kind == POINTING:
-        put(pointing_error(target_rotation, rotation), out, 3)
+        out[3], out[4], out[5] = pointing_error(target_rotation, rotation)
 
 
-@kernel
+@inlined
 def rotation_error(target: Array, actual: Array) -> Vector:
     """Return log(R_target Rᵀ), the rotation vector from actual to target, world axes."""
     # R_target Rᵀ = Σ_i t_i a_iᵀ over the columns; its antisymmetric part is ½ Σ a_i × t_i.
     double, trace = (0.0, 0.0, 0.0), 0.0
     for i in range(3):
-        a, b = column(actual, 0, i), column(target, 0, i)
+        a, b = linear(actual, i), linear(target, i)
         double = plus(double, 1.0, cross(a, b))
         trace += dot(a, b)
     return _scaled(double, 0.5, 0.5 * (trace - 1.0))
 
 
-@kernel
+@inlined
 def pointing_error(target: Array, actual: Array) -> Vector:
     """Return the shortest rotation vector that aligns the z axes, world axes."""
-    a, b = column(actual, 0, 2), column(target, 0, 2)
+    a, b = z_axis(actual), z_axis(target)
     return _scaled(cross(a, b), 1.0, dot(a, b))
 
 
-@kernel
+@inlined
+def z_axis(rotation: Array) -> Vector:
+    """Return the z axis of a frame."""
+    return rotation[0, 2], rotation[1, 2], rotation[2, 2]
+
+
+@inlined
 def _scaled(normal: Vector, scale: float, cosine: float) -> Vector:
     """Return the rotation vector along `normal`, of length sin θ by `scale`, with cos θ."""
     sine = scale * sqrt(dot(normal, normal))
@@ -76,7 +91,7 @@ def _scaled(normal: Vector, scale: float, cosine: float) -> Vector:
     return scale * normal[0], scale * normal[1], scale * normal[2]
 
 
-@kernel
+@inlined
 def pull_error(
     angle_kind: int,
     error: Array,
@@ -93,24 +108,24 @@ def pull_error(
     for i in range(3):
         out[i] = -z[i]
         out[3 + i] = 0.0
-    w = vector(z, 3)
+    w = angular_part(z)
     if angle_kind == LOGARITHM:
-        phi = vector(error, 3)
+        phi = angular_part(error)
         once = cross(phi, w)
         twice = cross(phi, once)
         c = logarithm_coefficient(sqrt(dot(phi, phi)))
         for i in range(3):
             out[3 + i] = -(w[i] - 0.5 * once[i] + c * twice[i])
     elif angle_kind == POINTING:
-        a, b = column(rotation, 0, 2), column(target_rotation, 0, 2)
+        a, b = z_axis(rotation), z_axis(target_rotation)
         normal, cosine = cross(a, b), dot(a, b)
         f, slope = pointing_coefficients(sqrt(dot(normal, normal)), cosine)
         turned, along = cross(b, w), slope * dot(w, normal)
         moment = plus((f * turned[0], f * turned[1], f * turned[2]), along, b)
-        put(cross(a, moment), out, 3)
+        out[3], out[4], out[5] = cross(a, moment)
 
 
-@kernel
+@inlined
 def logarithm_coefficient(angle: float) -> float:
     """Return c of Jr⁻¹(φ) = I + ½ [φ] + c [φ]²: (1 - (θ/2) cot(θ/2)) / θ²."""
     if angle < _SMALL:
@@ -119,7 +134,7 @@ def logarithm_coefficient(angle: float) -> float:
     return (1.0 - 0.5 * angle / tan(0.5 * angle)) / (angle * angle)
 
 
-@kernel
+@inlined
 def pointing_coefficients(sine: float, cosine: float) -> tuple[float, float]:
     """Return f = θ / sin θ and df/d(cos θ) = (θ cos θ - sin θ) / sin³θ."""
     angle = atan2(sine, cosine)
@@ -131,7 +146,7 @@ def pointing_coefficients(sine: float, cosine: float) -> tuple[float, float]:
     return angle / sine, (angle * cosine - sine) / (sine * sine * sine)
 
 
-@kernel
+@inlined
 def task_rows(
     rows: Rows, pointing: bool, rotation: Array, jacobian: Array, out: Array
 ) -> None:
@@ -139,26 +154,26 @@ def task_rows(
     for i in range(rows.shape[0]):
         row = rows[i]
         if pointing and row >= 3:
-            axis = column(rotation, 0, row - 3)
+            axis = linear(rotation, row - 3)
             for k in range(jacobian.shape[1]):
-                out[i, k] = dot(axis, column(jacobian, 3, k))
+                out[i, k] = dot(axis, angular(jacobian, k))
         else:
             for k in range(jacobian.shape[1]):
                 out[i, k] = jacobian[row, k]
 
 
-@kernel
+@inlined
 def select(rows: Rows, pointing: bool, rotation: Array, twist: Array, out: Array) -> None:
     """Set `out` (m,) to S·twist (6,)."""
     for i in range(rows.shape[0]):
         row = rows[i]
         if pointing and row >= 3:
-            out[i] = dot(column(rotation, 0, row - 3), vector(twist, 3))
+            out[i] = dot(linear(rotation, row - 3), angular_part(twist))
         else:
             out[i] = twist[row]
 
 
-@kernel
+@inlined
 def unselect(rows: Rows, pointing: bool, rotation: Array, values: Array, out: Array) -> None:
     """Set `out` (6,) to Sᵀ·values (m,)."""
     for i in range(6):
@@ -166,7 +181,6 @@ def unselect(rows: Rows, pointing: bool, rotation: Array, values: Array, out: Ar
     for i in range(rows.shape[0]):
         row = rows[i]
         if pointing and row >= 3:
-            turned = plus(vector(out, 3), values[i], column(rotation, 0, row - 3))
-            put(turned, out, 3)
+            add_angular(out, values[i], linear(rotation, row - 3))
         else:
             out[row] += values[i]
