@@ -57,6 +57,7 @@ class Rollout:
         self._gain = FEEDBACK / path.duration
         self._rows, self._angle_kind = task.rows, kernels.angle_kind(task)
         self._table, self._at = self._new_table(len(grid.stage_times))
+        self._space = np.zeros(kernels.space_size(robot.dof, task.dimension))
         # What `polish` works on: one stage, at a node.
         self._node_table, self._node = self._new_table(1)
         self.aim(path.samples(grid.stage_times))
@@ -166,6 +167,8 @@ class Rollout:
             self._angle_kind,
             self._gain,
             self._law,
+            self._space,
+            np.zeros(6),
             epsilon_matrix,
             np.ascontiguousarray(start_matrix),
             None if target_matrix is None else np.ascontiguousarray(target_matrix),
@@ -233,11 +236,12 @@ class Rollout:
         target_gradient : (S, 12)
             With respect to the path's poses [m, world rotation vector] and twists.
         """
-        epsilon_gradient = np.empty((len(self._table), self.robot.dof))
-        target_gradient = np.empty((len(epsilon_gradient), 12))
+        count, n = len(self._table), self.robot.dof
+        epsilon_gradient, start_gradient = np.empty((count, n)), np.empty(n)
+        target_gradient = np.empty((count, 12))
         if error_cotangent is None:
-            error_cotangent = np.zeros((len(epsilon_gradient), 6))
-        start_gradient = kernels.pullback(
+            error_cotangent = np.zeros((count, 6))
+        kernels.pullback(
             np.ascontiguousarray(q_cotangent),
             np.ascontiguousarray(qd_cotangent),
             np.ascontiguousarray(error_cotangent),
@@ -246,7 +250,9 @@ class Rollout:
             self._angle_kind,
             self._gain,
             self._law,
+            self._space,
             epsilon_gradient,
+            start_gradient,
             target_gradient,
         )
         return epsilon_gradient, start_gradient, target_gradient

@@ -12,7 +12,7 @@ made of small ones, which LLVM inlines. A kernel is compiled for what it is give
 that moves, costs no one a compilation who has neither.
 """
 
-from selfmotion.kernels.backward import pullback, sensitivities
+from selfmotion.kernels.backward import pullback, sensitivities, space_size
 from selfmotion.kernels.contraction import contract_task
 from selfmotion.kernels.damping import Law
 from selfmotion.kernels.forward import advance
@@ -28,5 +28,6 @@ __all__ = [
     "contract_task",
     "pullback",
     "sensitivities",
+    "space_size",
     "stages",
 ]

@@ -2,69 +2,99 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
 from selfmotion.arrays import Array
 from selfmotion.jit import inlined, kernel
 from selfmotion.kernels.algebra import add_angular, angular, angular_part, cross, plus, respond
 from selfmotion.kernels.contraction import contract
 from selfmotion.kernels.damping import Law, pull_damping
-from selfmotion.kernels.table import Stage, stage
+from selfmotion.kernels.table import Stage, part, stage
 from selfmotion.kernels.tool import NO_ANGLE, POINTING, Rows, pull_error, unselect
 
 
 class Space(NamedTuple):
-    """What `pull_stage` works in, kept from stage to stage: vectors by their own length.
+    """What the kernels here work in, as views of one array.
 
-    z (m,); Sᵀy and Sᵀz (6,); cotangents of the pose error and of the tool's twist (6,); M (6, n).
+    Attributes
+    ----------
+    w : (n,)
+        The cotangent of q̇.
+    z : (m,)
+        -A⁻¹Jw.
+    full_y, full_z : (6,)
+        Sᵀy and Sᵀz.
+    by_error, twist : (6,)
+        Cotangents of the pose error and of the tool's twist.
+    weights : (6, n)
+        M, of which ⟨M, ∂J6⟩ is taken.
+    by_epsilon, by_q, by_target : (n,), (n,), (12,)
+        What a stage's pullback gives.
+    by_slope : (4, n)
+        The last four of `by_q`.
     """
 
+    w: Array
     z: Array
     full_y: Array
     full_z: Array
     by_error: Array
     twist: Array
     weights: Array
+    by_epsilon: Array
+    by_q: Array
+    by_target: Array
+    by_slope: Array
 
 
 @inlined
-def workspace(n: int, m: int) -> Space:
-    """Return the workspace for n joints and m rows."""
+def divide(space: Array, n: int, m: int) -> Space:
+    """Return the parts of the array to work in, for n joints and m rows of the task."""
     return Space(
-        np.empty(m), np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty((6, n))
+        w=part(space, 0, (n,)),
+        z=part(space, n, (m,)),
+        full_y=part(space, n + m, (6,)),
+        full_z=part(space, n + m + 6, (6,)),
+        by_error=part(space, n + m + 12, (6,)),
+        twist=part(space, n + m + 18, (6,)),
+        weights=part(space, n + m + 24, (6, n)),
+        by_epsilon=part(space, 7 * n + m + 24, (n,)),
+        by_q=part(space, 8 * n + m + 24, (n,)),
+        by_target=part(space, 9 * n + m + 24, (12,)),
+        by_slope=part(space, 9 * n + m + 36, (4, n)),
     )
+
+
+def space_size(n: int, m: int) -> int:
+    """Return how long the array to work in is."""
+    return 13 * n + m + 36
 
 
 @inlined
 def pull_stage(
-    w: Array,
     at: Stage,
     rows: Rows,
     angle_kind: int,
     gain: float,
     law: Law | None,
+    space: Space,
     error_bar: Array,
     epsilon_bar: Array,
-    q_bar: Array,
     target_bar: Array,
-    space: Space,
 ) -> None:
-    """Pull the cotangents w (n,) on q̇ and ē (6,) on the pose error back.
+    """Pull the cotangents `space.w` on q̇ and ē (6,) on the pose error back.
 
-    To ε (set), q (added) and the path (set): z = -A⁻¹Jw, ε̄ = w + Jᵀz (eq. 4 itself, for ε = w and
+    To ε (set), q (added to `space.by_q`) and the path (set): z = -A⁻¹Jw, ε̄ = w + Jᵀz (eq. 4 itself, for ε = w and
     u = 0), q̄ = ⟨y ε̄ᵀ + z q̇ᵀ, ∂J/∂q⟩ + (ēᵀ - zᵀS K) ∂e/∂q, and where the angular rows are in tool
     axes, -zᵀ ∂S u. Damping adds (λ0² zᵀy + K zᵀS e) ∂f, see `pull_damping`; K is (1 - f) times the
     `gain`. The path's cotangent (12,) is that of its pose [m, rad], then -Sᵀz of its twist.
     """
-    n, m = w.shape[0], rows.shape[0]
     pointing = angle_kind == POINTING
-    for i in range(m):
+    for i in range(rows.shape[0]):
         space.z[i] = 0.0
-    respond(at.task_jacobian, at.factor, space.z, w, epsilon_bar)
+    respond(at.task_jacobian, at.factor, space.z, space.w, epsilon_bar)
     unselect(rows, pointing, at.rotation, at.y, space.full_y)
     unselect(rows, pointing, at.rotation, space.z, space.full_z)
     for i in range(6):
-        for k in range(n):
+        for k in range(epsilon_bar.shape[0]):
             space.weights[i, k] = (
                 space.full_y[i] * epsilon_bar[k] + space.full_z[i] * at.qd[k]
             )
@@ -87,7 +117,7 @@ def pull_stage(
         pull_damping(
             at, rows, pointing, gain, space.z, space.full_z, space.weights, space.twist
         )
-    contract(at.jacobian, space.weights, space.twist, q_bar)
+    contract(at.jacobian, space.weights, space.twist, space.by_q)
 
 
 @inlined
@@ -113,49 +143,48 @@ def pullback(
     angle_kind: int,
     gain: float,
     law: Law | None,
+    work: Array,
     epsilon_bar: Array,
+    start_bar: Array,
     target_bar: Array,
-) -> Array:
+) -> None:
     """Reverse the Runge-Kutta recursion: cotangents on all stages → start (n,).
 
-    Sets those of ε (S, n) and of the path (S, 12), see `pull_stage`.
+    Sets those of ε (S, n), of the start (n,) and of the path (S, 12), see `pull_stage`.
 
     A stage's slope acts on the later stages of its step and on the step's end.
     """
     count, n = q_cotangent.shape
-    m = rows.shape[0]
-    space = workspace(n, m)
-    state, q_bar, slope, chi = np.zeros(n), np.zeros(n), np.empty(n), np.zeros((4, n))
+    space = divide(work, n, rows.shape[0])
+    by_slope = space.by_slope
     for s in range(count - 1, -1, -1):
-        at = stage(table[s], n, m)
+        at = stage(table[s], n, rows.shape[0])
         i, h, last = s % 4, at.step[0], s == count - 1
         for k in range(n):
-            slope[k] = qd_cotangent[s, k]
+            w = qd_cotangent[s, k]
             if not last:
-                slope[k] += state[k] * h / (6.0 if i in (0, 3) else 3.0)
+                w += start_bar[k] * h / (6.0 if i in (0, 3) else 3.0)
                 if i < 3:
-                    slope[k] += chi[i + 1, k] * (h if i == 2 else 0.5 * h)
-            q_bar[k] = q_cotangent[s, k]
+                    w += by_slope[i + 1, k] * (h if i == 2 else 0.5 * h)
+            space.w[k] = w
+            space.by_q[k] = q_cotangent[s, k]
         pull_stage(
-            slope,
             at,
             rows,
             angle_kind,
             gain,
             law,
+            space,
             error_cotangent[s],
             epsilon_bar[s],
-            q_bar,
             target_bar[s],
-            space,
         )
         for k in range(n):
-            chi[i, k] = q_bar[k]
+            by_slope[i, k] = space.by_q[k]
             if last:
-                state[k] = q_bar[k]
+                start_bar[k] = space.by_q[k]
             elif i == 0:
-                state[k] += chi[0, k] + chi[1, k] + chi[2, k] + chi[3, k]
-    return state
+                start_bar[k] += by_slope[0, k] + by_slope[1, k] + by_slope[2, k] + by_slope[3, k]
 
 
 @kernel
@@ -165,6 +194,8 @@ def sensitivities(
     angle_kind: int,
     gain: float,
     law: Law | None,
+    work: Array,
+    no_error: Array,
     epsilon_matrix: Array,
     start_matrix: Array,
     target_matrix: Array | None,
@@ -180,47 +211,48 @@ def sensitivities(
     at every stage. The rows of the matrices are pullbacks of the unit vectors.
     """
     count, n, d = epsilon_matrix.shape
-    m = rows.shape[0]
-    space, no_error, unit = workspace(n, m), np.zeros(6), np.zeros(n)
-    by_epsilon, by_q, by_target = np.empty(n), np.empty(n), np.empty(12)
+    space = divide(work, n, rows.shape[0])
     for j in range(n):
         for x in range(d):
             q_matrix[0, j, x] = start_matrix[j, x]
     for s in range(count):
-        at = stage(table[s], n, m)
-        now, slope = q_matrix[s], qd_matrix[s]
+        at = stage(table[s], n, rows.shape[0])
         for j in range(n):
             for k in range(n):
-                unit[k], by_q[k] = 1.0 if k == j else 0.0, 0.0
+                space.w[k], space.by_q[k] = (1.0 if k == j else 0.0), 0.0
             pull_stage(
-                unit,
                 at,
                 rows,
                 angle_kind,
                 gain,
                 law,
-                no_error,
-                by_epsilon,
-                by_q,
-                by_target,
                 space,
+                no_error,
+                space.by_epsilon,
+                space.by_target,
             )
             for x in range(d):
-                slope[j, x] = 0.0
-            for k in range(n):
-                for x in range(d):
-                    slope[j, x] += by_epsilon[k] * epsilon_matrix[s, k, x] + by_q[k] * now[k, x]
-            if target_matrix is not None:
-                for k in range(12):
-                    for x in range(d):
-                        slope[j, x] += by_target[k] * target_matrix[s, k, x]
+                slope = 0.0
+                for k in range(n):
+                    slope += space.by_epsilon[k] * epsilon_matrix[s, k, x]
+                    slope += space.by_q[k] * q_matrix[s, k, x]
+                if target_matrix is not None:
+                    for k in range(12):
+                        slope += space.by_target[k] * target_matrix[s, k, x]
+                qd_matrix[s, j, x] = slope
         if s + 1 < count:
-            i, h = s % 4, at.step[0]
-            for j in range(n):
-                for x in range(d):
-                    total = slope[j, x]
-                    if i == 3:
-                        total += qd_matrix[s - 3, j, x]
-                        total += 2.0 * (qd_matrix[s - 2, j, x] + qd_matrix[s - 1, j, x])
-                    share = h / 6.0 if i == 3 else (h if i == 2 else 0.5 * h)
-                    q_matrix[s + 1, j, x] = q_matrix[s - i, j, x] + share * total
+            step_matrix(q_matrix, qd_matrix, s, at.step[0])
+
+
+@inlined
+def step_matrix(q_matrix: Array, qd_matrix: Array, s: int, h: float) -> None:
+    """Set ∂q/∂x of stage s + 1 from the slopes so far, as `step` does with q."""
+    i = s % 4
+    share = h / 6.0 if i == 3 else (h if i == 2 else 0.5 * h)
+    for j in range(q_matrix.shape[1]):
+        for x in range(q_matrix.shape[2]):
+            slope = qd_matrix[s, j, x]
+            if i == 3:
+                slope += qd_matrix[s - 3, j, x]
+                slope += 2.0 * (qd_matrix[s - 2, j, x] + qd_matrix[s - 1, j, x])
+            q_matrix[s + 1, j, x] = q_matrix[s - i, j, x] + share * slope
