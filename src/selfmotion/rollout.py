@@ -98,13 +98,13 @@ class Rollout:
         `q` (S, n) is the table's own: each stage writes that of the next.
         """
         model, data, tool = self.robot.model, self._data, self.robot.tool_id
-        jacobians, place, advance = pin.computeJointJacobians, pin.updateFramePlacement, kernels.advance
-        rows, angle_kind, law = self._rows, self._angle_kind, self._law
+        jacobians, place = pin.computeJointJacobians, pin.updateFramePlacement
+        advance, rows, angle_kind, law = kernels.advance, self._rows, self._angle_kind, self._law
         # Views of Pinocchio's own memory: each of the two calls refreshes its own. All joints are
         # on the way to the tool, so that its Jacobian is that of all joints.
         jacobian, pose = data.J, data.oMf[tool]
         rotation, translation = pose.rotation, pose.translation
-        for stage, configuration in enumerate(list(q)):
+        for stage, configuration in enumerate(q):
             jacobians(model, data, configuration)
             place(model, data, tool)
             if not advance(
@@ -124,8 +124,8 @@ class Rollout:
         -------
         t, q, qd : (N + 1,), (N + 1, n), (N + 1, n)
         """
-        here, node = self.grid.node_stages, self._node
-        q, qd = self._at.q[here], self._at.qd[here]
+        here, run, node = self.grid.node_stages, self._at, self._node
+        q, qd = run.q[here], run.qd[here]
         if self.damped:
             return self.grid.nodes, q, qd
         for i, stage in enumerate(here):
@@ -138,7 +138,7 @@ class Rollout:
                 node.q[0] += node.qd[0]
                 if np.abs(node.qd[0]).max() < _POLISHED:
                     break
-            node.target_twist[0], node.epsilon[0] = self._at.target_twist[stage], self._at.epsilon[stage]
+            node.target_twist[0], node.epsilon[0] = run.target_twist[stage], run.epsilon[stage]
             if self._advance(self._node_table, node.q, 0.0) is None:
                 q[i], qd[i] = node.q[0], node.qd[0]
         self.jacobian_evaluations += len(here)

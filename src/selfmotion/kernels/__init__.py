@@ -7,9 +7,9 @@ y = A⁻¹(u - Jε), and eq. 4 in the form that needs one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 
-The kernels that Python calls are `advance`, `pullback`, `sensitivities` and `contract_task`. Each is
-made of small ones, which LLVM inlines. A kernel is compiled for what it is given: damping, or a path
-that moves, costs no one a compilation who has neither.
+Python calls `advance`, `pullback`, `sensitivities` and `contract_task`. Each is made of small
+kernels, which LLVM inlines, and is compiled for what it is given: who has no damping, or a path
+that does not move, does not wait for theirs.
 """
 
 from selfmotion.kernels.backward import pullback, sensitivities, space_size

@@ -182,4 +182,7 @@ def _rotate(a: Array, vectors: Array, i: int, j: int) -> None:
     a[i, j] = a[j, i] = 0.0
     for k in range(a.shape[0]):
         first, second = vectors[k, i], vectors[k, j]
-        vectors[k, i], vectors[k, j] = cosine * first - sine * second, sine * first + cosine * second
+        vectors[k, i], vectors[k, j] = (
+            cosine * first - sine * second,
+            sine * first + cosine * second,
+        )

@@ -82,10 +82,11 @@ def pull_stage(
 ) -> None:
     """Pull the cotangents `space.w` on q̇ and ē (6,) on the pose error back.
 
-    To ε (set), q (added to `space.by_q`) and the path (set): z = -A⁻¹Jw, ε̄ = w + Jᵀz (eq. 4 itself, for ε = w and
-    u = 0), q̄ = ⟨y ε̄ᵀ + z q̇ᵀ, ∂J/∂q⟩ + (ēᵀ - zᵀS K) ∂e/∂q, and where the angular rows are in tool
-    axes, -zᵀ ∂S u. Damping adds (λ0² zᵀy + K zᵀS e) ∂f, see `pull_damping`; K is (1 - f) times the
-    `gain`. The path's cotangent (12,) is that of its pose [m, rad], then -Sᵀz of its twist.
+    To ε (set), q (added to `space.by_q`) and the path (set). z = -A⁻¹Jw and ε̄ = w + Jᵀz are eq. 4
+    itself, for ε = w and u = 0; q̄ = ⟨y ε̄ᵀ + z q̇ᵀ, ∂J/∂q⟩ + (ēᵀ - zᵀS K) ∂e/∂q, and where the
+    angular rows are in tool axes, -zᵀ ∂S u. Damping adds (λ0² zᵀy + K zᵀS e) ∂f, see
+    `pull_damping`; K is (1 - f) times the `gain`. The path's cotangent (12,) is that of its pose
+    [m, rad], then -Sᵀz of its twist.
     """
     pointing = angle_kind == POINTING
     for i in range(rows.shape[0]):
@@ -95,16 +96,12 @@ def pull_stage(
     unselect(rows, pointing, at.rotation, space.z, space.full_z)
     for i in range(6):
         for k in range(epsilon_bar.shape[0]):
-            space.weights[i, k] = (
-                space.full_y[i] * epsilon_bar[k] + space.full_z[i] * at.qd[k]
-            )
+            space.weights[i, k] = space.full_y[i] * epsilon_bar[k] + space.full_z[i] * at.qd[k]
     fade = 0.0 if law is None else at.damping[1]
     for i in range(6):
         space.by_error[i] = error_bar[i] - (1.0 - fade) * gain * space.full_z[i]
     # Everything but ∂J6 acts through the tool's own twist J6 ∂q.
-    pull_error(
-        angle_kind, at.error, at.rotation, at.target_rotation, space.by_error, space.twist
-    )
+    pull_error(angle_kind, at.error, at.rotation, at.target_rotation, space.by_error, space.twist)
     # Moved together, target and tool turn the error with them: ∂e = ω × e.
     for i in range(6):
         target_bar[i], target_bar[6 + i] = -space.twist[i], -space.full_z[i]
@@ -114,9 +111,7 @@ def pull_stage(
     if pointing:
         pull_axes(at, epsilon_bar, space)
     if law is not None and fade > 0.0:
-        pull_damping(
-            at, rows, pointing, gain, space.z, space.full_z, space.weights, space.twist
-        )
+        pull_damping(at, rows, pointing, gain, space.z, space.full_z, space.weights, space.twist)
     contract(at.jacobian, space.weights, space.twist, space.by_q)
 
 

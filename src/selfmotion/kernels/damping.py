@@ -53,7 +53,7 @@ def damp(gram: Array, law: Law, out: Array) -> float:
     out[0], out[1], out[2] = law[1] * law[1], rest * rest, -2.0 * rest / square
     for i in range(m):
         gram[i, i] += out[0] * out[1]
-    return 1.0 - out[1]
+    return 1.0 - rest * rest
 
 
 @inlined

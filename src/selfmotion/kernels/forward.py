@@ -101,6 +101,10 @@ def step(table: Array, s: int, n: int, h: float) -> None:
     if i < 3:
         add_scaled(start, h if i == 2 else 0.5 * h, slope, q)
     else:
-        first, second, third = qd_of(table, s - 3, n), qd_of(table, s - 2, n), qd_of(table, s - 1, n)
+        first, second, third = (
+            qd_of(table, s - 3, n),
+            qd_of(table, s - 2, n),
+            qd_of(table, s - 1, n),
+        )
         for k in range(n):
             q[k] = start[k] + h / 6.0 * (first[k] + 2.0 * (second[k] + third[k]) + slope[k])

@@ -8,9 +8,7 @@ from math import prod
 from typing import Any, NamedTuple
 
 from numba import types
-from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
-from numba.np.arrayobj import make_array, populate_array
 
 from selfmotion.arrays import Array
 from selfmotion.jit import inlined
@@ -35,6 +33,10 @@ def _type_part(context: Any) -> Any:
 
 @lower_builtin(part, types.Array, types.Integer, types.BaseTuple)
 def _lower_part(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    # Only compiling needs these, and they take as long to import as a tenth of the package.
+    from numba.core import cgutils
+    from numba.np.arrayobj import make_array, populate_array
+
     row = make_array(signature.args[0])(context, builder, arguments[0])
     view = make_array(signature.return_type)(context, builder)
     shape = cgutils.unpack_tuple(builder, arguments[2])

@@ -1,6 +1,6 @@
 """The tool, compiled: its pose error and the rows of the task, both ways."""
 
-from math import atan2, cos, sin, sqrt, tan
+from math import atan2, sqrt, tan
 
 import numpy as np
 import numpy.typing as npt
@@ -147,9 +147,7 @@ def pointing_coefficients(sine: float, cosine: float) -> tuple[float, float]:
 
 
 @inlined
-def task_rows(
-    rows: Rows, pointing: bool, rotation: Array, jacobian: Array, out: Array
-) -> None:
+def task_rows(rows: Rows, pointing: bool, rotation: Array, jacobian: Array, out: Array) -> None:
     """Set `out` (m, n) to J = S J6; angular rows in tool axes where `pointing`."""
     for i in range(rows.shape[0]):
         row = rows[i]
