@@ -34,32 +34,38 @@ def advance(
     """Evaluate eq. 4 at stage s, q̇ = J⁺u + (I - J⁺J) ε, and set the next stage's q.
 
     `world_jacobian` (6, n) is that of the point at the world's origin, `rotation` and `translation`
-    the tool's pose. With a `law`, A = JJᵀ + λ²I is damped near singular poses, see `damp`, and the
-    pose feedback K fades out as damping fades in: speeds would otherwise grow with an error that
-    the arm cannot take out. Without one, that is not even compiled.
-
-    False where A is not positive definite (a singular pose) or q̇ is not finite.
+    the tool's pose. False where the motion breaks down, see `evaluate`.
     """
     at = stage(table[s], world_jacobian.shape[1], rows.shape[0])
-    pointing = angle_kind == POINTING
     observe(world_jacobian, rotation, translation, at)
-    pose_error(
-        angle_kind, at.target_translation, at.target_rotation, at.translation, at.rotation, at.error
-    )
-    task_rows(rows, pointing, at.rotation, at.jacobian, at.task_jacobian)
-
-    gram(at.task_jacobian, at.factor)  # A = JJᵀ
-    if law is not None:
-        gain *= damp(at.factor, law, at.damping)  # A += λ²I
-    add_scaled(at.target_twist, gain, at.error, at.command)  # ẋ_d + K e
-    select(rows, pointing, at.rotation, at.command, at.y)  # y = u, the rows of it
-    if not cholesky(at.factor):
-        return False
-    respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)  # y = A⁻¹(u - Jε), q̇ = Jᵀy + ε
-    if not finite(at.qd):
+    if not evaluate(at, rows, angle_kind, gain, law):
         return False
     step(table, s, at.q.shape[0], at.step[0])
     return True
+
+
+@inlined
+def evaluate(at: Stage, rows: Rows, angle_kind: int, gain: float, law: Law | None) -> bool:
+    """Evaluate eq. 4: q̇ = J⁺u + (I - J⁺J) ε, with u = S(ẋ_d + K e).
+
+    With a `law`, A = JJᵀ + λ²I is damped near singular poses, see `damp`, and the pose feedback K
+    fades out as damping fades in: speeds would otherwise grow with an error that the arm cannot
+    take out. False where A is not positive definite (a singular pose), or q̇ is not finite.
+    """
+    pointing = angle_kind == POINTING
+    pose_error(
+        angle_kind, at.target_translation, at.target_rotation, at.translation, at.rotation, at.error
+    )
+    task_rows(rows, pointing, at.rotation, at.jacobian, at.task_jacobian)  # J = S J6
+    gram(at.task_jacobian, at.factor)  # A = JJᵀ
+    if law is not None:
+        gain *= damp(at.factor, law, at.damping)  # A = JJᵀ + λ²I
+    add_scaled(at.target_twist, gain, at.error, at.command)  # ẋ_d + K e
+    select(rows, pointing, at.rotation, at.command, at.y)  # y = u
+    if not cholesky(at.factor):
+        return False
+    respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)  # y = A⁻¹(u - Jε), q̇ = Jᵀy + ε
+    return finite(at.qd)
 
 
 @inlined
@@ -101,10 +107,7 @@ def step(table: Array, s: int, n: int, h: float) -> None:
     if i < 3:
         add_scaled(start, h if i == 2 else 0.5 * h, slope, q)
     else:
-        first, second, third = (
-            qd_of(table, s - 3, n),
-            qd_of(table, s - 2, n),
-            qd_of(table, s - 1, n),
-        )
+        first, second = qd_of(table, s - 3, n), qd_of(table, s - 2, n)
+        third = qd_of(table, s - 1, n)
         for k in range(n):
             q[k] = start[k] + h / 6.0 * (first[k] + 2.0 * (second[k] + third[k]) + slope[k])
