@@ -9,12 +9,10 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from conftest import central_difference, robot_named, short_line, start_of
+from conftest import central_difference
 from selfmotion import kernels
 from selfmotion.arrays import Array
-from selfmotion.grid import Grid
-from selfmotion.kernels import algebra, contraction, damping, tool
-from selfmotion.rollout import Rollout
+from selfmotion.kernels import algebra, backward, contraction, damping, table, tool
 
 Case = tuple[sm.RobotModel, sm.Task, Array, sm.Path]
 
@@ -48,6 +46,31 @@ def random_rotation(rng: np.random.Generator) -> Array:
 def positive(rng: np.random.Generator, m: int) -> Array:
     root = rng.normal(size=(m, m + 2))
     return np.asarray(root @ root.T)
+
+
+@pytest.mark.parametrize(("n", "m"), [(3, 2), (7, 6), (8, 5), (2, 1)])
+def test_parts_tile_what_they_are_parts_of(n: int, m: int) -> None:
+    """Each number belongs to one part: no overlap, none left, none beyond the end."""
+    divide = backward.divide.py_func
+    for parts, size in ((table.stages, kernels.columns(n, m)), (divide, kernels.space_size(n, m))):
+        numbers = np.arange(float(size))
+        found = np.concatenate([part.ravel() for part in parts(numbers, n, m)])
+        np.testing.assert_array_equal(np.sort(found), numbers)
+
+
+def test_compiled_parts_are_those_in_python() -> None:
+    """Of a row, and q and q̇ by themselves."""
+    rows = np.random.default_rng(0).normal(size=(2, kernels.columns(7, 6)))
+    read = compiled(table.stage)
+    for s in range(2):
+        for mine, theirs in zip(read(rows[s], 7, 6), table.stages(rows[s], 7, 6), strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+        np.testing.assert_array_equal(
+            compiled(table.q_of)(rows, s, 7), kernels.stages(rows, 7, 6).q[s]
+        )
+        np.testing.assert_array_equal(
+            compiled(table.qd_of)(rows, s, 7), kernels.stages(rows, 7, 6).qd[s]
+        )
 
 
 @pytest.mark.parametrize("m", SIZES)
@@ -296,55 +319,3 @@ def test_pullback_of_one_stage_equals_central_differences(case: Case, damped: bo
     )
     exact = np.concatenate([to_q, to_epsilon[0], to_target[0]])
     np.testing.assert_allclose(exact, expected, atol=GRADIENT * np.abs(expected).max())
-
-
-@pytest.mark.parametrize("last", [False, True])
-def test_a_breakdown_has_the_time_of_the_first_number_that_is_not_finite(
-    case: Case, last: bool
-) -> None:
-    robot, task, start, path = case
-    rollout = Rollout(robot, path, task, Grid.aligned(path.knots, 8))
-    times = rollout.grid.stage_times
-    stage = len(times) - 1 if last else 13
-    epsilon = np.zeros((len(times), robot.dof))
-    assert rollout.run(start, epsilon) is None
-    for broken in (np.nan, np.inf):
-        epsilon[stage, 0] = broken
-        assert rollout.run(start, epsilon) == times[stage]
-
-
-@pytest.mark.parametrize(("name", "task"), [("panda", "pointing"), ("ur5", "pointing")])
-def test_polished_nodes_of_a_tilted_pointing_path_are_on_it(name: str, task: str) -> None:
-    """A tool axis along no axis of the world, and a grid so coarse that there is much to do."""
-    robot = robot_named(name)
-    start = start_of(robot, task) + 0.3
-    pose = robot.pose(start)
-    assert np.abs(pose.rotation[:, 2]).max() < 0.95
-    end = pose.copy()
-    end.translation = pose.translation + np.array([-0.04, 0.03, -0.03])
-    end.rotation = pin.exp3(np.array([0.2, -0.3, 0.1])) @ pose.rotation
-    path = sm.Line(pose, end, 1.5)
-    rows = sm.Task.of(task)
-    rollout = Rollout(robot, path, rows, Grid.aligned(path.knots, 8))
-    assert rollout.run(start, 0.1 * np.ones((33, robot.dof))) is None
-    assert np.abs(rollout.drift[:, :5]).max() > 1e-7
-    t, q, qd = rollout.polish()
-    for here, speed, when in zip(q, qd, t, strict=True):
-        error = rows.twist_error(path.pose(when), robot.pose(here))
-        np.testing.assert_allclose(error, 0.0, atol=1e-12)
-        rotation = robot.pose(here).rotation
-        wanted = rows.select(path.twist(when)[:, None], rotation)[:, 0]
-        np.testing.assert_allclose(robot.task_jacobian(here, rows) @ speed, wanted, atol=1e-12)
-
-
-def test_polishing_leaves_the_run_as_it_is(panda: sm.RobotModel) -> None:
-    """What `samples` and `pullback` return is that of the last run."""
-    start = start_of(panda, "pose")
-    path = short_line(panda, start)
-    rollout = Rollout(panda, path, sm.Task.POSE, Grid.aligned(path.knots, 8))
-    assert rollout.run(start, 0.1 * np.ones((33, 7))) is None
-    before, drift = rollout.samples().q.copy(), rollout.drift
-    _, q, _ = rollout.polish()
-    assert not np.array_equal(q, before[rollout.grid.node_stages])
-    np.testing.assert_array_equal(rollout.samples().q, before)
-    np.testing.assert_array_equal(rollout.drift, drift)
