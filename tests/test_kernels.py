@@ -25,7 +25,7 @@ TASKS = [sm.Task.POSE, sm.Task.POSITION, sm.Task.POINTING, sm.Task.PLANAR, sm.Ta
 
 
 def compiled(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a kernel that only kernels call as one that Python can call."""
+    """Return a kernel that kernels call as they have it, not as Python runs it."""
     function: Callable[..., Any] = numba.njit(error_model="numpy")(lambda *given: kernel(*given))
     return function
 
@@ -51,8 +51,10 @@ def positive(rng: np.random.Generator, m: int) -> Array:
 @pytest.mark.parametrize(("n", "m"), [(3, 2), (7, 6), (8, 5), (2, 1)])
 def test_parts_tile_what_they_are_parts_of(n: int, m: int) -> None:
     """Each number belongs to one part: no overlap, none left, none beyond the end."""
-    divide = backward.divide.py_func
-    for parts, size in ((table.stages, kernels.columns(n, m)), (divide, kernels.space_size(n, m))):
+    for parts, size in (
+        (table.parts, kernels.columns(n, m)),
+        (backward.divide, kernels.space_size(n, m)),
+    ):
         numbers = np.arange(float(size))
         found = np.concatenate([part.ravel() for part in parts(numbers, n, m)])
         np.testing.assert_array_equal(np.sort(found), numbers)
@@ -61,15 +63,15 @@ def test_parts_tile_what_they_are_parts_of(n: int, m: int) -> None:
 def test_compiled_parts_are_those_in_python() -> None:
     """Of a row, and q and q̇ by themselves."""
     rows = np.random.default_rng(0).normal(size=(2, kernels.columns(7, 6)))
-    read = compiled(table.stage)
+    read = compiled(table.parts)
     for s in range(2):
-        for mine, theirs in zip(read(rows[s], 7, 6), table.stages(rows[s], 7, 6), strict=True):
+        for mine, theirs in zip(read(rows[s], 7, 6), table.parts(rows[s], 7, 6), strict=True):
             np.testing.assert_array_equal(mine, theirs)
         np.testing.assert_array_equal(
-            compiled(table.q_of)(rows, s, 7), kernels.stages(rows, 7, 6).q[s]
+            compiled(table.q_of)(rows, s, 7), kernels.parts(rows, 7, 6).q[s]
         )
         np.testing.assert_array_equal(
-            compiled(table.qd_of)(rows, s, 7), kernels.stages(rows, 7, 6).qd[s]
+            compiled(table.qd_of)(rows, s, 7), kernels.parts(rows, 7, 6).qd[s]
         )
 
 
@@ -277,7 +279,7 @@ def test_pullback_of_one_stage_equals_central_differences(case: Case, damped: bo
     q, epsilon = start + 0.02 * rng.normal(size=n), rng.normal(size=n)
     goal = path.pose(0.0)
     table = np.zeros((1, kernels.columns(n, m)))
-    at, data = kernels.stages(table, n, m), robot.model.createData()
+    at, data = kernels.parts(table, n, m), robot.model.createData()
     gain, kind = 3.0, kernels.angle_kind(task)
     sigma = np.linalg.svd(robot.task_jacobian(q, task), compute_uv=False)[-1]
     law = (1.3 * float(sigma), 0.4 * float(sigma)) if damped else None

@@ -43,14 +43,15 @@ def kernel(function: _Function) -> _Function:
 
 
 def inlined(function: _Function) -> _Function:
-    """Compile a numeric function that only kernels call: LLVM puts it into each of them.
+    """Make a numeric function one that kernels can call: LLVM puts it into each of them.
 
-    It cannot be called from Python, which spares half of its compilation. Division follows NumPy.
+    It has no wrapper for Python, which spares a good part of its compilation; from Python it runs
+    as it is written, uncompiled. Division in kernels follows NumPy.
     """
-    compiled: _Function = numba.njit(
+    made: _Function = numba.extending.register_jitable(
         error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True
     )(function)
-    return compiled
+    return made
 
 
 event.register("numba:compile", _Announcement())

@@ -66,7 +66,7 @@ class Rollout:
     def _new_table(self, stages: int) -> tuple[Array, kernels.Stage]:
         n, m = self.robot.dof, self.task.dimension
         table = np.zeros((stages, kernels.columns(n, m)))
-        return table, kernels.stages(table, n, m)
+        return table, kernels.parts(table, n, m)
 
     def aim(self, target: PathSamples) -> None:
         """Follow other poses and twists from now on, given at the stages (S)."""

@@ -16,7 +16,7 @@ from selfmotion.kernels.backward import pullback, sensitivities, space_size
 from selfmotion.kernels.contraction import contract_task
 from selfmotion.kernels.damping import Law
 from selfmotion.kernels.forward import advance
-from selfmotion.kernels.table import Stage, columns, stages
+from selfmotion.kernels.table import Stage, columns, parts
 from selfmotion.kernels.tool import angle_kind
 
 __all__ = [
@@ -26,8 +26,8 @@ __all__ = [
     "angle_kind",
     "columns",
     "contract_task",
+    "parts",
     "pullback",
     "sensitivities",
     "space_size",
-    "stages",
 ]

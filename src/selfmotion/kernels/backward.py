@@ -7,7 +7,7 @@ from selfmotion.jit import inlined, kernel
 from selfmotion.kernels.algebra import add_angular, angular, angular_part, cross, plus, respond
 from selfmotion.kernels.contraction import contract
 from selfmotion.kernels.damping import Law, pull_damping
-from selfmotion.kernels.table import Stage, part, stage
+from selfmotion.kernels.table import Stage, part, parts
 from selfmotion.kernels.tool import NO_ANGLE, POINTING, Rows, pull_error, unselect
 
 
@@ -153,7 +153,7 @@ def pullback(
     space = divide(work, n, rows.shape[0])
     by_slope = space.by_slope
     for s in range(count - 1, -1, -1):
-        at = stage(table[s], n, rows.shape[0])
+        at = parts(table[s], n, rows.shape[0])
         i, h, last = s % 4, at.step[0], s == count - 1
         for k in range(n):
             w = qd_cotangent[s, k]
@@ -211,7 +211,7 @@ def sensitivities(
         for x in range(d):
             q_matrix[0, j, x] = start_matrix[j, x]
     for s in range(count):
-        at = stage(table[s], n, rows.shape[0])
+        at = parts(table[s], n, rows.shape[0])
         for j in range(n):
             for k in range(n):
                 space.w[k], space.by_q[k] = (1.0 if k == j else 0.0), 0.0

@@ -15,7 +15,7 @@ from selfmotion.kernels.algebra import (
     respond,
 )
 from selfmotion.kernels.damping import Law, damp
-from selfmotion.kernels.table import Stage, q_of, qd_of, stage
+from selfmotion.kernels.table import Stage, parts, q_of, qd_of
 from selfmotion.kernels.tool import POINTING, Rows, pose_error, select, task_rows
 
 
@@ -36,7 +36,7 @@ def advance(
     `world_jacobian` (6, n) is that of the point at the world's origin, `rotation` and `translation`
     the tool's pose. False where the motion breaks down, see `evaluate`.
     """
-    at = stage(table[s], world_jacobian.shape[1], rows.shape[0])
+    at = parts(table[s], world_jacobian.shape[1], rows.shape[0])
     observe(world_jacobian, rotation, translation, at)
     if not evaluate(at, rows, angle_kind, gain, law):
         return False

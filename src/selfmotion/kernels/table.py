@@ -97,7 +97,8 @@ class Stage(NamedTuple):
     damping: Array
 
 
-def stages(table: Array, n: int, m: int) -> Stage:
+@inlined
+def parts(table: Array, n: int, m: int) -> Stage:
     """Return the parts of a row or of a table, for n joints and m rows of the task."""
     path = 3 * n
     tool = path + 19
@@ -123,18 +124,15 @@ def stages(table: Array, n: int, m: int) -> Stage:
     )
 
 
-stage = inlined(stages)
-
-
 @inlined
 def q_of(table: Array, s: int, n: int) -> Array:
-    """Return q of stage s, as `stage` has it."""
+    """Return q of stage s, as `parts` has it."""
     return part(table[s], 0, (n,))
 
 
 @inlined
 def qd_of(table: Array, s: int, n: int) -> Array:
-    """Return q̇ of stage s, as `stage` has it."""
+    """Return q̇ of stage s, as `parts` has it."""
     return part(table[s], n, (n,))
 
 
