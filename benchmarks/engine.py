@@ -36,7 +36,11 @@ class Measured:
 
 
 def pinocchio_loop(objective: Objective) -> Any:
-    """Return a bare Python loop of the Pinocchio calls that one rollout makes."""
+    """Return a bare Python loop of Pinocchio's Jacobians and poses along one rollout.
+
+    The calls that anyone would make; the rollout itself takes the frame's Jacobian from that of the
+    joints.
+    """
     robot = objective.rollout.robot
     model, data, tool = robot.model, robot.model.createData(), robot.tool_id
     axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

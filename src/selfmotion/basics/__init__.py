@@ -17,7 +17,7 @@ from selfmotion.basics.errors import (
     StartError,
 )
 from selfmotion.basics.files import read_archive, write_archive, write_atomically, write_csv
-from selfmotion.basics.jit import kernel
+from selfmotion.basics.jit import inlined, kernel
 from selfmotion.basics.progress import Progress, silent
 from selfmotion.basics.saved import Saved, is_known, restore
 
@@ -38,6 +38,7 @@ __all__ = [
     "Saved",
     "SelfmotionError",
     "StartError",
+    "inlined",
     "is_known",
     "kernel",
     "per_joint",

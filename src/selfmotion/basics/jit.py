@@ -42,4 +42,16 @@ def kernel(function: _Function) -> _Function:
     return compiled
 
 
+def inlined(function: _Function) -> _Function:
+    """Make a numeric function one that kernels can call: LLVM puts it into each of them.
+
+    It has no wrapper for Python, which spares a good part of its compilation; from Python it runs
+    as it is written, uncompiled. Division in kernels follows NumPy.
+    """
+    made: _Function = numba.extending.register_jitable(
+        error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True
+    )(function)
+    return made
+
+
 event.register("numba:compile", _Announcement())

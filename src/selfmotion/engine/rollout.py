@@ -11,8 +11,6 @@ from selfmotion.path import Path, PathSamples
 from selfmotion.robot import RobotModel
 from selfmotion.task import DampingLaw, Task, feedback_rate
 
-_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-
 # A Newton correction this small [rad or m] is rounding; quadratic convergence needs few steps.
 _POLISHED, _POLISHING_STEPS = 1e-13, 4
 
@@ -48,38 +46,29 @@ class Rollout:
         damping: DampingLaw | None = None,
     ) -> None:
         self.robot, self.path, self.task, self.grid = robot, path, task, grid
+        self.damping = damping
         self.jacobian_evaluations = 0
         self._data = robot.model.createData()
-        self.damping = damping
-        # σ0 and λ0; the kernels take a threshold of 0 for none.
-        self._law = (0.0, 0.0) if damping is None else (damping.threshold, damping.strength)
+        self._law = None if damping is None else (damping.threshold, damping.strength)
         self._gain = feedback_rate(path.duration)
-        self._rows = task.rows
-        self._angle_kind = kernels.angle_kind(task.rows, task.tool_axes)
-        times, n, m = grid.stage_times, robot.dof, task.dimension
-        at = kernels.layout(n, m)
-        table = self._table = np.zeros((len(times), at.columns))
-        self._q, self._qd = table[:, at.q : at.q + n], table[:, at.qd : at.qd + n]
-        self._epsilon = table[:, at.epsilon : at.epsilon + n]
-        self._target_translation = table[:, at.target_translation : at.target_translation + 3]
-        self._target_twist = table[:, at.target_twist : at.target_twist + 6]
-        self._translation = table[:, at.translation : at.translation + 3]
-        self._error = table[:, at.error : at.error + 6]
-        self._fade = table[:, at.damping + 1]
-        # Reshaping splits the last axis of a view, hence shares the table's memory.
-        self._target_rotation = table[:, at.target_rotation : at.target_twist].reshape(-1, 3, 3)
-        self._rotation = table[:, at.rotation : at.error].reshape(-1, 3, 3)
-        self._jacobian = table[:, at.jacobian : at.task_jacobian].reshape(-1, 6, n)
-        self._task_jacobian = table[:, at.task_jacobian : at.factor].reshape(-1, m, n)
-        self.aim(path.samples(times))
-        table[:, at.step] = grid.stage_steps
-        self._q_rows = list(self._q)
+        self._rows, self._angle_kind = task.rows, kernels.angle_kind(task.rows, task.tool_axes)
+        self._table, self._at = self._new_table(len(grid.stage_times))
+        self._space = np.zeros(kernels.space_size(robot.dof, task.dimension))
+        # What `polished` works on: one stage, at a node.
+        self._node_table, self._node = self._new_table(1)
+        self.aim(path.samples(grid.stage_times))
+        self._at.step[:, 0] = grid.stage_steps
+
+    def _new_table(self, stages: int) -> tuple[Array, kernels.Stage]:
+        n, m = self.robot.dof, self.task.dimension
+        table = np.zeros((stages, kernels.columns(n, m)))
+        return table, kernels.parts(table, n, m)
 
     def aim(self, target: PathSamples) -> None:
         """Follow other poses and twists from now on, given at the stages (S)."""
-        self._target_translation[:] = target.translation
-        self._target_rotation[:] = target.rotation
-        self._target_twist[:] = target.twist
+        self._at.target_translation[:] = target.translation
+        self._at.target_rotation[:] = target.rotation
+        self._at.target_twist[:] = target.twist
 
     def run(self, start: Array, epsilon: Array) -> float | None:
         """Integrate from `start` (n,) under null motion `epsilon` (S, n) at the stage times.
@@ -90,38 +79,38 @@ class Rollout:
             None when it arrived; otherwise the time [s] at which the task Jacobian lost rank or a
             number stopped being finite.
         """
+        self._at.epsilon[:] = epsilon
+        self._at.q[0] = start
+        failed = self._advance(self._table, self._at.q, self._gain)
+        if failed is None:
+            self.jacobian_evaluations += len(self._table)
+            return None
+        self.jacobian_evaluations += failed + 1
+        return float(self.grid.stage_times[failed])
+
+    def _advance(self, table: Array, q: Array, gain: float) -> int | None:
+        """Evaluate eq. 4 at the stages of a table; return the one where it broke down, if any.
+
+        `q` (S, n) is the table's own: each stage writes that of the next.
+        """
         model, data, tool = self.robot.model, self._data, self.robot.tool_id
-        jacobians, frame_jacobian = pin.computeJointJacobians, pin.getFrameJacobian
-        place, advance, axes = pin.updateFramePlacement, kernels.advance, _AXES
-        # These two are views of Pinocchio's own memory: each `place` refreshes them.
-        rotation, translation = data.oMf[tool].rotation, data.oMf[tool].translation
-        table, rows, angle_kind = self._table, self._rows, self._angle_kind
-        gain, (threshold, strength) = self._gain, self._law
-        self._epsilon[:] = epsilon
-        self._q[0] = start
-        for stage, q in enumerate(self._q_rows):
-            jacobians(model, data, q)
-            jacobian = frame_jacobian(model, data, tool, axes)
+        jacobians, place = pin.computeJointJacobians, pin.updateFramePlacement
+        advance, rows, angle_kind, law = kernels.advance, self._rows, self._angle_kind, self._law
+        # Views of Pinocchio's own memory: each of the two calls refreshes its own. All joints are
+        # on the way to the tool, so that its Jacobian is that of all joints.
+        jacobian, pose = data.J, data.oMf[tool]
+        rotation, translation = pose.rotation, pose.translation
+        for stage, configuration in enumerate(q):
+            jacobians(model, data, configuration)
             place(model, data, tool)
             if not advance(
-                stage,
-                jacobian,
-                rotation,
-                translation,
-                table,
-                rows,
-                angle_kind,
-                gain,
-                threshold,
-                strength,
+                stage, jacobian, rotation, translation, table, rows, angle_kind, gain, law
             ):
-                self.jacobian_evaluations += stage + 1
-                return float(self.grid.stage_times[stage])
-        self.jacobian_evaluations += len(self._q_rows)
+                return stage
         return None
 
     def polished(self) -> tuple[Array, Array, Array]:
-        """Return the nodes of the last run, put exactly onto the path.
+        """Return the nodes of the last run, put exactly onto the path; the run stays as it is.
 
         Newton's method q ← q + J⁺e, from errors the size of the integration's; then eq. 4 once
         more for q̇. A motion that was damped anywhere is returned as it is: it is off the path by
@@ -131,26 +120,23 @@ class Rollout:
         -------
         t, q, qd : (N + 1,), (N + 1, n), (N + 1, n)
         """
-        here, n = self.grid.node_stages, self.robot.dof
+        here, run, node = self.grid.node_stages, self._at, self._node
+        q, qd = run.q[here], run.qd[here]
         if self.damped:
-            return self.grid.nodes, self._q[here], self._qd[here]
-        model, data, tool = self.robot.model, self._data, self.robot.tool_id
-        rotation, translation = data.oMf[tool].rotation, data.oMf[tool].translation
-        # A table of its own: the last run stays as it is.
-        table, rows, kind = self._table[here], self._rows, self._angle_kind
-        q, qd = table[:, :n].copy(), table[:, n : 2 * n]
-        for node in range(len(here)):
-            for _ in range(_POLISHING_STEPS + 1):
-                pin.computeJointJacobians(model, data, q[node])
-                jacobian = pin.getFrameJacobian(model, data, tool, _AXES)
-                pin.updateFramePlacement(model, data, tool)
-                sound = kernels.evaluate(
-                    node, jacobian, rotation, translation, table, rows, kind, 0.0, 0.0, 0.0
-                )
-                step = kernels.newton_step(table[node], n, rows, kind)
-                if not sound or np.abs(step).max() < _POLISHED:
+            return self.grid.nodes, q, qd
+        for i, stage in enumerate(here):
+            self._node_table[0] = self._table[stage]
+            # J⁺e is eq. 4 for ẋ = 0, ε = 0 and K = 1.
+            node.target_twist[:] = node.epsilon[:] = 0.0
+            for _ in range(_POLISHING_STEPS):
+                if self._advance(self._node_table, node.q, 1.0) is not None:
                     break
-                q[node] += step
+                node.q[0] += node.qd[0]
+                if np.abs(node.qd[0]).max() < _POLISHED:
+                    break
+            node.target_twist[0], node.epsilon[0] = run.target_twist[stage], run.epsilon[stage]
+            if self._advance(self._node_table, node.q, 0.0) is None:
+                q[i], qd[i] = node.q[0], node.qd[0]
         self.jacobian_evaluations += len(here)
         return self.grid.nodes, q, qd
 
@@ -169,8 +155,6 @@ class Rollout:
             That of the path's poses [m, world rotation vector] and twists; without it the path is
             fixed.
         """
-        if target_matrix is None:
-            target_matrix = np.zeros((0, 12, epsilon_matrix.shape[2]))
         epsilon_matrix = np.ascontiguousarray(epsilon_matrix)
         by_q, by_qd = np.empty_like(epsilon_matrix), np.empty_like(epsilon_matrix)
         kernels.sensitivities(
@@ -178,9 +162,12 @@ class Rollout:
             self._rows,
             self._angle_kind,
             self._gain,
+            self._law,
+            self._space,
+            np.zeros(6),
             epsilon_matrix,
             np.ascontiguousarray(start_matrix),
-            np.ascontiguousarray(target_matrix),
+            None if target_matrix is None else np.ascontiguousarray(target_matrix),
             by_q,
             by_qd,
         )
@@ -194,7 +181,7 @@ class Rollout:
     @property
     def error(self) -> Array:
         """Pose error e of the last run at the stages, (S, 6) [m, rad], without copying."""
-        return self._error
+        return self._at.error
 
     @property
     def drift(self) -> Array:
@@ -202,25 +189,25 @@ class Rollout:
 
         What integration let in, and damping.
         """
-        return self._error[self.grid.node_stages]
+        return self._at.error[self.grid.node_stages]
 
     @property
     def damped(self) -> bool:
         """Whether the last run was damped at any stage."""
-        return bool(np.any(self._fade > 0.0))
+        return bool(np.any(self._at.damping[:, 1] > 0.0))
 
     def samples(self) -> Samples:
         """Return the last run at its stages, without copying: valid until the next run."""
         return Samples(
             sampling=self.grid.sampling,
-            q=self._q,
-            qd=self._qd,
-            jacobian=self._jacobian,
-            rotation=self._rotation,
-            translation=self._translation,
-            error=self._error,
+            q=self._at.q,
+            qd=self._at.qd,
+            jacobian=self._at.jacobian,
+            rotation=self._at.rotation,
+            translation=self._at.translation,
+            error=self._at.error,
             task=self.task,
-            task_jacobian=self._task_jacobian,
+            task_jacobian=self._at.task_jacobian,
         )
 
     def pullback(
@@ -246,11 +233,12 @@ class Rollout:
         target_gradient : (S, 12)
             With respect to the path's poses [m, world rotation vector] and twists.
         """
-        epsilon_gradient = np.empty_like(self._qd)
-        target_gradient = np.empty((len(epsilon_gradient), 12))
+        count, n = len(self._table), self.robot.dof
+        epsilon_gradient, start_gradient = np.empty((count, n)), np.empty(n)
+        target_gradient = np.empty((count, 12))
         if error_cotangent is None:
-            error_cotangent = np.zeros((len(epsilon_gradient), 6))
-        start_gradient = kernels.pullback(
+            error_cotangent = np.zeros((count, 6))
+        kernels.pullback(
             np.ascontiguousarray(q_cotangent),
             np.ascontiguousarray(qd_cotangent),
             np.ascontiguousarray(error_cotangent),
@@ -258,7 +246,10 @@ class Rollout:
             self._rows,
             self._angle_kind,
             self._gain,
+            self._law,
+            self._space,
             epsilon_gradient,
+            start_gradient,
             target_gradient,
         )
         return epsilon_gradient, start_gradient, target_gradient

@@ -7,42 +7,37 @@ y = A⁻¹(u - Jε), and eq. 4 in the form that needs one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 
-Column k of J6 is [v_k; ω_k]. On a chain, with ω = 0 for prismatic joints,
-
-    ∂J6_i/∂q_k = [ω_k × v_i; ω_k × ω_i]  for k ≤ i,   [ω_i × v_k; 0]  for k > i,
-
-so that ⟨M, ∂J6/∂q_k⟩ needs two running sums of cross products over the columns of M and J6.
+Python calls `advance`, `pullback`, `sensitivities` and `contract_task`. Each is made of small
+kernels, which LLVM inlines, and is compiled for what it is given: who has no damping, or a path
+that does not move, does not wait for theirs.
 """
 
-from selfmotion.kernels.algebra import (
-    LOGARITHM,
-    POINTING,
-    angle_kind,
-    cholesky,
-    contract_task,
-    pointing_error,
-    rotation_error,
-    select,
-    solve_cholesky,
-)
-from selfmotion.kernels.backward import pullback, sensitivities
-from selfmotion.kernels.forward import advance, evaluate, newton_step
-from selfmotion.kernels.table import layout
+from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
+from selfmotion.kernels.backward import pullback, sensitivities, space_size
+from selfmotion.kernels.contraction import contract_task
+from selfmotion.kernels.damping import Law
+from selfmotion.kernels.forward import advance
+from selfmotion.kernels.table import Stage, columns, part, parts
+from selfmotion.kernels.tool import POINTING, Rows, angle_kind, pose_error, select, task_rows
 
 __all__ = [
-    "LOGARITHM",
     "POINTING",
+    "Law",
+    "Rows",
+    "Stage",
     "advance",
     "angle_kind",
     "cholesky",
+    "columns",
     "contract_task",
-    "evaluate",
-    "layout",
-    "newton_step",
-    "pointing_error",
+    "gram",
+    "part",
+    "parts",
+    "pose_error",
     "pullback",
-    "rotation_error",
     "select",
     "sensitivities",
     "solve_cholesky",
+    "space_size",
+    "task_rows",
 ]

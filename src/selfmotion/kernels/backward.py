@@ -1,140 +1,130 @@
 """All stages of eq. 4 backward: the exact derivative of the discrete scheme."""
 
-import numpy as np
+from typing import NamedTuple
 
-from selfmotion.basics import Array, kernel
-from selfmotion.kernels.algebra import (
-    NO_ANGLE,
-    POINTING,
-    Rows,
-    add_cross,
-    contract,
-    pull_error,
-    solve_cholesky,
-    unselect,
-)
-from selfmotion.kernels.table import layout
+from selfmotion.basics import Array, inlined, kernel
+from selfmotion.kernels.algebra import add_angular, angular, angular_part, cross, plus, respond
+from selfmotion.kernels.contraction import contract
+from selfmotion.kernels.damping import Law, pull_damping
+from selfmotion.kernels.table import Stage, part, parts
+from selfmotion.kernels.tool import NO_ANGLE, POINTING, Rows, pull_error, unselect
 
 
-@kernel
+class Space(NamedTuple):
+    """What the kernels here work in, as views of one array.
+
+    Attributes
+    ----------
+    w : (n,)
+        The cotangent of q̇.
+    z : (m,)
+        -A⁻¹Jw.
+    full_y, full_z : (6,)
+        Sᵀy and Sᵀz.
+    by_error, twist : (6,)
+        Cotangents of the pose error and of the tool's twist.
+    weights : (6, n)
+        M, of which ⟨M, ∂J6⟩ is taken.
+    by_epsilon, by_q, by_target : (n,), (n,), (12,)
+        What a stage's pullback gives.
+    by_slope : (4, n)
+        The last four of `by_q`.
+    """
+
+    w: Array
+    z: Array
+    full_y: Array
+    full_z: Array
+    by_error: Array
+    twist: Array
+    weights: Array
+    by_epsilon: Array
+    by_q: Array
+    by_target: Array
+    by_slope: Array
+
+
+@inlined
+def divide(space: Array, n: int, m: int) -> Space:
+    """Return the parts of the array to work in, for n joints and m rows of the task."""
+    return Space(
+        w=part(space, 0, (n,)),
+        z=part(space, n, (m,)),
+        full_y=part(space, n + m, (6,)),
+        full_z=part(space, n + m + 6, (6,)),
+        by_error=part(space, n + m + 12, (6,)),
+        twist=part(space, n + m + 18, (6,)),
+        weights=part(space, n + m + 24, (6, n)),
+        by_epsilon=part(space, 7 * n + m + 24, (n,)),
+        by_q=part(space, 8 * n + m + 24, (n,)),
+        by_target=part(space, 9 * n + m + 24, (12,)),
+        by_slope=part(space, 9 * n + m + 36, (4, n)),
+    )
+
+
+def space_size(n: int, m: int) -> int:
+    """Return how long the array to work in is."""
+    return 13 * n + m + 36
+
+
+@inlined
 def pull_stage(
-    w: Array,
-    row: Array,
+    at: Stage,
     rows: Rows,
     angle_kind: int,
     gain: float,
+    law: Law | None,
+    space: Space,
     error_bar: Array,
     epsilon_bar: Array,
-    q_bar: Array,
     target_bar: Array,
 ) -> None:
-    """Pull the cotangents w (n,) on q̇ and ē (6,) on the pose error back.
+    """Pull the cotangents `space.w` on q̇ and ē (6,) on the pose error back.
 
-    To ε (set), q (added) and the path (set): z = A⁻¹Jw,  ε̄ = w - Jᵀz,
-    q̄ = ⟨y ε̄ᵀ - z q̇ᵀ, ∂J/∂q⟩ + (zᵀS K + ēᵀ) ∂e/∂q, and where the angular rows are in tool axes,
-    zᵀ ∂S u. Damping adds -(λ0² zᵀy + K zᵀS e) ∂f, see `damp`, with ∂f = df/dσ² 2 ⟨v (Jᵀv)ᵀ, ∂J⟩;
-    K is (1 - f) times the `gain`. The path's cotangent (12,) is that of its pose [m, rad], then
-    Sᵀz of its twist.
+    To ε (set), q (added to `space.by_q`) and the path (set). z = -A⁻¹Jw and ε̄ = w + Jᵀz are eq. 4
+    itself, for ε = w and u = 0; q̄ = ⟨y ε̄ᵀ + z q̇ᵀ, ∂J/∂q⟩ + (ēᵀ - zᵀS K) ∂e/∂q, and where the
+    angular rows are in tool axes, -zᵀ ∂S u. Damping adds (λ0² zᵀy + K zᵀS e) ∂f, see
+    `pull_damping`; K is (1 - f) times the `gain`. The path's cotangent (12,) is that of its pose
+    [m, rad], then -Sᵀz of its twist.
     """
-    n, m = w.shape[0], rows.shape[0]
-    at = layout(n, m)
-    qd = row[at.qd : at.qd + n]
-    target_rotation = row[at.target_rotation : at.target_rotation + 9].reshape(3, 3)
-    target_twist = row[at.target_twist : at.target_twist + 6]
-    rotation = row[at.rotation : at.rotation + 9].reshape(3, 3)
-    error = row[at.error : at.error + 6]
-    jacobian = row[at.jacobian : at.jacobian + 6 * n].reshape(6, n)
-    task_jacobian = row[at.task_jacobian : at.task_jacobian + m * n].reshape(m, n)
-    factor = row[at.factor : at.factor + m * m].reshape(m, m)
-    y = row[at.y : at.y + m]
     pointing = angle_kind == POINTING
-
-    z = np.zeros(m)
-    for i in range(m):
-        for k in range(n):
-            z[i] += task_jacobian[i, k] * w[k]
-    solve_cholesky(factor, z)
-    for k in range(n):
-        total = w[k]
-        for i in range(m):
-            total -= task_jacobian[i, k] * z[i]
-        epsilon_bar[k] = total
-
-    full_y, full_z = np.empty(6), np.empty(6)
-    unselect(rows, pointing, rotation, y, full_y)
-    unselect(rows, pointing, rotation, z, full_z)
-    weights = np.empty((6, n))
+    for i in range(rows.shape[0]):
+        space.z[i] = 0.0
+    respond(at.task_jacobian, at.factor, space.z, space.w, epsilon_bar)
+    unselect(rows, pointing, at.rotation, at.y, space.full_y)
+    unselect(rows, pointing, at.rotation, space.z, space.full_z)
     for i in range(6):
-        for k in range(n):
-            weights[i, k] = full_y[i] * epsilon_bar[k] - full_z[i] * qd[k]
+        for k in range(epsilon_bar.shape[0]):
+            space.weights[i, k] = space.full_y[i] * epsilon_bar[k] + space.full_z[i] * at.qd[k]
+    fade = 0.0 if law is None else at.damping[1]
+    for i in range(6):
+        space.by_error[i] = error_bar[i] - (1.0 - fade) * gain * space.full_z[i]
     # Everything but ∂J6 acts through the tool's own twist J6 ∂q.
-    twist_bar = np.zeros(6)
-    fade = row[at.damping + 1]
-    if fade > 0.0:
-        _pull_damping(row, rows, pointing, gain, z, full_z, weights, twist_bar)
-        gain *= 1.0 - fade
-    contract(jacobian, weights, q_bar)
-    by_error, by_twist = gain * full_z + error_bar, np.zeros(6)
-    pull_error(angle_kind, error, rotation, target_rotation, by_error, by_twist)
+    pull_error(angle_kind, at.error, at.rotation, at.target_rotation, space.by_error, space.twist)
     # Moved together, target and tool turn the error with them: ∂e = ω × e.
     for i in range(6):
-        twist_bar[i] += by_twist[i]
-        target_bar[i] = -by_twist[i]
-        target_bar[6 + i] = full_z[i]
+        target_bar[i], target_bar[6 + i] = -space.twist[i], -space.full_z[i]
     if angle_kind != NO_ANGLE:
-        add_cross(error[3], error[4], error[5], by_error[3:], target_bar[3:6])
+        turned = cross(angular_part(at.error), angular_part(space.by_error))
+        add_angular(target_bar, 1.0, turned)
     if pointing:
-        first, second = np.zeros(3), np.zeros(3)
-        for i in range(3):
-            second[i] = -(target_twist[3 + i] + gain * error[3 + i])
-            for k in range(n):
-                first[i] += jacobian[3 + i, k] * epsilon_bar[k]
-                second[i] += jacobian[3 + i, k] * qd[k]
-        add_cross(full_y[3], full_y[4], full_y[5], first, twist_bar[3:])
-        add_cross(-full_z[3], -full_z[4], -full_z[5], second, twist_bar[3:])
-    for k in range(n):
-        for i in range(6):
-            q_bar[k] += jacobian[i, k] * twist_bar[i]
+        pull_axes(at, epsilon_bar, space)
+    if law is not None and fade > 0.0:
+        pull_damping(at, rows, pointing, gain, space.z, space.full_z, space.weights, space.twist)
+    contract(at.jacobian, space.weights, space.twist, space.by_q)
 
 
-@kernel
-def _pull_damping(
-    row: Array,
-    rows: Rows,
-    pointing: bool,
-    gain: float,
-    z: Array,
-    full_z: Array,
-    weights: Array,
-    twist_bar: Array,
-) -> None:
-    """Add what -(λ0² zᵀy + K zᵀS e) ∂f leaves: on J6 to `weights` (6, n), on S to `twist_bar`."""
-    n, m = weights.shape[1], rows.shape[0]
-    at = layout(n, m)
-    rotation = row[at.rotation : at.rotation + 9].reshape(3, 3)
-    error = row[at.error : at.error + 6]
-    jacobian = row[at.jacobian : at.jacobian + 6 * n].reshape(6, n)
-    task_jacobian = row[at.task_jacobian : at.task_jacobian + m * n].reshape(m, n)
-    y = row[at.y : at.y + m]
-    strength, by_square = row[at.damping], row[at.damping + 2]
-    v = row[at.damping + 3 : at.columns]
-    slope = 0.0
-    for i in range(m):
-        slope += strength * z[i] * y[i]
-    for i in range(6):
-        slope += gain * full_z[i] * error[i]
-    factor = -2.0 * by_square * slope
-    left, right, turn = np.empty(6), np.zeros(n), np.zeros(3)
-    unselect(rows, pointing, rotation, v, left)
-    for k in range(n):
-        for i in range(m):
-            right[k] += task_jacobian[i, k] * v[i]
-        for i in range(3):
-            turn[i] += jacobian[3 + i, k] * right[k]
-        for i in range(6):
-            weights[i, k] += factor * left[i] * right[k]
-    if pointing:
-        add_cross(factor * left[3], factor * left[4], factor * left[5], turn, twist_bar[3:])
+@inlined
+def pull_axes(at: Stage, epsilon_bar: Array, space: Space) -> None:
+    """Add what turning the tool's axes, ∂S, does to J and u, to the twist's cotangent."""
+    by_y, by_z = (0.0, 0.0, 0.0), angular_part(at.command)
+    by_z = -by_z[0], -by_z[1], -by_z[2]
+    for k in range(epsilon_bar.shape[0]):
+        turning = angular(at.jacobian, k)
+        by_y = plus(by_y, epsilon_bar[k], turning)
+        by_z = plus(by_z, at.qd[k], turning)
+    add_angular(space.twist, 1.0, cross(angular_part(space.full_y), by_y))
+    add_angular(space.twist, 1.0, cross(angular_part(space.full_z), by_z))
 
 
 @kernel
@@ -146,47 +136,49 @@ def pullback(
     rows: Rows,
     angle_kind: int,
     gain: float,
+    law: Law | None,
+    work: Array,
     epsilon_bar: Array,
+    start_bar: Array,
     target_bar: Array,
-) -> Array:
+) -> None:
     """Reverse the Runge-Kutta recursion: cotangents on all stages → start (n,).
 
-    Sets those of ε (S, n) and of the path (S, 12), see `pull_stage`.
+    Sets those of ε (S, n), of the start (n,) and of the path (S, 12), see `pull_stage`.
 
     A stage's slope acts on the later stages of its step and on the step's end.
     """
-    stages, n = q_cotangent.shape
-    step = layout(n, rows.shape[0]).step
-    state, q_bar = np.zeros(n), np.zeros(n)
-    chi, slope = np.zeros((4, n)), np.empty(n)
-    for s in range(stages - 1, -1, -1):
-        i, h = s % 4, table[s, step]
-        last = s == stages - 1
+    count, n = q_cotangent.shape
+    space = divide(work, n, rows.shape[0])
+    by_slope = space.by_slope
+    for s in range(count - 1, -1, -1):
+        at = parts(table[s], n, rows.shape[0])
+        i, h, last = s % 4, at.step[0], s == count - 1
         for k in range(n):
-            slope[k] = qd_cotangent[s, k]
+            w = qd_cotangent[s, k]
             if not last:
-                slope[k] += state[k] * h / (6.0 if i in (0, 3) else 3.0)
+                w += start_bar[k] * h / (6.0 if i in (0, 3) else 3.0)
                 if i < 3:
-                    slope[k] += chi[i + 1, k] * (h if i == 2 else 0.5 * h)
-            q_bar[k] = q_cotangent[s, k]
+                    w += by_slope[i + 1, k] * (h if i == 2 else 0.5 * h)
+            space.w[k] = w
+            space.by_q[k] = q_cotangent[s, k]
         pull_stage(
-            slope,
-            table[s],
+            at,
             rows,
             angle_kind,
             gain,
+            law,
+            space,
             error_cotangent[s],
             epsilon_bar[s],
-            q_bar,
             target_bar[s],
         )
-        chi[i] = q_bar
-        if last:
-            state[:] = q_bar
-        elif i == 0:
-            for k in range(n):
-                state[k] += chi[0, k] + chi[1, k] + chi[2, k] + chi[3, k]
-    return state
+        for k in range(n):
+            by_slope[i, k] = space.by_q[k]
+            if last:
+                start_bar[k] = space.by_q[k]
+            elif i == 0:
+                start_bar[k] += by_slope[0, k] + by_slope[1, k] + by_slope[2, k] + by_slope[3, k]
 
 
 @kernel
@@ -195,50 +187,66 @@ def sensitivities(
     rows: Rows,
     angle_kind: int,
     gain: float,
+    law: Law | None,
+    work: Array,
+    no_error: Array,
     epsilon_matrix: Array,
     start_matrix: Array,
-    target_matrix: Array,
+    target_matrix: Array | None,
     q_matrix: Array,
     qd_matrix: Array,
 ) -> None:
     """Set ∂q/∂x and ∂q̇/∂x at all stages, (S, n, d).
 
     For ∂ε/∂x = `epsilon_matrix` (S, n, d), ∂q(0)/∂x = `start_matrix` (n, d) and that of the path's
-    poses and twists, `target_matrix` (S, 12, d), or (0, 12, d) where the path is fixed.
+    poses and twists, `target_matrix` (S, 12, d), or None where the path is fixed.
 
     The tangent of the Runge-Kutta recursion: ∂q̇ = (I - J⁺J) ∂ε + (∂q̇/∂q) ∂q + (∂q̇/∂path) ∂path
     at every stage. The rows of the matrices are pullbacks of the unit vectors.
     """
-    stages, n = epsilon_matrix.shape[:2]
-    step = layout(n, rows.shape[0]).step
-    projector, slope_by_q, unit = np.empty((n, n)), np.empty((n, n)), np.zeros(n)
-    slope_by_target = np.empty((n, 12))
-    no_error = np.zeros(6)
-    state, now = start_matrix.copy(), start_matrix.copy()
-    for s in range(stages):
-        for k in range(n):
-            unit[k] = 1.0
-            slope_by_q[k] = 0.0
+    count, n, d = epsilon_matrix.shape
+    space = divide(work, n, rows.shape[0])
+    for j in range(n):
+        for x in range(d):
+            q_matrix[0, j, x] = start_matrix[j, x]
+    for s in range(count):
+        at = parts(table[s], n, rows.shape[0])
+        for j in range(n):
+            for k in range(n):
+                space.w[k], space.by_q[k] = (1.0 if k == j else 0.0), 0.0
             pull_stage(
-                unit,
-                table[s],
+                at,
                 rows,
                 angle_kind,
                 gain,
+                law,
+                space,
                 no_error,
-                projector[k],
-                slope_by_q[k],
-                slope_by_target[k],
+                space.by_epsilon,
+                space.by_target,
             )
-            unit[k] = 0.0
-        slope = projector @ epsilon_matrix[s] + slope_by_q @ now
-        if len(target_matrix) > 0:
-            slope += slope_by_target @ target_matrix[s]
-        q_matrix[s], qd_matrix[s] = now, slope
-        i, h = s % 4, table[s, step]
-        if i == 3:
-            before = qd_matrix[s - 3] + 2.0 * (qd_matrix[s - 2] + qd_matrix[s - 1])
-            state += h / 6.0 * (before + slope)
-            now[:] = state
-        else:
-            now[:] = state + (h if i == 2 else 0.5 * h) * slope
+            for x in range(d):
+                slope = 0.0
+                for k in range(n):
+                    slope += space.by_epsilon[k] * epsilon_matrix[s, k, x]
+                    slope += space.by_q[k] * q_matrix[s, k, x]
+                if target_matrix is not None:
+                    for k in range(12):
+                        slope += space.by_target[k] * target_matrix[s, k, x]
+                qd_matrix[s, j, x] = slope
+        if s + 1 < count:
+            step_matrix(q_matrix, qd_matrix, s, at.step[0])
+
+
+@inlined
+def step_matrix(q_matrix: Array, qd_matrix: Array, s: int, h: float) -> None:
+    """Set ∂q/∂x of stage s + 1 from the slopes so far, as `step` does with q."""
+    i = s % 4
+    share = h / 6.0 if i == 3 else (h if i == 2 else 0.5 * h)
+    for j in range(q_matrix.shape[1]):
+        for x in range(q_matrix.shape[2]):
+            slope = qd_matrix[s, j, x]
+            if i == 3:
+                slope += qd_matrix[s - 3, j, x]
+                slope += 2.0 * (qd_matrix[s - 2, j, x] + qd_matrix[s - 1, j, x])
+            q_matrix[s + 1, j, x] = q_matrix[s - i, j, x] + share * slope

@@ -5,16 +5,17 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, kernel
 from selfmotion.kernels import (
-    LOGARITHM,
     POINTING,
+    Rows,
     cholesky,
-    pointing_error,
-    rotation_error,
+    gram,
+    part,
+    pose_error,
     select,
     solve_cholesky,
+    task_rows,
 )
 
-Rows = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
 # What `trace` says of a curve.
@@ -59,24 +60,16 @@ def correct(
     n, m = frame_jacobian.shape[1], rows.shape[0]
     error, z, along = np.zeros(6), np.empty(m), np.zeros(m)
     jacobian, factor = np.empty((m, n)), np.empty((m, m))
-    for i in range(3):
-        error[i] = target[i] - translation[i]
     pointing = angle_kind == POINTING
-    if angle_kind == LOGARITHM:
-        rotation_error(target[3:12].reshape(3, 3), rotation, error[3:])
-    elif pointing:
-        pointing_error(target[3:12].reshape(3, 3), rotation, error[3:])
+    pose_error(
+        angle_kind, part(target, 0, (3,)), part(target, 3, (3, 3)), translation, rotation, error
+    )
     select(rows, pointing, rotation, error, z)
-    for k in range(n):
-        select(rows, pointing, rotation, frame_jacobian[:, k], jacobian[:, k])
+    task_rows(rows, pointing, rotation, frame_jacobian, jacobian)
     for i in range(m):
         for k in range(n):
             along[i] += jacobian[i, k] * tangent[k]
-        for j in range(i + 1):
-            total = 0.0
-            for k in range(n):
-                total += jacobian[i, k] * jacobian[j, k]
-            factor[i, j] = total
+    gram(jacobian, factor)
     if not cholesky(factor):
         return -1.0
     solve_cholesky(factor, z)

@@ -1,0 +1,72 @@
+"""Contractions with the kinematic Hessian ∂J/∂q, compiled: O(n), without the tensor.
+
+Column k of J6 is [v_k; ω_k]. On a chain, with ω = 0 for prismatic joints,
+
+    ∂J6_i/∂q_k = [ω_k × v_i; ω_k × ω_i]  for k ≤ i,   [ω_i × v_k; 0]  for k > i.
+"""
+
+import numpy as np
+
+from selfmotion.basics import Array, inlined, kernel
+from selfmotion.kernels.algebra import (
+    add_angular,
+    angular,
+    angular_part,
+    cross,
+    dot,
+    linear,
+    plus,
+)
+from selfmotion.kernels.tool import Rows, unselect
+
+
+@inlined
+def contract(jacobian: Array, weights: Array, twist: Array, out: Array) -> None:
+    """Add ⟨M, ∂J6/∂q_k⟩ + twist·J6_k to out[k], for M = `weights` (6, n) and `twist` (6,).
+
+    Two running sums of cross products, which start from what acts on all columns alike.
+    """
+    n = jacobian.shape[1]
+    # Σ_{i ≥ k} v_i × M_v,i + ω_i × M_ω,i
+    outer = angular_part(twist)
+    for k in range(n - 1, -1, -1):
+        v, w = linear(jacobian, k), angular(jacobian, k)
+        outer = plus(outer, 1.0, cross(v, linear(weights, k)))
+        outer = plus(outer, 1.0, cross(w, angular(weights, k)))
+        out[k] += dot(w, outer)
+    # Σ_{i < k} M_v,i × ω_i
+    inner = (twist[0], twist[1], twist[2])
+    for k in range(n):
+        out[k] += dot(linear(jacobian, k), inner)
+        inner = plus(inner, 1.0, cross(linear(weights, k), angular(jacobian, k)))
+
+
+@kernel
+def contract_task(
+    jacobian: Array, rotation: Array, weights: Array, rows: Rows, pointing: bool
+) -> Array:
+    """Return ⟨M, ∂J/∂q_k⟩ of the task Jacobian for S samples: M = `weights` (S, m, n) → (S, n).
+
+    Where S depends on q (rows in tool axes), ∂S adds ω_k · Σ_i (SᵀM)_ω,i × ω_i.
+    """
+    samples, m, n = weights.shape
+    out = np.zeros((samples, n))
+    here, full = np.empty((6, n)), np.empty((6, n))
+    turn, values, moment, twist = np.empty((3, 3)), np.empty(m), np.empty(6), np.empty(6)
+    for s in range(samples):
+        # Copies: whatever the caller's arrays look like in memory, the rest is compiled once.
+        for i in range(3):
+            twist[i] = twist[3 + i] = 0.0
+            for j in range(3):
+                turn[i, j] = rotation[s, i, j]
+        for k in range(n):
+            for i in range(m):
+                values[i] = weights[s, i, k]
+            unselect(rows, pointing, turn, values, moment)
+            for i in range(6):
+                here[i, k], full[i, k] = jacobian[s, i, k], moment[i]
+            if pointing:
+                turning = cross(angular_part(moment), angular(here, k))
+                add_angular(twist, 1.0, turning)
+        contract(here, full, twist, out[s])
+    return out

@@ -1,0 +1,182 @@
+"""The tool, compiled: its pose error and the rows of the task, both ways."""
+
+from math import atan2, sqrt, tan
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, inlined
+from selfmotion.kernels.algebra import (
+    Vector,
+    add_angular,
+    angular,
+    angular_part,
+    cross,
+    dot,
+    linear,
+    plus,
+)
+
+Rows = npt.NDArray[np.intp]
+
+# How a task measures its angular error.
+NO_ANGLE, LOGARITHM, POINTING = 0, 1, 2
+
+# Below this angle the closed forms in sin θ lose digits and their series serve: to 1e-15 there.
+_SMALL = 0.05
+
+
+def angle_kind(rows: Rows, tool_axes: bool) -> int:
+    """Return how a task with these rows of [v, ω] measures its angular error."""
+    if tool_axes:
+        return POINTING
+    return LOGARITHM if np.any(rows >= 3) else NO_ANGLE
+
+
+@inlined
+def pose_error(
+    angle_kind: int,
+    target_translation: Array,
+    target_rotation: Array,
+    translation: Array,
+    rotation: Array,
+    out: Array,
+) -> None:
+    """Set `out` (6,) to the pose error e: to the target's position, then by what rotation vector.
+
+    The angular part, in world axes, is as `angle_kind` says: none, `rotation_error` or
+    `pointing_error`.
+    """
+    for i in range(3):
+        out[i] = target_translation[i] - translation[i]
+    if angle_kind == LOGARITHM:
+        out[3], out[4], out[5] = rotation_error(target_rotation, rotation)
+    elif angle_kind == POINTING:
+        out[3], out[4], out[5] = pointing_error(target_rotation, rotation)
+
+
+@inlined
+def rotation_error(target: Array, actual: Array) -> Vector:
+    """Return log(R_target Rᵀ), the rotation vector from actual to target, world axes."""
+    # R_target Rᵀ = Σ_i t_i a_iᵀ over the columns; its antisymmetric part is ½ Σ a_i × t_i.
+    double, trace = (0.0, 0.0, 0.0), 0.0
+    for i in range(3):
+        a, b = linear(actual, i), linear(target, i)
+        double = plus(double, 1.0, cross(a, b))
+        trace += dot(a, b)
+    return _scaled(double, 0.5, 0.5 * (trace - 1.0))
+
+
+@inlined
+def pointing_error(target: Array, actual: Array) -> Vector:
+    """Return the shortest rotation vector that aligns the z axes, world axes."""
+    a, b = z_axis(actual), z_axis(target)
+    return _scaled(cross(a, b), 1.0, dot(a, b))
+
+
+@inlined
+def z_axis(rotation: Array) -> Vector:
+    """Return the z axis of a frame."""
+    return rotation[0, 2], rotation[1, 2], rotation[2, 2]
+
+
+@inlined
+def _scaled(normal: Vector, scale: float, cosine: float) -> Vector:
+    """Return the rotation vector along `normal`, of length sin θ by `scale`, with cos θ."""
+    sine = scale * sqrt(dot(normal, normal))
+    if sine > 1e-12:
+        scale *= atan2(sine, cosine) / sine
+    return scale * normal[0], scale * normal[1], scale * normal[2]
+
+
+@inlined
+def pull_error(
+    angle_kind: int,
+    error: Array,
+    rotation: Array,
+    target_rotation: Array,
+    z: Array,
+    out: Array,
+) -> None:
+    """Set `out` (6,) to the cotangent of the tool's twist that z (6,) on the pose error e leaves.
+
+    ∂e_v = -v. With φ = log(R_d Rᵀ): ∂φ = -Jr⁻¹(φ) ω. With e = θ (a × b)/sin θ for axes a (tool)
+    and b (target): ∂a = ω × a.
+    """
+    for i in range(3):
+        out[i] = -z[i]
+        out[3 + i] = 0.0
+    w = angular_part(z)
+    if angle_kind == LOGARITHM:
+        phi = angular_part(error)
+        once = cross(phi, w)
+        twice = cross(phi, once)
+        c = logarithm_coefficient(sqrt(dot(phi, phi)))
+        for i in range(3):
+            out[3 + i] = -(w[i] - 0.5 * once[i] + c * twice[i])
+    elif angle_kind == POINTING:
+        a, b = z_axis(rotation), z_axis(target_rotation)
+        normal, cosine = cross(a, b), dot(a, b)
+        f, slope = pointing_coefficients(sqrt(dot(normal, normal)), cosine)
+        turned, along = cross(b, w), slope * dot(w, normal)
+        moment = plus((f * turned[0], f * turned[1], f * turned[2]), along, b)
+        out[3], out[4], out[5] = cross(a, moment)
+
+
+@inlined
+def logarithm_coefficient(angle: float) -> float:
+    """Return c of Jr⁻¹(φ) = I + ½ [φ] + c [φ]²: (1 - (θ/2) cot(θ/2)) / θ²."""
+    if angle < _SMALL:
+        square = angle * angle
+        return 1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square / 1209600.0))
+    return (1.0 - 0.5 * angle / tan(0.5 * angle)) / (angle * angle)
+
+
+@inlined
+def pointing_coefficients(sine: float, cosine: float) -> tuple[float, float]:
+    """Return f = θ / sin θ and df/d(cos θ) = (θ cos θ - sin θ) / sin³θ."""
+    angle = atan2(sine, cosine)
+    if angle < _SMALL:
+        square = angle * angle
+        f = 1.0 + square * (1.0 / 6.0 + square * (7.0 / 360.0 + square * 31.0 / 15120.0))
+        slope = 1.0 / 3.0 + square * (2.0 / 15.0 + square * (2.0 / 63.0 + square * 4.0 / 675.0))
+        return f, -slope
+    return angle / sine, (angle * cosine - sine) / (sine * sine * sine)
+
+
+@inlined
+def task_rows(rows: Rows, pointing: bool, rotation: Array, jacobian: Array, out: Array) -> None:
+    """Set `out` (m, n) to J = S J6; angular rows in tool axes where `pointing`."""
+    for i in range(rows.shape[0]):
+        row = rows[i]
+        if pointing and row >= 3:
+            axis = linear(rotation, row - 3)
+            for k in range(jacobian.shape[1]):
+                out[i, k] = dot(axis, angular(jacobian, k))
+        else:
+            for k in range(jacobian.shape[1]):
+                out[i, k] = jacobian[row, k]
+
+
+@inlined
+def select(rows: Rows, pointing: bool, rotation: Array, twist: Array, out: Array) -> None:
+    """Set `out` (m,) to S·twist (6,)."""
+    for i in range(rows.shape[0]):
+        row = rows[i]
+        if pointing and row >= 3:
+            out[i] = dot(linear(rotation, row - 3), angular_part(twist))
+        else:
+            out[i] = twist[row]
+
+
+@inlined
+def unselect(rows: Rows, pointing: bool, rotation: Array, values: Array, out: Array) -> None:
+    """Set `out` (6,) to Sᵀ·values (m,)."""
+    for i in range(6):
+        out[i] = 0.0
+    for i in range(rows.shape[0]):
+        row = rows[i]
+        if pointing and row >= 3:
+            add_angular(out, values[i], linear(rotation, row - 3))
+        else:
+            out[row] += values[i]
