@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from engine import Evaluation, objective_on, pinocchio_loop
+from engine import Measured, objective_on, pinocchio_loop
 from problems import circle
 
 
@@ -25,12 +25,12 @@ def test_pinocchio_loop(benchmark: Any, objective: Any) -> None:
 
 @pytest.mark.benchmark(group="kernels")
 def test_rollout(benchmark: Any, objective: Any) -> None:
-    benchmark(Evaluation(objective, gradient=False))
+    benchmark(Measured(objective, gradient=False))
 
 
 @pytest.mark.benchmark(group="kernels")
 def test_rollout_and_gradient(benchmark: Any, objective: Any) -> None:
-    benchmark(Evaluation(objective, gradient=True))
+    benchmark(Measured(objective, gradient=True))
 
 
 FIRST_PLAN = """
