@@ -169,7 +169,7 @@ def _read_named(arm: NamedArm) -> Urdf:
             return read_urdf(folder / arm.urdf)
     share = _example_robot_data()
     urdf = read_urdf(share / "robots" / arm.urdf)
-    return Urdf(urdf.source, urdf.text, (str(share.parent), str(share)), urdf.joints)
+    return dataclasses.replace(urdf, package_dirs=(str(share.parent), str(share)))
 
 
 def _example_robot_data() -> Path:

@@ -1,5 +1,8 @@
 """Reading a URDF: yourdfpy parses it, this module refuses what Pinocchio would accept silently.
 
+What yourdfpy cannot do is done on the XML, here and once: telling well-formed from not, finding
+xacro, turning continuous joints into single-angle ones, making mesh addresses absolute.
+
 Pinocchio loads a zero joint axis, reversed limits or a link with two parents without a word, and
 gives continuous joints two coordinates. Here such files are refused with a message that names the
 joint or link, and continuous joints become single-angle joints without limits.
@@ -56,18 +59,15 @@ class Urdf:
         Folders in which ``package://`` addresses are looked up.
     joints : dict
         Joint name → `UrdfJoint`.
+    links : tuple of str
+        Names of all links, in file order.
     """
 
     source: str
     text: str
     package_dirs: tuple[str, ...]
     joints: dict[str, UrdfJoint]
-
-    @property
-    def links(self) -> tuple[str, ...]:
-        """Names of all links, in file order."""
-        root = ElementTree.fromstring(self.text)
-        return tuple(link.get("name", "") for link in root.findall("link"))
+    links: tuple[str, ...]
 
     @property
     def sha256(self) -> str:
@@ -140,7 +140,9 @@ def parse_urdf(
     _single_angle(root)
     if mesh_folder is not None:
         _absolute_meshes(root, mesh_folder)
-    return Urdf(source, ElementTree.tostring(root, encoding="unicode"), package_dirs, joints)
+    links = tuple(link.name for link in parsed.links)
+    prepared = ElementTree.tostring(root, encoding="unicode")
+    return Urdf(source, prepared, package_dirs, joints, links)
 
 
 def _parse_with_yourdfpy(text: str, source: str) -> Any:
