@@ -1,13 +1,14 @@
 """Re-checks a finished trajectory by forward kinematics; shares no code with the rollout."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array
-from selfmotion.certificate.deviation import deviation_from, deviation_size, excess
-from selfmotion.certificate.findings import DampedStretch, Extreme, Tolerance
+from selfmotion.basics import Array, ProblemError
+from selfmotion.certificate.deviation import smallest_singular_values
+from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import arm_limits
+from selfmotion.certificate.path_error import check_path
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.certificate.verdict import Certificate
 from selfmotion.motion import Trajectory
@@ -33,7 +34,8 @@ def certify(
     Parameters
     ----------
     robot, path, task, trajectory
-        The motion and what it should do; times of the trajectory are those of the path.
+        The motion and what it should do; times of the trajectory are those of the path, its joints
+        are those of the arm by name, in any order.
     tolerance : Tolerance, optional
         What the motion may miss the path by.
     requirements : sequence of Requirement
@@ -50,39 +52,59 @@ def certify(
     Returns
     -------
     Certificate
+
+    Raises
+    ------
+    FileFormatError
+        The trajectory is of other joints.
+    ProblemError
+        A requirement is none, or returns no finding.
     """
     tolerance, task = tolerance or Tolerance(), Task.of(task)
+    trajectory = trajectory.of_joints(robot.joint_names)
     motion = FinishedMotion(robot, trajectory)
-    t = motion.t
-    in_tool_axes = any(item.in_tool_axes for item in relaxations)
-    deviation, singular = deviation_from(robot, path, task, t, motion.q, in_tool_axes)
-    beyond = excess(relaxations, path.duration, t, deviation)
-    distance, angle = np.linalg.norm(beyond[:, :3], axis=1), np.linalg.norm(beyond[:, 3:], axis=1)
-    position = _extreme(distance, t, robot.tool, np.argmax)
-    rotation = _extreme(angle, t, robot.tool, np.argmax)
-    damped = () if damping is None else _damped_stretches(damping, t, singular)
-    findings = tuple(
-        item.judge(motion) for item in (*arm_limits(robot, requirements), *requirements)
-    )
+    path_check = check_path(robot, path, task, trajectory, tolerance, relaxations)
+    position, rotation = path_check.position, path_check.rotation
+    singular = smallest_singular_values(robot, task, motion.q)
+    damped = () if damping is None else _damped_stretches(damping, motion.t, singular)
+    _check(requirements)
+    wanted = (*arm_limits(robot, requirements), *requirements)
+    findings = tuple(_judged(item, motion) for item in wanted)
     return Certificate(
         position,
         rotation,
-        smallest_singular_value=_extreme(singular, t, robot.tool, np.argmin),
+        smallest_singular_value=_least(singular, motion.t, robot.tool),
         closure=float(np.abs(trajectory.q[-1] - trajectory.q[0]).max()),
-        samples=len(t),
+        samples=path_check.samples,
         tolerance=tolerance,
         findings=findings,
         failures=(
             *_cut_short(ending, path, trajectory),
             *_off_path(position, rotation, tolerance, damped),
+            *_undecided(path_check.undecided),
             *(item.text for item in findings if not item.kept),
         ),
-        deviations=tuple(
-            _extreme(deviation_size(item, path.duration, t, deviation), t, item.name, np.argmax)
-            for item in relaxations
-        ),
+        deviations=path_check.deviations,
         damped=damped,
     )
+
+
+def _check(requirements: Sequence[Requirement]) -> None:
+    for item in requirements:
+        if not isinstance(item, Requirement):
+            raise ProblemError(
+                f"requirements: {item!r} is no Requirement; derive a class of your own from "
+                f"selfmotion.Requirement, or take constraint.requirement(robot)"
+            )
+
+
+def _judged(requirement: Requirement, motion: FinishedMotion) -> Finding:
+    found = requirement.judge(motion)
+    if not isinstance(found, Finding):
+        raise ProblemError(
+            f"requirement '{requirement.name}': judge() returned {found!r}, expected a Finding"
+        )
+    return found
 
 
 def _damped_stretches(law: DampingLaw, t: Array, singular: Array) -> tuple[DampedStretch, ...]:
@@ -109,9 +131,20 @@ def _because(time: float, damped: tuple[DampedStretch, ...]) -> str:
     return f", {when} damping was active, {before[-1]}"
 
 
-def _extreme(values: Array, t: Array, name: str, choose: Callable[[Array], np.intp]) -> Extreme:
-    worst = int(choose(values))
+def _least(values: Array, t: Array, name: str) -> Extreme:
+    worst = int(np.argmin(values))
     return Extreme(float(values[worst]), float(t[worst]), name)
+
+
+def _undecided(intervals: tuple[tuple[float, float], ...]) -> tuple[str, ...]:
+    if not intervals:
+        return ()
+    first, last = intervals[0]
+    others = f", and on {len(intervals) - 1} other intervals" if len(intervals) > 1 else ""
+    return (
+        f"whether the tool is on the path from t = {first:.6g} to {last:.6g} s is not "
+        f"decided{others}: the path or the motion is not smooth there",
+    )
 
 
 def _cut_short(ending: str, path: Path, trajectory: Trajectory) -> tuple[str, ...]:

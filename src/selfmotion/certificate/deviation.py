@@ -15,13 +15,13 @@ _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 def deviation_from(
     robot: RobotModel, path: Path, task: Task, t: Array, q: Array, in_tool_axes: bool
-) -> tuple[Array, Array]:
-    """Return how the tool deviates from the path, (K, 6), and the smallest singular value, (K,).
+) -> Array:
+    """Return how the tool deviates from the path, (K, 6).
 
     Rows x, y, z [m] and rx, ry, rz [rad] as `Relaxation` has them; zero where the task leaves them
     free.
     """
-    rotation, translation, jacobian = _kinematics(robot, q)
+    rotation, translation = _poses(robot, q)
     target = path.samples(t)
     linear = task.rows[task.rows < 3]
     miss = np.zeros((len(t), 6))
@@ -29,24 +29,35 @@ def deviation_from(
     miss[:, 3:] = _turns(task, target.rotation, rotation)
     if in_tool_axes:
         miss[:, :3] = np.einsum("kji,kj->ki", target.rotation, miss[:, :3])
+    return miss
+
+
+def smallest_singular_values(robot: RobotModel, task: Task, q: Array) -> Array:
+    """Return the smallest singular value of the task Jacobian at q (K, n), (K,)."""
+    model, data, tool = robot.model, robot.model.createData(), robot.tool_id
+    jacobian, rotation = np.empty((len(q), 6, robot.dof)), np.empty((len(q), 3, 3))
+    for k, configuration in enumerate(q):
+        pin.computeJointJacobians(model, data, configuration)
+        rotation[k] = pin.updateFramePlacement(model, data, tool).rotation
+        jacobian[k] = pin.getFrameJacobian(model, data, tool, _AXES)
     values = np.linalg.svd(task.select_along(jacobian, rotation), compute_uv=False)
-    return miss, values[:, -1].astype(np.float64)
+    return values[:, -1].astype(np.float64)
 
 
-def _kinematics(robot: RobotModel, q: Array) -> tuple[Array, Array, Array]:
-    """Return rotations, translations and Jacobians of the tool at q (K, n).
+def _poses(robot: RobotModel, q: Array) -> tuple[Array, Array]:
+    """Return rotations and translations of the tool at q (K, n).
 
     By calls of its own: what checks a motion must not share a fault with what made it.
     """
     model, data, tool = robot.model, robot.model.createData(), robot.tool_id
     rotation, translation = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
-    jacobian = np.empty((len(q), 6, robot.dof))
+    pose = data.oMf[tool]
+    seen_rotation, seen_translation = pose.rotation, pose.translation
     for k, configuration in enumerate(q):
-        pin.computeJointJacobians(model, data, configuration)
-        pose = pin.updateFramePlacement(model, data, tool)
-        rotation[k], translation[k] = pose.rotation, pose.translation
-        jacobian[k] = pin.getFrameJacobian(model, data, tool, _AXES)
-    return rotation, translation, jacobian
+        pin.forwardKinematics(model, data, configuration)
+        pin.updateFramePlacement(model, data, tool)
+        rotation[k], translation[k] = seen_rotation, seen_translation
+    return rotation, translation
 
 
 def _turns(task: Task, target: Array, actual: Array) -> Array:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, ProblemError, read_only
 from selfmotion.certificate.findings import Finding
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.robot import RobotModel
@@ -27,6 +27,22 @@ class JointLimits(Requirement):
     order: int
     lower: Array
     upper: Array
+
+    def __post_init__(self) -> None:
+        for name in ("lower", "upper"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        lower, upper = self.lower, self.upper
+        # Written so that NaN is refused.
+        if self.order not in (0, 1, 2) or lower.shape != upper.shape or not np.all(lower <= upper):
+            raise ProblemError(
+                f"limits of order {self.order}: lower {lower.tolist()} and upper {upper.tolist()}, "
+                f"expected order 0, 1 or 2 and lower ≤ upper for each joint"
+            )
+        if self.order > 0 and not (np.all(upper > 0.0) and np.all(lower < 0.0)):
+            raise ProblemError(
+                f"{self.name}: lower {lower.tolist()} and upper {upper.tolist()}, expected "
+                f"numbers below and above 0"
+            )
 
     @property
     def name(self) -> str:  # type: ignore[override]  # it follows from the order

@@ -19,6 +19,9 @@ from selfmotion.costs import Samples
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
+# Joints with limits turn less than this [rad].
+_MOST_TURNS = 4.0 * np.pi
+
 
 @dataclass(frozen=True, eq=False)
 class JointPositionLimits(Constraint):
@@ -62,8 +65,18 @@ class JointPositionLimits(Constraint):
                 own.append(arm)
                 continue
             values = per_joint(given, robot.dof, f"{robot.name}: {LIMIT_NAMES[0]}")
+            _check_radians(robot, values)
             own.append(values if self.replace else read_only(tighter(values, arm)))
-        return own[0], own[1]
+        lower, upper = own
+        wrong = np.flatnonzero(~(lower < upper))
+        if wrong.size:
+            k = int(wrong[0])
+            raise ProblemError(
+                f"{robot.name}: {LIMIT_NAMES[0]}: joint '{robot.joint_names[k]}': lower "
+                f"{lower[k]:.6g} is not below upper {upper[k]:.6g}; the arm's own limits count as "
+                f"well, unless replace=True"
+            )
+        return lower, upper
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +152,17 @@ class JointAccelerationLimits(Constraint):
         return per_joint(self.limit, robot.dof, what, positive=True)
 
 
+def _check_radians(robot: RobotModel, limits: Array) -> None:
+    """Refuse limits of revolute joints that can only be meant in degrees."""
+    for name, value in zip(robot.joint_names, limits, strict=True):
+        if np.isfinite(value) and abs(value) > _MOST_TURNS and not robot.is_prismatic(name):
+            raise ProblemError(
+                f"{robot.name}: {LIMIT_NAMES[0]}: joint '{name}': {value:.6g} rad is "
+                f"{value / (2.0 * np.pi):.1f} turns; limits are in radians (numpy.radians), ±inf "
+                f"for none"
+            )
+
+
 @dataclass(frozen=True, eq=False)
 class BoundLimits:
     """lower ≤ x ≤ upper for x = q, q̇ or q̈ of the joints that have finite limits.
@@ -172,14 +196,6 @@ class BoundLimits:
     ) -> "BoundLimits":
         """Return lower ≤ x ≤ upper for the joints with a finite limit on either side."""
         lower, upper = limits
-        wrong = np.flatnonzero(~(lower < upper))
-        if wrong.size:
-            k = int(wrong[0])
-            raise ProblemError(
-                f"{robot.name}: {name}: joint '{robot.joint_names[k]}': lower {lower[k]:.6g} is "
-                f"not below upper {upper[k]:.6g}; the arm's own limits count as well, unless "
-                f"replace=True"
-            )
         if not margin > 0.0:
             raise ProblemError(f"{robot.name}: {name}: margin is {margin}, expected > 0")
         joints = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))

@@ -1,5 +1,6 @@
 """A joint motion over time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +54,28 @@ class Trajectory:
             raise FileFormatError(
                 f"trajectory: t[{row}] = {self.t[row]} does not come after {self.t[row - 1]}"
             )
+
+    def of_joints(self, names: Sequence[str]) -> "Trajectory":
+        """Return the same motion with its joints in another order.
+
+        Raises
+        ------
+        FileFormatError
+            A joint is missing, or there is one more; it is named.
+        """
+        wanted, own = tuple(names), self.joint_names
+        if wanted == own:
+            return self
+        if len(set(own)) < len(own):
+            twice = next(name for name in own if own.count(name) > 1)
+            raise FileFormatError(f"trajectory: joint '{twice}' appears twice")
+        for name, where, others in (
+            *((name, "is missing from the trajectory", own) for name in wanted if name not in own),
+            *((name, "is none of the arm's", wanted) for name in own if name not in wanted),
+        ):
+            raise FileFormatError(f"trajectory: joint '{name}' {where}: {', '.join(others)}")
+        order = [own.index(name) for name in wanted]
+        return Trajectory(self.t, self.q[:, order], self.qd[:, order], wanted)
 
     @property
     def duration(self) -> float:

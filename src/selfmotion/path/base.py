@@ -57,6 +57,14 @@ class Path(Saved, ABC, family="path"):
         """Times [s] between which the motion is C² or better, first 0, last `duration`."""
         return read_only([0.0, self.duration])
 
+    @property
+    def marks(self) -> Array:
+        """Times [s] between which the motion is smooth to any order, the knots among them.
+
+        Where waypoints are given, theirs: a certificate looks there, whatever lies between.
+        """
+        return self.knots
+
     @abstractmethod
     def evaluate(self, t: Array) -> PathSamples:
         """Return the motion at times (K,) known to lie in [0, duration].

@@ -41,6 +41,12 @@ class Retimed(Path, kind="retimed"):
         """See `Path.knots`."""
         return self._t
 
+    @property
+    def marks(self) -> Array:
+        """See `Path.marks`: the samples of the pace, and when the original's are passed."""
+        passed = np.interp(self._path.marks, self._sigma, self._t)
+        return np.union1d(self._t, passed)
+
     def pace(self, t: Array) -> tuple[Array, Array]:
         """Return σ and dσ/dt at times `t` (K,)."""
         from scipy.interpolate import CubicHermiteSpline

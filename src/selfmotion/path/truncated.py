@@ -46,6 +46,12 @@ class Truncated(Path, kind="truncated"):
         graded = self.duration - rest[gaps > _CLOSE * rest]
         return read_only([0.0, *np.union1d(inner, graded), self.duration])
 
+    @property
+    def marks(self) -> Array:
+        """See `Path.marks`."""
+        inner = self._path.marks
+        return np.union1d(self.knots, inner[inner < self.duration])
+
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
         return self._path.samples(t)

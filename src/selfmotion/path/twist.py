@@ -16,6 +16,8 @@ _DEGREE = 24
 # Chebyshev tail, relative to the largest velocity, at which a piece counts as resolved.
 _TAIL = 1e-13
 _SHORTEST = 2.0**-12
+# What two pieces may differ by where they meet, relative to the largest velocity.
+_JUMP = 1e-9
 
 
 class TwistPath(Path, kind="twist"):
@@ -173,7 +175,20 @@ def _resolve(
         else:
             middle = 0.5 * (left + right)
             pending += [(middle, right), (left, middle)]
+    _check_jumps(breaks, pieces, scale)
     return breaks, pieces
+
+
+def _check_jumps(breaks: list[float], pieces: list[Array], scale: float) -> None:
+    """Refuse a velocity that jumps from one piece to the next, which each by itself may not."""
+    for time, before, after in zip(breaks[1:-1], pieces[:-1], pieces[1:], strict=True):
+        jump = chebyshev.chebval(-1.0, after) - chebyshev.chebval(1.0, before)
+        size = float(np.abs(jump).max())
+        if not size <= _JUMP * max(scale, 1e-300):
+            raise PathError(
+                f"twist path: the velocity jumps by {size:.3g} m/s or rad/s at t = {time:.6g} s; "
+                f"no arm follows that: split the path there, or give poses (Waypoints)"
+            )
 
 
 def _sample(velocity: Callable[[float], npt.ArrayLike], t: float) -> Array:

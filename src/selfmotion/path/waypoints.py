@@ -15,12 +15,15 @@ from selfmotion.path.base import Path, PathSamples, as_pose, unit
 
 _COLUMNS = ("t", "x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
+# Poses nearer than this [m], and cosine of half the angle, are the same.
+_STILL = 1e-12
 
 
 class Waypoints(Path, kind="waypoints"):
     """Poses with times, joined smoothly in position and on SO(3), exact at each waypoint.
 
     Positions follow a cubic spline (C², not-a-knot), orientations scipy's `RotationSpline` (C²).
+    Two equal poses in a row are a pause, before and after which the tool comes to rest.
 
     Parameters
     ----------
@@ -60,6 +63,10 @@ class Waypoints(Path, kind="waypoints"):
         _check(times, points, turns)
         if corners not in ("blend", "stop"):
             raise PathError(f"waypoints: corners is '{corners}', expected 'blend' or 'stop'")
+        if not (np.isfinite(corner_angle) and corner_angle > 0.0):
+            raise PathError(
+                f"waypoints: corner_angle is {corner_angle} rad, expected a number above 0"
+            )
         self._t = read_only(times - times[0])
         self.duration = float(self._t[-1])
         self._points = read_only(points)
@@ -102,13 +109,18 @@ class Waypoints(Path, kind="waypoints"):
         return read_only(self._t[self._bounds])
 
     @property
+    def marks(self) -> Array:
+        """See `Path.marks`: the waypoints' times."""
+        return self._t
+
+    @property
     def waypoint_times(self) -> Array:
         """The waypoints' times [s], (N,)."""
         return self._t
 
     @property
     def corner_times(self) -> Array:
-        """Times [s] of the waypoints where the tool comes to rest (`corners="stop"`)."""
+        """Times [s] of the waypoints where the tool comes to rest: corners and pauses."""
         return self._t[self._stops]
 
     @cached_property
@@ -121,6 +133,11 @@ class Waypoints(Path, kind="waypoints"):
             bound = np.cos(self._corner_angle) * lengths[:-1] * lengths[1:]
             # A tool that rests on one side has no direction there, hence no kink.
             stops[1:-1] = (cosine < bound) & (lengths[:-1] > 0) & (lengths[1:] > 0)
+        # Two equal poses in a row are a pause: the tool comes to rest, and stays.
+        alike = np.abs(np.einsum("ki,ki->k", self._turns[:-1], self._turns[1:]))
+        pauses = (lengths <= _STILL) & (alike >= 1.0 - _STILL)
+        stops[:-1] |= pauses
+        stops[1:] |= pauses
         return stops
 
     @cached_property

@@ -27,6 +27,8 @@ from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
+# A path that is nowhere nearer than so many times the arm's reach is in other units.
+_FAR = 20.0
 
 
 class _TaskField:
@@ -107,6 +109,7 @@ class Problem:
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
             object.__setattr__(self, "start", None)
         self._check_rank()
+        self._check_units()
         self._check_costs()
         self._check_constraints()
         if self.start is not None:
@@ -214,6 +217,17 @@ class Problem:
                 f"joints",
                 dof=robot.dof,
                 rows=task.dimension,
+            )
+
+    def _check_units(self) -> None:
+        """Refuse a path that can only be meant in millimetres."""
+        times = np.linspace(0.0, self.path.duration, 9)
+        distances = np.linalg.norm(self.path.samples(times).translation, axis=1)
+        reach = self.robot.reach
+        if np.isfinite(reach) and distances.min() > _FAR * reach:
+            raise ProblemError(
+                f"{self.robot.name}: the path is {distances.min():.4g} m away from the arm's root "
+                f"and more, the arm reaches {reach:.4g} m; positions are in metres"
             )
 
     def _check_costs(self) -> None:

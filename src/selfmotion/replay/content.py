@@ -172,12 +172,11 @@ def _clearance(curve: ClearanceCurve, payload: Payload) -> Json:
 
 def _joints(plan: Plan) -> list[Json]:
     robot = plan.robot
-    kinds = [robot.urdf.joints[name].kind for name in robot.joint_names]
     return [
         {
             "name": name,
             "node": links.joint_name(robot, k),
-            "unit": "m" if kinds[k] == "prismatic" else "rad",
+            "unit": "m" if robot.is_prismatic(name) else "rad",
             "lower": _finite(robot.lower[k]),
             "upper": _finite(robot.upper[k]),
             "speed": _finite(robot.velocity_limit[k]),

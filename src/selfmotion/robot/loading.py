@@ -52,6 +52,8 @@ NAMED_ARMS: Mapping[str, NamedArm] = {
 }
 
 
+# A joint that is held may be this far beyond its limits [rad or m]: rounding of a file.
+_BESIDE = 1e-9
 # Beside this module in an installed package, at the top of the repository in a checkout.
 _OWN_ARMS = (Path(__file__).parent / "arms", Path(__file__).parents[3] / "robots")
 
@@ -122,7 +124,7 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
     free = [joint.name for joint in chain if joint.name not in lock]
     if not free:
         raise RobotError(f"{urdf.source}: no joint is left free between the root and '{tool}'")
-    locked = _locked_joints(full, free, lock)
+    locked = _locked_joints(urdf, full, free, lock)
     reference, locked_ids = locked_configuration(full, locked)
     model = pin.buildReducedModel(full, locked_ids, reference)
     names = tuple(model.names[1:])
@@ -197,15 +199,53 @@ def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:
             raise RobotError(f"{urdf.source}: lock names joint '{name}', which is not movable here")
         if not np.isfinite(value):
             raise RobotError(f"{urdf.source}: lock holds joint '{name}' at {value}, not finite")
+        joint = model.joints[model.getJointId(name)]
+        if joint.nq != 1:
+            raise RobotError(
+                f"{urdf.source}: lock holds joint '{name}', which has {joint.nq} coordinates; "
+                f"only joints with one can be held"
+            )
+        lower = model.lowerPositionLimit[joint.idx_q] - _BESIDE
+        upper = model.upperPositionLimit[joint.idx_q] + _BESIDE
+        if not lower <= value <= upper:
+            raise RobotError(
+                f"{urdf.source}: lock holds joint '{name}' at {value:.6g} rad or m, beyond its "
+                f"limits {lower:.6g} to {upper:.6g}"
+            )
 
 
-def _locked_joints(model: Any, free: list[str], lock: Mapping[str, float]) -> dict[str, float]:
-    locked = {}
-    for index in range(1, model.njoints):
-        joint, name = model.joints[index], model.names[index]
-        if name in free or joint.nq != 1:
-            continue
+def _locked_joints(
+    urdf: Urdf, model: Any, free: list[str], lock: Mapping[str, float]
+) -> dict[str, float]:
+    """Return where the joints off the chain are held; those that mimic one follow it."""
+    locked: dict[str, float] = {}
+
+    def hold(name: str) -> float:
+        if name in locked:
+            return locked[name]
+        joint, source = model.joints[model.getJointId(name)], urdf.joints[name]
         lower = model.lowerPositionLimit[joint.idx_q]
         upper = model.upperPositionLimit[joint.idx_q]
-        locked[name] = float(lock.get(name, np.clip(0.0, lower, upper)))
+        value = lock.get(name, np.clip(0.0, lower, upper))
+        if source.mimics in free and name not in lock:
+            raise RobotError(
+                f"{urdf.source}: joint '{name}' mimics '{source.mimics}', which moves on the way "
+                f"to the tool; a joint beside the chain cannot follow it: hold it with lock= if "
+                f"its links do not matter"
+            )
+        if source.mimics is not None and source.mimics not in free:
+            followed = source.multiplier * hold(source.mimics) + source.offset
+            if name in lock and abs(followed - lock[name]) > _BESIDE:
+                raise RobotError(
+                    f"{urdf.source}: lock holds joint '{name}' at {lock[name]:.6g}, but it mimics "
+                    f"'{source.mimics}' and stands at {followed:.6g}; hold that one"
+                )
+            value = followed
+        locked[name] = float(value)
+        return locked[name]
+
+    for index in range(1, model.njoints):
+        name = model.names[index]
+        if name not in free and model.joints[index].nq == 1:
+            hold(name)
     return locked

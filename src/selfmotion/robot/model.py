@@ -68,6 +68,24 @@ class RobotModel:
         """Number n of joints."""
         return len(self.joint_names)
 
+    def is_prismatic(self, joint: str) -> bool:
+        """Whether a joint's coordinate is a length [m]."""
+        return self.urdf.joints[joint].kind == "prismatic"
+
+    @property
+    def reach(self) -> float:
+        """How far from its root the tool can be at most [m]: an upper bound, link by link."""
+        links = sum(
+            float(np.linalg.norm(place.translation)) for place in self.model.jointPlacements
+        )
+        tool = self.model.frames[self.tool_id].placement.translation
+        slides = [
+            float(max(abs(low), abs(high)))
+            for name, low, high in zip(self.joint_names, self.lower, self.upper, strict=True)
+            if self.is_prismatic(name)
+        ]
+        return links + float(np.linalg.norm(tool)) + sum(slides)
+
     def configuration(self, q: npt.ArrayLike) -> Array:
         """Return `q` as a float64 vector of n finite numbers.
 

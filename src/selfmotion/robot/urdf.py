@@ -34,7 +34,8 @@ class UrdfJoint:
     name, kind, parent, child : str
         Names of joint and links; `kind` is the URDF type.
     mimics : str or None
-        The joint it copies, where it has a ``<mimic>`` tag.
+        The joint it copies, where it has a ``<mimic>`` tag:
+        its coordinate is `multiplier` times that joint's, plus `offset`.
     """
 
     name: str
@@ -42,6 +43,8 @@ class UrdfJoint:
     parent: str
     child: str
     mimics: str | None
+    multiplier: float = 1.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -137,6 +140,7 @@ def parse_urdf(
     for link in parsed.links:
         _check_inertia(link, source)
     _check_tree(parsed, source)
+    _check_mimics(joints, source)
     _single_angle(root)
     if mesh_folder is not None:
         _absolute_meshes(root, mesh_folder)
@@ -162,8 +166,14 @@ def _parse_with_yourdfpy(text: str, source: str) -> Any:
 
 
 def _joint(joint: Any) -> UrdfJoint:
-    mimics = joint.mimic.joint if joint.mimic is not None else None
-    return UrdfJoint(joint.name, joint.type, joint.parent, joint.child, mimics)
+    mimic = joint.mimic
+    if mimic is None:
+        return UrdfJoint(joint.name, joint.type, joint.parent, joint.child, None)
+    multiplier = 1.0 if mimic.multiplier is None else float(mimic.multiplier)
+    offset = 0.0 if mimic.offset is None else float(mimic.offset)
+    return UrdfJoint(
+        joint.name, joint.type, joint.parent, joint.child, mimic.joint, multiplier, offset
+    )
 
 
 def _check_names(parsed: Any, source: str) -> None:
@@ -202,8 +212,11 @@ def _check_joint(joint: Any, source: str) -> None:
         raise RobotError(
             f"{where} has reversed limits: lower {limit.lower} is above upper {limit.upper}"
         )
-    if limit.velocity is not None and limit.velocity < 0:
-        raise RobotError(f"{where} has a negative velocity limit {limit.velocity}")
+    for name, value in (("lower", limit.lower), ("upper", limit.upper)):
+        if np.isnan(value):
+            raise RobotError(f"{where} has {name} limit {value}, expected a number")
+    if limit.velocity is not None and not limit.velocity >= 0:
+        raise RobotError(f"{where} has velocity limit {limit.velocity}, expected a number ≥ 0")
 
 
 def _check_inertia(link: Any, source: str) -> None:
@@ -225,6 +238,32 @@ def _check_tree(parsed: Any, source: str) -> None:
     if len(roots) != 1:
         found = ", ".join(roots) if roots else "none (the joints form a loop)"
         raise RobotError(f"{source}: expected one root link, found: {found}")
+    for link in parent_of:
+        above, passed = link, {link}
+        while above in parent_of:
+            above = parent_of[above]
+            if above in passed:
+                raise RobotError(
+                    f"{source}: link '{link}' is not connected to the root '{roots[0]}': its "
+                    f"joints form a loop through '{above}'"
+                )
+            passed.add(above)
+
+
+def _check_mimics(joints: dict[str, UrdfJoint], source: str) -> None:
+    for joint in joints.values():
+        passed, name = {joint.name}, joint.mimics
+        while name is not None:
+            if name not in joints or name in passed:
+                what = "which mimics it in turn" if name in passed else "which does not exist"
+                raise RobotError(f"{source}: joint '{joint.name}' mimics '{name}', {what}")
+            passed.add(name)
+            name = joints[name].mimics
+        if not np.all(np.isfinite([joint.multiplier, joint.offset])):
+            raise RobotError(
+                f"{source}: joint '{joint.name}' mimics '{joint.mimics}' with multiplier "
+                f"{joint.multiplier} and offset {joint.offset}, expected finite numbers"
+            )
 
 
 def _single_angle(root: ElementTree.Element) -> None:

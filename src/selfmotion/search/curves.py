@@ -119,8 +119,7 @@ class SelfMotion:
 
     def __init__(self, robot: RobotModel, task: Task, spacing: float) -> None:
         self.robot, self.spacing = robot, spacing
-        kinds = [robot.urdf.joints[name].kind for name in robot.joint_names]
-        self.revolute = np.array([kind != "prismatic" for kind in kinds])
+        self.revolute = np.array([not robot.is_prismatic(name) for name in robot.joint_names])
         self._rows = task.rows
         self._kind = angle_kind(task.rows, task.tool_axes)
         self._tool = robot.tool_kinematics()

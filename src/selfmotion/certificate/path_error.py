@@ -1,0 +1,207 @@
+"""How far the tool is off its path at any time: a bound, not only samples.
+
+Between the trajectory's samples, the path's own marks and the ends of relaxed windows, the
+deviation of the tool from the path is smooth. On each such interval it is measured at 2k + 1
+points; the polynomial through every other of them predicts the rest, and the largest miss r of
+these predictions bounds how far the polynomial through all points is off between them (its own
+error is smaller by the order of two further halvings). The bound is the largest value of that
+polynomial plus r. Intervals on which it does not decide are halved.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.certificate.deviation import deviation_from, deviation_size, excess
+from selfmotion.certificate.findings import Extreme, Tolerance
+from selfmotion.motion import Trajectory
+from selfmotion.path import Path
+from selfmotion.robot import RobotModel
+from selfmotion.task import Relaxation, Task
+
+# Points per interval, where there are many intervals and where not.
+_FEW, _MANY, _CROWD = 5, 9, 4096
+# Between them the polynomials are looked at this many times.
+_DENSE = 33
+# No joint moves more than this [rad or m] in one interval: the deviation is smooth on its scale.
+_TRAVEL = 0.2
+# An interval is halved this many times before it counts as undecided.
+_DEPTH = 12
+# Marks nearer to each other than this share of the duration are one.
+_SAME = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class PathCheck:
+    """What is known of a motion's errors.
+
+    Attributes
+    ----------
+    position, rotation : Extreme
+        Bounds of the errors beyond what is relaxed [m], [rad], and about when they are largest.
+    deviations : tuple of Extreme
+        Bounds of the deviation of each relaxation's rows.
+    undecided : tuple of (float, float)
+        Intervals [s] on which the measurements do not settle.
+    samples : int
+        How many poses were looked at.
+    """
+
+    position: Extreme
+    rotation: Extreme
+    deviations: tuple[Extreme, ...]
+    undecided: tuple[tuple[float, float], ...]
+    samples: int
+
+
+class _Bounds(NamedTuple):
+    """For I intervals: bounds of 2 + R quantities, about when, and the errors measured."""
+
+    values: Array
+    times: Array
+    measured: Array
+
+
+def check_path(
+    robot: RobotModel,
+    path: Path,
+    task: Task,
+    trajectory: Trajectory,
+    tolerance: Tolerance,
+    relaxations: Sequence[Relaxation],
+) -> PathCheck:
+    """Bound the errors of a motion; parameters as in `certify`."""
+    allowed = np.array([tolerance.position, tolerance.rotation])
+    edges = _edges(path, trajectory, relaxations)
+    pending = np.stack([edges[:-1], edges[1:]], axis=1)
+    count = _MANY if len(pending) <= _CROWD else _FEW
+    width = 2 + len(relaxations)
+    worst = [Extreme(0.0, float(edges[0]), "")] * width
+    samples = 0
+    for depth in range(_DEPTH + 1):
+        found = _bounds(robot, path, task, trajectory, relaxations, pending, count)
+        samples += len(pending) * (count - 1)
+        # Written so that NaN settles nothing and is no small error either.
+        kept = np.asarray(found.values[:, :2] <= allowed).all(axis=1)
+        broken = ~np.asarray(found.measured <= allowed).all(axis=1)
+        unsettled = ~(kept | broken)
+        done = ~unsettled if depth < _DEPTH else np.ones(len(pending), dtype=bool)
+        worst = [
+            _larger(one, found.values[done, k], found.times[done, k]) for k, one in enumerate(worst)
+        ]
+        if depth == _DEPTH or not unsettled.any():
+            break
+        middle = pending[unsettled].mean(axis=1)
+        halves = [pending[unsettled, 0], middle, middle, pending[unsettled, 1]]
+        pending = np.stack(halves, axis=1).reshape(-1, 2)
+    gaps = tuple((float(a), float(b)) for a, b in pending[unsettled])
+    names = (robot.tool, robot.tool, *(item.name for item in relaxations))
+    extremes = tuple(replace(one, name=name) for one, name in zip(worst, names, strict=True))
+    return PathCheck(extremes[0], extremes[1], extremes[2:], gaps, samples + 1)
+
+
+def _larger(worst: Extreme, values: Array, times: Array) -> Extreme:
+    """Return the worst of an extreme and values (I,) at times (I,); NaN is worse than any."""
+    if not len(values):
+        return worst
+    k = int(np.argmax(np.where(np.isnan(values), np.inf, values)))
+    if values[k] <= worst.value:
+        return worst
+    return Extreme(float(values[k]), float(times[k]), worst.name)
+
+
+def _edges(path: Path, trajectory: Trajectory, relaxations: Sequence[Relaxation]) -> Array:
+    """Return the times between which the deviation is smooth, no joint moving far, (E,)."""
+    end = min(float(trajectory.t[-1]), path.duration)
+    start = max(float(trajectory.t[0]), 0.0)
+    windows = [time for item in relaxations for time in item.window(path.duration)]
+    marks = np.concatenate([trajectory.t, path.marks, windows])
+    marks = np.unique(np.clip(marks, start, end))
+    gaps = np.diff(marks)
+    kept = np.append(True, gaps > _SAME * path.duration)
+    marks = marks[kept]
+    marks[-1] = end
+    # |Δq| is at most the interval's length by the largest speed at its points, for a cubic.
+    shares = np.linspace(0.0, 1.0, 5)
+    inner = marks[:-1, None] + np.diff(marks)[:, None] * shares
+    speeds = np.abs(trajectory(inner.ravel(), order=1)).max(axis=1).reshape(inner.shape)
+    travel = np.diff(marks) * speeds.max(axis=1)
+    pieces = np.maximum(np.ceil(travel / _TRAVEL), 1.0).astype(int)
+    fine = [
+        first + (last - first) * np.arange(number) / number
+        for first, last, number in zip(marks[:-1], marks[1:], pieces, strict=True)
+        if number > 1
+    ]
+    return np.unique(np.concatenate([marks, *fine]))
+
+
+def _bounds(
+    robot: RobotModel,
+    path: Path,
+    task: Task,
+    trajectory: Trajectory,
+    relaxations: Sequence[Relaxation],
+    intervals: Array,
+    count: int,
+) -> _Bounds:
+    """Measure intervals (I, 2) at `count` points each."""
+    shares, predict, dense_shares, dense = _stencil(count)
+    starts, lengths = intervals[:, :1], np.diff(intervals, axis=1)
+    t = starts + lengths * shares
+    in_tool_axes = any(item.in_tool_axes for item in relaxations)
+    q = trajectory(np.minimum(t, intervals[:, 1:]).ravel())
+    miss = deviation_from(robot, path, task, t.ravel(), q, in_tool_axes)
+    miss = miss.reshape(len(intervals), count, 6)
+    left = np.abs(miss[:, 1::2] - np.einsum("ab,ibk->iak", predict, miss[:, ::2]))
+    rest = np.stack([_length(left[:, :, :3]), _length(left[:, :, 3:])], axis=2).max(axis=1)
+    between = np.einsum("ab,ibk->iak", dense, miss)
+    times = starts + lengths * dense_shares
+    values = _quantities(between, times, path.duration, relaxations)
+    measured = _quantities(miss, t, path.duration, relaxations)[:, :, :2].max(axis=1)
+    which = np.argmax(np.where(np.isnan(values), np.inf, values), axis=1)
+    rows = np.arange(len(intervals))[:, None]
+    angular = [0, 1, *(int(item.angular) for item in relaxations)]
+    bounds = values[rows, which, np.arange(values.shape[2])] + rest[:, angular]
+    return _Bounds(bounds, times[rows, which], measured)
+
+
+def _quantities(miss: Array, t: Array, duration: float, relaxations: Sequence[Relaxation]) -> Array:
+    """Return for deviations (I, P, 6) the errors beyond relaxations, and what these take."""
+    flat, times = miss.reshape(-1, 6), t.ravel()
+    beyond = excess(relaxations, duration, times, flat)
+    columns = [_length(beyond[:, :3]), _length(beyond[:, 3:])]
+    columns += [deviation_size(item, duration, times, flat) for item in relaxations]
+    return np.stack(columns, axis=1).reshape(*t.shape, -1)
+
+
+def _length(rows: Array) -> Array:
+    return np.asarray(np.linalg.norm(rows, axis=-1))
+
+
+@cache
+def _stencil(count: int) -> tuple[Array, Array, Array, Array]:
+    """Return the points of [0, 1]; from every other to the rest; points between; from all to them.
+
+    Lagrange interpolation, as matrices.
+    """
+    shares = np.linspace(0.0, 1.0, count)
+    between = np.linspace(0.0, 1.0, _DENSE)
+    return (
+        shares,
+        _lagrange(shares[::2], shares[1::2]),
+        between,
+        _lagrange(shares, between),
+    )
+
+
+def _lagrange(nodes: Array, points: Array) -> Array:
+    """Return the matrix (P, N) from values at nodes (N,) to the polynomial's at points (P,)."""
+    matrix = np.ones((len(points), len(nodes)))
+    for j, node in enumerate(nodes):
+        for other in np.delete(nodes, j):
+            matrix[:, j] *= (points - other) / (node - other)
+    return matrix
