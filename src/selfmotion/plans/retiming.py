@@ -21,8 +21,10 @@ from selfmotion.plans.plan import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Relaxation
 
-# Share of the limits that is used, so that the certificate between grid points holds as well.
-_SHARE = 0.98
+# Where the motion rests, its length goes on at this share of its largest speed.
+_STILL = 0.05
+# Times are this share longer than limits ask, for the last digits of a product.
+_ROUNDING = 1e-9
 # Grid points of toppra, and samples of the new motion, per sample of the old one: the first that
 # keeps the plan's tolerance.
 _DENSITIES = (4, 8, 16)
@@ -130,15 +132,27 @@ def _pace(
 ) -> tuple[Array, Array, Array]:
     """Return new times, and σ and dσ/dt there."""
     count = density * (len(motion.t) - 1)
-    grid = np.interp(np.arange(count + 1) / density, np.arange(len(motion.t)), motion.t)
-    rates = _toppra(motion, grid, _SHARE * velocity, _SHARE * acceleration)
-    # Between grid points the squared rate is linear in σ, hence σ̈ constant and the times exact.
-    steps = 2.0 * np.diff(grid) / (rates[:-1] + rates[1:])
-    return np.append(0.0, np.cumsum(steps)), grid - grid[0], rates
+    sigma = np.interp(np.arange(count + 1) / density, np.arange(len(motion.t)), motion.t)
+    q, qd = motion(sigma), motion(sigma, order=1)
+    # The pace is looked for over the length of the joint path: over σ, a motion that begins at
+    # rest would bound nothing there. A share of the largest speed keeps it increasing.
+    speed = np.linalg.norm(qd, axis=1)
+    stretch = np.hypot(speed, _STILL * max(float(speed.max()), np.finfo(float).tiny))
+    length = np.append(0.0, np.cumsum(0.5 * (stretch[1:] + stretch[:-1]) * np.diff(sigma)))
+    rates = _toppra(length, q, velocity, acceleration)
+    # Between grid points the squared rate is linear in the length, so that the times are exact.
+    t = np.append(0.0, np.cumsum(2.0 * np.diff(length) / (rates[:-1] + rates[1:])))
+    rates = rates / stretch
+    # toppra keeps the limits at its grid points; the cubics pass them by about a per cent between.
+    trial = Trajectory(t, q, qd * rates[:, None], motion.joint_names)
+    faster = float((np.abs(trial.extremes(1)[1]) / velocity).max())
+    harder = float((np.abs(trial.extremes(2)[1]) / acceleration).max())
+    slower = max(1.0, faster, harder**0.5) * (1.0 + _ROUNDING)
+    return slower * t, sigma - sigma[0], rates / slower
 
 
-def _toppra(motion: Trajectory, grid: Array, velocity: Array, acceleration: Array) -> Array:
-    """Return the largest dσ/dt at the grid of σ, zero at both ends."""
+def _toppra(length: Array, q: Array, velocity: Array, acceleration: Array) -> Array:
+    """Return the largest rates at lengths (K,) of a joint path q (K, n), zero at both ends."""
     import logging
 
     try:
@@ -154,8 +168,8 @@ def _toppra(motion: Trajectory, grid: Array, velocity: Array, acceleration: Arra
             constraint.JointVelocityConstraint(np.stack([-velocity, velocity], axis=1)),
             constraint.JointAccelerationConstraint(np.stack([-acceleration, acceleration], axis=1)),
         ],
-        toppra.SplineInterpolator(motion.t, motion.q),
-        gridpoints=grid,
+        toppra.SplineInterpolator(length, q),
+        gridpoints=length,
     )
     _, rates, _ = solver.compute_parameterization(0.0, 0.0)
     if rates is None:
