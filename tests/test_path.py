@@ -170,8 +170,8 @@ def test_csv_is_read(tmp_path: Path) -> None:
     [
         ("", "is empty"),
         ("t,x,y\n0,0,0\n", "the header is t,x,y"),
-        ("t,x,y,z\n0,0,0,0\n1,0,zero,0\n", "row 2: could not convert"),
-        ("t,x,y,z\n0,0,0,0\n1,0,0\n", "row 2 has 3 values"),
+        ("t,x,y,z\n0,0,0,0\n1,0,zero,0\n", "line 3: could not convert"),
+        ("t,x,y,z\n0,0,0,0\n1,0,0\n", "line 3 has 3 values"),
         ("t,x,y,z\n0,0,0,0\n", "at least two poses"),
         ("t,x,y,z\n0,0,0,0\n0,1,0,0\n", r"t\[1\] = 0.0 does not come after"),
         ("t,x,y,z\n0,0,0,0\n1,nan,0,0\n", r"positions\[1\] is not finite"),

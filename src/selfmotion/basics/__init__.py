@@ -16,7 +16,13 @@ from selfmotion.basics.errors import (
     SelfmotionError,
     StartError,
 )
-from selfmotion.basics.files import read_archive, write_archive, write_atomically, write_csv
+from selfmotion.basics.files import (
+    read_archive,
+    read_table,
+    write_archive,
+    write_atomically,
+    write_csv,
+)
 from selfmotion.basics.jit import inlined, kernel
 from selfmotion.basics.progress import Progress, silent
 from selfmotion.basics.saved import Saved, is_known, restore
@@ -44,6 +50,7 @@ __all__ = [
     "per_joint",
     "read_archive",
     "read_only",
+    "read_table",
     "restore",
     "silent",
     "write_archive",

@@ -85,3 +85,46 @@ def write_csv(file: Path, header: Sequence[str], table: Array) -> None:
             stream.write((",".join(map(repr, row)) + "\n").encode())
 
     write_atomically(file, write)
+
+
+def read_table(file: Path) -> tuple[list[str], Array]:
+    """Read a table of numbers with a header line.
+
+    Columns are separated by comma, semicolon or tab, whichever the header has; lines that begin
+    with # and empty ones are left out, a byte order mark is not seen.
+
+    Returns
+    -------
+    names : list of str
+    values : (N, C)
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, has no rows, a name twice, or a row that is short, long or not
+        numeric; the line is named.
+    """
+    try:
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileFormatError(f"{file}: cannot be read: {error}") from error
+    kept = [(k, line) for k, line in enumerate(lines, 1) if line.strip() and line[0] != "#"]
+    if not kept:
+        raise FileFormatError(f"{file}: is empty, expected a header line and rows of numbers")
+    mark = max(",;\t", key=kept[0][1].count)
+    names = [name.strip().strip('"') for name in kept[0][1].split(mark)]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise FileFormatError(f"{file}: line {kept[0][0]}: column '{twice[0]}' appears twice")
+    rows = []
+    for number, line in kept[1:]:
+        cells = line.split(mark)
+        if len(cells) != len(names):
+            raise FileFormatError(
+                f"{file}: line {number} has {len(cells)} values, expected {len(names)}"
+            )
+        try:
+            rows.append([float(cell) for cell in cells])
+        except ValueError as error:
+            raise FileFormatError(f"{file}: line {number}: {error}") from error
+    return names, np.array(rows, dtype=np.float64).reshape(-1, len(names))

@@ -35,6 +35,8 @@ class Certificate:
         rad].
     damped : tuple of DampedStretch
         Where the inverse was damped, in order of time.
+    notes : tuple of str
+        What a reader should know, though it speaks neither for nor against the motion.
     """
 
     position_error: Extreme
@@ -47,6 +49,7 @@ class Certificate:
     failures: tuple[str, ...]
     deviations: tuple[Extreme, ...] = ()
     damped: tuple[DampedStretch, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def limit_margin(self) -> Extreme:
@@ -88,8 +91,9 @@ class Certificate:
                 f"verified: at most {self.position_error.value:.1e} m and "
                 f"{self.rotation_error.value:.1e} rad off the path"
                 f"{', beyond what is relaxed' if self.deviations else ''}{self._damping_text}"
+                f"{''.join(f'; {note}' for note in self.notes)}"
             )
-        return "not verified: " + "; ".join(self.failures)
+        return "; ".join(("not verified: " + "; ".join(self.failures), *self.notes))
 
     @property
     def _damping_text(self) -> str:

@@ -1,6 +1,7 @@
 """The command line: parse, call, print."""
 
 import sys
+import traceback
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,18 +23,25 @@ _console = Console(highlight=False)
 # Apart from the results, so that these can be piped.
 _stages = Console(stderr=True, highlight=False)
 
-VERIFIED, NOT_VERIFIED, BAD_INPUT = 0, 1, 2
+VERIFIED, NOT_VERIFIED, BAD_INPUT, FAILED = 0, 1, 2, 3
 
 
 def main() -> None:
-    """Run the command; exit code 2 and one line for bad input."""
+    """Run the command; exit code 2 and one line for bad input, 3 for a fault of ours."""
     try:
         app()
     except sm.SelfmotionError as error:
-        Console(stderr=True, highlight=False).print(
-            f"error: {error}", style="red", markup=False, soft_wrap=True
-        )
+        _complain(f"error: {error}")
         sys.exit(BAD_INPUT)
+    except Exception:
+        # Not bad input, and no verdict: whoever reads exit codes must not take it for one.
+        traceback.print_exc()
+        _complain("selfmotion failed; this is a fault of the program, not of what it was given")
+        sys.exit(FAILED)
+
+
+def _complain(text: str) -> None:
+    Console(stderr=True, highlight=False).print(text, style="red", markup=False, soft_wrap=True)
 
 
 @app.command(
@@ -102,12 +110,47 @@ def plan(
     raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
 
 
-@app.command(epilog="Example: selfmotion check plan.npz")
-def check(plan: options.PlanArgument) -> None:
-    """Re-check a saved plan by forward kinematics."""
-    saved = sm.load_plan(plan)
-    certificate = saved.check()
-    tables.show_certificate(certificate, _console)
+@app.command(
+    epilog="Example: selfmotion check motion.csv --robot panda --path seam.csv --acceleration 10"
+)
+def check(
+    file: options.CheckedArgument,
+    robot: options.RobotOption = None,
+    path: options.PathOption = None,
+    corners: options.CornersOption = "blend",
+    task: options.TaskOption = "pose",
+    tool: options.ToolOption = None,
+    lock: options.LockOption = None,
+    degrees: options.DegreesOption = False,
+    velocity: options.VelocityOption = None,
+    acceleration: options.AccelerationOption = None,
+    obstacles: options.ObstaclesOption = None,
+    clearance: options.ClearanceOption = 0.0,
+    srdf: options.SrdfOption = None,
+    tolerance: options.ToleranceOption = 1e-6,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Check a motion by forward kinematics: a saved plan, or one that something else made."""
+    if file.suffix == ".npz":
+        certificate = sm.load_plan(file).certificate
+    else:
+        if robot is None or path is None:
+            raise sm.ProblemError(
+                f"{file}: a motion is checked against a robot and a path: give --robot and --path"
+            )
+        arm = sm.load_robot(robot, tool=tool, lock=options.locks(lock or []))
+        certificate = sm.certify(
+            arm,
+            sm.Waypoints.from_csv(path, corners=corners),
+            task,
+            sm.Trajectory.from_csv(file, degrees=degrees),
+            sm.Tolerance(tolerance, tolerance),
+            options.requirements(arm, velocity, acceleration, obstacles, clearance, srdf),
+        )
+    if as_json:
+        _console.print_json(data=tables.certificate_json(certificate))
+    else:
+        tables.show_certificate(certificate, _console)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
 
 

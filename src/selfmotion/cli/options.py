@@ -1,5 +1,6 @@
 """Options of the commands, and what their texts mean."""
 
+import json
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -8,6 +9,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.collision import obstacle_from_dict
 
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
 Corners = Literal["blend", "stop"]
@@ -66,6 +68,37 @@ OutOption = Annotated[
 ]
 HtmlOption = Annotated[Path | None, typer.Option(help="Write a replay to open in a browser.")]
 
+CheckedArgument = Annotated[
+    Path, typer.Argument(help="A plan saved as .npz, or a motion as .csv: t, a column per joint.")
+]
+RobotOption = Annotated[
+    str | None, typer.Option(help="For a motion: name (`selfmotion robots`) or .urdf file.")
+]
+LockOption = Annotated[
+    list[str] | None,
+    typer.Option(help="Joint to hold: NAME=VALUE (rad or m). Repeatable."),
+]
+DegreesOption = Annotated[
+    bool, typer.Option("--degrees", help="Angles of the motion are in degrees.")
+]
+VelocityOption = Annotated[
+    str | None, typer.Option(help="Speed limits (rad/s or m/s): one number, or one per joint.")
+]
+AccelerationOption = Annotated[
+    str | None, typer.Option(help="Acceleration limits (rad/s² or m/s²), likewise.")
+]
+ObstaclesOption = Annotated[
+    Path | None, typer.Option(help="Obstacles: JSON, a list of shapes as a plan has them.")
+]
+ClearanceOption = Annotated[
+    float, typer.Option(help="Distance to keep from obstacles and of links from each other (m).")
+]
+SrdfOption = Annotated[
+    Path | None, typer.Option(help="SRDF whose disabled pairs of links are left out.")
+]
+ToleranceOption = Annotated[float, typer.Option(help="What the path may be missed by (m and rad).")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")]
+
 
 def relaxation(text: str) -> sm.Relaxation:
     """Return what --relax describes."""
@@ -100,3 +133,53 @@ def numbers(text: str, option: str, count: int | None = None) -> Array:
     if count is not None and len(numbers) != count:
         raise sm.ProblemError(f"{option} has {len(numbers)} numbers, expected {count}")
     return numbers
+
+
+def locks(texts: list[str]) -> dict[str, float]:
+    """Return what --lock describes."""
+    held = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            held[name] = float(value)
+        except ValueError:
+            raise sm.RobotError(
+                f"--lock is '{text}', expected NAME=VALUE like joint_7=0.5"
+            ) from None
+    return held
+
+
+def requirements(
+    robot: sm.RobotModel,
+    velocity: str | None,
+    acceleration: str | None,
+    obstacles: Path | None,
+    clearance: float,
+    srdf: Path | None,
+) -> tuple[sm.Requirement, ...]:
+    """Return what a motion of others has to keep besides its path and the arm's own limits."""
+    asked: list[sm.Constraint] = []
+    if velocity is not None:
+        asked.append(sm.JointVelocityLimits(_one_or_each(velocity, "--velocity")))
+    if acceleration is not None:
+        asked.append(sm.JointAccelerationLimits(_one_or_each(acceleration, "--acceleration")))
+    if obstacles is not None or clearance > 0.0 or srdf is not None:
+        bodies = () if obstacles is None else read_obstacles(obstacles)
+        asked.append(sm.Clearance(bodies, clearance, srdf))
+    return tuple(item.requirement(robot) for item in asked)
+
+
+def _one_or_each(text: str, option: str) -> Array | float:
+    found = numbers(text, option)
+    return float(found[0]) if len(found) == 1 else found
+
+
+def read_obstacles(file: Path) -> tuple[sm.Obstacle, ...]:
+    """Return the obstacles of a JSON file: a list of what `Obstacle.to_dict` returns."""
+    try:
+        listed = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise sm.FileFormatError(f"{file}: cannot be read as JSON: {error}") from error
+    if not (isinstance(listed, list) and all(isinstance(item, dict) for item in listed)):
+        raise sm.FileFormatError(f"{file}: expected a list of obstacles, each a table of values")
+    return tuple(obstacle_from_dict(item) for item in listed)

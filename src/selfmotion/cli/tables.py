@@ -1,7 +1,8 @@
 """Plans, certificates and robots as tables for the terminal; legible in a log as well."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
@@ -119,3 +120,12 @@ def _distance(gap: Gap) -> str:
 def _compare(before: float, after: float) -> tuple[str, str, str]:
     change = f"{100.0 * (after - before) / abs(before):+.1f} %" if before else ""
     return f"{before:.6g}", f"{after:.6g}", change
+
+
+def certificate_json(certificate: Certificate) -> dict[str, Any]:
+    """Return a certificate as JSON-safe values, the verdict first."""
+    return {
+        "verified": certificate.verified,
+        "verdict": certificate.verdict,
+        **dataclasses.asdict(certificate),
+    }

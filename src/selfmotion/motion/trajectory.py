@@ -2,11 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, FileFormatError, read_only
+from selfmotion.basics import Array, FileFormatError, read_only, read_table
+
+# What follows a joint's name in the header of the column of its velocity.
+_VELOCITY = "_velocity"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +58,54 @@ class Trajectory:
             raise FileFormatError(
                 f"trajectory: t[{row}] = {self.t[row]} does not come after {self.t[row - 1]}"
             )
+
+    @classmethod
+    def from_csv(cls, file: str | Path, *, degrees: bool = False) -> "Trajectory":
+        """Read a motion that something else made.
+
+        The columns are ``t`` [s], one per joint for q under the joint's name [rad or m], and
+        optionally ``NAME_velocity`` for q̇; in any order, separated by comma, semicolon or tab.
+        Without velocities they are those of a cubic spline through the positions.
+
+        Parameters
+        ----------
+        file : path
+        degrees : bool
+            Whether angles are in degrees; then all columns are taken for angles.
+
+        Raises
+        ------
+        FileFormatError
+            The file cannot be read, a column is missing, or a row is wrong; it is named.
+        """
+        header, table = read_table(Path(file))
+        column = {name: table[:, i] for i, name in enumerate(header)}
+        rates = [name for name in header if name.endswith(_VELOCITY)]
+        names = [name for name in header if name not in ("t", *rates)]
+        if "t" not in column or not names:
+            raise FileFormatError(
+                f"{file}: the header is {','.join(header)}, expected t and a column per joint"
+            )
+        if rates and set(rates) != {name + _VELOCITY for name in names}:
+            odd = set(rates) ^ {name + _VELOCITY for name in names}
+            raise FileFormatError(
+                f"{file}: column '{min(odd)}' does not match; velocities are given for all joints "
+                f"or for none, as NAME{_VELOCITY}"
+            )
+        t = column["t"]
+        q = np.stack([column[name] for name in names], axis=1)
+        qd = np.stack([column[name + _VELOCITY] for name in names], axis=1) if rates else q
+        try:
+            given = cls(t, q, qd, tuple(names))
+        except FileFormatError as error:
+            raise FileFormatError(f"{file}: {error}") from error
+        scale = np.pi / 180.0 if degrees else 1.0
+        if rates:
+            return cls(given.t, scale * given.q, scale * given.qd, given.joint_names)
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(given.t, scale * given.q)
+        return cls(given.t, scale * given.q, spline(given.t, 1), given.joint_names)
 
     def of_joints(self, names: Sequence[str]) -> "Trajectory":
         """Return the same motion with its joints in another order.

@@ -1,6 +1,5 @@
 """A tool motion through given poses at given times."""
 
-import csv
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path as FilePath
@@ -10,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, FileFormatError, PathError, read_only
+from selfmotion.basics import Array, FileFormatError, PathError, read_only, read_table
 from selfmotion.path.base import Path, PathSamples, as_pose, unit
 
 _COLUMNS = ("t", "x", "y", "z")
@@ -91,8 +90,15 @@ class Waypoints(Path, kind="waypoints"):
             The file cannot be read, a column is missing or unknown, a row is short or not
             numeric; the row is named.
         """
-        header, rows = _read_csv(FilePath(file))
-        table = np.array(rows)
+        header, table = read_table(FilePath(file))
+        wanted = {*_COLUMNS, *_QUATERNION} if "qw" in header else {*_COLUMNS}
+        if set(header) != wanted:
+            raise FileFormatError(
+                f"{file}: the header is {','.join(header)}, expected {','.join(_COLUMNS)} or "
+                f"{','.join(_COLUMNS + _QUATERNION)}"
+            )
+        if len(table) < 2:
+            raise FileFormatError(f"{file}: has {len(table)} rows, expected at least two poses")
         column = {name: table[:, i] for i, name in enumerate(header)}
         turns = None
         if "qw" in column:
@@ -229,34 +235,3 @@ def _check(t: Array, points: Array, turns: Array) -> None:
     zero = np.flatnonzero(np.linalg.norm(turns, axis=1) < 1e-9)
     if zero.size:
         raise PathError(f"waypoints: quaternions[{zero[0]}] is zero")
-
-
-def _read_csv(file: FilePath) -> tuple[list[str], list[list[float]]]:
-    try:
-        with file.open(newline="", encoding="utf-8") as stream:
-            lines = [row for row in csv.reader(stream) if row and not row[0].startswith("#")]
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{file}: cannot be read: {error}") from error
-    if not lines:
-        raise FileFormatError(f"{file}: is empty, expected a header line {','.join(_COLUMNS)}")
-    header = [name.strip() for name in lines[0]]
-    wanted = {*_COLUMNS, *_QUATERNION} if "qw" in header else {*_COLUMNS}
-    if set(header) != wanted or len(header) != len(wanted):
-        raise FileFormatError(
-            f"{file}: the header is {','.join(header)}, expected "
-            f"{','.join(_COLUMNS)} or {','.join(_COLUMNS + _QUATERNION)}"
-        )
-    rows = []
-    for number, line in enumerate(lines[1:], start=1):
-        try:
-            row = [float(value) for value in line]
-        except ValueError as error:
-            raise FileFormatError(f"{file}: row {number}: {error}") from error
-        if len(row) != len(header):
-            raise FileFormatError(
-                f"{file}: row {number} has {len(row)} values, expected {len(header)}"
-            )
-        rows.append(row)
-    if len(rows) < 2:
-        raise FileFormatError(f"{file}: has {len(rows)} rows, expected at least two poses")
-    return header, rows

@@ -1,6 +1,8 @@
 """Plans as files: a description in JSON and arrays, in one ``.npz``."""
 
 import dataclasses
+import hashlib
+import json
 from collections.abc import Mapping
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
@@ -38,6 +40,7 @@ class Archive(NamedTuple):
     coefficients: Array
     report: Report
     certificate: Certificate
+    altered: str = ""
 
     def write(self, file: FilePath) -> None:
         """Write the file, atomically."""
@@ -60,17 +63,35 @@ class Archive(NamedTuple):
             "coefficients": self.coefficients,
             "history_x": np.array([iteration.x for iteration in history]),
         }
+        description["digest"] = _digest(description, arrays)
         write_archive(file, description, arrays)
 
     @classmethod
     def read(cls, file: FilePath) -> "Archive":
-        """Read a file; FileFormatError where it is none, or of another version."""
+        """Read a file; FileFormatError where it is none, or of another version.
+
+        The certificate is that of the motion as it is read, measured anew.
+        """
         description, arrays = read_archive(file)
         _check_format(file, description)
+        written = description.pop("digest", None)
+        altered = ""
+        if written != _digest(description, arrays):
+            altered = f"{file.name} was changed after the plan was written: its digest differs"
         try:
-            return _restore(description, arrays)
+            return _restore(description, arrays)._replace(altered=altered)
         except (KeyError, TypeError, ValueError) as error:
             raise FileFormatError(f"{file}: is no plan, or a damaged one: {error!r}") from error
+
+
+def _digest(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
+    """Return a digest of robot, path, requirements, motion and all else that a file holds."""
+    digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name], dtype=np.float64)
+        digest.update(f"{name} {array.shape}".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
 
 
 def _check_format(file: FilePath, description: Mapping[str, Any]) -> None:

@@ -1,12 +1,12 @@
 """A finished plan: the motion, the problem it solves, how it was found, and what the check says."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
-from selfmotion.basics import Array, PlanError, write_csv
+from selfmotion.basics import Array, CollisionError, PlanError, RobotError, write_csv
 from selfmotion.certificate import Certificate, Requirement, Tolerance
 from selfmotion.collision import Obstacle
 from selfmotion.motion import Trajectory
@@ -47,6 +47,8 @@ class Plan:
         x, the null motion's coefficients.
     report : Report
     certificate : Certificate
+    altered : str
+        Why the file that it was read from is not the one that was written; "" where it is.
     """
 
     views: ClassVar[Views | None] = None
@@ -57,6 +59,7 @@ class Plan:
     coefficients: Array
     report: Report
     certificate: Certificate
+    altered: str = ""
 
     @property
     def robot(self) -> RobotModel:
@@ -90,7 +93,10 @@ class Plan:
 
     def check(self) -> Certificate:
         """Return a new certificate of the motion, by the same tolerance and requirements."""
-        return self.problem.certify(self.trajectory, self.tolerance, self.report.ending)
+        found = self.problem.certify(self.trajectory, self.tolerance, self.report.ending)
+        if not self.altered:
+            return found
+        return replace(found, failures=(self.altered, *found.failures))
 
     def require(self) -> "Plan":
         """Return the plan itself if its certificate is verified.
@@ -142,11 +148,23 @@ class Plan:
 
 
 def load_plan(file: str | FilePath) -> Plan:
-    """Read a plan that `Plan.save` wrote.
+    """Read a plan that `Plan.save` wrote, and measure its motion anew.
+
+    A file that was changed is never verified. Where the robot's own file has changed since, the
+    certificate's notes say so: the plan is checked against the arm it was made for.
 
     Raises
     ------
     FileFormatError
         The file is missing, is no plan, lacks something, or was written by a newer version.
     """
-    return Plan(*Archive.read(FilePath(file)))
+    plan = Plan(*Archive.read(FilePath(file)))
+    try:
+        certificate = plan.check()
+    except (CollisionError, RobotError) as error:
+        unknown = f"it could not be measured anew: {error}"
+        certificate = replace(plan.certificate, failures=(unknown, *plan.certificate.failures))
+    if plan.robot.urdf.has_changed():
+        note = f"{plan.robot.urdf.source} has changed since the plan was made"
+        certificate = replace(certificate, notes=(*certificate.notes, note))
+    return replace(plan, certificate=certificate)

@@ -77,6 +77,16 @@ class Urdf:
         """Digest of the text; two robots with the same digest have the same kinematics."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
+    def has_changed(self) -> bool:
+        """Whether the file that it was read from is there, and other than it was then."""
+        file = Path(self.source)
+        if not file.is_file():
+            return False
+        try:
+            return read_urdf(file).sha256 != self.sha256
+        except RobotError:
+            return True
+
     def continuous(self) -> set[str]:
         """Return the names of joints that the file declares continuous."""
         return {joint.name for joint in self.joints.values() if joint.kind == "continuous"}
