@@ -1,7 +1,7 @@
 """Collisions: exact distances for certificates, smooth conservative ones for optimisation."""
 
 from selfmotion.collision.clearance import ClearanceModel, Clearances
-from selfmotion.collision.exact import Clearance, CollisionModel
+from selfmotion.collision.exact import Closest, CollisionModel, Overlap, srdf_line
 from selfmotion.collision.obstacles import (
     Box,
     Capsule,
@@ -15,13 +15,15 @@ from selfmotion.collision.obstacles import (
 __all__ = [
     "Box",
     "Capsule",
-    "Clearance",
     "ClearanceModel",
     "Clearances",
+    "Closest",
     "CollisionModel",
     "Cylinder",
     "Mesh",
     "Obstacle",
+    "Overlap",
     "Sphere",
     "obstacle_from_dict",
+    "srdf_line",
 ]

@@ -21,9 +21,9 @@ from selfmotion.task import Task
 class Clearance:
     """The arm keeps a distance from obstacles and from itself.
 
-    While optimising, links are their convex hulls, and far from each other capsules around these;
-    the certificate measures the meshes themselves. Obstacles are not checked against the immovable
-    base: no motion changes that distance, and an arm bolted to a table touches it.
+    While optimising, links are their convex hulls; the certificate measures the meshes
+    themselves. Obstacles are not checked against the immovable base: no motion changes that
+    distance, and an arm bolted to a table touches it.
 
     Parameters
     ----------
@@ -141,8 +141,8 @@ class BoundClearance:
         )
 
 
-# Beyond the distance asked for, capsules may stand for links where they are this far apart [m]:
-# well outside of where the optimiser feels the constraint.
+# So far beyond the distance asked for, clearances begin to level off [m]: well outside of where
+# the optimiser feels the constraint.
 _NEAR = 0.01
 # Clearances count in units of this, to weigh about as much as joint angles.
 _METRE = 0.1
