@@ -11,8 +11,9 @@ import trimesh
 
 from selfmotion.collision import Box, Capsule, CollisionModel, Cylinder, Mesh, Sphere, srdf_line
 from selfmotion.collision.bodies import Body
+from selfmotion.collision.kernels import winding_number
 from selfmotion.collision.pairs import candidate_pairs
-from selfmotion.collision.solids import Solid, winding_number
+from selfmotion.collision.solids import Solid
 from selfmotion.errors import CollisionError, RobotError
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
 

@@ -120,19 +120,20 @@ def test_lever_arms_of_a_planar_arm_by_hand(tmp_path) -> None:
     np.testing.assert_allclose(pairs["c", "post"], [1.2, 1.0, 0.6], atol=EXACT)
 
 
-def test_pairs_that_overlap_often_are_listed() -> None:
-    model = CollisionModel(load_robot("baxter"))
+@pytest.mark.parametrize("name", ["baxter", "pr2"])
+def test_pairs_that_overlap_often_are_listed(name: str) -> None:
+    model = CollisionModel(load_robot(name))
     left_out = [item for item in model.overlapping if not item.is_checked]
-    assert left_out
+    assert model.overlapping
     for item in left_out:
         assert item.share == 1.0
         assert (item.first, item.second) not in model.pairs
     q = samples(model.robot, 200, 3)
     share = (model.distances(q, 0.0) <= 0.0).mean(axis=0)
     listed = {(item.first, item.second) for item in model.overlapping}
-    # Three standard deviations of a share of 200 and of 500.
-    assert all(model.pairs[i] in listed for i in np.flatnonzero(share > 0.5 + 0.13))
+    # Three standard deviations of a share of 200 and one of 100 samples.
+    assert all(model.pairs[i] in listed for i in np.flatnonzero(share > 0.5 + 0.19))
     checked = [item for item in model.overlapping if item.is_checked]
     for item in checked:
         index = model.pairs.index((item.first, item.second))
-        assert share[index] == pytest.approx(item.share, abs=0.13)
+        assert share[index] == pytest.approx(item.share, abs=0.19)

@@ -22,6 +22,8 @@ from selfmotion.collision import (
 )
 from selfmotion.collision import obstacles as module
 from selfmotion.errors import CollisionError
+from selfmotion.replay import scene
+from selfmotion.replay.payload import Payload
 from selfmotion.robot import load_robot
 
 POSE = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 1.1), np.array([0.1, 0.2, 0.3]))
@@ -133,6 +135,8 @@ def test_an_own_shape_is_one_class(monkeypatch: pytest.MonkeyPatch) -> None:
     dot = np.array([ball.pairs.index(name) for name in names])
     # The cone's base is 0.25 m below its middle.
     assert first[hat].min() == pytest.approx(second[dot].min() - 0.25, abs=0.05)
+    drawn = scene.obstacle_commands("/plan", [cone], Payload())
+    assert [command["path"] for command in drawn] == ["/plan/obstacles/hat/0"]
 
 
 def test_a_shape_has_one_class() -> None:

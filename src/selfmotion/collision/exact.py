@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -13,62 +12,17 @@ from selfmotion.arrays import Array
 from selfmotion.collision import levers
 from selfmotion.collision.bodies import link_bodies, obstacle_bodies
 from selfmotion.collision.distances import HullDistances, Ints
+from selfmotion.collision.found import Closest, Overlap
 from selfmotion.collision.meshes import MeshDistances
 from selfmotion.collision.obstacles import Obstacle
 from selfmotion.collision.pairs import candidate_pairs
 from selfmotion.errors import RobotError
 from selfmotion.robot import RobotModel
 
-# Configurations in which pairs of links are tried, and the share of them from which on an overlap
-# is worth telling.
+# Configurations in which a pair of links must overlap to count as touching by design.
 _SAMPLES = 500
-_OFTEN = 0.5
-
-
-@dataclass(frozen=True)
-class Closest:
-    """The smallest distance found, and where.
-
-    Attributes
-    ----------
-    value : float
-        [m]; negative when the two overlap, inf when there is no pair to check.
-    first, second : str
-        The two links, or link and obstacle; empty when there is no pair.
-    index : int
-        Row of the samples it was found in.
-    """
-
-    value: float
-    first: str
-    second: str
-    index: int = 0
-
-
-@dataclass(frozen=True)
-class Overlap:
-    """Two links that overlap in half or more of 500 sampled configurations.
-
-    Attributes
-    ----------
-    first, second : str
-        The links.
-    share : float
-        In how many of the configurations.
-    is_checked : bool
-        False for those that overlap in each: they touch by design and are left out.
-    """
-
-    first: str
-    second: str
-    share: float
-    is_checked: bool
-
-
-def srdf_line(first: str, second: str) -> str:
-    """Return the line of an SRDF that leaves a pair of links out."""
-    return f'<disable_collisions link1="{first}" link2="{second}" reason="Default"/>'
-
+# The share of the first of them from which on an overlap is worth telling, and how many these are.
+_OFTEN, _FIRST = 0.5, 100
 
 _NO_PAIR = Closest(math.inf, "", "")
 
@@ -95,8 +49,8 @@ class CollisionModel:
     pairs : tuple of (str, str)
         Names of the P pairs that are checked; a link of several pieces appears repeatedly.
     overlapping : tuple of Overlap
-        Pairs of links that overlap in half or more of 500 sampled configurations. Those
-        that do in each are not checked.
+        Pairs of links that overlap in half or more of 100 sampled configurations. Those that do
+        in each of 500 are not checked.
 
     Raises
     ------
@@ -130,12 +84,13 @@ class CollisionModel:
         self._set_pairs(_indices(candidate_pairs(self._bodies, robot.urdf, srdf)))
         overlaps = self._count_overlaps()
         always = overlaps == _SAMPLES
-        found: dict[tuple[str, str], int] = {}
-        for pair in np.flatnonzero(overlaps >= _OFTEN * _SAMPLES):
-            found[self.pairs[pair]] = max(int(overlaps[pair]), found.get(self.pairs[pair], 0))
+        found: dict[tuple[str, str], float] = {}
+        for pair in np.flatnonzero(overlaps >= _OFTEN * _FIRST):
+            share = min(overlaps[pair] / _FIRST, 1.0)
+            found[self.pairs[pair]] = max(share, found.get(self.pairs[pair], 0.0))
         self._set_pairs(self.hulls.pairs[~always])
         self.overlapping = tuple(
-            Overlap(*names, count / _SAMPLES, names in self.pairs) for names, count in found.items()
+            Overlap(*names, share, names in self.pairs) for names, share in found.items()
         )
 
     @property
@@ -327,7 +282,10 @@ class CollisionModel:
         return met, alone
 
     def _count_overlaps(self) -> Ints:
-        """Return in how many samples each pair of links overlaps, (P,), where that is often."""
+        """Return in how many samples each pair of links overlaps, (P,).
+
+        Exact of those that overlap in each; of others up to the first 100, where that is often.
+        """
         rng = np.random.default_rng(0)
         lower, upper = self.robot.finite_limits()
         q = rng.uniform(lower, upper, (_SAMPLES, self.robot.dof))
@@ -335,8 +293,9 @@ class CollisionModel:
         often = [not self._bodies[j].is_obstacle for j in self.hulls.pairs[:, 1].tolist()]
         possible = np.flatnonzero(often)
         for row in range(_SAMPLES):
-            # The rest cannot reach the share any more.
-            possible = possible[count[possible] + _SAMPLES - row >= _OFTEN * _SAMPLES]
+            # Those that can still reach the share, then those that overlapped in each so far.
+            least = _OFTEN * _FIRST - (_FIRST - row) if row < _FIRST else row
+            possible = possible[count[possible] >= least]
             if not possible.size:
                 break
             self._place(q[row])

@@ -1,6 +1,5 @@
 """Solids as coal knows them: convex hulls, what is inside a mesh, how far a body extends."""
 
-import math
 from functools import cached_property
 from typing import Any
 
@@ -10,10 +9,8 @@ import numpy.typing as npt
 
 from selfmotion.arrays import Array
 from selfmotion.errors import CollisionError
-from selfmotion.jit import kernel
 
 Indices = npt.NDArray[np.int64]
-Vector = tuple[float, float, float]
 
 # A mesh whose hull is larger by less than this share of its volume counts as convex.
 _CONVEX = 1e-3
@@ -92,8 +89,24 @@ class Solid:
             return ends, float(hull.radius)
         if isinstance(hull, coal.ConvexBase):
             return np.array(hull.points()), 0.0
-        corners = np.array(np.meshgrid(*zip(self.low, self.high, strict=True))).reshape(3, -1).T
-        return corners, 0.0
+        return self._box, 0.0
+
+    def surface(self) -> tuple[Array, Indices]:
+        """Return corners (V, 3) and triangles (T, 3) of what to draw for it.
+
+        The mesh itself; of other geometry the hull of its corners, or else the box around it.
+        """
+        if self.is_mesh:
+            return self._corners, self._welded
+        from scipy.spatial import ConvexHull
+
+        corners = self.outline[0] if isinstance(self.hull, coal.ConvexBase) else self._box
+        return corners, np.asarray(ConvexHull(corners).simplices, dtype=np.int64)
+
+    @property
+    def _box(self) -> Array:
+        sides = zip(self.low, self.high, strict=True)
+        return np.array(np.meshgrid(*sides)).reshape(3, -1).T
 
     @cached_property
     def is_convex(self) -> bool:
@@ -144,6 +157,8 @@ class Solid:
         """
         if not self.is_mesh or self.is_flat:
             return False
+        from selfmotion.collision.kernels import winding_number
+
         within = np.all(points @ self._planes[:, :3].T + self._planes[:, 3] <= 0.0, axis=1)
         return any(abs(winding_number(self._triangles, point)) > 0.5 for point in points[within])
 
@@ -170,40 +185,6 @@ class Solid:
         grid = np.round(points / (_FLAT * float(np.ptp(points, axis=0).max())))
         _, first, index = np.unique(grid, axis=0, return_index=True, return_inverse=True)
         return points[first], index.reshape(-1)
-
-
-@kernel
-def _from(corner: Array, point: Array) -> Vector:
-    return (corner[0] - point[0], corner[1] - point[1], corner[2] - point[2])
-
-
-@kernel
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@kernel
-def winding_number(corners: Array, point: Array) -> float:
-    """Return how often the triangles (T, 3, 3) wind around the point: 1 inside, 0 outside.
-
-    The sum of their solid angles over 4π, after Van Oosterom and Strackee (1983).
-    """
-    total = 0.0
-    for k in range(len(corners)):
-        a, b, c = (
-            _from(corners[k, 0], point),
-            _from(corners[k, 1], point),
-            _from(corners[k, 2], point),
-        )
-        la, lb, lc = math.sqrt(_dot(a, a)), math.sqrt(_dot(b, b)), math.sqrt(_dot(c, c))
-        volume = (
-            a[0] * (b[1] * c[2] - b[2] * c[1])
-            + a[1] * (b[2] * c[0] - b[0] * c[2])
-            + a[2] * (b[0] * c[1] - b[1] * c[0])
-        )
-        edges = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
-        total += math.atan2(volume, edges)
-    return total / (2.0 * math.pi)
 
 
 def _thickened(points: Array, label: str) -> tuple[bool, Array]:

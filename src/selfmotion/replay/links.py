@@ -11,7 +11,7 @@ import pinocchio as pin
 from selfmotion.arrays import Array
 from selfmotion.errors import RobotError
 from selfmotion.replay import three
-from selfmotion.replay.meshes import Color, Mesh, read_meshes, simplify
+from selfmotion.replay.meshes import Color, DrawnMesh, read_meshes, simplify
 from selfmotion.replay.payload import Json, Payload
 from selfmotion.robot import RobotModel
 
@@ -92,7 +92,7 @@ def bake(robot: RobotModel, payload: Payload, triangle_budget: int) -> Arm:
         A mesh cannot be read, or a shape cannot be drawn; names the visual and the file.
     """
     objects = list(robot.geometry(pin.GeometryType.VISUAL).geometryObjects)
-    files: dict[str, list[Mesh]] = {}
+    files: dict[str, list[DrawnMesh]] = {}
     for item in objects:
         if _is_mesh(item) and item.meshPath not in files:
             files[item.meshPath] = read_meshes(
@@ -121,7 +121,7 @@ def bake(robot: RobotModel, payload: Payload, triangle_budget: int) -> Arm:
     return Arm(tuple(visuals), meshes, triangles, drawn)
 
 
-def _within(mesh: Mesh, share: float) -> Mesh:
+def _within(mesh: DrawnMesh, share: float) -> DrawnMesh:
     """Simplify until at most `share` of the triangles are left."""
     cells, most = 256, share * len(mesh.faces)
     while len(mesh.faces) > most and cells > 2:
@@ -137,7 +137,7 @@ def _scale(item: Any) -> Array:
     return np.asarray(item.meshScale, dtype=np.float64).reshape(3)
 
 
-def _visuals(item: Any, link: str, meshes: list[Mesh], numbers: list[int]) -> Iterator[Visual]:
+def _visuals(item: Any, link: str, meshes: list[DrawnMesh], numbers: list[int]) -> Iterator[Visual]:
     joint = int(item.parentJoint) - 1
     placement: Array = item.placement.homogeneous
     red, green, blue, opacity = (float(value) for value in item.meshColor)

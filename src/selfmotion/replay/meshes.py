@@ -24,7 +24,7 @@ Color = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class DrawnMesh:
     """Triangles of one colour.
 
     Attributes
@@ -51,7 +51,7 @@ class Mesh:
         return np.asarray(self.origin + self.step * self.grid)
 
 
-def make_mesh(vertices: Array, faces: npt.NDArray[Any], color: Color | None = None) -> Mesh:
+def make_mesh(vertices: Array, faces: npt.NDArray[Any], color: Color | None = None) -> DrawnMesh:
     """Weld equal vertices, then split them again along creases.
 
     Parameters
@@ -77,7 +77,7 @@ def make_mesh(vertices: Array, faces: npt.NDArray[Any], color: Color | None = No
     order = np.argsort(appears)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
-    return Mesh(
+    return DrawnMesh(
         grid=points[corners.ravel()[appears[order]]].astype(np.uint16),
         origin=origin,
         step=step,
@@ -115,7 +115,7 @@ def _split_creases(points: Array, faces: npt.NDArray[np.int64]) -> npt.NDArray[n
     return np.asarray(labels, dtype=np.int64)
 
 
-def simplify(mesh: Mesh, cells: int) -> Mesh:
+def simplify(mesh: DrawnMesh, cells: int) -> DrawnMesh:
     """Merge vertices that share a cell of a grid with `cells` cells along the longest side.
 
     Triangles that collapse are dropped. For meshes beyond a page's budget only.
@@ -137,8 +137,8 @@ def simplify(mesh: Mesh, cells: int) -> Mesh:
 
 def read_meshes(
     path: str, owner: str, loaded: Any = None, scale: Array | float = 1.0
-) -> list[Mesh]:
-    """Read a mesh file, one `Mesh` per colour in it, in the file's units.
+) -> list[DrawnMesh]:
+    """Read a mesh file, one `DrawnMesh` per colour in it, in the file's units.
 
     Parameters
     ----------

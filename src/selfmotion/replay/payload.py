@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.replay.meshes import Mesh
+from selfmotion.replay.meshes import DrawnMesh
 
 _TYPES = {
     "u1": "Uint8Array",
@@ -38,7 +38,7 @@ class Payload:
         self._arrays.append(np.ascontiguousarray(values, dtype=f"<{dtype}").ravel())
         return {"$": len(self._arrays) - 1}
 
-    def mesh(self, mesh: Mesh) -> Json:
+    def mesh(self, mesh: DrawnMesh) -> Json:
         """Add a mesh in a form that compresses well: see `grid_codes` and `face_codes`."""
         faces = face_codes(mesh.faces)
         return {
