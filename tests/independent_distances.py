@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
+from selfmotion.collision.bodies import Body
 from selfmotion.collision.distances import HullDistances
 from selfmotion.collision.solids import Solid
 from selfmotion.robot import RobotModel, load_robot
@@ -64,6 +65,11 @@ def mesh_of(points: np.ndarray, faces: np.ndarray) -> Any:
         mesh.addTriangle(*points[face])
     mesh.endModel()
     return mesh
+
+
+def body(name: str, joint: int, place: pin.SE3, geometry: Any) -> Body:
+    """Return a geometry as a body."""
+    return Body(name, joint, joint == 0, place, Solid(geometry, name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,15 +178,13 @@ class Trial:
         places = [pin.SE3(pin.SE3.Random()) for _ in shapes[1]]
         for place in places:
             place.translation = rng.uniform(-0.3, 0.3, 3)
-        bodies = [(6, pin.SE3.Identity(), Solid(shape, "moving")) for shape in shapes[0]]
+        bodies = [body("moving", 6, pin.SE3.Identity(), shape) for shape in shapes[0]]
         bodies += [
-            (0, place, Solid(shape, "still"))
-            for place, shape in zip(places, shapes[1], strict=True)
+            body("still", 0, place, shape) for place, shape in zip(places, shapes[1], strict=True)
         ]
         count = len(shapes[0])
         pairs = np.array([(i, count + j) for i in range(count) for j in range(count)])
-        names = [f"moving {i}" for i in range(count)] + [f"still {i}" for i in range(count)]
-        model = HullDistances(robot, bodies, names, pairs)
+        model = HullDistances(robot, bodies, pairs)
         return cls(model, *([Convex.of(shape) for shape in side] for side in shapes), places)
 
     def faults(

@@ -12,6 +12,7 @@ from independent_distances import (
     TOLERANCE,
     Convex,
     Trial,
+    body,
     fault,
     free_body,
     mesh_of,
@@ -68,8 +69,8 @@ def test_the_check_by_support_functions_finds_errors(apart: float, change) -> No
 
 
 def one_pair(free: RobotModel, first: object, second: object, there: pin.SE3) -> HullDistances:
-    bodies = [(6, HERE, Solid(first, "first")), (0, there, Solid(second, "second"))]
-    return HullDistances(free, bodies, ("first", "second"), np.array([[0, 1]]))
+    bodies = [body("first", 6, HERE, first), body("second", 0, there, second)]
+    return HullDistances(free, bodies, np.array([[0, 1]]))
 
 
 def hull_distances(model: HullDistances, q: np.ndarray) -> np.ndarray:

@@ -131,9 +131,9 @@ def test_pairs_that_overlap_often_are_listed(name: str) -> None:
     q = samples(model.robot, 200, 3)
     share = (model.distances(q, 0.0) <= 0.0).mean(axis=0)
     listed = {(item.first, item.second) for item in model.overlapping}
-    # Three standard deviations of a share of 200 and one of 100 samples.
-    assert all(model.pairs[i] in listed for i in np.flatnonzero(share > 0.5 + 0.19))
+    # Three standard deviations of a share of 200 and one of 500 samples.
+    assert all(model.pairs[i] in listed for i in np.flatnonzero(share > 0.5 + 0.13))
     checked = [item for item in model.overlapping if item.is_checked]
     for item in checked:
         index = model.pairs.index((item.first, item.second))
-        assert share[index] == pytest.approx(item.share, abs=0.19)
+        assert share[index] == pytest.approx(item.share, abs=0.13)

@@ -8,7 +8,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion.arrays import Array
-from selfmotion.collision.solids import Solid
+from selfmotion.collision.bodies import Body
 from selfmotion.robot import RobotModel
 
 Ints = npt.NDArray[np.int64]
@@ -20,21 +20,20 @@ class BoundingBoxes:
     Parameters
     ----------
     robot : RobotModel
-    bodies : sequence of (int, pinocchio.SE3, Solid)
-        The joint that carries it, its placement there, and the body.
+    bodies : sequence of Body
     """
 
-    def __init__(self, robot: RobotModel, bodies: Sequence[tuple[int, pin.SE3, Solid]]) -> None:
+    def __init__(self, robot: RobotModel, bodies: Sequence[Body]) -> None:
         self._model, self._data = robot.model, robot.model.createData()
         # Views into the data, which Pinocchio updates: reading placements costs no call.
         moving = list(self._data.oMi)[1:]
         self._rotation_views = [place.rotation for place in moving]
         self._position_views = [place.translation for place in moving]
-        self._joints = np.array([joint for joint, _, _ in bodies], dtype=np.int64)
-        self._axes = np.array([place.rotation for _, place, _ in bodies]).reshape(-1, 3, 3)
-        middles = [place.act(0.5 * (solid.low + solid.high)) for _, place, solid in bodies]
+        self._joints = np.array([body.joint for body in bodies], dtype=np.int64)
+        self._axes = np.array([body.place.rotation for body in bodies]).reshape(-1, 3, 3)
+        middles = [body.place.act(0.5 * (body.solid.low + body.solid.high)) for body in bodies]
         self._middles = np.array(middles).reshape(-1, 3)
-        halves = [0.5 * (solid.high - solid.low) for _, _, solid in bodies]
+        halves = [0.5 * (body.solid.high - body.solid.low) for body in bodies]
         self._halves = np.array(halves).reshape(-1, 3)
 
     @property

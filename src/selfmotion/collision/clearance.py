@@ -8,10 +8,9 @@ import numpy.typing as npt
 from selfmotion.arrays import Array
 from selfmotion.collision.distances import Ints
 from selfmotion.collision.exact import CollisionModel
+from selfmotion.collision.overlaps import SAMPLES
 
-# Configurations that tell which pairs of hulls are too wide to say anything about their links.
-_SAMPLES = 300
-# The share of these in which a pair whose links do meet elsewhere may overlap without need.
+# The share of sampled configurations in which hulls of links that meet elsewhere may overlap alone.
 _FALSE_ALARMS = 0.1
 
 
@@ -83,7 +82,7 @@ class ClearanceModel:
 
     Notes
     -----
-    Hulls may overlap where their links do not. Judged over 300 sampled configurations, two
+    Hulls may overlap where their links do not. Judged over 500 sampled configurations, two
     links are not paired when this happens at all though they never meet, or in more than a tenth
     of the samples; a link and an obstacle, when it happens in each. These pairs are left
     to the exact model, so a motion that is clear here still needs its verdict.
@@ -123,11 +122,9 @@ class ClearanceModel:
 
     def _useful(self) -> Ints:
         """Return the indices of pairs whose hulls overlap hardly more often than the bodies."""
-        exact, rng = self._exact, np.random.default_rng(0)
-        lower, upper = self.robot.finite_limits()
-        q = rng.uniform(lower, upper, (_SAMPLES, self.robot.dof))
-        met, wrong = exact.false_alarms(q)
+        exact = self._exact
+        met, alone = exact.overlap_counts()
         world = {obstacle.name for obstacle in exact.obstacles}
         to_world = np.array([pair[1] in world for pair in exact.pairs], dtype=bool)
-        allowed = np.where(met > 0, _FALSE_ALARMS * _SAMPLES, 0.0)
-        return np.flatnonzero(np.where(to_world, wrong < _SAMPLES, wrong <= allowed))
+        allowed = np.where(met > 0, _FALSE_ALARMS * SAMPLES, 0.0)
+        return np.flatnonzero(np.where(to_world, alone < SAMPLES, alone <= allowed))

@@ -12,8 +12,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion.arrays import Array
+from selfmotion.collision.bodies import Body
 from selfmotion.collision.bounds import BoundingBoxes
-from selfmotion.collision.solids import Solid
 from selfmotion.errors import CollisionError
 from selfmotion.robot import RobotModel
 
@@ -60,10 +60,7 @@ class HullDistances:
     Parameters
     ----------
     robot : RobotModel
-    bodies : sequence of (int, pinocchio.SE3, Solid)
-        The joint that carries it, its placement there, and the body.
-    names : sequence of str
-        What messages call the bodies.
+    bodies : sequence of Body
     pairs : (P, 2)
         Indices of bodies.
     """
@@ -71,16 +68,15 @@ class HullDistances:
     def __init__(
         self,
         robot: RobotModel,
-        bodies: Sequence[tuple[int, pin.SE3, Solid]],
-        names: Sequence[str],
+        bodies: Sequence[Body],
         pairs: Ints,
     ) -> None:
-        self.pairs, self._robot, self._names = pairs, robot, names
+        self.pairs, self._robot, self._bodies = pairs, robot, bodies
         self._boxes = BoundingBoxes(robot, bodies)
         self._sizes = (2.0 * self._boxes.radii[pairs].sum(axis=1) + _ROUNDING).tolist()
         self._model = pin.GeometryModel()
-        for i, (joint, place, solid) in enumerate(bodies):
-            item = pin.GeometryObject(str(i), joint, 0, place, solid.hull)
+        for i, body in enumerate(bodies):
+            item = pin.GeometryObject(str(i), body.joint, 0, body.place, body.solid.hull)
             self._model.addGeometryObject(item)
         for first, second in pairs.tolist():
             self._model.addCollisionPair(pin.CollisionPair(first, second))
@@ -159,24 +155,23 @@ class HullDistances:
         first, second = self.pairs[pair].tolist()
         answer = coal.DistanceResult()
         coal.distance(
-            *(part for i in (first, second) for part in (self._hull(i), self._transform(i))),
+            *(part for i in (first, second) for part in self._placed(i)),
             coal.DistanceRequest(),
             answer,
         )
         if not bound - _ROUNDING <= answer.min_distance <= bound + self._sizes[pair]:
             raise CollisionError(
-                f"'{self._names[first]}' and '{self._names[second]}': coal finds a distance of "
-                f"{answer.min_distance} m, but boxes around them are {bound:.6g} m apart; this is "
-                f"an error of coal's: replace the shape of one of them by a simpler one"
+                f"'{self._bodies[first].name}' and '{self._bodies[second].name}': coal finds a "
+                f"distance of {answer.min_distance} m, but boxes around them are {bound:.6g} m "
+                f"apart; this is an error of coal's: replace the shape of one of them by a "
+                f"simpler one"
             )
         return answer
 
-    def _hull(self, body: int) -> Any:
-        return self._model.geometryObjects[body].geometry
-
-    def _transform(self, body: int) -> Any:
+    def _placed(self, body: int) -> tuple[Any, Any]:
         place = self._places.oMg[body]
-        return coal.Transform3s(place.rotation, place.translation)
+        hull = self._bodies[body].solid.hull
+        return hull, coal.Transform3s(place.rotation, place.translation)
 
 
 def _set_requests(requests: Any) -> None:

@@ -10,20 +10,18 @@ import numpy.typing as npt
 
 from selfmotion.arrays import Array
 from selfmotion.collision import levers
-from selfmotion.collision.bodies import link_bodies, obstacle_bodies
+from selfmotion.collision.bodies import obstacle_bodies
 from selfmotion.collision.distances import HullDistances, Ints
 from selfmotion.collision.found import Closest, Overlap
 from selfmotion.collision.meshes import MeshDistances
 from selfmotion.collision.obstacles import Obstacle
+from selfmotion.collision.overlaps import SAMPLES, count_overlaps, links_of
 from selfmotion.collision.pairs import candidate_pairs
 from selfmotion.errors import RobotError
 from selfmotion.robot import RobotModel
 
-# Configurations in which a pair of links must overlap to count as touching by design.
-_SAMPLES = 500
-# The share of the first of them from which on an overlap is worth telling, and how many these are.
-_OFTEN, _FIRST = 0.5, 100
-
+# The share of sampled configurations from which on an overlap of links is worth telling.
+_OFTEN = 0.5
 _NO_PAIR = Closest(math.inf, "", "")
 
 
@@ -48,9 +46,11 @@ class CollisionModel:
     ----------
     pairs : tuple of (str, str)
         Names of the P pairs that are checked; a link of several pieces appears repeatedly.
+    bodies : tuple of str
+        Names of the B bodies, likewise.
     overlapping : tuple of Overlap
-        Pairs of links that overlap in half or more of 100 sampled configurations. Those that do
-        in each of 500 are not checked.
+        Pairs of links that overlap in half or more of 500 sampled configurations. Those that do
+        in each are not checked.
 
     Raises
     ------
@@ -78,25 +78,27 @@ class CollisionModel:
         srdf: str | Path | None = None,
     ) -> None:
         self.robot, self.obstacles = robot, tuple(obstacles)
-        links = link_bodies(robot)
-        self.has_bodies = len(links) > 0
-        self._bodies = links + obstacle_bodies(self.obstacles, robot.urdf.links)
-        self._set_pairs(_indices(candidate_pairs(self._bodies, robot.urdf, srdf)))
-        overlaps = self._count_overlaps()
-        always = overlaps == _SAMPLES
-        found: dict[tuple[str, str], float] = {}
-        for pair in np.flatnonzero(overlaps >= _OFTEN * _FIRST):
-            share = min(overlaps[pair] / _FIRST, 1.0)
-            found[self.pairs[pair]] = max(share, found.get(self.pairs[pair], 0.0))
-        self._set_pairs(self.hulls.pairs[~always])
+        links = links_of(robot)
+        self.has_bodies = len(links.bodies) > 0
+        self._bodies = (*links.bodies, *obstacle_bodies(self.obstacles, robot.urdf.links))
+        self.bodies = tuple(body.name for body in self._bodies)
+        pairs: list[tuple[int, int]] = []
+        often: dict[tuple[str, str], int] = {}
+        for first, second in candidate_pairs(self._bodies, robot.urdf, srdf):
+            met, _ = links.counts.get((first, second), (0, 0))
+            if met < SAMPLES:
+                pairs.append((first, second))
+            if met >= _OFTEN * SAMPLES:
+                names = self.bodies[first], self.bodies[second]
+                often[names] = max(met, often.get(names, 0))
+        self._index = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        self.pairs = tuple((self.bodies[i], self.bodies[j]) for i, j in pairs)
         self.overlapping = tuple(
-            Overlap(*names, share, names in self.pairs) for names, share in found.items()
+            Overlap(*names, met / SAMPLES, names in self.pairs) for names, met in often.items()
         )
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        """Names of the B bodies; a link of several pieces appears repeatedly."""
-        return tuple(body.name for body in self._bodies)
+        self.hulls = HullDistances(robot, self._bodies, self._index)
+        solids = [body.solid for body in self._bodies]
+        self._meshes = MeshDistances(solids, self.bodies, self._index)
 
     @cached_property
     def open_meshes(self) -> tuple[str, ...]:
@@ -175,13 +177,18 @@ class CollisionModel:
             A row is not a configuration of the arm.
         """
         q = self.samples(q_samples)
-        bounds, worst = self.hulls.lower_bounds(q), _NO_PAIR
-        lowest = bounds.min(axis=1, initial=math.inf)
-        for row in np.argsort(lowest, kind="stable"):
+        if not len(q) or not self.pairs:
+            return _NO_PAIR
+        self._place(q[0])
+        worst = self._closest(self.hulls.lower_bounds(q[:1])[0], _NO_PAIR, 0)
+        # Pairs that are farther apart need no close look.
+        bounds = self.hulls.lower_bounds(q, worst.value)
+        lowest = bounds.min(axis=1)
+        for row in np.argsort(lowest, kind="stable").tolist():
             if lowest[row] >= worst.value:
                 break
             self._place(q[row])
-            worst = self._closest(bounds[row], worst, int(row))
+            worst = self._closest(bounds[row], worst, row)
         return worst
 
     def distances(self, q_samples: npt.ArrayLike, within: float = math.inf) -> Array:
@@ -267,53 +274,12 @@ class CollisionModel:
                 best = Closest(value, *self.pairs[pair], row)
         return best
 
-    def false_alarms(self, q_samples: Array) -> tuple[Ints, Ints]:
-        """Return in how many samples (K, n) bodies overlap, and in how many their hulls alone.
-
-        Both (P,).
-        """
-        met, alone = (np.zeros(len(self.pairs), dtype=np.int64) for _ in range(2))
-        for row, bounds in enumerate(self.hulls.lower_bounds(q_samples, 0.0)):
-            self._place(q_samples[row])
-            for pair in np.flatnonzero(bounds <= 0.0).tolist():
-                hulls, bodies = self._overlap(pair, bounds[pair])
-                met[pair] += bodies
-                alone[pair] += hulls and not bodies
+    def overlap_counts(self) -> tuple[Ints, Ints]:
+        """Return in how many of 500 configurations bodies overlap, and their hulls alone, (P,)."""
+        known = [links_of(self.robot).counts.get((i, j)) for i, j in self._index.tolist()]
+        unknown = np.flatnonzero([counts is None for counts in known])
+        met, alone = count_overlaps(self.robot, self.hulls, self._meshes, unknown)
+        for pair, counts in enumerate(known):
+            if counts is not None:
+                met[pair], alone[pair] = counts
         return met, alone
-
-    def _count_overlaps(self) -> Ints:
-        """Return in how many samples each pair of links overlaps, (P,).
-
-        Exact of those that overlap in each; of others up to the first 100, where that is often.
-        """
-        rng = np.random.default_rng(0)
-        lower, upper = self.robot.finite_limits()
-        q = rng.uniform(lower, upper, (_SAMPLES, self.robot.dof))
-        bounds, count = self.hulls.lower_bounds(q, 0.0), np.zeros(len(self.pairs), dtype=np.int64)
-        often = [not self._bodies[j].is_obstacle for j in self.hulls.pairs[:, 1].tolist()]
-        possible = np.flatnonzero(often)
-        for row in range(_SAMPLES):
-            # Those that can still reach the share, then those that overlapped in each so far.
-            least = _OFTEN * _FIRST - (_FIRST - row) if row < _FIRST else row
-            possible = possible[count[possible] >= least]
-            if not possible.size:
-                break
-            self._place(q[row])
-            for pair in possible[bounds[row, possible] <= 0.0].tolist():
-                count[pair] += self._overlap(pair, bounds[row, pair])[1]
-        return count
-
-    def _overlap(self, pair: int, bound: float) -> tuple[bool, bool]:
-        """Return whether the hulls of a pair overlap as they are placed, and the bodies."""
-        hulls = self.hulls.distance(pair, bound)
-        return hulls <= 0.0, self._meshes.overlaps(pair, hulls)
-
-    def _set_pairs(self, pairs: Ints) -> None:
-        placed = [(body.joint, body.place, body.solid) for body in self._bodies]
-        self.hulls = HullDistances(self.robot, placed, self.bodies, pairs)
-        self._meshes = MeshDistances([body.solid for body in self._bodies], self.bodies, pairs)
-        self.pairs = tuple((self.bodies[i], self.bodies[j]) for i, j in pairs.tolist())
-
-
-def _indices(pairs: list[tuple[int, int]]) -> Ints:
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2)

@@ -25,7 +25,7 @@ class Closest:
 
 @dataclass(frozen=True)
 class Overlap:
-    """Two links that overlap in half or more of 100 sampled configurations.
+    """Two links that overlap in half or more of 500 sampled configurations.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Overlap:
     share : float
         In how many of the configurations.
     is_checked : bool
-        False for those that overlap in each of 500: they touch by design and are left out.
+        False for those that overlap in each: they touch by design and are left out.
     """
 
     first: str
