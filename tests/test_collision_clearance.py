@@ -27,7 +27,7 @@ WORLD = (
     Capsule("capsule", pin.SE3(TURNED.rotation, np.array([-0.4, 0.5, 0.8])), 0.05, 0.4),
 )
 # Where clearances begin to level off, and over which distance, by default [m].
-NEAR, WIDTH = 0.02, 0.05
+NEAR, WIDTH = 0.02, 0.02
 # What two distances of coal may differ by.
 GJK = 2e-6
 # Central differences with a step of 1e-6 of distances solved to 1e-9; with a step of 1e-4 of

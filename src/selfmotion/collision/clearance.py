@@ -90,7 +90,7 @@ class ClearanceModel:
     Not for use by several threads at once.
     """
 
-    def __init__(self, exact: CollisionModel, near: float = 0.02, width: float = 0.05) -> None:
+    def __init__(self, exact: CollisionModel, near: float = 0.02, width: float = 0.02) -> None:
         self.robot, self._exact, self._near, self._width = exact.robot, exact, near, width
         self._kept = self._useful()
         self.pairs = tuple(exact.pairs[i] for i in self._kept)
