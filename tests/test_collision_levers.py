@@ -6,6 +6,7 @@ import pytest
 
 from selfmotion.collision import Box, CollisionModel, Sphere
 from selfmotion.collision.bodies import Body, link_bodies
+from selfmotion.collision.pairs import candidate_pairs
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
 
 WORLD = (Box("box", [0.6, 0.3, 0.5], [0.2, 0.3, 0.4]), Sphere("ball", [-0.4, 0.5, 0.9], 0.1))
@@ -123,11 +124,15 @@ def test_lever_arms_of_a_planar_arm_by_hand(tmp_path) -> None:
 @pytest.mark.parametrize("name", ["baxter", "pr2"])
 def test_pairs_that_overlap_often_are_listed(name: str) -> None:
     model = CollisionModel(load_robot(name))
-    left_out = [item for item in model.overlapping if not item.is_checked]
     assert model.overlapping
+    pairs = candidate_pairs(link_bodies(model.robot), model.robot.urdf)
+    names = [(model.bodies[i], model.bodies[j]) for i, j in pairs]
+    left_out = [item for item in model.overlapping if not item.is_checked]
+    assert len(names) > len(model.pairs) or not left_out
     for item in left_out:
         assert item.share == 1.0
-        assert (item.first, item.second) not in model.pairs
+        pair = (item.first, item.second)
+        assert model.pairs.count(pair) < names.count(pair)
     q = samples(model.robot, 200, 3)
     share = (model.distances(q, 0.0) <= 0.0).mean(axis=0)
     listed = {(item.first, item.second) for item in model.overlapping}
@@ -135,5 +140,5 @@ def test_pairs_that_overlap_often_are_listed(name: str) -> None:
     assert all(model.pairs[i] in listed for i in np.flatnonzero(share > 0.5 + 0.13))
     checked = [item for item in model.overlapping if item.is_checked]
     for item in checked:
-        index = model.pairs.index((item.first, item.second))
-        assert share[index] == pytest.approx(item.share, abs=0.13)
+        pieces = [i for i, pair in enumerate(model.pairs) if pair == (item.first, item.second)]
+        assert share[pieces].max() == pytest.approx(item.share, abs=0.13)

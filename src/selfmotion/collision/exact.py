@@ -83,18 +83,19 @@ class CollisionModel:
         self._bodies = (*links.bodies, *obstacle_bodies(self.obstacles, robot.urdf.links))
         self.bodies = tuple(body.name for body in self._bodies)
         pairs: list[tuple[int, int]] = []
-        often: dict[tuple[str, str], int] = {}
+        often: dict[tuple[str, str, bool], int] = {}
         for first, second in candidate_pairs(self._bodies, robot.urdf, srdf):
             met, _ = links.counts.get((first, second), (0, 0))
             if met < SAMPLES:
                 pairs.append((first, second))
             if met >= _OFTEN * SAMPLES:
-                names = self.bodies[first], self.bodies[second]
-                often[names] = max(met, often.get(names, 0))
+                key = self.bodies[first], self.bodies[second], met < SAMPLES
+                often[key] = max(met, often.get(key, 0))
         self._index = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         self.pairs = tuple((self.bodies[i], self.bodies[j]) for i, j in pairs)
         self.overlapping = tuple(
-            Overlap(*names, met / SAMPLES, names in self.pairs) for names, met in often.items()
+            Overlap(first, second, met / SAMPLES, is_checked)
+            for (first, second, is_checked), met in often.items()
         )
         self.hulls = HullDistances(robot, self._bodies, self._index)
         solids = [body.solid for body in self._bodies]
@@ -102,7 +103,7 @@ class CollisionModel:
 
     @cached_property
     def open_meshes(self) -> tuple[str, ...]:
-        """Links and obstacles with a mesh that is not closed.
+        """Links and obstacles with a mesh that is neither closed, nor flat, nor as its hull.
 
         Whether another body is wholly inside one of these is not certain: it is decided by the
         winding number, which serves small holes. Distances from its surface are right.
@@ -134,8 +135,8 @@ class CollisionModel:
         """How much the distance of each pair changes at most per unit of each joint, (P, n).
 
         At every configuration within the joint limits, in the order of `pairs`: from one
-        configuration to another the distance changes by Σ_j lever_pj |Δq_j| at most. Joints that
-        move both bodies as one block count nothing.
+        configuration to another the distance of bodies that are apart changes by
+        Σ_j lever_pj |Δq_j| at most. Joints that move both bodies as one block count nothing.
         """
         return levers.pair_levers(self._axis_distances, self.moved, self.hulls.pairs)
 
