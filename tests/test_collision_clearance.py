@@ -101,6 +101,14 @@ def test_pullback_is_the_weighted_sum_of_the_gradients(models) -> None:
     assert clearances.pullback(weights) == pytest.approx(expected, abs=1e-10)
 
 
+def test_changes_along_motions_are_the_gradients_times_these(models) -> None:
+    _, model = models
+    clearances = model.clearances(samples(model.robot, 4))
+    tangents = np.random.default_rng(3).normal(size=(4, model.robot.dof, 3))
+    expected = clearances.jacobian() @ tangents
+    assert clearances.along(tangents) == pytest.approx(expected, abs=1e-10)
+
+
 def test_no_pair_is_closer_than_its_clearance(models) -> None:
     exact, model = models
     q = samples(model.robot, 25)

@@ -50,6 +50,19 @@ class Clearances:
         gradient[present] = np.add.reduceat(terms, starts, axis=0)
         return gradient
 
+    def along(self, tangents: Array) -> Array:
+        """Return how the distances change along motions of the samples, (K, P, d).
+
+        Parameters
+        ----------
+        tangents : (K, n, d)
+            Derivatives of the configurations by d parameters.
+        """
+        changes = np.zeros((*self.values.shape, tangents.shape[2]))
+        terms = self.slopes[:, None] @ tangents[self.rows]
+        changes[self.rows, self.columns] = terms[:, 0]
+        return changes
+
     def jacobian(self) -> Array:
         """Return ∂d/∂q, (K, P, n); most of it is zero, see `slopes`."""
         jacobian = np.zeros((*self.values.shape, self.slopes.shape[1]))

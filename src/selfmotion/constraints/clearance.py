@@ -121,8 +121,7 @@ class BoundClearance:
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
-        jacobian = self._clearances(samples).jacobian()
-        return np.asarray(-(jacobian @ motion.q) / _METRE)
+        return self._clearances(samples).along(-motion.q / _METRE)
 
     def _clearances(self, samples: Samples) -> Clearances:
         """Return the distances at the nodes; those of the last motion are kept."""
