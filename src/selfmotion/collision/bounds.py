@@ -24,17 +24,21 @@ class BoundingBoxes:
     """
 
     def __init__(self, robot: RobotModel, bodies: Sequence[Body]) -> None:
-        self._model, self._data = robot.model, robot.model.createData()
-        # Views into the data, which Pinocchio updates: reading placements costs no call.
-        moving = list(self._data.oMi)[1:]
-        self._rotation_views = [place.rotation for place in moving]
-        self._position_views = [place.translation for place in moving]
-        self._joints = np.array([body.joint for body in bodies], dtype=np.int64)
-        self._axes = np.array([body.place.rotation for body in bodies]).reshape(-1, 3, 3)
+        model = robot.model
+        axes, is_revolute = joint_axes(robot)
+        places = list(model.jointPlacements)[1:]
+        self._chain = (
+            np.array([place.rotation for place in places]),
+            np.array([place.translation for place in places]),
+            axes,
+            is_revolute,
+        )
+        joints = np.array([body.joint for body in bodies], dtype=np.int64)
+        turns = np.array([body.place.rotation for body in bodies]).reshape(-1, 3, 3)
         middles = [body.place.act(0.5 * (body.solid.low + body.solid.high)) for body in bodies]
-        self._middles = np.array(middles).reshape(-1, 3)
         halves = [0.5 * (body.solid.high - body.solid.low) for body in bodies]
         self._halves = np.array(halves).reshape(-1, 3)
+        self._boxes = (joints, turns, np.array(middles).reshape(-1, 3), self._halves)
 
     @property
     def radii(self) -> Array:
@@ -55,20 +59,16 @@ class BoundingBoxes:
         # Here, because importing numba takes longer than everything else in the package.
         from selfmotion.collision import kernels
 
-        rotations, positions = self._placements(q)
-        return kernels.lower_bounds(
-            rotations, positions, self._joints, self._axes, self._middles, self._halves, pairs,
-            limit,
-        )  # fmt: skip
+        return kernels.lower_bounds(q, *self._chain, *self._boxes, pairs, limit)
 
-    def _placements(self, q: Array) -> tuple[Array, Array]:
-        count, n = q.shape
-        # Row 0 of each is the world.
-        rotations, positions = np.zeros((count, 3 * (n + 1), 3)), np.zeros((count, 3 * (n + 1)))
-        rotations[:, :3] = np.eye(3)
-        for k in range(count):
-            pin.forwardKinematics(self._model, self._data, q[k])
-            np.concatenate(self._rotation_views, out=rotations[k, 3:])
-            np.concatenate(self._position_views, out=positions[k, 3:])
-        shape = (count, n + 1, 3)
-        return rotations.reshape(*shape, 3), positions.reshape(shape)
+
+def joint_axes(robot: RobotModel) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Return the joints' axes in their own frames, (n, 3), and which joints are revolute, (n,)."""
+    model = robot.model
+    data = model.createData()
+    # Columns [v, ω] at the world's origin; of one joint Pinocchio returns a vector.
+    columns = pin.computeJointJacobians(model, data, np.zeros(robot.dof)).reshape(6, -1).T
+    twists = [data.oMi[j + 1].actInv(pin.Motion(columns[j])) for j in range(robot.dof)]
+    is_revolute = np.array([bool(np.any(twist.angular)) for twist in twists])
+    axes = [t.angular if r else t.linear for t, r in zip(twists, is_revolute, strict=True)]
+    return np.array(axes).reshape(-1, 3), is_revolute

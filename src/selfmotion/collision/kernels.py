@@ -9,6 +9,7 @@ from selfmotion.arrays import Array
 from selfmotion.jit import kernel
 
 Ints = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
 Vector = tuple[float, float, float]
 # Edges whose cosine differs from one by less are parallel: the faces decide about them.
 _PARALLEL = 1e-6
@@ -57,30 +58,83 @@ def separation(a: Array, b: Array, t: Array, g: Array, h: Array) -> float:
 
 
 @kernel
-def lower_bounds(
+def _turned(axis: Array, angle: float, rotation: Array) -> None:
+    """Write the rotation by an angle about a unit vector (Rodrigues' formula)."""
+    s, c = math.sin(angle), math.cos(angle)
+    x, y, z, rest = axis[0], axis[1], axis[2], 1.0 - c
+    for a in range(3):
+        for b in range(3):
+            rotation[a, b] = axis[a] * axis[b] * rest
+        rotation[a, a] += c
+    rotation[0, 1] -= z * s
+    rotation[1, 0] += z * s
+    rotation[0, 2] += y * s
+    rotation[2, 0] -= y * s
+    rotation[1, 2] -= x * s
+    rotation[2, 1] += x * s
+
+
+@kernel
+def _compose(first: Array, at: Array, second: Array, there: Array, r: Array, p: Array) -> None:
+    """Write the product of two placements."""
+    for a in range(3):
+        x, y, z = first[a, 0], first[a, 1], first[a, 2]
+        p[a] = at[a] + x * there[0] + y * there[1] + z * there[2]
+        for b in range(3):
+            r[a, b] = x * second[0, b] + y * second[1, b] + z * second[2, b]
+
+
+@kernel
+def placements(
+    q: Array,
     rotations: Array,
     positions: Array,
-    joints: Ints,
     axes: Array,
+    is_revolute: Flags,
+    r: Array,
+    p: Array,
+) -> None:
+    """Write where q (n,) places the joints of a chain: (n + 1, 3, 3) and (n + 1, 3).
+
+    Row 0 is the world. Each joint has a place in the frame of the one before, (n, 3, 3) and (n, 3),
+    and an axis in its own, (n, 3).
+    """
+    r[0], p[0] = np.eye(3), 0.0
+    turn, middle, shift = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    identity, none = np.eye(3), np.zeros(3)
+    for j in range(len(q)):
+        _compose(r[j], p[j], rotations[j], positions[j], middle, shift)
+        if is_revolute[j]:
+            _turned(axes[j], q[j], turn)
+            _compose(middle, shift, turn, none, r[j + 1], p[j + 1])
+        else:
+            _compose(middle, shift, identity, q[j] * axes[j], r[j + 1], p[j + 1])
+
+
+@kernel
+def lower_bounds(
+    q: Array,
+    rotations: Array,
+    positions: Array,
+    axes: Array,
+    is_revolute: Flags,
+    joints: Ints,
+    turns: Array,
     middles: Array,
     halves: Array,
     pairs: Ints,
     limit: float,
 ) -> Array:
-    """Return `BoundingBoxes.lower_bounds`, for placements (K, J, 3, 3) and (K, J, 3) of joints."""
-    bounds = np.empty((len(rotations), len(pairs)))
+    """Return `BoundingBoxes.lower_bounds`; the chain as in `placements`."""
+    bounds = np.empty((len(q), len(pairs)))
+    r, p = np.empty((q.shape[1] + 1, 3, 3)), np.empty((q.shape[1] + 1, 3))
     turned, place = np.empty((len(joints), 3, 3)), np.empty((len(joints), 3))
     radii, t = np.sqrt((halves * halves).sum(axis=1)), np.empty(3)
-    for k in range(len(rotations)):
+    for k in range(len(q)):
+        placements(q[k], rotations, positions, axes, is_revolute, r, p)
         for i in range(len(joints)):
-            rotation, position = rotations[k, joints[i]], positions[k, joints[i]]
-            for a in range(3):
-                x, y, z = rotation[a, 0], rotation[a, 1], rotation[a, 2]
-                place[i, a] = position[a] + (
-                    x * middles[i, 0] + y * middles[i, 1] + z * middles[i, 2]
-                )
-                for b in range(3):
-                    turned[i, a, b] = x * axes[i, 0, b] + y * axes[i, 1, b] + z * axes[i, 2, b]
+            j = joints[i]
+            _compose(r[j], p[j], turns[i], middles[i], turned[i], place[i])
         for pair in range(len(pairs)):
             i, j = pairs[pair, 0], pairs[pair, 1]
             for a in range(3):

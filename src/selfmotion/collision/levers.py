@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from selfmotion.arrays import Array
 from selfmotion.collision.bodies import Body
+from selfmotion.collision.bounds import joint_axes
 from selfmotion.robot import RobotModel
 
 Ints = npt.NDArray[np.int64]
@@ -60,15 +61,9 @@ class _Chain:
     def __init__(self, robot: RobotModel) -> None:
         model = robot.model
         self._places = [pin.SE3(place) for place in model.jointPlacements]
-        data = model.createData()
-        # Motion of each joint in its own axes per unit of speed: [v, ω].
-        columns = pin.computeJointJacobians(model, data, np.zeros(robot.dof)).reshape(6, -1).T
-        twists = [
-            data.oMi[joint].actInv(pin.Motion(columns[joint - 1]))
-            for joint in range(1, robot.dof + 1)
-        ]
-        self.is_revolute = [False, *(bool(np.any(twist.angular)) for twist in twists)]
-        self._axes = [np.zeros(3), *(np.array(twist.angular) for twist in twists)]
+        axes, is_revolute = joint_axes(robot)
+        self.is_revolute = [False, *is_revolute.tolist()]
+        self._axes = [np.zeros(3), *axes]
         lower, upper = robot.finite_limits()
         travel = np.where(self.is_revolute[1:], 0.0, np.maximum(np.abs(lower), np.abs(upper)))
         self._travel = [0.0, *travel.tolist()]
