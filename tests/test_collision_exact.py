@@ -10,9 +10,11 @@ import pytest
 import trimesh
 
 from selfmotion.basics.errors import CollisionError, RobotError
-from selfmotion.collision import Box, Capsule, CollisionModel, Cylinder, Mesh, Sphere
-from selfmotion.collision.pairs import Body, candidate_pairs
-from selfmotion.collision.shapes import winding_number
+from selfmotion.collision import Box, Capsule, CollisionModel, Cylinder, Mesh, Sphere, srdf_line
+from selfmotion.collision.bodies import Body
+from selfmotion.collision.kernels import winding_number
+from selfmotion.collision.pairs import candidate_pairs
+from selfmotion.collision.solids import Solid
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
 
 BOXES = (
@@ -184,9 +186,10 @@ def test_links_that_touch_by_design_are_no_pair(panda: RobotModel) -> None:
 
 
 def test_the_base_is_not_checked_against_the_world(panda: RobotModel) -> None:
-    table = Body("table", 0, is_obstacle=True)
-    base = Body("panda_link0", 0, is_obstacle=False)
-    arm = Body("panda_link1", 1, is_obstacle=False)
+    here, solid = pin.SE3.Identity(), Solid(coal.Sphere(0.1), "ball")
+    table = Body("table", 0, True, here, solid)
+    base = Body("panda_link0", 0, False, here, solid)
+    arm = Body("panda_link1", 1, False, here, solid)
     assert candidate_pairs([base, arm, table], panda.urdf) == [(1, 2)]
 
 
@@ -243,17 +246,43 @@ def test_refuses_what_is_no_configuration(panda: RobotModel, q: np.ndarray) -> N
 def test_hull_distances_are_finite_and_repeat(name: str) -> None:
     """Whatever was asked before: the distance at a configuration is a function of it alone."""
     robot = load_robot(name)
-    model = CollisionModel(robot)
-    lower, upper = robot.finite_limits()
-    samples = np.random.default_rng(0).uniform(lower, upper, (20, robot.dof))
+    hulls = CollisionModel(robot).hulls
+    q = samples(robot, 20)
+    bounds, pairs = hulls.lower_bounds(q), range(len(hulls.pairs))
     runs = []
-    for order in (samples, samples[::-1]):
-        rows = []
-        for q in order:
-            model.place_hulls(q)
-            rows.append([model.hull_contact([pair])[0] for pair in range(len(model.pairs))])
-        runs.append(np.array(rows if order is samples else rows[::-1]))
+    for order in (range(20), reversed(range(20))):
+        rows = {}
+        for k in order:
+            hulls.place(q[k])
+            rows[k] = [hulls.distance(pair, bounds[k, pair]) for pair in pairs]
+        runs.append(np.array([rows[k] for k in range(20)]))
     assert np.abs(runs[0]).max() < 10.0
-    apart = runs[0] > 0.0
-    # Solved to 1e-12 of a squared distance of at most some metres; 1e-6 m at coal's own accuracy.
-    np.testing.assert_allclose(runs[0][apart], runs[1][apart], atol=1e-9)
+    np.testing.assert_array_equal(*runs)
+
+
+def test_distances_of_all_pairs_are_exact_where_they_are_asked_for(panda: RobotModel) -> None:
+    model = CollisionModel(panda, BOXES)
+    q = samples(panda, 30)
+    every, near = model.distances(q), model.distances(q, 0.05)
+    assert every.shape == (30, len(model.pairs))
+    np.testing.assert_allclose(
+        every.min(axis=1), [model.distance(row).value for row in q], atol=GJK
+    )
+    close = every < 0.05 - GJK
+    np.testing.assert_allclose(near[close], every[close], atol=GJK)
+    assert np.all(near <= every + GJK)
+    assert np.all(near[~close] >= 0.05 - GJK)
+
+
+def test_what_touches_is_named_with_the_line_that_leaves_it_out(
+    panda: RobotModel, tmp_path: Path
+) -> None:
+    folded = np.array([0.0, 1.0, 0.0, -3.0, 0.0, 3.0, 0.0])
+    model = CollisionModel(panda)
+    touching = model.touching(folded)
+    assert touching
+    assert [item.value for item in touching] == sorted(item.value for item in touching)
+    assert touching[0].value == pytest.approx(model.distance(folded).value, abs=GJK)
+    lines = "".join(srdf_line(item.first, item.second) for item in touching)
+    (tmp_path / "panda.srdf").write_text(f"<robot name='panda'>{lines}</robot>")
+    assert CollisionModel(panda, srdf=tmp_path / "panda.srdf").touching(folded) == ()

@@ -1,8 +1,11 @@
 """Obstacles: values that cannot be broken, and the way into files and back."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, ClassVar
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -11,12 +14,17 @@ from selfmotion.basics.errors import CollisionError
 from selfmotion.collision import (
     Box,
     Capsule,
+    CollisionModel,
     Cylinder,
     Mesh,
     Obstacle,
     Sphere,
     obstacle_from_dict,
 )
+from selfmotion.collision import obstacles as module
+from selfmotion.replay import scene
+from selfmotion.replay.payload import Payload
+from selfmotion.robot import load_robot
 
 POSE = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 1.1), np.array([0.1, 0.2, 0.3]))
 ALL = [
@@ -98,3 +106,54 @@ def test_refuses_dicts_with_a_key_missing(key: str) -> None:
     del values[key]
     with pytest.raises(CollisionError):
         obstacle_from_dict(values)
+
+
+def test_an_own_shape_is_one_class(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It goes into files and back, is measured, and needs no other place to know it."""
+    monkeypatch.setattr(module, "_shapes", dict(module._shapes))
+
+    @dataclass(frozen=True, eq=False)
+    class Cone(Obstacle):
+        shape: ClassVar[str] = "cone"
+        radius: float
+        length: float
+
+        def geometry(self) -> Any:
+            return coal.Cone(self.radius, self.length)
+
+    cone = Cone("hat", [0.0, 0.0, 3.0], 0.2, 0.5)
+    again = obstacle_from_dict(json.loads(json.dumps(cone.to_dict())))
+    assert isinstance(again, Cone)
+    assert again.to_dict() == cone.to_dict()
+    panda = load_robot("panda")
+    upright = np.zeros(7)
+    over = CollisionModel(panda, [cone])
+    ball = CollisionModel(panda, [Sphere("hat", [0.0, 0.0, 3.0], 1e-6)])
+    names = [pair for pair in over.pairs if pair[1] == "hat"]
+    first, second = (model.distances(upright[None])[0] for model in (over, ball))
+    hat = np.array([over.pairs.index(name) for name in names])
+    dot = np.array([ball.pairs.index(name) for name in names])
+    # The cone's base is 0.25 m below its middle.
+    assert first[hat].min() == pytest.approx(second[dot].min() - 0.25, abs=0.05)
+    drawn = scene.obstacle_commands("/plan", [cone], Payload())
+    assert [command["path"] for command in drawn] == ["/plan/obstacles/hat/0"]
+
+
+def test_a_shape_has_one_class() -> None:
+    for name in ("box", ""):
+        with pytest.raises(CollisionError, match="expected a name that no other obstacle has"):
+            type("Crate", (Obstacle,), {"shape": name})
+
+
+def test_an_obstacle_without_geometry_is_no_class(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_shapes", dict(module._shapes))
+    with pytest.raises(TypeError, match="geometry"):
+        type("Ghost", (Obstacle,), {"shape": "ghost"})("ghost", POSE)
+
+
+def test_refuses_a_shape_without_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_shapes", dict(module._shapes))
+    body = {"shape": "half space", "geometry": lambda self: coal.Halfspace(0.0, 0.0, 1.0, 0.0)}
+    half = type("Half", (Obstacle,), body)("ground", POSE)
+    with pytest.raises(CollisionError, match=r"half space 'ground': it reaches"):
+        CollisionModel(load_robot("panda"), [half])

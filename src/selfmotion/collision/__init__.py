@@ -1,7 +1,8 @@
 """Collisions: exact distances for certificates, smooth conservative ones for optimisation."""
 
 from selfmotion.collision.clearance import ClearanceModel, Clearances
-from selfmotion.collision.exact import Closest, CollisionModel
+from selfmotion.collision.exact import CollisionModel
+from selfmotion.collision.found import Closest, Overlap, srdf_line
 from selfmotion.collision.obstacles import (
     Box,
     Capsule,
@@ -11,6 +12,7 @@ from selfmotion.collision.obstacles import (
     Sphere,
     obstacle_from_dict,
 )
+from selfmotion.collision.solids import Solid
 
 __all__ = [
     "Box",
@@ -22,6 +24,9 @@ __all__ = [
     "Cylinder",
     "Mesh",
     "Obstacle",
+    "Overlap",
+    "Solid",
     "Sphere",
     "obstacle_from_dict",
+    "srdf_line",
 ]

@@ -2,41 +2,25 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
-from selfmotion.basics import Array, CollisionError
-from selfmotion.collision import shapes
+from selfmotion.basics import Array, RobotError
+from selfmotion.collision import levers
+from selfmotion.collision.bodies import obstacle_bodies
+from selfmotion.collision.distances import HullDistances, Ints
+from selfmotion.collision.found import Closest, Overlap
+from selfmotion.collision.meshes import MeshDistances
 from selfmotion.collision.obstacles import Obstacle
-from selfmotion.collision.pairs import Body, candidate_pairs
+from selfmotion.collision.overlaps import SAMPLES, count_overlaps, links_of
+from selfmotion.collision.pairs import candidate_pairs
 from selfmotion.robot import RobotModel
 
-
-@dataclass(frozen=True)
-class Closest:
-    """The smallest distance found, and where.
-
-    Attributes
-    ----------
-    value : float
-        [m]; negative when the two overlap, inf when there is no pair to check.
-    first, second : str
-        The two links, or link and obstacle; empty when there is no pair.
-    index : int
-        Row of the samples it was found in.
-    """
-
-    value: float
-    first: str
-    second: str
-    index: int = 0
-
-
+# The share of sampled configurations from which on an overlap of links is worth telling.
+_OFTEN = 0.5
 _NO_PAIR = Closest(math.inf, "", "")
 
 
@@ -57,22 +41,33 @@ class CollisionModel:
     srdf : Path, optional
         File whose ``<disable_collisions>`` pairs are left out.
 
+    Attributes
+    ----------
+    pairs : tuple of (str, str)
+        Names of the P pairs that are checked; a link of several pieces appears repeatedly.
+    bodies : tuple of str
+        Names of the B bodies, likewise.
+    overlapping : tuple of Overlap
+        Pairs of links that overlap in half or more of 500 sampled configurations. Those that do
+        in each are not checked.
+
     Raises
     ------
     CollisionError
-        Two obstacles, or an obstacle and a link, have the same name; a mesh or the SRDF cannot be
-        read.
+        Two obstacles, or an obstacle and a link, have the same name; a piece of geometry is no
+        body; a mesh or the SRDF cannot be read.
     RobotError
         A mesh of the robot is missing.
 
     Notes
     -----
-    Links joined by a movable joint are not checked against each other, nor are pairs that overlap
-    in each of 500 sampled configurations: they touch by design. Without collision geometry in the
-    URDF (`has_bodies` is False) there is no pair at all.
+    Links joined by a movable joint are not checked against each other. Without collision geometry
+    in the URDF (`has_bodies` is False) there is no pair at all.
 
-    Distances of the convex hulls (GJK) bound those of the meshes from below, so the meshes are
-    visited only for the few pairs that may hold the minimum.
+    Boxes around the hulls, then the hulls (GJK) bound the distances of the meshes from below, so
+    the meshes are visited only for the few pairs that may hold the minimum.
+
+    Not for use by several threads at once.
     """
 
     def __init__(
@@ -81,28 +76,87 @@ class CollisionModel:
         obstacles: Sequence[Obstacle] = (),
         srdf: str | Path | None = None,
     ) -> None:
-        self.robot = robot
-        self.obstacles = tuple(obstacles)
-        self._meshes = robot.geometry(pin.GeometryType.COLLISION)
-        self.has_bodies = len(self._meshes.geometryObjects) > 0
-        links = [
-            Body(robot.model.frames[piece.parentFrame].name, piece.parentJoint, is_obstacle=False)
-            for piece in self._meshes.geometryObjects
-        ]
-        _check_names(self.obstacles, robot.urdf.links)
-        world = [Body(obstacle.name, 0, is_obstacle=True) for obstacle in self.obstacles]
-        self._bodies = links + world
-        for obstacle in self.obstacles:
-            self._meshes.addGeometryObject(_geometry_object(obstacle))
-        self._hulls = _hulls_of(self._meshes)
-        self._solids = [shapes.Solid(piece.geometry) for piece in self._meshes.geometryObjects]
-        self._set_pairs(candidate_pairs(self._bodies, robot.urdf, srdf))
-        self._set_pairs(self._not_always_touching())
+        self.robot, self.obstacles = robot, tuple(obstacles)
+        links = links_of(robot)
+        self.has_bodies = len(links.bodies) > 0
+        self._bodies = (*links.bodies, *obstacle_bodies(self.obstacles, robot.urdf.links))
+        self.bodies = tuple(body.name for body in self._bodies)
+        pairs: list[tuple[int, int]] = []
+        often: dict[tuple[str, str, bool], int] = {}
+        for first, second in candidate_pairs(self._bodies, robot.urdf, srdf):
+            met, _ = links.counts.get((first, second), (0, 0))
+            if met < SAMPLES:
+                pairs.append((first, second))
+            if met >= _OFTEN * SAMPLES:
+                key = self.bodies[first], self.bodies[second], met < SAMPLES
+                often[key] = max(met, often.get(key, 0))
+        self._index = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        self.pairs = tuple((self.bodies[i], self.bodies[j]) for i, j in pairs)
+        self.overlapping = tuple(
+            Overlap(first, second, met / SAMPLES, is_checked)
+            for (first, second, is_checked), met in often.items()
+        )
+        self.hulls = HullDistances(robot, self._bodies, self._index)
+        solids = [body.solid for body in self._bodies]
+        self._meshes = MeshDistances(solids, self.bodies, self._index)
 
-    @property
-    def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Names of the bodies that are checked; a link of several pieces appears repeatedly."""
-        return tuple((self._bodies[i].name, self._bodies[j].name) for i, j in self._index_pairs)
+    @cached_property
+    def open_meshes(self) -> tuple[str, ...]:
+        """Links and obstacles with a mesh that is neither closed, nor flat, nor as its hull.
+
+        Whether another body is wholly inside one of these is not certain: it is decided by the
+        winding number, which serves small holes. Distances from its surface are right.
+        """
+        found = (
+            body.name
+            for body in self._bodies
+            if not (body.solid.is_flat or body.solid.is_closed or body.solid.is_convex)
+        )
+        return tuple(dict.fromkeys(found))
+
+    @cached_property
+    def moved(self) -> npt.NDArray[np.bool_]:
+        """Which bodies each joint moves, (B, n): those on its link and on all beyond."""
+        return levers.moved_by(self._bodies, self.robot.dof)
+
+    @cached_property
+    def lever_arms(self) -> Array:
+        """How far points of the bodies move at most per unit of each joint, (B, n).
+
+        Row b bounds |∂x/∂q_j| over all points x of body b, in [m/rad] for revolute joints and
+        [m/m] for prismatic ones, at every configuration within the joint limits. So no point moves
+        farther than Σ_j lever_bj |Δq_j|.
+        """
+        return np.where(self.moved, self._axis_distances, 0.0)
+
+    @cached_property
+    def pair_levers(self) -> Array:
+        """How much the distance of each pair changes at most per unit of each joint, (P, n).
+
+        At every configuration within the joint limits, in the order of `pairs`: from one
+        configuration to another the distance of bodies that are apart changes by
+        Σ_j lever_pj |Δq_j| at most. Joints that move both bodies as one block count nothing.
+        """
+        return levers.pair_levers(self._axis_distances, self.moved, self.hulls.pairs)
+
+    @cached_property
+    def _axis_distances(self) -> Array:
+        return levers.axis_distances(self.robot, self._bodies)
+
+    def samples(self, q_samples: npt.ArrayLike) -> Array:
+        """Return samples (K, n) as an array.
+
+        Raises
+        ------
+        RobotError
+            The shape is not (K, n), or a number is not finite.
+        """
+        q = np.ascontiguousarray(q_samples, dtype=np.float64)
+        if q.ndim != 2 or q.shape[1] != self.robot.dof or not np.isfinite(q).all():
+            raise RobotError(
+                f"samples have shape {q.shape}, expected (K, {self.robot.dof}) finite numbers"
+            )
+        return q
 
     def distance(self, q: npt.ArrayLike) -> Closest:
         """Return the smallest distance over all pairs at `q`.
@@ -112,7 +166,7 @@ class CollisionModel:
         RobotError
             `q` is not a configuration of the arm.
         """
-        return self._closest(self.robot.configuration(q), _NO_PAIR, 0)
+        return self.worst(self.robot.configuration(q)[None])
 
     def worst(self, q_samples: npt.ArrayLike) -> Closest:
         """Return the smallest distance over a motion (K, n); its `index` is the row.
@@ -122,17 +176,53 @@ class CollisionModel:
         RobotError
             A row is not a configuration of the arm.
         """
-        worst = _NO_PAIR
-        for index, q in enumerate(np.atleast_2d(np.asarray(q_samples, dtype=np.float64))):
-            worst = self._closest(self.robot.configuration(q), worst, index)
+        q = self.samples(q_samples)
+        if not len(q) or not self.pairs:
+            return _NO_PAIR
+        self._place(q[0])
+        worst = self._closest(self.hulls.lower_bounds(q[:1])[0], _NO_PAIR, 0)
+        # Pairs that are farther apart need no close look.
+        bounds = self.hulls.lower_bounds(q, worst.value)
+        lowest = bounds.min(axis=1)
+        for row in np.argsort(lowest, kind="stable").tolist():
+            if lowest[row] >= worst.value:
+                break
+            self._place(q[row])
+            worst = self._closest(bounds[row], worst, row)
         return worst
+
+    def distances(self, q_samples: npt.ArrayLike, within: float = math.inf) -> Array:
+        """Return the distance of every pair at samples (K, n), (K, P) [m], as `pairs` names them.
+
+        Parameters
+        ----------
+        q_samples : (K, n)
+        within : float
+            Pairs that are farther apart than this need no exact number [m]: theirs is a lower
+            bound of the distance that is not below `within`.
+
+        Raises
+        ------
+        RobotError
+            A row is not a configuration of the arm.
+        """
+        q = self.samples(q_samples)
+        values = self.hulls.lower_bounds(q, within)
+        for row in range(len(q)):
+            near = np.flatnonzero(values[row] < within).tolist()
+            if near:
+                self._place(q[row])
+            for pair in near:
+                hulls = self.hulls.distance(pair, values[row, pair])
+                far = hulls >= within
+                values[row, pair] = hulls if far else self._meshes.refine(pair, hulls)
+        return values
 
     def collides(self, q: Array, margin: float = 0.0) -> bool:
         """Whether some pair is closer than `margin` [m] at `q` (n,); made for many calls.
 
-        The convex hulls decide alone where they are apart by more than the margin, and where all
-        meshes are convex to 0.1 % of the volume; only other meshes are visited. So the answer is
-        never False in error, and True in error within the gap of mesh and hull at most.
+        The convex hulls decide alone where they are apart by more than the margin, and where both
+        meshes are convex to 0.1 % of the volume; only other meshes are visited.
 
         Raises
         ------
@@ -141,185 +231,55 @@ class CollisionModel:
         """
         if q.shape != (self.robot.dof,) or not math.isfinite(q.dot(q)):
             self.robot.configuration(q)
-        if not self._index_pairs:
+        bounds = self.hulls.lower_bounds(q[None], margin)[0]
+        near = np.flatnonzero(bounds < margin)
+        if not near.size:
             return False
-        if margin != self._margin:
-            self._set_margin(margin)
-        self.place_hulls(q)
-        self._broad_phase.update(False)
-        if not pin.computeCollisions(self._broad_phase, True):
-            return False
-        if self._hulls_decide:
-            return True
-        lower = self._lower_bounds()
-        near = np.flatnonzero(lower < margin)
-        return any(self._pair_distance(int(i), lower[i]) < margin for i in near)
+        self._place(q)
+        open_ = []
+        for pair in near.tolist():
+            hulls = self.hulls.distance(pair, bounds[pair])
+            if hulls < margin:
+                if self._meshes.hulls_decide[pair]:
+                    return True
+                open_.append((hulls, pair))
+        return any(
+            self._meshes.refine(pair, hulls, margin) < margin for hulls, pair in sorted(open_)
+        )
 
-    def overlaps(self, q_samples: Array) -> dict[tuple[str, str], npt.NDArray[np.bool_]]:
-        """Return for each pair of names at which samples (K, n) the two overlap, (K,)."""
-        found = {names: np.zeros(len(q_samples), dtype=bool) for names in self.pairs}
-        for k, q in enumerate(q_samples):
-            for i in np.flatnonzero(self._place(self.robot.configuration(q)) <= 0.0):
-                row = found[self._names(int(i))]
-                row[k] = row[k] or self._pair_distance(int(i), 0.0) <= 0.0
-        return found
+    def touching(self, q: npt.ArrayLike) -> tuple[Closest, ...]:
+        """Return all pairs that overlap at `q`, the deepest first; see also `srdf_line`.
 
-    def place_hulls(self, q: Array) -> None:
-        """Place the convex hulls at `q` (n,), for `hull_contact`."""
-        pin.updateGeometryPlacements(self.robot.model, self._data, self._hulls, self._hull_data, q)
-
-    def hull_contact(self, pairs: Sequence[int]) -> tuple[float, ...]:
-        """Return the smallest distance of some pairs' hulls as they are placed, and where.
-
-        Made for many calls.
-
-        Parameters
-        ----------
-        pairs : sequence of int
-            Indices into `pairs`.
-
-        Returns
-        -------
-        (7,)
-            The distance [m], minus the depth where they overlap; the normal from the second body
-            to the first; a point of the first that is nearest. In world axes.
+        Raises
+        ------
+        RobotError
+            `q` is not a configuration of the arm.
         """
-        model, data = self._hulls, self._hull_data
-        contact = pin.computeDistance(model, data, pairs[0])
-        for pair in pairs[1:]:
-            other = pin.computeDistance(model, data, pair)
-            if other.min_distance < contact.min_distance:
-                contact = other
-        x, y, z = contact.normal.tolist()
-        return (contact.min_distance, -x, -y, -z, *contact.getNearestPoint1().tolist())
+        values = self.distances(self.robot.configuration(q)[None], 0.0)[0]
+        rows = [i for i in np.argsort(values, kind="stable").tolist() if values[i] <= 0.0]
+        return tuple(Closest(float(values[i]), *self.pairs[i]) for i in rows)
 
-    def _closest(self, q: Array, best: Closest, index: int) -> Closest:
-        """Return the smaller of `best` and the distance at `q`."""
-        if not self._index_pairs:
-            return best
-        lower = self._place(q)
-        for i in np.argsort(lower, kind="stable"):
-            if lower[i] >= best.value:
+    def _place(self, q: Array) -> None:
+        self._meshes.follow(self.hulls.place(q))
+
+    def _closest(self, bounds: Array, best: Closest, row: int) -> Closest:
+        """Return the smaller of `best` and the smallest distance as the bodies are placed."""
+        near = np.flatnonzero(bounds < best.value).tolist()
+        found = sorted((self.hulls.distance(pair, bounds[pair]), pair) for pair in near)
+        for hulls, pair in found:
+            if hulls >= best.value:
                 break
-            value = self._pair_distance(int(i), float(lower[i]))
+            value = self._meshes.refine(pair, hulls, best.value)
             if value < best.value:
-                best = Closest(value, *self._names(int(i)), index)
+                best = Closest(value, *self.pairs[pair], row)
         return best
 
-    def _names(self, pair: int) -> tuple[str, str]:
-        first, second = self._index_pairs[pair]
-        return self._bodies[first].name, self._bodies[second].name
-
-    def _place(self, q: Array) -> Array:
-        """Place all bodies and return the distances of their hulls, (P,)."""
-        self.place_hulls(q)
-        return self._lower_bounds()
-
-    def _lower_bounds(self) -> Array:
-        """Return the distances of the hulls as they are placed, and place the meshes with them."""
-        pin.updateGeometryPlacements(self.robot.model, self._data, self._meshes, self._mesh_data)
-        pin.computeDistances(self._hulls, self._hull_data)
-        return np.array([result.min_distance for result in self._hull_results])
-
-    def _pair_distance(self, pair: int, hulls: float) -> float:
-        """Return the distance of one pair [m], given that of its convex hulls."""
-        if pair not in self._refined or (hulls <= 0.0 and self._refined[pair]):
-            return hulls
-        surfaces = pin.computeDistance(self._meshes, self._mesh_data, pair).min_distance
-        if hulls > 0.0:
-            return float(surfaces)
-        if surfaces <= 0.0 or self._nested(*self._index_pairs[pair]):
-            return hulls
-        return float(surfaces)
-
-    def _nested(self, first: int, second: int) -> bool:
-        """Whether one body is inside the other, their surfaces apart."""
-        return self._holds(first, second) or self._holds(second, first)
-
-    def _holds(self, outer: int, inner: int) -> bool:
-        relative = self._mesh_data.oMg[outer].actInv(self._mesh_data.oMg[inner])
-        points = self._solids[inner].seeds @ relative.rotation.T + relative.translation
-        return self._solids[outer].contains_any(points)
-
-    def _not_always_touching(self) -> list[tuple[int, int]]:
-        rng = np.random.default_rng(0)
-        lower, upper = self.robot.finite_limits()
-        touching = [
-            i
-            for i, (a, b) in enumerate(self._index_pairs)
-            if not (self._bodies[a].is_obstacle or self._bodies[b].is_obstacle)
-        ]
-        for _ in range(_SAMPLES):
-            if not touching:
-                break
-            distances = self._place(rng.uniform(lower, upper))
-            touching = [i for i in touching if self._pair_distance(i, distances[i]) <= 0.0]
-        return [pair for i, pair in enumerate(self._index_pairs) if i not in set(touching)]
-
-    def _set_pairs(self, pairs: list[tuple[int, int]]) -> None:
-        self._index_pairs = pairs
-        for geometry in (self._hulls, self._meshes):
-            geometry.removeAllCollisionPairs()
-            for first, second in pairs:
-                geometry.addCollisionPair(pin.CollisionPair(first, second))
-        # Own data: neither threads nor the robot's kinematics share state with the checks.
-        self._data = self.robot.model.createData()
-        self._hull_data = self._hulls.createData()
-        self._mesh_data = self._meshes.createData()
-        for request in self._hull_data.distanceRequests:
-            request.gjk_tolerance = _SOLVED
-        self._hull_results = [self._hull_data.distanceResults[i] for i in range(len(pairs))]
-        self._refined = self._pairs_to_refine()
-        self._hulls_decide = all(self._refined.values())
-        self._broad_phase = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
-            self.robot.model, self._hulls, self._hull_data
-        )
-        self._set_margin(0.0)
-
-    def _set_margin(self, margin: float) -> None:
-        self._margin = margin
-        for i in range(len(self._index_pairs)):
-            self._hull_data.collisionRequests[i].security_margin = margin
-
-    def _pairs_to_refine(self) -> dict[int, bool]:
-        """Map the pairs with a mesh to whether the hulls decide about overlap all the same."""
-        return {
-            index: self._solids[i].is_convex and self._solids[j].is_convex
-            for index, (i, j) in enumerate(self._index_pairs)
-            if self._solids[i].is_mesh or self._solids[j].is_mesh
-        }
-
-
-# Relative accuracy of distances of hulls: at coal's 1e-6 they jump by a micrometre from one
-# configuration to the next, which an optimiser takes for slope. Depths of overlap keep coal's
-# accuracy: asked for more, its EPA now and then fails and returns the largest float.
-_SOLVED = 1e-12
-
-# Configurations in which a pair must overlap to count as touching by design.
-_SAMPLES = 500
-
-
-def _check_names(obstacles: Sequence[Obstacle], links: Sequence[str]) -> None:
-    taken = set(links)
-    for obstacle in obstacles:
-        if obstacle.name in taken:
-            raise CollisionError(f"{obstacle.label}: a link or another obstacle has this name too")
-        taken.add(obstacle.name)
-
-
-def _geometry_object(obstacle: Obstacle) -> Any:
-    return pin.GeometryObject(
-        obstacle.name, 0, 0, obstacle.pose, shapes.obstacle_geometry(obstacle)
-    )
-
-
-def _hulls_of(meshes: Any) -> Any:
-    hulls = pin.GeometryModel()
-    for piece in meshes.geometryObjects:
-        hull = shapes.convex_hull(piece.geometry)
-        hulls.addGeometryObject(
-            pin.GeometryObject(
-                piece.name, piece.parentJoint, piece.parentFrame, piece.placement, hull
-            )
-        )
-    return hulls
+    def overlap_counts(self) -> tuple[Ints, Ints]:
+        """Return in how many of 500 configurations bodies overlap, and their hulls alone, (P,)."""
+        known = [links_of(self.robot).counts.get((i, j)) for i, j in self._index.tolist()]
+        unknown = np.flatnonzero([counts is None for counts in known])
+        met, alone = count_overlaps(self.robot, self.hulls, self._meshes, unknown)
+        for pair, counts in enumerate(known):
+            if counts is not None:
+                met[pair], alone[pair] = counts
+        return met, alone

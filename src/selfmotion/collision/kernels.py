@@ -1,181 +1,179 @@
-"""All pairs of all samples: distances of capsules, and the pullback to joint space."""
+"""What is compiled: bounding boxes of all pairs at all samples, and winding numbers."""
+
+import math
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, kernel
-from selfmotion.collision.segments import (
-    Contact,
-    Vector,
-    blend,
-    cross,
-    segment_box,
-    segment_cylinder,
-    segment_segment,
-)
 
 Ints = npt.NDArray[np.int64]
-
-# Cores of the obstacles: `dimensions` holds half lengths, a radius first for a cylinder.
-SEGMENT, BOX, CYLINDER = 0, 1, 2
-
-
-@kernel
-def _turn(rotation: Array, v: Vector) -> Vector:
-    return (
-        rotation[0, 0] * v[0] + rotation[0, 1] * v[1] + rotation[0, 2] * v[2],
-        rotation[1, 0] * v[0] + rotation[1, 1] * v[1] + rotation[1, 2] * v[2],
-        rotation[2, 0] * v[0] + rotation[2, 1] * v[1] + rotation[2, 2] * v[2],
-    )
+Flags = npt.NDArray[np.bool_]
+Vector = tuple[float, float, float]
+# Edges whose cosine differs from one by less are parallel: the faces decide about them.
+_PARALLEL = 1e-6
 
 
 @kernel
-def _vector(row: Array) -> Vector:
-    return (row[0], row[1], row[2])
+def separation(a: Array, b: Array, t: Array, g: Array, h: Array) -> float:
+    """Return the signed distance of two boxes along the best of 15 axes.
+
+    These are the normals of all faces, and what is normal to an edge of each (S. Gottschalk, M.
+    Lin, D. Manocha, "OBBTree", SIGGRAPH 1996). Of boxes that overlap it is minus the depth, of
+    others at most the distance.
+
+    Parameters
+    ----------
+    a, b : (3, 3)
+        Columns: axes of the boxes.
+    t : (3,)
+        From the middle of the first to that of the second.
+    g, h : (3,)
+        Half lengths of the first and of the second.
+    """
+    c, u, v = np.empty((3, 3)), np.empty(3), np.empty(3)
+    for i in range(3):
+        u[i] = a[0, i] * t[0] + a[1, i] * t[1] + a[2, i] * t[2]
+        v[i] = b[0, i] * t[0] + b[1, i] * t[1] + b[2, i] * t[2]
+        for j in range(3):
+            c[i, j] = a[0, i] * b[0, j] + a[1, i] * b[1, j] + a[2, i] * b[2, j]
+    best = -math.inf
+    for i in range(3):
+        reach = abs(c[i, 0]) * h[0] + abs(c[i, 1]) * h[1] + abs(c[i, 2]) * h[2]
+        best = max(best, abs(u[i]) - g[i] - reach)
+        reach = abs(c[0, i]) * g[0] + abs(c[1, i]) * g[1] + abs(c[2, i]) * g[2]
+        best = max(best, abs(v[i]) - h[i] - reach)
+    for i in range(3):
+        k, m = (i + 1) % 3, (i + 2) % 3
+        for j in range(3):
+            square = 1.0 - c[i, j] * c[i, j]
+            if square > _PARALLEL:
+                p, r = (j + 1) % 3, (j + 2) % 3
+                gap = abs(u[m] * c[k, j] - u[k] * c[m, j])
+                gap -= g[k] * abs(c[m, j]) + g[m] * abs(c[k, j])
+                gap -= h[p] * abs(c[i, r]) + h[r] * abs(c[i, p])
+                best = max(best, gap / math.sqrt(square))
+    return best
 
 
 @kernel
-def _against_obstacle(
-    c: Vector, e: Vector, kind: int, rotation: Array, position: Array, size: Array
-) -> Contact:
-    """Return `segments`' answer for the segment c ± e and an obstacle's core, in world axes."""
-    place = _vector(position)
-    if kind == SEGMENT:
-        half = (rotation[0, 2] * size[2], rotation[1, 2] * size[2], rotation[2, 2] * size[2])
-        return segment_segment(c, e, place, half)
-    inverse = rotation.T
-    local, half = _turn(inverse, blend(c, -1.0, place)), _turn(inverse, e)
-    if kind == BOX:
-        distance, normal, point = segment_box(local, half, _vector(size))
-    else:
-        distance, normal, point = segment_cylinder(local, half, size[0], size[2])
-    return distance, _turn(rotation, normal), blend(place, 1.0, _turn(rotation, point))
+def _turned(axis: Array, angle: float, rotation: Array) -> None:
+    """Write the rotation by an angle about a unit vector (Rodrigues' formula)."""
+    s, c = math.sin(angle), math.cos(angle)
+    x, y, z, rest = axis[0], axis[1], axis[2], 1.0 - c
+    for a in range(3):
+        for b in range(3):
+            rotation[a, b] = axis[a] * axis[b] * rest
+        rotation[a, a] += c
+    rotation[0, 1] -= z * s
+    rotation[1, 0] += z * s
+    rotation[0, 2] += y * s
+    rotation[2, 0] -= y * s
+    rotation[1, 2] -= x * s
+    rotation[2, 1] += x * s
 
 
 @kernel
-def evaluate(
+def _compose(first: Array, at: Array, second: Array, there: Array, r: Array, p: Array) -> None:
+    """Write the product of two placements."""
+    for a in range(3):
+        x, y, z = first[a, 0], first[a, 1], first[a, 2]
+        p[a] = at[a] + x * there[0] + y * there[1] + z * there[2]
+        for b in range(3):
+            r[a, b] = x * second[0, b] + y * second[1, b] + z * second[2, b]
+
+
+@kernel
+def placements(
+    q: Array,
     rotations: Array,
     positions: Array,
+    axes: Array,
+    is_revolute: Flags,
+    r: Array,
+    p: Array,
+) -> None:
+    """Write where q (n,) places the joints of a chain: (n + 1, 3, 3) and (n + 1, 3).
+
+    Row 0 is the world. Each joint has a place in the frame of the one before, (n, 3, 3) and (n, 3),
+    and an axis in its own, (n, 3).
+    """
+    r[0], p[0] = np.eye(3), 0.0
+    turn, middle, shift = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    identity, none = np.eye(3), np.zeros(3)
+    for j in range(len(q)):
+        _compose(r[j], p[j], rotations[j], positions[j], middle, shift)
+        if is_revolute[j]:
+            _turned(axes[j], q[j], turn)
+            _compose(middle, shift, turn, none, r[j + 1], p[j + 1])
+        else:
+            _compose(middle, shift, identity, q[j] * axes[j], r[j + 1], p[j + 1])
+
+
+@kernel
+def lower_bounds(
+    q: Array,
+    rotations: Array,
+    positions: Array,
+    axes: Array,
+    is_revolute: Flags,
     joints: Ints,
+    turns: Array,
     middles: Array,
     halves: Array,
-    radii: Array,
-    self_pairs: Ints,
-    world_pairs: Ints,
-    kinds: Ints,
-    obstacle_rotations: Array,
-    obstacle_positions: Array,
-    obstacle_sizes: Array,
-    obstacle_radii: Array,
-) -> tuple[Array, Array]:
-    """Return the distances (K, P) [m] and their wrenches (K, P, 6).
-
-    A wrench holds the normal n and the moment p × n about the world origin: a twist [v, ω] of the
-    first body, given at that origin, changes the distance by their scalar product. The second
-    body feels the opposite.
-
-    Parameters
-    ----------
-    rotations, positions : (K, J, 3, 3), (K, J, 3)
-        Placements of the joints in world axes, the world itself first.
-    joints, middles, halves, radii : (C,), (C, 3), (C, 3), (C,)
-        The capsules in their joints' axes.
-    self_pairs : (S, 2)
-        Capsule and capsule.
-    world_pairs : (W, 2)
-        Capsule and obstacle; P = S + W, in this order.
-    kinds, obstacle_rotations, obstacle_positions, obstacle_sizes, obstacle_radii
-        The obstacles: a core in world axes, and how far the solid reaches beyond it.
-    """
-    count, own = len(rotations), len(self_pairs)
-    pairs = own + len(world_pairs)
-    values, wrenches = np.empty((count, pairs)), np.empty((count, pairs, 6))
-    c, e = np.empty((len(joints), 3)), np.empty((len(joints), 3))
-    for k in range(count):
-        for i in range(len(joints)):
-            rotation = rotations[k, joints[i]]
-            place = _vector(positions[k, joints[i]])
-            c[i, 0], c[i, 1], c[i, 2] = blend(place, 1.0, _turn(rotation, _vector(middles[i])))
-            e[i, 0], e[i, 1], e[i, 2] = _turn(rotation, _vector(halves[i]))
-        for pair in range(pairs):
-            if pair < own:
-                i, j = self_pairs[pair]
-                reach = radii[i] + radii[j]
-                distance, n, point = segment_segment(
-                    _vector(c[i]), _vector(e[i]), _vector(c[j]), _vector(e[j])
-                )
-            else:
-                i, j = world_pairs[pair - own]
-                reach = radii[i] + obstacle_radii[j]
-                distance, n, point = _against_obstacle(
-                    _vector(c[i]),
-                    _vector(e[i]),
-                    kinds[j],
-                    obstacle_rotations[j],
-                    obstacle_positions[j],
-                    obstacle_sizes[j],
-                )
-            values[k, pair] = distance - reach
-            moment = cross(point, n)
-            for a in range(3):
-                wrenches[k, pair, a] = n[a]
-                wrenches[k, pair, 3 + a] = moment[a]
-    return values, wrenches
-
-
-@kernel
-def nearest(values: Array, wrenches: Array, group: Ints, count: int) -> tuple[Array, Array]:
-    """Return the smallest of the distances of each group, (K, count), and its wrench.
-
-    Parameters
-    ----------
-    values, wrenches : (K, P), (K, P, 6)
-        What `evaluate` returned.
-    group : (P,)
-        The group of each pair, below `count`.
-    """
-    least = np.full((len(values), count), np.inf)
-    wrench = np.zeros((len(values), count, 6))
-    for k in range(len(values)):
-        for pair in range(len(group)):
-            if values[k, pair] < least[k, group[pair]]:
-                least[k, group[pair]] = values[k, pair]
-                wrench[k, group[pair]] = wrenches[k, pair]
-    return least, wrench
-
-
-@kernel
-def pull_back(
-    weights: Array, wrenches: Array, pair_joints: Ints, jacobians: Array, parents: Ints
+    pairs: Ints,
+    limit: float,
 ) -> Array:
-    """Return Σ_p w_kp ∂d_kp/∂q_k, (K, n).
+    """Return `BoundingBoxes.lower_bounds`; the chain as in `placements`."""
+    bounds = np.empty((len(q), len(pairs)))
+    r, p = np.empty((q.shape[1] + 1, 3, 3)), np.empty((q.shape[1] + 1, 3))
+    turned, place = np.empty((len(joints), 3, 3)), np.empty((len(joints), 3))
+    radii, t = np.sqrt((halves * halves).sum(axis=1)), np.empty(3)
+    for k in range(len(q)):
+        placements(q[k], rotations, positions, axes, is_revolute, r, p)
+        for i in range(len(joints)):
+            j = joints[i]
+            _compose(r[j], p[j], turns[i], middles[i], turned[i], place[i])
+        for pair in range(len(pairs)):
+            i, j = pairs[pair, 0], pairs[pair, 1]
+            for a in range(3):
+                t[a] = place[j, a] - place[i, a]
+            gap = math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) - radii[i] - radii[j]
+            if gap < limit:
+                gap = max(gap, separation(turned[i], turned[j], t, halves[i], halves[j]))
+            bounds[k, pair] = gap
+    return bounds
 
-    The wrenches on each joint's body are summed from the tool to the base, as joint torques are.
 
-    Parameters
-    ----------
-    weights, wrenches : (K, P), (K, P, 6)
-        The cotangent, and what `evaluate` returned.
-    pair_joints : (P, 2)
-        Joints of the first and the second body; 0 is the world.
-    jacobians : (K, 6, n)
-        Columns: twist of everything beyond a joint per unit of its speed, at the world origin.
-    parents : (n + 1,)
-        Parent of each joint.
+@kernel
+def _from(corner: Array, point: Array) -> Vector:
+    return (corner[0] - point[0], corner[1] - point[1], corner[2] - point[2])
+
+
+@kernel
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def winding_number(corners: Array, point: Array) -> float:
+    """Return how often the triangles (T, 3, 3) wind around the point: 1 inside, 0 outside.
+
+    The sum of their solid angles over 4π, after Van Oosterom and Strackee (1983).
     """
-    count, n = len(jacobians), jacobians.shape[2]
-    gradient, load = np.zeros((count, n)), np.empty((n + 1, 6))
-    for k in range(count):
-        load[:] = 0.0
-        for pair in range(len(pair_joints)):
-            weight = weights[k, pair]
-            if weight != 0.0:
-                first, second = pair_joints[pair]
-                for a in range(6):
-                    load[first, a] += weight * wrenches[k, pair, a]
-                    load[second, a] -= weight * wrenches[k, pair, a]
-        for joint in range(n, 0, -1):
-            for a in range(6):
-                gradient[k, joint - 1] += jacobians[k, a, joint - 1] * load[joint, a]
-                load[parents[joint], a] += load[joint, a]
-    return gradient
+    total = 0.0
+    for k in range(len(corners)):
+        a, b, c = (
+            _from(corners[k, 0], point),
+            _from(corners[k, 1], point),
+            _from(corners[k, 2], point),
+        )
+        la, lb, lc = math.sqrt(_dot(a, a)), math.sqrt(_dot(b, b)), math.sqrt(_dot(c, c))
+        volume = (
+            a[0] * (b[1] * c[2] - b[2] * c[1])
+            + a[1] * (b[2] * c[0] - b[0] * c[2])
+            + a[2] * (b[0] * c[1] - b[1] * c[0])
+        )
+        edges = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+        total += math.atan2(volume, edges)
+    return total / (2.0 * math.pi)

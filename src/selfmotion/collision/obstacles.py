@@ -1,10 +1,12 @@
-"""Obstacles that stand still in the world."""
+"""Obstacles that stand still in the world. An own shape is a subclass of `Obstacle`."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar
 
+import coal
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -15,9 +17,27 @@ from selfmotion.basics import Array, CollisionError, read_only
 _ROTATION_TOLERANCE = 1e-6
 
 
+# Shape → class, filled as the classes are made.
+_shapes: dict[str, type["Obstacle"]] = {}
+
+
 @dataclass(frozen=True, eq=False)
-class Obstacle:
-    """What every obstacle has; use `Box`, `Sphere`, `Cylinder`, `Capsule` or `Mesh`.
+class Obstacle(ABC):
+    """What every obstacle has; use `Box`, `Sphere`, `Cylinder`, `Capsule`, `Mesh` or an own shape.
+
+    An own shape is a frozen dataclass derived from this one. It names its `shape`, adds its
+    lengths as fields, and returns its `geometry`; it is then known to `obstacle_from_dict`::
+
+        @dataclass(frozen=True, eq=False)
+        class Cone(Obstacle):
+            shape: ClassVar[str] = "cone"
+            radius: float
+            length: float
+
+            def geometry(self) -> Any:
+                return coal.Cone(self.radius, self.length)
+
+    Fields must be numbers, texts, lists of these, arrays or paths, which is what files can hold.
 
     Attributes
     ----------
@@ -29,13 +49,24 @@ class Obstacle:
     Raises
     ------
     CollisionError
-        The name is empty, the pose is no rigid motion, or a length is not positive.
+        The name is empty, the pose is no rigid motion, or a length is not positive. When a class
+        is made: its shape is the name of another one.
     """
 
     shape: ClassVar[str] = ""
 
     name: str
     pose: pin.SE3
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        super().__init_subclass__(**keywords)
+        known = _shapes.get(cls.shape)
+        if not cls.shape or (known and known.__qualname__ != cls.__qualname__):
+            raise CollisionError(
+                f"class {cls.__name__}: its shape is {cls.shape!r}, expected a name that no other "
+                f"obstacle has; taken are {', '.join(_shapes)}"
+            )
+        _shapes[cls.shape] = cls
 
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and self.name):
@@ -46,6 +77,16 @@ class Obstacle:
     def label(self) -> str:
         """Shape and name, as messages say it."""
         return f"{self.shape} '{self.name}'"
+
+    @abstractmethod
+    def geometry(self) -> Any:
+        """Return its coal geometry, in the obstacle's frame [m].
+
+        Raises
+        ------
+        CollisionError
+            A file is missing or cannot be read.
+        """
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as JSON-safe values; `obstacle_from_dict` reverses this exactly."""
@@ -93,6 +134,10 @@ class Box(Obstacle):
             )
         object.__setattr__(self, "size", read_only(size))
 
+    def geometry(self) -> Any:
+        """See `Obstacle.geometry`."""
+        return coal.Box(*self.size.tolist())
+
 
 @dataclass(frozen=True, eq=False)
 class Sphere(Obstacle):
@@ -111,6 +156,10 @@ class Sphere(Obstacle):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._set_length("radius")
+
+    def geometry(self) -> Any:
+        """See `Obstacle.geometry`."""
+        return coal.Sphere(self.radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +182,10 @@ class Cylinder(Obstacle):
         self._set_length("radius")
         self._set_length("length")
 
+    def geometry(self) -> Any:
+        """See `Obstacle.geometry`."""
+        return coal.Cylinder(self.radius, self.length)
+
 
 @dataclass(frozen=True, eq=False)
 class Capsule(Obstacle):
@@ -153,6 +206,10 @@ class Capsule(Obstacle):
         super().__post_init__()
         self._set_length("radius")
         self._set_length("length")
+
+    def geometry(self) -> Any:
+        """See `Obstacle.geometry`."""
+        return coal.Capsule(self.radius, self.length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,10 +234,14 @@ class Mesh(Obstacle):
         object.__setattr__(self, "file", Path(self.file))
         self._set_length("scale")
 
-
-_SHAPES: Mapping[str, type[Obstacle]] = {
-    cls.shape: cls for cls in (Box, Sphere, Cylinder, Capsule, Mesh)
-}
+    def geometry(self) -> Any:
+        """See `Obstacle.geometry`."""
+        if not self.file.is_file():
+            raise CollisionError(f"{self.label}: no such file: {self.file}")
+        try:
+            return coal.MeshLoader().load(str(self.file), np.full(3, self.scale))
+        except (RuntimeError, ValueError) as error:
+            raise CollisionError(f"{self.label}: {self.file} cannot be read: {error}") from error
 
 
 def obstacle_from_dict(values: Mapping[str, Any]) -> Obstacle:
@@ -199,9 +260,10 @@ def obstacle_from_dict(values: Mapping[str, Any]) -> Obstacle:
     """
     rest = dict(values)
     shape, name = rest.pop("shape", None), rest.pop("name", None)
-    if shape not in _SHAPES:
+    if shape not in _shapes:
         raise CollisionError(
-            f"obstacle {name!r}: shape is {shape!r}, expected one of {', '.join(_SHAPES)}"
+            f"obstacle {name!r}: shape is {shape!r}, expected one of {', '.join(_shapes)}; an own "
+            f"shape is known once its class is imported"
         )
     label = f"{shape} {name!r}"
     if "position" not in rest:
@@ -213,12 +275,14 @@ def obstacle_from_dict(values: Mapping[str, Any]) -> Obstacle:
             f"{label}: position has shape {position.shape} and rotation {rotation.shape}, "
             f"expected (3,) and (3, 3)"
         )
-    cls = _SHAPES[shape]
-    known = {f.name for f in fields(cls)} - {"name", "pose"}
+    cls = _shapes[shape]
+    own = [f for f in fields(cls) if f.name not in ("name", "pose")]
+    known = {f.name for f in own}
     unknown = sorted(set(rest) - known)
     if unknown:
         raise CollisionError(f"{label}: has '{unknown[0]}', expected {', '.join(sorted(known))}")
-    missing = sorted(known - set(rest) - {"scale"})
+    needed = {f.name for f in own if f.default is MISSING and f.default_factory is MISSING}
+    missing = sorted(needed - set(rest))
     if missing:
         raise CollisionError(f"{label}: '{missing[0]}' is missing")
     return cls(name, pin.SE3(rotation, position), **rest)

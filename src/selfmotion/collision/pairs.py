@@ -3,30 +3,11 @@
 import itertools
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from selfmotion.basics import CollisionError
+from selfmotion.collision.bodies import Body
 from selfmotion.robot import Urdf
-
-
-@dataclass(frozen=True)
-class Body:
-    """A piece of geometry and what carries it.
-
-    Attributes
-    ----------
-    name : str
-        The link it belongs to, or the obstacle.
-    joint : int
-        Index of the joint that moves it; 0 for the world.
-    is_obstacle : bool
-        Whether it belongs to the world rather than to the robot.
-    """
-
-    name: str
-    joint: int
-    is_obstacle: bool
 
 
 def candidate_pairs(

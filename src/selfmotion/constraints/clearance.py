@@ -29,9 +29,9 @@ from selfmotion.task import Task
 class Clearance(Constraint):
     """The arm keeps a distance from obstacles and from itself.
 
-    While optimising, links are their convex hulls, and far from each other capsules around these;
-    the certificate measures the meshes themselves. Obstacles are not checked against the immovable
-    base: no motion changes that distance, and an arm bolted to a table touches it.
+    While optimising, links are their convex hulls; the certificate measures the meshes
+    themselves. Obstacles are not checked against the immovable base: no motion changes that
+    distance, and an arm bolted to a table touches it.
 
     Parameters
     ----------
@@ -152,8 +152,7 @@ class BoundClearance:
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
-        jacobian = self._clearances(samples).jacobian()
-        return np.asarray(-(jacobian @ motion.q) / _METRE)
+        return self._clearances(samples).along(-motion.q / _METRE)
 
     def _clearances(self, samples: Samples) -> Clearances:
         """Return the distances at the nodes; those of the last motion are kept."""
@@ -172,8 +171,8 @@ class BoundClearance:
         )
 
 
-# Beyond the distance asked for, capsules may stand for links where they are this far apart [m]:
-# well outside of where the optimiser feels the constraint.
+# So far beyond the distance asked for, clearances begin to level off [m]: well outside of where
+# the optimiser feels the constraint.
 _NEAR = 0.01
 # Clearances count in units of this, to weigh about as much as joint angles.
 _METRE = 0.1

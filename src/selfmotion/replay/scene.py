@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from selfmotion.basics import Array, CollisionError
-from selfmotion.collision import Box, Capsule, Cylinder, Mesh, Obstacle, Sphere
+from selfmotion.basics import Array
+from selfmotion.collision import Box, Capsule, Cylinder, Mesh, Obstacle, Solid, Sphere
 from selfmotion.replay import shapes, three
 from selfmotion.replay.links import Arm, safe
 from selfmotion.replay.meshes import read_meshes
@@ -253,6 +253,8 @@ def obstacle_commands(root: str, obstacles: Sequence[Obstacle], payload: Payload
     ------
     RobotError
         A mesh cannot be read.
+    CollisionError
+        An own shape has no geometry.
     """
     look = three.material(_OBSTACLE, opacity=0.85)
     return [
@@ -277,4 +279,4 @@ def _obstacle(item: Obstacle, payload: Payload) -> list[tuple[Json, Array]]:
             scaled = matrix @ np.diag([item.scale, item.scale, item.scale, 1.0])
             meshes = read_meshes(str(item.file), item.label)
             return [(_surface(payload, mesh.vertices, mesh.faces), scaled) for mesh in meshes]
-    raise CollisionError(f"{item!r} is no obstacle")
+    return [(_surface(payload, *Solid(item.geometry(), item.label).surface()), matrix)]

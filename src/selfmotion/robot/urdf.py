@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import RobotError
+from selfmotion.robot.collision_elements import check_collision_elements
 
 _SINGLE_COORDINATE = ("revolute", "prismatic", "continuous")
 _KNOWN_TYPES = (*_SINGLE_COORDINATE, "fixed", "floating", "planar")
@@ -142,6 +143,7 @@ def parse_urdf(
         raise RobotError(f"{source}: is a xacro file; expand it first: `xacro {source} > arm.urdf`")
     if root.tag != "robot":
         raise RobotError(f"{source}: the root element is <{root.tag}>, expected <robot>")
+    check_collision_elements(root, source)
     parsed = _parse_with_yourdfpy(text, source)
     joints = {joint.name: joint for joint in map(_joint, parsed.joints)}
     _check_names(parsed, source)

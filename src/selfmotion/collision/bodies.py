@@ -1,0 +1,104 @@
+"""What can collide: the links' collision geometry and the obstacles, complete or refused."""
+
+import xml.etree.ElementTree as ElementTree
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pinocchio as pin
+
+from selfmotion.basics import CollisionError, RobotError
+from selfmotion.collision.obstacles import Obstacle
+from selfmotion.collision.solids import Solid
+from selfmotion.robot import RobotModel, Urdf
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A piece of geometry and what carries it.
+
+    Attributes
+    ----------
+    name : str
+        The link it belongs to, or the obstacle.
+    joint : int
+        Index of the joint that moves it; 0 for the world.
+    is_obstacle : bool
+        Whether it belongs to the world rather than to the robot.
+    place : pinocchio.SE3
+        Its frame in that of the joint.
+    solid : Solid
+    """
+
+    name: str
+    joint: int
+    is_obstacle: bool
+    place: pin.SE3
+    solid: Solid
+
+
+def link_bodies(robot: RobotModel) -> list[Body]:
+    """Return every collision element of the robot as a body, locked joints where they are held.
+
+    Raises
+    ------
+    RobotError
+        A mesh file is missing or cannot be read.
+    CollisionError
+        An element is no body, or is missing among what Pinocchio made of them.
+    """
+    try:
+        pieces = robot.geometry(pin.GeometryType.COLLISION).geometryObjects
+    except RobotError as error:
+        raise _which_mesh(robot.urdf, error) from error
+    links = [robot.model.frames[piece.parentFrame].name for piece in pieces]
+    _check_count(robot.urdf, links)
+    bodies = []
+    for link, piece in zip(links, pieces, strict=True):
+        file = f" ({piece.meshPath})" if piece.meshPath else ""
+        solid = Solid(piece.geometry, f"{robot.urdf.source}: link '{link}'{file}")
+        bodies.append(Body(link, piece.parentJoint, False, piece.placement, solid))
+    return bodies
+
+
+def obstacle_bodies(obstacles: Sequence[Obstacle], links: Sequence[str]) -> list[Body]:
+    """Return the obstacles as bodies.
+
+    Raises
+    ------
+    CollisionError
+        A name is that of a link or taken twice, or the geometry is no body.
+    """
+    taken, bodies = set(links), []
+    for item in obstacles:
+        if item.name in taken:
+            raise CollisionError(f"{item.label}: a link or another obstacle has this name too")
+        taken.add(item.name)
+        bodies.append(Body(item.name, 0, True, item.pose, Solid(item.geometry(), item.label)))
+    return bodies
+
+
+def _check_count(urdf: Urdf, links: Sequence[str]) -> None:
+    root, made = ElementTree.fromstring(urdf.text), Counter(links)
+    for link in root.findall("link"):
+        name, wanted = link.get("name", ""), len(link.findall("collision"))
+        if made[name] != wanted:
+            raise CollisionError(
+                f"{urdf.source}: link '{name}' has {wanted} <collision> elements, but Pinocchio "
+                f"made {made[name]} bodies of them; look for a part that is no valid URDF"
+            )
+
+
+def _which_mesh(urdf: Urdf, error: RobotError) -> RobotError:
+    """Return an error that names the link and the file that is missing, or the one given."""
+    for link in ElementTree.fromstring(urdf.text).findall("link"):
+        for mesh in link.iterfind("collision/geometry/mesh"):
+            file = mesh.get("filename", "")
+            scheme, _, rest = file.rpartition("://")
+            folders = urdf.package_dirs if scheme in ("package", "model") else ("",)
+            if not any(Path(folder, rest).is_file() for folder in folders):
+                return RobotError(
+                    f"{urdf.source}: link '{link.get('name')}': no such mesh file: {file}"
+                )
+    return error

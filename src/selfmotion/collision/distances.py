@@ -1,0 +1,187 @@
+"""Distances of convex hulls: coal's answers, each held against the bounding boxes."""
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from selfmotion.basics import Array, CollisionError
+from selfmotion.collision.bodies import Body
+from selfmotion.collision.bounds import BoundingBoxes
+from selfmotion.robot import RobotModel
+
+Ints = npt.NDArray[np.int64]
+
+# Relative accuracy of squared distances. At coal's 1e-6 the closest points wander by some tenths
+# of a millimetre from one configuration to the next, which an optimiser takes for slope. Asked
+# for less than about 1e-11 of round bodies, its GJK (3.0.3) cannot see from rounding that it has
+# arrived: it takes a flat simplex for an overlap, and returns 0 or minus the largest float.
+# Depths of overlap keep coal's accuracy: asked for more, its EPA now and then fails.
+TOLERANCE = 1e-9
+# What distances may be below those of the bounding boxes, from rounding [m].
+_ROUNDING = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Distances of pairs of bodies at samples, where they are, and how they change.
+
+    Attributes
+    ----------
+    values : (M,)
+        Signed distances [m].
+    normals : (M, 3)
+        Directions from the second body to the first; where they overlap, in which the first has
+        to leave.
+    points : (M, 3)
+        Nearest points of the first body; those of the second are at points - value normal.
+    slopes : (M, n)
+        Derivatives of the distances by the joints, as if these moved the first body only.
+    """
+
+    values: Array
+    normals: Array
+    points: Array
+    slopes: Array
+
+
+class HullDistances:
+    """Distances of the convex hulls of pairs of bodies.
+
+    Not for use by several threads at once.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    bodies : sequence of Body
+    pairs : (P, 2)
+        Indices of bodies.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        bodies: Sequence[Body],
+        pairs: Ints,
+    ) -> None:
+        self.pairs, self._robot, self._bodies = pairs, robot, bodies
+        self._boxes = BoundingBoxes(robot, bodies)
+        self._sizes = (2.0 * self._boxes.radii[pairs].sum(axis=1) + _ROUNDING).tolist()
+        self._model = pin.GeometryModel()
+        for i, body in enumerate(bodies):
+            item = pin.GeometryObject(str(i), body.joint, 0, body.place, body.solid.hull)
+            self._model.addGeometryObject(item)
+        for first, second in pairs.tolist():
+            self._model.addCollisionPair(pin.CollisionPair(first, second))
+        # Own data: neither threads nor the robot's kinematics share state with the checks.
+        self._data, self._places = robot.model.createData(), self._model.createData()
+        _set_requests(self._places.distanceRequests)
+
+    def lower_bounds(self, q: Array, limit: float = math.inf) -> Array:
+        """Return what the distances at q (K, n) are at least, (K, P); see `BoundingBoxes`."""
+        return self._boxes.lower_bounds(q, self.pairs, limit)
+
+    def place(self, q: Array) -> Any:
+        """Place the hulls at q (n,), and return their placements in world axes, by body."""
+        pin.updateGeometryPlacements(self._robot.model, self._data, self._model, self._places, q)
+        return self._places.oMg
+
+    def distance(self, pair: int, bound: float) -> float:
+        """Return the signed distance of a pair as it is placed; its lower bound is known [m].
+
+        Raises
+        ------
+        CollisionError
+            It contradicts the bound, asked for twice in different ways.
+        """
+        value = pin.computeDistance(self._model, self._places, pair).min_distance
+        # Written so that NaN is asked for again, too.
+        if not bound - _ROUNDING <= value <= bound + self._sizes[pair]:
+            value = self._again(pair, bound).min_distance
+        return float(value)
+
+    def contacts(self, q: Array, rows: Ints, pairs: Ints, bounds: Array) -> "Contacts":
+        """Return distances with derivatives of many pairs at many samples.
+
+        Parameters
+        ----------
+        q : (K, n)
+            The samples.
+        rows, pairs : (M,)
+            Sample and pair of each distance; rows in order.
+        bounds : (M,)
+            Their lower bounds [m].
+
+        Raises
+        ------
+        CollisionError
+            See `distance`.
+        """
+        jacobians = np.empty((len(q), 6, self._robot.dof))
+        values, placed = np.empty(len(rows)), -1
+        normals, points = np.empty((len(rows), 3)), np.empty((len(rows), 3))
+        chain, model, places = self._robot.model, self._model, self._places
+        wanted = zip(rows.tolist(), pairs.tolist(), bounds.tolist(), strict=True)
+        for k, (row, pair, bound) in enumerate(wanted):
+            if row != placed:
+                # Of one joint Pinocchio returns a vector.
+                columns = pin.computeJointJacobians(chain, self._data, q[row])
+                jacobians[row], placed = columns.reshape(6, -1), row
+                pin.updateGeometryPlacements(chain, self._data, model, places)
+            answer = pin.computeDistance(model, places, pair)
+            value = answer.min_distance
+            if not bound - _ROUNDING <= value <= bound + self._sizes[pair]:
+                answer = self._again(pair, bound)
+                value = answer.min_distance
+            values[k] = value
+            # Copies: coal writes the next answer in the same place.
+            normals[k] = answer.normal
+            points[k] = answer.getNearestPoint1()
+        # coal's normals point from the first body to the second.
+        np.negative(normals, out=normals)
+        wrenches = np.hstack([normals, np.cross(points, normals)])
+        slopes = np.einsum("mi,mij->mj", wrenches, jacobians[rows])
+        return Contacts(values, normals, points, slopes)
+
+    def _again(self, pair: int, bound: float) -> Any:
+        """Ask once more, with coal's own settings, where an answer contradicts the boxes."""
+        first, second = self.pairs[pair].tolist()
+        answer = coal.DistanceResult()
+        coal.distance(
+            *(part for i in (first, second) for part in self._placed(i)),
+            coal.DistanceRequest(),
+            answer,
+        )
+        if not bound - _ROUNDING <= answer.min_distance <= bound + self._sizes[pair]:
+            raise CollisionError(
+                f"'{self._bodies[first].name}' and '{self._bodies[second].name}': coal finds a "
+                f"distance of {answer.min_distance} m, but boxes around them are {bound:.6g} m "
+                f"apart; this is an error of coal's: replace the shape of one of them by a "
+                f"simpler one"
+            )
+        return answer
+
+    def _placed(self, body: int) -> tuple[Any, Any]:
+        place = self._places.oMg[body]
+        hull = self._bodies[body].solid.hull
+        return hull, coal.Transform3s(place.rotation, place.translation)
+
+
+def _set_requests(requests: Any) -> None:
+    """Make answers accurate, and functions of the placement alone.
+
+    Pinocchio has each search begin where the last one of the pair ended, by an attribute that coal
+    warns about. From the middles of the bodies' boxes it takes a fifth longer.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        for request in requests:
+            request.gjk_tolerance = TOLERANCE
+            request.enable_cached_gjk_guess = False
+            request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess

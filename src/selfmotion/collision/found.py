@@ -1,0 +1,49 @@
+"""What a collision model finds, with the names of the bodies."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Closest:
+    """The smallest distance found, and where.
+
+    Attributes
+    ----------
+    value : float
+        [m]; negative when the two overlap, inf when there is no pair to check.
+    first, second : str
+        The two links, or link and obstacle; empty when there is no pair.
+    index : int
+        Row of the samples it was found in.
+    """
+
+    value: float
+    first: str
+    second: str
+    index: int = 0
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Two links that overlap in half or more of 500 sampled configurations.
+
+    Attributes
+    ----------
+    first, second : str
+        The links.
+    share : float
+        In how many of the configurations.
+    is_checked : bool
+        False for those that overlap in each: they touch by design and are left out. Of links of
+        several pieces, others may still be checked.
+    """
+
+    first: str
+    second: str
+    share: float
+    is_checked: bool
+
+
+def srdf_line(first: str, second: str) -> str:
+    """Return the line of an SRDF that leaves a pair of links out."""
+    return f'<disable_collisions link1="{first}" link2="{second}" reason="Default"/>'

@@ -1,0 +1,113 @@
+"""Distances of meshes, where those of their convex hulls do not decide."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import coal
+import numpy as np
+
+from selfmotion.basics import CollisionError
+from selfmotion.collision.distances import Ints
+from selfmotion.collision.solids import Solid
+
+# What distances of surfaces may be below those of the hulls, by the accuracy of both [m].
+_ROUNDING = 1e-5
+
+
+class MeshDistances:
+    """Signed distances of pairs of bodies, given those of their hulls.
+
+    Parameters
+    ----------
+    solids : sequence of Solid
+        The bodies.
+    names : sequence of str
+        What messages call them.
+    pairs : (P, 2)
+        Indices of bodies.
+
+    Attributes
+    ----------
+    hulls_decide : list of bool
+        For which pairs the hulls alone tell whether the bodies overlap.
+    """
+
+    def __init__(self, solids: Sequence[Solid], names: Sequence[str], pairs: Ints) -> None:
+        self._solids, self._names = solids, names
+        self._pairs: list[tuple[int, int]] = [(i, j) for i, j in pairs.tolist()]
+        convex = [solid.is_convex for solid in solids]
+        self.hulls_decide = [convex[i] and convex[j] for i, j in self._pairs]
+        self._places: Any = None
+        self._request, self._touch = coal.DistanceRequest(), coal.CollisionRequest()
+
+    def follow(self, places: Any) -> None:
+        """Take placements (SE3) of the bodies in world axes; they may change afterwards."""
+        self._places = places
+
+    def refine(self, pair: int, hulls: float, beyond: float = math.inf) -> float:
+        """Return the signed distance of a pair as it is placed, given that of its hulls [m].
+
+        Where it is more than `beyond`, another number that is not below `beyond` may be returned in
+        its place, sooner.
+
+        Raises
+        ------
+        CollisionError
+            coal finds the surfaces nearer than the hulls.
+        """
+        first, second = (self._solids[i] for i in self._pairs[pair])
+        if not (first.is_mesh or second.is_mesh):
+            return hulls
+        if self.overlaps(pair, hulls):
+            return hulls
+        if beyond <= 0.0:
+            return 0.0
+        surfaces = self._surfaces(pair, beyond)
+        if hulls > 0.0:
+            if not surfaces >= min(hulls, beyond) - _ROUNDING:
+                raise CollisionError(
+                    f"{self._label(pair)}: coal finds meshes {surfaces} m apart whose convex "
+                    f"hulls are {hulls:.6g} m apart; this is an error of coal's: replace the shape "
+                    f"of one of them by a simpler one"
+                )
+            return max(surfaces, min(hulls, beyond))
+        return surfaces
+
+    def overlaps(self, pair: int, hulls: float) -> bool:
+        """Whether the bodies of a pair overlap as they are placed, given their hulls' distance."""
+        if hulls > 0.0 or self.hulls_decide[pair]:
+            return hulls <= 0.0
+        contact = coal.collide(*self._placed(pair), self._touch, coal.CollisionResult())
+        return bool(contact) or self._is_nested(pair)
+
+    def _surfaces(self, pair: int, beyond: float) -> float:
+        """Return the distance of the surfaces, and of what is no mesh the solid's."""
+        result = coal.DistanceResult()
+        # coal looks for something nearer than what it has already.
+        if beyond < math.inf:
+            result.min_distance = beyond
+        return float(coal.distance(*self._placed(pair), self._request, result))
+
+    def _placed(self, pair: int) -> tuple[Any, Any, Any, Any]:
+        """Return geometry and placement of both bodies, as coal takes them."""
+        first, second = (
+            (self._solids[i].geometry, coal.Transform3s(place.rotation, place.translation))
+            for i in self._pairs[pair]
+            for place in [self._places[i]]
+        )
+        return *first, *second
+
+    def _is_nested(self, pair: int) -> bool:
+        """Whether one body is inside the other, their surfaces apart."""
+        i, j = self._pairs[pair]
+        return self._holds(i, j) or self._holds(j, i)
+
+    def _holds(self, outer: int, inner: int) -> bool:
+        relative = self._places[outer].actInv(self._places[inner])
+        points = self._solids[inner].seeds @ relative.rotation.T + relative.translation
+        return self._solids[outer].contains_any(np.asarray(points))
+
+    def _label(self, pair: int) -> str:
+        i, j = self._pairs[pair]
+        return f"'{self._names[i]}' and '{self._names[j]}'"

@@ -1,0 +1,77 @@
+"""How often bodies overlap in sampled configurations, and how often their convex hulls alone do."""
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from selfmotion.collision.bodies import Body, link_bodies
+from selfmotion.collision.distances import HullDistances, Ints
+from selfmotion.collision.meshes import MeshDistances
+from selfmotion.collision.pairs import candidate_pairs
+from selfmotion.robot import RobotModel
+
+# How many configurations are tried.
+SAMPLES = 500
+
+
+@dataclass(frozen=True, eq=False)
+class Links:
+    """The bodies of a robot, and what 500 configurations tell of their pairs.
+
+    Attributes
+    ----------
+    bodies : tuple of Body
+        Its links' pieces.
+    counts : dict
+        Index pair of bodies → in how many configurations these overlap, and their hulls alone.
+    """
+
+    bodies: tuple[Body, ...]
+    counts: dict[tuple[int, int], tuple[int, int]]
+
+
+# To read the meshes of an arm and to try its pairs takes longer than many a plan.
+_known: WeakKeyDictionary[RobotModel, Links] = WeakKeyDictionary()
+
+
+def links_of(robot: RobotModel) -> Links:
+    """Return the bodies of a robot and its pairs; made once.
+
+    Raises
+    ------
+    RobotError, CollisionError
+        See `link_bodies`.
+    """
+    if robot not in _known:
+        bodies = link_bodies(robot)
+        pairs = candidate_pairs(bodies, robot.urdf)
+        index = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        names = [body.name for body in bodies]
+        hulls = HullDistances(robot, bodies, index)
+        meshes = MeshDistances([body.solid for body in bodies], names, index)
+        met, alone = count_overlaps(robot, hulls, meshes, np.arange(len(pairs)))
+        counts = zip(met.tolist(), alone.tolist(), strict=True)
+        _known[robot] = Links(tuple(bodies), dict(zip(pairs, counts, strict=True)))
+    return _known[robot]
+
+
+def count_overlaps(
+    robot: RobotModel, hulls: HullDistances, meshes: MeshDistances, among: Ints
+) -> tuple[Ints, Ints]:
+    """Return in how many of 500 configurations bodies overlap, and in how many their hulls alone.
+
+    Both (P,), and zero but for the pairs `among` them.
+    """
+    rng = np.random.default_rng(0)
+    lower, upper = robot.finite_limits()
+    q = rng.uniform(lower, upper, (SAMPLES, robot.dof))
+    met, alone = (np.zeros(len(hulls.pairs), dtype=np.int64) for _ in range(2))
+    for row, bounds in enumerate(hulls.lower_bounds(q, 0.0)):
+        meshes.follow(hulls.place(q[row]))
+        for pair in among[bounds[among] <= 0.0].tolist():
+            distance = hulls.distance(pair, bounds[pair])
+            bodies = meshes.overlaps(pair, distance)
+            met[pair] += bodies
+            alone[pair] += distance <= 0.0 and not bodies
+    return met, alone
