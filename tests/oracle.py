@@ -22,6 +22,8 @@ from solids import Solid, solid_of_link, solid_of_obstacle
 
 # How many times per interval, and how many are worked on together.
 PER_INTERVAL, TOGETHER = 1000, 40_000
+# Of more intervals than this all are looked at less often first, and the worst of them closely.
+CLOSE, GLANCE = 60, 40
 # Products of a dozen rotations and lengths of a few metres differ by this in their order [m, rad];
 # q̇ and q̈ by this share.
 ROUNDING, SHARE = 1e-11, 1e-9
@@ -72,9 +74,14 @@ class Arm:
         self.held, self.tool = dict(robot.locked), robot.tool
         self._joint = {joint.name: joint for joint in parsed.joints}
         self._above = {joint.child: joint for joint in parsed.joints}
-        self.solids = [
+        self._links = parsed.links
+
+    @cached_property
+    def solids(self) -> list[tuple[str, Solid]]:
+        """The bodies of all links, with their names."""
+        return [
             (link.name, solid)
-            for link in parsed.links
+            for link in self._links
             for solid in map(solid_of_link, link.collisions)
         ]
 
@@ -127,6 +134,12 @@ def cubic(motion: sm.Trajectory, t: Array, order: int) -> Array:
     if order == 1:
         return np.asarray(slope + x * (2.0 * curve + 3.0 * x * bend / h))
     return np.asarray(2.0 * curve + 6.0 * x * bend / h)
+
+
+def _parts(intervals: Array, count: int) -> Iterator[Array]:
+    together = max(1, TOGETHER // count)
+    for begin in range(0, len(intervals), together):
+        yield intervals[begin : begin + together]
 
 
 @dataclass(frozen=True)
@@ -201,27 +214,42 @@ class Judge:
         )
         late = abs(motion.duration - self.path.duration) / self.path.duration
         verdict = Verdict({"duration": 0.0 if late <= SHARE else 1.0 + late}) | self._ends(motion)
-        for t in self._times(motion):
-            q = cubic(motion, t, 0)
-            known: dict[str, Any] = {}
-            verdict |= self._on_path(t, q, known) | self._within(motion, t)
-            for obstacles, pairs, distance in self.bodies:
-                verdict |= self._apart(q, known, obstacles, pairs, distance)
+        intervals = self._intervals(motion)
+        if len(intervals) > CLOSE:
+            worst = []
+            for part in _parts(intervals, GLANCE):
+                seen, errors = self._look(motion, part, GLANCE)
+                verdict |= seen
+                worst.append(errors)
+            intervals = intervals[np.sort(np.argsort(np.concatenate(worst))[-CLOSE:])]
+        for part in _parts(intervals, self.per_interval):
+            verdict |= self._look(motion, part, self.per_interval)[0]
         return verdict
 
-    def _times(self, motion: sm.Trajectory) -> Iterator[Array]:
-        """Yield times, closely in each interval between samples, marks and ends of windows."""
+    def _look(self, motion: sm.Trajectory, intervals: Array, count: int) -> tuple[Verdict, Array]:
+        """Return what intervals (I, 2) take, and the path's errors on each, (I,)."""
+        shares = np.arange(count + 1) / count
+        t = (intervals[:, :1] + np.diff(intervals, axis=1) * shares).clip(max=intervals[:, 1:])
+        t = t.ravel()
+        q = cubic(motion, t, 0)
+        known: dict[str, Any] = {}
+        errors = self._errors(t, q, known)
+        largest = errors.max(axis=0)
+        verdict = Verdict({"position": float(largest[0]), "rotation": float(largest[1])})
+        verdict |= self._within(motion, t)
+        for obstacles, pairs, distance in self.bodies:
+            verdict |= self._apart(q, known, obstacles, pairs, distance)
+        return verdict, errors.max(axis=1).reshape(len(intervals), -1).max(axis=1)
+
+    def _intervals(self, motion: sm.Trajectory) -> Array:
+        """Return the intervals between samples, marks and ends of windows, (I, 2)."""
         windows = [x for item in self.relaxations for x in item.window(self.path.duration)]
         marks = np.concatenate([motion.t, self.path.marks, windows])
         edges = np.unique(np.clip(marks, 0.0, min(motion.t[-1], self.path.duration)))
-        count = max(1, TOGETHER // self.per_interval)
-        shares = np.arange(self.per_interval) / self.per_interval
-        for begin in range(0, len(edges) - 1, count):
-            part = edges[begin : begin + count + 1]
-            t = part[:-1, None] + np.diff(part)[:, None] * shares
-            yield np.append(t.ravel(), part[-1])
+        return np.stack([edges[:-1], edges[1:]], axis=1)
 
-    def _on_path(self, t: Array, q: Array, known: dict[str, Any]) -> Verdict:
+    def _errors(self, t: Array, q: Array, known: dict[str, Any]) -> Array:
+        """Return the path's errors in position and rotation, as shares, (K, 2)."""
         turn, at = self.arm.place(self.arm.tool, q, known)
         target = self.path.samples(t)
         miss = at - target.translation
@@ -236,12 +264,8 @@ class Judge:
         if angular:
             around = self._rotation_vector(target.rotation, turn)
             turned = self._beyond(t, around, angular)
-        return Verdict(
-            {
-                "position": float((off.max() - ROUNDING) / self.tolerance.position),
-                "rotation": float((turned.max() - ROUNDING) / self.tolerance.rotation),
-            }
-        )
+        allowed = [self.tolerance.position, self.tolerance.rotation]
+        return (np.stack([off, turned], axis=1) - ROUNDING) / allowed
 
     def _turned(self, target: Array, actual: Array) -> Array:
         """Return the angles between orientations, or between their z axes, (K,), by chords."""

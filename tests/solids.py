@@ -14,8 +14,8 @@ import trimesh
 import selfmotion as sm
 from selfmotion.basics import Array
 
-# Points along edges, axes and rims.
-ALONG = 25
+# Points along edges, axes and rims; how often points are projected from body to body.
+ALONG, PROJECTIONS = 25, 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,12 @@ class Solid:
             if not len(rows):
                 break
             pick = [x if len(x) == 1 else x[rows] for x in (turn, at, turned, away)]
-            best = min(best, self._closest(other, *pick), other._closest(self, *pick[2:], *pick[:2]))
+            best = min(
+                best,
+                self._closest(other, *pick),
+                other._closest(self, *pick[2:], *pick[:2]),
+                self._projected(other, *pick),
+            )
         return best
 
     def _closest(self, other: "Solid", turn: Array, at: Array, turned: Array, away: Array) -> float:
@@ -103,6 +108,33 @@ class Solid:
         x = np.einsum("kij,pj->kpi", turn, self.points) + at[:, None] - away[:, None]
         x = np.einsum("kji,kpj->kpi", np.broadcast_to(turned, (len(x), 3, 3)), x)
         return float(other.excess(x).min() - self.radius)
+
+    def _projected(
+        self, other: "Solid", turn: Array, at: Array, turned: Array, away: Array
+    ) -> float:
+        """Return the least distance by projecting points from body to body and back."""
+        x = 0.5 * (at + away)
+        for _ in range(PROJECTIONS):
+            here = at + _by(turn, self.nearest(_back(turn, x - at)))
+            x = away + _by(turned, other.nearest(_back(turned, here - away)))
+        return float(np.linalg.norm(here - x, axis=1).min() - self.radius - other.radius)
+
+    def nearest(self, x: Array) -> Array:
+        """Return the points of what is rounded that are nearest to points (K, 3)."""
+        if not self.is_round:
+            return np.clip(x, -self.half, self.half)
+        length = np.hypot(x[:, 0], x[:, 1])
+        share = np.minimum(self.half[0] / np.maximum(length, 1e-300), 1.0)
+        along = np.clip(x[:, 2], -self.half[2], self.half[2])
+        return np.stack([share * x[:, 0], share * x[:, 1], along], axis=1)
+
+
+def _by(turn: Array, x: Array) -> Array:
+    return np.asarray((turn @ x[:, :, None])[:, :, 0])
+
+
+def _back(turn: Array, x: Array) -> Array:
+    return _by(turn.transpose(0, 2, 1), x)
 
 
 def solid_of_link(collision: Any) -> Solid:
