@@ -24,6 +24,8 @@ from solids import Solid, solid_of_link, solid_of_obstacle
 PER_INTERVAL, TOGETHER = 1000, 40_000
 # Of more intervals than this all are looked at less often first, and the worst of them closely.
 CLOSE, GLANCE = 60, 40
+# Bodies that are farther apart than wanted by this share are not looked at.
+CLEAR = 0.05
 # Products of a dozen rotations and lengths of a few metres differ by this in their order [m, rad];
 # q̇ and q̈ by this share.
 ROUNDING, SHARE = 1e-11, 1e-9
@@ -331,7 +333,8 @@ class Judge:
         at_rest = [(item.name, solid_of_obstacle(item)) for item in obstacles]
         bodies = self.arm.solids + at_rest
         wanted = {frozenset(pair) for pair in pairs}
-        nearest = np.inf
+        # Farther than this they are clear, however far that is.
+        nearest = distance + CLEAR * max(distance, 1e-3)
         for i, (first, one) in enumerate(bodies):
             for second, other in bodies[i + 1 :]:
                 if frozenset((first, second)) in wanted and first != second:

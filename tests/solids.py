@@ -16,6 +16,8 @@ from selfmotion.basics import Array
 
 # Points along edges, axes and rims; how often points are projected from body to body.
 ALONG, PROJECTIONS = 25, 40
+# Of so many places at most the distance is taken closely.
+MOST = 2048
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,19 +89,25 @@ class Solid:
         floor = np.linalg.norm(gap, axis=1) - self.reach - other.reach
         middle = np.einsum("kji,kj->ki", np.broadcast_to(turned, (len(gap), 3, 3)), gap)
         floor = np.maximum(floor, other.excess(middle) - self.reach)
-        near = np.argsort(floor)
-        best = below
-        for begin in range(0, len(near), 256):
-            rows = near[begin : begin + 256]
+        near = np.flatnonzero(floor < below)
+        if not len(near):
+            return below
+        best, places = below, (turn, at, turned, away)
+        # A rough look at all, then a close one at those that seem nearest.
+        rough = self._projected(other, *_picked(places, near), 5)
+        best = min(best, float(rough.min()))
+        order = near[np.argsort(rough)]
+        for begin in range(0, min(len(order), MOST), 256):
+            rows = order[begin : begin + 256]
             rows = rows[floor[rows] < best]
             if not len(rows):
-                break
-            pick = [x if len(x) == 1 else x[rows] for x in (turn, at, turned, away)]
+                continue
+            pick = _picked(places, rows)
             best = min(
                 best,
                 self._closest(other, *pick),
                 other._closest(self, *pick[2:], *pick[:2]),
-                self._projected(other, *pick),
+                float(self._projected(other, *pick, PROJECTIONS).min()),
             )
         return best
 
@@ -110,14 +118,14 @@ class Solid:
         return float(other.excess(x).min() - self.radius)
 
     def _projected(
-        self, other: "Solid", turn: Array, at: Array, turned: Array, away: Array
-    ) -> float:
-        """Return the least distance by projecting points from body to body and back."""
+        self, other: "Solid", turn: Array, at: Array, turned: Array, away: Array, often: int
+    ) -> Array:
+        """Return distances, (K,), by projecting points from body to body and back."""
         x = 0.5 * (at + away)
-        for _ in range(PROJECTIONS):
+        for _ in range(often):
             here = at + _by(turn, self.nearest(_back(turn, x - at)))
             x = away + _by(turned, other.nearest(_back(turned, here - away)))
-        return float(np.linalg.norm(here - x, axis=1).min() - self.radius - other.radius)
+        return np.asarray(np.linalg.norm(here - x, axis=1) - self.radius - other.radius)
 
     def nearest(self, x: Array) -> Array:
         """Return the points of what is rounded that are nearest to points (K, 3)."""
@@ -127,6 +135,10 @@ class Solid:
         share = np.minimum(self.half[0] / np.maximum(length, 1e-300), 1.0)
         along = np.clip(x[:, 2], -self.half[2], self.half[2])
         return np.stack([share * x[:, 0], share * x[:, 1], along], axis=1)
+
+
+def _picked(places: Any, rows: Any) -> list[Array]:
+    return [x if len(x) == 1 else x[rows] for x in places]
 
 
 def _by(turn: Array, x: Array) -> Array:
