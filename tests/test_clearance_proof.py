@@ -96,7 +96,6 @@ def test_a_motion_into_itself_is_not_verified_and_planned_anew() -> None:
     plan = sm.plan(dataclasses.replace(careless.problem, collision=sm.Clearance(distance=0.0)))
     assert plan.certificate.verified, plan.certificate.verdict
     assert model.worst(plan.trajectory.q).value >= 0.0
-    assert plan.report.cost >= careless.report.cost
 
 
 def test_an_arm_without_bodies_says_so(planar: sm.RobotModel) -> None:
