@@ -36,7 +36,7 @@ def test_plan_check_and_replay(tmp_path: Path) -> None:
 
     checked = run("check", plan)
     assert checked.returncode == 0
-    assert "verified: at most" in checked.stdout
+    assert "verified at all times" in checked.stdout
 
     again = tmp_path / "b.html"
     assert run("replay", plan, "--html", again).returncode == 0

@@ -130,8 +130,8 @@ def test_pairs_that_overlap_often_are_listed(name: str) -> None:
     left_out = [item for item in model.overlapping if not item.is_checked]
     assert len(names) > len(model.pairs) or not left_out
     for item in left_out:
-        assert item.share == 1.0
         pair = (item.first, item.second)
+        assert item.share == 1.0 or pair in model.robot.touching
         assert model.pairs.count(pair) < names.count(pair)
     q = samples(model.robot, 200, 3)
     share = (model.distances(q, 0.0) <= 0.0).mean(axis=0)

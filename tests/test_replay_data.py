@@ -114,16 +114,8 @@ def test_coal_stands_in_where_trimesh_fails():
     np.testing.assert_allclose(np.ptp(part.vertices, axis=0), 2 * np.ptp(expected.vertices, axis=0))
 
 
-def test_a_budget_is_kept_and_otherwise_nothing_is_dropped():
-    robot = load_robot("xarm7")
-    whole = bake(robot, Payload(), 10**9)
-    assert whole.drawn == whole.triangles > 40_000
-    cut = bake(robot, Payload(), 10_000)
-    assert 0 < cut.drawn <= 10_000 < cut.triangles
-
-
 def test_mesh_files_used_twice_are_packed_once():
-    arm = bake(load_robot("panda"), Payload(), 10**9)
+    arm = bake(load_robot("panda"), Payload())
     fingers = [v for v in arm.visuals if "finger" in v.name]
     used = {v.geometry["mesh"] for v in fingers}
     assert len(fingers) == 2 * len(used)

@@ -1,10 +1,28 @@
-"""Distance of the arm from obstacles and from itself."""
+"""Distance of the arm from obstacles and from itself, at all times.
+
+Between two times a and b the distance d of a pair of bodies changes by Σ_j l_j V_j at most, with
+V_j the way that joint j makes and l_j the pair's lever (`CollisionModel.pair_levers`). So
+d(t) ≥ ½ (d(a) + d(b) - Σ_j l_j V_j) in between. Intervals on which this does not decide are halved,
+beginning with few: pairs that are far apart, or hardly move, are looked at a few times only.
+"""
 
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array
 from selfmotion.certificate.findings import Finding
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
-from selfmotion.collision import CollisionModel, Obstacle
+from selfmotion.collision import Closest, CollisionModel, Obstacle, srdf_line
+from selfmotion.motion import Trajectory
+
+# Intervals to begin with; each is halved so often before it counts as undecided.
+_FIRST, _DEPTH = 16, 26
+# More intervals than this at once are not looked at: what is left is undecided.
+_MOST = 200_000
+# The distance that is reported is the smallest one to this share, or to this [m].
+_SHARE, _SLACK = 0.02, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,18 +42,194 @@ class KeepsApart(Requirement):
     name: str = "clearance"
 
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: the closest pair."""
-        closest = self.model.worst(motion.q)
-        names = f"{closest.first} - {closest.second}" if closest.first else "nothing"
-        time = float(motion.t[closest.index])
-        text = (
-            f"{names} are {closest.value * 1e3:.2f} mm apart at t = {time:.3f} s (wanted: "
-            f"{self.distance * 1e3:.2f} mm)"
+        """See `Requirement.judge`: the closest pair, to a fiftieth of its distance."""
+        found = closest_at_all_times(self.model, motion.trajectory, self.distance)
+        text = self._told(found)
+        if found.open_until is not None:
+            text = (
+                f"whether {found.names} keep {self.distance * 1e3:.2f} mm from t = "
+                f"{found.time:.6g} to {found.open_until:.6g} s is not decided: they come to "
+                f"{found.closest.value * 1e3:.4f} mm"
+            )
+        kept = found.open_until is None and bool(found.closest.value >= self.distance)
+        return Finding(
+            self.name, found.names, found.time, found.closest.value, self.distance, kept, text
         )
-        kept = bool(closest.value >= self.distance)
-        return Finding(self.name, names, time, closest.value, self.distance, kept, text)
+
+    @property
+    def covers(self) -> tuple[str, ...]:
+        """See `Requirement.covers`."""
+        return ("self-collision", "obstacles") if self.obstacles else ("self-collision",)
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
         """See `Requirement.obstacles`."""
         return self.model.obstacles
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """See `Requirement.remarks`: pairs that are left out, and meshes that are open."""
+        left_out = [f"{x.first} - {x.second}" for x in self.model.overlapping if not x.is_checked]
+        said = []
+        if left_out:
+            said.append(f"touching as they are made, left out: {', '.join(left_out)}")
+        if self.model.open_meshes:
+            open_ = ", ".join(self.model.open_meshes)
+            said.append(f"open meshes, in which a body wholly inside may be missed: {open_}")
+        return tuple(said)
+
+    def _told(self, found: "Approach") -> str:
+        text = (
+            f"{found.names} are {found.closest.value * 1e3:.2f} mm apart at t = {found.time:.3f} s "
+            f"(wanted: {self.distance * 1e3:.2f} mm)"
+        )
+        for pair in self.model.overlapping:
+            if {pair.first, pair.second} == {found.closest.first, found.closest.second}:
+                return (
+                    f"{text}; these links overlap in {100 * pair.share:.0f} % of all "
+                    f"configurations: if that is how they are made, give srdf= a file with "
+                    f"{srdf_line(pair.first, pair.second)}"
+                )
+        return text
+
+
+@dataclass(frozen=True)
+class Approach:
+    """How near two bodies come on a motion, at all times.
+
+    Attributes
+    ----------
+    closest : Closest
+        The smallest distance found.
+    time : float
+        When [s]; where something is undecided, when that begins.
+    open_until : float or None
+        When what is undecided ends [s]; None where all is decided.
+    """
+
+    closest: Closest
+    time: float
+    open_until: float | None = None
+
+    @property
+    def names(self) -> str:
+        """The two bodies."""
+        return f"{self.closest.first} - {self.closest.second}" if self.closest.first else "nothing"
+
+
+def closest_at_all_times(
+    model: CollisionModel, trajectory: Trajectory, distance: float
+) -> Approach:
+    """Return the closest approach of all pairs; no time is left out.
+
+    No pair comes nearer than `distance` [m] at any time unless the one returned does, or is
+    undecided; and none nearer than it by more than a fiftieth or 0.1 mm.
+    """
+    way, levers = Way(trajectory), model.pair_levers
+    edges = np.linspace(trajectory.t[0], trajectory.t[-1], _FIRST + 1)
+    best = model.worst(trajectory(edges))
+    approach = Approach(best, float(edges[best.index]))
+    if not model.pairs:
+        return approach
+    intervals = np.stack([edges[:-1], edges[1:]], axis=1)
+    budget = np.diff(way(edges), axis=0) @ levers.T
+    goal = _goal(best, distance)
+    need = np.maximum(np.pad(budget, ((0, 1), (0, 0))), np.pad(budget, ((1, 0), (0, 0))))
+    values = model.distances(trajectory(edges), goal + need)
+    first, last = values[:-1], values[1:]
+    for _ in range(_DEPTH):
+        # Written so that NaN settles nothing.
+        unsettled = ~(0.5 * (first + last - budget) >= goal)
+        rows = np.flatnonzero(unsettled.any(axis=1))
+        if not rows.size or approach.closest.value < distance:
+            return approach
+        if len(rows) > _MOST:
+            break
+        settled, (begin, end) = ~unsettled[rows], intervals[rows].T
+        middle = 0.5 * (begin + end)
+        intervals = np.stack([begin, middle, middle, end], axis=1).reshape(-1, 2)
+        budget = (way(intervals[:, 1]) - way(intervals[:, 0])) @ levers.T
+        need = goal + np.maximum(budget[0::2], budget[1::2])
+        inner = model.distances(trajectory(middle), np.where(settled, -np.inf, need))
+        # Pairs that are settled need no number any more.
+        ends = [np.where(settled, np.inf, side) for side in (first[rows], inner, last[rows])]
+        first = np.stack(ends[:2], axis=1).reshape(len(intervals), -1)
+        last = np.stack(ends[1:], axis=1).reshape(len(intervals), -1)
+        approach = _nearer(approach, model, middle, ends[1], need)
+        goal = _goal(approach.closest, distance)
+    row = rows[int(np.argmin(first[rows].min(axis=1)))] if len(rows) <= _MOST else 0
+    return _undecided(model, approach, intervals, first, distance, int(row))
+
+
+def _goal(best: Closest, distance: float) -> float:
+    """Return the distance down to which all has to be known [m]."""
+    return max(distance, best.value - max(_SLACK, _SHARE * best.value))
+
+
+def _nearer(
+    approach: Approach, model: CollisionModel, t: Array, values: Array, exact_below: Array
+) -> Approach:
+    """Return the smaller of an approach and distances (K, P) at times (K,), where exact."""
+    known = np.where(values < exact_below, values, np.inf)
+    row, pair = np.unravel_index(int(np.argmin(known)), known.shape)
+    if not known[row, pair] < approach.closest.value:
+        return approach
+    return Approach(Closest(float(known[row, pair]), *model.pairs[int(pair)]), float(t[row]))
+
+
+def _undecided(
+    model: CollisionModel,
+    approach: Approach,
+    intervals: Array,
+    first: Array,
+    distance: float,
+    row: int,
+) -> Approach:
+    """Return the approach that halving does not decide, unless it only concerns the report."""
+    pair = int(np.argmin(first[row]))
+    near = Closest(float(first[row, pair]), *model.pairs[pair])
+    if near.value > distance + _SLACK:
+        return approach
+    start, end = intervals[row]
+    return Approach(near, float(start), float(end))
+
+
+class Way:
+    """The way that each joint has made by a time: ∫ |q̇| dt along the cubics, exactly.
+
+    q̇ is a parabola on each, whose zeros part it into monotone pieces.
+    """
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self._trajectory = trajectory
+        t, qd = trajectory.t, trajectory.qd
+        middle = trajectory(0.5 * (t[:-1] + t[1:]), order=1)
+        # q̇ = a s² + b s + c with s from 0 to 1 over each interval.
+        self._a = 2.0 * (qd[:-1] + qd[1:] - 2.0 * middle)
+        self._b = 4.0 * middle - 3.0 * qd[:-1] - qd[1:]
+        self._c = qd[:-1]
+        every = np.arange(len(t) - 1)
+        whole = self._partial(every, np.ones(len(every)))
+        self._before = np.vstack([np.zeros(qd.shape[1]), np.cumsum(whole, axis=0)])
+
+    def __call__(self, t: Array) -> Array:
+        """Return the ways made by times (K,), (K, n) [rad or m]."""
+        edges = self._trajectory.t
+        k = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, len(edges) - 2)
+        return self._before[k] + self._partial(k, (t - edges[k]) / (edges[k + 1] - edges[k]))
+
+    def _partial(self, k: npt.NDArray[np.intp], s: Array) -> Array:
+        """Return the ways from the beginning of intervals k (K,) up to s (K,), (K, n)."""
+        a, b, c = self._a[k], self._b[k], self._c[k]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)), b))
+            zeros = np.sort(np.stack([u / a, c / u], axis=1), axis=1)
+        end = s[:, None, None]
+        zeros = np.where((zeros > 0.0) & (zeros < end), zeros, 0.0)
+        edges = np.concatenate(
+            [np.zeros_like(a)[:, None], np.sort(zeros, axis=1), np.zeros_like(a)[:, None] + end],
+            axis=1,
+        )
+        integral = edges * (c[:, None] + edges * (b[:, None] / 2.0 + edges * a[:, None] / 3.0))
+        steps = np.diff(self._trajectory.t)[k, None]
+        return np.asarray(np.abs(np.diff(integral, axis=1)).sum(axis=1) * steps)

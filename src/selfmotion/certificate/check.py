@@ -84,6 +84,8 @@ def certify(
             *_undecided(path_check.undecided),
             *(item.text for item in findings if not item.kept),
         ),
+        covers=tuple(dict.fromkeys(["path", *(what for item in wanted for what in item.covers)])),
+        remarks=tuple(remark for item in wanted for remark in item.remarks),
         deviations=path_check.deviations,
         damped=damped,
     )

@@ -49,6 +49,11 @@ class JointLimits(Requirement):
         """See `Requirement.name`."""
         return LIMIT_NAMES[self.order]
 
+    @property
+    def covers(self) -> tuple[str, ...]:
+        """See `Requirement.covers`."""
+        return (("joint limits", "speeds", "accelerations")[self.order],)
+
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: a margin (order 0), or the share of the limit that is used."""
         times, values = motion.trajectory.extremes(self.order)

@@ -72,3 +72,13 @@ class Requirement(ABC):
     def obstacles(self) -> tuple[Obstacle, ...]:
         """The bodies of the world that it is about, for whoever draws them."""
         return ()
+
+    @property
+    def covers(self) -> tuple[str, ...]:
+        """What a verdict may say was checked, when this was; by default its name."""
+        return (self.name,)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What it leaves out or cannot know, for whoever reads the certificate."""
+        return ()

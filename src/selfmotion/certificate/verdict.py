@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import LIMIT_NAMES
 
+# What a reader of a verdict would take to have been checked, unless told otherwise.
+_EXPECTED = ("path", "joint limits", "speeds", "accelerations", "self-collision")
+
 
 @dataclass(frozen=True)
 class Certificate:
@@ -30,6 +33,10 @@ class Certificate:
         What each requirement found, the arm's own limits first.
     failures : tuple of str
         What speaks against the motion; empty for a verified one.
+    covers : tuple of str
+        What was checked, at all times: "path", "joint limits", "speeds", "self-collision", …
+    remarks : tuple of str
+        What the requirements leave out or cannot know: pairs of links, open meshes.
     deviations : tuple of Extreme
         For each relaxation the largest deviation of its rows from the path, in its window [m or
         rad].
@@ -47,6 +54,8 @@ class Certificate:
     tolerance: Tolerance
     findings: tuple[Finding, ...]
     failures: tuple[str, ...]
+    covers: tuple[str, ...] = ("path",)
+    remarks: tuple[str, ...] = ()
     deviations: tuple[Extreme, ...] = ()
     damped: tuple[DampedStretch, ...] = ()
     notes: tuple[str, ...] = ()
@@ -72,6 +81,11 @@ class Certificate:
         return self._worst("clearance", min)
 
     @property
+    def not_checked(self) -> tuple[str, ...]:
+        """What a motion should keep and nothing here has looked at."""
+        return tuple(name for name in _EXPECTED if name not in self.covers)
+
+    @property
     def on_path(self) -> bool:
         """Whether the tool follows the path within the tolerance, beyond what is relaxed."""
         # Written so that NaN fails.
@@ -87,11 +101,12 @@ class Certificate:
     def verdict(self) -> str:
         """One line: verified, or what is wrong."""
         if self.verified:
+            left_out = f"; not checked: {', '.join(self.not_checked)}" if self.not_checked else ""
             return (
-                f"verified: at most {self.position_error.value:.1e} m and "
-                f"{self.rotation_error.value:.1e} rad off the path"
-                f"{', beyond what is relaxed' if self.deviations else ''}{self._damping_text}"
-                f"{''.join(f'; {note}' for note in self.notes)}"
+                f"verified at all times ({', '.join(self.covers)}): at most "
+                f"{self.position_error.value:.1e} m and {self.rotation_error.value:.1e} rad off "
+                f"the path{', beyond what is relaxed' if self.deviations else ''}"
+                f"{self._damping_text}{left_out}{''.join(f'; {note}' for note in self.notes)}"
             )
         return "; ".join(("not verified: " + "; ".join(self.failures), *self.notes))
 

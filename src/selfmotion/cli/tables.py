@@ -8,7 +8,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from selfmotion.certificate import Certificate
+from selfmotion.certificate import LIMIT_NAMES, Certificate
 from selfmotion.plans import Gap, Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -43,7 +43,8 @@ def show(plan: Plan, console: Console) -> None:
 
 def show_certificate(certificate: Certificate, console: Console) -> None:
     """Print what forward kinematics found, and the verdict."""
-    table = Table(box=box.SIMPLE_HEAD, title=f"checked at {certificate.samples} times")
+    title = f"checked at all times, with {certificate.samples} poses"
+    table = Table(box=box.SIMPLE_HEAD, title=title)
     table.add_column("worst")
     table.add_column("value", justify="right")
     table.add_column("at", justify="right")
@@ -61,12 +62,19 @@ def show_certificate(certificate: Certificate, console: Console) -> None:
         if worst is None:
             continue
         table.add_row(name, form.format(worst.value), f"{worst.time:.3f} s", worst.name)
+    shown = {"clearance", *LIMIT_NAMES}
+    for finding in certificate.findings:
+        if finding.requirement not in shown:
+            value = f"{finding.amount:.4g} (allowed: {finding.allowed:.4g})"
+            table.add_row(finding.requirement, value, f"{finding.time:.3f} s", finding.subject)
     for worst in certificate.deviations:
         unit = "rad" if "r" in worst.name else "m"
         value, time = f"{worst.value:.4g} {unit}", f"{worst.time:.3f} s"
         table.add_row(f"relaxed {worst.name}", value, time, "off the path, as allowed")
     table.add_row("end to start", f"{certificate.closure:.4g}", "", "")
     console.print(table)
+    for remark in certificate.remarks:
+        console.print(remark, style="dim", markup=False)
     style = "green" if certificate.verified else "bold red"
     console.print(certificate.verdict, style=style, markup=False)
 

@@ -49,7 +49,7 @@ class CollisionModel:
         Names of the B bodies, likewise.
     overlapping : tuple of Overlap
         Pairs of links that overlap in half or more of 500 sampled configurations. Those that do
-        in each are not checked.
+        in each, or are known to touch as they are made (`RobotModel.touching`), are not checked.
 
     Raises
     ------
@@ -83,12 +83,15 @@ class CollisionModel:
         self.bodies = tuple(body.name for body in self._bodies)
         pairs: list[tuple[int, int]] = []
         often: dict[tuple[str, str, bool], int] = {}
+        as_made = {frozenset(pair) for pair in robot.touching}
         for first, second in candidate_pairs(self._bodies, robot.urdf, srdf):
             met, _ = links.counts.get((first, second), (0, 0))
-            if met < SAMPLES:
+            names = self.bodies[first], self.bodies[second]
+            is_checked = met < SAMPLES and frozenset(names) not in as_made
+            if is_checked:
                 pairs.append((first, second))
-            if met >= _OFTEN * SAMPLES:
-                key = self.bodies[first], self.bodies[second], met < SAMPLES
+            if met >= _OFTEN * SAMPLES or (met and not is_checked):
+                key = *names, is_checked
                 often[key] = max(met, often.get(key, 0))
         self._index = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         self.pairs = tuple((self.bodies[i], self.bodies[j]) for i, j in pairs)
@@ -191,15 +194,19 @@ class CollisionModel:
             worst = self._closest(bounds[row], worst, row)
         return worst
 
-    def distances(self, q_samples: npt.ArrayLike, within: float = math.inf) -> Array:
+    def distances(
+        self,
+        q_samples: npt.ArrayLike,
+        within: float | Array = math.inf,
+    ) -> Array:
         """Return the distance of every pair at samples (K, n), (K, P) [m], as `pairs` names them.
 
         Parameters
         ----------
         q_samples : (K, n)
-        within : float
+        within : float or (K, P)
             Pairs that are farther apart than this need no exact number [m]: theirs is a lower
-            bound of the distance that is not below `within`.
+            bound of the distance that is not below `within`. -inf where none is needed.
 
         Raises
         ------
@@ -207,14 +214,15 @@ class CollisionModel:
             A row is not a configuration of the arm.
         """
         q = self.samples(q_samples)
-        values = self.hulls.lower_bounds(q, within)
+        asked = np.broadcast_to(np.asarray(within, dtype=np.float64), (len(q), len(self.pairs)))
+        values = self.hulls.lower_bounds(q, float(asked.max(initial=-math.inf)))
         for row in range(len(q)):
-            near = np.flatnonzero(values[row] < within).tolist()
+            near = np.flatnonzero(values[row] < asked[row]).tolist()
             if near:
                 self._place(q[row])
             for pair in near:
                 hulls = self.hulls.distance(pair, values[row, pair])
-                far = hulls >= within
+                far = hulls >= asked[row, pair]
                 values[row, pair] = hulls if far else self._meshes.refine(pair, hulls)
         return values
 

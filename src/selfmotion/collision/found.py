@@ -34,8 +34,8 @@ class Overlap:
     share : float
         In how many of the configurations.
     is_checked : bool
-        False for those that overlap in each: they touch by design and are left out. Of links of
-        several pieces, others may still be checked.
+        False for those that overlap in each, or are known to touch as they are made: they are left
+        out. Of links of several pieces, others may still be checked.
     """
 
     first: str

@@ -11,6 +11,7 @@ from selfmotion.basics import (
     NoSequenceError,
     ProblemError,
     Progress,
+    SelfmotionError,
     read_only,
     silent,
 )
@@ -88,8 +89,22 @@ def plan(
     if problem.damping is not None and max_evaluations is None:
         max_evaluations = _PATIENCE
     effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, Counts())
-    run = _Run(problem, effort, search or Search(), tolerance or Tolerance(), progress)
-    return run.plan()
+    settings = (search or Search(), tolerance or Tolerance(), progress)
+    found = _Run(problem, effort, *settings).plan()
+    # Few motions take an arm into itself: the others need not wait for distances.
+    if not _overlaps(found) or found.report.status in (Status.INTERRUPTED, Status.STOPPED):
+        return found
+    try:
+        apart = _Run(problem, replace(effort, apart=True), *settings).plan()
+    except (SelfmotionError, KeyboardInterrupt):
+        return found
+    return found if _overlaps(apart) and not _overlaps(found) else apart
+
+
+def _overlaps(plan: Plan) -> bool:
+    """Whether the arm meets itself where only the default asks it not to."""
+    asked = plan.problem.own_collision is not None
+    return asked and not plan.certificate.findings[-1].kept
 
 
 def _check(problem: Problem, search: Search | None, max_evaluations: int | None) -> None:

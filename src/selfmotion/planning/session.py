@@ -45,12 +45,15 @@ class Effort:
         Limit on evaluations of each session.
     counts : Counts
         Where work is added up.
+    apart : bool
+        Whether the optimisation keeps the arm apart from itself where only the default asks for it.
     """
 
     optimizer: Optimizer
     callback: Callback | None
     max_evaluations: int | None
     counts: Counts
+    apart: bool = False
 
 
 class Session:
@@ -116,7 +119,7 @@ class Session:
         """
         still, jacobians = settled_still_motion(problem, configuration, guide)
         effort.counts.jacobians += jacobians
-        bound = problem.bind_constraints(configuration, still.end)
+        bound = problem.bind_constraints(configuration, still.end, apart=effort.apart)
         objective = Objective.of(problem, still, free=free, constraints=bound, counts=effort.counts)
         return cls(effort, still, objective, free=free)
 

@@ -119,6 +119,7 @@ def _problem_to_dict(problem: Problem) -> dict[str, Any]:
             "continuous": sorted(robot.urdf.continuous()),
             "tool": robot.tool,
             "locked": dict(robot.locked),
+            "touching": [list(pair) for pair in robot.touching],
         },
         "path": problem.path.to_dict(),
         "task": problem.task.value,
@@ -128,12 +129,13 @@ def _problem_to_dict(problem: Problem) -> dict[str, Any]:
         "constraints": [item.to_dict() for item in problem.constraints],
         "relaxations": [item.to_dict() for item in problem.relaxations],
         "damping": None if problem.damping is None else dataclasses.asdict(problem.damping),
+        "collision": None if problem.collision is None else problem.collision.to_dict(),
     }
 
 
 def _problem_from_dict(values: Mapping[str, Any]) -> Problem:
     robot = rebuild_robot(**values["robot"])
-    damping = values["damping"]
+    damping, collision = values["damping"], values["collision"]
     return Problem(
         robot,
         restore(Path, values["path"]),
@@ -144,6 +146,7 @@ def _problem_from_dict(values: Mapping[str, Any]) -> Problem:
         tuple(restore(Constraint, item) for item in values["constraints"]),
         tuple(Relaxation(**item) for item in values["relaxations"]),
         None if damping is None else Damping(**damping),
+        None if collision is None else restore(Constraint, collision),
     )
 
 
@@ -176,7 +179,9 @@ def _certificate_from_dict(values: Mapping[str, Any]) -> Certificate:
     for key, kind in several.items():
         restored[key] = tuple(kind(**item) for item in restored[key])
     restored["tolerance"] = Tolerance(**values["tolerance"])
-    return Certificate(**{**restored, "failures": tuple(restored["failures"])})
+    for key in ("failures", "covers", "remarks", "notes"):
+        restored[key] = tuple(restored[key])
+    return Certificate(**restored)
 
 
 def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archive:

@@ -13,6 +13,7 @@ from selfmotion.basics import Array, ProblemError, RedundancyError, StartError, 
 from selfmotion.certificate import Certificate, Requirement, Tolerance, arm_limits, certify
 from selfmotion.constraints import (
     BoundConstraint,
+    Clearance,
     Constraint,
     Envelope,
     JointPositionLimits,
@@ -25,6 +26,8 @@ from selfmotion.plans.relaxed_rows import check_relaxations
 from selfmotion.robot import RobotModel
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 
+# Links must not overlap; one object, so that its bodies are made once for each arm.
+NO_OVERLAP = Clearance(distance=0.0)
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
 # A path that is nowhere nearer than so many times the arm's reach is in other units.
@@ -67,6 +70,9 @@ class Problem:
         Rows in which the tool may leave the path, by how much and when; the deviation is optimised
         along with the self-motion. By default none. A given start is on the path itself, and so
         are both ends of a closed path and the end of one with conditions there.
+    collision : Clearance, optional
+        How the arm keeps apart from itself where no constraint says it, and its URDF has bodies: by
+        default its links must not overlap. None to leave that out; the verdict then says so.
     damping : Damping, optional
         Go through singular poses, and past the edge of the workspace, at the price of the path: by
         default the tool stays on the path, and there is no motion through such poses. Adds the
@@ -94,6 +100,7 @@ class Problem:
     )
     relaxations: Sequence[Relaxation] = ()
     damping: Damping | None = None
+    collision: Clearance | None = NO_OVERLAP
 
     def __post_init__(self) -> None:
         for name, kind in _KINDS.items():
@@ -131,12 +138,31 @@ class Problem:
         weight = self.damping.path_weight * (rate / self.damping_law.threshold) ** 2
         return (*self.costs, PathError(float(weight), self.task.dimension))
 
-    def bind_constraints(self, start: Array, end: Array) -> tuple[BoundConstraint, ...]:
+    @cached_property
+    def own_collision(self) -> Clearance | None:
+        """What keeps the arm apart from itself, besides the constraints; None for nothing."""
+        if self.collision is None or not self.robot.urdf.has_collisions:
+            return None
+        if any(item.envelope(self.robot).bodies for item in self.constraints):
+            return None
+        return self.collision
+
+    @property
+    def all_constraints(self) -> tuple[Constraint, ...]:
+        """The constraints, with `own_collision` last where there is one."""
+        own = self.own_collision
+        return tuple(self.constraints) if own is None else (*self.constraints, own)
+
+    def bind_constraints(
+        self, start: Array, end: Array, *, apart: bool = True
+    ) -> tuple[BoundConstraint, ...]:
         """Return the constraints for this arm, given first and last configuration, (n,) each.
 
-        Those of the motion that the optimisation begins with.
+        Those of the motion that the optimisation begins with. Without `own_collision` where it need
+        not keep `apart` from itself.
         """
-        return tuple(item.bind(self.robot, self.task, start, end) for item in self.constraints)
+        asked = self.all_constraints if apart else self.constraints
+        return tuple(item.bind(self.robot, self.task, start, end) for item in asked)
 
     @cached_property
     def damping_law(self) -> DampingLaw | None:
@@ -149,13 +175,13 @@ class Problem:
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:
         """What the certificate has to judge besides the path: one of each constraint."""
-        return tuple(item.requirement(self.robot) for item in self.constraints)
+        return tuple(item.requirement(self.robot) for item in self.all_constraints)
 
     @cached_property
     def asked_envelope(self) -> Envelope:
         """What the constraints ask of single configurations and velocities."""
         free = Envelope.unbounded(self.robot.dof)
-        return reduce(and_, (item.envelope(self.robot) for item in self.constraints), free)
+        return reduce(and_, (item.envelope(self.robot) for item in self.all_constraints), free)
 
     @cached_property
     def envelope(self) -> Envelope:
@@ -244,7 +270,7 @@ class Problem:
         for item in self.constraints:
             item.check(self.robot, self.path, self.task)
         # Now, not when the motion is finished: without a requirement nothing judges it.
-        for item, found in zip(self.constraints, self.requirements, strict=True):
+        for item, found in zip(self.all_constraints, self.requirements, strict=True):
             if not isinstance(found, Requirement):
                 raise ProblemError(
                     f"constraint {type(item).__name__}: requirement() returned {found!r}, expected "
@@ -269,6 +295,7 @@ _KINDS: dict[str, Any] = {
     "path": Path,
     "null_motion": NullMotion,
     "damping": Damping | None,
+    "collision": Clearance | None,
 }
 _EXAMPLES = {
     "robot": "RobotModel (load_robot)",
@@ -276,6 +303,7 @@ _EXAMPLES = {
     "null_motion": "NullMotion (PolynomialNullMotion, BSplineNullMotion, or a class derived "
     "from NullMotion)",
     "damping": "Damping or None",
+    "collision": "Clearance or None",
 }
 _SEQUENCES = {"costs": Cost, "constraints": Constraint, "relaxations": Relaxation}
 

@@ -27,11 +27,15 @@ class NamedArm:
         The usual tool frame.
     home : tuple of float or None
         The configuration that its maker calls ready [rad], where there is one.
+    touching : tuple of (str, str)
+        Pairs of links whose meshes overlap in more than half of all configurations, as they are
+        made; no joint between them can keep them apart.
     """
 
     urdf: str
     tool: str
     home: tuple[float, ...] | None = None
+    touching: tuple[tuple[str, str], ...] = ()
 
 
 NAMED_ARMS: Mapping[str, NamedArm] = {
@@ -42,9 +46,20 @@ NAMED_ARMS: Mapping[str, NamedArm] = {
         home=(0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4),
     ),
     "xarm7": NamedArm("xarm_description/urdf/xarm7.urdf", "link_eef"),
-    "baxter": NamedArm("baxter_description/urdf/baxter.urdf", "left_gripper"),
+    "baxter": NamedArm(
+        "baxter_description/urdf/baxter.urdf",
+        "left_gripper",
+        touching=(
+            ("left_upper_shoulder", "left_upper_elbow"),
+            ("left_wrist", "left_upper_forearm_visual"),
+        ),
+    ),
     "tiago": NamedArm("tiago_description/robots/tiago.urdf", "arm_tool_link"),
-    "pr2": NamedArm("pr2_description/urdf/pr2.urdf", "r_gripper_tool_frame"),
+    "pr2": NamedArm(
+        "pr2_description/urdf/pr2.urdf",
+        "r_gripper_tool_frame",
+        touching=(("r_shoulder_pan_link", "r_upper_arm_link"),),
+    ),
     "ur5": NamedArm("ur_description/urdf/ur5_robot.urdf", "tool0"),
     "ur10": NamedArm("ur_description/urdf/ur10_robot.urdf", "tool0"),
     "kinova": NamedArm("kinova_description/robots/kinova.urdf", "j2s6s200_end_effector"),
@@ -91,7 +106,8 @@ def load_robot(
     """
     if isinstance(robot, str) and robot in NAMED_ARMS:
         arm = NAMED_ARMS[robot]
-        return build_robot(_read_named(arm), tool or arm.tool, lock or {})
+        named = build_robot(_read_named(arm), tool or arm.tool, lock or {})
+        return dataclasses.replace(named, touching=arm.touching)
     path = Path(robot)
     if path.suffix != ".urdf":
         raise RobotError(
@@ -162,13 +178,15 @@ def rebuild_robot(
     continuous: Sequence[str],
     tool: str,
     locked: Mapping[str, float],
+    touching: Sequence[Sequence[str]],
 ) -> RobotModel:
     """Build an arm from what a saved plan carries of it."""
     urdf = parse_urdf(text, source=source, package_dirs=tuple(package_dirs))
     # The text has the continuous joints as revolute ones already.
     for name in continuous:
         urdf.joints[name] = dataclasses.replace(urdf.joints[name], kind="continuous")
-    return build_robot(urdf, tool, locked)
+    pairs = tuple((first, second) for first, second in touching)
+    return dataclasses.replace(build_robot(urdf, tool, locked), touching=pairs)
 
 
 def _read_named(arm: NamedArm) -> Urdf:

@@ -42,6 +42,8 @@ class RobotModel:
         Index of the tool frame in `model`.
     urdf : Urdf
         What it was made from.
+    touching : tuple of (str, str)
+        Pairs of links whose bodies overlap as they are made, which no check looks at.
     """
 
     name: str
@@ -54,6 +56,7 @@ class RobotModel:
     model: Any = field(repr=False)
     tool_id: int = field(repr=False)
     urdf: Urdf = field(repr=False)
+    touching: tuple[tuple[str, str], ...] = ()
     _per_thread: threading.local = field(default_factory=threading.local, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -78,6 +78,11 @@ class Urdf:
         """Digest of the text; two robots with the same digest have the same kinematics."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
+    @property
+    def has_collisions(self) -> bool:
+        """Whether any link has a collision element."""
+        return "<collision" in self.text
+
     def has_changed(self) -> bool:
         """Whether the file that it was read from is there, and other than it was then."""
         file = Path(self.source)
