@@ -103,14 +103,17 @@ def _task(robot: sm.RobotModel) -> str:
 def main(
     count: Annotated[int, typer.Option(help="How many motions of each kind.")] = 300,
     seed: Annotated[int, typer.Option(help="Of the first one.")] = 0,
+    kinds: Annotated[str, typer.Option(help="Which of them.")] = "plates,limits,seams",
 ) -> None:
     """Make motions, certify and judge, tell counts and prices."""
     console, wrong = Console(), False
-    for name, scenes in (
-        ("plates", made(among_plates, count, seed)),
-        ("limits", made(near_limits, count, seed)),
-        ("seams", along_seams(count, seed)),
-    ):
+    makers = {
+        "plates": lambda: made(among_plates, count, seed),
+        "limits": lambda: made(near_limits, count, seed),
+        "seams": lambda: along_seams(count, seed),
+    }
+    for name in kinds.split(","):
+        scenes = makers[name]()
         verified = valid = false = strict = 0
         for number, scene in enumerate(scenes):
             certificate, found = scene.certify(), scene.judge.judge(scene.motion)
