@@ -3,16 +3,16 @@
 Each is made from a number, as what `selfmotion.certify` takes and as what `oracle.Judge` knows.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
-from oracle import Arm, Judge, cubic
+from oracle import Judge
+from own_kinematics import Arm, cubic
 from selfmotion.basics import Array
 
 # Half of what a critical quantity may lie beside its limit, as a share.
@@ -133,7 +133,7 @@ def _plate(name: str, known: Arm, motion: sm.Trajectory, rng: np.random.Generato
     link, solid = known.solids[rng.integers(len(known.solids))]
     t = rng.uniform(0.0, motion.t[-1]) + np.array([0.0, 1e-4])
     t -= max(0.0, t[-1] - motion.t[-1])
-    turn, at = solid.placed(known.place(link, cubic(motion, t, 0)))
+    _, at = solid.placed(known.place(link, cubic(motion, t, 0)))
     way = at[1] - at[0]
     normal = way / max(float(np.linalg.norm(way)), 1e-12)
     if np.linalg.norm(way) < 1e-9:  # a body that a joint turns about its own middle
@@ -206,13 +206,12 @@ def seams(number: int, robot: sm.RobotModel, start: Array) -> list[Scene]:
     path = seam(number, robot, start)
     task = ("position", "pointing", "pose")[number % 3]
     try:
-        plan = sm.plan(
-            sm.Problem(robot, path, task, start), max_evaluations=3
-        )
+        plan = sm.plan(sm.Problem(robot, path, task, start), max_evaluations=3)
     except sm.SelfmotionError:
         return []
-    judge = Judge.of(plan)
-    found = [Scene(judge, plan.trajectory, plan.requirements)]
+    # Its bodies are meshes, of which the judge knows nothing.
+    judge = replace(Judge.of(plan), bodies=())
+    found = [Scene(judge, plan.trajectory)]
     for spoil in (_thinned, _moved):
         motion = spoil(plan.trajectory, rng)
         wide = replace(judge, tolerance=sm.Tolerance(1.0, 1.0))
@@ -222,7 +221,7 @@ def seams(number: int, robot: sm.RobotModel, start: Array) -> list[Scene]:
         linear = max(shares["position"] * (share if rng.uniform() < 0.7 else 2.0), 1e-9)
         angular = max(shares["rotation"] * share, 1e-9)
         near = replace(judge, tolerance=sm.Tolerance(float(linear), float(angular)))
-        found.append(Scene(near, motion, plan.requirements))
+        found.append(Scene(near, motion))
     return found
 
 
@@ -239,5 +238,3 @@ def _moved(motion: sm.Trajectory, rng: np.random.Generator) -> sm.Trajectory:
     q[rows] += rng.normal(size=q[rows].shape) * 10.0 ** rng.uniform(-7, -4)
     qd[rows] += rng.normal(size=q[rows].shape) * 10.0 ** rng.uniform(-6, -2)
     return sm.Trajectory(motion.t, q, qd, motion.joint_names)
-
-

@@ -156,7 +156,9 @@ def build(words: Generated, folder: Path) -> sm.Problem:
     if words.odd in ("nan", "shape", "far"):
         start = {"nan": q * np.nan, "shape": q[:-1], "far": q + 3.0}[words.odd]
     limits = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
-    wanted = [_constraint(name, words, robot, path, task, folder, rng) for name in words.constraints]
+    wanted = [
+        _constraint(name, words, robot, path, task, folder, rng) for name in words.constraints
+    ]
     replaced = {type(item) for item in wanted}
     return sm.Problem(
         robot,
@@ -171,16 +173,16 @@ def build(words: Generated, folder: Path) -> sm.Problem:
     )
 
 
-def _path(
-    kind: str, poses: list[pin.SE3], duration: float, rng: np.random.Generator
-) -> sm.Path:
+def _path(kind: str, poses: list[pin.SE3], duration: float, rng: np.random.Generator) -> sm.Path:
     first, second = poses[:2]
     if kind in ("line", "constant"):
         law = {"line": "minimum_jerk", "constant": "constant"}[kind]
         return sm.Line(first, second, duration, law)
     if kind == "circle":
         radius, normal = rng.uniform(0.01, 0.08), rng.normal(size=3)
-        return sm.Circle.around(first, radius, duration, normal=normal, turn_tool=rng.random() < 0.2)
+        return sm.Circle.around(
+            first, radius, duration, normal=normal, turn_tool=rng.random() < 0.2
+        )
     if kind == "twist":
         v = rng.uniform(-0.1, 0.1, 6) / duration
         return sm.TwistPath(first, lambda t: v * np.sin(np.pi * t / duration), duration)
@@ -236,9 +238,7 @@ def _constraint(
     return makers[name]()
 
 
-def _obstacle(
-    kind: str, reach: float, folder: Path, rng: np.random.Generator
-) -> sm.Obstacle:
+def _obstacle(kind: str, reach: float, folder: Path, rng: np.random.Generator) -> sm.Obstacle:
     away = rng.normal(size=3)
     pose = pin.SE3(
         pin.exp3(rng.uniform(-2, 2, 3)), away / np.linalg.norm(away) * reach * rng.uniform(0.2, 1.0)

@@ -1,10 +1,9 @@
 """'verified' means at all times: judged by `oracle`, which shares no code with the certificate.
 
-The judge's own tests come first, then motions that are made to deceive, then what did deceive once.
+The judge's own tests come first, then motions that are made to deceive it, then certificates that
+are broken on purpose.
 """
 
-import sys
-import threading
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,9 +12,9 @@ import pytest
 
 import selfmotion as sm
 from conftest import PANDA_HOME, robot_named
-from oracle import Arm, Judge, cubic
-from scenes import Followed, Scene, among_plates, coarse, near_limits, seams
-from selfmotion.basics import Array
+from oracle import Judge
+from own_kinematics import Arm, cubic
+from scenes import Scene, among_plates, coarse, near_limits, seams
 from selfmotion.certificate import check as check_module
 from selfmotion.certificate import path_error
 
@@ -77,13 +76,25 @@ def test_limits_between_samples(tmp_path: Path) -> None:
     assert all(verified for verified, valid in outcomes if valid)
 
 
-def test_noisy_seams() -> None:
-    """Errors near the tolerance that peak between the times that anything looks at."""
+@pytest.fixture(scope="module")
+def along_seams() -> list[Scene]:
     panda = robot_named("panda")
-    outcomes = [
-        assert_confirmed(scene) for number in range(3) for scene in seams(number, panda, PANDA_HOME)
-    ]
-    assert len(outcomes) == 9
+    return [scene for number in (1, 2) for scene in seams(number, panda, PANDA_HOME)]
+
+
+def test_noisy_seams(along_seams: list[Scene]) -> None:
+    """Errors near the tolerance that peak between the times that anything looks at."""
+    outcomes = [assert_confirmed(scene) for scene in along_seams]
+    assert len(outcomes) == 6
+    assert all(verified for verified, valid in outcomes if valid)
+
+
+def test_thin_plates_between_samples(tmp_path: Path) -> None:
+    outcomes = []
+    for number in FEW:
+        (tmp_path / str(number)).mkdir()
+        outcomes.append(assert_confirmed(among_plates(number, tmp_path / str(number))))
+    assert {verified for verified, _ in outcomes} == {True, False}
     assert all(verified for verified, valid in outcomes if valid)
 
 
@@ -97,21 +108,23 @@ def refuted(scenes: list[Scene]) -> list[tuple[str, ...]]:
 
 
 def test_a_certificate_that_looks_at_the_samples_alone_is_refuted(
-    monkeypatch: pytest.MonkeyPatch,
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def at_ends(robot, path, task, motion, relaxations, intervals, count):
-        shares = np.array([0.0, 1.0])
-        t = intervals[:, :1] + np.diff(intervals, axis=1) * shares
-        q = motion(np.minimum(t, intervals[:, 1:]).ravel())
-        miss = path_error.deviation_from(robot, path, task, t.ravel(), q, False)
-        values = path_error._quantities(miss.reshape(len(t), 2, 6), t, path.duration, relaxations)
-        return path_error._Bounds(values.max(axis=1), t[:, :1] + 0.0 * values[:, 0], values[:, :, :2].max(axis=1))
+        q = motion(intervals.ravel())
+        miss = path_error.deviation_from(robot, path, task, intervals.ravel(), q, False)
+        miss = miss.reshape(len(intervals), 2, 6)
+        values = path_error._quantities(miss, intervals, path.duration, relaxations).max(axis=1)
+        return path_error._Bounds(values, intervals[:, :1] + 0.0 * values, values[:, :2])
 
-    panda = robot_named("panda")
-    scenes = [scene for number in range(3) for scene in seams(number, panda, PANDA_HOME)]
-    assert not refuted(scenes)
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
+    motion = sm.plan(sm.Problem(panda, path, start=PANDA_HOME), max_evaluations=3).trajectory
+    keep = np.arange(0, len(motion.t), 2)
+    motion = sm.Trajectory(motion.t[keep], motion.q[keep], motion.qd[keep], motion.joint_names)
+    scene = Scene(Judge(panda, path), motion)
+    assert not refuted([scene])
     monkeypatch.setattr(path_error, "_bounds", at_ends)
-    assert refuted(scenes)
+    assert "position" in refuted([scene])[0][0]
 
 
 @dataclass(frozen=True)
@@ -125,233 +138,25 @@ class Blind(sm.Requirement):
 
 
 def test_a_requirement_that_everything_keeps_is_refuted(tmp_path: Path) -> None:
-    made = [near_limits(number, tmp_path) for number in range(2, 32, 3)]
-    assert any("order 2" in text for item in refuted(
-        [replace(scene, requirements=[Blind()]) for scene in made]
-    ) for text in item)
-    plates = []
-    for number in FEW:
+    scenes = []
+    for number in range(24):
         (tmp_path / str(number)).mkdir()
-        scene = among_plates(number, tmp_path / str(number))
-        plates.append(replace(scene, requirements=[Blind()]))
-    assert any("apart" in text for item in refuted(plates) for text in item)
+        maker = near_limits if number % 3 == 2 else among_plates
+        scene = maker(number, tmp_path / str(number))
+        scenes.append(replace(scene, requirements=[Blind()]))
+    found = " ".join(text for item in refuted(scenes) for text in item)
+    assert "order 2" in found
+    assert "apart" in found
 
 
 def test_a_certificate_without_the_arms_limits_is_refuted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scenes = []
-    for number in range(0, 15):
+    for number in range(15):
         (tmp_path / str(number)).mkdir()
         scenes.append(near_limits(number, tmp_path / str(number)))
-    assert not refuted(scenes)
     monkeypatch.setattr(check_module, "arm_limits", lambda *_: ())
     found = " ".join(text for item in refuted(scenes) for text in item)
     assert "limits" in found
     assert "order 1" in found
-
-
-# --- what was called verified once, and is not
-
-
-def still(panda: sm.RobotModel) -> tuple[sm.Path, Array]:
-    pose = panda.pose(PANDA_HOME)
-    return sm.Waypoints.from_poses([0.0, 1.0], [pose, pose]), PANDA_HOME.copy()
-
-
-def test_speed_beyond_its_limit_between_two_samples(panda: sm.RobotModel) -> None:
-    """From rest to rest: the peak is 1.5 times the mean, at none of five points."""
-    path, q = still(panda)
-    ends = np.array([q, q])
-    ends[1, 6] += panda.velocity_limit[6] / 1.5 * 1.035
-    motion = sm.Trajectory([0.0, 1.0], ends, np.zeros((2, 7)), panda.joint_names)
-    certificate = sm.certify(panda, path, "pointing", motion)
-    assert certificate.velocity_ratio.value == pytest.approx(1.035, rel=1e-9)
-    assert "moves at 1.035 times its limit" in certificate.verdict
-
-
-def test_a_joint_beyond_its_limit_between_two_samples(panda: sm.RobotModel) -> None:
-    path, q = still(panda)
-    ends, rates = np.array([q, q]), np.zeros((2, 7))
-    ends[:, 6] = panda.upper[6] - 0.245
-    rates[:, 6] = 1.0, -1.0
-    motion = sm.Trajectory([0.0, 1.0], ends, rates, panda.joint_names)
-    certificate = sm.certify(panda, path, "pointing", motion)
-    assert certificate.limit_margin.value == pytest.approx(-0.005, abs=1e-12)
-    assert not certificate.verified
-
-
-@pytest.mark.parametrize("count", [300, 3000])
-def test_one_waypoint_off_by_five_millimetres_is_met_or_missed_by_name(
-    panda: sm.RobotModel, count: int
-) -> None:
-    t = np.linspace(0.0, 20.0, count)
-    points = PANDA_POINT + np.outer(np.sin(0.3 * t), [0.02, 0.05, 0.0])
-    k = int(0.3123 * count)
-    turns = np.tile([0.0, 1.0, 0.0, 0.0], (count, 1))
-    smooth = sm.Waypoints(t, points, turns)
-    plan = sm.plan(sm.Problem(panda, smooth), max_evaluations=3)
-    assert plan.certificate.verified
-    spiked = points.copy()
-    spiked[k, 2] += 0.005
-    certificate = sm.certify(panda, sm.Waypoints(t, spiked, turns), "pose", plan.trajectory)
-    assert not certificate.verified
-    assert certificate.position_error.value >= 0.005 - 1e-6
-    assert certificate.position_error.time == pytest.approx(t[k], abs=1.5 * t[1])
-
-
-PANDA_POINT = np.array([0.5, 0.0, 0.3])
-
-
-@pytest.mark.parametrize("corners", ["blend", "stop"])
-def test_the_tool_rests_in_a_pause(panda: sm.RobotModel, corners: str) -> None:
-    poses = [panda.pose(PANDA_HOME).copy() for _ in range(4)]
-    for pose, shift in zip(poses, ([0, 0, 0], [0, 0.2, 0], [0, 0.2, 0], [0.1, 0.2, 0]), strict=True):
-        pose.translation = pose.translation + np.array(shift)
-    path = sm.Waypoints.from_poses([0.0, 4.0, 6.0, 10.0], poses, corners=corners)
-    np.testing.assert_array_equal(path.corner_times, [4.0, 6.0])
-    plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME), max_evaluations=3).require()
-    _, at = Arm(panda).place(panda.tool, plan.trajectory(np.linspace(4.0, 6.0, 101)))
-    np.testing.assert_allclose(at, np.tile(poses[1].translation, (101, 1)), atol=1e-6)
-
-
-@pytest.mark.parametrize("when", [0.5, 0.37, 1.0 / 3.0, 0.9999, 1e-4])
-def test_a_velocity_that_jumps_is_refused(panda: sm.RobotModel, when: float) -> None:
-    with pytest.raises(sm.PathError, match=r"jumps|not smooth"):
-        sm.TwistPath(panda.pose(PANDA_HOME), lambda t: [0.0, 0.1 * (t > when), 0.0], 1.0)
-
-
-@pytest.fixture(scope="module")
-def line_plan() -> sm.Plan:
-    panda = robot_named("panda")
-    pose = panda.pose(PANDA_HOME)
-    end = pose.copy()
-    end.translation = end.translation + np.array([0.0, 0.1, 0.0])
-    return sm.plan(sm.Problem(panda, sm.Line(pose, end, 2.0), start=PANDA_HOME)).require()
-
-
-def test_joints_are_told_by_name(line_plan: sm.Plan) -> None:
-    motion, panda = line_plan.trajectory, line_plan.robot
-    names = panda.joint_names
-
-    def certified(motion: sm.Trajectory) -> sm.Certificate:
-        return sm.certify(panda, line_plan.path, "pose", motion)
-
-    turned = sm.Trajectory(motion.t, motion.q[:, ::-1], motion.qd[:, ::-1], names[::-1])
-    assert certified(turned).verified
-    assert not certified(sm.Trajectory(motion.t, motion.q, motion.qd, names[::-1])).verified
-    with pytest.raises(sm.FileFormatError, match="joint 'panda_joint7' is missing"):
-        certified(sm.Trajectory(motion.t, motion.q, motion.qd, (*names[:-1], "wrist")))
-
-
-def test_limits_that_cannot_be_meant_are_refused(panda: sm.RobotModel) -> None:
-    with pytest.raises(sm.ProblemError, match="expected numbers > 0"):
-        sm.JointVelocityLimits(-np.ones(7)).requirement(panda)
-    with pytest.raises(sm.ProblemError, match="limits are in radians"):
-        sm.JointPositionLimits(np.full(7, -170.0), np.full(7, 170.0)).requirement(panda)
-    with pytest.raises(sm.RobotError, match="'panda_joint1' at 99 rad or m, beyond its limits"):
-        sm.load_robot("panda", lock={"panda_joint1": 99.0})
-    path, q = still(panda)
-    q[0] += 2.0 * np.pi
-    motion = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), panda.joint_names)
-    wide = sm.JointPositionLimits(np.full(7, -7.0), np.full(7, 7.0)).requirement(panda)
-    assert not sm.certify(panda, path, "pose", motion, requirements=[wide]).verified
-
-
-def test_a_plan_that_was_changed_on_disk_is_not_verified(
-    line_plan: sm.Plan, tmp_path: Path
-) -> None:
-    file = tmp_path / "plan.npz"
-    line_plan.save(file)
-    assert sm.load_plan(file).require().check().verified
-    arrays = dict(np.load(file))
-    for change in ({"q": arrays["q"] + 0.1}, {"qd": arrays["qd"] * 1.1}):
-        np.savez_compressed(file, **(arrays | change))
-        altered = sm.load_plan(file)
-        assert not altered.check().verified
-        with pytest.raises(sm.PlanError, match="was changed after the plan was written"):
-            altered.require()
-
-
-FINGERS = "".join(
-    f'<link name="f_{name}"><collision><geometry><box size="0.02 0.02 0.05"/></geometry>'
-    f'</collision></link><joint name="g_{name}" type="prismatic"><parent link="l2"/>'
-    f'<child link="f_{name}"/><origin xyz="0 {0.03 * side} 0.1"/><axis xyz="0 {side} 0"/>'
-    f'<limit lower="0" upper="0.3" velocity="1" effort="1"/>{mimic}</joint>'
-    for name, side, mimic in (("left", 1, ""), ("right", -1, '<mimic joint="g_left"/>'))
-)
-
-
-def test_a_locked_joint_moves_the_one_that_mimics_it(tmp_path: Path) -> None:
-    joints = "".join(
-        f'<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="l{k - 1}"/>'
-        f'<child link="l{k}"/><origin xyz="0 0 0.3"/><axis xyz="0 0 1"/>'
-        f'<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>'
-        for k in (1, 2)
-    )
-    file = tmp_path / "gripper.urdf"
-    file.write_text(f'<robot name="g"><link name="l0"/>{joints}{FINGERS}</robot>')
-    robot = sm.load_robot(file, "l2", {"g_left": 0.3})
-    assert robot.locked == {"g_left": 0.3, "g_right": 0.3}
-    model = sm.CollisionModel(robot, [sm.Sphere("ball", [0.0, -0.33, 0.7], 0.03)])
-    assert model.distance([0.0, 0.0]).value < 0.0
-    with pytest.raises(sm.RobotError, match="it mimics 'g_left' and stands at 0.3"):
-        sm.load_robot(file, "l2", {"g_left": 0.3, "g_right": 0.0})
-
-
-@pytest.mark.parametrize("argument", ["qd", "q", "t"])
-def test_a_cost_that_writes_to_its_arguments_is_told(line_plan: sm.Plan, argument: str) -> None:
-    def careless(qd: Array, q: Array, t: Array) -> Array:
-        {"qd": qd, "q": q, "t": t}[argument][:] = 0.0
-        return np.sum(qd**2, axis=1)
-
-    costs = [sm.JointVelocity(), sm.FunctionCost(careless)]
-    with pytest.raises((ValueError, sm.ProblemError), match="read-only"):
-        sm.plan(replace(line_plan.problem, costs=costs))
-
-
-def test_a_loop_of_links_beside_the_tree_is_refused(tmp_path: Path) -> None:
-    loop = "".join(
-        f'<joint name="k{one}" type="fixed"><parent link="z{one}"/><child link="z{two}"/></joint>'
-        for one, two in ((1, 2), (2, 1))
-    )
-    file = tmp_path / "island.urdf"
-    file.write_text(
-        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
-        '<parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint><link name="z1"/>'
-        f'<link name="z2"/>{loop}</robot>'
-    )
-    with pytest.raises(sm.RobotError, match="its joints form a loop"):
-        sm.load_robot(file, tool="z1")
-
-
-# --- threads
-
-
-def test_a_robot_may_be_shared_by_threads(panda: sm.RobotModel, line_plan: sm.Plan) -> None:
-    """With a switch every microsecond: the same poses and plans as by one thread alone."""
-    q = PANDA_HOME + 0.01 * np.arange(50)[:, None]
-    poses = [panda.pose(x).homogeneous for x in q]
-    problem = replace(line_plan.problem, costs=[sm.JointVelocity()])
-    alone = sm.plan(problem, max_evaluations=3).trajectory.q
-    wrong: list[str] = []
-
-    def work() -> None:
-        for _ in range(20):
-            for x, pose in zip(q, poses, strict=True):
-                if not np.array_equal(panda.pose(x).homogeneous, pose):
-                    wrong.append("pose")
-        if not np.array_equal(sm.plan(problem, max_evaluations=3).trajectory.q, alone):
-            wrong.append("plan")
-
-    interval = sys.getswitchinterval()
-    sys.setswitchinterval(1e-6)
-    try:
-        threads = [threading.Thread(target=work) for _ in range(3)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    finally:
-        sys.setswitchinterval(interval)
-    assert wrong == []

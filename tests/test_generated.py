@@ -66,5 +66,3 @@ def test_what_is_wrong_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         end = end_of(SIMPLE, max_evaluations=3, patience=1)
         assert end.kind == kind
         assert end.is_wrong
-
-

@@ -221,7 +221,7 @@ def _check_joint(joint: Any, source: str) -> None:
     for name in ("velocity", "effort"):
         if limit is not None and getattr(limit, name) is None:
             raise RobotError(
-                f"{where} has a <limit> without {name}; add {name}=\"…\", 0 where there is none"
+                f'{where} has a <limit> without {name}; add {name}="…", 0 where there is none'
             )
     if joint.type == "continuous":
         return
