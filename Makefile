@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-peers suite suite-made fuzz distances study clean
+.PHONY: demo test lint format bench bench-peers suite suite-made fuzz fuzz-certificate fuzz-generated distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -47,6 +47,12 @@ suite-made: $(READY)  ## 12 problems made at random that have a known motion, pl
 
 fuzz: $(READY)  ## 200 random paths, judged by an independent checker
 	$(BIN)/python benchmarks/fuzz.py
+
+fuzz-certificate: $(READY)  ## 900 motions made to deceive, judged independently; the price of proof
+	$(BIN)/python benchmarks/certificate.py
+
+fuzz-generated: $(READY)  ## 5,000 generated problems: confirmed verdicts and typed errors only
+	$(BIN)/python benchmarks/generated.py
 
 distances: $(READY)  ## 100,000 distances of bodies of all kinds, judged without GJK
 	$(BIN)/python benchmarks/distances.py

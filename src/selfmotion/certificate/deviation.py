@@ -39,7 +39,7 @@ def smallest_singular_values(robot: RobotModel, task: Task, q: Array) -> Array:
     for k, configuration in enumerate(q):
         pin.computeJointJacobians(model, data, configuration)
         rotation[k] = pin.updateFramePlacement(model, data, tool).rotation
-        jacobian[k] = pin.getFrameJacobian(model, data, tool, _AXES)
+        jacobian[k] = pin.getFrameJacobian(model, data, tool, _AXES).reshape(6, -1)
     values = np.linalg.svd(task.select_along(jacobian, rotation), compute_uv=False)
     return values[:, -1].astype(np.float64)
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, ProblemError
 from selfmotion.certificate.deviation import deviation_from, deviation_size, excess
 from selfmotion.certificate.findings import Extreme, Tolerance
 from selfmotion.motion import Trajectory
@@ -29,6 +29,8 @@ _FEW, _MANY, _CROWD = 5, 9, 4096
 _DENSE = 33
 # No joint moves more than this [rad or m] in one interval: the deviation is smooth on its scale.
 _TRAVEL = 0.2
+# Where joints turn farther from one sample to the next [rad or m], the path is not looked for.
+_WILD = 200.0
 # An interval is halved this many times before it counts as undecided.
 _DEPTH = 12
 # Marks nearer to each other than this share of the duration are one.
@@ -75,6 +77,7 @@ def bound_errors(
     relaxations: Sequence[Relaxation],
 ) -> PathCheck:
     """Bound the errors of a motion; parameters as in `certify`."""
+    _check_times(path, trajectory)
     allowed = np.array([tolerance.position, tolerance.rotation])
     edges = _edges(path, trajectory, relaxations)
     pending = np.stack([edges[:-1], edges[1:]], axis=1)
@@ -98,10 +101,34 @@ def bound_errors(
         middle = pending[unsettled].mean(axis=1)
         halves = [pending[unsettled, 0], middle, middle, pending[unsettled, 1]]
         pending = np.stack(halves, axis=1).reshape(-1, 2)
-    gaps = tuple((float(a), float(b)) for a, b in pending[unsettled])
+    gaps = tuple((float(a), float(b)) for a, b in [*pending[unsettled], *_wild(trajectory)])
     names = (robot.tool, robot.tool, *(item.name for item in relaxations))
     extremes = tuple(replace(one, name=name) for one, name in zip(worst, names, strict=True))
     return PathCheck(extremes[0], extremes[1], extremes[2:], gaps, samples + 1)
+
+
+def _check_times(path: Path, trajectory: Trajectory) -> None:
+    """Refuse a motion that begins before or after its path: a part of one would not be judged."""
+    first = float(trajectory.t[0])
+    if not abs(first) <= 1e-9 * path.duration:
+        raise ProblemError(
+            f"the motion begins at t = {first:.6g} s, its path at 0: take {first:.6g} s from its "
+            f"times"
+        )
+
+
+def _wild(trajectory: Trajectory) -> Array:
+    """Return the intervals (K, 2) on which some joint turns many times, which no arm does."""
+    rows = np.flatnonzero(_travel(trajectory, trajectory.t) > _WILD)
+    return np.stack([trajectory.t[rows], trajectory.t[rows + 1]], axis=1)
+
+
+def _travel(trajectory: Trajectory, marks: Array) -> Array:
+    """Return how far joints go at most between marks (M,), about, (M - 1,) [rad or m]."""
+    lengths = np.diff(marks)
+    inner = marks[:-1, None] + lengths[:, None] * np.linspace(0.0, 1.0, 5)
+    speeds = np.abs(trajectory(np.minimum(inner.ravel(), marks[-1]), order=1)).max(axis=1)
+    return np.asarray(lengths * speeds.reshape(inner.shape).max(axis=1))
 
 
 def _larger(worst: Extreme, values: Array, times: Array) -> Extreme:
@@ -109,7 +136,7 @@ def _larger(worst: Extreme, values: Array, times: Array) -> Extreme:
     if not len(values):
         return worst
     k = int(np.argmax(np.where(np.isnan(values), np.inf, values)))
-    if values[k] <= worst.value:
+    if np.isnan(worst.value) or values[k] <= worst.value:
         return worst
     return Extreme(float(values[k]), float(times[k]), worst.name)
 
@@ -125,11 +152,7 @@ def _edges(path: Path, trajectory: Trajectory, relaxations: Sequence[Relaxation]
     kept = np.append(True, gaps > _SAME * path.duration)
     marks = marks[kept]
     marks[-1] = end
-    # |Δq| is at most the interval's length by the largest speed at its points, for a cubic.
-    shares = np.linspace(0.0, 1.0, 5)
-    inner = marks[:-1, None] + np.diff(marks)[:, None] * shares
-    speeds = np.abs(trajectory(inner.ravel(), order=1)).max(axis=1).reshape(inner.shape)
-    travel = np.diff(marks) * speeds.max(axis=1)
+    travel = np.minimum(_travel(trajectory, marks), _WILD)
     pieces = np.maximum(np.ceil(travel / _TRAVEL), 1.0).astype(int)
     fine = [
         first + (last - first) * np.arange(number) / number

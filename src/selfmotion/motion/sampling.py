@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, read_only
 
 _STENCIL = 5
 
@@ -30,6 +30,10 @@ class Sampling:
     t: Array
     weights: Array
     nodes: npt.NDArray[np.intp]
+
+    def __post_init__(self) -> None:
+        # Costs are handed these times.
+        object.__setattr__(self, "t", read_only(self.t))
 
     @classmethod
     def trapezoidal(cls, t: Array) -> "Sampling":

@@ -212,7 +212,7 @@ def _stationary(motion: Trajectory, order: int) -> Array:
     b, c = 3.0 * rise - 2.0 * a - z, a + z - 2.0 * rise
     ends = [np.zeros_like(rise), np.ones_like(rise)]
     inner: list[Array] = []
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         if order == 1:
             inner = [-b / (3.0 * c)]
         elif order == 0:

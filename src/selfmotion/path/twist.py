@@ -176,6 +176,7 @@ def _resolve(
             middle = 0.5 * (left + right)
             pending += [(middle, right), (left, middle)]
     _check_jumps(breaks, pieces, scale)
+    _check_ends(velocity, duration, pieces, scale)
     return breaks, pieces
 
 
@@ -188,6 +189,19 @@ def _check_jumps(breaks: list[float], pieces: list[Array], scale: float) -> None
             raise PathError(
                 f"twist path: the velocity jumps by {size:.3g} m/s or rad/s at t = {time:.6g} s; "
                 f"no arm follows that: split the path there, or give poses (Waypoints)"
+            )
+
+
+def _check_ends(
+    velocity: Callable[[float], npt.ArrayLike], duration: float, pieces: list[Array], scale: float
+) -> None:
+    """Refuse a velocity that jumps next to an end, where no point lies that is looked at."""
+    for time, place, piece in ((0.0, -1.0, pieces[0]), (duration, 1.0, pieces[-1])):
+        jump = float(np.abs(chebyshev.chebval(place, piece) - _sample(velocity, time)).max())
+        if not jump <= _JUMP * max(scale, 1e-300):
+            raise PathError(
+                f"twist path: the velocity jumps by {jump:.3g} m/s or rad/s next to t = "
+                f"{time:.6g} s; no arm follows that"
             )
 
 

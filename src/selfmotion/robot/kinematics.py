@@ -41,7 +41,8 @@ class ToolKinematics:
         pin.computeJointJacobians(self._model, self._data, q)
         pin.updateFramePlacement(self._model, self._data, self._tool_id)
         jacobian: Array = pin.getFrameJacobian(self._model, self._data, self._tool_id, _AXES)
-        return jacobian
+        # Of a single joint it comes as a vector.
+        return jacobian.reshape(6, -1)
 
     def place(self, q: Array) -> pin.SE3:
         """Return the tool's pose at `q` (n,), a copy; cheaper than with its Jacobian."""

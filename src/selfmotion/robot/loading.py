@@ -141,6 +141,12 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
     if not free:
         raise RobotError(f"{urdf.source}: no joint is left free between the root and '{tool}'")
     locked = _locked_joints(urdf, full, free, lock)
+    for name in locked:
+        if name in urdf.links:
+            raise RobotError(
+                f"{urdf.source}: joint '{name}', which is held, and a link share their name; "
+                f"rename one of them"
+            )
     reference, locked_ids = locked_configuration(full, locked)
     model = pin.buildReducedModel(full, locked_ids, reference)
     names = tuple(model.names[1:])

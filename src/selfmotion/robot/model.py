@@ -224,8 +224,15 @@ class RobotModel:
         ------
         InverseKinematicsError
             No attempt arrived; says what the best one left over.
+        RobotError
+            The pose is no SE3.
         """
         task = Task.of(task)
+        if not isinstance(pose, pin.SE3):
+            raise RobotError(
+                f"{self.name}: the pose is a {type(pose).__name__}, expected a pinocchio.SE3; of a "
+                f"(4, 4) matrix that is pinocchio.SE3(matrix)"
+            )
         rng = np.random.default_rng(rng)
         lower, upper = self.finite_limits()
         start = 0.5 * (lower + upper) if seed is None else self.configuration(seed)

@@ -217,9 +217,14 @@ def _check_joint(joint: Any, source: str) -> None:
     axis = np.asarray(joint.axis, dtype=float)
     if not (np.all(np.isfinite(axis)) and np.linalg.norm(axis) > 1e-6):
         raise RobotError(f"{where} has axis {axis.tolist()}, expected a direction of length > 0")
+    limit = joint.limit
+    for name in ("velocity", "effort"):
+        if limit is not None and getattr(limit, name) is None:
+            raise RobotError(
+                f'{where} has a <limit> without {name}; add {name}="…", 0 where there is none'
+            )
     if joint.type == "continuous":
         return
-    limit = joint.limit
     if limit is None or limit.lower is None or limit.upper is None:
         raise RobotError(
             f"{where} is {joint.type} without lower and upper limits; add them, or make it "
@@ -230,8 +235,11 @@ def _check_joint(joint: Any, source: str) -> None:
             f"{where} has reversed limits: lower {limit.lower} is above upper {limit.upper}"
         )
     for name, value in (("lower", limit.lower), ("upper", limit.upper)):
-        if np.isnan(value):
-            raise RobotError(f"{where} has {name} limit {value}, expected a number")
+        if not np.isfinite(value):
+            raise RobotError(
+                f"{where} has {name} limit {value}, expected a number; without limits it is "
+                f"continuous"
+            )
     if limit.velocity is not None and not limit.velocity >= 0:
         raise RobotError(f"{where} has velocity limit {limit.velocity}, expected a number ≥ 0")
 

@@ -1,0 +1,68 @@
+"""Generated problems end in a plan whose verdict the judge confirms, or in a typed error."""
+
+import hypothesis
+import pytest
+
+import generated
+import selfmotion as sm
+from generated import Generated, end_of
+from strategies import problems
+
+# `make fuzz-generated` plans 5,000, with more evaluations and looking more closely.
+COUNT, EVALUATIONS, PER_INTERVAL = 300, 3, 40
+
+
+@hypothesis.settings(
+    max_examples=COUNT,
+    derandomize=True,
+    database=None,
+    deadline=None,
+    phases=[hypothesis.Phase.explicit, hypothesis.Phase.generate],
+    suppress_health_check=list(hypothesis.HealthCheck),
+)
+@hypothesis.given(problems(most_joints=6))
+def test_generated_problems_end_well(words: Generated) -> None:
+    end = end_of(words, max_evaluations=EVALUATIONS, per_interval=PER_INTERVAL)
+    assert not end.is_wrong, (end.kind, end.text)
+
+
+SIMPLE = Generated(
+    joints=(("revolute", "0 0 1", ""),) * 4,
+    gripper=False,
+    locked=0,
+    path="line",
+    task="planar",
+    free=False,
+    constraints=(),
+    obstacles=(),
+    costs=(),
+    null_motion="polynomial",
+    relaxed="",
+    damped=False,
+    odd="",
+    seed=1,
+)
+
+
+def test_what_is_wrong_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """False verdicts, untyped exceptions and hangs each have a name."""
+    assert end_of(SIMPLE, max_evaluations=3).kind == "verified"
+    plan = sm.plan
+
+    def careless(problem: sm.Problem, **options: object) -> sm.Plan:
+        found = plan(problem, **options)
+        object.__setattr__(found.trajectory, "qd", 1.001 * found.trajectory.qd)
+        return found
+
+    def broken(*_: object, **__: object) -> sm.Plan:
+        raise KeyError("joint")
+
+    def endless(*_: object, **__: object) -> sm.Plan:
+        while True:
+            pass
+
+    for stand_in, kind in ((careless, "FALSE"), (broken, "UNTYPED"), (endless, "HANG")):
+        monkeypatch.setattr(generated.sm, "plan", stand_in)
+        end = end_of(SIMPLE, max_evaluations=3, patience=1)
+        assert end.kind == kind
+        assert end.is_wrong
