@@ -10,7 +10,7 @@ import pytest
 import selfmotion as sm
 from conftest import central_difference, objective_of
 from selfmotion.basics.arrays import Array
-from selfmotion.costs import PathError
+from selfmotion.costs import OffPath
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart
 from selfmotion.motion.grid import Grid
@@ -93,7 +93,7 @@ def test_damped_gradient_equals_central_differences(case: Case) -> None:
     start = case[2]
     rollout = partly_damped(case)
     table = table_of(rollout)
-    away = PathError(1e3, case[1].dimension)
+    away = OffPath(1e3, case[1].dimension)
     costs = [sm.JointVelocity(), sm.Manipulability(0.7), away]
     objective = objective_of(rollout, table, costs, FixedStart(start))
     x = 0.1 * np.random.default_rng(7).normal(size=objective.size)

@@ -11,7 +11,7 @@ import pytest
 import selfmotion as sm
 from conftest import PANDA_HOME, central_difference, objective_of, robot_named, short_line, start_of
 from selfmotion.basics.arrays import Array
-from selfmotion.costs import PathError
+from selfmotion.costs import OffPath
 from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.objective import Objective
 from selfmotion.engine.rollout import Rollout
@@ -65,7 +65,7 @@ def objective_with(task: str, name: str, *, free: bool, damped: bool) -> Objecti
     return objective_of(
         Rollout(robot, path, rows, grid, damping=law),
         NullMotionTable(functions, None, robot.dof),
-        [*costs, PathError(100.0, rows.dimension)] if damped else costs,
+        [*costs, OffPath(100.0, rows.dimension)] if damped else costs,
         FreeStart(robot, rows, start) if free else FixedStart(start),
         deviation=Deviation(path, relaxations, grid.stage_times, (not free, False)),
     )

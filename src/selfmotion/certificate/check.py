@@ -8,7 +8,7 @@ from selfmotion.basics import Array, ProblemError
 from selfmotion.certificate.deviation import smallest_singular_values
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import arm_limits
-from selfmotion.certificate.path_error import check_path
+from selfmotion.certificate.path_error import bound_errors
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.certificate.verdict import Certificate
 from selfmotion.motion import Trajectory
@@ -63,7 +63,7 @@ def certify(
     tolerance, task = tolerance or Tolerance(), Task.of(task)
     trajectory = trajectory.of_joints(robot.joint_names)
     motion = FinishedMotion(robot, trajectory)
-    path_check = check_path(robot, path, task, trajectory, tolerance, relaxations)
+    path_check = bound_errors(robot, path, task, trajectory, tolerance, relaxations)
     position, rotation = path_check.position, path_check.rotation
     singular = smallest_singular_values(robot, task, motion.q)
     damped = () if damping is None else _damped_stretches(damping, motion.t, singular)

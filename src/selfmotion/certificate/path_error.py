@@ -68,7 +68,7 @@ class _Bounds(NamedTuple):
     measured: Array
 
 
-def check_path(
+def bound_errors(
     robot: RobotModel,
     path: Path,
     task: Task,

@@ -17,7 +17,7 @@ from selfmotion.costs.manipulability import (
     Manipulability,
     SmallestSingularValue,
 )
-from selfmotion.costs.path_error import PathError
+from selfmotion.costs.off_path import OffPath
 from selfmotion.costs.samples import Samples
 
 __all__ = [
@@ -34,8 +34,8 @@ __all__ = [
     "KineticEnergy",
     "LostCost",
     "Manipulability",
+    "OffPath",
     "Partials",
-    "PathError",
     "PathLength",
     "Posture",
     "Samples",

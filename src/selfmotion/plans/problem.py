@@ -19,7 +19,7 @@ from selfmotion.constraints import (
     JointPositionLimits,
     JointVelocityLimits,
 )
-from selfmotion.costs import Cost, JointVelocity, PathError
+from selfmotion.costs import Cost, JointVelocity, OffPath
 from selfmotion.motion import NullMotion, PolynomialNullMotion, Trajectory
 from selfmotion.path import Path
 from selfmotion.plans.relaxed_rows import check_relaxations
@@ -136,7 +136,7 @@ class Problem:
             return tuple(self.costs)
         rate = feedback_rate(self.path.duration)
         weight = self.damping.path_weight * (rate / self.damping_law.threshold) ** 2
-        return (*self.costs, PathError(float(weight), self.task.dimension))
+        return (*self.costs, OffPath(float(weight), self.task.dimension))
 
     @cached_property
     def own_collision(self) -> Clearance | None:

@@ -10,7 +10,7 @@ from selfmotion.motion import PolynomialNullMotion
 from selfmotion.robot import RobotModel, load_robot
 from selfmotion.study.context import Context, finely, run_published
 from selfmotion.study.engine import bind, optimum
-from selfmotion.study.results import Claim, Curve, Plot, Section, Verdict
+from selfmotion.study.results import Claim, Plot, PlottedCurve, Section, Verdict
 from selfmotion.task import Task
 
 # A norm of the coefficients at which, in the test of growth, the guard steps in.
@@ -42,7 +42,9 @@ def _velocity_term(context: Context) -> tuple[Plot, Claim]:
     _, tame = optimum(null, max_iterations=400)
     published = run_published(problem, max_iterations=8)
     curves = tuple(
-        Curve.of(label, np.arange(1, len(found.history)), [_norm(i.x) for i in found.history[1:]])
+        PlottedCurve.of(
+            label, np.arange(1, len(found.history)), [_norm(i.x) for i in found.history[1:]]
+        )
         for label, found in (("12 coefficients", wild), ("4 coefficients", tame))
     )
     plot = Plot(

@@ -18,7 +18,7 @@ from selfmotion.study.published import (
     flops_per_rate,
     published_null_motion,
 )
-from selfmotion.study.results import Claim, Curve, Plot, Section, Table, Verdict
+from selfmotion.study.results import Claim, Plot, PlottedCurve, Section, Table, Verdict
 
 # Iterations of the published scheme on each chain: the same for all, so that costs compare.
 _ITERATIONS = 4
@@ -103,7 +103,7 @@ def _growth(context: Context) -> tuple[Table, Plot, Claim]:
         f"Growth with the joints: n to the {power:.2f}",
         "joints n",
         "Mflop a gradient",
-        (Curve.of("published scheme", n, mflop, marker="o"),),
+        (PlottedCurve.of("published scheme", n, mflop, marker="o"),),
         "log",
         "log",
     )

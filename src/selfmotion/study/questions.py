@@ -20,7 +20,7 @@ from selfmotion.robot import load_robot
 from selfmotion.study.context import FINE, Context, finely
 from selfmotion.study.engine import bind, optimum
 from selfmotion.study.published import ODE23_TOLERANCE, PublishedFunction
-from selfmotion.study.results import Claim, Curve, Plot, Section, Table, Verdict
+from selfmotion.study.results import Claim, Plot, PlottedCurve, Section, Table, Verdict
 
 # A tolerance of the integrator, tight for its order.
 _TIGHT = 1e-6
@@ -106,7 +106,7 @@ def _differences(context: Context) -> _Answer:
     }
     deltas = context.scale.deltas
     errors = {label: _gradient_errors(context, *case) for label, case in cases.items()}
-    curves = tuple(Curve.of(label, deltas, e, marker="o") for label, e in errors.items())
+    curves = tuple(PlottedCurve.of(label, deltas, e, marker="o") for label, e in errors.items())
     plot = Plot(
         "differences",
         "Forward differences against exact gradients",
@@ -273,7 +273,7 @@ def _minima(context: Context) -> _Answer:
         f"Where {len(costs)} random starts end",
         "log₁₀ F",
         "starts",
-        (Curve.of("", middles, counts),),
+        (PlottedCurve.of("", middles, counts),),
         bars=True,
     )
     distinct = 1 + int(np.sum(np.diff(ordered) > 1e-3 * ordered[:-1]))

@@ -50,7 +50,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Curve:
+class PlottedCurve:
     """A line through points, in a plot."""
 
     label: str
@@ -68,7 +68,7 @@ class Curve:
         *,
         marker: str = "",
         faint: bool = False,
-    ) -> "Curve":
+    ) -> "PlottedCurve":
         """Return a curve through arrays."""
         return cls(
             label,
@@ -88,7 +88,7 @@ class Plot:
     name : str
         Of its PNG file.
     title, x_label, y_label : str
-    curves : tuple of Curve
+    curves : tuple of PlottedCurve
     x_scale, y_scale : {"linear", "log"}
     equal : bool
         Whether a metre is as long upwards as sideways.
@@ -100,7 +100,7 @@ class Plot:
     title: str
     x_label: str
     y_label: str
-    curves: tuple[Curve, ...]
+    curves: tuple[PlottedCurve, ...]
     x_scale: str = "linear"
     y_scale: str = "linear"
     equal: bool = False

@@ -9,7 +9,7 @@ from selfmotion.optimise import Minimum
 from selfmotion.study.context import Context
 from selfmotion.study.engine import bind, optimum
 from selfmotion.study.published import published_null_motion
-from selfmotion.study.results import Claim, Curve, Plot, Section, Table, Verdict
+from selfmotion.study.results import Claim, Plot, PlottedCurve, Section, Table, Verdict
 
 # A surge: after the first two iterations, a drop more than this many times the one before, and
 # above this share of F.
@@ -72,7 +72,7 @@ def section(context: Context) -> Section:
 
 def _plot(minima: list[Minimum], labels: list[str], shown: tuple[int, ...]) -> Plot:
     curves = tuple(
-        Curve.of(
+        PlottedCurve.of(
             labels[k],
             np.arange(len(minima[k].history)),
             [max(i.cost / minima[k].cost - 1.0, 1e-9) for i in minima[k].history],

@@ -6,7 +6,7 @@ from selfmotion.basics import Array
 from selfmotion.costs import Cost, InverseManipulability, JointVelocity, Manipulability
 from selfmotion.study.context import Context, Result, finely
 from selfmotion.study.engine import optimum
-from selfmotion.study.results import Claim, Curve, Plot, Section, Table, Verdict
+from selfmotion.study.results import Claim, Plot, PlottedCurve, Section, Table, Verdict
 
 _LINKS = np.array([2.0, 2.0, 1.0])
 
@@ -56,7 +56,7 @@ def section(context: Context) -> Section:
 
 
 def _speeds(name: str, title: str, motion: Result) -> Plot:
-    curves = tuple(Curve.of(f"joint {k + 1}", motion.t, motion.qd[:, k]) for k in range(3))
+    curves = tuple(PlottedCurve.of(f"joint {k + 1}", motion.t, motion.qd[:, k]) for k in range(3))
     return Plot(name, title, "t [s]", "q̇ [rad/s]", curves)
 
 
@@ -64,9 +64,9 @@ def _figure3(context: Context) -> tuple[Plot, Plot]:
     history = context.published().minimum.history
     steps = np.arange(len(history))
     x = np.array([iteration.x for iteration in history])
-    entries = tuple(Curve.of("", steps, x[:, k], faint=True) for k in range(x.shape[1]))
-    norm = Curve.of("|x|", steps, np.linalg.norm(x, axis=1), marker="o")
-    cost = Curve.of("F", steps, [iteration.cost for iteration in history], marker="o")
+    entries = tuple(PlottedCurve.of("", steps, x[:, k], faint=True) for k in range(x.shape[1]))
+    norm = PlottedCurve.of("|x|", steps, np.linalg.norm(x, axis=1), marker="o")
+    cost = PlottedCurve.of("F", steps, [iteration.cost for iteration in history], marker="o")
     return (
         Plot("figure3", "Figure 3: x against iterations", "iteration", "x", (norm, *entries)),
         Plot("figure3_cost", "F against iterations", "iteration", "F", (cost,)),
@@ -75,11 +75,11 @@ def _figure3(context: Context) -> tuple[Plot, Plot]:
 
 def _arm(name: str, title: str, motion: Result) -> Plot:
     frames = np.linspace(0, len(motion.t) - 1, 13).astype(int)
-    curves = [Curve.of("", *_joints(motion.q[k]).T, faint=True) for k in frames]
+    curves = [PlottedCurve.of("", *_joints(motion.q[k]).T, faint=True) for k in frames]
     tool = np.array([_joints(q)[-1] for q in motion.q])
-    ends = [Curve.of("start", *_joints(motion.q[0]).T, marker="o")]
-    ends += [Curve.of("end", *_joints(motion.q[-1]).T, marker="o")]
-    path = Curve.of("tool's path", *tool.T)
+    ends = [PlottedCurve.of("start", *_joints(motion.q[0]).T, marker="o")]
+    ends += [PlottedCurve.of("end", *_joints(motion.q[-1]).T, marker="o")]
+    path = PlottedCurve.of("tool's path", *tool.T)
     return Plot(name, title, "x [m]", "y [m]", (*ends, path, *curves), equal=True)
 
 

@@ -11,7 +11,7 @@ from selfmotion.task import Task
 
 
 @dataclass(frozen=True)
-class PathError(Cost):
+class OffPath(Cost):
     """Distance of the tool from the path: G = ½ w |S e|², e the pose error [m, rad].
 
     S selects the task's rows. On the path it is 0 and has no gradient. A damped problem has this
