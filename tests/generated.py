@@ -48,18 +48,18 @@ class End:
 
 @contextmanager
 def alarm(seconds: int) -> Iterator[None]:
-    """Raise `Hang` after some seconds."""
+    """Raise `Hang` after some seconds of this process's own time."""
 
     def ring(*_: Any) -> None:
         raise Hang
 
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.alarm(seconds)
+    before = signal.signal(signal.SIGPROF, ring)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def end_of(
