@@ -251,6 +251,47 @@ def test_a_loop_of_links_beside_the_tree_is_refused(tmp_path: Path) -> None:
         sm.load_robot(file, tool="z1")
 
 
+ONE_JOINT = (
+    '<robot name="r"><link name="a"/><link name="{link}"/><joint name="j" type="revolute">'
+    '<parent link="a"/><child link="{link}"/><axis xyz="0 0 1"/>{limit}</joint></robot>'
+)
+LIMIT = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
+
+
+@pytest.mark.parametrize(
+    ("link", "limit", "message"),
+    [
+        ("j", LIMIT, "joint 'j' and a link share their name"),
+        ("b", LIMIT.replace(' velocity="1"', ""), "joint 'j' has a <limit> without velocity"),
+        ("b", LIMIT.replace(' effort="1"', ""), "joint 'j' has a <limit> without effort"),
+        ("b", LIMIT.replace('"-1"', '"-inf"'), "joint 'j' has lower limit -inf, expected a number"),
+    ],
+)
+def test_urdfs_that_pinocchio_stumbles_over_are_refused_by_name(
+    tmp_path: Path, link: str, limit: str, message: str
+) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(ONE_JOINT.format(link=link, limit=limit))
+    with pytest.raises(sm.RobotError, match=message):
+        sm.load_robot(file)
+
+
+def test_an_arm_of_one_joint_is_an_arm(tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(ONE_JOINT.format(link="b", limit=LIMIT))
+    robot = sm.load_robot(file)
+    assert robot.jacobian([0.3]).shape == (6, 1)
+    assert robot.redundancy("position") == 1
+    path = sm.Waypoints.from_poses([0.0, 1.0], [robot.pose([0.3])] * 2)
+    motion = sm.Trajectory([0.0, 1.0], [[0.3], [0.3]], [[0.0], [0.0]], robot.joint_names)
+    assert sm.certify(robot, path, "pose", motion).verified
+
+
+def test_a_pose_of_another_kind_is_refused(panda: sm.RobotModel) -> None:
+    with pytest.raises(sm.RobotError, match=r"is a ndarray, expected a pinocchio\.SE3"):
+        panda.inverse_kinematics(panda.pose(PANDA_HOME).homogeneous)
+
+
 # --- threads
 
 

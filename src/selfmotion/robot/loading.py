@@ -124,6 +124,12 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
             f"{urdf.source}: no link '{tool}' to use as tool frame; links: {', '.join(urdf.links)}"
         )
     full = pin.buildModelFromXML(urdf.text)
+    for name in full.names[1:]:
+        # Pinocchio then cannot tell which of the two is meant.
+        if name in urdf.links:
+            raise RobotError(
+                f"{urdf.source}: joint '{name}' and a link share their name; rename one of them"
+            )
     _check_lock(urdf, full, lock)
     chain = [joint for joint in urdf.chain(tool) if joint.kind != "fixed"]
     for joint in chain:
@@ -141,12 +147,6 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
     if not free:
         raise RobotError(f"{urdf.source}: no joint is left free between the root and '{tool}'")
     locked = _locked_joints(urdf, full, free, lock)
-    for name in locked:
-        if name in urdf.links:
-            raise RobotError(
-                f"{urdf.source}: joint '{name}', which is held, and a link share their name; "
-                f"rename one of them"
-            )
     reference, locked_ids = locked_configuration(full, locked)
     model = pin.buildReducedModel(full, locked_ids, reference)
     names = tuple(model.names[1:])
