@@ -113,14 +113,20 @@ class Judge:
             tuple(problem.relaxations),
             per_interval=per_interval,
         )
-        limits, bodies, ends = {}, [], []
+        limits: dict[int, tuple[Array, Array]] = {}
+        bodies, ends = [], []
+
+        def limit(order: int, lower: Array, upper: Array) -> None:
+            known = limits.get(order, (-np.inf, np.inf))
+            limits[order] = np.maximum(lower, known[0]), np.minimum(upper, known[1])
+
         for item in problem.constraints:
             match item:
                 case sm.JointPositionLimits():
-                    limits[0] = item.limits(problem.robot)
+                    limit(0, *item.limits(problem.robot))
                 case sm.JointVelocityLimits() | sm.JointAccelerationLimits():
                     most = item.of(problem.robot)
-                    limits[1 if isinstance(item, sm.JointVelocityLimits) else 2] = (-most, most)
+                    limit(1 if isinstance(item, sm.JointVelocityLimits) else 2, -most, most)
                 case sm.EndConfiguration():
                     ends.append((0, np.asarray(item.q)))
                 case sm.EndVelocity():

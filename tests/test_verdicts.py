@@ -102,6 +102,16 @@ def test_a_motion_that_begins_beside_its_path_is_refused(
         sm.certify(panda, path, "pose", motion)
 
 
+def test_a_retimed_path_knows_when_waypoints_are_passed() -> None:
+    """Else a certificate would look beside them."""
+    t = np.linspace(0.0, 4.0, 30)
+    path = sm.Waypoints(t, np.outer(np.sin(t), [1.0, 0.0, 0.5]))
+    sigma = np.array([0.0, 1.0, 1.2, 3.0, 4.0])
+    slow = sm.Retimed(path, [0.0, 2.0, 3.0, 4.0, 6.0], sigma, [0.0, 0.4, 0.3, 0.9, 0.0])
+    passed, _ = slow.pace(slow.marks)
+    assert np.abs(passed[:, None] - t).min(axis=0).max() < 1e-12
+
+
 @pytest.mark.parametrize("size", [1e3, 1e6, 1e12, 1e300])
 def test_joints_that_turn_a_thousand_times_come_to_a_verdict(
     panda: sm.RobotModel, size: float

@@ -9,6 +9,9 @@ import numpy.typing as npt
 from selfmotion.basics import Array, PathError, read_only, restore
 from selfmotion.path.base import Path, PathSamples
 
+# Intervals of the pace are halved so often to find when a time of the original is passed.
+_HALVINGS = 52
+
 
 class Retimed(Path, kind="retimed"):
     """The same geometric path at another pace: pose(t) is that of the original at σ(t).
@@ -44,8 +47,14 @@ class Retimed(Path, kind="retimed"):
     @property
     def marks(self) -> Array:
         """See `Path.marks`: the samples of the pace, and when the original's are passed."""
-        passed = np.interp(self._path.marks, self._sigma, self._t)
-        return np.union1d(self._t, passed)
+        wanted = self._path.marks
+        k = np.clip(np.searchsorted(self._sigma, wanted) - 1, 0, len(self._t) - 2)
+        early, late = self._t[k], self._t[k + 1]
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (early + late)
+            before = self.pace(middle)[0] < wanted
+            early, late = np.where(before, middle, early), np.where(before, late, middle)
+        return np.union1d(self._t, late)
 
     def pace(self, t: Array) -> tuple[Array, Array]:
         """Return σ and dσ/dt at times `t` (K,)."""
