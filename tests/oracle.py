@@ -48,10 +48,12 @@ class Verdict:
     shares: dict[str, float] = field(default_factory=dict)
 
     def __or__(self, other: "Verdict") -> "Verdict":
-        keys = self.shares.keys() | other.shares.keys()
-        return Verdict(
-            {key: max(self.shares.get(key, 0.0), other.shares.get(key, 0.0)) for key in keys}
-        )
+        # Of two, NaN is the larger.
+        pairs = {
+            key: (self.shares.get(key, 0.0), other.shares.get(key, 0.0))
+            for key in self.shares | other.shares
+        }
+        return Verdict({key: float(np.maximum(*pair)) for key, pair in pairs.items()})
 
     @property
     def refutes(self) -> tuple[str, ...]:
