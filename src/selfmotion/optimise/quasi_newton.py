@@ -167,28 +167,13 @@ class _Run:
         s = alpha * direction
         self._x = self._x + s
         gradient = self._function.gradient(self._x)
-        update = self._renew(s, gradient - self._gradient)
+        self._h, update = renewed(self._h, s, gradient - self._gradient, self._method.update)
+        # One update is enough to give H the scale of F.
+        self._scaled = self._scaled or update != "none"
         self._gradient = gradient
         if self._record(update, alpha):
             return Status.STOPPED
         return Status.UNBOUNDED if np.linalg.norm(self._x) > self._bound else None
-
-    def _renew(self, s: Array, y: Array) -> str:
-        """Renew H by the formula that the switch chooses; return its name."""
-        hy = self._h @ y
-        sy, yhy = float(s @ y), float(y @ hy)
-        # Without positive curvature along s no update keeps H positive definite.
-        if sy <= 1e-14 * float(np.linalg.norm(s) * np.linalg.norm(y)) or yhy <= 0.0:
-            return "none"
-        self._scaled = True
-        update = self._method.update
-        if update == "fletcher":
-            update = "dfp" if sy < yhy else "bfgs"
-        self._h += np.outer(s, s) / sy - np.outer(hy, hy) / yhy
-        if update == "bfgs":
-            v = s / sy - hy / yhy
-            self._h += yhy * np.outer(v, v)
-        return update
 
     def _record(self, update: str, step: float) -> bool:
         iteration = Iteration(
@@ -201,3 +186,23 @@ class _Run:
         )
         self._history.append(iteration)
         return self._callback is not None and bool(self._callback(iteration))
+
+
+def renewed(h: Array, s: Array, y: Array, update: str) -> tuple[Array, str]:
+    """Return H renewed by a formula of Broyden's family for s = Δx and y = Δ∇F, and its name.
+
+    `update` is "bfgs", "dfp", or "fletcher" for the switch; the name is "none" where no formula
+    keeps H positive definite.
+    """
+    hy = h @ y
+    sy, yhy = float(s @ y), float(y @ hy)
+    # Without positive curvature along s no update keeps H positive definite.
+    if not (sy > 1e-14 * float(np.linalg.norm(s) * np.linalg.norm(y)) and yhy > 0.0):
+        return h, "none"
+    if update == "fletcher":
+        update = "dfp" if sy < yhy else "bfgs"
+    h = h + (np.outer(s, s) / sy - np.outer(hy, hy) / yhy)
+    if update == "bfgs":
+        v = s / sy - hy / yhy
+        h = h + yhy * np.outer(v, v)
+    return h, update

@@ -1,0 +1,357 @@
+"""Sequential quadratic programming: the quasi-Newton method where conditions bind."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.optimise.base import (
+    Callback,
+    ConstrainedFunction,
+    Iteration,
+    Minimum,
+    Residuals,
+    Status,
+    inverse_metric,
+)
+from selfmotion.optimise.quasi_newton import renewed
+from selfmotion.optimise.restoration import restored
+from selfmotion.optimise.step import Step, best_step
+
+# Violations up to this share of the tolerance do not count in judging a step: the curvature of
+# conditions that bind would otherwise shorten every step along them.
+_IGNORED = 0.75
+# A step is taken when the penalty function falls by this share of what the model expects, and
+# corrected first when it falls by less than the second.
+_TAKEN, _POOR, _GOOD = 1e-3, 0.1, 0.75
+# The trust region shrinks to this share of a step that failed, and grows by this factor.
+_SHRINK, _GROW = 0.3, 2.5
+# It is at first this many times the step that would lower a quadratic cost to nothing, and not
+# worth going on with below this share of that.
+_FIRST_REGION, _LAST_REGION = 2.0, 1e-9
+# The penalty is raised until this share of the violation that a step takes out counts as progress,
+# and to this many times the sum of the multipliers.
+_STEERING, _PENALTY = 0.3, 1.2
+# Powell's damping: sᵀy is at least this share of sᵀBs.
+_DAMPING = 0.2
+# So many relaxed steps in turn have to take the violation to this share: conditions otherwise pull
+# in opposite directions here, and are to be restored on another way; so often at most.
+_PATIENCE, _PROGRESS, _RESTORATIONS = 4, 0.7, 3
+# Trials of one step.
+_TRIALS = 40
+
+
+@dataclass(frozen=True)
+class SequentialQuadratic:
+    """Sequential quadratic programming with a trust region and a quasi-Newton matrix.
+
+    Each step minimises a quadratic model of the Lagrangian where the linearised conditions hold
+    (`best_step`). It is judged by the exact penalty function
+
+        F + π max(0, h₁/tolerance₁, …) ,
+
+    where |h| stands for h of equalities, corrected once for the curvature of the conditions
+    (second-order correction), and renewed by Broyden's family with Fletcher's switch on the
+    Lagrangian, damped. π grows with the multipliers, and until a step's share in taking out the
+    violation outweighs what it costs. Variables are scaled by the first estimate of the inverse
+    Hessian. Where conditions stay violated because they pull in opposite directions, a quadratic
+    penalty leads elsewhere (`restored`). Without conditions near, steps are those of `QuasiNewton`
+    with a trust region in the place of the line search.
+
+    J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., chapter 18; R. H. Byrd,
+    J. Nocedal and R. A. Waltz, "Steering exact penalty methods for nonlinear programming",
+    Optimization Methods and Software 23, 2008.
+
+    Parameters
+    ----------
+    tolerance : float
+        Converged when all conditions are kept and the decrease that the model predicts is below
+        this times |F|.
+    max_iterations : int
+    """
+
+    tolerance: float = 1e-7
+    max_iterations: int = 200
+
+    def __post_init__(self) -> None:
+        if not self.tolerance > 0.0:
+            raise ProblemError(f"optimiser: tolerance is {self.tolerance}, expected > 0")
+
+    def minimize(
+        self,
+        function: ConstrainedFunction,
+        x0: Array,
+        inverse_hessian: Array | None = None,
+        *,
+        max_evaluations: int | None = None,
+        callback: Callback | None = None,
+    ) -> Minimum:
+        """Minimise `function` from `x0` where its conditions are kept.
+
+        Parameters
+        ----------
+        function : ConstrainedFunction
+        x0 : (size,)
+            F(x0) must be finite; conditions may be violated.
+        inverse_hessian : (size, size), optional
+            By default the inverse of the function's Gauss-Newton matrix at the start.
+        max_evaluations : int, optional
+            Limit on `Function.evaluations`.
+        callback : callable, optional
+            Called with each `Iteration`; returning True stops.
+
+        Returns
+        -------
+        Minimum
+            With multipliers, one per condition. Where it did not converge: the best point found,
+            which is the cheapest that keeps all conditions, or the one that violates them least.
+        """
+        run = _Run(self, function, x0, max_evaluations, callback)
+        try:
+            status = run.until_done(inverse_hessian)
+        except KeyboardInterrupt:
+            status = Status.INTERRUPTED
+        return run.minimum(status)
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Where F and h are known."""
+
+    x: Array
+    cost: float
+    at: Residuals
+
+    @property
+    def kept(self) -> bool:
+        return self.at.worst <= 1.0
+
+    @property
+    def excess(self) -> float:
+        """The violation that counts in judging a step."""
+        return max(self.at.worst - _IGNORED, 0.0)
+
+    def better(self, other: "_Point") -> bool:
+        """Whether it would be the one to show."""
+        if self.kept and other.kept:
+            return self.cost < other.cost
+        return self.at.worst < other.at.worst
+
+
+class _Run:
+    """The state of one minimisation; p, gradients and rows are those of scaled variables."""
+
+    def __init__(
+        self,
+        method: SequentialQuadratic,
+        function: ConstrainedFunction,
+        x0: Array,
+        max_evaluations: int | None,
+        callback: Callback | None,
+    ) -> None:
+        self._method, self._function, self._callback = method, function, callback
+        self._limit = np.inf if max_evaluations is None else max_evaluations
+        self._history: list[Iteration] = []
+        self._iterations = 0
+        here = self._point(np.array(x0, dtype=np.float64))
+        if here is None:
+            raise ProblemError("optimiser: the cost or a condition at the start is not finite")
+        self._here = self._best = here
+        self._gradient, self._rows = np.zeros(len(x0)), np.zeros((len(here.at.h), len(x0)))
+        self._multipliers = np.zeros(len(here.at.h))
+        self._begin(np.eye(len(x0)))
+
+    def _begin(self, inverse_hessian: Array) -> None:
+        """Scale the variables; begin with a new trust region and penalty."""
+        values, vectors = np.linalg.eigh(inverse_hessian)
+        self._scale = vectors * np.sqrt(np.maximum(values, 0.0))
+        self._h, self._penalty = np.eye(len(values)), 0.0
+        self._region = _FIRST_REGION * max(np.sqrt(2.0 * abs(self._here.cost)), 1e-3)
+        self._smallest = _LAST_REGION * self._region
+        # The violations that relaxed steps in turn arrived at.
+        self._relaxed: list[float] = []
+
+    def until_done(self, inverse_hessian: Array | None) -> Status:
+        status = self._descend(inverse_hessian)
+        for attempt in range(_RESTORATIONS):
+            if status is not Status.INFEASIBLE:
+                break
+            before = self._best.at.worst
+            x, ended = restored(
+                self._function, self._best.x, 10.0**attempt, self._limit, self._note
+            )
+            self._go(self._point(x) or self._here)
+            status = self._descend(None) if ended is None else ended
+            if self._best.at.worst > _PROGRESS * before:
+                break
+        return status
+
+    def minimum(self, status: Status) -> Minimum:
+        end = self._here if status is Status.CONVERGED else self._best
+        return Minimum(
+            read_only(end.x),
+            end.cost,
+            self._scale @ self._h @ self._scale.T,
+            tuple(self._history),
+            status,
+            read_only(self._multipliers),
+        )
+
+    def _descend(self, inverse_hessian: Array | None) -> Status:
+        """Take steps until nothing is left to gain, or conditions pull in opposite directions."""
+        if inverse_hessian is None:
+            inverse_hessian = inverse_metric(self._function.metric(self._here.x))
+        self._begin(inverse_hessian)
+        self._derive()
+        if self._record("none", 0.0):
+            return Status.STOPPED
+        while self._iterations < self._method.max_iterations:
+            self._iterations += 1
+            status = self._iterate()
+            if status is not None:
+                return status
+        return Status.MAX_ITERATIONS
+
+    def _iterate(self) -> Status | None:
+        hessian = np.linalg.inv(self._h)
+        hessian = 0.5 * (hessian + hessian.T)
+        for _ in range(_TRIALS):
+            step = best_step(self._gradient, hessian, self._here.at, self._rows, self._region)
+            self._multipliers = step.multipliers
+            status = self._finished(step)
+            if status is not None:
+                return status
+            self._raise_penalty(step)
+            p, there, ratio = self._try(step, hessian)
+            size = float(np.max(np.abs(p)))
+            if there is not None and ratio >= _TAKEN:
+                break
+            self._region = _SHRINK * min(size, self._region)
+        else:
+            return Status.PRECISION
+        if ratio > _GOOD and size > 0.9 * self._region:
+            self._region *= _GROW
+        elif ratio < _POOR:
+            self._region *= 0.5
+        update = self._accept(p, there, step, hessian)
+        return Status.STOPPED if self._record(update, 1.0) else None
+
+    def _finished(self, step: Step) -> Status | None:
+        """Return why there is nothing more to do, before a step is tried."""
+        here = self._here
+        small = step.gain <= self._method.tolerance * max(abs(here.cost), np.finfo(float).tiny)
+        if not step.relaxed and here.kept and small:
+            return Status.CONVERGED
+        if step.relaxed and self._stuck():
+            return Status.INFEASIBLE
+        if self._region < self._smallest or not np.any(step.p):
+            return Status.PRECISION if here.kept else Status.INFEASIBLE
+        if self._function.evaluations >= self._limit:
+            return Status.MAX_EVALUATIONS
+        return None
+
+    def _stuck(self) -> bool:
+        """Whether relaxed steps no longer take out what is violated."""
+        worst = self._relaxed
+        return len(worst) > _PATIENCE and worst[-1] > _PROGRESS * worst[-1 - _PATIENCE]
+
+    def _raise_penalty(self, step: Step) -> None:
+        fall = self._here.excess - max(step.worst - _IGNORED, 0.0)
+        needed = [self._penalty]
+        if fall > 0.0:
+            needed.append(-step.gain / ((1.0 - _STEERING) * fall))
+        if not step.relaxed:
+            prices = np.abs(step.multipliers) * self._here.at.tolerance
+            needed.append(_PENALTY * float(prices.sum()))
+        self._penalty = max(needed)
+
+    def _try(self, step: Step, hessian: Array) -> tuple[Array, _Point | None, float]:
+        """Return a step, corrected where that helps, where it leads, and how well it was foreseen.
+
+        The last is the fall of the penalty function as a share of the one expected.
+        """
+        fall = self._here.excess - max(step.worst - _IGNORED, 0.0)
+        expected = step.gain + self._penalty * fall
+
+        def share(there: _Point | None) -> float:
+            if there is None or not expected > 0.0:
+                return -np.inf
+            actual = self._here.cost - there.cost
+            actual += self._penalty * (self._here.excess - there.excess)
+            return actual / expected
+
+        there = self._reach(step.p)
+        ratio = share(there)
+        curved = there is not None and there.at.worst > max(step.worst, _IGNORED)
+        spent = self._function.evaluations >= self._limit
+        if there is None or ratio >= _POOR or not curved or spent or step.relaxed:
+            return step.p, there, ratio
+        # Second-order correction: the conditions as they are there, linear from there on.
+        shifted = Residuals(there.at.h - self._rows @ step.p, there.at.tolerance, there.at.equality)
+        p = best_step(self._gradient, hessian, shifted, self._rows, self._region).p
+        corrected = self._reach(p)
+        if share(corrected) > ratio:
+            return p, corrected, share(corrected)
+        return step.p, there, ratio
+
+    def _accept(self, p: Array, there: _Point | None, step: Step, hessian: Array) -> str:
+        """Go there; return how H was renewed."""
+        if there is None:
+            raise RuntimeError("a step is taken only to where F is finite")
+        before = self._gradient + self._rows.T @ step.multipliers
+        self._go(there)
+        self._derive()
+        if step.relaxed:
+            self._relaxed.append(there.at.worst)
+        else:
+            self._relaxed.clear()
+        y = self._gradient + self._rows.T @ step.multipliers - before
+        bent = hessian @ p
+        curvature, found = float(p @ bent), float(p @ y)
+        if found < _DAMPING * curvature:
+            share = (1.0 - _DAMPING) * curvature / (curvature - found)
+            y = share * y + (1.0 - share) * bent
+        self._h, update = renewed(self._h, p, y, "fletcher")
+        return update
+
+    def _reach(self, p: Array) -> _Point | None:
+        return self._point(self._here.x + self._scale @ p)
+
+    def _point(self, x: Array) -> _Point | None:
+        """Return what is known at x; None where F or a condition is not finite."""
+        cost = self._function.value(x)
+        if not np.isfinite(cost):
+            return None
+        at = self._function.conditions(x)
+        return _Point(x, cost, at) if np.all(np.isfinite(at.h)) else None
+
+    def _derive(self) -> None:
+        x = self._here.x
+        gradient, rows = self._function.gradient(x), self._function.condition_rows(x)
+        if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(rows))):
+            raise ProblemError(
+                "optimiser: the cost and the conditions are finite, but a derivative is not"
+            )
+        self._gradient, self._rows = self._scale.T @ gradient, rows @ self._scale
+
+    def _go(self, there: _Point) -> None:
+        self._here = there
+        if there.better(self._best):
+            self._best = there
+
+    def _record(self, update: str, step: float) -> bool:
+        size = float(np.linalg.norm(np.linalg.solve(self._scale.T, self._gradient)))
+        return self._note(
+            Iteration(
+                read_only(self._here.x),
+                self._here.cost,
+                size,
+                update,
+                step,
+                self._function.evaluations,
+            )
+        )
+
+    def _note(self, iteration: Iteration) -> bool:
+        self._history.append(iteration)
+        return self._callback is not None and bool(self._callback(iteration))
