@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, ProblemError
 from selfmotion.constraints import BoundConstraint, NodeTangents
 from selfmotion.costs import ERROR, Cost, Samples
 from selfmotion.engine.conditions import Conditions
@@ -181,6 +181,30 @@ class Objective:
             parts.append(np.tensordot(by_target, target, 2))
         return np.concatenate(parts)
 
+    def require_finite(self, x: Array) -> None:
+        """Raise ProblemError where a cost or a condition has no finite value at x; says when."""
+        samples = self.samples(x)
+        if not np.all(np.isfinite(samples.q)):
+            return
+        for cost in self._costs:
+            self._require_finite(f"cost '{cost.name}'", "value", np.asarray(cost.value(samples)))
+        for item in self.constraints.constraints:
+            h = item.residual(samples)
+            if not np.all(np.isfinite(h)):
+                raise ProblemError(
+                    f"constraint '{item.name}': its residual is not finite on the motion at the "
+                    f"start; expected numbers wherever the arm may be"
+                )
+
+    def _require_finite(self, what: str, which: str, table: Array) -> None:
+        bad = ~np.isfinite(table)
+        if bad.any():
+            row = int(np.argmax(bad.reshape(len(bad), -1).any(axis=1)))
+            raise ProblemError(
+                f"{what}: its {which} is {table[row]} at t = {self.grid.stage_times[row]:.6g} s, "
+                f"expected finite numbers; selfmotion.testing.check_cost checks a cost"
+            )
+
     def slope(self, x: Array, direction: Array) -> float:
         """Return the derivative of `value` at x along `direction`."""
         return float(self.gradient(x) @ direction)
@@ -314,9 +338,11 @@ class Objective:
                 (by_error, partials.error),
             ):
                 if part is not None:
+                    self._require_finite(f"cost '{cost.name}'", "gradient", part)
                     total += weights * part
             for order, part in ((1, partials.qdd), (2, partials.qddd)):
                 if part is not None:
+                    self._require_finite(f"cost '{cost.name}'", "gradient", part)
                     by_qd[nodes] += sampling.differentiation(order).T @ (weights * part)
         return by_q, by_qd, by_error
 

@@ -77,6 +77,7 @@ class Status(Enum):
     MAX_EVALUATIONS = "max_evaluations"
     UNBOUNDED = "unbounded"
     INFEASIBLE = "infeasible"
+    GRADIENT = "gradient"
     STOPPED = "stopped"
     INTERRUPTED = "interrupted"
 
@@ -96,6 +97,8 @@ _MESSAGES = {
     "JointVelocity cost",
     Status.INFEASIBLE: "no step brings the conditions nearer: they contradict each other or are "
     "out of reach from here; allow more (limits, null motion), or start elsewhere",
+    Status.GRADIENT: "the cost does not change as its gradient says: the gradient is wrong "
+    "(selfmotion.testing.check_cost tells), or the cost has a kink here",
     Status.STOPPED: "the callback asked to stop",
     Status.INTERRUPTED: "interrupted; this is the best found so far",
 }

@@ -14,6 +14,7 @@ from selfmotion.optimise.base import (
     Status,
     inverse_metric,
 )
+from selfmotion.optimise.derivative import is_misleading
 from selfmotion.optimise.quasi_newton import renewed
 from selfmotion.optimise.restoration import restored
 from selfmotion.optimise.step import Step, best_step
@@ -228,7 +229,7 @@ class _Run:
                 break
             self._region = _SHRINK * min(size, self._region)
         else:
-            return Status.PRECISION
+            return self._without_progress(step)
         if ratio > _GOOD and size > 0.9 * self._region:
             self._region *= _GROW
         elif ratio < _POOR:
@@ -245,10 +246,18 @@ class _Run:
         if step.relaxed and self._stuck():
             return Status.INFEASIBLE
         if self._region < self._smallest or not np.any(step.p):
-            return Status.PRECISION if here.kept else Status.INFEASIBLE
+            return self._without_progress(step)
         if self._function.evaluations >= self._limit:
             return Status.MAX_EVALUATIONS
         return None
+
+    def _without_progress(self, step: Step) -> Status:
+        """Return why steps of any length fail."""
+        here, p = self._here, self._scale @ step.p
+        slope = float(self._gradient @ step.p)
+        if is_misleading(self._function.value, here.x, here.cost, p, slope):
+            return Status.GRADIENT
+        return Status.PRECISION if here.kept else Status.INFEASIBLE
 
     def _stuck(self) -> bool:
         """Whether relaxed steps no longer take out what is violated."""

@@ -66,7 +66,7 @@ def _rough(finished: Finished, session: Session) -> bool:
     """Whether limits that are kept at the nodes are exceeded between them."""
     findings = finished.certificate.findings
     beyond = any(not item.kept and item.requirement in LIMIT_NAMES for item in findings)
-    return beyond and not session.violations
+    return beyond and finished.certificate.on_path and not session.violations
 
 
 def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tolerance) -> bool:

@@ -164,6 +164,8 @@ class Session:
 
     def minimize(self) -> None:
         """Optimise on the present grid, from the motion that there is."""
+        if not np.isfinite(self._objective.value(self._x)):
+            self._objective.require_finite(self._x)
         minimum = None if self._bound else self._free_minimum()
         self._minimum = self._bound_minimum() if minimum is None else minimum
         self._x = np.array(self._minimum.x)
@@ -174,7 +176,7 @@ class Session:
         """Optimise on halved grids until the cost agrees."""
         rises = 0
         for _ in range(MOST_HALVINGS):
-            if self.status in _CUT_SHORT:
+            if self.status in (*_CUT_SHORT, Status.UNBOUNDED, Status.GRADIENT):
                 return
             unmet, before = self.score()
             self.refine()
