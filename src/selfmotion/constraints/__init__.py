@@ -1,6 +1,12 @@
 """What a motion must keep: limits, end conditions, closed paths, clearance."""
 
-from selfmotion.constraints.base import BoundConstraint, Constraint, NodePartials, NodeTangents
+from selfmotion.constraints.base import (
+    BoundConstraint,
+    Constraint,
+    NodePartials,
+    NodeTangents,
+    easing_of,
+)
 from selfmotion.constraints.clearance import Clearance
 from selfmotion.constraints.ends import ClosedPath, EndConfiguration, EndVelocity
 from selfmotion.constraints.envelope import Envelope
@@ -23,4 +29,5 @@ __all__ = [
     "JointVelocityLimits",
     "NodePartials",
     "NodeTangents",
+    "easing_of",
 ]

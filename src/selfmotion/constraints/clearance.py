@@ -162,6 +162,11 @@ class BoundClearance:
             self._last[:] = [q, self.model.clearances(q)]
         return cast(Clearances, self._last[1])
 
+    def easing(self, column: int) -> tuple[float, str]:
+        """See `easing_of`: a millimetre."""
+        first, second = self.model.pairs[column]
+        return 1e-3 / _METRE, f"1 mm less between '{first}' and '{second}'"
+
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""
         first, second = self.model.pairs[column]

@@ -211,6 +211,14 @@ class BoundLimits:
         above = motion.of_order(self.order)[:, self.joints] / self.scale[:, None]
         return np.concatenate([above, -above], axis=1)
 
+    def easing(self, column: int) -> tuple[float, str]:
+        """See `easing_of`: 2 % of a rate, on both sides; 0.01 rad or m of a position."""
+        joint = f"joint '{self.joint_names[column % len(self.joints)]}'"
+        if self.order > 0:
+            return 0.02, f"2 % more {('speed', 'acceleration')[self.order - 1]} for {joint}"
+        side = "upper" if column < len(self.joints) else "lower"
+        return 0.01, f"0.01 rad or m more at the {side} limit of {joint}"
+
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""
         joint = column % len(self.joints)

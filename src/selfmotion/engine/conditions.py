@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from selfmotion.basics import Array
-from selfmotion.constraints import BoundConstraint, NodeTangents
+from selfmotion.constraints import BoundConstraint, NodeTangents, easing_of
 from selfmotion.costs import Samples
 from selfmotion.motion import Grid
 from selfmotion.optimise import Residuals
+from selfmotion.plans import Binding
 
 # A constraint whose violation, squared and integrated, is above this counts as much as ten times
 # the cost.
@@ -65,6 +67,29 @@ class Conditions:
             total += 10.0 * min(1.0, float(np.sum(shares[:, None] * bad**2)) / _NOTICED)
         return total
 
+    def active(self, samples: Samples, multipliers: Array, least: float) -> tuple[Binding, ...]:
+        """Return what binds, for multipliers (C,) of all conditions, the most expensive first.
+
+        What would save less than `least` is left out.
+        """
+        found: dict[tuple[str, str], tuple[float, npt.NDArray[np.bool_]]] = {}
+        first = 0
+        for item in self.constraints:
+            shape = item.residual(samples).shape
+            prices = np.abs(multipliers[first : first + shape[0] * shape[1]]).reshape(shape)
+            first += prices.size
+            for column in np.flatnonzero(prices.any(axis=0)):
+                amount, words = easing_of(item, int(column))
+                saving, binds = found.get((item.name, words), (0.0, np.zeros(shape[0], np.bool_)))
+                saving += amount * float(prices[:, column].sum())
+                found[item.name, words] = saving, binds | (prices[:, column] > 0.0)
+        kept = [
+            Binding(name, words, saving, _spans(binds, samples.sampling.node_times))
+            for (name, words), (saving, binds) in found.items()
+            if saving >= least
+        ]
+        return tuple(sorted(kept, key=lambda item: -item.saving))
+
     def violated(self, samples: Samples) -> tuple[str, ...]:
         """Return a message for each constraint that is not kept, on its worst place."""
         messages = []
@@ -77,3 +102,12 @@ class Conditions:
                 text = item.describe(samples, int(row), int(column))
                 messages.append(f"{item.name}: {text}")
         return tuple(messages)
+
+
+def _spans(binds: npt.NDArray[np.bool_], times: Array) -> tuple[tuple[float, float], ...]:
+    """Return the stretches of nodes that bind; one free node between two is none."""
+    if len(binds) == 1:
+        return ((float(times[0]), float(times[-1])),)
+    nodes = np.flatnonzero(binds)
+    parts = np.split(nodes, np.flatnonzero(np.diff(nodes) > 2) + 1)
+    return tuple((float(times[part[0]]), float(times[part[-1]])) for part in parts)

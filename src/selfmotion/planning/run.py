@@ -207,6 +207,7 @@ class _Run:
             seconds=time.perf_counter() - self._began,
             gap=gap,
             ending=part.ending,
+            active=session.active,
         )
         return Plan(
             problem=self._problem,

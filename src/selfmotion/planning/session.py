@@ -15,7 +15,7 @@ from selfmotion.engine import (
     settled_still_motion,
 )
 from selfmotion.optimise import Callback, Iteration, Minimum, Optimizer, SequentialQuadratic, Status
-from selfmotion.plans import Problem
+from selfmotion.plans import Binding, Problem
 
 # Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands.
 _COST_AGREEMENT = 1e-4
@@ -23,6 +23,8 @@ _COST_AGREEMENT = 1e-4
 _RISE, _RISES = 1.5, 2
 # Equalities are met to this [rad, rad/s], which Newton's method needs a few steps for.
 _CLOSED, _CLOSING_STEPS = 1e-11, 12
+# What would save less than this share of the cost does not bind.
+_LEAST_SAVING = 1e-6
 # After these the user has no more time to give.
 _CUT_SHORT = (Status.INTERRUPTED, Status.STOPPED, Status.MAX_EVALUATIONS)
 
@@ -65,6 +67,8 @@ class Session:
     history : list of Iteration
     violations : tuple of str
         What is wrong for each constraint that the last minimisation could not meet.
+    active : tuple of Binding
+        What kept it from a lower cost.
     """
 
     def __init__(
@@ -80,6 +84,7 @@ class Session:
         self._x = np.zeros(objective.size)
         self.history: list[Iteration] = []
         self.violations: tuple[str, ...] = ()
+        self.active: tuple[Binding, ...] = ()
 
     @classmethod
     def begin(
@@ -243,6 +248,7 @@ class Session:
         """Minimise where conditions count."""
         effort, before = self._effort, self._minimum
         self._bound = True
+        self.active = ()
         minimum = SequentialQuadratic().minimize(
             self._objective,
             self._x,
@@ -251,6 +257,10 @@ class Session:
             callback=effort.callback,
         )
         self.history += minimum.history
+        if minimum.status is Status.CONVERGED:
+            objective, least = self._objective, _LEAST_SAVING * abs(minimum.cost)
+            samples = objective.samples(minimum.x)
+            self.active = objective.constraints.active(samples, minimum.multipliers, least)
         return minimum
 
     def _limit(self) -> int | None:
