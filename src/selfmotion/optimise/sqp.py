@@ -241,8 +241,10 @@ class _Run:
         """Return why there is nothing more to do, before a step is tried."""
         here = self._here
         small = step.gain <= self._method.tolerance * max(abs(here.cost), np.finfo(float).tiny)
+        # A trust region that failures made small says nothing about what is left to gain.
+        inside = float(np.max(np.abs(step.p), initial=0.0)) < 0.99 * self._region
         if not step.relaxed and here.kept and small:
-            return Status.CONVERGED
+            return Status.CONVERGED if inside else self._without_progress(step)
         if step.relaxed and self._stuck():
             return Status.INFEASIBLE
         if self._region < self._smallest or not np.any(step.p):
