@@ -176,16 +176,22 @@ class _Run:
         status = self._descend(inverse_hessian)
         for attempt in range(_RESTORATIONS):
             if status is not Status.INFEASIBLE:
-                break
+                return status
             before = self._best.at.worst
-            x, ended = restored(
-                self._function, self._best.x, 10.0**attempt, self._limit, self._note
-            )
-            self._go(self._point(x) or self._here)
-            status = self._descend(None) if ended is None else ended
+            status = self._begin_again(10.0**attempt)
             if self._best.at.worst > _PROGRESS * before:
                 break
-        return status
+        went_astray = status is Status.INFEASIBLE and self._best.kept
+        return Status.PRECISION if went_astray else status
+
+    def _begin_again(self, weight: float) -> Status:
+        """Go on from the best point, after restoring its conditions if they are violated."""
+        self._here = self._best
+        if self._here.kept:
+            return self._descend(None)
+        x, ended = restored(self._function, self._here.x, weight, self._limit, self._note)
+        self._go(self._point(x) or self._here)
+        return self._descend(None) if ended is None else ended
 
     def minimum(self, status: Status) -> Minimum:
         end = self._here if status is Status.CONVERGED else self._best
