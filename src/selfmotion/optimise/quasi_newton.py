@@ -165,7 +165,7 @@ class _Run:
             more=lambda: self._function.evaluations < self._limit,
         )
         if found is None:
-            if self._function.evaluations >= self._limit:
+            if self._function.evaluations + 2 > self._limit:
                 return Status.MAX_EVALUATIONS
             misled = is_misleading(self._function.value, self._x, self._cost, direction, slope)
             return Status.GRADIENT if misled else Status.PRECISION

@@ -15,13 +15,11 @@ from selfmotion.optimise.base import (
     inverse_metric,
 )
 from selfmotion.optimise.derivative import is_misleading
+from selfmotion.optimise.penalty import IGNORED, ExactPenalty, Point
 from selfmotion.optimise.quasi_newton import renewed
 from selfmotion.optimise.restoration import restored
 from selfmotion.optimise.step import Step, best_step
 
-# Violations up to this share of the tolerance do not count in judging a step: the curvature of
-# conditions that bind would otherwise shorten every step along them.
-_IGNORED = 0.75
 # A step is taken when the penalty function falls by this share of what the model expects, and
 # corrected first when it falls by less than the second.
 _TAKEN, _POOR, _GOOD = 1e-3, 0.1, 0.75
@@ -30,9 +28,8 @@ _SHRINK, _GROW = 0.3, 2.5
 # It is at first this many times the step that would lower a quadratic cost to nothing, and not
 # worth going on with below this share of that.
 _FIRST_REGION, _LAST_REGION = 2.0, 1e-9
-# The penalty is raised until this share of the violation that a step takes out counts as progress,
-# and to this many times the sum of the multipliers.
-_STEERING, _PENALTY = 0.3, 1.2
+# Variables are scaled by no less than this share of the largest scale, squared.
+_FLATTEST = 1e-12
 # Powell's damping: sᵀy is at least this share of sᵀBs.
 _DAMPING = 0.2
 # So many relaxed steps in turn have to take the violation to this share: conditions otherwise pull
@@ -47,17 +44,11 @@ class SequentialQuadratic:
     """Sequential quadratic programming with a trust region and a quasi-Newton matrix.
 
     Each step minimises a quadratic model of the Lagrangian where the linearised conditions hold
-    (`best_step`). It is judged by the exact penalty function
-
-        F + π max(0, h₁/tolerance₁, …) ,
-
-    where |h| stands for h of equalities, corrected once for the curvature of the conditions
-    (second-order correction), and renewed by Broyden's family with Fletcher's switch on the
-    Lagrangian, damped. π grows with the multipliers, and until a step's share in taking out the
-    violation outweighs what it costs. Variables are scaled by the first estimate of the inverse
-    Hessian. Where conditions stay violated because they pull in opposite directions, a quadratic
-    penalty leads elsewhere (`restored`). Without conditions near, steps are those of `QuasiNewton`
-    with a trust region in the place of the line search.
+    (`best_step`), is judged by an exact penalty function (`ExactPenalty`) and corrected once for
+    the curvature of the conditions (second-order correction). The model's matrix is renewed by
+    Broyden's family with Fletcher's switch on the Lagrangian, damped. Variables are scaled by the
+    first estimate of the inverse Hessian. Where conditions stay violated because they pull in
+    opposite directions, a quadratic penalty leads elsewhere (`restored`).
 
     J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., chapter 18; R. H. Byrd,
     J. Nocedal and R. A. Waltz, "Steering exact penalty methods for nonlinear programming",
@@ -115,30 +106,6 @@ class SequentialQuadratic:
         return run.minimum(status)
 
 
-@dataclass(frozen=True, eq=False)
-class _Point:
-    """Where F and h are known."""
-
-    x: Array
-    cost: float
-    at: Residuals
-
-    @property
-    def kept(self) -> bool:
-        return self.at.worst <= 1.0
-
-    @property
-    def excess(self) -> float:
-        """The violation that counts in judging a step."""
-        return max(self.at.worst - _IGNORED, 0.0)
-
-    def better(self, other: "_Point") -> bool:
-        """Whether it would be the one to show."""
-        if self.kept and other.kept:
-            return self.cost < other.cost
-        return self.at.worst < other.at.worst
-
-
 class _Run:
     """The state of one minimisation; p, gradients and rows are those of scaled variables."""
 
@@ -165,8 +132,9 @@ class _Run:
     def _begin(self, inverse_hessian: Array) -> None:
         """Scale the variables; begin with a new trust region and penalty."""
         values, vectors = np.linalg.eigh(inverse_hessian)
-        self._scale = vectors * np.sqrt(np.maximum(values, 0.0))
-        self._h, self._penalty = np.eye(len(values)), 0.0
+        least = _FLATTEST * float(np.max(values, initial=0.0))
+        self._scale = vectors * np.sqrt(np.maximum(values, least))
+        self._h, self._penalty = np.eye(len(values)), ExactPenalty()
         self._region = _FIRST_REGION * max(np.sqrt(2.0 * abs(self._here.cost)), 1e-3)
         self._smallest = _LAST_REGION * self._region
         # The violations that relaxed steps in turn arrived at.
@@ -228,7 +196,7 @@ class _Run:
             status = self._finished(step)
             if status is not None:
                 return status
-            self._raise_penalty(step)
+            self._penalty.raise_for(self._here, step)
             p, there, ratio = self._try(step, hessian)
             size = float(np.max(np.abs(p)))
             if there is not None and ratio >= _TAKEN:
@@ -263,6 +231,8 @@ class _Run:
         """Return why steps of any length fail."""
         here, p = self._here, self._scale @ step.p
         slope = float(self._gradient @ step.p)
+        if self._function.evaluations + 2 > self._limit:
+            return Status.MAX_EVALUATIONS
         if is_misleading(self._function.value, here.x, here.cost, p, slope):
             return Status.GRADIENT
         return Status.PRECISION if here.kept else Status.INFEASIBLE
@@ -272,34 +242,14 @@ class _Run:
         worst = self._relaxed
         return len(worst) > _PATIENCE and worst[-1] > _PROGRESS * worst[-1 - _PATIENCE]
 
-    def _raise_penalty(self, step: Step) -> None:
-        fall = self._here.excess - max(step.worst - _IGNORED, 0.0)
-        needed = [self._penalty]
-        if fall > 0.0:
-            needed.append(-step.gain / ((1.0 - _STEERING) * fall))
-        if not step.relaxed:
-            prices = np.abs(step.multipliers) * self._here.at.tolerance
-            needed.append(_PENALTY * float(prices.sum()))
-        self._penalty = max(needed)
-
-    def _try(self, step: Step, hessian: Array) -> tuple[Array, _Point | None, float]:
+    def _try(self, step: Step, hessian: Array) -> tuple[Array, Point | None, float]:
         """Return a step, corrected where that helps, where it leads, and how well it was foreseen.
 
         The last is the fall of the penalty function as a share of the one expected.
         """
-        fall = self._here.excess - max(step.worst - _IGNORED, 0.0)
-        expected = step.gain + self._penalty * fall
-
-        def share(there: _Point | None) -> float:
-            if there is None or not expected > 0.0:
-                return -np.inf
-            actual = self._here.cost - there.cost
-            actual += self._penalty * (self._here.excess - there.excess)
-            return actual / expected
-
         there = self._reach(step.p)
-        ratio = share(there)
-        curved = there is not None and there.at.worst > max(step.worst, _IGNORED)
+        ratio = self._penalty.share(self._here, there, step)
+        curved = there is not None and there.at.worst > max(step.worst, IGNORED)
         spent = self._function.evaluations >= self._limit
         if there is None or ratio >= _POOR or not curved or spent or step.relaxed:
             return step.p, there, ratio
@@ -307,11 +257,12 @@ class _Run:
         shifted = Residuals(there.at.h - self._rows @ step.p, there.at.tolerance, there.at.equality)
         p = best_step(self._gradient, hessian, shifted, self._rows, self._region).p
         corrected = self._reach(p)
-        if share(corrected) > ratio:
-            return p, corrected, share(corrected)
+        better = self._penalty.share(self._here, corrected, step)
+        if better > ratio:
+            return p, corrected, better
         return step.p, there, ratio
 
-    def _accept(self, p: Array, there: _Point | None, step: Step, hessian: Array) -> str:
+    def _accept(self, p: Array, there: Point | None, step: Step, hessian: Array) -> str:
         """Go there; return how H was renewed."""
         if there is None:
             raise RuntimeError("a step is taken only to where F is finite")
@@ -331,16 +282,16 @@ class _Run:
         self._h, update = renewed(self._h, p, y, "fletcher")
         return update
 
-    def _reach(self, p: Array) -> _Point | None:
+    def _reach(self, p: Array) -> Point | None:
         return self._point(self._here.x + self._scale @ p)
 
-    def _point(self, x: Array) -> _Point | None:
+    def _point(self, x: Array) -> Point | None:
         """Return what is known at x; None where F or a condition is not finite."""
         cost = self._function.value(x)
         if not np.isfinite(cost):
             return None
         at = self._function.conditions(x)
-        return _Point(x, cost, at) if np.all(np.isfinite(at.h)) else None
+        return Point(x, cost, at) if np.all(np.isfinite(at.h)) else None
 
     def _derive(self) -> None:
         x = self._here.x
@@ -351,23 +302,15 @@ class _Run:
             )
         self._gradient, self._rows = self._scale.T @ gradient, rows @ self._scale
 
-    def _go(self, there: _Point) -> None:
+    def _go(self, there: Point) -> None:
         self._here = there
         if there.better(self._best):
             self._best = there
 
     def _record(self, update: str, step: float) -> bool:
+        here, count = self._here, self._function.evaluations
         size = float(np.linalg.norm(np.linalg.solve(self._scale.T, self._gradient)))
-        return self._note(
-            Iteration(
-                read_only(self._here.x),
-                self._here.cost,
-                size,
-                update,
-                step,
-                self._function.evaluations,
-            )
-        )
+        return self._note(Iteration(read_only(here.x), here.cost, size, update, step, count))
 
     def _note(self, iteration: Iteration) -> bool:
         self._history.append(iteration)

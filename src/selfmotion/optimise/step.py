@@ -17,7 +17,7 @@ from selfmotion.optimise.quadratic import minimize_quadratic
 # Equalities may be met to this share of their tolerance, so that dependent ones stay consistent.
 _SLACK = 1e-3
 # Inequalities may use this share of their tolerance; the rest is for their curvature.
-AIM = 0.5
+AIM = 0.7
 # Share of what the relaxation could take out that is left for the cost.
 _ROOM = 0.1
 # Weight of the length of p against t in finding the least t, at the border of the region.
@@ -50,6 +50,8 @@ class Step:
 
 def best_step(gradient: Array, hessian: Array, at: Residuals, rows: Array, region: float) -> Step:
     """Return the step within a trust region |p| ≤ `region` (in each component)."""
+    if not len(gradient):
+        return Step(gradient, np.zeros(len(at.h)), 0.0, at.worst, at.worst > 1.0)
     reach = np.full(len(gradient), region)
     # A condition that no p within the region violates cannot matter.
     near = at.equality | (at.h + region * np.abs(rows).sum(axis=1) > 0.0)
