@@ -3,7 +3,6 @@
 from selfmotion.constraints.base import (
     BoundConstraint,
     Constraint,
-    NodePartials,
     NodeTangents,
     easing_of,
 )
@@ -27,7 +26,6 @@ __all__ = [
     "JointAccelerationLimits",
     "JointPositionLimits",
     "JointVelocityLimits",
-    "NodePartials",
     "NodeTangents",
     "easing_of",
 ]

@@ -19,20 +19,6 @@ from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
-class NodePartials:
-    """Derivatives of a number with respect to the motion at the nodes; None stands for zero.
-
-    Attributes
-    ----------
-    q, qd, qdd : (N + 1, n) or None
-    """
-
-    q: Array | None = None
-    qd: Array | None = None
-    qdd: Array | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class NodeTangents:
     """How the motion at the nodes changes with d decision variables.
 
@@ -107,9 +93,6 @@ class BoundConstraint(Protocol):
     def residual(self, samples: Samples) -> Array:
         """Return h: (N + 1, C) for conditions at every node, (1, C) for conditions on the whole."""
 
-    def pullback(self, samples: Samples, weights: Array) -> NodePartials:
-        """Return the derivative of Σ weights · h, weights shaped as h."""
-
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """Return ∂h/∂x for d variables: h's shape with d appended."""
 
@@ -132,8 +115,3 @@ def motion_of_order(samples: Samples, order: int) -> Array:
     table = (samples.q, samples.qd)[order] if order < 2 else samples.qdd
     nodes: Array = table[samples.nodes]
     return nodes
-
-
-def partials_of_order(order: int, values: Array) -> NodePartials:
-    """Return `values` (N + 1, n) as the derivative with respect to q (0), q̇ (1) or q̈ (2)."""
-    return NodePartials(**{("q", "qd", "qdd")[order]: values})

@@ -18,7 +18,7 @@ from selfmotion.collision import (
     Obstacle,
     obstacle_from_dict,
 )
-from selfmotion.constraints.base import Constraint, NodePartials, NodeTangents, motion_of_order
+from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
 from selfmotion.robot import RobotModel
@@ -145,10 +145,6 @@ class BoundClearance:
     def residual(self, samples: Samples) -> Array:
         """See `BoundConstraint.residual`."""
         return (self.distance + self.margin - self._clearances(samples).values) / _METRE
-
-    def pullback(self, samples: Samples, weights: Array) -> NodePartials:
-        """See `BoundConstraint.pullback`."""
-        return NodePartials(q=self._clearances(samples).pullback(-weights / _METRE))
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""

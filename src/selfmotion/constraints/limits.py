@@ -9,10 +9,8 @@ from selfmotion.basics import Array, ProblemError, per_joint, read_only
 from selfmotion.certificate import LIMIT_NAMES, JointLimits
 from selfmotion.constraints.base import (
     Constraint,
-    NodePartials,
     NodeTangents,
     motion_of_order,
-    partials_of_order,
 )
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
@@ -198,13 +196,6 @@ class BoundLimits:
         above = (x - self.upper) / self.scale + self.margin
         below = (self.lower - x) / self.scale + self.margin
         return np.hstack([above, below])
-
-    def pullback(self, samples: Samples, weights: Array) -> NodePartials:
-        """See `BoundConstraint.pullback`."""
-        count = len(self.joints)
-        values = np.zeros((len(weights), samples.q.shape[1]))
-        values[:, self.joints] = (weights[:, :count] - weights[:, count:]) / self.scale
-        return partials_of_order(self.order, values)
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""

@@ -30,6 +30,9 @@ _SHRINK, _GROW = 0.3, 2.5
 _FIRST_REGION, _LAST_REGION = 2.0, 1e-9
 # Variables are scaled by no less than this share of the largest scale, squared.
 _FLATTEST = 1e-12
+# Converged is what neither the present matrix nor the first foresees a gain from: of more than this
+# share of F for the first, which is asked so often.
+_DOUBTFUL, _DOUBTS = 1e-4, 3
 # Powell's damping: sᵀy is at least this share of sᵀBs.
 _DAMPING = 0.2
 # So many relaxed steps in turn have to take the violation to this share: conditions otherwise pull
@@ -120,7 +123,7 @@ class _Run:
         self._method, self._function, self._callback = method, function, callback
         self._limit = np.inf if max_evaluations is None else max_evaluations
         self._history: list[Iteration] = []
-        self._iterations = 0
+        self._iterations, self._doubts = 0, 0
         here = self._point(np.array(x0, dtype=np.float64))
         if here is None:
             raise ProblemError("optimiser: the cost or a condition at the start is not finite")
@@ -136,7 +139,7 @@ class _Run:
         self._scale = vectors * np.sqrt(np.maximum(values, least))
         self._h, self._penalty = np.eye(len(values)), ExactPenalty()
         self._region = _FIRST_REGION * max(np.sqrt(2.0 * abs(self._here.cost)), 1e-3)
-        self._smallest = _LAST_REGION * self._region
+        self._first_region, self._smallest = self._region, _LAST_REGION * self._region
         # The violations that relaxed steps in turn arrived at.
         self._relaxed: list[float] = []
 
@@ -183,9 +186,23 @@ class _Run:
         while self._iterations < self._method.max_iterations:
             self._iterations += 1
             status = self._iterate()
-            if status is not None:
+            if status is Status.CONVERGED and self._is_doubtful():
+                self._h, self._doubts = np.eye(len(self._h)), self._doubts + 1
+                self._region = self._first_region
+            elif status is not None:
                 return status
         return Status.MAX_ITERATIONS
+
+    def _is_doubtful(self) -> bool:
+        """Whether the first matrix foresees much more than the present one.
+
+        That may have been bent where conditions were violated, far from here.
+        """
+        if self._doubts >= _DOUBTS:
+            return False
+        first = np.eye(len(self._h))
+        step = best_step(self._gradient, first, self._here.at, self._rows, self._first_region)
+        return step.gain > _DOUBTFUL * abs(self._here.cost)
 
     def _iterate(self) -> Status | None:
         hessian = np.linalg.inv(self._h)
