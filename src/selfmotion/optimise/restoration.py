@@ -10,8 +10,8 @@ from selfmotion.optimise.quasi_newton import QuasiNewton
 
 # The violation at the start weighs this many times the cost there.
 _WEIGHT = 10.0
-# This exact, and no more iterations than that: the rest is for sequential quadratic programming.
-_TOLERANCE, _ITERATIONS = 1e-4, 40
+# This exact, and no more evaluations than that: the rest is for sequential quadratic programming.
+_TOLERANCE, _EVALUATIONS = 1e-4, 60
 
 
 class _Penalised:
@@ -92,10 +92,11 @@ def restored(
         asked[0] = bool(note(replace(iteration, cost=function.value(iteration.x))))
         return asked[0]
 
-    method = QuasiNewton(tolerance=_TOLERANCE, max_iterations=_ITERATIONS)
-    most = None if np.isinf(limit) else int(limit)
+    most = int(min(limit, function.evaluations + _EVALUATIONS))
+    method = QuasiNewton(tolerance=_TOLERANCE)
     found = method.minimize(penalised, x, max_evaluations=most, callback=told)
     if asked[0]:
         return found.x, Status.STOPPED
-    ended = found.status in (Status.INTERRUPTED, Status.MAX_EVALUATIONS)
-    return found.x, found.status if ended else None
+    if found.status is Status.INTERRUPTED:
+        return found.x, found.status
+    return found.x, Status.MAX_EVALUATIONS if function.evaluations >= limit else None

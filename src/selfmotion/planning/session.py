@@ -236,7 +236,9 @@ class Session:
         ended = asked or minimum.status in (Status.INTERRUPTED, Status.MAX_EVALUATIONS)
         if ended or not self._breaks(minimum.x):
             return minimum
-        self._minimum, self._x = minimum, np.array(minimum.x)
+        # The last point that kept all: the one after it may be anywhere.
+        last = minimum.history[-2] if len(minimum.history) > 1 else minimum.history[-1]
+        self._x = np.array(last.x)
         return None
 
     def _breaks(self, x: Array) -> bool:
