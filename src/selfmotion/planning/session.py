@@ -171,8 +171,7 @@ class Session:
         """Optimise on the present grid, from the motion that there is."""
         if not np.isfinite(self._objective.value(self._x)):
             self._objective.require_finite(self._x)
-        minimum = None if self._bound else self._free_minimum()
-        self._minimum = self._bound_minimum() if minimum is None else minimum
+        self._minimum = self._next_minimum()
         self._x = np.array(self._minimum.x)
         self._close()
         self.violations = self._objective.violations(self._x)
@@ -213,17 +212,21 @@ class Session:
     def _cost(self) -> float:
         return sum(self._objective.terms(self._x).values())
 
-    def _free_minimum(self) -> Minimum | None:
-        """Minimise as far as conditions are kept; None where they begin to count."""
+    def _next_minimum(self) -> Minimum:
+        """Minimise by the optimiser as long as conditions are kept; go on with them from there."""
         effort, objective, before = self._effort, self._objective, self._minimum
-        if self._breaks(self._x):
-            return None
+        if self._bound or self._breaks(self._x):
+            return self._bound_minimum(known=False)
+        kept: list[Iteration] = []
         asked = False
 
         def note(iteration: Iteration) -> bool:
             nonlocal asked
+            if self._breaks(iteration.x):
+                return True
+            kept.append(iteration)
             asked = effort.callback is not None and bool(effort.callback(iteration))
-            return asked or self._breaks(iteration.x)
+            return asked
 
         minimum = effort.optimizer.minimize(
             objective,
@@ -232,23 +235,29 @@ class Session:
             max_evaluations=self._limit(),
             callback=note,
         )
-        self.history += minimum.history
+        self.history += kept
         ended = asked or minimum.status in (Status.INTERRUPTED, Status.MAX_EVALUATIONS)
         if ended or not self._breaks(minimum.x):
             return minimum
         # The last point that kept all: the one after it may be anywhere.
-        last = minimum.history[-2] if len(minimum.history) > 1 else minimum.history[-1]
-        self._x = np.array(last.x)
-        return None
+        self._x = np.array(kept[-1].x) if kept else self._x
+        return self._bound_minimum(known=len(kept) > 0)
 
     def _breaks(self, x: Array) -> bool:
         """Whether a condition is violated; not where there is no motion."""
         objective = self._objective
         return np.isfinite(objective.value(x)) and not objective.conditions(x).worst <= 1.0
 
-    def _bound_minimum(self) -> Minimum:
-        """Minimise where conditions count."""
+    def _bound_minimum(self, *, known: bool) -> Minimum:
+        """Minimise where conditions count; `known` says that the start was told to the callback."""
         effort, before = self._effort, self._minimum
+        first = known
+
+        def note(iteration: Iteration) -> bool:
+            nonlocal first
+            repeated, first = first, False
+            return not repeated and effort.callback is not None and bool(effort.callback(iteration))
+
         self._bound = True
         self.active = ()
         minimum = SequentialQuadratic().minimize(
@@ -256,9 +265,9 @@ class Session:
             self._x,
             None if before is None else before.inverse_hessian,
             max_evaluations=self._limit(),
-            callback=effort.callback,
+            callback=note,
         )
-        self.history += minimum.history
+        self.history += minimum.history[1 if known else 0 :]
         if minimum.status is Status.CONVERGED:
             objective, least = self._objective, _LEAST_SAVING * abs(minimum.cost)
             samples = objective.samples(minimum.x)
