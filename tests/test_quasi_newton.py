@@ -9,7 +9,8 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics.arrays import Array
 from selfmotion.optimise.line_search import _minimizer, _Point
-from selfmotion.optimise.quasi_newton import Minimum, renewed
+from selfmotion.optimise.quasi_newton import Minimum
+from selfmotion.optimise.update import damped, renewed
 
 # From H0 = I, as the paper has it: these functions know no metric of their own.
 plain = partial(sm.QuasiNewton, initial_metric="identity")
@@ -350,3 +351,19 @@ def test_a_function_without_bottom_ends_where_its_start_is_lost_in_rounding() ->
     found = plain().minimize(function, np.zeros(1))
     assert found.status is sm.Status.UNBOUNDED
     assert function.evaluations <= 100
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_damping_keeps_the_matrix_positive_and_leaves_good_curvature_alone(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    factor = rng.normal(size=(4, 4))
+    hessian = factor @ factor.T + 0.1 * np.eye(4)
+    s, y = rng.normal(size=4), 3.0 * rng.normal(size=4)
+    curvature, again = s @ hessian @ s, damped(y, s, hessian)
+    assert s @ again == pytest.approx(max(s @ y, 0.2 * curvature))
+    if s @ y >= 0.2 * curvature:
+        np.testing.assert_array_equal(again, y)
+    h, name = renewed(np.linalg.inv(hessian), s, again, "fletcher")
+    assert name != "none"
+    assert np.linalg.eigvalsh(h).min() > 0.0
+    np.testing.assert_allclose(h @ again, s, atol=1e-8)

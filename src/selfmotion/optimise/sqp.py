@@ -16,9 +16,9 @@ from selfmotion.optimise.base import (
 )
 from selfmotion.optimise.derivative import is_misleading
 from selfmotion.optimise.penalty import IGNORED, ExactPenalty, Point
-from selfmotion.optimise.quasi_newton import renewed
 from selfmotion.optimise.restoration import restored
 from selfmotion.optimise.step import Step, best_step
+from selfmotion.optimise.update import damped, renewed
 
 # A step is taken when the penalty function falls by this share of what the model expects, and
 # corrected first when it falls by less than the second.
@@ -33,8 +33,6 @@ _FLATTEST = 1e-12
 # Converged is what neither the present matrix nor the first foresees a gain from: of more than this
 # share of F for the first, which is asked so often.
 _DOUBTFUL, _DOUBTS = 1e-4, 3
-# Powell's damping: sᵀy is at least this share of sᵀBs.
-_DAMPING = 0.2
 # So many relaxed steps in turn have to take the violation to this share: conditions otherwise pull
 # in opposite directions here, and are to be restored on another way; so often at most.
 _PATIENCE, _PROGRESS, _RESTORATIONS = 4, 0.7, 3
@@ -291,12 +289,7 @@ class _Run:
         else:
             self._relaxed.clear()
         y = self._gradient + self._rows.T @ step.multipliers - before
-        bent = hessian @ p
-        curvature, found = float(p @ bent), float(p @ y)
-        if found < _DAMPING * curvature:
-            share = (1.0 - _DAMPING) * curvature / (curvature - found)
-            y = share * y + (1.0 - share) * bent
-        self._h, update = renewed(self._h, p, y, "fletcher")
+        self._h, update = renewed(self._h, p, damped(y, p, hessian), "fletcher")
         return update
 
     def _reach(self, p: Array) -> Point | None:

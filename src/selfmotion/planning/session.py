@@ -36,6 +36,7 @@ class Effort:
     Attributes
     ----------
     optimizer : Optimizer
+        Minimises as long as conditions are kept.
     callback : callable or None
         Called with each `Iteration`.
     max_evaluations : int or None
