@@ -2,7 +2,8 @@
 
 60 problems made at random for each seed. Each is planned, and compared with what another revision
 made of it: `--store` writes a revision's results, `--against` compares with them. Limits are taken
-from another motion, which is then forgotten, so that they bind at x = 0 and can be kept.
+from another motion, which is then forgotten, so that they bind at x = 0 and can be kept. Times are
+those of the processor.
 """
 
 from __future__ import annotations
@@ -304,14 +305,20 @@ def compare(results: list[dict[str, Any]], stored: dict[str, Any], console: Cons
     console.print(f"solved: {_count(old for old, _ in pairs)} → {_count(new for _, new in pairs)}")
     lost = [new["name"] for old, new in pairs if old["solved"] and not new["solved"]]
     console.print(f"solved before and not now: {', '.join(lost) or 'none'}")
-    for label, side in (("before", 0), ("now", 1)):
-        counts = np.array([pair[side]["evaluations"] for pair in pairs if pair[0]["solved"]])
-        median, most = np.percentile(counts, [50, 95])
-        seconds = sum(pair[side]["seconds"] for pair in pairs)
-        console.print(
-            f"{label}: evaluations where solved before: median {median:.0f}, 95 % {most:.0f}; "
-            f"{seconds:.1f} s in all"
-        )
+    for start, free in (("given", False), ("free", True)):
+        chosen = [pair for pair in pairs if ("free start" in pair[0]["name"]) == free]
+        for label, side in (("before", 0), ("now", 1)):
+            counts = [pair[side]["evaluations"] for pair in chosen if pair[0]["solved"]]
+            if not counts:
+                continue
+            median, most = np.percentile(counts, [50, 95])
+            seconds = sum(pair[side]["seconds"] for pair in chosen)
+            console.print(
+                f"{start} start, {label}: {median:.0f} evaluations in the median and {most:.0f} at "
+                f"95 % of those solved before; {seconds:.1f} s of one processor in all"
+            )
+    if not ratios:
+        return
     console.print(f"cost ratio: largest {max(ratios):.5f}, median {np.median(ratios):.5f}")
 
 
