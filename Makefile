@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-peers suite suite-made fuzz fuzz-certificate fuzz-generated distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-peers suite suite-made fuzz fuzz-certificate fuzz-generated distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -25,6 +25,9 @@ format: $(READY)
 bench: $(READY)  ## the figures of the README's performance table
 	$(BIN)/pip install --quiet --constraint constraints.txt -e '.[bench]'
 	$(BIN)/python benchmarks/run.py
+
+bench-constrained: $(READY)  ## problems whose constraints bind, against an earlier revision
+	$(BIN)/python benchmarks/constrained.py
 
 study: $(READY)  ## the paper re-run, as a report in out/study
 	$(BIN)/selfmotion study --out out/study

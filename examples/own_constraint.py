@@ -45,9 +45,6 @@ class BandConditions:
         total = samples.q[samples.nodes] @ SUM
         return np.stack([total - self.upper, self.lower - total], axis=1) + MARGIN
 
-    def pullback(self, samples, weights):
-        return sm.NodePartials(q=(weights[:, :1] - weights[:, 1:]) * SUM)
-
     def tangents(self, samples, motion):
         total = np.einsum("n,knd->kd", SUM, motion.q)
         return np.stack([total, -total], axis=1)

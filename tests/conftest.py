@@ -9,7 +9,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.engine import Counts, Deviation, Objective, Rollout
-from selfmotion.engine.augmented_lagrangian import AugmentedLagrangian
+from selfmotion.engine.conditions import Conditions
 from selfmotion.engine.start import Start
 from selfmotion.motion import NullMotionTable
 
@@ -107,7 +107,7 @@ def objective_of(
         costs,
         start,
         deviation or Deviation(path, (), grid.stage_times, (False, False)),
-        AugmentedLagrangian(constraints, grid),
+        Conditions(constraints, grid),
         Counts(),
     )
 

@@ -5,14 +5,15 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import selfmotion as sm
 from conftest import PANDA_HOME, central_difference, robot_named, short_line, start_of
 from selfmotion.basics.arrays import Array
 from selfmotion.certificate import ClosedMotion, EndState, JointLimits
+from selfmotion.cli.tables import show
 from selfmotion.constraints import NodeTangents
 from selfmotion.engine import Objective, StillMotion
-from selfmotion.engine.augmented_lagrangian import AugmentedLagrangian
 from selfmotion.engine.start import FreeStart
 from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import PolynomialNullMotion
@@ -42,9 +43,7 @@ CONSTRAINTS = {
 }
 
 
-def objective_with(
-    constraint: sm.Constraint, name: str, task: str
-) -> tuple[Objective, AugmentedLagrangian]:
+def objective_with(constraint: sm.Constraint, name: str, task: str) -> Objective:
     """Return an objective with a free start and one constraint that is violated."""
     robot, rows = robot_named(name), sm.Task.of(task)
     start = start_of(robot, task)
@@ -54,29 +53,26 @@ def objective_with(
     problem = sm.Problem(robot, path, rows, start, null_motion=motion, constraints=())
     still = StillMotion.on(problem, start, grid)
     bound = constraint.bind(robot, rows, start, start)
-    objective = Objective.of(problem, still, free=True, constraints=[bound])
-    return objective, objective.conditions
+    return Objective.of(problem, still, free=True, constraints=[bound])
 
 
 @pytest.mark.parametrize("constraint", CONSTRAINTS)
 @pytest.mark.parametrize(("name", "task"), [("planar_3r", "planar"), ("panda", "pointing")])
-def test_gradients_equal_central_differences(constraint: str, name: str, task: str) -> None:
-    made = CONSTRAINTS[constraint](robot_named(name))
-    objective, conditions = objective_with(made, name, task)
+def test_rows_equal_central_differences(constraint: str, name: str, task: str) -> None:
+    """Of all conditions at once, also of those that are not violated."""
+    objective = objective_with(CONSTRAINTS[constraint](robot_named(name)), name, task)
     x = 0.02 * np.random.default_rng(1).normal(size=objective.size)
-    conditions.start(objective.samples(x), 1.0)
-    conditions.update(objective.samples(x))
-    assert conditions.value(objective.samples(x)) > 0.0
-    x = x + 0.005
-    exact = objective.gradient(x)
-    differences = central_difference(objective.value, x, 1e-6)
+    assert objective.conditions(x).worst > 1.0
+    weights = np.random.default_rng(2).normal(size=len(objective.conditions(x).h))
+    exact = weights @ objective.condition_rows(x)
+    differences = central_difference(lambda x: float(weights @ objective.conditions(x).h), x, 1e-6)
     assert np.abs(exact - differences).max() <= GRADIENT * np.abs(differences).max()
 
 
 @pytest.mark.parametrize("constraint", CONSTRAINTS)
 def test_tangents_equal_central_differences(constraint: str) -> None:
     made = CONSTRAINTS[constraint](robot_named("panda"))
-    objective, _ = objective_with(made, "panda", "pose")
+    objective = objective_with(made, "panda", "pose")
     bound = made.bind(robot_named("panda"), sm.Task.POSE, np.zeros(7), np.zeros(7))
     x = 0.02 * np.random.default_rng(2).normal(size=objective.size)
     tangents: NodeTangents = objective.node_tangents(x)
@@ -92,16 +88,20 @@ def test_tangents_equal_central_differences(constraint: str) -> None:
         np.testing.assert_allclose(exact[..., i], differences, atol=1e-6 * scale)
 
 
-def test_clearance_gradient_equals_central_differences() -> None:
+def test_clearance_rows_equal_central_differences() -> None:
     robot = robot_named("panda")
     pose = robot.pose(start_of(robot, "pose"))
     box = sm.Box("box", pose.translation + np.array([0.0, 0.0, 0.25]), [0.1, 0.1, 0.1])
-    objective, conditions = objective_with(sm.Clearance((box,), 0.1), "panda", "pose")
+    objective = objective_with(sm.Clearance((box,), 0.1), "panda", "pose")
     x = 0.01 * np.random.default_rng(3).normal(size=objective.size)
-    conditions.start(objective.samples(x), 1.0)
-    assert conditions.value(objective.samples(x)) > 0.0
-    exact = objective.gradient(x)
-    differences = central_difference(objective.value, x, 1e-7)
+    excess = np.maximum(objective.conditions(x).h, 0.0)
+    assert excess.any()
+
+    def value(x: Array) -> float:
+        return float(np.sum(np.maximum(objective.conditions(x).h, 0.0) ** 2))
+
+    exact = 2.0 * excess @ objective.condition_rows(x)
+    differences = central_difference(value, x, 1e-7)
     # Closest points jump on flat faces; away from jumps the agreement is that of the differences.
     assert np.abs(exact - differences).max() <= 1e-4 * np.abs(differences).max()
 
@@ -402,3 +402,133 @@ def test_passing_closer_than_capsules_allow_costs_nothing(panda_circle: Circle) 
     plan = sm.plan(panda_circle(constraints=[sm.Clearance([box], 5e-3)]))
     assert plan.certificate.verified
     assert plan.report.cost == pytest.approx(free.report.cost, rel=1e-3)
+
+
+# A price is a first derivative: this near to what re-planning saves.
+PRICE = 0.2
+
+
+@pytest.mark.parametrize("kind", ["acceleration", "position"])
+def test_prices_are_what_easing_a_limit_saves(panda_circle: Circle, kind: str) -> None:
+    """Against plans with a limit that is a little wider."""
+    robot = panda_circle().robot
+    motion = sm.BSplineNullMotion(8)
+    free = sm.plan(panda_circle("position", null_motion=motion))
+    assert free.report.active == ()
+    highest = float(free.trajectory.q[:, 3].max())
+
+    def limited(eased: float) -> sm.Plan:
+        upper = np.array(robot.upper)
+        upper[3] = highest - 0.05 + 0.01 * eased
+        limits: tuple[sm.Constraint, ...] = (sm.JointPositionLimits(upper=upper), LIMITS[1])
+        if kind == "acceleration":
+            limits = (*LIMITS, sm.JointAccelerationLimits(1.0 * (1.0 + 0.02 * eased)))
+        return sm.plan(panda_circle("position", null_motion=motion, constraints=limits))
+
+    tight, wide = limited(0.0), limited(0.2)
+    assert tight.certificate.verified
+    assert wide.certificate.verified
+    saved = tight.report.cost - wide.report.cost
+    priced = 0.2 * sum(item.saving for item in tight.report.active)
+    assert saved > 0.0
+    assert priced == pytest.approx(saved, rel=PRICE)
+    first = tight.report.active[0]
+    assert first.constraint == f"joint {kind} limits"
+    assert "joint 'panda_joint4'" in first.easing
+    assert all(0.0 <= a <= b <= 4.0 for a, b in first.spans)
+
+
+def test_prices_are_saved_and_shown(panda_circle: Circle, tmp_path) -> None:
+    limits = (*LIMITS, sm.JointAccelerationLimits(1.5), sm.ClosedPath())
+    plan = sm.plan(panda_circle("position", constraints=limits))
+    assert {"closed path", "joint acceleration limits"} <= {
+        item.constraint for item in plan.report.active
+    }
+    plan.save(tmp_path / "plan.npz")
+    assert sm.load_plan(tmp_path / "plan.npz").report.active == plan.report.active
+    console = Console(record=True, width=120)
+    show(plan, console)
+    text = console.export_text()
+    assert "2 % more acceleration for joint 'panda_joint" in text
+    assert "constraints that bind" in text
+
+
+def test_what_is_not_finite_is_named_with_its_time(panda_circle: Circle) -> None:
+    """The cost's value, its gradient, and a constraint's residual; without limits and with."""
+
+    def late(t: Array) -> Array:
+        return np.where(t > 2.0, np.nan, 1.0)
+
+    value = sm.FunctionCost(lambda qd, q, t: late(t), lambda qd, q, t: (0 * qd, 0 * q), "late")
+    gradient = sm.FunctionCost(
+        lambda qd, q, t: np.sum(q**2, axis=1),
+        lambda qd, q, t: (0 * qd, late(t)[:, None] * q),
+        "bad",
+    )
+    tight = sm.JointVelocityLimits(0.1)
+    for constraints in (LIMITS, (*LIMITS, tight)):
+        for cost, text in (
+            (value, r"cost 'late': its value is nan at t = 2\.0625 s"),
+            (gradient, r"cost 'bad': its gradient is .* at t = 2\.0625 s"),
+        ):
+            with pytest.raises(sm.ProblemError, match=text):
+                sm.plan(panda_circle(costs=[cost], constraints=constraints))
+
+
+def test_a_wrong_gradient_is_no_convergence(panda_circle: Circle) -> None:
+    wrong = sm.FunctionCost(
+        lambda qd, q, t: np.sum(q**2, axis=1), lambda qd, q, t: (0 * qd, -2 * q), "wrong"
+    )
+    plan = sm.plan(panda_circle(costs=[wrong], constraints=()))
+    assert plan.report.status is sm.Status.GRADIENT
+    assert "check_cost" in plan.report.message
+
+
+def test_limits_that_do_not_bind_cost_no_evaluation(panda_circle: Circle) -> None:
+    """Exactly the quasi-Newton method then, point by point."""
+    without, within = sm.plan(panda_circle(constraints=())), sm.plan(panda_circle())
+    assert without.report.evaluations == within.report.evaluations
+    for first, second in zip(without.report.history, within.report.history, strict=True):
+        np.testing.assert_array_equal(first.x, second.x)
+
+
+def test_conditions_name_an_equality_that_is_missed_on_either_side() -> None:
+    objective = objective_with(sm.ClosedPath(velocity=False), "panda", "pose")
+    signs = set()
+    for seed in range(6):
+        x = 0.05 * np.random.default_rng(seed).normal(size=objective.size)
+        signs.add(float(np.sign(objective.conditions(x).h[0])))
+        assert objective.conditions(x).worst > 1.0
+        assert "closed path" in objective.violations(x)[0]
+    assert signs == {-1.0, 1.0}
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_the_metric_is_the_differenced_gauss_newton_matrix(
+    panda: sm.RobotModel, order: int
+) -> None:
+    """∫ (∂q^(k)/∂x)ᵀ W (∂q^(k)/∂x) dt, the derivatives by central differences of motions."""
+    cost = (sm.JointVelocity(), sm.JointAcceleration(), sm.JointJerk())[order - 1]
+    path = short_line(panda, PANDA_HOME)
+    motion = PolynomialNullMotion(3, "joint")
+    problem = sm.Problem(panda, path, "pose", PANDA_HOME, motion, costs=[cost], constraints=())
+    objective = Objective.of(
+        problem, StillMotion.on(problem, PANDA_HOME, Grid.aligned(path.knots, 12))
+    )
+    x = 0.05 * np.random.default_rng(0).normal(size=objective.size)
+    sampling = objective.grid.sampling
+
+    def derivative(x: Array) -> Array:
+        samples = objective.samples(x)
+        table = samples.qd if order == 1 else (samples.qdd if order == 2 else samples.qddd)
+        return table.copy()
+
+    step = 1e-5
+    tangent = np.stack(
+        [(derivative(x + e) - derivative(x - e)) / (2 * step) for e in step * np.eye(len(x))],
+        axis=2,
+    )
+    weight = cost.curvature(7)[order]
+    expected = np.einsum("s,sid,ij,sje->de", sampling.weights, tangent, weight, tangent)
+    metric = objective.metric(x)
+    np.testing.assert_allclose(metric, expected, atol=1e-6 * np.abs(expected).max())

@@ -41,11 +41,6 @@ class SlowNodes:
     def residual(self, samples: sm.Samples) -> Array:
         return np.abs(samples.qd[samples.nodes][:, 3:4]) / self.limit - 1.0 + 2e-3
 
-    def pullback(self, samples: sm.Samples, weights: Array) -> sm.NodePartials:
-        by_qd = np.zeros((len(weights), 7))
-        by_qd[:, 3] = weights[:, 0] * np.sign(samples.qd[samples.nodes][:, 3]) / self.limit
-        return sm.NodePartials(qd=by_qd)
-
     def tangents(self, samples: sm.Samples, motion: sm.NodeTangents) -> Array:
         signs = np.sign(samples.qd[samples.nodes][:, 3])
         return (signs[:, None] * motion.qd[:, 3] / self.limit)[:, None]

@@ -8,7 +8,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics.arrays import Array
+from selfmotion.optimise.line_search import _minimizer, _Point
 from selfmotion.optimise.quasi_newton import Minimum
+from selfmotion.optimise.update import damped, renewed
 
 # From H0 = I, as the paper has it: these functions know no metric of their own.
 plain = partial(sm.QuasiNewton, initial_metric="identity")
@@ -221,3 +223,147 @@ def test_cost_never_rises() -> None:
 def test_bad_settings_are_refused(arguments: dict[str, object]) -> None:
     with pytest.raises(sm.ProblemError, match="optimiser"):
         plain(**arguments)
+
+
+def random_phi(seed: int) -> tuple[Callable[[float], float], Callable[[float], float]]:
+    """Return φ, bounded below and falling at 0, and φ'."""
+    rng = np.random.default_rng(seed)
+    size, rate, phase = rng.normal(size=4), rng.uniform(0.2, 3.0, 4), rng.uniform(0.0, 6.0, 4)
+    bowl, tilt = rng.uniform(0.01, 0.5), float(np.sum(size * rate * np.cos(phase)))
+    tilt += 10.0 ** rng.uniform(-2.0, 1.0)
+
+    def value(a: float) -> float:
+        return float(np.sum(size * np.sin(rate * a + phase)) + bowl * a**2 - tilt * a)
+
+    def slope(a: float) -> float:
+        return float(np.sum(size * rate * np.cos(rate * a + phase)) + 2.0 * bowl * a - tilt)
+
+    return value, slope
+
+
+@pytest.mark.parametrize("sigma", [0.02, 0.1, 0.9])
+@pytest.mark.parametrize("seed", range(100))
+def test_strong_wolfe_conditions_on_random_functions(seed: int, sigma: float) -> None:
+    """Both conditions, and no acceptable point that was seen is better."""
+    value, slope = random_phi(seed)
+    seen: list[tuple[float, float]] = []
+
+    def noted(a: float) -> float:
+        seen.append((a, value(a)))
+        return seen[-1][1]
+
+    search = sm.LineSearch(sigma=sigma)
+    first = 10.0 ** np.random.default_rng(seed).uniform(-2.0, 2.0)
+    found = search.search(
+        noted, slope, value(0), slope(0), first=first, longest=1e6, more=lambda: True
+    )
+    assert found is not None
+    alpha, reached = found
+    assert reached == value(alpha)
+    assert reached <= value(0) + search.rho * alpha * slope(0)
+    assert abs(slope(alpha)) <= -sigma * slope(0)
+    low_enough = [v for a, v in seen if v <= value(0) + search.rho * a * slope(0)]
+    assert reached == min(low_enough)
+    assert len(seen) <= 40
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_interpolation_is_exact_on_cubics(seed: int) -> None:
+    """The step is where a cubic is least between two steps, seen from either end."""
+    rng = np.random.default_rng(seed)
+    cubic, (near, far) = np.polynomial.Polynomial(rng.normal(size=4)), np.sort(rng.normal(size=2))
+    rate = cubic.deriv()
+    points = [_Point(a, float(cubic(a)), float(rate(a))) for a in (near, far)]
+    candidates = [near, far, *(r.real for r in rate.roots() if near < r.real < far and not r.imag)]
+    best = min(candidates, key=cubic)
+    assert _minimizer(points[0], points[1], near, far) == pytest.approx(best, abs=1e-6)
+    assert _minimizer(points[1], points[0], far, near) == pytest.approx(best, abs=1e-6)
+
+
+def test_no_curvature_along_the_step_gives_no_update() -> None:
+    h = np.diag([1.0, 2.0, 3.0])
+    s = np.array([1.0, 0.0, 0.0])
+    for y in (np.array([0.0, 1.0, 1.0]), np.array([-1e-3, 1.0, 1.0]), np.zeros(3)):
+        again, name = renewed(h, s, y, "fletcher")
+        assert name == "none"
+        np.testing.assert_array_equal(again, h)
+
+
+@pytest.mark.parametrize("offset", [50.0, -50.0])
+def test_costs_below_zero_converge_as_others(offset: float) -> None:
+    """Relative to |F|, from a metric and from the identity."""
+    counts = []
+    for sign in (offset, abs(offset)):
+        function, hessian, center = quadratic(offset=sign)
+        found = sm.QuasiNewton().minimize(function, np.zeros(6), 0.7 * np.linalg.inv(hessian))
+        assert found.status is sm.Status.CONVERGED
+        np.testing.assert_allclose(found.x, center, atol=1e-2)
+        counts.append(function.evaluations)
+    assert abs(counts[0] - counts[1]) <= 1
+    function, _, center = quadratic(offset=offset)
+    found = plain().minimize(function, np.zeros(6))
+    assert found.status is sm.Status.CONVERGED
+    assert function.evaluations <= 40
+
+
+@pytest.mark.parametrize("slope", np.geomspace(1e-4, 1e4, 9))
+def test_falling_for_ever_stops_at_the_stated_bound(slope: float) -> None:
+    function = Counted(lambda x: float(-slope * x[0]), lambda x: np.array([-slope, 0.0]))
+    found = plain(unbounded=1e4).minimize(function, np.zeros(2))
+    assert found.status is sm.Status.UNBOUNDED
+    # The line search may go twice as far from where it began.
+    assert 1e4 < np.linalg.norm(found.x) <= 3e4
+    assert function.evaluations <= 20
+
+
+def test_the_first_step_from_the_identity_is_no_longer_than_one() -> None:
+    function, _, _ = quadratic(offset=1.0)
+    steps: list[float] = []
+    value = function._value
+    function._value = lambda x: (steps.append(float(np.linalg.norm(x))), value(x))[1]
+    plain(max_iterations=1).minimize(function, np.zeros(6))
+    assert steps[1] <= 1.0 + 1e-12
+
+
+def test_a_gradient_that_is_not_finite_is_an_error_and_a_slope_a_step_too_far() -> None:
+    function = Counted(lambda x: float(x @ x), lambda x: np.full(2, np.nan))
+    with pytest.raises(sm.ProblemError, match="its gradient is not"):
+        plain().minimize(function, np.ones(2))
+
+    def slope(a: float) -> float:
+        return 2.0 * a - 2.0 if a < 3.0 else np.nan
+
+    found = sm.LineSearch(sigma=0.1).search(
+        lambda a: a**2 - 2.0 * a if a < 3.0 else -1.5,
+        slope,
+        0.0,
+        -2.0,
+        first=4.0,
+        longest=1e6,
+        more=lambda: True,
+    )
+    assert found is not None
+    assert found[0] == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_function_without_bottom_ends_where_its_start_is_lost_in_rounding() -> None:
+    function = Counted(lambda x: float(-(x[0] ** 3)) - x[0], lambda x: -3.0 * x**2 - 1.0)
+    found = plain().minimize(function, np.zeros(1))
+    assert found.status is sm.Status.UNBOUNDED
+    assert function.evaluations <= 100
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_damping_keeps_the_matrix_positive_and_leaves_good_curvature_alone(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    factor = rng.normal(size=(4, 4))
+    hessian = factor @ factor.T + 0.1 * np.eye(4)
+    s, y = rng.normal(size=4), 3.0 * rng.normal(size=4)
+    curvature, again = s @ hessian @ s, damped(y, s, hessian)
+    assert s @ again == pytest.approx(max(s @ y, 0.2 * curvature))
+    if s @ y >= 0.2 * curvature:
+        np.testing.assert_array_equal(again, y)
+    h, name = renewed(np.linalg.inv(hessian), s, again, "fletcher")
+    assert name != "none"
+    assert np.linalg.eigvalsh(h).min() > 0.0
+    np.testing.assert_allclose(h @ again, s, atol=1e-8)

@@ -60,7 +60,6 @@ from selfmotion.constraints import (
     JointAccelerationLimits,
     JointPositionLimits,
     JointVelocityLimits,
-    NodePartials,
     NodeTangents,
 )
 from selfmotion.costs import (
@@ -110,6 +109,7 @@ from selfmotion.planning import (
     plan,
 )
 from selfmotion.plans import (
+    Binding,
     Gap,
     Plan,
     Problem,
@@ -136,6 +136,7 @@ if TYPE_CHECKING:
 __all__ = [
     "NAMED_ARMS",
     "BSplineNullMotion",
+    "Binding",
     "BoundConstraint",
     "Box",
     "BreakdownError",
@@ -185,7 +186,6 @@ __all__ = [
     "Minimum",
     "Motion",
     "NoSequenceError",
-    "NodePartials",
     "NodeTangents",
     "NullMotion",
     "Obstacle",

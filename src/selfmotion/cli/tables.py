@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from selfmotion.certificate import LIMIT_NAMES, Certificate
-from selfmotion.plans import Gap, Plan
+from selfmotion.plans import Gap, Plan, Report
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
@@ -36,6 +36,8 @@ def show(plan: Plan, console: Console) -> None:
         f"gradient;\n{report.jacobian_evaluations} Jacobians, {report.steps} steps, "
         f"{report.seconds:.2f} s\n{report.status.value}: {report.message}"
     )
+    if report.active:
+        console.print(_prices(report))
     if report.gap is not None:
         console.print(_distance(report.gap))
     show_certificate(plan.certificate, console)
@@ -123,6 +125,19 @@ def _distance(gap: Gap) -> str:
         f"{gap.sequences} refined:\n{cost}; joint path {gap.length:.4g}, "
         f"{100.0 * gap.length_excess:+.2f} % from its shortest sequence"
     )
+
+
+def _prices(report: Report) -> Table:
+    """Return what each binding constraint costs."""
+    table = Table(box=box.SIMPLE_HEAD, title="constraints that bind")
+    table.add_column("with")
+    table.add_column("the cost would fall by", justify="right")
+    table.add_column("binds at")
+    for item in report.active:
+        share = f"{100.0 * item.saving / abs(report.cost):.3g} %" if report.cost else ""
+        spans = ", ".join(f"{a:.2f} s" if a == b else f"{a:.2f}-{b:.2f} s" for a, b in item.spans)
+        table.add_row(item.easing, share, spans)
+    return table
 
 
 def _compare(before: float, after: float) -> tuple[str, str, str]:

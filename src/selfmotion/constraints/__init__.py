@@ -1,6 +1,11 @@
 """What a motion must keep: limits, end conditions, closed paths, clearance."""
 
-from selfmotion.constraints.base import BoundConstraint, Constraint, NodePartials, NodeTangents
+from selfmotion.constraints.base import (
+    BoundConstraint,
+    Constraint,
+    NodeTangents,
+    easing_of,
+)
 from selfmotion.constraints.clearance import Clearance
 from selfmotion.constraints.ends import ClosedPath, EndConfiguration, EndVelocity
 from selfmotion.constraints.envelope import Envelope
@@ -21,6 +26,6 @@ __all__ = [
     "JointAccelerationLimits",
     "JointPositionLimits",
     "JointVelocityLimits",
-    "NodePartials",
     "NodeTangents",
+    "easing_of",
 ]

@@ -19,20 +19,6 @@ from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
-class NodePartials:
-    """Derivatives of a number with respect to the motion at the nodes; None stands for zero.
-
-    Attributes
-    ----------
-    q, qd, qdd : (N + 1, n) or None
-    """
-
-    q: Array | None = None
-    qd: Array | None = None
-    qdd: Array | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class NodeTangents:
     """How the motion at the nodes changes with d decision variables.
 
@@ -107,9 +93,6 @@ class BoundConstraint(Protocol):
     def residual(self, samples: Samples) -> Array:
         """Return h: (N + 1, C) for conditions at every node, (1, C) for conditions on the whole."""
 
-    def pullback(self, samples: Samples, weights: Array) -> NodePartials:
-        """Return the derivative of Σ weights · h, weights shaped as h."""
-
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """Return ∂h/∂x for d variables: h's shape with d appended."""
 
@@ -117,13 +100,18 @@ class BoundConstraint(Protocol):
         """Return what is wrong where h[row, column] is too large, with names and numbers."""
 
 
+def easing_of(bound: BoundConstraint, column: int) -> tuple[float, str]:
+    """Return how much larger h may be to ask for a little less, and what that means in words.
+
+    What a constraint's own `easing(column)` says, where it has one: ``(0.02, "2 % more speed for
+    joint 'elbow'")``. Columns with the same words are eased together.
+    """
+    own = getattr(bound, "easing", None)
+    return (0.01, f"{bound.name} eased by 0.01") if own is None else own(column)
+
+
 def motion_of_order(samples: Samples, order: int) -> Array:
     """Return q (0), q̇ (1) or q̈ (2) at the nodes, (N + 1, n)."""
     table = (samples.q, samples.qd)[order] if order < 2 else samples.qdd
     nodes: Array = table[samples.nodes]
     return nodes
-
-
-def partials_of_order(order: int, values: Array) -> NodePartials:
-    """Return `values` (N + 1, n) as the derivative with respect to q (0), q̇ (1) or q̈ (2)."""
-    return NodePartials(**{("q", "qd", "qdd")[order]: values})

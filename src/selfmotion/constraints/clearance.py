@@ -18,7 +18,7 @@ from selfmotion.collision import (
     Obstacle,
     obstacle_from_dict,
 )
-from selfmotion.constraints.base import Constraint, NodePartials, NodeTangents, motion_of_order
+from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
 from selfmotion.robot import RobotModel
@@ -146,10 +146,6 @@ class BoundClearance:
         """See `BoundConstraint.residual`."""
         return (self.distance + self.margin - self._clearances(samples).values) / _METRE
 
-    def pullback(self, samples: Samples, weights: Array) -> NodePartials:
-        """See `BoundConstraint.pullback`."""
-        return NodePartials(q=self._clearances(samples).pullback(-weights / _METRE))
-
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
         return self._clearances(samples).along(-motion.q / _METRE)
@@ -160,6 +156,11 @@ class BoundClearance:
         if not self._last or not np.array_equal(self._last[0], q):
             self._last[:] = [q, self.model.clearances(q)]
         return cast(Clearances, self._last[1])
+
+    def easing(self, column: int) -> tuple[float, str]:
+        """See `easing_of`: a millimetre."""
+        first, second = self.model.pairs[column]
+        return 1e-3 / _METRE, f"1 mm less between '{first}' and '{second}'"
 
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""

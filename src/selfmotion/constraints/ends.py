@@ -16,13 +16,13 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, per_joint, read_only
 from selfmotion.certificate import ClosedMotion, EndState
-from selfmotion.constraints.base import Constraint, NodePartials, NodeTangents, motion_of_order
+from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
 from selfmotion.costs import Samples
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel, null_basis
 from selfmotion.task import Task
 
-# The augmented Lagrangian need only come near [rad, rad/s]: Newton's method then closes the rest.
+# The optimiser need only come near [rad, rad/s]: Newton's method then closes the rest.
 _NEAR = 1e-4
 # An end configuration may be this far off [m, rad]: what the certificate grants it.
 _NEAR_END = 1e-6
@@ -170,18 +170,6 @@ class BoundEnd:
             x = motion_of_order(samples, order)
             parts.append(self.null.T @ (x[-1] - (x[0] if self.target is None else self.target)))
         return np.concatenate(parts)[None, :]
-
-    def pullback(self, samples: Samples, weights: Array) -> NodePartials:
-        """See `BoundConstraint.pullback`."""
-        n, r = self.null.shape
-        tables = {}
-        for k, order in enumerate(self.orders):
-            table = np.zeros((len(samples.nodes), n))
-            table[-1] = self.null @ weights[0, k * r : (k + 1) * r]
-            if self.target is None:
-                table[0] = -table[-1]
-            tables[("q", "qd")[order]] = table
-        return NodePartials(**tables)
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""

@@ -9,10 +9,8 @@ from selfmotion.basics import Array, ProblemError, per_joint, read_only
 from selfmotion.certificate import LIMIT_NAMES, JointLimits
 from selfmotion.constraints.base import (
     Constraint,
-    NodePartials,
     NodeTangents,
     motion_of_order,
-    partials_of_order,
 )
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
@@ -215,17 +213,18 @@ class BoundLimits:
         below = (self.lower - x) / self.scale + self.margin
         return np.hstack([above, below])
 
-    def pullback(self, samples: Samples, weights: Array) -> NodePartials:
-        """See `BoundConstraint.pullback`."""
-        count = len(self.joints)
-        values = np.zeros((len(weights), samples.q.shape[1]))
-        values[:, self.joints] = (weights[:, :count] - weights[:, count:]) / self.scale
-        return partials_of_order(self.order, values)
-
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
         above = motion.of_order(self.order)[:, self.joints] / self.scale[:, None]
         return np.concatenate([above, -above], axis=1)
+
+    def easing(self, column: int) -> tuple[float, str]:
+        """See `easing_of`: 2 % of a rate, on both sides; 0.01 rad or m of a position."""
+        joint = f"joint '{self.joint_names[column % len(self.joints)]}'"
+        if self.order > 0:
+            return 0.02, f"2 % more {('speed', 'acceleration')[self.order - 1]} for {joint}"
+        side = "upper" if column < len(self.joints) else "lower"
+        return 0.01, f"0.01 rad or m more at the {side} limit of {joint}"
 
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""

@@ -6,16 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, ProblemError
 from selfmotion.constraints import BoundConstraint, NodeTangents
 from selfmotion.costs import ERROR, Cost, Samples
-from selfmotion.engine.augmented_lagrangian import AugmentedLagrangian
+from selfmotion.engine.conditions import Conditions
 from selfmotion.engine.counts import Counts
 from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart, Start
 from selfmotion.engine.still import StillMotion
 from selfmotion.motion import Grid, NullMotionTable, Trajectory
+from selfmotion.optimise import Residuals
 from selfmotion.path import PathSamples
 from selfmotion.plans import Problem
 
@@ -29,7 +30,7 @@ class Evaluation:
     x : (size,)
         The decision vector.
     terms : dict
-        What each cost contributes to F, without the constraints.
+        What each cost contributes to F.
     trajectory : Trajectory
         Its nodes put onto the path, unless damped.
     damped : bool
@@ -43,12 +44,12 @@ class Evaluation:
 
     @property
     def cost(self) -> float:
-        """F without the constraints."""
+        """F."""
         return sum(self.terms.values())
 
 
 class Objective:
-    """F = ∫ Σ G(q̇, q, t) dt along the motion of a decision vector, plus its constraints' terms.
+    """F = ∫ Σ G(q̇, q, t) dt along the motion of a decision vector, and the conditions on it.
 
     The decision vector is [z | x | c]: where the start is on its self-motion manifold (nothing for
     a given start), the null motion's coefficients, and those of the tool's deviation from the path
@@ -65,8 +66,7 @@ class Objective:
         z → q(0).
     deviation : Deviation
         c → the poses and twists that the tool follows.
-    conditions : AugmentedLagrangian
-        The constraints.
+    constraints : Conditions
     counts : Counts
         Where work is added up.
     """
@@ -78,11 +78,11 @@ class Objective:
         costs: Sequence[Cost],
         start: Start,
         deviation: Deviation,
-        conditions: AugmentedLagrangian,
+        constraints: Conditions,
         counts: Counts,
     ) -> None:
         self.rollout, self.null_motion, self.start = rollout, null_motion, start
-        self.conditions, self.counts = conditions, counts
+        self.constraints, self.counts = constraints, counts
         self._deviation = deviation
         self._costs = tuple(costs)
         self._at: Array | None = None
@@ -99,7 +99,6 @@ class Objective:
         grid: Grid | None = None,
         free: bool = False,
         constraints: Sequence[BoundConstraint] = (),
-        conditions: AugmentedLagrangian | None = None,
         counts: Counts | None = None,
     ) -> "Objective":
         """Return the objective of a problem around its motion at x = 0.
@@ -114,9 +113,7 @@ class Objective:
         free : bool
             Whether the start may move along its self-motion.
         constraints : sequence of BoundConstraint
-            Those that count, anew.
-        conditions : AugmentedLagrangian, optional
-            The same, with the multipliers of a coarser grid, in place of `constraints`.
+            Those that count.
         counts : Counts, optional
         """
         robot, task, grid = problem.robot, problem.task, grid or still.grid
@@ -135,7 +132,7 @@ class Objective:
             problem.all_costs,
             start,
             Deviation(problem.path, problem.relaxations, t, problem.pinned),
-            conditions or AugmentedLagrangian(constraints, grid),
+            Conditions(constraints, grid),
             Counts() if counts is None else counts,
         )
 
@@ -161,12 +158,9 @@ class Objective:
         return x[:first], x[first:last], x[last:]
 
     def value(self, x: Array) -> float:
-        """Return cost and constraints' terms at x; infinite where the motion breaks down."""
+        """Return the cost at x; infinite where the motion breaks down."""
         self._run(x)
         total = sum(self._terms.values())
-        if not np.isfinite(total):
-            return np.inf
-        total += self.conditions.value(self.rollout.samples())
         return total if np.isfinite(total) else np.inf
 
     def gradient(self, x: Array) -> Array:
@@ -187,12 +181,36 @@ class Objective:
             parts.append(np.tensordot(by_target, target, 2))
         return np.concatenate(parts)
 
+    def require_finite(self, x: Array) -> None:
+        """Raise ProblemError where a cost or a condition has no finite value at x; says when."""
+        samples = self.samples(x)
+        if not np.all(np.isfinite(samples.q)):
+            return
+        for cost in self._costs:
+            self._require_finite(f"cost '{cost.name}'", "value", np.asarray(cost.value(samples)))
+        for item in self.constraints.constraints:
+            h = item.residual(samples)
+            if not np.all(np.isfinite(h)):
+                raise ProblemError(
+                    f"constraint '{item.name}': its residual is not finite on the motion at the "
+                    f"start; expected numbers wherever the arm may be"
+                )
+
+    def _require_finite(self, what: str, which: str, table: Array) -> None:
+        bad = ~np.isfinite(table)
+        if bad.any():
+            row = int(np.argmax(bad.reshape(len(bad), -1).any(axis=1)))
+            raise ProblemError(
+                f"{what}: its {which} is {table[row]} at t = {self.grid.stage_times[row]:.6g} s, "
+                f"expected finite numbers; selfmotion.testing.check_cost checks a cost"
+            )
+
     def slope(self, x: Array, direction: Array) -> float:
         """Return the derivative of `value` at x along `direction`."""
         return float(self.gradient(x) @ direction)
 
     def terms(self, x: Array) -> dict[str, float]:
-        """Return what each cost contributes to F at x, without the constraints' terms."""
+        """Return what each cost contributes to F at x."""
         self._run(x)
         return dict(self._terms)
 
@@ -211,10 +229,19 @@ class Objective:
 
     def violations(self, x: Array) -> tuple[str, ...]:
         """Return what is wrong for each constraint that is not kept at x, on its worst place."""
-        return self.conditions.violated(self.samples(x))
+        return self.constraints.violated(self.samples(x))
+
+    def conditions(self, x: Array) -> Residuals:
+        """Return h at x, which inequalities ask to be ≤ 0 and equalities to be 0."""
+        return self.constraints.residuals(self.samples(x))
+
+    def condition_rows(self, x: Array) -> Array:
+        """Return ∂h/∂x at x, (C, size)."""
+        tangents = self.node_tangents(x)
+        return self.constraints.rows(self.samples(x), tangents)
 
     def metric(self, x: Array) -> Array:
-        """Return the Gauss-Newton matrix of quadratic costs and active constraints, (size, size).
+        """Return the Gauss-Newton matrix of quadratic costs, (size, size).
 
         ∫ Σ_k (∂q^(k)/∂x)ᵀ W_k (∂q^(k)/∂x) dt over the derivatives q^(k) of q that the costs weigh
         (that of ½ q̇ᵀq̇ where none does), and likewise over the pose error. Its inverse starts the
@@ -239,8 +266,7 @@ class Objective:
                     tangent = by_q if order == 0 else by_qd
                 weighted = sampling.weights[:, None, None] * (weight @ tangent)
                 metric += tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size)
-        tangents = self._at_nodes(by_q, by_qd)
-        return metric + self.conditions.curvature(self.rollout.samples(), tangents)
+        return metric
 
     def node_tangents(self, x: Array) -> NodeTangents:
         """Return how the motion at the nodes changes with the decision vector, at x."""
@@ -312,17 +338,12 @@ class Objective:
                 (by_error, partials.error),
             ):
                 if part is not None:
+                    self._require_finite(f"cost '{cost.name}'", "gradient", part)
                     total += weights * part
             for order, part in ((1, partials.qdd), (2, partials.qddd)):
                 if part is not None:
+                    self._require_finite(f"cost '{cost.name}'", "gradient", part)
                     by_qd[nodes] += sampling.differentiation(order).T @ (weights * part)
-        for condition in self.conditions.gradient(samples):
-            if condition.q is not None:
-                by_q[nodes] += condition.q
-            if condition.qd is not None:
-                by_qd[nodes] += condition.qd
-            if condition.qdd is not None:
-                by_qd[nodes] += sampling.differentiation(1)[nodes].T @ condition.qdd
         return by_q, by_qd, by_error
 
     def _sensitivities(self, x: Array) -> tuple[Array, Array]:

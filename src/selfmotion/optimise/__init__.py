@@ -2,24 +2,30 @@
 
 from selfmotion.optimise.base import (
     Callback,
+    ConstrainedFunction,
     Function,
     Iteration,
     Minimum,
     Optimizer,
+    Residuals,
     Status,
     inverse_metric,
 )
 from selfmotion.optimise.line_search import LineSearch
 from selfmotion.optimise.quasi_newton import QuasiNewton
+from selfmotion.optimise.sqp import SequentialQuadratic
 
 __all__ = [
     "Callback",
+    "ConstrainedFunction",
     "Function",
     "Iteration",
     "LineSearch",
     "Minimum",
     "Optimizer",
     "QuasiNewton",
+    "Residuals",
+    "SequentialQuadratic",
     "Status",
     "inverse_metric",
 ]

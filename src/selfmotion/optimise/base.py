@@ -1,11 +1,12 @@
 """What is minimised, what minimises it, and what comes of it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from selfmotion.basics import Array
 
@@ -30,6 +31,43 @@ class Function(Protocol):
         """Return the Gauss-Newton matrix at x, (size, size): what is known of the Hessian."""
 
 
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """Conditions on x at one point: h ≤ 0, or h = 0 for equalities.
+
+    Attributes
+    ----------
+    h : (C,)
+    tolerance : (C,)
+        What h (|h| for an equality) may be and still count as kept.
+    equality : (C,) of bool
+    """
+
+    h: Array
+    tolerance: Array
+    equality: npt.NDArray[np.bool_]
+
+    @property
+    def excess(self) -> Array:
+        """How far each is violated, in multiples of its tolerance; ≤ 0 where it is kept, (C,)."""
+        return np.asarray(np.where(self.equality, np.abs(self.h), self.h) / self.tolerance)
+
+    @property
+    def worst(self) -> float:
+        """The largest violation in multiples of its tolerance; kept where ≤ 1."""
+        return float(np.max(self.excess, initial=0.0))
+
+
+class ConstrainedFunction(Function, Protocol):
+    """What is minimised, and conditions on it."""
+
+    def conditions(self, x: Array) -> Residuals:
+        """Return h(x), where F is finite."""
+
+    def condition_rows(self, x: Array) -> Array:
+        """Return ∂h/∂x, (C, size)."""
+
+
 class Status(Enum):
     """How an optimisation ended."""
 
@@ -38,6 +76,8 @@ class Status(Enum):
     MAX_ITERATIONS = "max_iterations"
     MAX_EVALUATIONS = "max_evaluations"
     UNBOUNDED = "unbounded"
+    INFEASIBLE = "infeasible"
+    GRADIENT = "gradient"
     STOPPED = "stopped"
     INTERRUPTED = "interrupted"
 
@@ -55,6 +95,10 @@ _MESSAGES = {
     Status.MAX_EVALUATIONS: "the limit on evaluations was reached; raise max_evaluations to go on",
     Status.UNBOUNDED: "the coefficients grow without bound: the cost has no minimum; add a "
     "JointVelocity cost",
+    Status.INFEASIBLE: "no step brings the conditions nearer: they contradict each other or are "
+    "out of reach from here; allow more (limits, null motion), or start elsewhere",
+    Status.GRADIENT: "the cost does not change as its gradient says: the gradient is wrong "
+    "(selfmotion.testing.check_cost tells), or the cost has a kink here",
     Status.STOPPED: "the callback asked to stop",
     Status.INTERRUPTED: "interrupted; this is the best found so far",
 }
@@ -93,7 +137,7 @@ Callback = Callable[[Iteration], bool | None]
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """What `QuasiNewton.minimize` found.
+    """What an optimiser found.
 
     Attributes
     ----------
@@ -103,6 +147,9 @@ class Minimum:
         The last estimate.
     history : tuple of Iteration
     status : Status
+    multipliers : (C,)
+        λ of the conditions, where there are some: ∇F + Σ λ ∇h = 0, so that F falls by λ for each
+        unit that h may be larger.
     """
 
     x: Array
@@ -110,6 +157,7 @@ class Minimum:
     inverse_hessian: Array
     history: tuple[Iteration, ...]
     status: Status
+    multipliers: Array = field(default_factory=lambda: np.zeros(0))
 
 
 class Optimizer(Protocol):

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+# Evaluations of one search, by far.
+_MOST = 60
+
 
 @dataclass(frozen=True)
 class _Point:
@@ -22,7 +25,7 @@ class LineSearch:
     φ(α) ≤ φ(0) + ρ α φ'(0)  and  |φ'(α)| ≤ -σ φ'(0).
 
     R. Fletcher, Practical Methods of Optimization, 2nd ed., chapter 2.6; `tau1` to `tau3` as there.
-    A step where φ is infinite counts as too long.
+    A step where φ is infinite, or its slope, counts as too long.
 
     Parameters
     ----------
@@ -73,11 +76,16 @@ class LineSearch:
         """
         start = _Point(0.0, value0, slope0)
         before, alpha = start, first
-        while more():
+        for _ in range(_MOST):
+            if not more():
+                break
             here = _Point(alpha, value(alpha))
             if self._too_high(here, start) or here.value >= before.value:
                 return self._section(value, slope, start, before, here, more)
             here = _Point(alpha, here.value, slope(alpha))
+            if not np.isfinite(_slope(here)):
+                beyond = _Point(alpha, np.inf)
+                return self._section(value, slope, start, before, beyond, more)
             if abs(_slope(here)) <= -self.sigma * slope0 or (
                 alpha >= longest and _slope(here) < 0.0
             ):
@@ -102,7 +110,9 @@ class LineSearch:
         """Shrink a bracket; `low` is its best end, of known slope, pointing into it."""
         slope0 = _slope(start)
         rounding = 4.0 * np.finfo(float).eps * abs(start.value)
-        while more():
+        for _ in range(_MOST):
+            if not more():
+                break
             length = high.alpha - low.alpha
             nearest = low.alpha + self.tau2 * length
             farthest = high.alpha - self.tau3 * length
@@ -114,6 +124,9 @@ class LineSearch:
                 high = here
                 continue
             here = _Point(alpha, here.value, slope(alpha))
+            if not np.isfinite(_slope(here)):
+                high = _Point(alpha, np.inf)
+                continue
             if abs(_slope(here)) <= -self.sigma * slope0:
                 return here.alpha, here.value
             if length * _slope(here) >= 0.0:

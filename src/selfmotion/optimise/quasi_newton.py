@@ -13,7 +13,9 @@ from selfmotion.optimise.base import (
     Status,
     inverse_metric,
 )
+from selfmotion.optimise.derivative import is_misleading
 from selfmotion.optimise.line_search import LineSearch
+from selfmotion.optimise.update import renewed
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ class QuasiNewton:
     max_iterations : int
     line_search : LineSearch
     unbounded : float
-        Stops when |x| exceeds this times its scale at the start (1 + |x0|).
+        Stops when |x| exceeds this times its scale at the start (1 + |x0|), or F is so negative
+        that its value at the start is lost in rounding.
     """
 
     update: str = "fletcher"
@@ -125,11 +128,13 @@ class _Run:
         self._cost = function.value(self._x)
         if not np.isfinite(self._cost):
             raise ProblemError("optimiser: the cost at the start is not finite")
+        # So far down, the cost at the start is a rounding error.
+        self._lowest = -max(abs(self._cost), 1.0) / float(np.finfo(float).eps)
         self._gradient = np.zeros_like(self._x)
         self._history: list[Iteration] = []
 
     def until_done(self) -> Status:
-        self._gradient = self._function.gradient(self._x)
+        self._gradient = self._derivative()
         if self._record("none", 0.0):
             return Status.STOPPED
         for _ in range(self._method.max_iterations):
@@ -161,34 +166,28 @@ class _Run:
             more=lambda: self._function.evaluations < self._limit,
         )
         if found is None:
-            spent = self._function.evaluations >= self._limit
-            return Status.MAX_EVALUATIONS if spent else Status.PRECISION
+            if self._function.evaluations + 2 > self._limit:
+                return Status.MAX_EVALUATIONS
+            misled = is_misleading(self._function.value, self._x, self._cost, direction, slope)
+            return Status.GRADIENT if misled else Status.PRECISION
         alpha, self._cost = found
         s = alpha * direction
         self._x = self._x + s
-        gradient = self._function.gradient(self._x)
-        update = self._renew(s, gradient - self._gradient)
+        gradient = self._derivative()
+        self._h, update = renewed(self._h, s, gradient - self._gradient, self._method.update)
+        # One update is enough to give H the scale of F.
+        self._scaled = self._scaled or update != "none"
         self._gradient = gradient
         if self._record(update, alpha):
             return Status.STOPPED
-        return Status.UNBOUNDED if np.linalg.norm(self._x) > self._bound else None
+        far = np.linalg.norm(self._x) > self._bound or self._cost < self._lowest
+        return Status.UNBOUNDED if far else None
 
-    def _renew(self, s: Array, y: Array) -> str:
-        """Renew H by the formula that the switch chooses; return its name."""
-        hy = self._h @ y
-        sy, yhy = float(s @ y), float(y @ hy)
-        # Without positive curvature along s no update keeps H positive definite.
-        if sy <= 1e-14 * float(np.linalg.norm(s) * np.linalg.norm(y)) or yhy <= 0.0:
-            return "none"
-        self._scaled = True
-        update = self._method.update
-        if update == "fletcher":
-            update = "dfp" if sy < yhy else "bfgs"
-        self._h += np.outer(s, s) / sy - np.outer(hy, hy) / yhy
-        if update == "bfgs":
-            v = s / sy - hy / yhy
-            self._h += yhy * np.outer(v, v)
-        return update
+    def _derivative(self) -> Array:
+        gradient = self._function.gradient(self._x)
+        if not np.all(np.isfinite(gradient)):
+            raise ProblemError("optimiser: the cost is finite, but its gradient is not")
+        return gradient
 
     def _record(self, update: str, step: float) -> bool:
         iteration = Iteration(

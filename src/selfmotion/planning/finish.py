@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Progress
-from selfmotion.certificate import Certificate, Tolerance
+from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
 from selfmotion.engine import MOST_HALVINGS, Evaluation
 from selfmotion.motion import Trajectory
 from selfmotion.optimise import Status
@@ -39,7 +39,8 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
         try:
             progress("checking", 1, 1)
             finished = _check(problem, session, tolerance, part.ending)
-            if _stands(finished, session):
+            rough = _rough(finished, session)
+            if finished.certificate.on_path and not rough:
                 break
             trajectory = finished.motion.trajectory
             # What damping costs stays on any grid: there, the motion stands when the tool does.
@@ -52,6 +53,8 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
             if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
                 break
             session.refine()
+            if rough:
+                session.minimize()
         except KeyboardInterrupt:
             session.end(Status.INTERRUPTED)
             break
@@ -59,12 +62,11 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
     return finished or _check(problem, session, tolerance, part.ending)
 
 
-def _stands(finished: Finished, session: Session) -> bool:
-    """Whether a finer grid is not needed."""
-    # Accelerations of the cubics come near those of the motion as the square of the step.
-    ratio = finished.certificate.acceleration_ratio
-    rough = ratio is not None and ratio.value > 1.0 and not session.violations
-    return finished.certificate.on_path and not rough
+def _rough(finished: Finished, session: Session) -> bool:
+    """Whether limits that are kept at the nodes are exceeded between them."""
+    findings = finished.certificate.findings
+    beyond = any(not item.kept and item.requirement in LIMIT_NAMES for item in findings)
+    return beyond and finished.certificate.on_path and not session.violations
 
 
 def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tolerance) -> bool:

@@ -65,6 +65,12 @@ class _Attempt:
         return self.session is not None and not self.session.violations
 
     @property
+    def arrived_with_room(self) -> bool:
+        """Whether a finer grid will find a motion, too: not on the last part that is possible."""
+        session = self.session
+        return session is not None and self.arrived and session.status is not Status.PRECISION
+
+    @property
     def cost(self) -> float:
         return np.inf if self.found is None else self.found.cost
 
@@ -118,6 +124,7 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
 def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) -> Part | None:
     """Return the candidate's motion on the largest part on which it arrives."""
     arrived: _Attempt | None = None
+    edge: _Attempt | None = None
     low, high = 0.0, failed.problem.path.duration
     back = _AGREEMENT
     for _ in range(_PROBES):
@@ -130,12 +137,14 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
         if probe < _LEAST * problem.path.duration or high - low < _AGREEMENT * high:
             break
         attempt = _attempt(_until(problem, probe), failed.candidate, effort)
-        if attempt.arrived or attempt.cut_short:
+        if attempt.arrived_with_room or attempt.cut_short:
             arrived, low = attempt, probe
         else:
+            edge = attempt if attempt.arrived and edge is None else edge
             failed, high = attempt, probe
         if attempt.cut_short:
             break
+    arrived = arrived or edge
     return None if arrived is None else _part(problem, arrived, reach, failed.reason)
 
 

@@ -46,7 +46,8 @@ def plan(
     ----------
     problem : Problem
     optimizer : Optimizer, optional
-        By default `QuasiNewton`.
+        By default `QuasiNewton`. It minimises the cost as long as constraints are kept; where
+        they begin to count, `SequentialQuadratic` goes on.
     search : Search, optional
         How to search where the start is free, and whether to compare with a global search.
     tolerance : Tolerance, optional
@@ -222,6 +223,7 @@ class _Run:
             seconds=time.perf_counter() - self._began,
             gap=gap,
             ending=part.ending,
+            active=session.active,
         )
         return Plan(
             problem=self._problem,

@@ -14,20 +14,17 @@ from selfmotion.engine import (
     StillMotion,
     settled_still_motion,
 )
-from selfmotion.optimise import Callback, Iteration, Minimum, Optimizer, Status
-from selfmotion.plans import Problem
+from selfmotion.optimise import Callback, Iteration, Minimum, Optimizer, SequentialQuadratic, Status
+from selfmotion.plans import Binding, Problem
 
 # Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands.
 _COST_AGREEMENT = 1e-4
 # A cost that rises this much on two grids in turn has no limit.
 _RISE, _RISES = 1.5, 2
-# The first round of the augmented Lagrangian is minimised this much more coarsely.
-_FIRST_COARSENESS = 1e4
-# Rounds of the augmented Lagrangian. What has not fallen to this share in so many of them, while
-# penalties grew tenfold in each, does not fall any more.
-_ROUNDS, _STUCK_ROUNDS, _STUCK = 12, 4, 0.9
 # Equalities are met to this [rad, rad/s], which Newton's method needs a few steps for.
 _CLOSED, _CLOSING_STEPS = 1e-11, 12
+# What would save less than this share of the cost does not bind.
+_LEAST_SAVING = 1e-6
 # After these the user has no more time to give.
 _CUT_SHORT = (Status.INTERRUPTED, Status.STOPPED, Status.MAX_EVALUATIONS)
 
@@ -39,6 +36,7 @@ class Effort:
     Attributes
     ----------
     optimizer : Optimizer
+        Minimises as long as conditions are kept.
     callback : callable or None
         Called with each `Iteration`.
     max_evaluations : int or None
@@ -73,6 +71,8 @@ class Session:
     history : list of Iteration
     violations : tuple of str
         What is wrong for each constraint that the last minimisation could not meet.
+    active : tuple of Binding
+        What kept it from a lower cost.
     """
 
     def __init__(
@@ -83,11 +83,12 @@ class Session:
         self._before = effort.counts.evaluations
         self._minimum: Minimum | None = None
         self._ended: Status | None = None
-        # Whether the last motion kept all constraints: so far none is known to be active.
-        self._feasible = True
+        # Whether conditions count: so far none was met on the way.
+        self._bound = False
         self._x = np.zeros(objective.size)
         self.history: list[Iteration] = []
         self.violations: tuple[str, ...] = ()
+        self.active: tuple[Binding, ...] = ()
 
     @classmethod
     def begin(
@@ -161,37 +162,29 @@ class Session:
     def initial_score(self) -> float:
         """Return the cost of x = 0, much larger where constraints are violated: for ranking."""
         objective, x = self._objective, np.zeros_like(self._x)
-        objective.conditions.start(objective.samples(x), sum(objective.terms(x).values()))
-        return objective.value(x)
+        cost = objective.value(x)
+        if not np.isfinite(cost):
+            return cost
+        return cost + max(abs(cost), 1e-3) * objective.constraints.penalty(objective.samples(x))
 
     def score(self) -> tuple[bool, float]:
         """Return whether constraints are violated, then the cost: the smaller, the better."""
         return bool(self.violations), self._cost()
 
     def minimize(self) -> None:
-        """Optimise on the present grid: rounds of the augmented Lagrangian until all is kept."""
-        objective = self._objective
-        conditions = objective.conditions
-        conditions.start(objective.samples(self._x), self._cost())
-        worst: list[float] = []
-        for round_number in range(_ROUNDS):
-            self._minimum = self._round(round_number)
-            self._x = np.array(self._minimum.x)
-            kept = conditions.update(objective.samples(self._x))
-            if (kept and self._feasible) or self.status in _CUT_SHORT:
-                break
-            self._feasible = kept
-            worst.append(conditions.worst)
-            if round_number >= _STUCK_ROUNDS and worst[-1] > _STUCK * worst[-1 - _STUCK_ROUNDS]:
-                break
+        """Optimise on the present grid, from the motion that there is."""
+        if not np.isfinite(self._objective.value(self._x)):
+            self._objective.require_finite(self._x)
+        self._minimum = self._next_minimum()
+        self._x = np.array(self._minimum.x)
         self._close()
-        self.violations = objective.violations(self._x)
+        self.violations = self._objective.violations(self._x)
 
     def refine_until_settled(self) -> None:
         """Optimise on halved grids until the cost agrees."""
         rises = 0
         for _ in range(MOST_HALVINGS):
-            if self.status in _CUT_SHORT:
+            if self.status in (*_CUT_SHORT, Status.UNBOUNDED, Status.GRADIENT):
                 return
             unmet, before = self.score()
             self.refine()
@@ -215,7 +208,7 @@ class Session:
             self._still,
             grid=grid,
             free=self._free,
-            conditions=coarse.conditions.refined(grid),
+            constraints=coarse.constraints.constraints,
             counts=self._effort.counts,
         )
         self._close()
@@ -223,28 +216,75 @@ class Session:
     def _cost(self) -> float:
         return sum(self._objective.terms(self._x).values())
 
-    def _round(self, number: int) -> Minimum:
-        """Minimise with the present multipliers; the estimate of H is that of a coarser grid."""
-        effort, before = self._effort, self._minimum
-        # New multipliers change the curvature, a finer grid hardly does.
-        h = None if before is None or number > 0 else before.inverse_hessian
-        # While multipliers are still far off, minimising to the last digit is lost work.
-        coarseness = 1.0 if self._feasible else max(_FIRST_COARSENESS * 0.1**number, 1.0)
-        limit = None
-        if effort.max_evaluations is not None:
-            # At least one more, so that there is something to show.
-            used_up = self._before + effort.max_evaluations
-            limit = max(used_up, effort.counts.evaluations + 1)
+    def _next_minimum(self) -> Minimum:
+        """Minimise by the optimiser as long as conditions are kept; go on with them from there."""
+        effort, objective, before = self._effort, self._objective, self._minimum
+        if self._bound or self._breaks(self._x):
+            return self._bound_minimum(known=False)
+        kept: list[Iteration] = []
+        asked = False
+
+        def note(iteration: Iteration) -> bool:
+            nonlocal asked
+            if self._breaks(iteration.x):
+                return True
+            kept.append(iteration)
+            asked = effort.callback is not None and bool(effort.callback(iteration))
+            return asked
+
         minimum = effort.optimizer.minimize(
+            objective,
+            self._x,
+            None if before is None else before.inverse_hessian,
+            max_evaluations=self._limit(),
+            callback=note,
+        )
+        self.history += kept
+        ended = asked or minimum.status in (Status.INTERRUPTED, Status.MAX_EVALUATIONS)
+        if ended or not self._breaks(minimum.x):
+            return minimum
+        # The last point that kept all: the one after it may be anywhere.
+        self._x = np.array(kept[-1].x) if kept else self._x
+        return self._bound_minimum(known=len(kept) > 0)
+
+    def _breaks(self, x: Array) -> bool:
+        """Whether a condition is violated; not where there is no motion."""
+        objective = self._objective
+        return np.isfinite(objective.value(x)) and not objective.conditions(x).worst <= 1.0
+
+    def _bound_minimum(self, *, known: bool) -> Minimum:
+        """Minimise where conditions count; `known` says that the start was told to the callback."""
+        effort, before = self._effort, self._minimum
+        first = known
+
+        def note(iteration: Iteration) -> bool:
+            nonlocal first
+            repeated, first = first, False
+            return not repeated and effort.callback is not None and bool(effort.callback(iteration))
+
+        self._bound = True
+        self.active = ()
+        minimum = SequentialQuadratic().minimize(
             self._objective,
             self._x,
-            h,
-            coarseness=coarseness,
-            max_evaluations=limit,
-            callback=effort.callback,
+            None if before is None else before.inverse_hessian,
+            max_evaluations=self._limit(),
+            callback=note,
         )
-        self.history += minimum.history
+        self.history += minimum.history[1 if known else 0 :]
+        if minimum.status is Status.CONVERGED:
+            objective, least = self._objective, _LEAST_SAVING * abs(minimum.cost)
+            samples = objective.samples(minimum.x)
+            self.active = objective.constraints.active(samples, minimum.multipliers, least)
         return minimum
+
+    def _limit(self) -> int | None:
+        effort = self._effort
+        if effort.max_evaluations is None:
+            return None
+        # At least one more, so that there is something to show.
+        used_up = self._before + effort.max_evaluations
+        return max(used_up, effort.counts.evaluations + 1)
 
     def _close(self) -> None:
         """Meet the equalities to rounding by Newton's method.
@@ -252,16 +292,16 @@ class Session:
         The step is the smallest in the metric of H⁻¹ that takes out the residual, so that it
         hardly changes the cost: -H Gᵀ(G H Gᵀ)⁻¹ h with G = ∂h/∂x.
         """
-        objective, conditions = self._objective, self._objective.conditions
-        if not conditions.has_equalities or self._minimum is None:
+        objective = self._objective
+        if not objective.constraints.has_equalities or self._minimum is None:
             return
         h = self._minimum.inverse_hessian
         best, x, nearest = self._x, self._x, np.inf
         for _ in range(_CLOSING_STEPS):
             if not np.isfinite(sum(objective.terms(x).values())):
                 break
-            tangents = objective.node_tangents(x)
-            residual, rows = conditions.equalities(objective.samples(x), tangents)
+            at = objective.conditions(x)
+            residual, rows = at.h[at.equality], objective.condition_rows(x)[at.equality]
             miss = float(np.max(np.abs(residual), initial=0.0))
             # Conditions that contradict each other, or are out of reach, are not met by more steps.
             if not miss < nearest:

@@ -23,7 +23,7 @@ from selfmotion.motion import NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Status
 from selfmotion.path import Path
 from selfmotion.plans.problem import Problem
-from selfmotion.plans.report import Gap, Report
+from selfmotion.plans.report import Binding, Gap, Report
 from selfmotion.robot import rebuild_robot
 from selfmotion.task import Damping, Relaxation
 
@@ -166,6 +166,7 @@ def _report_to_dict(report: Report) -> dict[str, Any]:
         "initial_terms": dict(report.initial_terms),
         "status": report.status.value,
         "gap": None if report.gap is None else dataclasses.asdict(report.gap),
+        "active": [dataclasses.asdict(item) for item in report.active],
     }
 
 
@@ -193,6 +194,10 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archiv
     report = dict(description["report"])
     report["status"] = Status(report["status"])
     report["gap"] = None if report["gap"] is None else Gap(**report["gap"])
+    report["active"] = tuple(
+        Binding(**{**item, "spans": tuple(tuple(span) for span in item["spans"])})
+        for item in report["active"]
+    )
     return Archive(
         problem=_problem_from_dict(description["problem"]),
         trajectory=Trajectory(arrays["t"], arrays["q"], arrays["qd"], names),

@@ -53,6 +53,28 @@ class Gap:
         return self.length / self.best_length - 1.0
 
 
+@dataclass(frozen=True)
+class Binding:
+    """A constraint that keeps the plan from a lower cost, with its price.
+
+    Attributes
+    ----------
+    constraint : str
+        Its name.
+    easing : str
+        What asking for a little less would be, in words, with the joint or the pair.
+    saving : float
+        What that would take off F, to first order: the multipliers' sum times the amount.
+    spans : tuple of (float, float)
+        First and last time [s] of each stretch on which it binds.
+    """
+
+    constraint: str
+    easing: str
+    saving: float
+    spans: tuple[tuple[float, float], ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Report:
     """How a plan was found.
@@ -82,6 +104,8 @@ class Report:
         Distance from the global optimum, where a global search was made.
     ending : str
         Why the motion ends before its path does; "" where it does not.
+    active : tuple of Binding
+        The constraints that bind, the most expensive first.
     """
 
     cost: float
@@ -99,3 +123,4 @@ class Report:
     seconds: float
     gap: Gap | None = None
     ending: str = ""
+    active: tuple[Binding, ...] = ()

@@ -1,0 +1,113 @@
+"""The constraints of a problem as one list of numbers: h ≤ 0 or h = 0, and its derivatives."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array
+from selfmotion.constraints import BoundConstraint, NodeTangents, easing_of
+from selfmotion.costs import Samples
+from selfmotion.motion import Grid
+from selfmotion.optimise import Residuals
+from selfmotion.plans import Binding
+
+# A constraint whose violation, squared and integrated, is above this counts as much as ten times
+# the cost.
+_NOTICED = 2e-3
+
+
+class Conditions:
+    """All conditions of some constraints at the nodes of a grid, in one order.
+
+    Parameters
+    ----------
+    constraints : sequence of BoundConstraint
+    grid : Grid
+    """
+
+    def __init__(self, constraints: Sequence[BoundConstraint], grid: Grid) -> None:
+        self.constraints = tuple(constraints)
+        steps = np.diff(grid.nodes)
+        self._shares = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+
+    def on(self, grid: Grid) -> "Conditions":
+        """Return the same on another grid."""
+        return Conditions(self.constraints, grid)
+
+    def residuals(self, samples: Samples) -> Residuals:
+        """Return h of all conditions, with their tolerances."""
+        tables = [item.residual(samples).ravel() for item in self.constraints]
+        pairs = list(zip(self.constraints, tables, strict=True))
+        none = np.zeros(0)
+        return Residuals(
+            np.concatenate([none, *tables]),
+            np.concatenate([none, *(np.full(len(h), item.tolerance) for item, h in pairs)]),
+            np.concatenate([none, *(np.full(len(h), item.equality) for item, h in pairs)]) > 0.0,
+        )
+
+    def rows(self, samples: Samples, motion: NodeTangents) -> Array:
+        """Return the derivatives of all conditions, (C, d)."""
+        size = motion.q.shape[2]
+        rows = [item.tangents(samples, motion).reshape(-1, size) for item in self.constraints]
+        return np.vstack([np.zeros((0, size)), *rows])
+
+    @property
+    def has_equalities(self) -> bool:
+        """Whether a constraint is an equality."""
+        return any(item.equality for item in self.constraints)
+
+    def penalty(self, samples: Samples) -> float:
+        """Return about 10 for each constraint that is violated, 0 where all are kept."""
+        total = 0.0
+        for item in self.constraints:
+            h = item.residual(samples)
+            bad = np.abs(h) if item.equality else np.maximum(h, 0.0)
+            shares = np.ones(1) if len(h) == 1 else self._shares
+            total += 10.0 * min(1.0, float(np.sum(shares[:, None] * bad**2)) / _NOTICED)
+        return total
+
+    def active(self, samples: Samples, multipliers: Array, least: float) -> tuple[Binding, ...]:
+        """Return what binds, for multipliers (C,) of all conditions, the most expensive first.
+
+        What would save less than `least` is left out.
+        """
+        found: dict[tuple[str, str], tuple[float, npt.NDArray[np.bool_]]] = {}
+        first = 0
+        for item in self.constraints:
+            shape = item.residual(samples).shape
+            prices = np.abs(multipliers[first : first + shape[0] * shape[1]]).reshape(shape)
+            first += prices.size
+            for column in np.flatnonzero(prices.any(axis=0)):
+                amount, words = easing_of(item, int(column))
+                saving, binds = found.get((item.name, words), (0.0, np.zeros(shape[0], np.bool_)))
+                saving += amount * float(prices[:, column].sum())
+                found[item.name, words] = saving, binds | (prices[:, column] > 0.0)
+        kept = [
+            Binding(name, words, saving, _spans(binds, samples.sampling.node_times))
+            for (name, words), (saving, binds) in found.items()
+            if saving >= least
+        ]
+        return tuple(sorted(kept, key=lambda item: -item.saving))
+
+    def violated(self, samples: Samples) -> tuple[str, ...]:
+        """Return a message for each constraint that is not kept, on its worst place."""
+        messages = []
+        for item in self.constraints:
+            h = item.residual(samples)
+            size = np.abs(h) if item.equality else h
+            # Written so that NaN counts as violated.
+            if not np.max(size, initial=-np.inf) <= item.tolerance:
+                row, column = np.unravel_index(int(np.argmax(size)), h.shape)
+                text = item.describe(samples, int(row), int(column))
+                messages.append(f"{item.name}: {text}")
+        return tuple(messages)
+
+
+def _spans(binds: npt.NDArray[np.bool_], times: Array) -> tuple[tuple[float, float], ...]:
+    """Return the stretches of nodes that bind; one free node between two is none."""
+    if len(binds) == 1:
+        return ((float(times[0]), float(times[-1])),)
+    nodes = np.flatnonzero(binds)
+    parts = np.split(nodes, np.flatnonzero(np.diff(nodes) > 2) + 1)
+    return tuple((float(times[part[0]]), float(times[part[-1]])) for part in parts)
