@@ -12,6 +12,8 @@ from selfmotion.basics import Array
 # Rows are kept to this, relative to their largest entry; and work is bounded.
 _KEPT, _ITERATIONS = 1e-10, 2000
 _FREE = 1e30
+# Rows with no larger entry are as good as 0, and not scaled.
+_NOTHING = 1e-100
 
 
 def minimize_quadratic(
@@ -43,11 +45,11 @@ def minimize_quadratic(
     """
     from daqp import solve
 
-    size = np.maximum(np.max(np.abs(rows), axis=1, initial=0.0), np.finfo(float).tiny)
-    used = np.isfinite(1.0 / size)
-    low = np.clip(np.concatenate([-reach, lower / np.where(used, size, 1.0)]), -_FREE, _FREE)
-    high = np.clip(np.concatenate([reach, upper / np.where(used, size, 1.0)]), -_FREE, _FREE)
-    scaled = np.ascontiguousarray(rows / np.where(used, size, 1.0)[:, None])
+    size = np.max(np.abs(rows), axis=1, initial=0.0)
+    scale = np.where(size > _NOTHING, size, 1.0)
+    low = np.clip(np.concatenate([-reach, lower / scale]), -_FREE, _FREE)
+    high = np.clip(np.concatenate([reach, upper / scale]), -_FREE, _FREE)
+    scaled = np.ascontiguousarray(rows / scale[:, None])
     p, _, flag, details = solve(
         np.ascontiguousarray(hessian),
         np.ascontiguousarray(gradient),
@@ -60,5 +62,5 @@ def minimize_quadratic(
     )
     if flag != 1 or not np.all(np.isfinite(p)):
         return None
-    multipliers = np.asarray(details["lam"])[len(p) :] / np.where(used, size, 1.0)
+    multipliers = np.asarray(details["lam"])[len(p) :] / scale
     return np.asarray(p), multipliers

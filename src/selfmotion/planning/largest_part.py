@@ -110,7 +110,8 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
         return None
     first = _until(problem, goal)
     attempts = []
-    for candidate in _candidates(first, reach.starts)[:_FINALISTS]:
+    starts = _apart(first, reach.starts) if effort.apart else reach.starts
+    for candidate in _candidates(first, starts)[:_FINALISTS]:
         attempts.append(_attempt(first, candidate, effort))
         if attempts[-1].cut_short:
             return _part(problem, attempts[-1], reach, "")
@@ -194,6 +195,15 @@ def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attemp
     # Constraints that cannot be met may throw it far off: x = 0 then tells more.
     until = max(_kept_until(problem, motion.t, motion.q, motion.qd), -_rank(problem, *candidate)[1])
     return _Attempt(candidate, problem, session, until, found)
+
+
+def _apart(problem: Problem, starts: list[Array]) -> list[Array]:
+    """Return the starts at which the arm does not meet itself; all where it always does."""
+    own = problem.own_collision
+    if own is None:
+        return starts
+    model = own.model(problem.robot)
+    return [q for q in starts if not model.collides(q, own.distance)] or starts
 
 
 def _candidates(problem: Problem, starts: list[Array]) -> list[_Candidate]:
