@@ -27,7 +27,7 @@ bench: $(READY)  ## the figures of the README's performance table
 	$(BIN)/python benchmarks/run.py
 
 bench-constrained: $(READY)  ## problems whose constraints bind, against an earlier revision
-	$(BIN)/python benchmarks/constrained.py
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/constrained.py
 
 study: $(READY)  ## the paper re-run, as a report in out/study
 	$(BIN)/selfmotion study --out out/study

@@ -3,7 +3,8 @@
 60 problems made at random for each seed. Each is planned, and compared with what another revision
 made of it: `--store` writes a revision's results, `--against` compares with them. Limits are taken
 from another motion, which is then forgotten, so that they bind at x = 0 and can be kept. Times are
-those of the processor.
+those of the processor. The problems are those of one thread (OMP_NUM_THREADS=1): with more, the
+last digits of eigenvectors differ, and with them the random motions.
 """
 
 from __future__ import annotations
