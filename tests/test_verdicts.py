@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import selfmotion as sm
@@ -322,3 +323,48 @@ def test_a_robot_may_be_shared_by_threads(panda: sm.RobotModel, line_plan: sm.Pl
     finally:
         sys.setswitchinterval(interval)
     assert wrong == []
+
+
+SLIDER = """<robot name="slider"><link name="l0"/><link name="l1"/>
+<joint name="turn" type="revolute"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" velocity="100" effort="1"/></joint>
+<link name="l2"><collision><geometry><sphere radius="0.01"/></geometry></collision></link>
+<joint name="slide" type="prismatic"><parent link="l1"/><child link="l2"/><axis xyz="1 0 0"/>
+<limit lower="0" upper="0.1" velocity="100" effort="1"/></joint></robot>"""
+
+
+def test_a_joint_beyond_the_urdfs_limits_lengthens_levers(tmp_path: Path) -> None:
+    """The tool is 5 m out where the URDF allows 0.1 m, and passes a plate of 2 mm."""
+    (tmp_path / "slider.urdf").write_text(SLIDER)
+    robot = sm.load_robot(tmp_path / "slider.urdf", "l2")
+    t = np.linspace(0.0, 1.0, 21)
+    still = np.zeros_like(t)
+    motion = sm.Trajectory(
+        t,
+        np.column_stack([2.0 * t, still + 5.0]),
+        np.column_stack([still + 2.0, still]),
+        robot.joint_names,
+    )
+    path = sm.Circle(
+        robot.pose([0.0, 5.0]),
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0],
+        1.0,
+        turns=1.0 / np.pi,
+        turn_tool=True,
+        time_law="constant",
+    )
+    limits = sm.JointPositionLimits([-3.0, -10.0], [3.0, 10.0], replace=True).requirement(robot)
+
+    def certified(angle: float) -> sm.Certificate:
+        place = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), np.zeros(3))
+        place.translation = 5.0 * place.rotation[:, 0]
+        plate = sm.Box("plate", place, [0.1, 0.002, 0.1])
+        clearance = sm.Clearance([plate], 0.001).requirement(robot)
+        return sm.certify(
+            robot, path, "planar", motion, sm.Tolerance(1e-3, 1e-3), [limits, clearance]
+        )
+
+    for angle in (0.77, 1.03, 1.53):
+        assert "plate" in " ".join(certified(angle).failures)
+    assert certified(2.5).verified

@@ -1,7 +1,7 @@
 """Distance of the arm from obstacles and from itself, at all times.
 
 Between two times a and b the distance d of a pair of bodies changes by Σ_j l_j V_j at most, with
-V_j the way that joint j makes and l_j the pair's lever (`CollisionModel.pair_levers`). So
+V_j the way that joint j makes and l_j the pair's lever (`CollisionModel.pair_levers_up_to`). So
 d(t) ≥ ½ (d(a) + d(b) - Σ_j l_j V_j) in between. Intervals on which this does not decide are halved,
 beginning with few: pairs that are far apart, or hardly move, are looked at a few times only.
 """
@@ -125,7 +125,7 @@ def closest_at_all_times(
     No pair comes nearer than `distance` [m] at any time unless the one returned does, or is
     undecided; and none nearer than it by more than a fiftieth or 0.1 mm.
     """
-    way, levers = Way(trajectory), model.pair_levers
+    way, levers = Way(trajectory), _levers(model, trajectory)
     edges = np.linspace(trajectory.t[0], trajectory.t[-1], _FIRST + 1)
     best = model.worst(trajectory(edges))
     approach = Approach(best, float(edges[best.index]))
@@ -159,6 +159,11 @@ def closest_at_all_times(
         goal = _goal(approach.closest, distance)
     row = rows[int(np.argmin(first[rows].min(axis=1)))] if len(rows) <= _MOST else 0
     return _undecided(model, approach, intervals, first, distance, int(row))
+
+
+def _levers(model: CollisionModel, trajectory: Trajectory) -> Array:
+    """Return the pairs' levers (P, n), also where joints leave the URDF's limits."""
+    return model.pair_levers_up_to(np.abs(trajectory.extremes(0)[1]).max(axis=0))
 
 
 def _goal(best: Closest, distance: float) -> float:

@@ -142,6 +142,15 @@ class CollisionModel:
         """
         return levers.pair_levers(self._axis_distances, self.moved, self.hulls.pairs)
 
+    def pair_levers_up_to(self, farthest: Array) -> Array:
+        """Return `pair_levers` where joints go as far as `farthest` (n,) from 0, (P, n).
+
+        A prismatic joint beyond its limits lengthens the levers of all revolute ones.
+        """
+        extra = levers.travel_beyond(self.robot, farthest)
+        counted = levers.is_turned(self.robot) & (self.pair_levers > 0.0)
+        return np.asarray(self.pair_levers + np.where(counted, extra, 0.0))
+
     @cached_property
     def _axis_distances(self) -> Array:
         return levers.axis_distances(self.robot, self._bodies)

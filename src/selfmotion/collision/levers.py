@@ -55,6 +55,22 @@ def pair_levers(distances: Array, moved: npt.NDArray[np.bool_], pairs: Ints) -> 
     return np.asarray(np.where(moved[first] != moved[second], nearer, 0.0))
 
 
+def is_turned(robot: RobotModel) -> npt.NDArray[np.bool_]:
+    """Return which joints are revolute, (n,)."""
+    return np.asarray(joint_axes(robot)[1], dtype=np.bool_)
+
+
+def travel_beyond(robot: RobotModel, farthest: Array) -> float:
+    """Return how much longer levers get where joints go as far as `farthest` (n,) from 0 [m]."""
+    return float(np.maximum(farthest - _travel(robot), 0.0)[~is_turned(robot)].sum())
+
+
+def _travel(robot: RobotModel) -> Array:
+    """Return how far prismatic joints go from 0 within their limits, 0 for the others, (n,)."""
+    lower, upper = robot.finite_limits()
+    return np.where(is_turned(robot), 0.0, np.maximum(np.abs(lower), np.abs(upper)))
+
+
 class _Chain:
     """The joints of an arm, one after the other; index 0 is the world, as in Pinocchio."""
 
@@ -64,9 +80,7 @@ class _Chain:
         axes, is_revolute = joint_axes(robot)
         self.is_revolute = [False, *is_revolute.tolist()]
         self._axes = [np.zeros(3), *axes]
-        lower, upper = robot.finite_limits()
-        travel = np.where(self.is_revolute[1:], 0.0, np.maximum(np.abs(lower), np.abs(upper)))
-        self._travel = [0.0, *travel.tolist()]
+        self._travel = [0.0, *_travel(robot).tolist()]
 
     def outwards(self, points: Array, carrier: int, joint: int) -> float:
         """Return how far points (V, 3) of a body that the joint moves are from its axis at most."""
