@@ -93,12 +93,12 @@ def test_clearances_level_off_smoothly_and_from_below() -> None:
     assert np.all(slopes[far] == 0.0)
 
 
-def test_pullback_is_the_weighted_sum_of_the_gradients(models) -> None:
+def test_distances_along_motions_follow_from_the_gradients(models) -> None:
     _, model = models
     clearances = model.clearances(samples(model.robot, 4))
-    weights = np.random.default_rng(2).normal(size=clearances.values.shape)
-    expected = np.einsum("kp,kpn->kn", weights, clearances.jacobian())
-    assert clearances.pullback(weights) == pytest.approx(expected, abs=1e-10)
+    tangents = np.random.default_rng(2).normal(size=(4, model.robot.dof, 3))
+    expected = np.einsum("kpn,knd->kpd", clearances.jacobian(), tangents)
+    assert clearances.along(tangents) == pytest.approx(expected, abs=1e-10)
 
 
 def test_changes_along_motions_are_the_gradients_times_these(models) -> None:
@@ -175,7 +175,7 @@ def test_an_arm_without_geometry_has_no_pairs() -> None:
     clearances = model.clearances(np.zeros((4, 3)))
     assert model.pairs == ()
     assert clearances.values.shape == (4, 0)
-    assert np.array_equal(clearances.pullback(np.zeros((4, 0))), np.zeros((4, 3)))
+    assert clearances.along(np.zeros((4, 3, 2))).shape == (4, 0, 2)
     assert clearances.jacobian().shape == (4, 0, 3)
 
 
@@ -184,5 +184,3 @@ def test_refuses_wrong_shapes() -> None:
     for q in (np.zeros(6), np.zeros((2, 5)), np.full((2, 6), np.nan)):
         with pytest.raises(RobotError, match="samples have shape"):
             model.clearances(q)
-    with pytest.raises(ValueError, match="weights have shape"):
-        model.clearances(np.zeros((2, 6))).pullback(np.zeros((1, 1)))

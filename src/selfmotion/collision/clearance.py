@@ -33,23 +33,6 @@ class Clearances:
     columns: Ints = field(repr=False)
     slopes: Array = field(repr=False)
 
-    def pullback(self, weights: npt.ArrayLike) -> Array:
-        """Return Σ_p w_kp ∂d_kp/∂q_k, (K, n), for weights (K, P).
-
-        Raises
-        ------
-        ValueError
-            The weights do not have the shape of `values`.
-        """
-        w = np.asarray(weights, dtype=np.float64)
-        if w.shape != self.values.shape:
-            raise ValueError(f"weights have shape {w.shape}, expected {self.values.shape}")
-        gradient = np.zeros((len(w), self.slopes.shape[1]))
-        present, starts = np.unique(self.rows, return_index=True)
-        terms = w[self.rows, self.columns, None] * self.slopes
-        gradient[present] = np.add.reduceat(terms, starts, axis=0)
-        return gradient
-
     def along(self, tangents: Array) -> Array:
         """Return how the distances change along motions of the samples, (K, P, d).
 
