@@ -29,7 +29,9 @@ class InverseManipulability(Cost):
 
     def value(self, samples: Samples) -> Array:
         """See `Cost.value`."""
-        return self.mu / samples.gram_determinant
+        # Infinite at singular poses, through which damped motions may pass.
+        with np.errstate(divide="ignore"):
+            return np.asarray(self.mu / samples.gram_determinant)
 
     def gradient(self, samples: Samples) -> Partials:
         """See `Cost.gradient`: ∂G = -G ∂log det(JJᵀ)."""
