@@ -18,7 +18,6 @@ class ScipyBfgs:
         x0,
         inverse_hessian=None,
         *,
-        coarseness=1.0,
         max_evaluations=None,
         callback=None,
     ):
@@ -45,8 +44,7 @@ class ScipyBfgs:
             note(x.copy(), cost, gradient)
             return cost, gradient
 
-        options = {"hess_inv0": 0.5 * (inverse_hessian + inverse_hessian.T)}
-        options["gtol"] = 1e-6 * coarseness
+        options = {"hess_inv0": 0.5 * (inverse_hessian + inverse_hessian.T), "gtol": 1e-6}
         with contextlib.suppress(StopIteration):
             minimize(value_and_gradient, x0, jac=True, method="BFGS", options=options)
         status = stopped[0] or sm.Status.CONVERGED

@@ -173,7 +173,6 @@ class Optimizer(Protocol):
         x0: Array,
         inverse_hessian: Array | None = None,
         *,
-        coarseness: float = 1.0,
         max_evaluations: int | None = None,
         callback: Callback | None = None,
     ) -> Minimum:
@@ -186,9 +185,6 @@ class Optimizer(Protocol):
         inverse_hessian : (size, size), optional
             An estimate of the inverse Hessian from a function much like this one. Without it the
             optimiser begins as it likes.
-        coarseness : float
-            How many times more coarsely than usual to minimise, ≥ 1: far from the end of a
-            sequence of minimisations, the last digits are lost work.
         max_evaluations : int, optional
             Limit on `Function.evaluations`.
         callback : callable, optional

@@ -1,6 +1,6 @@
 """The Broyden-family quasi-Newton method with Fletcher's switch; knows only x → (F, ∇F)."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -71,7 +71,6 @@ class QuasiNewton:
         x0: Array,
         inverse_hessian: Array | None = None,
         *,
-        coarseness: float = 1.0,
         max_evaluations: int | None = None,
         callback: Callback | None = None,
     ) -> Minimum:
@@ -84,8 +83,6 @@ class QuasiNewton:
             F(x0) must be finite.
         inverse_hessian : (size, size), optional
             H0; by default that of `initial_metric`.
-        coarseness : float
-            Factor on the tolerance.
         max_evaluations : int, optional
             Limit on `Function.evaluations`.
         callback : callable, optional
@@ -98,8 +95,7 @@ class QuasiNewton:
         """
         if inverse_hessian is None and self.initial_metric == "gauss-newton":
             inverse_hessian = inverse_metric(function.metric(x0))
-        method = replace(self, tolerance=self.tolerance * coarseness)
-        run = _Run(method, function, x0, inverse_hessian, max_evaluations, callback)
+        run = _Run(self, function, x0, inverse_hessian, max_evaluations, callback)
         try:
             status = run.until_done()
         except KeyboardInterrupt:

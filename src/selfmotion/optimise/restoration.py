@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.optimise.base import Callback, ConstrainedFunction, Iteration, Status
+from selfmotion.optimise.base import Callback, ConstrainedFunction, Iteration, Residuals, Status
 from selfmotion.optimise.quasi_newton import QuasiNewton
 
 # The violation at the start weighs this many times the cost there.
@@ -28,12 +28,13 @@ class _Penalised:
         cost = self._function.value(x)
         if not np.isfinite(cost):
             return np.inf
-        total = cost + 0.5 * self._weight * float(np.sum(self._excess(x) ** 2))
+        violated = _excess(self._function.conditions(x))
+        total = cost + 0.5 * self._weight * float(np.sum(violated**2))
         return total if np.isfinite(total) else np.inf
 
     def gradient(self, x: Array) -> Array:
         at = self._function.conditions(x)
-        pull = self._weight * self._excess(x) / at.tolerance
+        pull = self._weight * _excess(at) / at.tolerance
         rows = self._function.condition_rows(x)
         return np.asarray(self._function.gradient(x) + pull @ rows)
 
@@ -42,14 +43,14 @@ class _Penalised:
 
     def metric(self, x: Array) -> Array:
         at = self._function.conditions(x)
-        violated = self._excess(x) != 0.0
+        violated = _excess(at) != 0.0
         rows = self._function.condition_rows(x)[violated] / at.tolerance[violated, None]
         return np.asarray(self._function.metric(x) + self._weight * rows.T @ rows)
 
-    def _excess(self, x: Array) -> Array:
-        """Return h/tolerance where it is violated, 0 elsewhere; equalities keep their sign."""
-        at = self._function.conditions(x)
-        return np.asarray(np.where(at.equality, at.h, np.maximum(at.h, 0.0)) / at.tolerance)
+
+def _excess(at: Residuals) -> Array:
+    """Return h/tolerance where it is violated, 0 elsewhere; equalities keep their sign."""
+    return np.asarray(np.where(at.equality, at.h, np.maximum(at.h, 0.0)) / at.tolerance)
 
 
 def restored(

@@ -55,7 +55,8 @@ def best_step(gradient: Array, hessian: Array, at: Residuals, rows: Array, regio
     reach = np.full(len(gradient), region)
     # A condition that no p within the region violates cannot matter.
     near = at.equality | (at.h + region * np.abs(rows).sum(axis=1) > 0.0)
-    h, tolerance, equality = at.h[near], at.tolerance[near], at.equality[near]
+    some = Residuals(at.h[near], at.tolerance[near], at.equality[near])
+    h, tolerance, equality = some.h, some.tolerance, some.equality
     a = rows[near]
 
     def bands(relaxation: float) -> tuple[Array, Array]:
@@ -65,7 +66,7 @@ def best_step(gradient: Array, hessian: Array, at: Residuals, rows: Array, regio
     found = minimize_quadratic(hessian, gradient, a, *bands(0.0), reach)
     relaxed = found is None
     if found is None:
-        least = _least_violation(h, tolerance, equality, a, region)
+        least = _least_violation(some, a, region)
         before = at.worst
         for room in (_ROOM, 0.5, 1.0):
             found = minimize_quadratic(
@@ -75,20 +76,18 @@ def best_step(gradient: Array, hessian: Array, at: Residuals, rows: Array, regio
                 break
         else:
             found = np.zeros_like(gradient), np.zeros(len(a))
-    p, some = found
+    p, prices = found
     multipliers = np.zeros(len(at.h))
-    multipliers[near] = some
+    multipliers[near] = prices
     linear = Residuals(at.h + rows @ p, at.tolerance, at.equality)
     return Step(p, multipliers, -float(gradient @ p + 0.5 * p @ hessian @ p), linear.worst, relaxed)
 
 
-def _least_violation(
-    h: Array, tolerance: Array, equality: Array, rows: Array, region: float
-) -> float:
+def _least_violation(at: Residuals, rows: Array, region: float) -> float:
     """Return the least t with h + A p ≤ t · tolerance (|h + A p| for equalities), |p| ≤ region."""
+    h, tolerance, equality = at.h, at.tolerance, at.equality
     size = rows.shape[1]
-    excess = np.where(equality, np.abs(h), h) / tolerance
-    scale = float(np.max(excess, initial=1.0))
+    scale = max(at.worst, 1.0)
     # In units of the region and of the violation, both of order 1.
     above = np.column_stack([rows * region, -tolerance * scale])
     below = np.column_stack([-rows[equality] * region, -tolerance[equality] * scale])

@@ -219,12 +219,8 @@ class Problem:
     @property
     def pinned(self) -> tuple[bool, bool]:
         """Whether the tool has to be on the path itself at its start and at its end."""
-        starts, ends = zip((self.start is not None, False), *self._pins, strict=True)
-        return any(starts), any(ends)
-
-    @property
-    def _pins(self) -> list[tuple[bool, bool]]:
-        return [item.pins for item in self.constraints]
+        pins = [(self.start is not None, False), *(item.pins for item in self.constraints)]
+        return any(start for start, _ in pins), any(end for _, end in pins)
 
     def _check_rank(self) -> None:
         robot, task = self.robot, self.task
