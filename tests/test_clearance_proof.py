@@ -1,6 +1,8 @@
 """Clearance at all times: what happens between two looks is bounded, decided, or said."""
 
 import dataclasses
+from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -109,6 +111,54 @@ def test_pairs_left_out_are_listed() -> None:
     for first, second in robot.touching:
         assert first in remarks
         assert second in remarks
+
+
+def srdf_without(pairs: Iterable[tuple[str, str]]) -> str:
+    rows = [f'<disable_collisions link1="{a}" link2="{b}" reason="Never"/>' for a, b in pairs]
+    return f"<robot name='panda'>{''.join(rows)}</robot>"
+
+
+def test_pairs_that_the_srdf_leaves_out_are_listed(tmp_path: Path) -> None:
+    robot = robot_named("panda")
+    every = tuple(dict.fromkeys(sm.CollisionModel(robot).pairs))
+    (tmp_path / "one.srdf").write_text(srdf_without(every[:1]))
+    one = sm.Clearance(srdf=tmp_path / "one.srdf").requirement(robot)
+    assert one.covers == ("self-collision",)
+    assert f"left out as asked: {' - '.join(every[0])}" in one.remarks
+
+
+def test_a_plan_keeps_the_pairs_that_its_srdf_left_out(tmp_path: Path) -> None:
+    """Whatever becomes of the SRDF: a plan that is read again is judged by the same pairs."""
+    robot = robot_named("panda")
+    start = start_of(robot, "pose")
+    pair = sm.CollisionModel(robot).pairs[0]
+    (tmp_path / "one.srdf").write_text(srdf_without([pair]))
+    kept = sm.Clearance(srdf=tmp_path / "one.srdf")
+    plan = sm.plan(sm.Problem(robot, short_line(robot, start), start=start, collision=kept))
+    plan.save(tmp_path / "plan.npz")
+    (tmp_path / "one.srdf").write_text(srdf_without(sm.CollisionModel(robot).pairs))
+    again = sm.load_plan(tmp_path / "plan.npz")
+    assert again.problem.collision is not None
+    assert again.problem.collision.disabled == (pair,)
+    assert again.certificate.remarks == plan.certificate.remarks
+
+
+def test_disabled_links_come_in_pairs() -> None:
+    with pytest.raises(sm.ProblemError, match=r"disabled has \('a', 'b', 'c'\), expected pairs"):
+        sm.Clearance(disabled=[("a", "b", "c")])
+
+
+def test_where_the_srdf_leaves_out_all_pairs_self_collision_is_not_covered(tmp_path: Path) -> None:
+    robot = robot_named("panda")
+    (tmp_path / "all.srdf").write_text(srdf_without(sm.CollisionModel(robot).pairs))
+    start = start_of(robot, "pose")
+    line = short_line(robot, start)
+    own = sm.Clearance(srdf=tmp_path / "all.srdf")
+    plan = sm.plan(sm.Problem(robot, line, start=start, collision=own))
+    assert "self-collision" in plan.certificate.not_checked
+    assert sm.Clearance(
+        [sm.Sphere("ball", [2.0, 0.0, 0.0], 0.1)], srdf=tmp_path / "all.srdf"
+    ).requirement(robot).covers == ("obstacles",)
 
 
 def test_links_that_overlap_from_the_start_are_named_with_the_remedy() -> None:

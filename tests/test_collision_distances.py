@@ -163,8 +163,7 @@ def test_a_mesh_is_as_far_as_the_nearer_of_the_boxes_it_is_made_of(
     for _ in range(300):
         q = np.concatenate([rng.uniform(-1.0, 1.0, 3), rng.uniform(-3.0, 3.0, 3)])
         hulls = hull_distances(pair, q)[0]
-        meshes.follow(pair.place(q))
-        value = meshes.refine(0, hulls)
+        value = meshes.refine(pair.place(q), 0, hulls)
         pose = free.pose(q)
         expected = min(
             coal.distance(

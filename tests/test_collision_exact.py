@@ -10,7 +10,16 @@ import pytest
 import trimesh
 
 from selfmotion.basics.errors import CollisionError, RobotError
-from selfmotion.collision import Box, Capsule, CollisionModel, Cylinder, Mesh, Sphere, srdf_line
+from selfmotion.collision import (
+    Box,
+    Capsule,
+    CollisionModel,
+    Cylinder,
+    Mesh,
+    Sphere,
+    disabled_links,
+    srdf_line,
+)
 from selfmotion.collision.bodies import Body
 from selfmotion.collision.kernels import winding_number
 from selfmotion.collision.pairs import candidate_pairs
@@ -173,7 +182,7 @@ def test_winding_number_counts_a_closed_surface_once() -> None:
 
 def test_pairs_of_panda_with_its_srdf(panda: RobotModel) -> None:
     """44, counted by hand from the file: 17 pieces of geometry, 35 disabled pairs of links."""
-    model = CollisionModel(panda, srdf=srdf_of("panda"))
+    model = CollisionModel(panda, disabled=disabled_links(srdf_of("panda")))
     assert len(model.pairs) == 44
     assert ("panda_link0", "panda_leftfinger") in model.pairs
     assert len(CollisionModel(panda).pairs) > 44
@@ -218,8 +227,12 @@ def test_without_geometry_there_is_nothing_to_check() -> None:
         (lambda r: CollisionModel(r, [BOXES[0], BOXES[0]]), "box 'box': a link or another"),
         (lambda r: CollisionModel(r, [Sphere("panda_hand", [0, 0, 0], 1)]), "a link or another"),
         (lambda r: CollisionModel(r, [Mesh("m", [0, 0, 0], "no.stl")]), "mesh 'm': no such file"),
-        (lambda r: CollisionModel(r, srdf="no.srdf"), "no.srdf: SRDF cannot be read"),
-        (lambda r: CollisionModel(r, srdf=__file__), "not well-formed XML"),
+        (lambda _: disabled_links("no.srdf"), "no.srdf: SRDF cannot be read"),
+        (lambda _: disabled_links(__file__), "not well-formed XML"),
+        (
+            lambda r: CollisionModel(r, disabled=[("panda_link1", "panda_link33")]),
+            "no link 'panda_link33'; it has 'panda_link3'",
+        ),
     ],
 )
 def test_refuses_what_cannot_be_checked(panda: RobotModel, make, message: str) -> None:
@@ -285,4 +298,7 @@ def test_what_touches_is_named_with_the_line_that_leaves_it_out(
     assert touching[0].value == pytest.approx(model.distance(folded).value, abs=GJK)
     lines = "".join(srdf_line(item.first, item.second) for item in touching)
     (tmp_path / "panda.srdf").write_text(f"<robot name='panda'>{lines}</robot>")
-    assert CollisionModel(panda, srdf=tmp_path / "panda.srdf").touching(folded) == ()
+    assert (
+        CollisionModel(panda, disabled=disabled_links(tmp_path / "panda.srdf")).touching(folded)
+        == ()
+    )

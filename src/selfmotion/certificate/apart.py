@@ -59,7 +59,8 @@ class KeepsApart(Requirement):
     @property
     def covers(self) -> tuple[str, ...]:
         """See `Requirement.covers`."""
-        return ("self-collision", "obstacles") if self.obstacles else ("self-collision",)
+        links = ("self-collision",) if self.model.checks_links else ()
+        return (*links, "obstacles") if self.obstacles else links
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -68,11 +69,14 @@ class KeepsApart(Requirement):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """See `Requirement.remarks`: pairs that are left out, and meshes that are open."""
+        """See `Requirement.remarks`: pairs that are left out and why, and open meshes."""
         left_out = [f"{x.first} - {x.second}" for x in self.model.overlapping if not x.is_checked]
         said = []
         if left_out:
             said.append(f"touching as they are made, left out: {', '.join(left_out)}")
+        if self.model.disabled:
+            disabled = ", ".join(" - ".join(pair) for pair in self.model.disabled)
+            said.append(f"left out as asked: {disabled}")
         if self.model.open_meshes:
             open_ = ", ".join(self.model.open_meshes)
             said.append(f"open meshes, in which a body wholly inside may be missed: {open_}")

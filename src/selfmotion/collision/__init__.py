@@ -12,6 +12,7 @@ from selfmotion.collision.obstacles import (
     Sphere,
     obstacle_from_dict,
 )
+from selfmotion.collision.pairs import disabled_links
 from selfmotion.collision.solids import Solid
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "Overlap",
     "Solid",
     "Sphere",
+    "disabled_links",
     "obstacle_from_dict",
     "srdf_line",
 ]

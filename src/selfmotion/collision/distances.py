@@ -1,6 +1,7 @@
 """Distances of convex hulls: coal's answers, each held against the bounding boxes."""
 
 import math
+import threading
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,6 +27,25 @@ Ints = npt.NDArray[np.int64]
 TOLERANCE = 1e-9
 # What distances may be below those of the bounding boxes, from rounding [m].
 _ROUNDING = 1e-5
+
+
+def _request() -> Any:
+    """Return how distances are asked for: accurately, as functions of the placement alone.
+
+    Pinocchio has each search begin where the last one of the pair ended, by an attribute that coal
+    warns about. From the middles of the bodies' boxes it takes a fifth longer.
+    """
+    request = coal.DistanceRequest()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        request.gjk_tolerance = TOLERANCE
+        request.enable_cached_gjk_guess = False
+        request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess
+    return request
+
+
+# Made on import: filters of warnings belong to the process, not to a thread.
+_REQUEST = _request()
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +74,7 @@ class Contacts:
 class HullDistances:
     """Distances of the convex hulls of pairs of bodies.
 
-    Not for use by several threads at once.
+    Each thread places the bodies for itself.
 
     Parameters
     ----------
@@ -79,9 +99,7 @@ class HullDistances:
             self._model.addGeometryObject(item)
         for first, second in pairs.tolist():
             self._model.addCollisionPair(pin.CollisionPair(first, second))
-        # Own data: neither threads nor the robot's kinematics share state with the checks.
-        self._data, self._places = robot.model.createData(), self._model.createData()
-        _set_requests(self._places.distanceRequests)
+        self._per_thread = threading.local()
 
     def lower_bounds(self, q: Array, limit: float = math.inf) -> Array:
         """Return what the distances at q (K, n) are at least, (K, P); see `BoundingBoxes`."""
@@ -89,8 +107,20 @@ class HullDistances:
 
     def place(self, q: Array) -> Any:
         """Place the hulls at q (n,), and return their placements in world axes, by body."""
-        pin.updateGeometryPlacements(self._robot.model, self._data, self._model, self._places, q)
-        return self._places.oMg
+        data, places = self._own()
+        pin.updateGeometryPlacements(self._robot.model, data, self._model, places, q)
+        return places.oMg
+
+    def _own(self) -> tuple[Any, Any]:
+        """Return where this thread keeps the chain's placements, and the bodies'."""
+        own = self._per_thread.__dict__
+        if not own:
+            places = self._model.createData()
+            for pair in range(len(places.distanceRequests)):
+                places.distanceRequests[pair] = _REQUEST
+            own["kept"] = self._robot.model.createData(), places
+        kept: tuple[Any, Any] = own["kept"]
+        return kept
 
     def distance(self, pair: int, bound: float) -> float:
         """Return the signed distance of a pair as it is placed; its lower bound is known [m].
@@ -100,7 +130,8 @@ class HullDistances:
         CollisionError
             It contradicts the bound, asked for twice in different ways.
         """
-        value = pin.computeDistance(self._model, self._places, pair).min_distance
+        _, places = self._own()
+        value = pin.computeDistance(self._model, places, pair).min_distance
         # Written so that NaN is asked for again, too.
         if not bound - _ROUNDING <= value <= bound + self._sizes[pair]:
             value = self._again(pair, bound).min_distance
@@ -126,14 +157,15 @@ class HullDistances:
         jacobians = np.empty((len(q), 6, self._robot.dof))
         values, placed = np.empty(len(rows)), -1
         normals, points = np.empty((len(rows), 3)), np.empty((len(rows), 3))
-        chain, model, places = self._robot.model, self._model, self._places
+        chain, model = self._robot.model, self._model
+        data, places = self._own()
         wanted = zip(rows.tolist(), pairs.tolist(), bounds.tolist(), strict=True)
         for k, (row, pair, bound) in enumerate(wanted):
             if row != placed:
                 # Of one joint Pinocchio returns a vector.
-                columns = pin.computeJointJacobians(chain, self._data, q[row])
+                columns = pin.computeJointJacobians(chain, data, q[row])
                 jacobians[row], placed = columns.reshape(6, -1), row
-                pin.updateGeometryPlacements(chain, self._data, model, places)
+                pin.updateGeometryPlacements(chain, data, model, places)
             answer = pin.computeDistance(model, places, pair)
             value = answer.min_distance
             if not bound - _ROUNDING <= value <= bound + self._sizes[pair]:
@@ -168,20 +200,7 @@ class HullDistances:
         return answer
 
     def _placed(self, body: int) -> tuple[Any, Any]:
-        place = self._places.oMg[body]
+        _, places = self._own()
+        place = places.oMg[body]
         hull = self._bodies[body].solid.hull
         return hull, coal.Transform3s(place.rotation, place.translation)
-
-
-def _set_requests(requests: Any) -> None:
-    """Make answers accurate, and functions of the placement alone.
-
-    Pinocchio has each search begin where the last one of the pair ended, by an attribute that coal
-    warns about. From the middles of the bodies' boxes it takes a fifth longer.
-    """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        for request in requests:
-            request.gjk_tolerance = TOLERANCE
-            request.enable_cached_gjk_guess = False
-            request.gjk_initial_guess = coal.GJKInitialGuess.BoundingVolumeGuess

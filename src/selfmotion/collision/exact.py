@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -38,8 +37,8 @@ class CollisionModel:
         The arm. All its links count, those on locked joints too, where they are held.
     obstacles : sequence of Obstacle
         The world. The robot's immovable base is not checked against it.
-    srdf : Path, optional
-        File whose ``<disable_collisions>`` pairs are left out.
+    disabled : sequence of (str, str)
+        Pairs of links that are left out; see `disabled_links` for those of an SRDF.
 
     Attributes
     ----------
@@ -50,12 +49,14 @@ class CollisionModel:
     overlapping : tuple of Overlap
         Pairs of links that overlap in half or more of 500 sampled configurations. Those that do
         in each, or are known to touch as they are made (`RobotModel.touching`), are not checked.
+    disabled : tuple of (str, str)
+        Pairs of links that are left out only because that was asked for.
 
     Raises
     ------
     CollisionError
         Two obstacles, or an obstacle and a link, have the same name; a piece of geometry is no
-        body; a mesh or the SRDF cannot be read.
+        body; a mesh cannot be read; a link that is disabled is not the arm's.
     RobotError
         A mesh of the robot is missing.
 
@@ -66,15 +67,13 @@ class CollisionModel:
 
     Boxes around the hulls, then the hulls (GJK) bound the distances of the meshes from below, so
     the meshes are visited only for the few pairs that may hold the minimum.
-
-    Not for use by several threads at once.
     """
 
     def __init__(
         self,
         robot: RobotModel,
         obstacles: Sequence[Obstacle] = (),
-        srdf: str | Path | None = None,
+        disabled: Sequence[tuple[str, str]] = (),
     ) -> None:
         self.robot, self.obstacles = robot, tuple(obstacles)
         links = links_of(robot)
@@ -84,7 +83,8 @@ class CollisionModel:
         pairs: list[tuple[int, int]] = []
         often: dict[tuple[str, str, bool], int] = {}
         as_made = {frozenset(pair) for pair in robot.touching}
-        for first, second in candidate_pairs(self._bodies, robot.urdf, srdf):
+        candidates = candidate_pairs(self._bodies, robot.urdf, disabled)
+        for first, second in candidates:
             met, _ = links.counts.get((first, second), (0, 0))
             names = self.bodies[first], self.bodies[second]
             is_checked = met < SAMPLES and frozenset(names) not in as_made
@@ -99,9 +99,20 @@ class CollisionModel:
             Overlap(first, second, met / SAMPLES, is_checked)
             for (first, second, is_checked), met in often.items()
         )
+        kept = {(self.bodies[i], self.bodies[j]) for i, j in candidates}
+        every = candidate_pairs(self._bodies, robot.urdf) if disabled else candidates
+        named = dict.fromkeys((self.bodies[i], self.bodies[j]) for i, j in every)
+        self.disabled = tuple(pair for pair in named if pair not in kept)
         self.hulls = HullDistances(robot, self._bodies, self._index)
         solids = [body.solid for body in self._bodies]
         self._meshes = MeshDistances(solids, self.bodies, self._index)
+
+    @property
+    def checks_links(self) -> bool:
+        """Whether some pair of links is checked, unless there is none that can meet."""
+        left_out = self.disabled or any(not pair.is_checked for pair in self.overlapping)
+        checked = any(not self._bodies[second].is_obstacle for _, second in self._index)
+        return checked or not left_out
 
     @cached_property
     def open_meshes(self) -> tuple[str, ...]:
@@ -191,16 +202,14 @@ class CollisionModel:
         q = self.samples(q_samples)
         if not len(q) or not self.pairs:
             return _NO_PAIR
-        self._place(q[0])
-        worst = self._closest(self.hulls.lower_bounds(q[:1])[0], _NO_PAIR, 0)
+        worst = self._closest(q, self.hulls.lower_bounds(q[:1])[0], _NO_PAIR, 0)
         # Pairs that are farther apart need no close look.
         bounds = self.hulls.lower_bounds(q, worst.value)
         lowest = bounds.min(axis=1)
         for row in np.argsort(lowest, kind="stable").tolist():
             if lowest[row] >= worst.value:
                 break
-            self._place(q[row])
-            worst = self._closest(bounds[row], worst, row)
+            worst = self._closest(q, bounds[row], worst, row)
         return worst
 
     def distances(
@@ -227,12 +236,11 @@ class CollisionModel:
         values = self.hulls.lower_bounds(q, float(asked.max(initial=-math.inf)))
         for row in range(len(q)):
             near = np.flatnonzero(values[row] < asked[row]).tolist()
-            if near:
-                self._place(q[row])
+            places = self.hulls.place(q[row]) if near else None
             for pair in near:
                 hulls = self.hulls.distance(pair, values[row, pair])
                 far = hulls >= asked[row, pair]
-                values[row, pair] = hulls if far else self._meshes.refine(pair, hulls)
+                values[row, pair] = hulls if far else self._meshes.refine(places, pair, hulls)
         return values
 
     def collides(self, q: Array, margin: float = 0.0) -> bool:
@@ -252,7 +260,7 @@ class CollisionModel:
         near = np.flatnonzero(bounds < margin)
         if not near.size:
             return False
-        self._place(q)
+        places = self.hulls.place(q)
         open_ = []
         for pair in near.tolist():
             hulls = self.hulls.distance(pair, bounds[pair])
@@ -261,7 +269,8 @@ class CollisionModel:
                     return True
                 open_.append((hulls, pair))
         return any(
-            self._meshes.refine(pair, hulls, margin) < margin for hulls, pair in sorted(open_)
+            self._meshes.refine(places, pair, hulls, margin) < margin
+            for hulls, pair in sorted(open_)
         )
 
     def touching(self, q: npt.ArrayLike) -> tuple[Closest, ...]:
@@ -276,17 +285,15 @@ class CollisionModel:
         rows = [i for i in np.argsort(values, kind="stable").tolist() if values[i] <= 0.0]
         return tuple(Closest(float(values[i]), *self.pairs[i]) for i in rows)
 
-    def _place(self, q: Array) -> None:
-        self._meshes.follow(self.hulls.place(q))
-
-    def _closest(self, bounds: Array, best: Closest, row: int) -> Closest:
-        """Return the smaller of `best` and the smallest distance as the bodies are placed."""
+    def _closest(self, q: Array, bounds: Array, best: Closest, row: int) -> Closest:
+        """Return the smaller of `best` and the smallest distance at a row of q (K, n)."""
+        places = self.hulls.place(q[row])
         near = np.flatnonzero(bounds < best.value).tolist()
         found = sorted((self.hulls.distance(pair, bounds[pair]), pair) for pair in near)
         for hulls, pair in found:
             if hulls >= best.value:
                 break
-            value = self._meshes.refine(pair, hulls, best.value)
+            value = self._meshes.refine(places, pair, hulls, best.value)
             if value < best.value:
                 best = Closest(value, *self.pairs[pair], row)
         return best

@@ -38,18 +38,21 @@ class MeshDistances:
         self._pairs: list[tuple[int, int]] = [(i, j) for i, j in pairs.tolist()]
         convex = [solid.is_convex for solid in solids]
         self.hulls_decide = [convex[i] and convex[j] for i, j in self._pairs]
-        self._places: Any = None
         self._request, self._touch = coal.DistanceRequest(), coal.CollisionRequest()
 
-    def follow(self, places: Any) -> None:
-        """Take placements (SE3) of the bodies in world axes; they may change afterwards."""
-        self._places = places
+    def refine(self, places: Any, pair: int, hulls: float, beyond: float = math.inf) -> float:
+        """Return the signed distance of a pair [m].
 
-    def refine(self, pair: int, hulls: float, beyond: float = math.inf) -> float:
-        """Return the signed distance of a pair as it is placed, given that of its hulls [m].
-
-        Where it is more than `beyond`, another number that is not below `beyond` may be returned in
-        its place, sooner.
+        Parameters
+        ----------
+        places : sequence of SE3
+            Where the bodies are, in world axes.
+        pair : int
+        hulls : float
+            The distance of their hulls.
+        beyond : float
+            Where it is more than this, another number that is not below this may be returned,
+            sooner [m].
 
         Raises
         ------
@@ -59,11 +62,11 @@ class MeshDistances:
         first, second = (self._solids[i] for i in self._pairs[pair])
         if not (first.is_mesh or second.is_mesh):
             return hulls
-        if self.overlaps(pair, hulls):
+        if self.overlaps(places, pair, hulls):
             return hulls
         if beyond <= 0.0:
             return 0.0
-        surfaces = self._surfaces(pair, beyond)
+        surfaces = self._surfaces(places, pair, beyond)
         if hulls > 0.0:
             if not surfaces >= min(hulls, beyond) - _ROUNDING:
                 raise CollisionError(
@@ -74,37 +77,37 @@ class MeshDistances:
             return max(surfaces, min(hulls, beyond))
         return surfaces
 
-    def overlaps(self, pair: int, hulls: float) -> bool:
-        """Whether the bodies of a pair overlap as they are placed, given their hulls' distance."""
+    def overlaps(self, places: Any, pair: int, hulls: float) -> bool:
+        """Whether the bodies of a pair overlap where they are, given their hulls' distance."""
         if hulls > 0.0 or self.hulls_decide[pair]:
             return hulls <= 0.0
-        contact = coal.collide(*self._placed(pair), self._touch, coal.CollisionResult())
-        return bool(contact) or self._is_nested(pair)
+        contact = coal.collide(*self._placed(places, pair), self._touch, coal.CollisionResult())
+        return bool(contact) or self._is_nested(places, pair)
 
-    def _surfaces(self, pair: int, beyond: float) -> float:
+    def _surfaces(self, places: Any, pair: int, beyond: float) -> float:
         """Return the distance of the surfaces, and of what is no mesh the solid's."""
         result = coal.DistanceResult()
         # coal looks for something nearer than what it has already.
         if beyond < math.inf:
             result.min_distance = beyond
-        return float(coal.distance(*self._placed(pair), self._request, result))
+        return float(coal.distance(*self._placed(places, pair), self._request, result))
 
-    def _placed(self, pair: int) -> tuple[Any, Any, Any, Any]:
+    def _placed(self, places: Any, pair: int) -> tuple[Any, Any, Any, Any]:
         """Return geometry and placement of both bodies, as coal takes them."""
         first, second = (
             (self._solids[i].geometry, coal.Transform3s(place.rotation, place.translation))
             for i in self._pairs[pair]
-            for place in [self._places[i]]
+            for place in [places[i]]
         )
         return *first, *second
 
-    def _is_nested(self, pair: int) -> bool:
+    def _is_nested(self, places: Any, pair: int) -> bool:
         """Whether one body is inside the other, their surfaces apart."""
         i, j = self._pairs[pair]
-        return self._holds(i, j) or self._holds(j, i)
+        return self._holds(places, i, j) or self._holds(places, j, i)
 
-    def _holds(self, outer: int, inner: int) -> bool:
-        relative = self._places[outer].actInv(self._places[inner])
+    def _holds(self, places: Any, outer: int, inner: int) -> bool:
+        relative = places[outer].actInv(places[inner])
         points = self._solids[inner].seeds @ relative.rotation.T + relative.translation
         return self._solids[outer].contains_any(np.asarray(points))
 

@@ -68,10 +68,10 @@ def count_overlaps(
     q = rng.uniform(lower, upper, (SAMPLES, robot.dof))
     met, alone = (np.zeros(len(hulls.pairs), dtype=np.int64) for _ in range(2))
     for row, bounds in enumerate(hulls.lower_bounds(q, 0.0)):
-        meshes.follow(hulls.place(q[row]))
+        places = hulls.place(q[row])
         for pair in among[bounds[among] <= 0.0].tolist():
             distance = hulls.distance(pair, bounds[pair])
-            bodies = meshes.overlaps(pair, distance)
+            bodies = meshes.overlaps(places, pair, distance)
             met[pair] += bodies
             alone[pair] += distance <= 0.0 and not bodies
     return met, alone

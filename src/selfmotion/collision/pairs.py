@@ -2,7 +2,8 @@
 
 import itertools
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 from selfmotion.basics import CollisionError
@@ -11,22 +12,29 @@ from selfmotion.robot import Urdf
 
 
 def candidate_pairs(
-    bodies: Sequence[Body], urdf: Urdf, srdf: str | Path | None = None
+    bodies: Sequence[Body], urdf: Urdf, disabled: Iterable[tuple[str, str]] = ()
 ) -> list[tuple[int, int]]:
     """Return the index pairs of `bodies` that can meet and are not meant to.
 
     Left out are pairs whose distance no joint changes (so also the robot's base against the
     world: an arm bolted to a table touches it), links that a movable joint joins, where links
-    joined by fixed joints count as one, and links that the SRDF disables.
+    joined by fixed joints count as one, and pairs of links that are `disabled`.
 
     Raises
     ------
     CollisionError
-        The SRDF cannot be read.
+        A link that is disabled is not the arm's.
     """
     excluded = _joined_links(urdf)
-    if srdf is not None:
-        excluded |= _disabled_links(srdf)
+    for pair in disabled:
+        for link in pair:
+            if link not in urdf.links:
+                near = ", ".join(f"'{name}'" for name in get_close_matches(link, urdf.links))
+                raise CollisionError(
+                    f"collisions of {' and '.join(repr(name) for name in pair)} are disabled, but "
+                    f"the URDF has no link '{link}'" + (f"; it has {near}" if near else "")
+                )
+        excluded.add(frozenset(pair))
     part = _rigid_parts(urdf)
 
     def can_meet(first: Body, second: Body) -> bool:
@@ -66,7 +74,14 @@ def _joined_links(urdf: Urdf) -> set[frozenset[str]]:
     }
 
 
-def _disabled_links(srdf: str | Path) -> set[frozenset[str]]:
+def disabled_links(srdf: str | Path) -> tuple[tuple[str, str], ...]:
+    """Return the pairs of links whose collisions an SRDF disables.
+
+    Raises
+    ------
+    CollisionError
+        The SRDF cannot be read, or a pair of it is not complete.
+    """
     try:
         root = ElementTree.parse(srdf).getroot()
     except OSError as error:
@@ -75,7 +90,13 @@ def _disabled_links(srdf: str | Path) -> set[frozenset[str]]:
         raise CollisionError(f"{srdf}: SRDF is not well-formed XML: {error}") from error
     if root.tag != "robot":
         raise CollisionError(f"{srdf}: the root element is <{root.tag}>, expected <robot>")
-    return {
-        frozenset((tag.get("link1", ""), tag.get("link2", "")))
-        for tag in root.iter("disable_collisions")
-    }
+    pairs = []
+    for tag in root.iter("disable_collisions"):
+        first, second = tag.get("link1", ""), tag.get("link2", "")
+        if not (first and second):
+            raise CollisionError(
+                f"{srdf}: <disable_collisions> has link1='{first}' and link2='{second}', expected "
+                f"two links"
+            )
+        pairs.append((first, second))
+    return tuple(pairs)

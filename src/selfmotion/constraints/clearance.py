@@ -1,7 +1,7 @@
 """Distance from obstacles, and of links from each other."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
@@ -16,6 +16,7 @@ from selfmotion.collision import (
     Clearances,
     CollisionModel,
     Obstacle,
+    disabled_links,
     obstacle_from_dict,
 )
 from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
@@ -40,14 +41,22 @@ class Clearance(Constraint):
     distance : float
         Smallest distance [m].
     srdf : path, optional
-        File whose ``disable_collisions`` are left out.
+        File whose ``disable_collisions`` are left out as well. It is read once, here.
+    disabled : sequence of (str, str)
+        Pairs of links that are left out.
+
+    Raises
+    ------
+    CollisionError
+        The SRDF cannot be read.
     """
 
     obstacles: tuple[Obstacle, ...] = ()
     distance: float = 5e-3
-    srdf: str | Path | None = None
+    srdf: InitVar[str | Path | None] = None
+    disabled: tuple[tuple[str, str], ...] = ()
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, srdf: str | Path | None) -> None:
         given: Any = self.obstacles
         listed = (given,) if isinstance(given, Obstacle) else given
         if not (
@@ -58,6 +67,9 @@ class Clearance(Constraint):
                 f"Capsule or Mesh"
             )
         object.__setattr__(self, "obstacles", tuple(listed))
+        pairs = [_pair(item) for item in self.disabled]
+        read = () if srdf is None else disabled_links(srdf)
+        object.__setattr__(self, "disabled", tuple(dict.fromkeys((*pairs, *read))))
         if not (np.isfinite(self.distance) and self.distance >= 0.0):
             raise ProblemError(f"clearance: distance is {self.distance} m, expected ≥ 0")
 
@@ -95,7 +107,7 @@ class Clearance(Constraint):
             "kind": self.kind,
             "obstacles": [obstacle.to_dict() for obstacle in self.obstacles],
             "distance": self.distance,
-            "srdf": None if self.srdf is None else str(self.srdf),
+            "disabled": [list(pair) for pair in self.disabled],
         }
 
     def _models(self, robot: RobotModel) -> "_Models":
@@ -105,11 +117,19 @@ class Clearance(Constraint):
         return made[robot]
 
 
+def _pair(given: Any) -> tuple[str, str]:
+    """Return a pair of links as it was given, or raise ProblemError."""
+    match given:
+        case [str() as first, str() as second]:
+            return first, second
+    raise ProblemError(f"clearance: disabled has {given!r}, expected pairs of names of links")
+
+
 class _Models:
     """The exact model of a clearance, and the one that the optimiser follows."""
 
     def __init__(self, wanted: Clearance, robot: RobotModel) -> None:
-        self.exact = CollisionModel(robot, wanted.obstacles, wanted.srdf)
+        self.exact = CollisionModel(robot, wanted.obstacles, wanted.disabled)
         self._near = wanted.distance + _NEAR
         if not self.exact.has_bodies:
             raise ProblemError(

@@ -32,7 +32,7 @@ class Page {
     this.number = number;
     get("time").max = this.duration;
     get("description").textContent = this.plan.description;
-    get("verdict").textContent = this.plan.verdict;
+    get("verdict").textContent = get("verdict").title = this.plan.verdict;
     get("verdict").classList.toggle("verified", this.plan.verified);
     [...get("choice").children].forEach((button, k) => button.setAttribute("aria-pressed", k === number));
     for (const cell of document.querySelectorAll("[data-plan]")) {
