@@ -63,7 +63,7 @@ def test_cyclic_optimum_closes_and_costs_more() -> None:
 @pytest.mark.parametrize("task", ["pose", "pointing", "position"])
 def test_lagrangian_optimum_on_a_panda(panda_circle: Circle, task: str) -> None:
     """Redundancy 1, 2 and 4; ours has the cubic's cost, hence is a little above."""
-    problem = panda_circle(task)
+    problem = panda_circle(task, rest=False)
     ours = sm.plan(problem)
     best = sm.plan_by(problem, sm.LagrangianOptimum(ours, tolerance=1e-5))
     assert best.certificate.verified
@@ -100,7 +100,7 @@ def test_hamiltonian_flow(panda_circle: Circle, task: str) -> None:
 
 
 def test_gradient_projection_climbs(panda_circle: Circle) -> None:
-    problem = panda_circle("position")
+    problem = panda_circle("position", rest=False)
     still = sm.plan_by(problem, sm.PseudoInverse())
     moving = sm.plan_by(problem, sm.GradientProjection(gain=1.0))
     end = still.trajectory.q[-1], moving.trajectory.q[-1]

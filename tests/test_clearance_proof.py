@@ -10,7 +10,7 @@ import pytest
 import selfmotion as sm
 from conftest import PANDA_HOME, robot_named, short_line, start_of
 from selfmotion.certificate import KeepsApart
-from selfmotion.certificate.apart import Way, closest_at_all_times
+from selfmotion.certificate.apart import closest_at_all_times
 
 # Sums of a few hundred thousand steps against an exact integral, relative to its size.
 SUMMED = 1e-7
@@ -29,7 +29,7 @@ def test_the_way_is_what_joints_make(circle: sm.Plan) -> None:
     # Any cubics do, also such that turn round twice in an interval.
     wild = dataclasses.replace(motion, qd=5.0 * rng.normal(size=motion.qd.shape))
     for trajectory, tolerance in ((motion, SUMMED), (wild, 1e-4)):
-        way, dense = Way(trajectory), np.linspace(0.0, 4.0, 400_001)
+        way, dense = trajectory.travelled, np.linspace(0.0, 4.0, 400_001)
         summed = np.cumsum(np.abs(np.diff(trajectory(dense), axis=0)), axis=0)
         for k in (1000, 123_456, 400_000):
             found = way(dense[[k]])[0]
@@ -79,7 +79,7 @@ def test_the_default_keeps_an_arm_apart_from_itself(name: str) -> None:
     assert plan.certificate.clearance is not None
     without = sm.plan(dataclasses.replace(plan.problem, collision=None))
     assert "self-collision" in without.certificate.not_checked
-    assert "not checked: accelerations, self-collision" in without.certificate.verdict
+    assert "self-collision" in without.certificate.verdict.split("not checked: ")[1]
     # Where nothing comes near, it changes nothing.
     np.testing.assert_array_equal(without.trajectory.q, plan.trajectory.q)
 

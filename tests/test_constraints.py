@@ -50,7 +50,7 @@ def objective_with(constraint: sm.Constraint, name: str, task: str) -> Objective
     path = short_line(robot, start)
     grid = Grid.aligned(path.knots, 12)
     motion = PolynomialNullMotion(1, "joint")
-    problem = sm.Problem(robot, path, rows, start, null_motion=motion, constraints=())
+    problem = sm.Problem(robot, path, rows, start, motion, constraints=(), rest=False)
     still = StillMotion.on(problem, start, grid)
     bound = constraint.bind(robot, rows, start, start)
     return Objective.of(problem, still, free=True, constraints=[bound])
@@ -198,7 +198,7 @@ def test_an_end_velocity_is_reached_and_checked(panda_circle: Circle) -> None:
 
 
 def test_a_jump_in_velocity_is_refused_where_the_path_repeats(panda_circle: Circle) -> None:
-    plan = sm.plan(panda_circle(constraints=(*LIMITS, sm.ClosedPath(velocity=False))))
+    plan = sm.plan(panda_circle(constraints=(*LIMITS, sm.ClosedPath(velocity=False)), rest=False))
     assert plan.certificate.verified
     check = certify_again(plan, [ClosedMotion(velocity=True)])
     assert "off that of the start" in check.verdict
@@ -209,7 +209,7 @@ def test_unreachable_limits_are_named(panda_circle: Circle) -> None:
     constraints = [sm.JointVelocityLimits(0.1 * robot.velocity_limit)]
     plan = sm.plan(panda_circle(constraints=constraints))
     assert not plan.certificate.verified
-    assert "velocity limits: velocity of joint 'panda_joint" in plan.report.message
+    assert "velocity limits: speed of joint 'panda_joint" in plan.report.message
     assert "times its limit" in plan.certificate.verdict
     with pytest.raises(sm.PlanError):
         plan.require()

@@ -29,6 +29,12 @@ def tumbling(t: float) -> list[float]:
     return [np.sin(t), t, 1.0, np.cos(3 * t), np.sin(t), t * t]
 
 
+def there_and_back() -> sm.Path:
+    """A line, a pause at its end, and the way back."""
+    way, back = sm.Line(pose(1), pose(2), 2.0), sm.Line(pose(2), pose(1), 3.0)
+    return way + sm.Dwell(pose(2), 0.7) + back
+
+
 PATHS = {
     "line": lambda: sm.Line(pose(1), pose(2), 2.0),
     "line at constant speed": lambda: sm.Line(pose(1), pose(2), 2.0, "constant"),
@@ -37,6 +43,9 @@ PATHS = {
     "twist": lambda: sm.TwistPath(pose(1), tumbling, 2.0),
     "waypoints": random_waypoints,
     "waypoints with stops": lambda: random_waypoints("stop"),
+    "ramped line": lambda: sm.Ramped(sm.Line(pose(1), pose(2), 2.0, "constant"), 0.4),
+    "ramped waypoints": lambda: sm.Ramped(random_waypoints(), 0.9),
+    "there and back": there_and_back,
 }
 
 
@@ -210,3 +219,43 @@ def test_samples_of_a_corner_path_are_continuous() -> None:
     path = sm.Waypoints([0, 1, 2, 3, 4], SQUARE, corners="stop")
     positions: Array = path.samples(np.linspace(0, 4, 4001)).translation
     assert np.linalg.norm(np.diff(positions, axis=0), axis=1).max() < 3e-3
+
+
+def test_a_ramp_begins_and_ends_at_rest_and_keeps_the_pace_in_between() -> None:
+    line = sm.Line(pose(1), pose(2), 2.0, "constant")
+    ramped = sm.Ramped(line, 0.4)
+    assert ramped.duration == pytest.approx(2.4)
+    assert np.abs(ramped.samples([0.0, ramped.duration]).twist).max() == 0.0
+    t = np.linspace(0.4, 2.0, 9)
+    here, there = ramped.samples(t), line.samples(t - 0.2)
+    np.testing.assert_allclose(here.translation, there.translation, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(here.twist, there.twist, rtol=0, atol=1e-14)
+
+
+def test_pieces_follow_each_other() -> None:
+    path = there_and_back()
+    assert path.duration == pytest.approx(5.7)
+    assert np.abs(path.samples(np.linspace(2.0, 2.7, 8)).twist).max() <= 1e-12
+    np.testing.assert_allclose(path.pose(2.5).homogeneous, pose(2).homogeneous, atol=1e-12)
+    np.testing.assert_allclose(path.pose(5.7).homogeneous, pose(1).homogeneous, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: sm.Joined([]), "no pieces"),
+        (
+            lambda: sm.Line(pose(1), pose(2), 2.0) + sm.Dwell(pose(3), 1.0),
+            "piece 2 begins .* m and",
+        ),
+        (
+            lambda: sm.Line(pose(1), pose(2), 2.0, "constant") + sm.Dwell(pose(2), 1.0),
+            "faster or slower than piece 1 ends",
+        ),
+        (lambda: sm.Ramped(sm.Line(pose(1), pose(2), 2.0), 3.0), "ramp is 3.0 s, expected"),
+        (lambda: sm.Dwell(pose(1), 0.0), "duration"),
+    ],
+)
+def test_paths_that_cannot_be_joined_or_ramped(make, message: str) -> None:
+    with pytest.raises(sm.PathError, match=message):
+        make()

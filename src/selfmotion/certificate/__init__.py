@@ -2,7 +2,7 @@
 
 from selfmotion.certificate.apart import KeepsApart
 from selfmotion.certificate.check import certify
-from selfmotion.certificate.ends import ClosedMotion, EndState
+from selfmotion.certificate.ends import AtRest, ClosedMotion, EndState
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import LIMIT_NAMES, JointLimits, arm_limits
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
@@ -10,6 +10,7 @@ from selfmotion.certificate.verdict import Certificate
 
 __all__ = [
     "LIMIT_NAMES",
+    "AtRest",
     "Certificate",
     "ClosedMotion",
     "DampedStretch",

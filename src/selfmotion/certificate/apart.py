@@ -9,7 +9,6 @@ beginning with few: pairs that are far apart, or hardly move, are looked at a fe
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from selfmotion.basics import Array
 from selfmotion.certificate.findings import Finding
@@ -129,7 +128,7 @@ def closest_at_all_times(
     No pair comes nearer than `distance` [m] at any time unless the one returned does, or is
     undecided; and none nearer than it by more than a fiftieth or 0.1 mm.
     """
-    way, levers = Way(trajectory), _levers(model, trajectory)
+    way, levers = trajectory.travelled, _levers(model, trajectory)
     edges = np.linspace(trajectory.t[0], trajectory.t[-1], _FIRST + 1)
     best = model.worst(trajectory(edges))
     approach = Approach(best, float(edges[best.index]))
@@ -201,44 +200,3 @@ def _undecided(
         return approach
     start, end = intervals[row]
     return Approach(near, float(start), float(end))
-
-
-class Way:
-    """The way that each joint has made by a time: ∫ |q̇| dt along the cubics, exactly.
-
-    q̇ is a parabola on each, whose zeros part it into monotone pieces.
-    """
-
-    def __init__(self, trajectory: Trajectory) -> None:
-        self._trajectory = trajectory
-        t, qd = trajectory.t, trajectory.qd
-        middle = trajectory(0.5 * (t[:-1] + t[1:]), order=1)
-        # q̇ = a s² + b s + c with s from 0 to 1 over each interval.
-        self._a = 2.0 * (qd[:-1] + qd[1:] - 2.0 * middle)
-        self._b = 4.0 * middle - 3.0 * qd[:-1] - qd[1:]
-        self._c = qd[:-1]
-        every = np.arange(len(t) - 1)
-        whole = self._partial(every, np.ones(len(every)))
-        self._before = np.vstack([np.zeros(qd.shape[1]), np.cumsum(whole, axis=0)])
-
-    def __call__(self, t: Array) -> Array:
-        """Return the ways made by times (K,), (K, n) [rad or m]."""
-        edges = self._trajectory.t
-        k = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, len(edges) - 2)
-        return self._before[k] + self._partial(k, (t - edges[k]) / (edges[k + 1] - edges[k]))
-
-    def _partial(self, k: npt.NDArray[np.intp], s: Array) -> Array:
-        """Return the ways from the beginning of intervals k (K,) up to s (K,), (K, n)."""
-        a, b, c = self._a[k], self._b[k], self._c[k]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            u = -0.5 * (b + np.copysign(np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0)), b))
-            zeros = np.sort(np.stack([u / a, c / u], axis=1), axis=1)
-        end = s[:, None, None]
-        zeros = np.where((zeros > 0.0) & (zeros < end), zeros, 0.0)
-        edges = np.concatenate(
-            [np.zeros_like(a)[:, None], np.sort(zeros, axis=1), np.zeros_like(a)[:, None] + end],
-            axis=1,
-        )
-        integral = edges * (c[:, None] + edges * (b[:, None] / 2.0 + edges * a[:, None] / 3.0))
-        steps = np.diff(self._trajectory.t)[k, None]
-        return np.asarray(np.abs(np.diff(integral, axis=1)).sum(axis=1) * steps)

@@ -14,28 +14,61 @@ ARRIVED = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class EndState(Requirement):
-    """q(T) (order 0) or q̇(T) (order 1) is the one asked for.
+    """q(T) (order 0) or q̇(T) (order 1) is the one asked for, or that at the start.
 
     Attributes
     ----------
     order : {0, 1}
     target : (n,)
         [rad or m], per s for order 1.
+    at_start : bool
     """
 
     order: int
     target: Array
+    at_start: bool = False
 
     @property
     def name(self) -> str:  # type: ignore[override]  # it follows from the order
         """See `Requirement.name`."""
-        return ("end configuration", "end velocity")[self.order]
+        quantity = ("configuration", "velocity")[self.order]
+        return f"{'start' if self.at_start else 'end'} {quantity}"
 
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: the joint that misses most."""
-        end = (motion.trajectory.q, motion.trajectory.qd)[self.order][-1]
+        row = 0 if self.at_start else -1
+        end = (motion.trajectory.q, motion.trajectory.qd)[self.order][row]
         words = ("away from where it should", "off the one asked for")[self.order]
-        return _miss(self.name, motion, end - self.target, self.order, words)
+        return _miss(self.name, motion, end - self.target, self.order, words, row)
+
+
+@dataclass(frozen=True)
+class AtRest(Requirement):
+    """The arm is at rest at the start, at the end, or both: q̇ = 0 there."""
+
+    start: bool
+    end: bool
+    name: str = "rest"
+
+    @property
+    def covers(self) -> tuple[str, ...]:
+        """See `Requirement.covers`."""
+        where = "both ends" if self.start and self.end else "the start" if self.start else "the end"
+        return (f"rest at {where}",)
+
+    def judge(self, motion: FinishedMotion) -> Finding:
+        """See `Requirement.judge`: the fastest joint at an end."""
+        t, qd, names = motion.trajectory.t, motion.trajectory.qd, motion.robot.joint_names
+        ends = [row for row, wanted in ((0, self.start), (-1, self.end)) if wanted]
+        speeds = np.abs(qd[ends])
+        row, worst = np.unravel_index(int(np.argmax(speeds)), speeds.shape)
+        speed, at = float(speeds[row, worst]), ends[int(row)]
+        text = (
+            f"joint '{names[worst]}' {'ends' if at else 'starts'} at {speed:.2e} rad/s or m/s, "
+            f"where the tool is at rest"
+        )
+        time, kept = float(t[at]), bool(speed <= ARRIVED)
+        return Finding(self.name, names[worst], time, speed, ARRIVED, kept, text)
 
 
 @dataclass(frozen=True)
@@ -54,11 +87,13 @@ class ClosedMotion(Requirement):
         return _miss(self.name, motion, qd[-1] - qd[0], 1, "off that of the start")
 
 
-def _miss(name: str, motion: FinishedMotion, miss: Array, order: int, words: str) -> Finding:
+def _miss(
+    name: str, motion: FinishedMotion, miss: Array, order: int, words: str, row: int = -1
+) -> Finding:
     size = np.abs(miss)
     worst = int(np.argmax(size))
     joint, amount = motion.robot.joint_names[worst], float(size[worst])
     with_velocity = " with a velocity" if order else ""
-    text = f"joint '{joint}' ends{with_velocity} {amount:.2e} {words}"
-    time = float(motion.trajectory.t[-1])
+    text = f"joint '{joint}' {'ends' if row else 'starts'}{with_velocity} {amount:.2e} {words}"
+    time = float(motion.trajectory.t[row])
     return Finding(name, joint, time, amount, ARRIVED, bool(amount <= ARRIVED), text)

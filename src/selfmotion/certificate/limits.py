@@ -1,4 +1,4 @@
-"""Limits of joint position, velocity and acceleration, judged at all times."""
+"""Limits of joint position, velocity, acceleration and jerk, judged at all times."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,18 +10,23 @@ from selfmotion.certificate.findings import Finding
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.robot import RobotModel
 
-LIMIT_NAMES = ("joint position limits", "joint velocity limits", "joint acceleration limits")
+LIMIT_NAMES = (
+    "joint position limits",
+    "joint velocity limits",
+    "joint acceleration limits",
+    "joint jerk limits",
+)
 
 
 @dataclass(frozen=True, eq=False)
 class JointLimits(Requirement):
-    """lower ≤ x ≤ upper for x = q (order 0), q̇ (1) or q̈ (2) of each joint, at all times.
+    """lower ≤ x ≤ upper for x = q (order 0), q̇ (1), q̈ (2) or the jerk (3), at all times.
 
     Attributes
     ----------
-    order : {0, 1, 2}
+    order : {0, 1, 2, 3}
     lower, upper : (n,)
-        [rad or m] per s^order, ±inf where there is none; symmetric for order 1 and 2.
+        [rad or m] per s^order, ±inf where there is none; symmetric from order 1 on.
     """
 
     order: int
@@ -33,10 +38,10 @@ class JointLimits(Requirement):
             object.__setattr__(self, name, read_only(getattr(self, name)))
         lower, upper = self.lower, self.upper
         # Written so that NaN is refused.
-        if self.order not in (0, 1, 2) or lower.shape != upper.shape or not np.all(lower <= upper):
+        if self.order not in range(4) or lower.shape != upper.shape or not np.all(lower <= upper):
             raise ProblemError(
                 f"limits of order {self.order}: lower {lower.tolist()} and upper {upper.tolist()}, "
-                f"expected order 0, 1 or 2 and lower ≤ upper for each joint"
+                f"expected order 0 to 3 and lower ≤ upper for each joint"
             )
         if self.order > 0 and not (np.all(upper > 0.0) and np.all(lower < 0.0)):
             raise ProblemError(
@@ -52,7 +57,10 @@ class JointLimits(Requirement):
     @property
     def covers(self) -> tuple[str, ...]:
         """See `Requirement.covers`."""
-        return (("joint limits", "speeds", "accelerations")[self.order],)
+        # Of the arm's makers nobody may have said.
+        if self.order > 1 and not np.all(np.isfinite(self.upper)):
+            return ()
+        return (("joint limits", "speeds", "accelerations", "jerks")[self.order],)
 
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: a margin (order 0), or the share of the limit that is used."""
@@ -104,4 +112,11 @@ def _acceleration(name: str, amount: float, time: float) -> str:
     )
 
 
-_TEXTS = (_position, _velocity, _acceleration)
+def _jerk(name: str, amount: float, time: float) -> str:
+    return (
+        f"joint '{name}' jerks at {amount:.5g} times its limit at t = {time:.3f} s: give it "
+        f"{max(amount, 0.0) ** (1.0 / 3.0):.5g} times the duration"
+    )
+
+
+_TEXTS = (_position, _velocity, _acceleration, _jerk)

@@ -7,10 +7,11 @@ from selfmotion.constraints.base import (
     easing_of,
 )
 from selfmotion.constraints.clearance import Clearance
-from selfmotion.constraints.ends import ClosedPath, EndConfiguration, EndVelocity
+from selfmotion.constraints.ends import ClosedPath, EndConfiguration, EndVelocity, StartVelocity
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.constraints.limits import (
     JointAccelerationLimits,
+    JointJerkLimits,
     JointPositionLimits,
     JointVelocityLimits,
 )
@@ -24,8 +25,10 @@ __all__ = [
     "EndVelocity",
     "Envelope",
     "JointAccelerationLimits",
+    "JointJerkLimits",
     "JointPositionLimits",
     "JointVelocityLimits",
     "NodeTangents",
+    "StartVelocity",
     "easing_of",
 ]

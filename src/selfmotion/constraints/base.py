@@ -7,12 +7,14 @@ digits of the optimisation stay within the limits themselves.
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Protocol
 
 from selfmotion.basics import Array, Saved
 from selfmotion.certificate import Requirement
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
+from selfmotion.motion import Sampling
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -24,16 +26,25 @@ class NodeTangents:
 
     Attributes
     ----------
-    q, qd, qdd : (N + 1, n, d)
+    q, qd : (N + 1, n, d)
+    sampling : Sampling
+        When.
     """
 
     q: Array
     qd: Array
-    qdd: Array
+    sampling: Sampling
 
     def of_order(self, order: int) -> Array:
-        """Return the tangents of q (0), q̇ (1) or q̈ (2)."""
-        return (self.q, self.qd, self.qdd)[order]
+        """Return the tangents of q (0), q̇ (1), q̈ (2) or the jerk (3), (N + 1, n, d)."""
+        return (self.q, self.qd)[order] if order < 2 else self._faster[order - 2]
+
+    @cached_property
+    def _faster(self) -> tuple[Array, Array]:
+        flat, here = self.qd.reshape(len(self.qd), -1), self.sampling.nodes
+        operators = (self.sampling.differentiation(order)[here] for order in (1, 2))
+        first, second = ((operator @ flat).reshape(self.qd.shape) for operator in operators)
+        return first, second
 
 
 class Constraint(Saved, ABC, family="constraint"):
@@ -48,9 +59,13 @@ class Constraint(Saved, ABC, family="constraint"):
     pins : (bool, bool)
         Whether the tool has to be on the path itself, not only within what is relaxed, at the start
         and at the end of the motion.
+    sets_velocity : (bool, bool)
+        Whether it says how fast the arm is at the start and at the end of the motion, which else
+        is at rest where the tool is.
     """
 
     pins: ClassVar[tuple[bool, bool]] = (False, False)
+    sets_velocity: ClassVar[tuple[bool, bool]] = (False, False)
 
     @abstractmethod
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundConstraint":
@@ -66,9 +81,16 @@ class Constraint(Saved, ABC, family="constraint"):
     def check(self, robot: RobotModel, path: Path, task: Task) -> None:
         """Raise ProblemError where it does not fit an arm, a path or a task."""
 
+    def check_start(self, robot: RobotModel, path: Path, task: Task, start: Array | None) -> None:
+        """Raise ProblemError where it does not fit the start, (n,) or None for a free one."""
+
     def envelope(self, robot: RobotModel) -> Envelope:
         """Return what it asks of single configurations and velocities; by default nothing."""
         return Envelope.unbounded(robot.dof)
+
+    def at_rest(self) -> "Constraint":
+        """Return what is left to ask of a motion that rests at both ends by itself."""
+        return self
 
     def on_part(self) -> "Constraint | None":
         """Return what it asks of a motion along the first part of the path; None for nothing."""
@@ -111,7 +133,7 @@ def easing_of(bound: BoundConstraint, column: int) -> tuple[float, str]:
 
 
 def motion_of_order(samples: Samples, order: int) -> Array:
-    """Return q (0), q̇ (1) or q̈ (2) at the nodes, (N + 1, n)."""
-    table = (samples.q, samples.qd)[order] if order < 2 else samples.qdd
+    """Return q (0), q̇ (1), q̈ (2) or the jerk (3) at the nodes, (N + 1, n)."""
+    table = (samples.q, samples.qd)[order] if order < 2 else (samples.qdd, samples.qddd)[order - 2]
     nodes: Array = table[samples.nodes]
     return nodes

@@ -18,7 +18,7 @@ from selfmotion.basics import Array, ProblemError, per_joint, read_only
 from selfmotion.certificate import ClosedMotion, EndState
 from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
 from selfmotion.costs import Samples
-from selfmotion.path import Path
+from selfmotion.path import STILL, Path
 from selfmotion.robot import RobotModel, null_basis
 from selfmotion.task import Task
 
@@ -26,7 +26,7 @@ from selfmotion.task import Task
 _NEAR = 1e-4
 # An end configuration may be this far off [m, rad]: what the certificate grants it.
 _NEAR_END = 1e-6
-# Poses and speeds nearer than this are the same: far above rounding, far below any tolerance.
+# Poses nearer than this are the same: far above rounding, far below any tolerance.
 _SAME_POSE = 1e-7
 
 
@@ -82,6 +82,7 @@ class EndVelocity(Constraint):
     """
 
     pins: ClassVar[tuple[bool, bool]] = (False, True)
+    sets_velocity: ClassVar[tuple[bool, bool]] = (False, True)
 
     qd: npt.ArrayLike = 0.0
 
@@ -100,8 +101,7 @@ class EndVelocity(Constraint):
         rotation = path.pose(path.duration).rotation
         twist = task.select(path.twist(path.duration)[:, None], rotation)
         speed = float(np.abs(twist).max())
-        # Waypoints and velocity functions end at rest up to their own rounding.
-        if speed > _SAME_POSE:
+        if speed > STILL:
             raise ProblemError(
                 f"the motion cannot end at rest: the path ends at {speed:.3g} m/s or rad/s; give "
                 f"the path a time law that ends at rest (time_law='minimum_jerk'), or ask for "
@@ -114,6 +114,51 @@ class EndVelocity(Constraint):
     def target(self, robot: RobotModel) -> Array:
         """Return q̇(T) (n,) for an arm."""
         return per_joint(self.qd, robot.dof, f"{robot.name}: end velocity")
+
+
+@dataclass(frozen=True, eq=False)
+class StartVelocity(Constraint):
+    """The motion begins with a joint velocity: that of an arm that moves already.
+
+    Needs a given start, where the tool's rows of it have to be those of the path's start.
+
+    Parameters
+    ----------
+    qd : (n,) or 0
+        q̇(0) [rad/s or m/s].
+    """
+
+    pins: ClassVar[tuple[bool, bool]] = (True, False)
+    sets_velocity: ClassVar[tuple[bool, bool]] = (True, False)
+
+    qd: npt.ArrayLike = 0.0
+
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
+        """See `Constraint.bind`."""
+        null = null_basis(robot, task, start)
+        return BoundEnd("start velocity", (1,), self.target(robot), null, row=0)
+
+    def requirement(self, robot: RobotModel) -> EndState:
+        """See `Constraint.requirement`."""
+        return EndState(1, self.target(robot), at_start=True)
+
+    def check_start(self, robot: RobotModel, path: Path, task: Task, start: Array | None) -> None:
+        """See `Constraint.check_start`: the tool has to begin as the path does."""
+        if start is None:
+            raise ProblemError("a start velocity needs a given start (start=)")
+        asked = robot.task_jacobian(start, task) @ self.target(robot)
+        twist = task.select(path.twist(0.0)[:, None], robot.pose(start).rotation)[:, 0]
+        row = int(np.argmax(np.abs(asked - twist)))
+        if abs(asked[row] - twist[row]) > _NEAR_END:
+            raise ProblemError(
+                f"the start velocity moves '{robot.tool}' at {asked[row]:.6g} m/s or rad/s in row "
+                f"'{task.row_names[row]}', but the path begins at {twist[row]:.6g}; give the path "
+                f"that speed, or the arm another one"
+            )
+
+    def target(self, robot: RobotModel) -> Array:
+        """Return q̇(0) (n,) for an arm."""
+        return per_joint(self.qd, robot.dof, f"{robot.name}: start velocity")
 
 
 @dataclass(frozen=True)
@@ -148,18 +193,26 @@ class ClosedPath(Constraint):
                 f"and {rotation:.3g} rad from where it began"
             )
 
+    def at_rest(self) -> "ClosedPath":
+        """See `Constraint.at_rest`: both velocities are 0."""
+        return ClosedPath(velocity=False)
+
     def on_part(self) -> None:
         """See `Constraint.on_part`: a part of a loop is not closed."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoundEnd:
-    """Nᵀ(x(T) - target) = 0, or Nᵀ(x(T) - x(0)) = 0 without a target, for x = q, q̇ or both."""
+    """Nᵀ(x - target) = 0 at an end (`row`), or Nᵀ(x(T) - x(0)) = 0 without a target.
+
+    x is q, q̇ or both.
+    """
 
     name: str
     orders: tuple[int, ...]
     target: Array | None
     null: Array
+    row: int = -1
     equality = True
     tolerance = _NEAR
 
@@ -168,7 +221,8 @@ class BoundEnd:
         parts = []
         for order in self.orders:
             x = motion_of_order(samples, order)
-            parts.append(self.null.T @ (x[-1] - (x[0] if self.target is None else self.target)))
+            reached, wanted = (x[-1], x[0]) if self.target is None else (x[self.row], self.target)
+            parts.append(self.null.T @ (reached - wanted))
         return np.concatenate(parts)[None, :]
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
@@ -176,7 +230,7 @@ class BoundEnd:
         parts = []
         for order in self.orders:
             x = motion.of_order(order)
-            parts.append(self.null.T @ (x[-1] - x[0] if self.target is None else x[-1]))
+            parts.append(self.null.T @ (x[-1] - x[0] if self.target is None else x[self.row]))
         return np.concatenate(parts)[None]
 
     def describe(self, samples: Samples, row: int, column: int) -> str:
@@ -185,4 +239,5 @@ class BoundEnd:
         quantity = ("configuration", "velocity")[order]
         goal = "that of the start" if self.target is None else "the one asked for"
         miss = np.abs(self.residual(samples)).max()
-        return f"the {quantity} at the end is {miss:.3g} (rad or m, per s) away from {goal}"
+        where = "end" if self.row else "start"
+        return f"the {quantity} at the {where} is {miss:.3g} (rad or m, per s) away from {goal}"

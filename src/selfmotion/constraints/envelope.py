@@ -17,8 +17,8 @@ class Envelope:
     ----------
     lower, upper : (n,)
         Position limits [rad or m]; ±inf where there is none.
-    speed, acceleration : (n,)
-        Limits of |q̇| and |q̈|; inf where there is none.
+    speed, acceleration, jerk : (n,)
+        Limits of |q̇|, |q̈| and of the jerk; inf where there is none.
     bodies : tuple of (CollisionModel, float)
         Bodies to keep apart, and the distance [m].
     """
@@ -27,23 +27,26 @@ class Envelope:
     upper: Array
     speed: Array
     acceleration: Array
+    jerk: Array
     bodies: tuple[tuple[CollisionModel, float], ...] = ()
 
     @classmethod
     def unbounded(cls, dof: int) -> "Envelope":
         """Return the envelope of n joints that allows everything."""
         free = read_only(np.full(dof, np.inf))
-        return cls(read_only(-free), free, free, free)
+        return cls(read_only(-free), free, free, free, free)
 
     @classmethod
     def of_limits(cls, limits: JointLimits) -> "Envelope":
-        """Return the envelope of limits of q, q̇ or q̈."""
+        """Return the envelope of limits of q, q̇, q̈ or the jerk."""
         own = cls.unbounded(len(limits.lower))
         if limits.order == 0:
             return replace(own, lower=limits.lower, upper=limits.upper)
         if limits.order == 1:
             return replace(own, speed=limits.upper)
-        return replace(own, acceleration=limits.upper)
+        if limits.order == 2:
+            return replace(own, acceleration=limits.upper)
+        return replace(own, jerk=limits.upper)
 
     def __and__(self, other: "Envelope") -> "Envelope":
         """Return the envelope of what both allow."""
@@ -52,6 +55,7 @@ class Envelope:
             read_only(np.minimum(self.upper, other.upper)),
             read_only(np.minimum(self.speed, other.speed)),
             read_only(np.minimum(self.acceleration, other.acceleration)),
+            read_only(np.minimum(self.jerk, other.jerk)),
             (*self.bodies, *other.bodies),
         )
 

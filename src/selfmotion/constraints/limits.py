@@ -1,4 +1,4 @@
-"""Limits of joint position, velocity and acceleration."""
+"""Limits of joint position, velocity, acceleration and jerk."""
 
 from dataclasses import dataclass
 
@@ -17,6 +17,7 @@ from selfmotion.costs import Samples
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
+_QUANTITIES = ("position", "speed", "acceleration", "jerk")
 # Joints with limits turn less than this [rad].
 _MOST_TURNS = 4.0 * np.pi
 
@@ -118,17 +119,17 @@ class JointVelocityLimits(Constraint):
 
 @dataclass(frozen=True, eq=False)
 class JointAccelerationLimits(Constraint):
-    """Joint accelerations stay below limits (URDFs give none).
+    """Joint accelerations stay below limits.
 
     Parameters
     ----------
-    limit : (n,) or float
-        [rad/s² or m/s²].
+    limit : (n,) or float, optional
+        [rad/s² or m/s²]; by default those of the arm's maker, if known (URDFs give none).
     margin : float
         Share of the limit that is aimed to be left unused; at least half of it is.
     """
 
-    limit: npt.ArrayLike
+    limit: npt.ArrayLike | None = None
     margin: float = 1e-2
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
@@ -146,7 +147,45 @@ class JointAccelerationLimits(Constraint):
 
     def of(self, robot: RobotModel) -> Array:
         """Return the limits for an arm, (n,) [rad/s² or m/s²]."""
+        if self.limit is None:
+            return robot.acceleration_limit
         what = f"{robot.name}: {LIMIT_NAMES[2]}"
+        return per_joint(self.limit, robot.dof, what, positive=True)
+
+
+@dataclass(frozen=True, eq=False)
+class JointJerkLimits(Constraint):
+    """Joint jerks, the derivatives of accelerations, stay below limits.
+
+    Parameters
+    ----------
+    limit : (n,) or float, optional
+        [rad/s³ or m/s³]; by default those of the arm's maker, if known (URDFs give none).
+    margin : float
+        Share of the limit that is aimed to be left unused; at least half of it is.
+    """
+
+    limit: npt.ArrayLike | None = None
+    margin: float = 5e-2
+
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
+        """See `Constraint.bind`."""
+        return BoundLimits.symmetric(robot, LIMIT_NAMES[3], 3, self.of(robot), self.margin)
+
+    def requirement(self, robot: RobotModel) -> JointLimits:
+        """See `Constraint.requirement`."""
+        limit = self.of(robot)
+        return JointLimits(3, -limit, limit)
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return Envelope.of_limits(self.requirement(robot))
+
+    def of(self, robot: RobotModel) -> Array:
+        """Return the limits for an arm, (n,) [rad/s³ or m/s³]."""
+        if self.limit is None:
+            return robot.jerk_limit
+        what = f"{robot.name}: {LIMIT_NAMES[3]}"
         return per_joint(self.limit, robot.dof, what, positive=True)
 
 
@@ -163,7 +202,7 @@ def _check_radians(robot: RobotModel, limits: Array) -> None:
 
 @dataclass(frozen=True, eq=False)
 class BoundLimits:
-    """lower ≤ x ≤ upper for x = q, q̇ or q̈ of the joints that have finite limits.
+    """lower ≤ x ≤ upper for x = q, q̇, q̈ or the jerk of the joints that have finite limits.
 
     h = (x - upper) / s + margin and (lower - x) / s + margin, with s = 1 for positions and the
     limit itself for its derivatives.
@@ -222,7 +261,7 @@ class BoundLimits:
         """See `easing_of`: 2 % of a rate, on both sides; 0.01 rad or m of a position."""
         joint = f"joint '{self.joint_names[column % len(self.joints)]}'"
         if self.order > 0:
-            return 0.02, f"2 % more {('speed', 'acceleration')[self.order - 1]} for {joint}"
+            return 0.02, f"2 % more {_QUANTITIES[self.order]} for {joint}"
         side = "upper" if column < len(self.joints) else "lower"
         return 0.01, f"0.01 rad or m more at the {side} limit of {joint}"
 
@@ -231,8 +270,7 @@ class BoundLimits:
         joint = column % len(self.joints)
         value = motion_of_order(samples, self.order)[row, self.joints[joint]]
         limit = self.upper[joint] if column < len(self.joints) else self.lower[joint]
-        quantity = ("position", "velocity", "acceleration")[self.order]
         return (
-            f"{quantity} of joint '{self.joint_names[joint]}' is {value:.4g} at t = "
+            f"{_QUANTITIES[self.order]} of joint '{self.joint_names[joint]}' is {value:.4g} at t = "
             f"{samples.sampling.node_times[row]:.3f} s, limit {limit:.4g}"
         )

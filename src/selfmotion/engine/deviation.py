@@ -65,6 +65,15 @@ class Deviation:
     pinned : (bool, bool)
         Whether the deviation vanishes, with its first two derivatives, at the first and the last
         time of the path, as it does at all other ends of windows.
+    rests : (bool, bool)
+        Whether only its first two derivatives vanish there, so that the tool rests.
+
+    Attributes
+    ----------
+    size : int
+        Number of entries of c.
+    banded : (size,) of bool
+        Which of them belong to a relaxation with a band.
     """
 
     def __init__(
@@ -73,11 +82,14 @@ class Deviation:
         relaxations: Sequence[Relaxation],
         t: Array,
         pinned: tuple[bool, bool],
+        rests: tuple[bool, bool] = (False, False),
     ) -> None:
         self._path, self._t = path, t
-        self._groups = [_group(item, path.duration, t, pinned) for item in relaxations]
+        self._groups = [_group(item, path.duration, t, pinned, rests) for item in relaxations]
         self._in_tool_axes = any(item.in_tool_axes for item in relaxations)
         self.size = sum(group.size for group in self._groups)
+        banded = [np.full(group.size, np.isfinite(group.band)) for group in self._groups]
+        self.banded = np.concatenate([np.zeros(0, dtype=bool), *banded])
 
     @cached_property
     def _nominal(self) -> PathSamples:
@@ -156,7 +168,13 @@ class Deviation:
         return self._shift(rate) + _turn(spin, self._shift(delta))
 
 
-def _group(item: Relaxation, duration: float, t: Array, pinned: tuple[bool, bool]) -> _Group:
+def _group(
+    item: Relaxation,
+    duration: float,
+    t: Array,
+    pinned: tuple[bool, bool],
+    rests: tuple[bool, bool],
+) -> _Group:
     from scipy.interpolate import BSpline
 
     start, end = item.window(duration)
@@ -169,13 +187,21 @@ def _group(item: Relaxation, duration: float, t: Array, pinned: tuple[bool, bool
     slack = 1e-9 * duration
     keep_first = start <= slack and not pinned[0]
     keep_last = end >= duration - slack and not pinned[1]
-    kept = slice(0 if keep_first else 3, count if keep_last else count - 3)
+    # Coefficients with the same label are equal, those with a negative one are zero: three equal
+    # ones at an end leave a value there, without slope or curvature.
+    labels = np.arange(count)
+    for first, keep, rest in ((0, keep_first, rests[0]), (count - 3, keep_last, rests[1])):
+        if rest or not keep:
+            own = labels[first : first + 3]
+            labels[np.isin(labels, own)] = own.min() if keep else -1
+    kept = np.array([labels == label for label in np.unique(labels) if label >= 0], dtype=float).T
+    kept = kept.reshape(count, -1)
     inside = (t >= start) & (t <= end)
     spline = BSpline(knots, np.eye(count), _DEGREE, extrapolate=True)
     values, rates = np.zeros((len(t), count)), np.zeros((len(t), count))
     values[inside] = spline(t[inside])
     rates[inside] = spline(t[inside], 1)
-    return _Group(item.indices, item.band, values[:, kept].copy(), rates[:, kept].copy())
+    return _Group(item.indices, item.band, values @ kept, rates @ kept)
 
 
 def _squash(s: Array, band: float) -> tuple[Array, Array, Array]:

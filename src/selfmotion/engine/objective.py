@@ -120,10 +120,10 @@ class Objective:
         t = grid.stage_times
         frame = still.frame(t)
         table = NullMotionTable(
-            problem.null_motion.functions(t, problem.path.duration),
+            problem.null_functions(t),
             frame,
             robot.dof if frame is None else frame.shape[2],
-            None if still.guide is None else still.guide(t),
+            None if still.guide is None else problem.brought_to_rest(t, still.guide(t)),
         )
         start: Start = FreeStart(robot, task, still.start) if free else FixedStart(still.start)
         return cls(
@@ -131,7 +131,7 @@ class Objective:
             table,
             problem.all_costs,
             start,
-            Deviation(problem.path, problem.relaxations, t, problem.pinned),
+            Deviation(problem.path, problem.relaxations, t, problem.pinned, problem.rests),
             Conditions(constraints, grid),
             Counts() if counts is None else counts,
         )
@@ -223,7 +223,9 @@ class Objective:
         """Return the motion of x with all that is known of it."""
         self._run(x)
         before = self.rollout.jacobian_evaluations
-        trajectory = Trajectory(*self.rollout.polished(), self.rollout.robot.joint_names)
+        t, q, qd = self.rollout.polished()
+        qdd = self.grid.sampling.differentiation(1)[self.grid.node_stages] @ qd
+        trajectory = Trajectory(t, q, qd, self.rollout.robot.joint_names, qdd)
         self.counts.jacobians += self.rollout.jacobian_evaluations - before
         return Evaluation(x.copy(), dict(self._terms), trajectory, self.rollout.damped)
 
@@ -244,8 +246,8 @@ class Objective:
         """Return the Gauss-Newton matrix of quadratic costs, (size, size).
 
         ∫ Σ_k (∂q^(k)/∂x)ᵀ W_k (∂q^(k)/∂x) dt over the derivatives q^(k) of q that the costs weigh
-        (that of ½ q̇ᵀq̇ where none does), and likewise over the pose error. Its inverse starts the
-        quasi-Newton method.
+        (that of ½ q̇ᵀq̇ where none does), and likewise over the pose error; and |∂F/∂c| for what
+        keeps a deviation within its band. Its inverse starts the quasi-Newton method.
         """
         self._run(x)
         n, sampling = self.rollout.robot.dof, self.grid.sampling
@@ -266,6 +268,11 @@ class Objective:
                     tangent = by_q if order == 0 else by_qd
                 weighted = sampling.weights[:, None, None] * (weight @ tangent)
                 metric += tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size)
+        if self._deviation.size:
+            # sin s bends as much as it rises: without it, steps would go round many times.
+            slope = np.abs(self.parts(self.gradient(x))[2]) * self._deviation.banded
+            last = self.size - len(slope)
+            metric[last:, last:] += np.diag(slope)
         return metric
 
     def node_tangents(self, x: Array) -> NodeTangents:
@@ -289,9 +296,7 @@ class Objective:
     def _at_nodes(self, by_q: Array, by_qd: Array) -> NodeTangents:
         sampling = self.grid.sampling
         here = sampling.nodes
-        nodes = by_qd[here]
-        faster = sampling.differentiation(1)[here] @ nodes.reshape(len(nodes), -1)
-        return NodeTangents(by_q[here], nodes, faster.reshape(nodes.shape))
+        return NodeTangents(by_q[here], by_qd[here], sampling)
 
     def _run(self, x: Array) -> None:
         """Make x the motion that the rollout holds."""

@@ -69,8 +69,10 @@ class StillMotion:
         rollout = Rollout(
             problem.robot, problem.path, problem.task, grid, damping=problem.damping_law
         )
-        idle = np.zeros((len(grid.stage_times), problem.robot.dof))
-        broken = rollout.run(configuration, idle if guide is None else guide(grid.stage_times))
+        t = grid.stage_times
+        idle = np.zeros((len(t), problem.robot.dof))
+        own = idle if guide is None else problem.brought_to_rest(t, guide(t))
+        broken = rollout.run(configuration, own)
         samples, rows = rollout.samples(), problem.task.rows
         target = problem.path.samples(grid.nodes).translation
         extent = max(float(np.ptp(target, axis=0).max()), _SHORTEST)

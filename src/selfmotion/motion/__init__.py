@@ -7,6 +7,7 @@ from selfmotion.motion.null_motion import (
     NullMotionTable,
     PolynomialNullMotion,
     TransportedFrame,
+    resting_window,
 )
 from selfmotion.motion.sampling import Sampling
 from selfmotion.motion.trajectory import Trajectory
@@ -20,4 +21,5 @@ __all__ = [
     "Sampling",
     "Trajectory",
     "TransportedFrame",
+    "resting_window",
 ]

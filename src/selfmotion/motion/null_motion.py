@@ -121,6 +121,18 @@ class BSplineNullMotion(NullMotion):
         return np.asarray(BSpline.design_matrix(t, knots, self.degree).toarray())
 
 
+def resting_window(t: Array, duration: float, orders: tuple[int, int]) -> Array:
+    """Return w(t) = c s^a (1 - s)^b with s = t / duration, (S,): at most 1.
+
+    Where a null motion is multiplied by it, that comes to rest at the start with its first a - 1
+    derivatives, and at the end with its first b - 1; `orders` are a and b.
+    """
+    a, b = orders
+    s = np.asarray(t) / duration
+    most = a**a * b**b / float((a + b) ** (a + b))
+    return np.asarray(s**a * (1.0 - s) ** b / most)
+
+
 @dataclass(frozen=True, eq=False)
 class NullMotionTable:
     """A null motion at S stages, bound to one motion: ε = ε_0 + R E φ.

@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, FileFormatError, read_only, read_table
+from selfmotion.motion.polynomials import differentiated, evaluated, inner_roots, may_pass
 
 # What follows a joint's name in the header of the column of its velocity.
 _VELOCITY = "_velocity"
@@ -15,7 +17,9 @@ _VELOCITY = "_velocity"
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Joint motion as a cubic Hermite spline: exact in q and q̇ at the samples, C¹ between them.
+    """Joint motion as a Hermite spline, exact at the samples, as controllers read it.
+
+    Quintic, with continuous acceleration, where accelerations are given; cubic where they are not.
 
     Attributes
     ----------
@@ -27,6 +31,8 @@ class Trajectory:
         Joint velocities [rad/s or m/s].
     joint_names : tuple of str
         Names of the n joints.
+    qdd : (N, n), optional
+        Joint accelerations [rad/s² or m/s²].
 
     Raises
     ------
@@ -38,9 +44,11 @@ class Trajectory:
     q: Array
     qd: Array
     joint_names: tuple[str, ...]
+    qdd: Array | None = None
 
     def __post_init__(self) -> None:
-        for name in ("t", "q", "qd"):
+        given = ("t", "q", "qd") if self.qdd is None else ("t", "q", "qd", "qdd")
+        for name in given:
             object.__setattr__(self, name, read_only(getattr(self, name)))
         shape = (len(self.t), len(self.joint_names))
         if len(self.t) < 2 or self.q.shape != shape or self.qd.shape != shape:
@@ -48,7 +56,9 @@ class Trajectory:
                 f"trajectory: t {self.t.shape}, q {self.q.shape}, qd {self.qd.shape}, "
                 f"expected (N,), {shape} and {shape} with N ≥ 2"
             )
-        for name in ("t", "q", "qd"):
+        if self.qdd is not None and self.qdd.shape != shape:
+            raise FileFormatError(f"trajectory: qdd {self.qdd.shape}, expected {shape}")
+        for name in given:
             bad = np.argwhere(~np.isfinite(getattr(self, name)))
             if len(bad):
                 raise FileFormatError(f"trajectory: {name}{bad[0].tolist()} is not finite")
@@ -127,7 +137,8 @@ class Trajectory:
         ):
             raise FileFormatError(f"trajectory: joint '{name}' {where}: {', '.join(others)}")
         order = [own.index(name) for name in wanted]
-        return Trajectory(self.t, self.q[:, order], self.qd[:, order], wanted)
+        faster = None if self.qdd is None else self.qdd[:, order]
+        return Trajectory(self.t, self.q[:, order], self.qd[:, order], wanted, faster)
 
     @property
     def duration(self) -> float:
@@ -137,38 +148,79 @@ class Trajectory:
     def extremes(self, order: int) -> tuple[Array, Array]:
         """Return the least and the largest value of each joint over the whole motion.
 
-        Exact: of each cubic at both its ends and where its next derivative is 0.
+        Exact: of each polynomial at both its ends and where its next derivative is 0.
 
         Parameters
         ----------
-        order : {0, 1, 2}
-            Of q (0), q̇ (1) or q̈ (2).
+        order : {0, 1, 2, 3}
+            Of q (0), q̇ (1), q̈ (2) or the jerk (3).
 
         Returns
         -------
         t, values : (2, n)
             When, and what: the least in the first row, the largest in the second.
         """
-        s = _stationary(self, order)
-        h, start = np.diff(self.t)[:, None, None], self.t[:-1, None, None]
-        weights = _HERMITE[order](s, h)
-        ends = (self.q[:-1], self.q[1:], self.qd[:-1], self.qd[1:])
-        values = sum(weight * end[:, None] for weight, end in zip(weights, ends, strict=True))
-        times = np.broadcast_to(start + h * s, np.shape(values))
-        flat, when = np.reshape(values, (-1, self.q.shape[1])), times.reshape(-1, self.q.shape[1])
-        rows = np.stack([np.argmin(flat, axis=0), np.argmax(flat, axis=0)])
-        joints = np.arange(flat.shape[1])
-        return when[rows, joints], flat[rows, joints]
+        pieces = self._pieces(order)
+        ends = np.stack([pieces[0], pieces.sum(axis=0)])
+        least, largest = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
+        steps, n = np.diff(self.t), len(self.joint_names)
+        # Only where the polynomials may go beyond all their ends, they are looked at inside.
+        some, joints = np.nonzero(may_pass(pieces, least, largest))
+        chosen = pieces[:, some, joints]
+        roots = inner_roots(differentiated(chosen))
+        inner = evaluated(chosen, roots)
+        rows, t, values = [], np.empty((2, n)), np.empty((2, n))
+        for joint in range(n):
+            here = joints == joint
+            rows = [self.t[:-1], self.t[1:], (self.t[some] + steps[some] * roots)[:, here].ravel()]
+            each = [ends[0, :, joint], ends[1, :, joint], inner[:, here].ravel()]
+            times, found = np.concatenate(rows), np.concatenate(each)
+            both = [int(np.argmin(found)), int(np.argmax(found))]
+            t[:, joint], values[:, joint] = times[both], found[both]
+        return t, values
+
+    def travelled(self, t: Array) -> Array:
+        """Return the way that each joint has made by times (K,), (K, n) [rad or m]: ∫ |q̇| dt.
+
+        Exact: from one turn, where q̇ = 0, to the next.
+        """
+        k, s = self._place(t)
+        return self._before[k] + self._way(k, s)
+
+    @cached_property
+    def _before(self) -> Array:
+        """The way made by the beginning of each interval, and in all, (N, n)."""
+        every = np.arange(len(self.t) - 1)
+        whole = self._way(every, np.ones(len(every)))
+        return np.vstack([np.zeros(whole.shape[1]), np.cumsum(whole, axis=0)])
+
+    def _way(self, k: npt.NDArray[np.intp], s: Array) -> Array:
+        """Return the ways from the beginning of intervals k (K,) up to s (K,), (K, n)."""
+        edge = np.broadcast_to(s[:, None, None], (len(k), 1, len(self.joint_names)))
+        stops = [np.zeros_like(edge), np.minimum(self._turns[k], edge), edge]
+        passed = evaluated(self._pieces(0)[:, k, None], np.concatenate(stops, axis=1))
+        return np.asarray(np.abs(np.diff(passed, axis=1)).sum(axis=1))
+
+    @cached_property
+    def _turns(self) -> Array:
+        """Where in each interval joints turn round, sorted, (N - 1, m, n); 0 for nowhere."""
+        pieces = self._pieces(1)
+        turns = np.zeros((len(pieces) - 1, *pieces.shape[1:]))
+        zero = np.zeros(pieces.shape[2])
+        some, joints = np.nonzero(may_pass(pieces, zero, zero))
+        turns[:, some, joints] = inner_roots(pieces[:, some, joints])
+        return np.sort(turns.transpose(1, 0, 2), axis=1)
 
     def __call__(self, t: npt.ArrayLike, order: int = 0) -> Array:
-        """Return q (`order` 0), q̇ (1), q̈ (2) at `t`.
+        """Return q (`order` 0), q̇ (1), q̈ (2) or the jerk (3) at `t`.
 
         Parameters
         ----------
         t : float or (K,)
             Times within the motion [s].
-        order : {0, 1, 2}
-            Derivative with respect to time. q̈ is that of the cubic: it jumps at the samples.
+        order : {0, 1, 2, 3}
+            Derivative with respect to time. The last one or two of a cubic, and the jerk of a
+            quintic, jump at the samples.
 
         Returns
         -------
@@ -177,70 +229,67 @@ class Trajectory:
         Raises
         ------
         ValueError
-            A time is outside the motion, or `order` is not 0, 1 or 2.
+            A time is outside the motion, or `order` is not 0, 1, 2 or 3.
         """
         times = np.asarray(t, dtype=np.float64)
-        if order not in _HERMITE:
-            raise ValueError(f"order is {order}, expected 0, 1 or 2")
+        pieces = self._pieces(order)
         if not (np.all(times >= self.t[0]) and np.all(times <= self.t[-1])):
             raise ValueError(
                 f"time {times.min()}..{times.max()} s is outside the motion, "
                 f"{self.t[0]}..{self.t[-1]} s"
             )
-        k = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
-        h = self.t[k + 1] - self.t[k]
-        s = (times - self.t[k]) / h
-        start, end, start_slope, end_slope = _HERMITE[order](s, h)
-        return np.asarray(
-            start[..., None] * self.q[k]
-            + end[..., None] * self.q[k + 1]
-            + start_slope[..., None] * self.qd[k]
-            + end_slope[..., None] * self.qd[k + 1]
+        k, s = self._place(times)
+        return evaluated(pieces[:, k], s[..., None])
+
+    def sample(self, rate: float) -> "Trajectory":
+        """Return the motion at `rate` samples per second [1/s], the last one at its end.
+
+        Raises
+        ------
+        ValueError
+            The rate is not positive.
+        """
+        if not (np.isfinite(rate) and rate > 0.0):
+            raise ValueError(f"rate is {rate} samples per second, expected a positive number")
+        count = int(np.ceil(self.duration * rate - 1e-9))
+        t = np.minimum(self.t[0] + np.arange(count + 1) / rate, self.t[-1])
+        return Trajectory(t, self(t), self(t, 1), self.joint_names, self(t, 2))
+
+    def _place(self, t: Array) -> tuple[npt.NDArray[np.intp], Array]:
+        """Return the interval of each time, and how far into it the time is, 0 to 1."""
+        k = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
+        return k, (t - self.t[k]) / (self.t[k + 1] - self.t[k])
+
+    def _pieces(self, order: int) -> Array:
+        """Return the coefficients of 1, s, s² … of a derivative in each interval, (m, N - 1, n).
+
+        s goes from 0 to 1 in each.
+        """
+        if order not in (0, 1, 2, 3):
+            raise ValueError(f"order is {order}, expected 0, 1, 2 or 3")
+        while len(self._derivatives) <= order:
+            steps = np.diff(self.t)[:, None]
+            self._derivatives.append(differentiated(self._derivatives[-1]) / steps)
+        return self._derivatives[order]
+
+    @cached_property
+    def _derivatives(self) -> list[Array]:
+        """The pieces of q, and of its derivatives as far as they were asked for."""
+        h, start, rate = (
+            np.diff(self.t)[:, None],
+            self.q[:-1],
+            np.diff(self.t)[:, None] * self.qd[:-1],
         )
-
-
-def _stationary(motion: Trajectory, order: int) -> Array:
-    """Return where in [0, 1] each cubic may have an extreme, (N - 1, 2 + k, n): ends, and inside.
-
-    With q(s) = q0 + a s + b s² + c s³, the zeros of a + 2bs + 3cs² for q and of b + 3cs for q̇; q̈ is
-    linear.
-    """
-    if order not in _HERMITE:
-        raise ValueError(f"order is {order}, expected 0, 1 or 2")
-    h, rise = np.diff(motion.t)[:, None], np.diff(motion.q, axis=0)
-    a, z = h * motion.qd[:-1], h * motion.qd[1:]
-    b, c = 3.0 * rise - 2.0 * a - z, a + z - 2.0 * rise
-    ends = [np.zeros_like(rise), np.ones_like(rise)]
-    inner: list[Array] = []
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        if order == 1:
-            inner = [-b / (3.0 * c)]
-        elif order == 0:
-            # Without cancellation, also where the cubic is nearly a parabola.
-            u = -(b + np.copysign(np.sqrt(np.maximum(b * b - 3.0 * a * c, 0.0)), b))
-            inner = [u / (3.0 * c), a / u]
-    # NaN and what is outside stand at an end, which is looked at anyway.
-    inside = [np.where((s > 0.0) & (s < 1.0), s, 0.0) for s in inner]
-    return np.stack([*ends, *inside], axis=1)
-
-
-_Weights = tuple[Array, Array, Array, Array]
-
-
-def _value(s: Array, h: Array) -> _Weights:
-    rest = 1.0 - s
-    end = s * s * (3.0 - 2.0 * s)
-    return 1.0 - end, end, h * s * rest * rest, -h * s * s * rest
-
-
-def _slope(s: Array, h: Array) -> _Weights:
-    end = 6.0 * s * (1.0 - s) / h
-    return -end, end, (1.0 - s) * (1.0 - 3.0 * s), s * (3.0 * s - 2.0)
-
-
-def _curvature(s: Array, h: Array) -> _Weights:
-    end = (6.0 - 12.0 * s) / h**2
-    return -end, end, (6.0 * s - 4.0) / h, (6.0 * s - 2.0) / h
-
-
-_HERMITE = {0: _value, 1: _slope, 2: _curvature}
+        if self.qdd is None:
+            rise, gain = np.diff(self.q, axis=0) - rate, h * self.qd[1:] - rate
+            return [np.stack([start, rate, 3.0 * rise - gain, gain - 2.0 * rise])]
+        bend = 0.5 * h**2 * self.qdd[:-1]
+        rise = np.diff(self.q, axis=0) - rate - bend
+        gain = h * self.qd[1:] - rate - 2.0 * bend
+        surge = 0.5 * h**2 * self.qdd[1:] - bend
+        higher = (
+            10.0 * rise - 4.0 * gain + surge,
+            7.0 * gain - 15.0 * rise - 2.0 * surge,
+            6.0 * rise - 3.0 * gain + surge,
+        )
+        return [np.stack([start, rate, bend, *higher])]

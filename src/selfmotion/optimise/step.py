@@ -54,7 +54,9 @@ def best_step(gradient: Array, hessian: Array, at: Residuals, rows: Array, regio
         return Step(gradient, np.zeros(len(at.h)), 0.0, at.worst, at.worst > 1.0)
     reach = np.full(len(gradient), region)
     # A condition that no p within the region violates cannot matter.
-    near = at.equality | (at.h + region * np.abs(rows).sum(axis=1) > 0.0)
+    change = region * np.abs(rows).sum(axis=1)
+    slack = _SLACK * at.tolerance
+    near = np.where(at.equality, np.abs(at.h) + change > slack, at.h + change > 0.0)
     some = Residuals(at.h[near], at.tolerance[near], at.equality[near])
     h, tolerance, equality = some.h, some.tolerance, some.equality
     a = rows[near]

@@ -88,6 +88,12 @@ class Path(Saved, ABC, family="path"):
             )
         return self.evaluate(np.clip(times, 0.0, self.duration))
 
+    def __add__(self, other: "Path") -> "Path":
+        """Return this path and then the other one; see `Joined`."""
+        from selfmotion.path.joined import Joined
+
+        return Joined([self, other]) if isinstance(other, Path) else NotImplemented
+
     def pose(self, t: float) -> pin.SE3:
         """Return the tool's pose at time `t` [s]."""
         samples = self.samples(t)
@@ -118,6 +124,11 @@ def as_pose(pose: pin.SE3 | npt.ArrayLike) -> pin.SE3:
     if error > 1e-6 or np.linalg.det(rotation) < 0:
         raise PathError(f"pose: its rotation is not orthonormal and right-handed (by {error:.2g})")
     return pin.SE3(np.array(rotation), np.array(matrix[:3, 3]))
+
+
+# What is slower than this [m/s, rad/s] is at rest: waypoints and velocity functions come to rest
+# up to their own rounding.
+STILL = 1e-7
 
 
 class TimeLaw(Enum):

@@ -28,7 +28,7 @@ from selfmotion.robot import rebuild_robot
 from selfmotion.task import Damping, Relaxation
 
 # Raised with every change that older versions cannot read.
-FORMAT = 2
+FORMAT = 3
 
 
 class Archive(NamedTuple):
@@ -54,12 +54,8 @@ class Archive(NamedTuple):
             "certificate": dataclasses.asdict(self.certificate),
         }
         arrays = {
-            "t": self.trajectory.t,
-            "q": self.trajectory.q,
-            "qd": self.trajectory.qd,
-            "initial_t": self.initial_trajectory.t,
-            "initial_q": self.initial_trajectory.q,
-            "initial_qd": self.initial_trajectory.qd,
+            **_arrays(self.trajectory, ""),
+            **_arrays(self.initial_trajectory, "initial_"),
             "coefficients": self.coefficients,
             "history_x": np.array([iteration.x for iteration in history]),
         }
@@ -120,6 +116,8 @@ def _problem_to_dict(problem: Problem) -> dict[str, Any]:
             "tool": robot.tool,
             "locked": dict(robot.locked),
             "touching": [list(pair) for pair in robot.touching],
+            "acceleration_limit": robot.acceleration_limit.tolist(),
+            "jerk_limit": robot.jerk_limit.tolist(),
         },
         "path": problem.path.to_dict(),
         "task": problem.task.value,
@@ -130,6 +128,7 @@ def _problem_to_dict(problem: Problem) -> dict[str, Any]:
         "relaxations": [item.to_dict() for item in problem.relaxations],
         "damping": None if problem.damping is None else dataclasses.asdict(problem.damping),
         "collision": None if problem.collision is None else problem.collision.to_dict(),
+        "rest": problem.rest,
     }
 
 
@@ -147,7 +146,18 @@ def _problem_from_dict(values: Mapping[str, Any]) -> Problem:
         tuple(Relaxation(**item) for item in values["relaxations"]),
         None if damping is None else Damping(**damping),
         None if collision is None else restore(Constraint, collision),
+        values["rest"],
     )
+
+
+def _arrays(trajectory: Trajectory, prefix: str) -> dict[str, Array]:
+    named = {"t": trajectory.t, "q": trajectory.q, "qd": trajectory.qd, "qdd": trajectory.qdd}
+    return {prefix + name: array for name, array in named.items() if array is not None}
+
+
+def _trajectory(arrays: Mapping[str, Array], prefix: str, names: tuple[str, ...]) -> Trajectory:
+    t, q, qd = (arrays[prefix + name] for name in ("t", "q", "qd"))
+    return Trajectory(t, q, qd, names, arrays.get(prefix + "qdd"))
 
 
 def _without(value: Any, *names: str) -> dict[str, Any]:
@@ -200,10 +210,8 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archiv
     )
     return Archive(
         problem=_problem_from_dict(description["problem"]),
-        trajectory=Trajectory(arrays["t"], arrays["q"], arrays["qd"], names),
-        initial_trajectory=Trajectory(
-            arrays["initial_t"], arrays["initial_q"], arrays["initial_qd"], names
-        ),
+        trajectory=_trajectory(arrays, "", names),
+        initial_trajectory=_trajectory(arrays, "initial_", names),
         coefficients=arrays["coefficients"],
         report=Report(history=history, **report),
         certificate=_certificate_from_dict(description["certificate"]),

@@ -41,4 +41,6 @@ def sample_problem(
         start=start,
         null_motion=null_motion or PolynomialNullMotion(),
         costs=(JointVelocity(), InverseManipulability(mu)),
+        # The paper's arm moves when the tool does not yet.
+        rest=False,
     )

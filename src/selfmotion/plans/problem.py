@@ -10,19 +10,22 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, RedundancyError, StartError, read_only
-from selfmotion.certificate import Certificate, Requirement, Tolerance, arm_limits, certify
+from selfmotion.certificate import AtRest, Certificate, Requirement, Tolerance, arm_limits, certify
 from selfmotion.constraints import (
     BoundConstraint,
     Clearance,
     Constraint,
     Envelope,
+    JointAccelerationLimits,
+    JointJerkLimits,
     JointPositionLimits,
     JointVelocityLimits,
 )
 from selfmotion.costs import Cost, JointVelocity, OffPath
-from selfmotion.motion import NullMotion, PolynomialNullMotion, Trajectory
+from selfmotion.motion import NullMotion, PolynomialNullMotion, Trajectory, resting_window
 from selfmotion.path import Path
 from selfmotion.plans.relaxed_rows import check_relaxations
+from selfmotion.plans.rest import rest_orders
 from selfmotion.robot import RobotModel
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 
@@ -30,6 +33,8 @@ from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 NO_OVERLAP = Clearance(distance=0.0)
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
+# A null motion that was found by a search fades in this share of the duration.
+_FADE = 0.05
 # A path that is nowhere nearer than so many times the arm's reach is in other units.
 _FAR = 20.0
 
@@ -65,7 +70,8 @@ class Problem:
         Their integrals are added up. By default ∫ ½ q̇ᵀq̇ dt.
     constraints : sequence of Constraint
         What the motion must keep, each judged by the certificate. By default the URDF's limits of
-        joint position and velocity.
+        joint position and velocity, and those of acceleration and jerk that the arm's maker
+        publishes (`RobotModel.acceleration_limit`).
     relaxations : sequence of Relaxation
         Rows in which the tool may leave the path, by how much and when; the deviation is optimised
         along with the self-motion. By default none. A given start is on the path itself, and so
@@ -73,6 +79,10 @@ class Problem:
     collision : Clearance, optional
         How the arm keeps apart from itself where no constraint says it, and its URDF has bodies: by
         default its links must not overlap. None to leave that out; the verdict then says so.
+    rest : bool
+        Whether the arm is at rest where the path begins or ends at rest, which a controller asks
+        for, unless a constraint says how fast it is there: the null motion then vanishes, and its
+        derivative too where the tool does not accelerate either. The paper's does not.
     damping : Damping, optional
         Go through singular poses, and past the edge of the workspace, at the price of the path: by
         default the tool stays on the path, and there is no motion through such poses. Adds the
@@ -96,11 +106,17 @@ class Problem:
     null_motion: NullMotion = field(default_factory=PolynomialNullMotion)
     costs: Sequence[Cost] = field(default_factory=lambda: (JointVelocity(),))
     constraints: Sequence[Constraint] = field(
-        default_factory=lambda: (JointPositionLimits(), JointVelocityLimits())
+        default_factory=lambda: (
+            JointPositionLimits(),
+            JointVelocityLimits(),
+            JointAccelerationLimits(),
+            JointJerkLimits(),
+        )
     )
     relaxations: Sequence[Relaxation] = ()
     damping: Damping | None = None
     collision: Clearance | None = NO_OVERLAP
+    rest: bool = True
 
     def __post_init__(self) -> None:
         for name, kind in _KINDS.items():
@@ -123,6 +139,8 @@ class Problem:
             start = read_only(self.robot.configuration(self.start))
             object.__setattr__(self, "start", start)
             self._check_start(start)
+        for item in self.constraints:
+            item.check_start(self.robot, self.path, self.task, self.given_start)
 
     @property
     def given_start(self) -> Array | None:
@@ -161,8 +179,38 @@ class Problem:
         Those of the motion that the optimisation begins with. Without `own_collision` where it need
         not keep `apart` from itself.
         """
-        asked = self.all_constraints if apart else self.constraints
+        asked: Sequence[Constraint] = self.all_constraints if apart else self.constraints
+        if all(self.rests):
+            asked = [item.at_rest() for item in asked]
         return tuple(item.bind(self.robot, self.task, start, end) for item in asked)
+
+    @cached_property
+    def rest_orders(self) -> tuple[int, int]:
+        """How smoothly the arm comes to rest at the start and at the end; see `rest_orders`."""
+        if not self.rest:
+            return 0, 0
+        moves = [item.sets_velocity for item in self.constraints]
+        start, end = rest_orders(self.path, self.task)
+        return start * (not any(m[0] for m in moves)), end * (not any(m[1] for m in moves))
+
+    @property
+    def rests(self) -> tuple[bool, bool]:
+        """Whether the arm has to be at rest at the start and at the end."""
+        start, end = self.rest_orders
+        return start > 0, end > 0
+
+    def null_functions(self, t: Array) -> Array:
+        """Return φ at times `t` (S,), (S, K): those of `null_motion`, at rest where the arm is."""
+        duration = self.path.duration
+        window = resting_window(t, duration, self.rest_orders)
+        return self.null_motion.functions(t, duration) * window[:, None]
+
+    def brought_to_rest(self, t: Array, epsilon: Array) -> Array:
+        """Return a null motion (S, n) that fades to nothing where the arm has to be at rest."""
+        start, end = self.rests
+        s = t / self.path.duration
+        fade = _fade(s) if start else np.ones(len(t))
+        return epsilon * (fade * (_fade(1.0 - s) if end else 1.0))[:, None]
 
     @cached_property
     def damping_law(self) -> DampingLaw | None:
@@ -174,8 +222,16 @@ class Problem:
 
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:
-        """What the certificate has to judge besides the path: one of each constraint."""
+        """What the certificate has to judge besides the path: rest, and one of each constraint."""
+        return (*self._rest(*self.rests), *self._asked)
+
+    @cached_property
+    def _asked(self) -> tuple[Requirement, ...]:
         return tuple(item.requirement(self.robot) for item in self.all_constraints)
+
+    def _rest(self, start: bool, end: bool) -> tuple[Requirement, ...]:
+        # A damped motion is under way to the path wherever it is off it.
+        return (AtRest(start, end),) if (start or end) and self.damping is None else ()
 
     @cached_property
     def asked_envelope(self) -> Envelope:
@@ -192,14 +248,18 @@ class Problem:
     def certify(
         self, trajectory: Trajectory, tolerance: Tolerance | None = None, ending: str = ""
     ) -> Certificate:
-        """Return the certificate of a motion, by all that the problem asks for; see `certify`."""
+        """Return the certificate of a motion, by all that the problem asks for; see `certify`.
+
+        A motion with an `ending` stops before it can rest at the end of the path.
+        """
+        rests = self._rest(self.rests[0], self.rests[1] and not ending)
         return certify(
             self.robot,
             self.path,
             self.task,
             trajectory,
             tolerance,
-            self.requirements,
+            (*rests, *self._asked),
             relaxations=self.relaxations,
             damping=self.damping_law,
             ending=ending,
@@ -266,7 +326,7 @@ class Problem:
         for item in self.constraints:
             item.check(self.robot, self.path, self.task)
         # Now, not when the motion is finished: without a requirement nothing judges it.
-        for item, found in zip(self.all_constraints, self.requirements, strict=True):
+        for item, found in zip(self.all_constraints, self._asked, strict=True):
             if not isinstance(found, Requirement):
                 raise ProblemError(
                     f"constraint {type(item).__name__}: requirement() returned {found!r}, expected "
@@ -302,6 +362,12 @@ _EXAMPLES = {
     "collision": "Clearance or None",
 }
 _SEQUENCES = {"costs": Cost, "constraints": Constraint, "relaxations": Relaxation}
+
+
+def _fade(s: Array) -> Array:
+    """Return a function of s (S,) that rises smoothly from 0 to 1 and stays there."""
+    u = np.minimum(s / _FADE, 1.0)
+    return np.asarray(u * u * (3.0 - 2.0 * u))
 
 
 def _sequence(items: Any, name: str, kind: type) -> tuple[Any, ...]:

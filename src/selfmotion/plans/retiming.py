@@ -1,7 +1,7 @@
 """The same joint path in the time that velocity and acceleration limits allow."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import reduce
 from operator import and_
 
@@ -28,6 +28,8 @@ _ROUNDING = 1e-9
 # Grid points of toppra, and samples of the new motion, per sample of the old one: the first that
 # keeps the plan's tolerance.
 _DENSITIES = (4, 8, 16)
+# Samples nearer to each other than this share of the window are one: their jerk would be rounding.
+_CLOSE = 0.1
 
 
 def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
@@ -102,9 +104,9 @@ def _positive(robot: RobotModel, limit: npt.ArrayLike, name: str) -> Array:
 
 
 def _retimed(plan: Plan, wanted: Sequence[Constraint], kept: Envelope, density: int) -> Plan:
-    t, sigma, rate = _pace(plan.trajectory, kept.speed, kept.acceleration, density)
-    q, qd = plan.trajectory(sigma), plan.trajectory(sigma, order=1) * rate[:, None]
-    trajectory = Trajectory(t, q, qd, plan.trajectory.joint_names)
+    pace = _slowed(_smoothed(_pace(plan.trajectory, kept, density), kept), plan.trajectory, kept)
+    t, sigma, rate = pace.t, pace.sigma, pace.rate
+    trajectory = pace.along(plan.trajectory)
     old = plan.problem
     # What asks for something of the end asks for it of the whole motion.
     asked = (item.on_part() if plan.report.ending else item for item in old.constraints)
@@ -127,10 +129,35 @@ def _moved(item: Relaxation, t: Array, sigma: Array) -> Relaxation:
     return replace(item, during=(first, last))
 
 
-def _pace(
-    motion: Trajectory, velocity: Array, acceleration: Array, density: int
-) -> tuple[Array, Array, Array]:
-    """Return new times, and σ and dσ/dt there."""
+@dataclass(frozen=True, eq=False)
+class _Pace:
+    """New times t, and the old time σ, dσ/dt and d²σ/dt² there; None for the last where it jumps.
+
+    All (K,).
+    """
+
+    t: Array
+    sigma: Array
+    rate: Array
+    bend: Array | None = None
+
+    def along(self, motion: Trajectory) -> Trajectory:
+        """Return a motion at this pace."""
+        at = self.sigma + motion.t[0]
+        q, qd, rate = motion(at), motion(at, 1), self.rate[:, None]
+        faster = None
+        if self.bend is not None:
+            faster = motion(at, 2) * rate**2 + qd * self.bend[:, None]
+        return Trajectory(self.t, q, qd * rate, motion.joint_names, faster)
+
+    def slower(self, factor: float) -> "_Pace":
+        """Return the same, taking `factor` times as long."""
+        bend = None if self.bend is None else self.bend / factor**2
+        return _Pace(factor * self.t, self.sigma, self.rate / factor, bend)
+
+
+def _pace(motion: Trajectory, kept: Envelope, density: int) -> _Pace:
+    """Return the fastest pace by limits of speed and acceleration at the grid points of toppra."""
     count = density * (len(motion.t) - 1)
     sigma = np.interp(np.arange(count + 1) / density, np.arange(len(motion.t)), motion.t)
     q, qd = motion(sigma), motion(sigma, order=1)
@@ -139,16 +166,48 @@ def _pace(
     speed = np.linalg.norm(qd, axis=1)
     stretch = np.hypot(speed, _STILL * max(float(speed.max()), np.finfo(float).tiny))
     length = np.append(0.0, np.cumsum(0.5 * (stretch[1:] + stretch[:-1]) * np.diff(sigma)))
-    rates = _toppra(length, q, velocity, acceleration)
+    rates = _toppra(length, q, kept.speed, kept.acceleration)
     # Between grid points the squared rate is linear in the length, so that the times are exact.
     t = np.append(0.0, np.cumsum(2.0 * np.diff(length) / (rates[:-1] + rates[1:])))
-    rates = rates / stretch
-    # toppra keeps the limits at its grid points; the cubics pass them by about a per cent between.
-    trial = Trajectory(t, q, qd * rates[:, None], motion.joint_names)
-    faster = float((np.abs(trial.extremes(1)[1]) / velocity).max())
-    harder = float((np.abs(trial.extremes(2)[1]) / acceleration).max())
-    slower = max(1.0, faster, harder**0.5) * (1.0 + _ROUNDING)
-    return slower * t, sigma - sigma[0], rates / slower
+    return _Pace(t, sigma - sigma[0], rates / stretch)
+
+
+def _smoothed(pace: _Pace, kept: Envelope) -> _Pace:
+    """Return the mean of a pace over a window in time, so that its acceleration jumps no more.
+
+    From one limit of the acceleration to the other within the window, the jerk keeps its limit.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    limited = np.isfinite(kept.jerk) & np.isfinite(kept.acceleration)
+    if not limited.any():
+        return pace
+    window = float((2.0 * kept.acceleration[limited] / kept.jerk[limited]).max())
+    # Before its start and after its end the motion rests.
+    t = np.concatenate([[-window], pace.t, [pace.t[-1] + window]])
+    sigma = np.concatenate([pace.sigma[:1], pace.sigma, pace.sigma[-1:]])
+    rate = np.concatenate([[0.0], pace.rate, [0.0]])
+    spline = CubicHermiteSpline(t, sigma, rate)
+    way = spline.antiderivative()
+    new = np.union1d(pace.t, pace.t + window)
+    new = new[np.append(True, np.diff(new) > _CLOSE * window)]
+    new[-1] = pace.t[-1] + window
+    before = new - window
+    mean = np.clip((way(new) - way(before)) / window, 0.0, pace.sigma[-1])
+    mean[0], mean[-1] = 0.0, pace.sigma[-1]
+    speed = np.maximum((spline(new) - spline(before)) / window, 0.0)
+    return _Pace(new, mean, speed, (spline(new, 1) - spline(before, 1)) / window)
+
+
+def _slowed(pace: _Pace, motion: Trajectory, kept: Envelope) -> _Pace:
+    """Return a pace so much slower that limits are kept between its samples as well."""
+    trial = pace.along(motion)
+    factors = [1.0]
+    for order, limit in ((1, kept.speed), (2, kept.acceleration), (3, kept.jerk)):
+        if order < 3 or pace.bend is not None:
+            share = float((np.abs(trial.extremes(order)[1]) / limit).max())
+            factors.append(share ** (1.0 / order))
+    return pace.slower(max(factors) * (1.0 + _ROUNDING))
 
 
 def _toppra(length: Array, q: Array, velocity: Array, acceleration: Array) -> Array:
@@ -163,12 +222,15 @@ def _toppra(length: Array, q: Array, velocity: Array, acceleration: Array) -> Ar
             "retiming needs the package toppra: pip install 'selfmotion[retime]'"
         ) from None
     logging.getLogger("toppra").setLevel(logging.ERROR)
+    # The length as one more joint: where the motion rests, nothing else bounds its pace.
+    velocity = np.append(velocity, np.linalg.norm(velocity))
+    acceleration = np.append(acceleration, np.linalg.norm(acceleration))
     solver = algorithm.TOPPRA(
         [
             constraint.JointVelocityConstraint(np.stack([-velocity, velocity], axis=1)),
             constraint.JointAccelerationConstraint(np.stack([-acceleration, acceleration], axis=1)),
         ],
-        toppra.SplineInterpolator(length, q),
+        toppra.SplineInterpolator(length, np.column_stack([q, length])),
         gridpoints=length,
     )
     _, rates, _ = solver.compute_parameterization(0.0, 0.0)

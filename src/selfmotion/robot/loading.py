@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import RobotError, read_only
+from selfmotion.basics import Array, RobotError, read_only
 from selfmotion.robot.model import RobotModel, locked_configuration
 from selfmotion.robot.urdf import Urdf, parse_urdf, read_urdf
 
@@ -107,7 +107,10 @@ def load_robot(
     if isinstance(robot, str) and robot in NAMED_ARMS:
         arm = NAMED_ARMS[robot]
         named = build_robot(_read_named(arm), tool or arm.tool, lock or {})
-        return dataclasses.replace(named, touching=arm.touching)
+        acceleration, jerk = (_published(robot, kind, named) for kind in ("acceleration", "jerk"))
+        return dataclasses.replace(
+            named, touching=arm.touching, acceleration_limit=acceleration, jerk_limit=jerk
+        )
     path = Path(robot)
     if path.suffix != ".urdf":
         raise RobotError(
@@ -168,6 +171,8 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
         model=model,
         tool_id=model.getFrameId(tool, pin.FrameType.BODY),
         urdf=urdf,
+        acceleration_limit=read_only(np.full(len(names), np.inf)),
+        jerk_limit=read_only(np.full(len(names), np.inf)),
     )
 
 
@@ -179,6 +184,8 @@ def rebuild_robot(
     tool: str,
     locked: Mapping[str, float],
     touching: Sequence[Sequence[str]],
+    acceleration_limit: Sequence[float],
+    jerk_limit: Sequence[float],
 ) -> RobotModel:
     """Build an arm from what a saved plan carries of it."""
     urdf = parse_urdf(text, source=source, package_dirs=tuple(package_dirs))
@@ -186,7 +193,21 @@ def rebuild_robot(
     for name in continuous:
         urdf.joints[name] = dataclasses.replace(urdf.joints[name], kind="continuous")
     pairs = tuple((first, second) for first, second in touching)
-    return dataclasses.replace(build_robot(urdf, tool, locked), touching=pairs)
+    return dataclasses.replace(
+        build_robot(urdf, tool, locked),
+        touching=pairs,
+        acceleration_limit=read_only(acceleration_limit),
+        jerk_limit=read_only(jerk_limit),
+    )
+
+
+def _published(name: str, kind: str, robot: RobotModel) -> Array:
+    """Return the limits that the maker of a named arm publishes, (n,); inf where there is none."""
+    import tomllib
+
+    known = tomllib.loads((Path(__file__).parent / "limits.toml").read_text("utf-8"))
+    limits = known.get(name, {}).get(kind, {})
+    return read_only([limits.get(joint, np.inf) for joint in robot.joint_names])
 
 
 def _read_named(arm: NamedArm) -> Urdf:

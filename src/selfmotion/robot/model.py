@@ -44,6 +44,9 @@ class RobotModel:
         What it was made from.
     touching : tuple of (str, str)
         Pairs of links whose bodies overlap as they are made, which no check looks at.
+    acceleration_limit, jerk_limit : (n,)
+        Limits that the maker of a named arm publishes [rad/s² or m/s², rad/s³ or m/s³]; inf where
+        none are known.
     """
 
     name: str
@@ -56,6 +59,8 @@ class RobotModel:
     model: Any = field(repr=False)
     tool_id: int = field(repr=False)
     urdf: Urdf = field(repr=False)
+    acceleration_limit: Array
+    jerk_limit: Array
     touching: tuple[tuple[str, str], ...] = ()
     _per_thread: threading.local = field(default_factory=threading.local, repr=False)
 
@@ -139,11 +144,11 @@ class RobotModel:
         here = self._kinematics
         return here.at(q), here.rotation.copy(), here.translation.copy()
 
-    def task_jacobian(self, q: npt.ArrayLike, task: Task) -> Array:
+    def task_jacobian(self, q: npt.ArrayLike, task: Task | str) -> Array:
         """Return the prescribed rows of the Jacobian at `q`, (m, n)."""
         here = self._kinematics
         jacobian = here.at(self.configuration(q))
-        return task.select(jacobian, here.rotation)
+        return Task.of(task).select(jacobian, here.rotation)
 
     def redundancy(self, task: Task | str) -> int:
         """Return n - rank J of the task at generic configurations (0: no self-motion)."""

@@ -1,0 +1,129 @@
+"""Tool motions one after the other, and waiting in between."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from selfmotion.basics import Array, PathError, read_only, restore
+from selfmotion.path.base import STILL, Path, PathSamples, as_pose, check_duration
+
+# Pieces may end this far from where the next one begins [m, rad].
+_GAP = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Dwell(Path, kind="dwell"):
+    """The tool stays where it is.
+
+    Parameters
+    ----------
+    at : SE3 or (4, 4)
+        Where [m], world axes.
+    duration : float
+        How long [s].
+    """
+
+    at: pin.SE3
+    duration: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at", as_pose(self.at))
+        object.__setattr__(self, "duration", check_duration(self.duration))
+
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
+        count = len(t)
+        return PathSamples(
+            t,
+            np.tile(self.at.translation, (count, 1)),
+            np.tile(self.at.rotation, (count, 1, 1)),
+            np.zeros((count, 6)),
+        )
+
+
+class Joined(Path, kind="joined"):
+    """Paths one after the other; ``first + second`` makes one.
+
+    Parameters
+    ----------
+    pieces : sequence of Path
+        Each begins where the one before it ends, in pose and speed.
+
+    Raises
+    ------
+    PathError
+        There is no piece, or the tool would jump from one to the next; says by how much.
+    """
+
+    def __init__(self, pieces: Sequence[Path]) -> None:
+        flat = [
+            part for one in pieces for part in (one.pieces if isinstance(one, Joined) else [one])
+        ]
+        if not flat:
+            raise PathError("joined path: has no pieces, expected at least one")
+        self.pieces: tuple[Path, ...] = tuple(flat)
+        self._ends = np.cumsum([piece.duration for piece in flat])
+        self.duration = float(self._ends[-1])
+        for number, (one, other) in enumerate(itertools.pairwise(flat), 1):
+            _check_joint(one, other, number)
+
+    @property
+    def knots(self) -> Array:
+        """See `Path.knots`: those of the pieces, and where they meet."""
+        return self._all([piece.knots for piece in self.pieces])
+
+    @property
+    def marks(self) -> Array:
+        """See `Path.marks`."""
+        return self._all([piece.marks for piece in self.pieces])
+
+    def _all(self, times: list[Array]) -> Array:
+        starts = self._ends - [piece.duration for piece in self.pieces]
+        inner = [part[:-1] + start for part, start in zip(times, starts, strict=True)]
+        return read_only([*np.concatenate(inner), self.duration])
+
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
+        which = np.minimum(np.searchsorted(self._ends, t, side="right"), len(self.pieces) - 1)
+        translation, rotation = np.empty((len(t), 3)), np.empty((len(t), 3, 3))
+        twist = np.empty((len(t), 6))
+        for number, piece in enumerate(self.pieces):
+            here = which == number
+            if not np.any(here):
+                continue
+            own = t[here] - (self._ends[number] - piece.duration)
+            part = piece.samples(np.clip(own, 0.0, piece.duration))
+            translation[here], rotation[here] = part.translation, part.rotation
+            twist[here] = part.twist
+        return PathSamples(t, translation, rotation, twist)
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Saved.to_dict`."""
+        return {"kind": self.kind, "pieces": [piece.to_dict() for piece in self.pieces]}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Joined":
+        """See `Saved.from_dict`."""
+        return cls([restore(Path, piece) for piece in values["pieces"]])
+
+
+def _check_joint(one: Path, other: Path, number: int) -> None:
+    end, start = one.pose(one.duration), other.pose(0.0)
+    apart = float(np.linalg.norm(start.translation - end.translation))
+    turned = float(np.linalg.norm(pin.log3(end.rotation.T @ start.rotation)))
+    where = f"joined path: piece {number + 1} begins"
+    if apart > _GAP or turned > _GAP:
+        raise PathError(
+            f"{where} {apart:.3g} m and {turned:.3g} rad from where piece {number} ends; put a "
+            f"Line between them"
+        )
+    jump = float(np.abs(other.twist(0.0) - one.twist(one.duration)).max())
+    if jump > STILL:
+        raise PathError(
+            f"{where} {jump:.3g} m/s or rad/s faster or slower than piece {number} ends; let both "
+            f"rest there (time_law='minimum_jerk', Ramped)"
+        )
