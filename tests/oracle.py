@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
-from own_kinematics import Arm, cubic
+from own_kinematics import Arm, along
 from selfmotion.basics import Array
 from selfmotion.certificate import KeepsApart
 from solids import solid_of_obstacle
@@ -124,9 +124,12 @@ class Judge:
             match item:
                 case sm.JointPositionLimits():
                     limit(0, *item.limits(problem.robot))
-                case sm.JointVelocityLimits() | sm.JointAccelerationLimits():
-                    most = item.of(problem.robot)
-                    limit(1 if isinstance(item, sm.JointVelocityLimits) else 2, -most, most)
+                case sm.JointVelocityLimits():
+                    limit(1, -item.of(problem.robot), item.of(problem.robot))
+                case sm.JointAccelerationLimits():
+                    limit(2, -item.of(problem.robot), item.of(problem.robot))
+                case sm.JointJerkLimits():
+                    limit(3, -item.of(problem.robot), item.of(problem.robot))
                 case sm.EndConfiguration():
                     ends.append((0, np.asarray(item.q)))
                 case sm.EndVelocity():
@@ -147,9 +150,9 @@ class Judge:
         """Return what a motion takes."""
         names = list(motion.joint_names)
         order = [names.index(name) for name in self.robot.joint_names]
-        motion = sm.Trajectory(
-            motion.t, motion.q[:, order], motion.qd[:, order], self.robot.joint_names
-        )
+        tables = [motion.q, motion.qd, motion.qdd]
+        q, qd, qdd = (None if table is None else table[:, order] for table in tables)
+        motion = sm.Trajectory(motion.t, q, qd, self.robot.joint_names, qdd)
         late = abs(motion.duration - self.path.duration) / self.path.duration
         verdict = Verdict({"duration": 0.0 if late <= SHARE else 1.0 + late}) | self._ends(motion)
         intervals = self._intervals(motion)
@@ -169,7 +172,7 @@ class Judge:
         shares = np.arange(count + 1) / count
         t = (intervals[:, :1] + np.diff(intervals, axis=1) * shares).clip(max=intervals[:, 1:])
         t = t.ravel()
-        q = cubic(motion, t, 0)
+        q = along(motion, t, 0)
         known: dict[str, Any] = {}
         errors = self._errors(t, q, known)
         largest = errors.max(axis=0)
@@ -242,7 +245,7 @@ class Judge:
         robot, shares = self.robot, {}
         own = {0: (robot.lower, robot.upper), 1: (-robot.velocity_limit, robot.velocity_limit)}
         for order, (lower, upper) in (own | self.limits).items():
-            x = cubic(motion, t, order)
+            x = along(motion, t, order)
             low, high = x.min(axis=0), x.max(axis=0)
             if order == 0:
                 shares["limits"] = 1.0 + float(max((lower - low).max(), (high - upper).max()))

@@ -71,16 +71,30 @@ class Arm:
         return turn @ (np.eye(3) + sine * across + versine * (across @ across)), at
 
 
-def cubic(motion: sm.Trajectory, t: Array, order: int) -> Array:
-    """Return q, q̇ or q̈ at times t (K,) of the cubics through the samples, by their powers."""
+def along(motion: sm.Trajectory, t: Array, order: int) -> Array:
+    """Return q (order 0) or a derivative at times t (K,), (K, n).
+
+    Of the polynomials that meet what is known at both ends of an interval, found by solving for
+    their powers: cubics, or quintics where accelerations are known.
+    """
+    given = [motion.q, motion.qd] if motion.qdd is None else [motion.q, motion.qd, motion.qdd]
     k = np.minimum(np.searchsorted(motion.t, t, side="right") - 1, len(motion.t) - 2)
-    h, x = np.diff(motion.t)[k][:, None], (t - motion.t[k])[:, None]
-    first, slope = motion.q[k], motion.qd[k]
-    rise = (motion.q[k + 1] - first) / h
-    bend = (motion.qd[k + 1] + slope - 2.0 * rise) / h
-    curve = (rise - slope) / h - bend
-    if order == 0:
-        return np.asarray(first + x * (slope + x * (curve + x * bend / h)))
-    if order == 1:
-        return np.asarray(slope + x * (2.0 * curve + 3.0 * x * bend / h))
-    return np.asarray(2.0 * curve + 6.0 * x * bend / h)
+    h, s = np.diff(motion.t)[:, None], ((t - motion.t[k]) / np.diff(motion.t)[k])[:, None]
+    powers = np.arange(2 * len(given))
+    rows = [
+        _powers(np.array([[end]]), powers, j)[0] for end in (0.0, 1.0) for j in range(len(given))
+    ]
+    # In units of the interval.
+    known = [x[rows_] * h**j for rows_ in (slice(-1), slice(1, None)) for j, x in enumerate(given)]
+    coefficients = np.linalg.solve(np.array(rows), np.stack(known).reshape(len(powers), -1))
+    coefficients = coefficients.reshape(len(powers), *known[0].shape)
+    values = np.einsum("kp,pkn->kn", _powers(s, powers, order), coefficients[:, k])
+    return np.asarray(values / h[k] ** order)
+
+
+def _powers(s: Array, powers: Array, order: int) -> Array:
+    """Return the derivatives of s^p for s (K, 1), (K, P)."""
+    factor = np.ones(len(powers))
+    for j in range(order):
+        factor = factor * (powers - j)
+    return np.asarray(factor * s ** np.maximum(powers - order, 0))

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 import selfmotion as sm
 from oracle import Judge
-from own_kinematics import Arm, cubic
+from own_kinematics import Arm, along
 from selfmotion.basics import Array
 
 # Half of what a critical quantity may lie beside its limit, as a share.
@@ -32,7 +32,7 @@ class Followed(sm.Path):
         return self.motion.t
 
     def evaluate(self, t: Array) -> sm.PathSamples:
-        turn, at = self.arm.place(self.arm.tool, cubic(self.motion, t, 0))
+        turn, at = self.arm.place(self.arm.tool, along(self.motion, t, 0))
         return sm.PathSamples(t, at, turn, np.zeros((len(t), 6)))
 
 
@@ -133,7 +133,7 @@ def _plate(name: str, known: Arm, motion: sm.Trajectory, rng: np.random.Generato
     link, solid = known.solids[rng.integers(len(known.solids))]
     t = rng.uniform(0.0, motion.t[-1]) + np.array([0.0, 1e-4])
     t -= max(0.0, t[-1] - motion.t[-1])
-    _, at = solid.placed(known.place(link, cubic(motion, t, 0)))
+    _, at = solid.placed(known.place(link, along(motion, t, 0)))
     way = at[1] - at[0]
     normal = way / max(float(np.linalg.norm(way)), 1e-12)
     if np.linalg.norm(way) < 1e-9:  # a body that a joint turns about its own middle
@@ -159,7 +159,7 @@ def near_limits(number: int, folder: Path) -> Scene:
     fine = np.concatenate(
         [np.linspace(a, b, 1001) for a, b in zip(motion.t[:-1], motion.t[1:], strict=True)]
     )
-    x = [cubic(motion, fine, order) for order in range(3)]
+    x = [along(motion, fine, order) for order in range(3)]
     # Each joint has its own share, so that one alone decides.
     shares = 1.0 + rng.uniform(-NEAR, NEAR) + rng.uniform(0.0, NEAR, joints)
     middle, half = 0.5 * (x[0].max(axis=0) + x[0].min(axis=0)), 0.5 * np.ptp(x[0], axis=0)

@@ -13,7 +13,7 @@ import pytest
 import selfmotion as sm
 from conftest import PANDA_HOME, robot_named
 from oracle import Judge
-from own_kinematics import Arm, cubic
+from own_kinematics import Arm, along
 from scenes import Scene, among_plates, coarse, near_limits, seams
 from selfmotion.certificate import check as check_module
 from selfmotion.certificate import path_error
@@ -43,7 +43,7 @@ def test_the_judges_kinematics_are_pinocchios(name: str) -> None:
 def test_the_judges_cubics_are_the_trajectorys(order: int) -> None:
     motion = coarse(np.random.default_rng(1), 4, 1.0)
     t = np.sort(np.random.default_rng(2).uniform(0.0, motion.t[-1], 500))
-    np.testing.assert_allclose(cubic(motion, t, order), motion(t, order), atol=1e-11)
+    np.testing.assert_allclose(along(motion, t, order), motion(t, order), atol=1e-11)
 
 
 # Balls are solids whose distances both know exactly; GJK ends at a relative 1e-6.
@@ -52,7 +52,7 @@ def test_the_judges_distances_are_coals(number: int, tmp_path: Path) -> None:
     scene = among_plates(number, tmp_path)
     (obstacles, pairs, wanted) = scene.judge.bodies[0]
     t = np.linspace(0.0, scene.motion.duration, 300)
-    q = cubic(scene.motion, t, 0)
+    q = along(scene.motion, t, 0)
     known = scene.requirements[0].model.worst(q).value
     share = scene.judge._apart(q, {}, obstacles, pairs, wanted).shares["apart"]
     found = wanted - (share - 1.0) * max(wanted, 1e-3)

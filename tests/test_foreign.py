@@ -46,11 +46,12 @@ def invoke(*arguments: str | Path) -> tuple[int, str]:
 def test_a_motion_from_a_table(
     plan: sm.Plan, seam: Path, tmp_path: Path, order: int, degrees: bool
 ) -> None:
-    """Joints in any order, degrees by flag, with velocities."""
+    """Joints in any order, degrees by flag, with velocities and accelerations."""
     motion, scale = plan.trajectory, 180.0 / np.pi if degrees else 1.0
-    names = motion.joint_names[::order]
-    table = np.column_stack([motion.t, scale * motion.q[:, ::order], scale * motion.qd[:, ::order]])
-    header = ["t", *names, *(f"{name}_velocity" for name in names)]
+    names, kinds = motion.joint_names[::order], ("", "_velocity", "_acceleration")
+    tables = [scale * motion(motion.t, k)[:, ::order] for k in range(3)]
+    table = np.column_stack([motion.t, *tables])
+    header = ["t", *(name + kind for kind in kinds for name in names)]
     write_csv(tmp_path / "motion.csv", header, table)
     asked = [tmp_path / "motion.csv", "--robot", "panda", "--path", seam]
     code, text = invoke(*asked, *(["--degrees"] if degrees else []), "--json")

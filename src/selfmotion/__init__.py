@@ -86,6 +86,7 @@ from selfmotion.motion import (
     BSplineNullMotion,
     NullMotion,
     PolynomialNullMotion,
+    RefinedNullMotion,
     Trajectory,
 )
 from selfmotion.optimise import (
@@ -213,6 +214,7 @@ __all__ = [
     "QuasiNewton",
     "Ramped",
     "RedundancyError",
+    "RefinedNullMotion",
     "Relaxation",
     "RenderError",
     "Report",

@@ -36,6 +36,9 @@ def show(plan: Plan, console: Console) -> None:
         f"gradient;\n{report.jacobian_evaluations} Jacobians, {report.steps} steps, "
         f"{report.seconds:.2f} s\n{report.status.value}: {report.message}"
     )
+    if report.remaining is not None and report.cost:
+        share = 100.0 * report.remaining / abs(report.cost)
+        console.print(f"any other null motion could save about {share:.2g} % (estimate)")
     if report.active:
         console.print(_prices(report))
     if report.gap is not None:

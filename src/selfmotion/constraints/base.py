@@ -78,6 +78,10 @@ class Constraint(Saved, ABC, family="constraint"):
     def requirement(self, robot: RobotModel) -> Requirement:
         """Return what the certificate judges; ProblemError where it misfits the arm."""
 
+    def applies(self, robot: RobotModel) -> bool:
+        """Return whether it asks anything of an arm: not where it keeps limits nobody knows."""
+        return True
+
     def check(self, robot: RobotModel, path: Path, task: Task) -> None:
         """Raise ProblemError where it does not fit an arm, a path or a task."""
 

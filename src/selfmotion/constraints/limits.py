@@ -145,6 +145,10 @@ class JointAccelerationLimits(Constraint):
         """See `Constraint.envelope`."""
         return Envelope.of_limits(self.requirement(robot))
 
+    def applies(self, robot: RobotModel) -> bool:
+        """See `Constraint.applies`."""
+        return bool(np.isfinite(self.of(robot)).any())
+
     def of(self, robot: RobotModel) -> Array:
         """Return the limits for an arm, (n,) [rad/s² or m/s²]."""
         if self.limit is None:
@@ -180,6 +184,10 @@ class JointJerkLimits(Constraint):
     def envelope(self, robot: RobotModel) -> Envelope:
         """See `Constraint.envelope`."""
         return Envelope.of_limits(self.requirement(robot))
+
+    def applies(self, robot: RobotModel) -> bool:
+        """See `Constraint.applies`."""
+        return bool(np.isfinite(self.of(robot)).any())
 
     def of(self, robot: RobotModel) -> Array:
         """Return the limits for an arm, (n,) [rad/s³ or m/s³]."""

@@ -3,11 +3,13 @@
 from selfmotion.engine.counts import Counts
 from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.objective import Evaluation, Objective
+from selfmotion.engine.remaining import INTERVALS, Remaining
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart
 from selfmotion.engine.still import MOST_HALVINGS, Guide, StillMotion, settled_still_motion
 
 __all__ = [
+    "INTERVALS",
     "MOST_HALVINGS",
     "Counts",
     "Deviation",
@@ -16,6 +18,7 @@ __all__ = [
     "FreeStart",
     "Guide",
     "Objective",
+    "Remaining",
     "Rollout",
     "StillMotion",
     "settled_still_motion",

@@ -15,7 +15,7 @@ from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart, Start
 from selfmotion.engine.still import StillMotion
-from selfmotion.motion import Grid, NullMotionTable, Trajectory
+from selfmotion.motion import Grid, NullMotion, NullMotionTable, Trajectory
 from selfmotion.optimise import Residuals
 from selfmotion.path import PathSamples
 from selfmotion.plans import Problem
@@ -100,6 +100,8 @@ class Objective:
         free: bool = False,
         constraints: Sequence[BoundConstraint] = (),
         counts: Counts | None = None,
+        null_motion: NullMotion | None = None,
+        around: Array | None = None,
     ) -> "Objective":
         """Return the objective of a problem around its motion at x = 0.
 
@@ -115,15 +117,22 @@ class Objective:
         constraints : sequence of BoundConstraint
             Those that count.
         counts : Counts, optional
+        null_motion : NullMotion, optional
+            By default that of the problem.
+        around : (S, n), optional
+            The null motion of x = 0; by default that of `still`.
         """
         robot, task, grid = problem.robot, problem.task, grid or still.grid
         t = grid.stage_times
-        frame = still.frame(t)
+        motion = null_motion or problem.null_motion
+        frame = still.frame(t, motion.space)
+        if around is None and still.guide is not None:
+            around = problem.brought_to_rest(t, still.guide(t))
         table = NullMotionTable(
-            problem.null_functions(t),
+            problem.null_functions(t, motion),
             frame,
             robot.dof if frame is None else frame.shape[2],
-            None if still.guide is None else problem.brought_to_rest(t, still.guide(t)),
+            around,
         )
         start: Start = FreeStart(robot, task, still.start) if free else FixedStart(still.start)
         return cls(

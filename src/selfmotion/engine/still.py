@@ -113,13 +113,14 @@ class StillMotion:
         times = [time for time in (first, self.broken) if time is not None]
         return min(times) if times else None
 
-    def frame(self, t: Array) -> Array | None:
-        """Return the basis R at times t (S,) that E maps to, (S, n, r); None for the identity.
+    def frame(self, t: Array, space: str) -> Array | None:
+        """Return the basis R at times t (S,) of a null motion's space, (S, n, r).
 
-        The null space along this motion, transported; n × 0 where no self-motion is left.
+        None for the identity; else the null space along this motion, transported: n × 0 where no
+        self-motion is left.
         """
         problem = self.problem
-        if problem.null_motion.space == "joint":
+        if space == "joint":
             return None
         if problem.robot.redundancy(problem.task) == 0:
             return np.zeros((len(t), problem.robot.dof, 0))

@@ -6,6 +6,7 @@ from selfmotion.motion.null_motion import (
     NullMotion,
     NullMotionTable,
     PolynomialNullMotion,
+    RefinedNullMotion,
     TransportedFrame,
     resting_window,
 )
@@ -18,6 +19,7 @@ __all__ = [
     "NullMotion",
     "NullMotionTable",
     "PolynomialNullMotion",
+    "RefinedNullMotion",
     "Sampling",
     "Trajectory",
     "TransportedFrame",

@@ -2,12 +2,17 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.polynomial import legendre
 
 from selfmotion.basics import Array, ProblemError, Saved
 from selfmotion.robot import null_space
+
+# Intervals of a spline that is worth its while, and coefficients beyond which quadratic programmes
+# take seconds.
+_FEWEST, _MOST_COEFFICIENTS = 8, 110
 
 
 class NullMotion(Saved, ABC, family="null motion"):
@@ -19,9 +24,19 @@ class NullMotion(Saved, ABC, family="null motion"):
     ----------
     space : {"null", "joint"}
         ``"null"``: E is (r, K) in a null-space basis; ``"joint"``: E is (n, K), R = I.
+    gain : float
+        Share of the cost that `finer` functions have to save to be worth their while.
     """
 
     space: str = "null"
+    gain: ClassVar[float] = np.inf
+
+    def finer(self, intervals: int, rows: int) -> "NullMotion":
+        """Return what to go on with where so many `intervals` pay: by default the same.
+
+        `rows` is r, or n where `space` is "joint".
+        """
+        return self
 
     @property
     @abstractmethod
@@ -119,6 +134,45 @@ class BSplineNullMotion(NullMotion):
         inner = np.linspace(0.0, duration, self.intervals + 1)
         knots = np.concatenate([[0.0] * self.degree, inner, [duration] * self.degree])
         return np.asarray(BSpline.design_matrix(t, knots, self.degree).toarray())
+
+
+@dataclass(frozen=True)
+class RefinedNullMotion(NullMotion):
+    """ε(t) as a cubic to begin with, and as a B-spline where that lowers the cost enough.
+
+    Parameters
+    ----------
+    gain : float
+        Share of the cost that may be left to save, as far as `Report.remaining` tells.
+    most : int
+        Largest number of the spline's intervals: 8, 16, 32 or 64; fewer where the redundancy is
+        so large that they would have more than 110 coefficients.
+    """
+
+    gain: float = 1e-3  # type: ignore[misc]  # fixed for other kinds
+    most: int = 64
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.gain) and self.gain > 0.0):
+            raise ProblemError(f"null motion: gain is {self.gain}, expected a number above 0")
+        if self.most not in (_FEWEST, 16, 32, 64):
+            raise ProblemError(f"null motion: most is {self.most}, expected 8, 16, 32 or 64")
+
+    @property
+    def fewest_steps(self) -> int:
+        """See `NullMotion.fewest_steps`: those of the cubic."""
+        return PolynomialNullMotion().fewest_steps
+
+    def functions(self, t: Array, duration: float) -> Array:
+        """See `NullMotion.functions`: those of the cubic."""
+        return PolynomialNullMotion().functions(t, duration)
+
+    def finer(self, intervals: int, rows: int) -> "BSplineNullMotion":
+        """See `NullMotion.finer`: a spline that can be any cubic, of not too many coefficients."""
+        fewer = min(intervals, self.most)
+        while fewer > _FEWEST and rows * (fewer + 3) > _MOST_COEFFICIENTS:
+            fewer //= 2
+        return BSplineNullMotion(fewer)
 
 
 def resting_window(t: Array, duration: float, orders: tuple[int, int]) -> Array:

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from selfmotion.basics import Array, FileFormatError, read_only, read_table
 from selfmotion.motion.polynomials import differentiated, evaluated, inner_roots, may_pass
 
-# What follows a joint's name in the header of the column of its velocity.
-_VELOCITY = "_velocity"
+# What follows a joint's name in the header of the columns of its velocity and acceleration.
+_MANY = {"_velocity": "velocities", "_acceleration": "accelerations"}
+_RATES = tuple(_MANY)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +75,9 @@ class Trajectory:
         """Read a motion that something else made.
 
         The columns are ``t`` [s], one per joint for q under the joint's name [rad or m], and
-        optionally ``NAME_velocity`` for q̇; in any order, separated by comma, semicolon or tab.
-        Without velocities they are those of a cubic spline through the positions.
+        optionally ``NAME_velocity`` for q̇ and ``NAME_acceleration`` for q̈; in any order, separated
+        by comma, semicolon or tab. Without velocities they are those of a cubic spline through the
+        positions.
 
         Parameters
         ----------
@@ -90,32 +92,40 @@ class Trajectory:
         """
         header, table = read_table(Path(file))
         column = {name: table[:, i] for i, name in enumerate(header)}
-        rates = [name for name in header if name.endswith(_VELOCITY)]
-        names = [name for name in header if name not in ("t", *rates)]
+        names = [name for name in header if name != "t" and not name.endswith(_RATES)]
         if "t" not in column or not names:
             raise FileFormatError(
                 f"{file}: the header is {','.join(header)}, expected t and a column per joint"
             )
-        if rates and set(rates) != {name + _VELOCITY for name in names}:
-            odd = set(rates) ^ {name + _VELOCITY for name in names}
-            raise FileFormatError(
-                f"{file}: column '{min(odd)}' does not match; velocities are given for all joints "
-                f"or for none, as NAME{_VELOCITY}"
-            )
-        t = column["t"]
-        q = np.stack([column[name] for name in names], axis=1)
-        qd = np.stack([column[name + _VELOCITY] for name in names], axis=1) if rates else q
+        scale = np.pi / 180.0 if degrees else 1.0
+        tables = [scale * np.stack([column[name] for name in names], axis=1)]
+        for ending in _RATES:
+            found = {name for name in header if name.endswith(ending)}
+            if not found:
+                continue
+            if found != {name + ending for name in names}:
+                odd = found ^ {name + ending for name in names}
+                raise FileFormatError(
+                    f"{file}: column '{min(odd)}' does not match; {_MANY[ending]} are given for "
+                    f"all joints or for none, as NAME{ending}"
+                )
+            if ending == _RATES[1] and len(tables) == 1:
+                raise FileFormatError(
+                    f"{file}: has accelerations but no velocities; give NAME{_RATES[0]} as well"
+                )
+            tables.append(scale * np.stack([column[name + ending] for name in names], axis=1))
+        t, q, qd, qdd = column["t"], tables[0], None, None
+        if len(tables) > 1:
+            qd, qdd = tables[1], tables[2] if len(tables) > 2 else None
         try:
-            given = cls(t, q, qd, tuple(names))
+            given = cls(t, q, q if qd is None else qd, tuple(names), qdd)
         except FileFormatError as error:
             raise FileFormatError(f"{file}: {error}") from error
-        scale = np.pi / 180.0 if degrees else 1.0
-        if rates:
-            return cls(given.t, scale * given.q, scale * given.qd, given.joint_names)
+        if qd is not None:
+            return given
         from scipy.interpolate import CubicSpline
 
-        spline = CubicSpline(given.t, scale * given.q)
-        return cls(given.t, scale * given.q, spline(given.t, 1), given.joint_names)
+        return cls(given.t, given.q, CubicSpline(given.t, given.q)(given.t, 1), given.joint_names)
 
     def of_joints(self, names: Sequence[str]) -> "Trajectory":
         """Return the same motion with its joints in another order.

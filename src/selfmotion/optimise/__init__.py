@@ -14,6 +14,7 @@ from selfmotion.optimise.base import (
 from selfmotion.optimise.line_search import LineSearch
 from selfmotion.optimise.quasi_newton import QuasiNewton
 from selfmotion.optimise.sqp import SequentialQuadratic
+from selfmotion.optimise.step import Step, best_step
 
 __all__ = [
     "Callback",
@@ -27,5 +28,7 @@ __all__ = [
     "Residuals",
     "SequentialQuadratic",
     "Status",
+    "Step",
+    "best_step",
     "inverse_metric",
 ]

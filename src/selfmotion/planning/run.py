@@ -196,8 +196,10 @@ class _Run:
         try:
             self._progress("finer grid", 1, 1)
             best.refine_until_settled()
+            best.enrich()
             if rival is not None and rival is not best and not best.cut_short:
                 rival.refine_until_settled()
+                rival.enrich()
                 violated, cost = rival.score()
                 return None if violated else cost
         except KeyboardInterrupt:
@@ -224,6 +226,8 @@ class _Run:
             gap=gap,
             ending=part.ending,
             active=session.active,
+            null_motion=session.null_motion,
+            remaining=session.remaining,
         )
         return Plan(
             problem=self._problem,

@@ -6,14 +6,17 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.engine import (
+    INTERVALS,
     MOST_HALVINGS,
     Counts,
     Evaluation,
     Guide,
     Objective,
+    Remaining,
     StillMotion,
     settled_still_motion,
 )
+from selfmotion.motion import BSplineNullMotion, Grid, NullMotion
 from selfmotion.optimise import Callback, Iteration, Minimum, Optimizer, SequentialQuadratic, Status
 from selfmotion.plans import Binding, Problem
 
@@ -25,6 +28,8 @@ _RISE, _RISES = 1.5, 2
 _CLOSED, _CLOSING_STEPS = 1e-11, 12
 # What would save less than this share of the cost does not bind.
 _LEAST_SAVING = 1e-6
+# After these there is nothing to go on from.
+_ADRIFT = (Status.UNBOUNDED, Status.GRADIENT)
 # After these the user has no more time to give.
 _CUT_SHORT = (Status.INTERRUPTED, Status.STOPPED, Status.MAX_EVALUATIONS)
 
@@ -73,6 +78,10 @@ class Session:
         What is wrong for each constraint that the last minimisation could not meet.
     active : tuple of Binding
         What kept it from a lower cost.
+    null_motion : NullMotion
+        The parameterisation that the motion has by now.
+    remaining : float or None
+        What any other one could still save, as far as is known [cost].
     """
 
     def __init__(
@@ -86,6 +95,8 @@ class Session:
         # Whether conditions count: so far none was met on the way.
         self._bound = False
         self._x = np.zeros(objective.size)
+        self.null_motion: NullMotion = still.problem.null_motion
+        self.remaining: float | None = None
         self.history: list[Iteration] = []
         self.violations: tuple[str, ...] = ()
         self.active: tuple[Binding, ...] = ()
@@ -184,7 +195,7 @@ class Session:
         """Optimise on halved grids until the cost agrees."""
         rises = 0
         for _ in range(MOST_HALVINGS):
-            if self.status in (*_CUT_SHORT, Status.UNBOUNDED, Status.GRADIENT):
+            if self.status in (*_CUT_SHORT, *_ADRIFT):
                 return
             unmet, before = self.score()
             self.refine()
@@ -201,17 +212,61 @@ class Session:
 
     def refine(self) -> None:
         """Go on with half the step length."""
-        coarse = self._objective
-        grid = coarse.grid.halved()
-        self._objective = Objective.of(
+        self._objective = self._on(self._objective.grid.halved())
+        self._close()
+
+    def enrich(self) -> None:
+        """Give the null motion more freedom as long as that pays, and say what is left."""
+        wanted = self._still.problem.null_motion
+        while not (self.violations or self.status in (*_CUT_SHORT, *_ADRIFT)):
+            left = self._left()
+            self.remaining = left.saving(INTERVALS[-1])
+            enough = wanted.gain * abs(self._cost())
+            if self.remaining <= enough:
+                return
+            rows = self._objective.null_motion.rows
+            finer = wanted.finer(left.intervals(0.5 * enough), rows)
+            if finer in (wanted, self.null_motion):
+                return
+            self._change(finer)
+            self.minimize()
+            self.refine_until_settled()
+
+    def _left(self) -> Remaining:
+        """Return what is left to save around the present motion."""
+        objective = self._objective
+        z, x, c = objective.parts(self._x)
+        around = objective.null_motion.epsilon(x)
+        fine = self._on(objective.grid, BSplineNullMotion(INTERVALS[-1]), around)
+        none = np.zeros(fine.null_motion.size)
+        return Remaining(fine, np.concatenate([z, none, c]), bound=self._bound)
+
+    def _change(self, motion: NullMotion) -> None:
+        """Go on with another null motion that can be what the present one is."""
+        before = self._objective
+        z, x, c = before.parts(self._x)
+        t, duration = before.grid.stage_times, self._still.problem.path.duration
+        own, new = (kind.functions(t, duration) for kind in (self.null_motion, motion))
+        same = np.linalg.lstsq(new, own)[0]
+        self.null_motion, self._minimum = motion, None
+        self._objective = self._on(before.grid)
+        rows = x.reshape(before.null_motion.rows, -1) @ same.T
+        self._x = np.concatenate([z, rows.ravel(), c])
+
+    def _on(
+        self, grid: Grid, motion: NullMotion | None = None, around: Array | None = None
+    ) -> Objective:
+        """Return the objective on a grid, with another null motion around a given one."""
+        return Objective.of(
             self._still.problem,
             self._still,
             grid=grid,
             free=self._free,
-            constraints=coarse.constraints.constraints,
+            constraints=self._objective.constraints.constraints,
             counts=self._effort.counts,
+            null_motion=motion or self.null_motion,
+            around=around,
         )
-        self._close()
 
     def _cost(self) -> float:
         return sum(self._objective.terms(self._x).values())

@@ -57,7 +57,8 @@ class Archive(NamedTuple):
             **_arrays(self.trajectory, ""),
             **_arrays(self.initial_trajectory, "initial_"),
             "coefficients": self.coefficients,
-            "history_x": np.array([iteration.x for iteration in history]),
+            "history_x": np.concatenate([np.zeros(0), *(item.x for item in history)]),
+            "history_sizes": np.array([len(item.x) for item in history], dtype=np.float64),
         }
         description["digest"] = _digest(description, arrays)
         write_archive(file, description, arrays)
@@ -177,6 +178,7 @@ def _report_to_dict(report: Report) -> dict[str, Any]:
         "status": report.status.value,
         "gap": None if report.gap is None else dataclasses.asdict(report.gap),
         "active": [dataclasses.asdict(item) for item in report.active],
+        "null_motion": None if report.null_motion is None else report.null_motion.to_dict(),
     }
 
 
@@ -197,13 +199,16 @@ def _certificate_from_dict(values: Mapping[str, Any]) -> Certificate:
 
 def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archive:
     names = tuple(description["joint_names"])
+    ends = np.cumsum(arrays["history_sizes"]).astype(int)
+    points = np.split(arrays["history_x"], ends[:-1]) if len(ends) else []
     history = tuple(
-        Iteration(x=x, **record)
-        for x, record in zip(arrays["history_x"], description["history"], strict=True)
+        Iteration(x=x, **record) for x, record in zip(points, description["history"], strict=True)
     )
     report = dict(description["report"])
     report["status"] = Status(report["status"])
     report["gap"] = None if report["gap"] is None else Gap(**report["gap"])
+    motion = report["null_motion"]
+    report["null_motion"] = None if motion is None else restore(NullMotion, motion)
     report["active"] = tuple(
         Binding(**{**item, "spans": tuple(tuple(span) for span in item["spans"])})
         for item in report["active"]

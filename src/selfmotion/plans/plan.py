@@ -127,10 +127,14 @@ class Plan:
         ).write(FilePath(file))
 
     def to_csv(self, file: str | FilePath) -> None:
-        """Write ``t`` and a column per joint for q, then q̇ (``NAME`` and ``NAME_velocity``)."""
+        """Write ``t`` and a column per joint for q, then for q̇ and q̈.
+
+        They are called ``NAME``, ``NAME_velocity`` and ``NAME_acceleration``.
+        """
         motion = self.trajectory
-        names = [*motion.joint_names, *(f"{name}_velocity" for name in motion.joint_names)]
-        table = np.column_stack([motion.t, motion.q, motion.qd])
+        endings = ("", "_velocity", "_acceleration")
+        names = [name + ending for ending in endings for name in motion.joint_names]
+        table = np.column_stack([motion.t, motion.q, motion.qd, motion(motion.t, 2)])
         write_csv(FilePath(file), ["t", *names], table)
 
     def figure(self) -> "Figure":

@@ -22,7 +22,7 @@ from selfmotion.constraints import (
     JointVelocityLimits,
 )
 from selfmotion.costs import Cost, JointVelocity, OffPath
-from selfmotion.motion import NullMotion, PolynomialNullMotion, Trajectory, resting_window
+from selfmotion.motion import NullMotion, RefinedNullMotion, Trajectory, resting_window
 from selfmotion.path import Path
 from selfmotion.plans.relaxed_rows import check_relaxations
 from selfmotion.plans.rest import rest_orders
@@ -65,7 +65,8 @@ class Problem:
         q(0) [rad or m]; must put the tool on the start of the path. By default free: many starts
         are tried, and the best ones optimised along with the rest of the motion.
     null_motion : NullMotion
-        The parameterisation of the self-motion.
+        The parameterisation of the self-motion. By default the paper's cubic to begin with, and
+        a spline where more freedom pays.
     costs : sequence of Cost
         Their integrals are added up. By default ∫ ½ q̇ᵀq̇ dt.
     constraints : sequence of Constraint
@@ -103,7 +104,7 @@ class Problem:
     path: Path
     task: _TaskField = _TaskField()  # a descriptor, meant to be shared
     start: npt.ArrayLike | str | None = None
-    null_motion: NullMotion = field(default_factory=PolynomialNullMotion)
+    null_motion: NullMotion = field(default_factory=RefinedNullMotion)
     costs: Sequence[Cost] = field(default_factory=lambda: (JointVelocity(),))
     constraints: Sequence[Constraint] = field(
         default_factory=lambda: (
@@ -167,9 +168,13 @@ class Problem:
 
     @property
     def all_constraints(self) -> tuple[Constraint, ...]:
-        """The constraints, with `own_collision` last where there is one."""
+        """The constraints that ask something, with `own_collision` last where there is one."""
         own = self.own_collision
-        return tuple(self.constraints) if own is None else (*self.constraints, own)
+        return (*self._asking, *([] if own is None else [own]))
+
+    @property
+    def _asking(self) -> tuple[Constraint, ...]:
+        return tuple(item for item in self.constraints if item.applies(self.robot))
 
     def bind_constraints(
         self, start: Array, end: Array, *, apart: bool = True
@@ -179,7 +184,7 @@ class Problem:
         Those of the motion that the optimisation begins with. Without `own_collision` where it need
         not keep `apart` from itself.
         """
-        asked: Sequence[Constraint] = self.all_constraints if apart else self.constraints
+        asked = list(self.all_constraints if apart else self._asking)
         if all(self.rests):
             asked = [item.at_rest() for item in asked]
         return tuple(item.bind(self.robot, self.task, start, end) for item in asked)
@@ -199,11 +204,11 @@ class Problem:
         start, end = self.rest_orders
         return start > 0, end > 0
 
-    def null_functions(self, t: Array) -> Array:
-        """Return φ at times `t` (S,), (S, K): those of `null_motion`, at rest where the arm is."""
+    def null_functions(self, t: Array, motion: NullMotion) -> Array:
+        """Return φ of a null motion at times `t` (S,), at rest where the arm has to be, (S, K)."""
         duration = self.path.duration
         window = resting_window(t, duration, self.rest_orders)
-        return self.null_motion.functions(t, duration) * window[:, None]
+        return motion.functions(t, duration) * window[:, None]
 
     def brought_to_rest(self, t: Array, epsilon: Array) -> Array:
         """Return a null motion (S, n) that fades to nothing where the arm has to be at rest."""

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from selfmotion.motion import NullMotion
 from selfmotion.optimise import Iteration, Status
 
 
@@ -106,6 +107,12 @@ class Report:
         Why the motion ends before its path does; "" where it does not.
     active : tuple of Binding
         The constraints that bind, the most expensive first.
+    null_motion : NullMotion or None
+        The parameterisation that the plan's coefficients are of; None for other works' methods.
+    remaining : float or None
+        An estimate of what any other null motion could still take off F, the constraints kept: by
+        the quadratic model of F around the plan in a spline of 64 intervals. None where there is
+        none to be had.
     """
 
     cost: float
@@ -124,3 +131,5 @@ class Report:
     gap: Gap | None = None
     ending: str = ""
     active: tuple[Binding, ...] = ()
+    null_motion: NullMotion | None = None
+    remaining: float | None = None

@@ -3,7 +3,7 @@
 from typing import Any
 
 from selfmotion.certificate import Extreme
-from selfmotion.plans import Plan
+from selfmotion.plans import Plan, Report
 
 # A number and a remark, shown smaller after it.
 Cell = tuple[str, str]
@@ -14,6 +14,8 @@ def facts(plan: Plan) -> dict[str, Cell]:
     report, certificate = plan.report, plan.certificate
     rows: dict[str, Cell] = {"verdict": (certificate.verdict, "")}
     rows["cost"] = _compared(report.cost, report.initial_cost)
+    if report.remaining is not None:
+        rows["left to save, estimate"] = (f"{report.remaining:.2g}", _share(report))
     for name, value in report.terms.items():
         rows[f"cost term: {name}"] = _compared(value, report.initial_terms.get(name))
     rows["position error, worst"] = _extreme(certificate.position_error, "m")
@@ -56,6 +58,13 @@ def describe(plan: Plan) -> str:
         f"{plan.robot.name}: {plan.robot.dof} joints follow a tool motion of "
         f"{plan.trajectory.duration:.3g} s (task '{plan.task.value}') at cost {report.cost:.4g}"
         f"{saved}. {plan.certificate.verdict}"
+    )
+
+
+def _share(report: Report) -> str:
+    left = report.remaining
+    return (
+        f"{100 * left / abs(report.cost):.2g} % by any null motion" if left and report.cost else ""
     )
 
 

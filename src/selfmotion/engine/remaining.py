@@ -1,0 +1,74 @@
+"""What another null motion could still save: an estimate, from one gradient and one matrix.
+
+Around a finished motion, with g and M the gradient and the Gauss-Newton matrix of the cost with
+respect to a fine spline that is added to its null motion, the quadratic model falls by ½ gᵀM⁻¹g;
+where constraints bind, by what the quadratic programme over the linearised conditions finds.
+"""
+
+from functools import cache
+
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.engine.objective import Objective
+from selfmotion.motion import BSplineNullMotion
+from selfmotion.optimise import Residuals, best_step
+
+# Intervals of the fine spline, and of coarser ones that it contains.
+INTERVALS = (8, 16, 32, 64)
+# Directions in which the cost hardly bends are not trusted further than this share allows.
+_FLAT = 1e-9
+# The model is believed within this many times its own step.
+_REACH = 3.0
+
+
+class Remaining:
+    """What is left to save around a motion, by splines of more and more intervals.
+
+    Parameters
+    ----------
+    fine : Objective
+        Its null motion is a spline of the most intervals, added to the motion's own.
+    x : (size,)
+        Where the motion is, its spline 0.
+    bound : bool
+        Whether conditions count.
+    """
+
+    def __init__(self, fine: Objective, x: Array, *, bound: bool) -> None:
+        self._fine, self._parts = fine, [len(part) for part in fine.parts(x)]
+        self._gradient, self._metric = fine.gradient(x), fine.metric(x)
+        none = Residuals(np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool))
+        self._at = fine.conditions(x) if bound else none
+        self._rows = fine.condition_rows(x) if bound else np.zeros((0, fine.size))
+
+    def saving(self, intervals: int) -> float:
+        """Return what a spline of so many intervals (of `INTERVALS`) would save [cost]."""
+        z, spline, c = self._parts
+        inner = np.kron(np.eye(self._fine.null_motion.rows), _within(intervals))
+        basis = np.zeros((self._fine.size, z + inner.shape[1] + c))
+        basis[:z, :z] = np.eye(z)
+        basis[z : z + spline, z : z + inner.shape[1]] = inner
+        basis[z + spline :, z + inner.shape[1] :] = np.eye(c)
+        values, vectors = np.linalg.eigh(basis.T @ self._metric @ basis)
+        scale = basis @ (vectors / np.sqrt(np.maximum(values, _FLAT * values[-1])))
+        slope, bend = scale.T @ self._gradient, scale.T @ self._metric @ scale
+        reach = _REACH * float(np.linalg.norm(slope))
+        if reach == 0.0:
+            return 0.0
+        step = best_step(slope, bend, self._at, self._rows @ scale, reach)
+        return 0.0 if step.relaxed else max(step.gain, 0.0)
+
+    def intervals(self, left: float) -> int:
+        """Return the fewest intervals that leave no more than `left` of what can be saved."""
+        most = self.saving(INTERVALS[-1])
+        return next(n for n in INTERVALS if n == INTERVALS[-1] or most - self.saving(n) <= left)
+
+
+@cache
+def _within(intervals: int) -> Array:
+    """Return the matrix from a spline's coefficients to those of the finest one, (K', K)."""
+    finest = INTERVALS[-1]
+    t = np.linspace(0.0, 1.0, 8 * finest + 1)
+    coarse, fine = (BSplineNullMotion(count).functions(t, 1.0) for count in (intervals, finest))
+    return np.asarray(np.linalg.lstsq(fine, coarse)[0])
