@@ -80,6 +80,13 @@ from selfmotion.costs import (
     Samples,
     SmallestSingularValue,
 )
+from selfmotion.formats import (
+    Job,
+    read_job,
+    read_path,
+    read_problem,
+    write_problem,
+)
 from selfmotion.motion import (
     BSplineNullMotion,
     NullMotion,
@@ -100,6 +107,7 @@ from selfmotion.path import (
     Line,
     Path,
     PathSamples,
+    Placed,
     Retimed,
     TwistPath,
     Waypoints,
@@ -169,6 +177,7 @@ __all__ = [
     "InverseKinematicsError",
     "InverseManipulability",
     "Iteration",
+    "Job",
     "JointAcceleration",
     "JointAccelerationLimits",
     "JointJerk",
@@ -195,6 +204,7 @@ __all__ = [
     "PathError",
     "PathLength",
     "PathSamples",
+    "Placed",
     "Plan",
     "PlanError",
     "PolynomialNullMotion",
@@ -228,9 +238,13 @@ __all__ = [
     "load_robot",
     "plan",
     "plan_by",
+    "read_job",
+    "read_path",
+    "read_problem",
     "retime",
     "sample_problem",
     "slowdown",
+    "write_problem",
 ]
 
 

@@ -1,5 +1,7 @@
 """The command line: parse, call, print."""
 
+import dataclasses
+import json
 import sys
 import traceback
 from pathlib import Path
@@ -10,7 +12,8 @@ import typer
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion.cli import options, tables
+from selfmotion import formats
+from selfmotion.cli import documents, options, tables
 from selfmotion.cli.stage_display import StageDisplay
 
 app = typer.Typer(
@@ -46,68 +49,101 @@ def _complain(text: str) -> None:
 
 @app.command(
     epilog="Example: selfmotion plan panda --circle 0.15 --duration 4 --out plan.npz --html a.html"
+    "; or: selfmotion plan cell.toml"
 )
 def plan(
-    robot: options.RobotArgument,
+    context: typer.Context,
+    problem: options.ProblemArgument,
     path: options.PathOption = None,
     circle: options.CircleOption = None,
     line: options.LineOption = None,
     normal: options.NormalOption = "x",
-    duration: options.DurationOption = 4.0,
+    duration: options.DurationOption = None,
+    feed: options.FeedOption = None,
+    frame: options.FrameOption = None,
     corners: options.CornersOption = "blend",
     task: options.TaskOption = "pose",
     relax: options.RelaxOption = None,
     start: options.StartOption = None,
+    warm: options.FromOption = None,
     tool: options.ToolOption = None,
+    lock: options.LockOption = None,
     degree: options.DegreeOption = 3,
     mu: options.MuOption = 0.0,
+    cost: options.CostOption = None,
+    velocity: options.VelocityOption = None,
+    acceleration: options.AccelerationOption = None,
+    closed: options.ClosedOption = False,
+    obstacles: options.ObstaclesOption = None,
+    clearance: options.ClearanceOption = 0.0,
+    srdf: options.SrdfOption = None,
+    no_collision: options.NoCollisionOption = False,
     damped: options.DampedOption = False,
+    settings: options.SetOption = None,
     max_evaluations: options.LimitOption = None,
     search: options.SearchOption = None,
     compare: options.CompareOption = False,
+    allow_code: options.AllowCodeOption = False,
     out: options.OutOption = None,
     html: options.HtmlOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Plan a motion, check it, and write it."""
-    _check_suffixes(out or [])
-    arm = sm.load_robot(robot, tool=tool)
-    rows = sm.Task.of(task)
-    configuration = options.numbers(start, "--start") if start is not None else None
-    motion: sm.Path
-    if sum(option is not None for option in (path, circle, line)) != 1:
-        raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
-    if path is not None:
-        motion = sm.Waypoints.from_csv(path, corners=corners)
+    check_suffixes(out or [])
+    shell = documents.Shell(
+        path, circle, line, normal, duration, feed, frame, corners, task, start, warm, tool,
+        lock or [], degree, mu, cost or [], velocity, acceleration, closed, obstacles, clearance,
+        srdf, no_collision, relax or [], damped,
+    )  # fmt: skip
+    names = {field.name for field in dataclasses.fields(shell)}
+    job = documents.read(problem, shell, settings or [], _typed(context, names), allow_code)
+    asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
+    given = {key: value for key, value in asked.items() if value is not None}
+    result = _plan_with_progress(job.problem, **{**job.settings, **given})
+    if as_json:
+        _console.print_json(data=tables.plan_json(result))
     else:
-        if configuration is None:
-            configuration = arm.dexterous_configuration(rows)
-        pose = arm.pose(configuration)
-        if circle is not None:
-            axis = np.eye(3)["xyz".index(normal)]
-            motion = sm.Circle.around(pose, circle, duration, normal=axis)
-        else:
-            end = pose.copy()
-            end.translation = pose.translation + options.numbers(line or "", "--line", 3)
-            motion = sm.Line(pose, end, duration)
-    costs: list[sm.Cost] = [sm.JointVelocity()]
-    if mu != 0.0:
-        costs.append(sm.InverseManipulability(mu))
-    problem = sm.Problem(
-        arm,
-        motion,
-        rows,
-        configuration,
-        sm.PolynomialNullMotion(degree),
-        tuple(costs),
-        relaxations=[options.relaxation(text) for text in relax or []],
-        damping=sm.Damping() if damped else None,
-    )
-    result = _plan_with_progress(
-        problem, max_evaluations=max_evaluations, search=options.search_settings(search, compare)
-    )
-    tables.show(result, _console)
-    _write(result, out or [], html)
+        tables.show(result, _console)
+    _write(result, [*job.outputs, *(out or [])], html, quiet=as_json)
     raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
+
+
+def _typed(context: typer.Context, names: set[str]) -> list[str]:
+    """Return those of the options that were typed."""
+    return [
+        parameter.opts[0]
+        for parameter in context.command.params
+        if parameter.name in names
+        and str(context.get_parameter_source(parameter.name or "")).endswith("COMMANDLINE")
+    ]
+
+
+@app.command(epilog="Example: selfmotion init panda; then: selfmotion plan panda.toml")
+def init(
+    robot: Annotated[str, typer.Argument(help="Name (see `selfmotion robots`).")],
+    out: Annotated[Path | None, typer.Option(help="File; by default ROBOT.toml.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
+) -> None:
+    """Write a commented problem file to begin with."""
+    file = Path(f"{robot}.toml") if out is None else out
+    text = formats.example_text(robot, file.name)
+    if file.exists() and not force:
+        raise sm.FileFormatError(f"{file}: is there already; give --out or --force")
+    formats.write_text(file, text)
+    _console.print(f"wrote {file}", markup=False)
+
+
+@app.command(epilog="Example: selfmotion schema --out problem.schema.json")
+def schema(
+    out: Annotated[Path | None, typer.Option(help="File; by default the terminal.")] = None,
+) -> None:
+    """Write the JSON Schema of problem files, for completion in an editor."""
+    text = json.dumps(formats.json_schema(), indent=1)
+    if out is None:
+        typer.echo(text)
+        return
+    formats.write_text(out, text + "\n")
+    _console.print(f"wrote {out}", markup=False)
 
 
 @app.command(
@@ -141,7 +177,7 @@ def check(
         arm = sm.load_robot(robot, tool=tool, lock=options.locks(lock or []))
         certificate = sm.certify(
             arm,
-            sm.Waypoints.from_csv(path, corners=corners),
+            formats.read_path(path, corners=corners),
             task,
             sm.Trajectory.from_csv(file, degrees=degrees),
             sm.Tolerance(tolerance, tolerance),
@@ -237,21 +273,31 @@ def _plan_with_progress(problem: sm.Problem, **options: Any) -> sm.Plan:
         return sm.plan(problem, callback=display.iteration, progress=display.stage, **options)
 
 
-def _write(result: sm.Plan, out: list[Path], html: Path | None) -> None:
+def _write(result: sm.Plan, out: list[Path], html: Path | None, *, quiet: bool = False) -> None:
     for file in out:
         if file.suffix == ".csv":
             result.to_csv(file)
+        elif file.suffix == ".html":
+            _replay(result, file)
         else:
             result.save(file)
-        _console.print(f"wrote {file}", markup=False)
     if html is not None:
-        from selfmotion.replay import write_replay
+        _replay(result, html)
+    for file in [*out, *([] if html is None else [html])]:
+        if not quiet:
+            _console.print(f"wrote {file}", markup=False)
 
-        write_replay(result, html)
-        _console.print(f"wrote {html}", markup=False)
+
+def _replay(result: sm.Plan, file: Path) -> None:
+    from selfmotion.replay import write_replay
+
+    write_replay(result, file)
 
 
-def _check_suffixes(files: list[Path]) -> None:
+def check_suffixes(files: list[Path]) -> None:
+    """Raise FileFormatError for a file that --out cannot write."""
     for file in files:
-        if file.suffix not in (".csv", ".npz"):
-            raise sm.FileFormatError(f"{file}: --out writes .npz (the plan) or .csv (its motion)")
+        if file.suffix not in (".csv", ".npz", ".html"):
+            raise sm.FileFormatError(
+                f"{file}: --out writes .npz (the plan), .csv (its motion) or .html (its replay)"
+            )

@@ -152,3 +152,23 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
         "verdict": certificate.verdict,
         **dataclasses.asdict(certificate),
     }
+
+
+def plan_json(plan: Plan) -> dict[str, Any]:
+    """Return how a plan was found and what the check says, as JSON-safe values."""
+    report = plan.report
+    return {
+        "robot": plan.robot.name,
+        "task": plan.task.value,
+        "cost": report.cost,
+        "initial_cost": report.initial_cost,
+        "terms": dict(report.terms),
+        "initial_terms": dict(report.initial_terms),
+        "evaluations": report.evaluations,
+        "iterations": report.iterations,
+        "seconds": report.seconds,
+        "status": report.status.value,
+        "message": report.message,
+        "duration": plan.trajectory.duration,
+        "certificate": certificate_json(plan.certificate),
+    }

@@ -1,6 +1,7 @@
 """Tool motion over time: what the tool frame is to do, as pose and twist at any time."""
 
-from selfmotion.path.base import Path, PathSamples, as_pose
+from selfmotion.path.base import Path, PathSamples, TimeLaw, as_pose
+from selfmotion.path.placed import Placed
 from selfmotion.path.retimed import Retimed
 from selfmotion.path.shapes import Circle, Line
 from selfmotion.path.truncated import Truncated
@@ -12,7 +13,9 @@ __all__ = [
     "Line",
     "Path",
     "PathSamples",
+    "Placed",
     "Retimed",
+    "TimeLaw",
     "Truncated",
     "TwistPath",
     "Waypoints",

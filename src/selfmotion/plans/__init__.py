@@ -2,11 +2,12 @@
 
 from selfmotion.plans.paper_problem import sample_problem
 from selfmotion.plans.plan import Plan, Views, load_plan
-from selfmotion.plans.problem import Problem
+from selfmotion.plans.problem import NO_OVERLAP, Problem
 from selfmotion.plans.report import Binding, Gap, Report
 from selfmotion.plans.retiming import retime, slowdown
 
 __all__ = [
+    "NO_OVERLAP",
     "Binding",
     "Gap",
     "Plan",
