@@ -126,7 +126,10 @@ def test_problems_of_all_kinds_round_trip(tmp_path: Path) -> None:
             "position",
             null_motion=sm.BSplineNullMotion(6),
             costs=[sm.GravityTorque(panda), sm.JointAcceleration([1, 2, 3, 4, 5, 6, 7])],
-            constraints=[sm.EndVelocity(), sm.JointVelocityLimits(1.0, replace=True)],
+            constraints=[
+                sm.JointAccelerationLimits(5.0),
+                sm.JointVelocityLimits(1.0, replace=True),
+            ],
             relaxations=[sm.Relaxation("z", during=(0.5, 1.5))],
             damping=sm.Damping(),
             collision=sm.Clearance(disabled=[("panda_link0", "panda_link2")]),

@@ -83,8 +83,10 @@ from selfmotion.costs import (
 from selfmotion.formats import (
     Job,
     read_job,
+    read_motion,
     read_path,
     read_problem,
+    write_motion,
     write_problem,
 )
 from selfmotion.motion import (
@@ -239,11 +241,13 @@ __all__ = [
     "plan",
     "plan_by",
     "read_job",
+    "read_motion",
     "read_path",
     "read_problem",
     "retime",
     "sample_problem",
     "slowdown",
+    "write_motion",
     "write_problem",
 ]
 

@@ -179,7 +179,7 @@ def check(
             arm,
             formats.read_path(path, corners=corners),
             task,
-            sm.Trajectory.from_csv(file, degrees=degrees),
+            sm.read_motion(file, degrees=degrees),
             sm.Tolerance(tolerance, tolerance),
             options.requirements(arm, velocity, acceleration, obstacles, clearance, srdf),
         )
@@ -188,6 +188,56 @@ def check(
     else:
         tables.show_certificate(certificate, _console)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500")
+def export(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    out: Annotated[
+        list[Path],
+        typer.Option(
+            help="File: .csv, .npz, .json, .yaml (ROS 2 JointTrajectory), .xml (MuJoCo keyframes), "
+            ".script (URScript). Repeatable."
+        ),
+    ],
+    rate: Annotated[
+        float | None, typer.Option(help="Samples per second; by default the plan's own.")
+    ] = None,
+    form: Annotated[
+        str | None,
+        typer.Option("--format", help=f"Whatever the suffix: {', '.join(formats.FORMS)}."),
+    ] = None,
+) -> None:
+    """Write a plan's motion for controllers and simulators, and check what was written."""
+    saved = sm.load_plan(file)
+    verified = not saved.altered
+    for target in out:
+        sm.write_motion(saved, target, rate=rate, form=form)
+        if form in formats.READABLE or (form is None and target.suffix not in (".xml", ".script")):
+            found = saved.problem.certify(
+                sm.read_motion(target), saved.tolerance, saved.report.ending
+            )
+            verified = verified and found.verified
+            _console.print(
+                f"wrote {target}; read back: {found.verdict}", markup=False, soft_wrap=True
+            )
+        else:
+            verified = verified and saved.certificate.verified
+            _console.print(f"wrote {target}", markup=False, soft_wrap=True)
+    raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion compare a.npz b.npz")
+def compare(
+    plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz.")],
+    as_json: options.JsonOption = False,
+) -> None:
+    """Compare plans: costs, durations, margins and verdicts, side by side."""
+    saved = {str(file): sm.load_plan(file) for file in plans}
+    if as_json:
+        _console.print_json(data={name: tables.plan_json(plan) for name, plan in saved.items()})
+    else:
+        tables.show_comparison(saved, _console)
 
 
 @app.command(

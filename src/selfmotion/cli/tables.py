@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -79,6 +80,46 @@ def show_certificate(certificate: Certificate, console: Console) -> None:
         console.print(remark, style="dim", markup=False)
     style = "green" if certificate.verified else "bold red"
     console.print(certificate.verdict, style=style, markup=False)
+
+
+def show_comparison(plans: Mapping[str, Plan], console: Console) -> None:
+    """Print a column per plan: its costs, and the worst that its check found."""
+    table = Table(box=box.SIMPLE_HEAD, title="plans side by side")
+    table.add_column("")
+    for name in plans:
+        table.add_column(name, justify="right", overflow="fold")
+    shown = list(plans.values())
+    for term in dict.fromkeys(term for plan in shown for term in plan.report.terms):
+        table.add_row(term, *(_number(plan.report.terms.get(term)) for plan in shown))
+    table.add_row("total cost", *(_number(plan.report.cost) for plan in shown))
+    table.add_section()
+    table.add_row("duration [s]", *(_number(plan.trajectory.duration) for plan in shown))
+    length = (float(np.abs(np.diff(plan.trajectory.q, axis=0)).sum()) for plan in shown)
+    table.add_row("joint path [rad, m]", *map(_number, length))
+    for label, name in _WORST.items():
+        worst = [getattr(plan.certificate, name) for plan in shown]
+        if any(item is not None for item in worst):
+            table.add_row(label, *(_number(item and item.value) for item in worst))
+    table.add_row("verified", *("yes" if plan.certificate.verified else "no" for plan in shown))
+    console.print(table)
+    for name, plan in plans.items():
+        if not plan.certificate.verified:
+            console.print(f"{name}: {plan.certificate.verdict}", style="bold red", markup=False)
+
+
+_WORST = {
+    "position error [m]": "position_error",
+    "rotation error [rad]": "rotation_error",
+    "margin to joint limits": "limit_margin",
+    "speed over its limit": "velocity_ratio",
+    "acceleration over its limit": "acceleration_ratio",
+    "smallest singular value": "smallest_singular_value",
+    "clearance [m]": "clearance",
+}
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.5g}"
 
 
 def show_robots(robots: Mapping[str, RobotModel], console: Console) -> None:

@@ -4,6 +4,7 @@ from typing import Any
 
 from selfmotion.formats.documents import in_si, read_document, write_document, write_text
 from selfmotion.formats.example import example_text
+from selfmotion.formats.motions import FORMS, READABLE, read_motion, write_motion
 from selfmotion.formats.overrides import grid_documents, parse_setting, set_key
 from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import pose_of
@@ -11,6 +12,8 @@ from selfmotion.formats.problem_file import Job, job_of, obstacle, read_job, rea
 from selfmotion.formats.problem_writing import write_job, write_problem
 
 __all__ = [
+    "FORMS",
+    "READABLE",
     "Job",
     "example_text",
     "grid_documents",
@@ -22,11 +25,13 @@ __all__ = [
     "pose_of",
     "read_document",
     "read_job",
+    "read_motion",
     "read_path",
     "read_problem",
     "set_key",
     "write_document",
     "write_job",
+    "write_motion",
     "write_problem",
     "write_text",
 ]
