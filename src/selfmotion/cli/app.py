@@ -60,6 +60,7 @@ def plan(
     normal: options.NormalOption = "x",
     duration: options.DurationOption = None,
     feed: options.FeedOption = None,
+    jump: options.JumpOption = None,
     frame: options.FrameOption = None,
     corners: options.CornersOption = "blend",
     task: options.TaskOption = "pose",
@@ -91,7 +92,7 @@ def plan(
     """Plan a motion, check it, and write it."""
     check_suffixes(out or [])
     shell = documents.Shell(
-        path, circle, line, normal, duration, feed, frame, corners, task, start, warm, tool,
+        path, circle, line, normal, duration, feed, jump, frame, corners, task, start, warm, tool,
         lock or [], degree, mu, cost or [], velocity, acceleration, closed, obstacles, clearance,
         srdf, no_collision, relax or [], damped,
     )  # fmt: skip

@@ -22,6 +22,7 @@ class Shell:
     normal: str
     duration: float | None
     feed: float | None
+    jump: float | None
     frame: str | None
     corners: str
     task: str
@@ -74,7 +75,7 @@ class Shell:
         if sum(option is not None for option in (self.path, self.circle, self.line)) != 1:
             raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
         if self.path is not None:
-            given = {"feed": self.feed, "duration": self.duration}
+            given = {"feed": self.feed, "duration": self.duration, "jump": self.jump}
             frame = {} if self.frame is None else {"frame": options.pose(self.frame, "--frame")}
             return {"kind": "file", "file": str(self.path), "corners": self.corners, **frame} | {
                 key: value for key, value in given.items() if value is not None

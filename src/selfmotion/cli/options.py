@@ -41,6 +41,10 @@ DurationOption = Annotated[
 FeedOption = Annotated[
     float | None, typer.Option(help="Tool speed along poses without times (m/s).")
 ]
+JumpOption = Annotated[
+    float | None,
+    typer.Option(help="Distance between poses of --path that is refused (m; 0.5 by default)."),
+]
 FrameOption = Annotated[
     str | None,
     typer.Option(help="Pose of the frame that --path is in: x,y,z,roll,pitch,yaw (m, rad)."),
