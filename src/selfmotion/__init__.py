@@ -31,6 +31,10 @@ from selfmotion.basics import (
     SelfmotionError,
     StartError,
 )
+from selfmotion.batch import (
+    Batch,
+    plan_many,
+)
 from selfmotion.certificate import (
     Certificate,
     Extreme,
@@ -146,6 +150,7 @@ if TYPE_CHECKING:
 __all__ = [
     "NAMED_ARMS",
     "BSplineNullMotion",
+    "Batch",
     "Binding",
     "BoundConstraint",
     "Box",
@@ -240,6 +245,7 @@ __all__ = [
     "load_robot",
     "plan",
     "plan_by",
+    "plan_many",
     "read_job",
     "read_motion",
     "read_path",

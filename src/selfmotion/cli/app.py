@@ -14,6 +14,7 @@ from rich.console import Console
 import selfmotion as sm
 from selfmotion import formats
 from selfmotion.cli import documents, options, tables
+from selfmotion.cli.batch_display import BatchDisplay, executor_at
 from selfmotion.cli.stage_display import StageDisplay
 
 app = typer.Typer(
@@ -267,6 +268,46 @@ def replay(
         written.append(render_gif(saved[0], gif))
     for file in written:
         _console.print(f"wrote {file}", markup=False)
+
+
+@app.command(epilog="Example: selfmotion batch cell.toml --workers 2 --out out/batch")
+def batch(
+    files: Annotated[
+        list[Path], typer.Argument(help="Problem files; of a [grid], all combinations.")
+    ],
+    out: Annotated[
+        Path, typer.Option(help="Folder for plans and tables; a run that was killed goes on there.")
+    ] = Path("out/batch"),
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes; by default one for each core.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
+    ] = None,
+    replays: Annotated[
+        int, typer.Option(min=0, help="Write replays of so many of the best plans.")
+    ] = 3,
+    allow_code: options.AllowCodeOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Plan many problems at once, into a folder with a ranked table."""
+    from selfmotion.batch import grid_items, plan_items
+
+    items = [item for file in files for item in grid_items(file, allow_code=allow_code)]
+    names = [item.name for item in items]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise sm.ProblemError(f"two problem files are called '{twice}'; rename one of them")
+    with executor_at(dask) as executor, BatchDisplay(_stages) as display:
+        result = plan_items(
+            items, executor, out=out, workers=workers, replays=replays, progress=display.show
+        )
+    if as_json:
+        _console.print_json(data=tables.batch_json(result))
+    else:
+        tables.show_batch(result, _console)
+    sound = all(row.verified for row in result.rows)
+    raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)
 
 
 @app.command(epilog="Example: selfmotion robots")

@@ -1,6 +1,7 @@
 """Plans, certificates and robots as tables for the terminal; legible in a log as well."""
 
 import dataclasses
+import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
 if TYPE_CHECKING:
+    from selfmotion.batch import Batch
     from selfmotion.study import Claim
 
 
@@ -120,6 +122,48 @@ _WORST = {
 
 def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.5g}"
+
+
+def show_batch(batch: "Batch", console: Console) -> None:
+    """Print the best of many plans, and how many there are."""
+    ranked = sorted(batch.rows, key=lambda row: (bool(row.error), not row.verified, row.cost))
+    keys = list(dict.fromkeys(key for row in ranked for key in row.settings))
+    table = Table(box=box.SIMPLE_HEAD, title="the best of them")
+    for name in ("name", *keys, "cost", "duration", "verified"):
+        table.add_column(name, overflow="fold")
+    for row in ranked[:_SHOWN]:
+        values = [json.dumps(row.settings.get(key, "")) for key in keys]
+        outcome = ["-", "-", "no plan"]
+        if not row.error:
+            state = "yes" if row.verified else "no"
+            outcome = [f"{row.cost:.6g}", f"{row.duration:.4g} s", state]
+        table.add_row(row.name, *values, *outcome)
+    console.print(table)
+    verified = sum(row.verified for row in batch.rows)
+    failed = [row for row in ranked if row.error]
+    console.print(
+        f"{len(ranked)} problems: {verified} verified, {len(failed)} without a plan; "
+        f"{batch.resumed} finished before"
+    )
+    for row in failed[:_SHOWN]:
+        console.print(f"{row.name}: {row.error}", style="red", markup=False, soft_wrap=True)
+    console.print(f"wrote {batch.folder / 'index.html'}", markup=False, soft_wrap=True)
+
+
+# Rows of a batch on the terminal; the files have all of them.
+_SHOWN = 10
+
+
+def batch_json(batch: "Batch") -> dict[str, Any]:
+    """Return the rows of a batch as JSON-safe values."""
+    rows = [
+        {key: str(value) if key == "file" else value for key, value in vars(row).items()}
+        for row in batch.rows
+    ]
+    for row in rows:
+        if row["error"]:
+            row["cost"] = row["initial_cost"] = None
+    return {"folder": str(batch.folder), "resumed": batch.resumed, "rows": rows}
 
 
 def show_robots(robots: Mapping[str, RobotModel], console: Console) -> None:

@@ -101,16 +101,25 @@ def read_job(file: str | FilePath, *, allow_code: bool = False) -> Job:
 
 
 def job_of(
-    document: Mapping[str, Any], file: FilePath | None = None, *, allow_code: bool = False
+    document: Mapping[str, Any],
+    file: FilePath | None = None,
+    *,
+    allow_code: bool = False,
+    memory: dict[str, Any] | None = None,
 ) -> Job:
-    """Return the job that a document describes; `file` is where it comes from. See `read_job`."""
+    """Return the job that a document describes; `file` is where it comes from. See `read_job`.
+
+    Where many documents are read, those with the same arm share it by `memory`.
+    """
     from selfmotion.formats.checking import checked
 
     with _named(file, ""):
         raw = in_si(document)
         functions = name_kinds(raw, FilePath() if file is None else file.parent, allow_code)
         table = checked(raw)
-        return _Reader(file, table, functions, _degrees_per_joint(document)).job()
+        return _Reader(
+            file, table, functions, _degrees_per_joint(document), {} if memory is None else memory
+        ).job()
 
 
 @contextmanager
@@ -152,15 +161,17 @@ class _Reader:
     table: Mapping[str, Any]
     functions: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     degrees: str = ""
+    memory: dict[str, Any] = field(default_factory=dict)
 
     def job(self) -> Job:
         table, file = self.table, self.file
         with _named(file, "robot"):
-            robot = self._robot(table["robot"])
+            robot = self._once(table["robot"], self._robot)
         self._check_degrees(robot)
         task = Task.of(table.get("task", "pose"))
         with _named(file, "start"):
-            start = _start(table.get("start", "free"), robot, task)
+            given = table.get("start", "free")
+            start = self._once((table["robot"], given, task), lambda _: _start(given, robot, task))
         with _named(file, "path"):
             path = self._path(dict(table["path"]), robot, start)
         options: dict[str, Any] = {}
@@ -181,6 +192,12 @@ class _Reader:
         with _named(file, ""):
             problem = Problem(robot, path, task, start, **options)
         return Job(problem, **self._settings())
+
+    def _once(self, values: Any, make: Callable[[Any], Any]) -> Any:
+        key = repr(values)
+        if key not in self.memory:
+            self.memory[key] = make(values)
+        return self.memory[key]
 
     def _check_degrees(self, robot: RobotModel) -> None:
         slides = [name for name in robot.joint_names if robot.is_prismatic(name)]
