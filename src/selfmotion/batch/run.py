@@ -141,8 +141,7 @@ def plan_items(
     run = _Run(folder, items, progress)
     pending = deque(items)
     if executor is not None:
-        run.through(executor, pending, _WINDOW)
-        if pending:
+        if run.through(executor, pending, _WINDOW):
             raise PlanError(
                 f"the executor broke after {len(run.rows)} of {len(items)} problems; what is "
                 f"finished is in '{folder.path}': run again to go on"
@@ -165,10 +164,7 @@ class _Run:
         self._began, self.resumed = time.monotonic(), 0
 
     def through(self, executor: Executor, pending: deque[Item], window: int) -> list[Item]:
-        """Run what is pending; return what was at work when the executor broke, if it did.
-
-        What could not be run stays in `pending`.
-        """
+        """Run what is pending; return what was at work when the executor broke, if it did."""
         flying: dict[Future[_Result], Item] = {}
         while pending or flying:
             while pending and len(flying) < window:
@@ -179,13 +175,12 @@ class _Run:
                 try:
                     flying[executor.submit(plan_task, task)] = item
                 except BrokenExecutor:
-                    pending.appendleft(item)
-                    return self._broken(flying, pending)
+                    return [*self._lost(flying), item]
             done, _ = wait(flying, return_when=FIRST_COMPLETED)
             for future in done:
                 fault = future.exception()
                 if isinstance(fault, BrokenExecutor):
-                    return self._broken(flying, pending)
+                    return self._lost(flying)
                 item = flying.pop(future)
                 if fault is None:
                     self._finish(item, *future.result())
@@ -210,29 +205,27 @@ class _Run:
 
     def on_this_machine(self, pending: deque[Item], workers: int) -> None:
         """Run what is pending in processes; where one dies, begin again with what it left."""
-        while pending:
+        suspects: deque[Item] = deque()
+        while pending or suspects:
             with _pool(workers) as pool:
-                suspects = self.through(pool, pending, _AT_HAND * workers)
-            # One of these may have killed its worker: alone, a second death tells which.
-            for suspect in suspects:
-                alone: deque[Item] = deque([suspect])
-                with _pool(1) as pool:
-                    self.through(pool, alone, 1)
-                if alone:
-                    died = "its process died twice, the second time with nothing else at work"
-                    self._finish(suspect, {"error": died, "fault": True}, b"")
-                if suspect in pending:
-                    pending.remove(suspect)
+                # One of these killed its worker: alone, a second death tells which.
+                while suspects:
+                    suspect = suspects.popleft()
+                    if self.through(pool, deque([suspect]), 1):
+                        died = "its process died twice, the second time with nothing else at work"
+                        self._finish(suspect, {"error": died, "fault": True}, b"")
+                        break
+                else:
+                    suspects.extend(self.through(pool, pending, _AT_HAND * workers))
 
-    def _broken(self, flying: dict[Future[_Result], Item], pending: deque[Item]) -> list[Item]:
-        """Keep what had been finished; put the rest back, and return it."""
+    def _lost(self, flying: dict[Future[_Result], Item]) -> list[Item]:
+        """Keep what had been finished when the executor broke, and return the rest."""
         lost = []
         for future, item in flying.items():
             if future.done() and not future.cancelled() and future.exception() is None:
                 self._finish(item, *future.result())
             else:
                 lost.append(item)
-        pending.extendleft(reversed(lost))
         return lost
 
     def _finish(self, item: Item, found: dict[str, Any], archive: bytes) -> None:

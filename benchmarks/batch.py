@@ -1,0 +1,54 @@
+"""How much faster two processes plan than one, and what a batch costs besides planning."""
+
+import argparse
+import tempfile
+import time
+
+import selfmotion as sm
+
+
+def problems(count):
+    """Return Pandas on circles of many durations."""
+    panda = sm.load_robot("panda")
+    start = panda.dexterous_configuration()
+    pose = panda.pose(start)
+    return [
+        sm.Problem(panda, sm.Circle.around(pose, 0.15, 3.0 + k / count), start=start)
+        for k in range(count)
+    ]
+
+
+def timed(count, workers):
+    """Return problems per second once all processes plan, overhead per plan and time to begin."""
+    ends, began = [], time.perf_counter()
+    with tempfile.TemporaryDirectory() as out:
+        batch = sm.plan_many(
+            problems(count),
+            out=out,
+            workers=workers,
+            progress=lambda found: ends.append(time.perf_counter()),
+        )
+    assert all(row.verified for row in batch.rows)
+    # The first plans of a process load what is compiled; from then on it is at speed.
+    first = 4 * workers
+    span = ends[-1] - ends[first - 1]
+    # Rows of problems in the order they were given, which is that of one worker.
+    busy = sum(row.seconds for row in batch.rows[first:])
+    overhead = (workers * span - busy) / (count - first)
+    return (count - first) / span, overhead, ends[0] - began
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=150)
+    count = parser.parse_args().count
+    timed(8, 1)  # compiles, where nothing has
+    one, overhead, begin = timed(count, 1)
+    two, _, _ = timed(count, 2)
+    print(f"one process: {one:.1f} plans per second, first plan after {begin:.1f} s")
+    print(f"besides planning and saving: {1e3 * overhead:.1f} ms per plan")
+    print(f"two processes: {two:.1f} plans per second, {two / one:.2f} × as many")
+
+
+if __name__ == "__main__":
+    main()
