@@ -265,6 +265,11 @@ def test_examples_run_as_they_are(name: str, tmp_path: Path) -> None:
         example_text("none", "cell.toml")
 
 
+def test_the_example_cell_runs() -> None:
+    cell = Path(__file__).parents[1] / "examples" / "cell.toml"
+    assert sm.read_job(cell).plan().certificate.verified
+
+
 def test_the_schema_accepts_what_is_read_and_refuses_what_is_not(tmp_path: Path) -> None:
     schema = json_schema()
     jsonschema.Draft202012Validator.check_schema(schema)

@@ -5,6 +5,7 @@ import dataclasses
 import html
 import io
 import json
+import urllib.parse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -162,7 +163,8 @@ def _page(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
 
     def cell(k: int, text: str) -> str:
         safe = html.escape(text)
-        shown = f'<a href="{safe}">{header[k]}</a>' if k in linked and text else safe
+        address = urllib.parse.quote(text)
+        shown = f'<a href="{address}">{header[k]}</a>' if k in linked and text else safe
         return f"<td>{shown}</td>"
 
     rows = ("".join(cell(k, text) for k, text in enumerate(line)) for line in lines)

@@ -91,7 +91,6 @@ def plan(
     as_json: options.JsonOption = False,
 ) -> None:
     """Plan a motion, check it, and write it."""
-    check_suffixes(out or [])
     shell = documents.Shell(
         path, circle, line, normal, duration, feed, jump, frame, corners, task, start, warm, tool,
         lock or [], degree, mu, cost or [], velocity, acceleration, closed, obstacles, clearance,
@@ -99,6 +98,7 @@ def plan(
     )  # fmt: skip
     names = {field.name for field in dataclasses.fields(shell)}
     job = documents.read(problem, shell, settings or [], _typed(context, names), allow_code)
+    check_suffixes([*job.outputs, *(out or [])])
     asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
     given = {key: value for key, value in asked.items() if value is not None}
     result = _plan_with_progress(job.problem, **{**job.settings, **given})
@@ -371,8 +371,10 @@ def _write(result: sm.Plan, out: list[Path], html: Path | None, *, quiet: bool =
             result.to_csv(file)
         elif file.suffix == ".html":
             _replay(result, file)
-        else:
+        elif file.suffix == ".npz":
             result.save(file)
+        else:
+            sm.write_motion(result, file)
     if html is not None:
         _replay(result, html)
     for file in [*out, *([] if html is None else [html])]:
@@ -389,7 +391,8 @@ def _replay(result: sm.Plan, file: Path) -> None:
 def check_suffixes(files: list[Path]) -> None:
     """Raise FileFormatError for a file that --out cannot write."""
     for file in files:
-        if file.suffix not in (".csv", ".npz", ".html"):
+        if file.suffix not in (".npz", ".html", *formats.SUFFIXES):
+            known = ", ".join(formats.SUFFIXES)
             raise sm.FileFormatError(
-                f"{file}: --out writes .npz (the plan), .csv (its motion) or .html (its replay)"
+                f"{file}: --out writes .npz (the plan), .html (its replay) or its motion ({known})"
             )

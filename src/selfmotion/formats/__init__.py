@@ -4,7 +4,7 @@ from typing import Any
 
 from selfmotion.formats.documents import in_si, read_document, write_document, write_text
 from selfmotion.formats.example import example_text
-from selfmotion.formats.motions import FORMS, READABLE, read_motion, write_motion
+from selfmotion.formats.motions import FORMS, READABLE, SUFFIXES, read_motion, write_motion
 from selfmotion.formats.overrides import grid_documents, parse_setting, set_key
 from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import pose_of
@@ -14,6 +14,7 @@ from selfmotion.formats.problem_writing import write_job, write_problem
 __all__ = [
     "FORMS",
     "READABLE",
+    "SUFFIXES",
     "Job",
     "example_text",
     "grid_documents",

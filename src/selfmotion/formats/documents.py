@@ -9,9 +9,10 @@ from typing import IO, Any
 
 from selfmotion.basics import FileFormatError, write_atomically
 
+# Keys with a number for each joint.
+PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "start", "upper")
 # Keys that may end in _deg or _mm: nothing else is an angle or a length.
-_PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "start", "upper")
-ANGLES = frozenset(("band", "corner_angle", "margin", "rotation_vector", "rpy", *_PER_JOINT))
+ANGLES = frozenset(("band", "corner_angle", "margin", "rotation_vector", "rpy", *PER_JOINT))
 _SIZES = ("length", "radius", "size")
 LENGTHS = frozenset(("band", "by", "center", "distance", "jump", "position", "positions", *_SIZES))
 _SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}

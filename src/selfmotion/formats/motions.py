@@ -55,9 +55,9 @@ def write_motion(
         The rate gives no samples, or the arm has what the format cannot say.
     """
     path = Path(file)
-    name = _SUFFIXES.get(path.suffix) if form is None else form
+    name = SUFFIXES.get(path.suffix) if form is None else form
     if name is None or name not in _WRITERS:
-        known = ", ".join(f"{form} ({suffix})" for suffix, form in _SUFFIXES.items())
+        known = ", ".join(f"{form} ({suffix})" for suffix, form in SUFFIXES.items())
         found = f"suffix '{path.suffix}'" if form is None else f"form '{form}'"
         raise FileFormatError(f"{path}: {found} is no format of motions: {known}, moveit")
     if name == "urscript" and rate is None:
@@ -183,7 +183,7 @@ _WRITERS: Mapping[str, _Writer] = {
     "mujoco": _write_mujoco,
     "urscript": _write_urscript,
 }
-_SUFFIXES = {
+SUFFIXES = {
     ".csv": "csv",
     ".npz": "npz",
     ".json": "json",

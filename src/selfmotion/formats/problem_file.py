@@ -21,7 +21,7 @@ from selfmotion.collision import obstacle_from_dict
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost, FunctionCost
 from selfmotion.formats.code import FUNCTION, name_kinds
-from selfmotion.formats.documents import in_si, read_document
+from selfmotion.formats.documents import PER_JOINT, in_si, read_document
 from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.motion import NullMotion
@@ -34,9 +34,6 @@ from selfmotion.task import Damping, Relaxation, Task
 
 if TYPE_CHECKING:
     import pinocchio as pin
-
-# Keys whose numbers are one for each joint: degrees make no sense where a joint slides.
-_PER_JOINT = ("start_deg", "q_deg", "qd_deg", "lower_deg", "upper_deg", "limit_deg", "posture_deg")
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +142,10 @@ def _degrees_per_joint(document: Any, where: str = "") -> str:
     elif isinstance(document, list):
         items = enumerate(document)
     for key, value in items:
-        if key in _PER_JOINT and isinstance(value, list):
+        # Where a joint slides, degrees make no sense.
+        name = str(key)
+        joints = name.endswith("_deg") and name.removesuffix("_deg") in PER_JOINT
+        if joints and isinstance(value, list):
             return f"{where}{key}"
         found = _degrees_per_joint(value, f"{where}{key}.")
         if found:
@@ -222,7 +222,8 @@ class _Reader:
         return load_robot(chosen, **values, arguments=arguments)
 
     def _path(self, values: dict[str, Any], robot: RobotModel, start: Array | None) -> Path:
-        frame, kind = values.pop("frame", None), values.get("kind")
+        kind = values.get("kind")
+        frame = None if kind == Placed.kind else values.pop("frame", None)
         if kind in ("circle", "line") and "start" not in values:
             if start is None:
                 raise ProblemError(
