@@ -1,11 +1,15 @@
 """The command line in this process, which spares each test the start of Python."""
 
+import io
+import sys
+from contextlib import redirect_stderr
 from pathlib import Path
+from unittest.mock import patch
 
+import pytest
 from typer.testing import CliRunner
 
-import selfmotion as sm
-from selfmotion.cli import app
+from selfmotion.cli import app, main
 
 
 def invoke(*arguments: str | Path) -> tuple[int, str]:
@@ -17,11 +21,15 @@ def invoke(*arguments: str | Path) -> tuple[int, str]:
 
 
 def complaint(*arguments: str | Path) -> str:
-    """Return the one line that `main` prints before it exits with 2."""
-    try:
-        code, output = invoke(*arguments)
-    except sm.SelfmotionError as error:
-        line = f"error: {error}"
-        assert "\n" not in line
-        return line
-    raise AssertionError(f"exit code {code}: {output}")
+    """Return the one line that the command prints for bad input, with exit code 2."""
+    printed = io.StringIO()
+    with (
+        patch.object(sys, "argv", ["selfmotion", *map(str, arguments)]),
+        redirect_stderr(printed),
+        pytest.raises(SystemExit) as stopped,
+    ):
+        main()
+    assert stopped.value.code == 2
+    (line,) = printed.getvalue().strip().splitlines()
+    assert line.startswith("error: ")
+    return line

@@ -2,8 +2,11 @@
 
 import json
 import sys
+from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -12,7 +15,14 @@ import pytest
 
 import selfmotion as sm
 from conftest import PANDA_HOME, robot_named
-from selfmotion.formats import example_text, grid_documents, json_schema, read_document, write_job
+from selfmotion.formats import (
+    example_text,
+    grid_documents,
+    job_of,
+    json_schema,
+    read_document,
+    write_job,
+)
 from shell import complaint, invoke
 
 CELL = """
@@ -292,7 +302,7 @@ MALFORMED = [
     ('task = "pose"', 'tsk = "pose"', "tsk: unknown key, did you mean 'task'?"),
     ('start = "home"', 'start = "hme"', "start: is 'hme', expected 'free', 'home'"),
     ('start = "home"', "start = [1, 2]", "start: configuration has shape (2,), expected (7,)"),
-    ('start = "home"', "start = [1, 2, 3, 4, 5, 6, nan]", "start: joint 'panda_joint7' is nan"),
+    ('start = "home"', "start = [1, 2, 3, 4, 5, 6, nan]", "start: is [1, 2, 3, 4, 5, 6, nan]"),
     ('start = "home"', 'start = "free"', "path: start: is missing, and there is no start conf"),
     ("= 50\n", "= 0.5\n", "max_evaluations: is 0.5, expected a whole number"),
     ('name = "panda"', 'name = "pnda"', "robot: name: unknown robot 'pnda', known: planar_3r"),
@@ -366,3 +376,40 @@ def test_degrees_are_refused_for_joints_that_slide(tmp_path: Path) -> None:
     file = written(tmp_path, text + 'path = { kind = "line", by = [0, 0, 0.1], duration = 1 }')
     with pytest.raises(sm.FileFormatError, match="start_deg: joint 'torso_lift_joint' slides"):
         sm.read_problem(file)
+
+
+JUNK = [
+    None, True, 0, -1, 1e300, 10**30, float("nan"), float("inf"), "", "1", [], [1, 2, 3], ["a"],
+    [[1, 2], [3]], [True, 1, 2], [0.0] * 7, {}, {"a": 1}, [{}],
+]  # fmt: skip
+
+
+def places(node: Any, way: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Yield the way to each value of a document."""
+    if way:
+        yield way
+    if isinstance(node, dict | list):
+        for key, value in node.items() if isinstance(node, dict) else enumerate(node):
+            yield from places(value, (*way, key))
+
+
+def test_whatever_is_put_anywhere_is_planned_or_refused_by_name(tmp_path: Path) -> None:
+    """A problem, or one line that begins with the file: never another exception."""
+    sound = read_document(written(tmp_path, CELL))
+    rng, memory, said = np.random.default_rng(0), dict[str, Any](), list[str]()
+    ways = list(places(sound))
+    for _ in range(150):
+        document = deepcopy(sound)
+        *way, last = ways[rng.integers(len(ways))]
+        node = document
+        for key in way:
+            node = node[key]
+        node[last] = JUNK[rng.integers(len(JUNK))]
+        try:
+            job_of(document, tmp_path / "cell.toml", memory=memory)
+        except sm.SelfmotionError as error:
+            said.append(str(error))
+    assert len(said) > 75
+    for line in said:
+        assert line.startswith(f"{tmp_path / 'cell.toml'}: ")
+        assert "\n" not in line

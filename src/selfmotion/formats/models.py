@@ -12,6 +12,7 @@ from functools import lru_cache, reduce
 from operator import or_
 from typing import Annotated, Any, Literal, get_args
 
+import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema, create_model
@@ -33,6 +34,8 @@ from selfmotion.task import Damping, Relaxation, Task
 # Kinds that no file names: what is missing of a plan, a cost that damping adds, functions (which
 # are named by module:attribute).
 _NOT_IN_FILES = {"LostCost", "OffPath", "FunctionCost"}
+# No angle, length, weight or time is beyond this, and its square is a number still.
+_HUGE = 1e15
 _STRICT = ConfigDict(extra="forbid", protected_namespaces=())
 
 
@@ -41,11 +44,16 @@ def _checked(kind: type | tuple[type, ...], what: str, schema: dict[str, Any]) -
 
     def check(value: Any) -> Any:
         sound = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
-        if not sound or (isinstance(value, float) and math.isnan(value)):
+        if not sound or (isinstance(value, int | float) and not _is_sensible(value)):
             raise ValueError(f"is {value!r}, expected {what}")
         return value
 
     return Annotated[Any, PlainValidator(check), WithJsonSchema(schema)]
+
+
+def _is_sensible(value: float) -> bool:
+    """Whether float64 can count with a number; infinity may mean that there is no limit."""
+    return not math.isnan(value) and (abs(value) < _HUGE or math.isinf(value))
 
 
 def _are_numbers(value: Any) -> bool:
@@ -57,6 +65,12 @@ def _are_numbers(value: Any) -> bool:
 def _numbers(value: Any) -> Any:
     if not _are_numbers(value):
         raise ValueError(f"is {value!r}, expected a number or a list of numbers")
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (ValueError, OverflowError):
+        raise ValueError(f"is {value!r}, expected rows of equal length") from None
+    if not all(map(_is_sensible, array.ravel().tolist())):
+        raise ValueError(f"is {value!r}, expected numbers that are not NaN, nor above {_HUGE:g}")
     return value
 
 
@@ -82,7 +96,7 @@ def _coordinates(value: Any) -> Any:
 
 
 def _is_number(value: Any) -> bool:
-    return _are_numbers(value) and not isinstance(value, list)
+    return _are_numbers(value) and not isinstance(value, list) and _is_sensible(value)
 
 
 def _start(value: Any) -> Any:

@@ -11,6 +11,8 @@ from selfmotion.path import as_pose
 
 # A quaternion shorter than this has no direction.
 _ZERO = 1e-9
+# No position or angle is beyond this, NaN and infinity included.
+_HUGE = 1e15
 
 
 def from_quaternion(values: Array) -> Array:
@@ -92,6 +94,6 @@ def numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise ValueError(f"{what} is {value!r}, expected {size} numbers") from None
-    if array.shape != shape or not np.all(np.isfinite(array)):
+    if array.shape != shape or not np.all(np.abs(array) < _HUGE):
         raise ValueError(f"{what} is {value!r}, expected {size} finite numbers")
     return array

@@ -242,7 +242,7 @@ class _Reader:
             case "line":
                 path = _line(values)
             case _:
-                path = restore(Path, values)
+                path = _restored(values)
         return path if frame is None else Placed(path, frame)
 
     def _cost(self, values: Mapping[str, Any], robot: RobotModel) -> Cost:
@@ -327,6 +327,18 @@ def _start(given: Any, robot: RobotModel, task: Task) -> Array | None:
             return robot.configuration(np.array(arm.home))
     homes = ", ".join(name for name, arm in NAMED_ARMS.items() if arm.home is not None)
     raise RobotError(f"is 'home', which is known of {homes} only; give numbers, or 'dexterous'")
+
+
+def _restored(values: Mapping[str, Any]) -> Path:
+    """Return a path of tables of numbers, such as a plan's file has; ProblemError for others."""
+    try:
+        with np.errstate(invalid="raise", over="raise"):
+            path: Path = restore(Path, values)
+            path.samples([0.0, 0.5 * path.duration, path.duration])
+    except (ArithmeticError, IndexError, TypeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise ProblemError(f"{values['kind']}: is no path with these numbers: {reason}") from error
+    return path
 
 
 def _circle(values: dict[str, Any]) -> Path:
