@@ -6,7 +6,6 @@ import tempfile
 import threading
 import time
 from collections.abc import Mapping
-from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +60,8 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
 
 def leave_with_parent() -> None:
     """End this process when the one that started it does, however that ended."""
+    from multiprocessing import parent_process
+
     parent = parent_process()
     if parent is None:
         return

@@ -1,6 +1,5 @@
 """The command line: parse, call, print."""
 
-import dataclasses
 import json
 import sys
 import traceback
@@ -91,13 +90,7 @@ def plan(
     as_json: options.JsonOption = False,
 ) -> None:
     """Plan a motion, check it, and write it."""
-    shell = documents.Shell(
-        path, circle, line, normal, duration, feed, jump, frame, corners, task, start, warm, tool,
-        lock or [], degree, mu, cost or [], velocity, acceleration, closed, obstacles, clearance,
-        srdf, no_collision, relax or [], damped,
-    )  # fmt: skip
-    names = {field.name for field in dataclasses.fields(shell)}
-    job = documents.read(problem, shell, settings or [], _typed(context, names), allow_code)
+    job = documents.read(context, problem, settings or [], allow_code)
     check_suffixes([*job.outputs, *(out or [])])
     asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
     given = {key: value for key, value in asked.items() if value is not None}
@@ -108,16 +101,6 @@ def plan(
         tables.show(result, _console)
     _write(result, [*job.outputs, *(out or [])], html, quiet=as_json)
     raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
-
-
-def _typed(context: typer.Context, names: set[str]) -> list[str]:
-    """Return those of the options that were typed."""
-    return [
-        parameter.opts[0]
-        for parameter in context.command.params
-        if parameter.name in names
-        and str(context.get_parameter_source(parameter.name or "")).endswith("COMMANDLINE")
-    ]
 
 
 @app.command(epilog="Example: selfmotion init panda; then: selfmotion plan panda.toml")

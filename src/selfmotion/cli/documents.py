@@ -1,8 +1,10 @@
 """What the options of ``selfmotion plan`` say, as the table of a problem file."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
+
+import typer
 
 import selfmotion as sm
 from selfmotion.cli import options
@@ -42,6 +44,13 @@ class Shell:
     no_collision: bool
     relax: list[str]
     damped: bool
+
+    @classmethod
+    def of(cls, context: typer.Context) -> "Shell":
+        """Return what was typed, of a command that has all these options."""
+        given = {field.name: context.params[field.name] for field in fields(cls)}
+        lists = {name: list(given[name] or []) for name in ("lock", "cost", "relax")}
+        return cls(**{**given, **lists})
 
     def document(self, robot: str) -> dict[str, Any]:
         """Return the table."""
@@ -112,17 +121,16 @@ class Shell:
         return found
 
 
-def read(
-    given: str, shell: Shell, settings: list[str], typed: list[str], allow_code: bool
-) -> "Any":
+def read(context: typer.Context, given: str, settings: list[str], allow_code: bool) -> sm.Job:
     """Return the job of a problem file, or of a robot with the options of the shell.
 
-    `typed` are the options that say what a problem file says itself: with one, they are refused.
+    Options that say what a problem file says itself are refused beside one.
     """
     file = Path(given) if Path(given).suffix in (".toml", ".json") else None
     if file is None:
-        document = shell.document(given)
+        document = Shell.of(context).document(given)
     else:
+        typed = _typed(context)
         if typed:
             raise sm.ProblemError(
                 f"{file}: the problem is in the file, so that {typed[0]} has no effect; change the "
@@ -135,6 +143,17 @@ def read(
     for text in settings:
         set_key(document, *parse_setting(text))
     return job_of(document, file, allow_code=allow_code)
+
+
+def _typed(context: typer.Context) -> list[str]:
+    """Return those of the options of `Shell` that were typed."""
+    names = {field.name for field in fields(Shell)}
+    return [
+        parameter.opts[0]
+        for parameter in context.command.params
+        if parameter.name in names
+        and str(context.get_parameter_source(parameter.name or "")).endswith("COMMANDLINE")
+    ]
 
 
 def _cost(text: str) -> dict[str, Any]:
