@@ -188,6 +188,16 @@ def test_an_executor_that_breaks_leaves_what_was_done(grid: Path, tmp_path: Path
     assert plan_items(grid_items(grid), InPlace(), out=tmp_path).resumed == 5
 
 
+def test_whoever_stops_a_batch_keeps_what_is_done(grid: Path, tmp_path: Path) -> None:
+    def stop(found: BatchProgress) -> None:
+        if found.done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        plan_items(grid_items(grid), InPlace(), out=tmp_path, progress=stop)
+    assert plan_items(grid_items(grid), InPlace(), out=tmp_path).resumed == 2
+
+
 def test_a_problem_that_changed_is_planned_anew(grid: Path, tmp_path: Path) -> None:
     plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
     grid.write_text(GRID.replace("[3, 4, 5]", "[3, 4.5, 5]"))

@@ -4,6 +4,7 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -16,6 +17,7 @@ from conftest import PANDA_HOME, robot_named
 from selfmotion.formats import (
     example_text,
     grid_documents,
+    job_of,
     json_schema,
     read_document,
     write_job,
@@ -194,6 +196,21 @@ def test_code_of_the_user_is_loaded_only_where_allowed(tmp_path: Path) -> None:
         sm.FileFormatError, match=r"costs\[1\]\.mus: unknown key, did you mean 'mu'"
     ):
         sm.read_problem(wrong, allow_code=True)
+
+
+def test_poses_that_differ_in_the_last_digits_are_two(tmp_path: Path) -> None:
+    grid = CELL.replace("lock =", "base = { position = [0, 0, 0] }\nlock =")
+    grid += '[grid]\n"robot.base.position" = [[0, 0, 1e-9], [0, 0, 2e-9]]\n'
+    memory: dict[str, Any] = {}
+    documents = grid_documents(read_document(written(tmp_path, grid)))
+    heights = [
+        job_of(one, tmp_path / "a.toml", memory=memory)
+        .problem.robot.pose(PANDA_HOME)
+        .translation[2]
+        for one, _ in documents
+    ]
+    assert heights[1] - heights[0] == pytest.approx(1e-9, rel=1e-3)
+    assert len(memory) == 4
 
 
 def test_grids_are_all_combinations(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 from selfmotion.basics import PlanError, SelfmotionError
 from selfmotion.batch.folder import Folder, Row
 from selfmotion.batch.items import Item, problem_items
-from selfmotion.batch.worker import leave_with_parent, plan_task
+from selfmotion.batch.worker import begin_process, plan_task
 from selfmotion.formats import Job
 from selfmotion.plans import Problem
 
@@ -251,9 +251,14 @@ def _pool(workers: int) -> Iterator[Executor]:
     os.environ.update({name: value or "1" for name, value in before.items()})
     try:
         with ProcessPoolExecutor(
-            workers, multiprocessing.get_context("spawn"), initializer=leave_with_parent
+            workers, multiprocessing.get_context("spawn"), initializer=begin_process
         ) as pool:
-            yield pool
+            try:
+                yield pool
+            except BaseException:
+                # Whoever stops a batch waits for the plans at work, not for those in line.
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
     finally:
         for name, value in before.items():
             if value is None:

@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import signal
 import tempfile
 import threading
 import time
@@ -58,10 +59,12 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
     return row, archive
 
 
-def leave_with_parent() -> None:
-    """End this process when the one that started it does, however that ended."""
+def begin_process() -> None:
+    """Leave Ctrl-C to the process that started this one; end when that does, however it ends."""
     from multiprocessing import parent_process
 
+    # A plan that is interrupted is the best so far, which must not count as finished.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     if parent is None:
         return

@@ -281,10 +281,14 @@ def batch(
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise sm.ProblemError(f"two problem files are called '{twice}'; rename one of them")
-    with executor_at(dask) as executor, BatchDisplay(_stages) as display:
-        result = plan_items(
-            items, executor, out=out, workers=workers, replays=replays, progress=display.show
-        )
+    try:
+        with executor_at(dask) as executor, BatchDisplay(_stages) as display:
+            result = plan_items(
+                items, executor, out=out, workers=workers, replays=replays, progress=display.show
+            )
+    except KeyboardInterrupt:
+        _complain(f"stopped; what is finished is in '{out}': run again to go on")
+        raise typer.Exit(NOT_VERIFIED) from None
     if as_json:
         _console.print_json(data=tables.batch_json(result))
     else:

@@ -93,7 +93,8 @@ def _code(name: Any, where: str, folder: FilePath, allowed: bool) -> Any:
         sys.path.insert(0, place)
     try:
         return getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError, SyntaxError) as error:
+    # A module of the user's may raise anything.
+    except Exception as error:
         raise FileFormatError(
             f"{where}: '{name}' cannot be imported: {error}; expected module:attribute, the module "
             f"in {folder} or installed"

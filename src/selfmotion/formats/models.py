@@ -10,7 +10,8 @@ import math
 from collections.abc import Iterable, Mapping
 from functools import lru_cache, reduce
 from operator import or_
-from typing import Annotated, Any, Literal, get_args
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 import numpy.typing as npt
@@ -307,5 +308,6 @@ def _type_of(annotation: Any) -> Any:
         return _LAWS
     if isinstance(annotation, type) and dataclasses.is_dataclass(annotation):
         return model_of(annotation)
-    rest = parts - {type(None)}
-    return _type_of(rest.pop()) if len(rest) == 1 else Any
+    # Of a list or a tuple, the parts are those of its items.
+    rest = parts - {type(None)} if get_origin(annotation) in (Union, UnionType) else ()
+    return _type_of(*rest) if len(rest) == 1 else Any

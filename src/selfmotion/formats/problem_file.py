@@ -1,5 +1,6 @@
 """From a problem file to a problem, and how to plan it."""
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -171,7 +172,8 @@ class _Reader:
         task = Task.of(table.get("task", "pose"))
         with _named(file, "start"):
             given = table.get("start", "free")
-            start = self._once((table["robot"], given, task), lambda _: _start(given, robot, task))
+            asked = (table["robot"], given, task.value)
+            start = self._once(asked, lambda _: _start(given, robot, task))
         with _named(file, "path"):
             path = self._path(dict(table["path"]), robot, start)
         options: dict[str, Any] = {}
@@ -194,7 +196,8 @@ class _Reader:
         return Job(problem, **self._settings())
 
     def _once(self, values: Any, make: Callable[[Any], Any]) -> Any:
-        key = repr(values)
+        # With all digits of poses, which their own text leaves out.
+        key = json.dumps(values, default=lambda pose: pose.homogeneous.tolist())
         if key not in self.memory:
             self.memory[key] = make(values)
         return self.memory[key]
