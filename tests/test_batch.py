@@ -113,8 +113,21 @@ def test_a_dask_cluster_gives_the_same(reference: sm.Batch, grid: Path, tmp_path
             "batch", grid, "--dask", cluster.scheduler_address, "--out", tmp_path / "out",
             "--replays", "0", "--json",
         )  # fmt: skip
+        with distributed.Client(cluster) as client:
+            pids, done = list(client.run(os.getpid).values()), list[int]()
+
+            def kill_one(found: BatchProgress) -> None:
+                done.append(found.done)
+                if found.done == 2:
+                    os.kill(pids[0], signal.SIGKILL)
+
+            lost = plan_items(
+                grid_items(grid), client.get_executor(), out=tmp_path / "lost", progress=kill_one
+            )
     assert code == 0
     assert len(json.loads(text)["rows"]) == 6
+    assert done == [1, 2, 3, 4, 5, 6]
+    same(lost, reference)
     again = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
     assert again.resumed == 6
     same(again, reference)

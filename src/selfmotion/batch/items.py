@@ -54,6 +54,10 @@ class Item:
         modules = sorted(name for name in own if not name.startswith(("selfmotion.", "__main__")))
         return {"problem": problem, "options": job.settings, "modules": modules}
 
+    def forget(self) -> None:
+        """Let go of the task, which is large and not needed any more."""
+        self.__dict__.pop("task", None)
+
     @cached_property
     def key(self) -> str:
         """A digest of all that decides the plan."""

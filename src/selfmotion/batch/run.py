@@ -196,6 +196,7 @@ class _Run:
         if row is not None:
             self.rows[item.name] = row
             self.resumed += 1
+            item.forget()
             return None
         try:
             return item.task
@@ -232,8 +233,7 @@ class _Run:
         file = self._folder.plan_file(item.name)
         row = Row(item.name, item.key, file, dict(item.settings), **found)
         self.rows[item.name] = self._folder.record(row, archive)
-        # What a worker was sent is not needed any more, and may be large.
-        item.__dict__.pop("task", None)
+        item.forget()
         done, total = len(self.rows), len(self._items)
         rate = (done - self.resumed) / max(time.monotonic() - self._began, 1e-9)
         failed = sum(bool(row.error) for row in self.rows.values())

@@ -7,7 +7,8 @@ from selfmotion.task import Task
 _TEXT = """\
 # What to plan: selfmotion plan {file}
 # Units are SI; keys may end in _deg or _mm for degrees and millimetres.
-# All keys: selfmotion schema --out problem.schema.json (for completion in an editor)
+# All keys: selfmotion schema --out problem.schema.json; editors complete them by a first line
+# "#:schema ./problem.schema.json".
 
 task = "{task}"        # pose, position, pointing (rotation about the tool axis free), planar, …
 start = "dexterous"    # or "free" (the best of many is found), "home", or numbers per joint

@@ -271,7 +271,7 @@ def _check_jumps(file: FilePath, rows: _Rows, rotations: Array, jump: float) -> 
     cosines = np.einsum("kij,kij->k", rotations[:-1], rotations[1:])
     turns = np.arccos(np.clip(0.5 * (cosines - 1.0), -1.0, 1.0))
     for what, amounts, bound, unit, remedy in (
-        ("jumps by", steps, jump, "m", f"more than {jump:g} m; if it is meant, give a larger jump"),
+        ("jumps by", steps, jump, "m", _remedy(jump)),
         ("turns by", turns, _FLIP, "rad", "which has no clear direction; add poses between"),
     ):
         far = np.flatnonzero(amounts > bound)
@@ -281,6 +281,13 @@ def _check_jumps(file: FilePath, rows: _Rows, rotations: Array, jump: float) -> 
                 f"{file}: {rows.places[row]}: the path {what} {amounts[row - 1]:.4g} {unit} from "
                 f"the pose before, {remedy}"
             )
+
+
+def _remedy(jump: float) -> str:
+    return (
+        f"more than {jump:g} m; give a larger jump if it is meant, or name the columns x_mm,… if "
+        f"they are millimetres"
+    )
 
 
 def _times(file: FilePath, rows: _Rows, feed: float | None, duration: float | None) -> Array:
