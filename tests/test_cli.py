@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from shell import invoke
 
 SELFMOTION = Path(sys.executable).with_name("selfmotion")
 
@@ -100,11 +101,17 @@ def test_robots_lists_every_arm() -> None:
     assert "panda_hand_tcp" in result.stdout
 
 
-@pytest.mark.parametrize("command", ["plan", "check", "replay", "robots", "demo", "study"])
+COMMANDS = (
+    "plan", "init", "schema", "check", "export", "compare", "replay", "batch", "robots", "demo",
+    "study",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 def test_help_has_an_example(command: str) -> None:
-    result = run(command, "--help")
-    assert result.returncode == 0
-    assert f"Example: selfmotion {command}" in result.stdout
+    code, text = invoke(command, "--help")
+    assert code == 0
+    assert f"Example: selfmotion {command}" in text
 
 
 def test_demo(tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ def test_import_leaves_the_heavy_and_optional_packages_alone() -> None:
     code = (
         "import sys, selfmotion; "
         "print([name for name in ('meshcat', 'matplotlib', 'trimesh', 'yourdfpy', 'toppra', "
-        "'typer', 'rich', 'scipy.integrate') if name in sys.modules])"
+        "'typer', 'rich', 'scipy.integrate', 'pydantic', 'tomli_w', 'xacro', 'distributed') "
+        "if name in sys.modules])"
     )
     result = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True

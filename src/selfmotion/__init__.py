@@ -31,6 +31,10 @@ from selfmotion.basics import (
     SelfmotionError,
     StartError,
 )
+from selfmotion.batch import (
+    Batch,
+    plan_many,
+)
 from selfmotion.certificate import (
     Certificate,
     Extreme,
@@ -82,6 +86,15 @@ from selfmotion.costs import (
     Samples,
     SmallestSingularValue,
 )
+from selfmotion.formats import (
+    Job,
+    read_job,
+    read_motion,
+    read_path,
+    read_problem,
+    write_motion,
+    write_problem,
+)
 from selfmotion.motion import (
     BSplineNullMotion,
     NullMotion,
@@ -105,6 +118,7 @@ from selfmotion.path import (
     Line,
     Path,
     PathSamples,
+    Placed,
     Ramped,
     Retimed,
     TwistPath,
@@ -142,6 +156,7 @@ if TYPE_CHECKING:
 __all__ = [
     "NAMED_ARMS",
     "BSplineNullMotion",
+    "Batch",
     "Binding",
     "BoundConstraint",
     "Box",
@@ -176,6 +191,7 @@ __all__ = [
     "InverseKinematicsError",
     "InverseManipulability",
     "Iteration",
+    "Job",
     "Joined",
     "JointAcceleration",
     "JointAccelerationLimits",
@@ -204,6 +220,7 @@ __all__ = [
     "PathError",
     "PathLength",
     "PathSamples",
+    "Placed",
     "Plan",
     "PlanError",
     "PolynomialNullMotion",
@@ -240,9 +257,16 @@ __all__ = [
     "load_robot",
     "plan",
     "plan_by",
+    "plan_many",
+    "read_job",
+    "read_motion",
+    "read_path",
+    "read_problem",
     "retime",
     "sample_problem",
     "slowdown",
+    "write_motion",
+    "write_problem",
 ]
 
 

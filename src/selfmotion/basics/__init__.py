@@ -18,6 +18,7 @@ from selfmotion.basics.errors import (
 )
 from selfmotion.basics.files import (
     read_archive,
+    read_rows,
     read_table,
     write_archive,
     write_atomically,
@@ -50,6 +51,7 @@ __all__ = [
     "per_joint",
     "read_archive",
     "read_only",
+    "read_rows",
     "read_table",
     "restore",
     "silent",

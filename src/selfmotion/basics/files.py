@@ -88,7 +88,13 @@ def write_csv(file: Path, header: Sequence[str], table: Array) -> None:
 
 
 def read_table(file: Path) -> tuple[list[str], Array]:
-    """Read a table of numbers with a header line.
+    """Read a table of numbers with a header line: names and values of `read_rows`."""
+    names, values, _ = read_rows(file)
+    return names, values
+
+
+def read_rows(file: Path) -> tuple[list[str], Array, list[int]]:
+    """Read a table of numbers with a header line, and tell on which line each row stands.
 
     Columns are separated by comma, semicolon or tab, whichever the header has; lines that begin
     with # and empty ones are left out, a byte order mark is not seen.
@@ -97,6 +103,7 @@ def read_table(file: Path) -> tuple[list[str], Array]:
     -------
     names : list of str
     values : (N, C)
+    lines : list of int
 
     Raises
     ------
@@ -116,7 +123,7 @@ def read_table(file: Path) -> tuple[list[str], Array]:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise FileFormatError(f"{file}: line {kept[0][0]}: column '{twice[0]}' appears twice")
-    rows = []
+    rows, numbers = [], []
     for number, line in kept[1:]:
         cells = line.split(mark)
         if len(cells) != len(names):
@@ -125,6 +132,7 @@ def read_table(file: Path) -> tuple[list[str], Array]:
             )
         try:
             rows.append([float(cell) for cell in cells])
+            numbers.append(number)
         except ValueError as error:
             raise FileFormatError(f"{file}: line {number}: {error}") from error
-    return names, np.array(rows, dtype=np.float64).reshape(-1, len(names))
+    return names, np.array(rows, dtype=np.float64).reshape(-1, len(names)), numbers

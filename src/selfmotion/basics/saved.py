@@ -47,6 +47,11 @@ class Saved:
             )
         cls._known[cls.kind] = cls
 
+    @classmethod
+    def kinds(cls) -> dict[str, type[Self]]:
+        """Return the classes of the family that files know, by kind."""
+        return dict(cls._known)  # type: ignore[arg-type]
+
     def to_dict(self) -> dict[str, Any]:
         """Return the description: ``kind`` and the fields.
 

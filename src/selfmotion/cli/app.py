@@ -1,5 +1,6 @@
 """The command line: parse, call, print."""
 
+import json
 import sys
 import traceback
 from pathlib import Path
@@ -10,7 +11,9 @@ import typer
 from rich.console import Console
 
 import selfmotion as sm
-from selfmotion.cli import options, tables
+from selfmotion import formats
+from selfmotion.cli import documents, options, tables
+from selfmotion.cli.batch_display import BatchDisplay, executor_at
 from selfmotion.cli.stage_display import StageDisplay
 
 app = typer.Typer(
@@ -46,68 +49,86 @@ def _complain(text: str) -> None:
 
 @app.command(
     epilog="Example: selfmotion plan panda --circle 0.15 --duration 4 --out plan.npz --html a.html"
+    "; or: selfmotion plan cell.toml"
 )
 def plan(
-    robot: options.RobotArgument,
+    context: typer.Context,
+    problem: options.ProblemArgument,
     path: options.PathOption = None,
     circle: options.CircleOption = None,
     line: options.LineOption = None,
     normal: options.NormalOption = "x",
-    duration: options.DurationOption = 4.0,
+    duration: options.DurationOption = None,
+    feed: options.FeedOption = None,
+    jump: options.JumpOption = None,
+    frame: options.FrameOption = None,
     corners: options.CornersOption = "blend",
     task: options.TaskOption = "pose",
     relax: options.RelaxOption = None,
     start: options.StartOption = None,
+    warm: options.FromOption = None,
     tool: options.ToolOption = None,
+    lock: options.LockOption = None,
     degree: options.DegreeOption = 3,
     mu: options.MuOption = 0.0,
+    cost: options.CostOption = None,
+    velocity: options.VelocityOption = None,
+    acceleration: options.AccelerationOption = None,
+    closed: options.ClosedOption = False,
+    obstacles: options.ObstaclesOption = None,
+    clearance: options.ClearanceOption = 0.0,
+    srdf: options.SrdfOption = None,
+    no_collision: options.NoCollisionOption = False,
     damped: options.DampedOption = False,
+    settings: options.SetOption = None,
     max_evaluations: options.LimitOption = None,
     search: options.SearchOption = None,
     compare: options.CompareOption = False,
+    allow_code: options.AllowCodeOption = False,
     out: options.OutOption = None,
     html: options.HtmlOption = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Plan a motion, check it, and write it."""
-    _check_suffixes(out or [])
-    arm = sm.load_robot(robot, tool=tool)
-    rows = sm.Task.of(task)
-    configuration = options.numbers(start, "--start") if start is not None else None
-    motion: sm.Path
-    if sum(option is not None for option in (path, circle, line)) != 1:
-        raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
-    if path is not None:
-        motion = sm.Waypoints.from_csv(path, corners=corners)
+    job = documents.read(context, problem, settings or [], allow_code)
+    check_suffixes([*job.outputs, *(out or [])])
+    asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
+    given = {key: value for key, value in asked.items() if value is not None}
+    result = _plan_with_progress(job.problem, **{**job.settings, **given})
+    if as_json:
+        _console.print_json(data=tables.plan_json(result))
     else:
-        if configuration is None:
-            configuration = arm.dexterous_configuration(rows)
-        pose = arm.pose(configuration)
-        if circle is not None:
-            axis = np.eye(3)["xyz".index(normal)]
-            motion = sm.Circle.around(pose, circle, duration, normal=axis)
-        else:
-            end = pose.copy()
-            end.translation = pose.translation + options.numbers(line or "", "--line", 3)
-            motion = sm.Line(pose, end, duration)
-    costs: list[sm.Cost] = [sm.JointVelocity()]
-    if mu != 0.0:
-        costs.append(sm.InverseManipulability(mu))
-    problem = sm.Problem(
-        arm,
-        motion,
-        rows,
-        configuration,
-        sm.PolynomialNullMotion(degree),
-        tuple(costs),
-        relaxations=[options.relaxation(text) for text in relax or []],
-        damping=sm.Damping() if damped else None,
-    )
-    result = _plan_with_progress(
-        problem, max_evaluations=max_evaluations, search=options.search_settings(search, compare)
-    )
-    tables.show(result, _console)
-    _write(result, out or [], html)
+        tables.show(result, _console)
+    _write(result, [*job.outputs, *(out or [])], html, quiet=as_json)
     raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion init panda; then: selfmotion plan panda.toml")
+def init(
+    robot: Annotated[str, typer.Argument(help="Name (see `selfmotion robots`).")],
+    out: Annotated[Path | None, typer.Option(help="File; by default ROBOT.toml.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
+) -> None:
+    """Write a commented problem file to begin with."""
+    file = Path(f"{robot}.toml") if out is None else out
+    text = formats.example_text(robot, file.name)
+    if file.exists() and not force:
+        raise sm.FileFormatError(f"{file}: is there already; give --out or --force")
+    formats.write_text(file, text)
+    _console.print(f"wrote {file}", markup=False)
+
+
+@app.command(epilog="Example: selfmotion schema --out problem.schema.json")
+def schema(
+    out: Annotated[Path | None, typer.Option(help="File; by default the terminal.")] = None,
+) -> None:
+    """Write the JSON Schema of problem files, for completion in an editor."""
+    text = json.dumps(formats.json_schema(), indent=1)
+    if out is None:
+        typer.echo(text)
+        return
+    formats.write_text(out, text + "\n")
+    _console.print(f"wrote {out}", markup=False)
 
 
 @app.command(
@@ -141,9 +162,9 @@ def check(
         arm = sm.load_robot(robot, tool=tool, lock=options.locks(lock or []))
         certificate = sm.certify(
             arm,
-            sm.Waypoints.from_csv(path, corners=corners),
+            formats.read_path(path, corners=corners),
             task,
-            sm.Trajectory.from_csv(file, degrees=degrees),
+            sm.read_motion(file, degrees=degrees),
             sm.Tolerance(tolerance, tolerance),
             options.requirements(arm, velocity, acceleration, obstacles, clearance, srdf),
         )
@@ -152,6 +173,56 @@ def check(
     else:
         tables.show_certificate(certificate, _console)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500")
+def export(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    out: Annotated[
+        list[Path],
+        typer.Option(
+            help="File: .csv, .npz, .json, .yaml (ROS 2 JointTrajectory), .xml (MuJoCo keyframes), "
+            ".script (URScript). Repeatable."
+        ),
+    ],
+    rate: Annotated[
+        float | None, typer.Option(help="Samples per second; by default the plan's own.")
+    ] = None,
+    form: Annotated[
+        str | None,
+        typer.Option("--format", help=f"Whatever the suffix: {', '.join(formats.FORMS)}."),
+    ] = None,
+) -> None:
+    """Write a plan's motion for controllers and simulators, and check what was written."""
+    saved = sm.load_plan(file)
+    verified = not saved.altered
+    for target in out:
+        sm.write_motion(saved, target, rate=rate, form=form)
+        if form in formats.READABLE or (form is None and target.suffix not in (".xml", ".script")):
+            found = saved.problem.certify(
+                sm.read_motion(target), saved.tolerance, saved.report.ending
+            )
+            verified = verified and found.verified
+            _console.print(
+                f"wrote {target}; read back: {found.verdict}", markup=False, soft_wrap=True
+            )
+        else:
+            verified = verified and saved.certificate.verified
+            _console.print(f"wrote {target}", markup=False, soft_wrap=True)
+    raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion compare a.npz b.npz")
+def compare(
+    plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz.")],
+    as_json: options.JsonOption = False,
+) -> None:
+    """Compare plans: costs, durations, margins and verdicts, side by side."""
+    saved = {str(file): sm.load_plan(file) for file in plans}
+    if as_json:
+        _console.print_json(data={name: tables.plan_json(plan) for name, plan in saved.items()})
+    else:
+        tables.show_comparison(saved, _console)
 
 
 @app.command(
@@ -180,6 +251,50 @@ def replay(
         written.append(render_gif(saved[0], gif))
     for file in written:
         _console.print(f"wrote {file}", markup=False)
+
+
+@app.command(epilog="Example: selfmotion batch cell.toml --workers 2 --out out/batch")
+def batch(
+    files: Annotated[
+        list[Path], typer.Argument(help="Problem files; of a [grid], all combinations.")
+    ],
+    out: Annotated[
+        Path, typer.Option(help="Folder for plans and tables; a run that was killed goes on there.")
+    ] = Path("out/batch"),
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes; by default one for each core.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
+    ] = None,
+    replays: Annotated[
+        int, typer.Option(min=0, help="Write replays of so many of the best plans.")
+    ] = 3,
+    allow_code: options.AllowCodeOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Plan many problems at once, into a folder with a ranked table."""
+    from selfmotion.batch import grid_items, plan_items
+
+    items = [item for file in files for item in grid_items(file, allow_code=allow_code)]
+    names = [item.name for item in items]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise sm.ProblemError(f"two problem files are called '{twice}'; rename one of them")
+    try:
+        with executor_at(dask) as executor, BatchDisplay(_stages) as display:
+            result = plan_items(
+                items, executor, out=out, workers=workers, replays=replays, progress=display.show
+            )
+    except KeyboardInterrupt:
+        _complain(f"stopped; what is finished is in '{out}': run again to go on")
+        raise typer.Exit(NOT_VERIFIED) from None
+    if as_json:
+        _console.print_json(data=tables.batch_json(result))
+    else:
+        tables.show_batch(result, _console)
+    sound = all(row.verified for row in result.rows)
+    raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)
 
 
 @app.command(epilog="Example: selfmotion robots")
@@ -237,21 +352,34 @@ def _plan_with_progress(problem: sm.Problem, **options: Any) -> sm.Plan:
         return sm.plan(problem, callback=display.iteration, progress=display.stage, **options)
 
 
-def _write(result: sm.Plan, out: list[Path], html: Path | None) -> None:
+def _write(result: sm.Plan, out: list[Path], html: Path | None, *, quiet: bool = False) -> None:
     for file in out:
         if file.suffix == ".csv":
             result.to_csv(file)
-        else:
+        elif file.suffix == ".html":
+            _replay(result, file)
+        elif file.suffix == ".npz":
             result.save(file)
-        _console.print(f"wrote {file}", markup=False)
+        else:
+            sm.write_motion(result, file)
     if html is not None:
-        from selfmotion.replay import write_replay
+        _replay(result, html)
+    for file in [*out, *([] if html is None else [html])]:
+        if not quiet:
+            _console.print(f"wrote {file}", markup=False)
 
-        write_replay(result, html)
-        _console.print(f"wrote {html}", markup=False)
+
+def _replay(result: sm.Plan, file: Path) -> None:
+    from selfmotion.replay import write_replay
+
+    write_replay(result, file)
 
 
-def _check_suffixes(files: list[Path]) -> None:
+def check_suffixes(files: list[Path]) -> None:
+    """Raise FileFormatError for a file that --out cannot write."""
     for file in files:
-        if file.suffix not in (".csv", ".npz"):
-            raise sm.FileFormatError(f"{file}: --out writes .npz (the plan) or .csv (its motion)")
+        if file.suffix not in (".npz", ".html", *formats.SUFFIXES):
+            known = ", ".join(formats.SUFFIXES)
+            raise sm.FileFormatError(
+                f"{file}: --out writes .npz (the plan), .html (its replay) or its motion ({known})"
+            )

@@ -2,32 +2,53 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import typer
 
 import selfmotion as sm
+from selfmotion import formats
 from selfmotion.basics import Array
-from selfmotion.collision import obstacle_from_dict
 
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
 Corners = Literal["blend", "stop"]
 Axis = Literal["x", "y", "z"]
 SearchMode = Literal["auto", "local", "global"]
 
-RobotArgument = Annotated[
-    str, typer.Argument(help="Name (see `selfmotion robots`) or path of a .urdf file.")
+ProblemArgument = Annotated[
+    str,
+    typer.Argument(
+        help="A problem file (.toml, .json; see `selfmotion init`), or a robot: name (see "
+        "`selfmotion robots`), .urdf or .xacro file."
+    ),
 ]
-PlanArgument = Annotated[Path, typer.Argument(help="A plan saved as .npz.")]
 
 PathOption = Annotated[
-    Path | None, typer.Option(help="Waypoints: CSV with t,x,y,z,qw,qx,qy,qz (s, m).")
+    Path | None,
+    typer.Option(
+        help="Poses: CSV with t,x,y,z and qw,qx,qy,qz or rx,ry,rz or roll,pitch,yaw or nx,ny,nz "
+        "(s, m, rad; x_mm, roll_deg, …), .npy, or ROS Path and PoseArray as .yaml and .json."
+    ),
 ]
 CircleOption = Annotated[float | None, typer.Option(help="Or a circle of this radius (m).")]
 LineOption = Annotated[str | None, typer.Option(help="Or a straight line by dx,dy,dz (m).")]
 NormalOption = Annotated[Axis, typer.Option(help="Axis of the circle.")]
-DurationOption = Annotated[float, typer.Option(help="Of circle or line (s).")]
+DurationOption = Annotated[
+    float | None,
+    typer.Option(help="Of circle or line (s; 4 by default), or of poses without times."),
+]
+FeedOption = Annotated[
+    float | None, typer.Option(help="Tool speed along poses without times (m/s).")
+]
+JumpOption = Annotated[
+    float | None,
+    typer.Option(help="Distance between poses of --path that is refused (m; 0.5 by default)."),
+]
+FrameOption = Annotated[
+    str | None,
+    typer.Option(help="Pose of the frame that --path is in: x,y,z,roll,pitch,yaw (m, rad)."),
+]
 CornersOption = Annotated[Corners, typer.Option(help="At kinks of the waypoints.")]
 TaskOption = Annotated[TaskName, typer.Option(help="What the path prescribes.")]
 RelaxOption = Annotated[
@@ -41,10 +62,35 @@ RelaxOption = Annotated[
 StartOption = Annotated[
     str | None, typer.Option(help="q1,q2,… (rad or m); default: one that suits the path.")
 ]
+FromOption = Annotated[
+    Path | None, typer.Option("--from", help="Start where this plan (.npz) starts.")
+]
 ToolOption = Annotated[str | None, typer.Option(help="Tool frame (a link).")]
 DegreeOption = Annotated[int, typer.Option(help="Degree of the null motion's polynomial.")]
 MuOption = Annotated[
     float, typer.Option(help="Weight of 1/det(JJᵀ), the distance from singular poses.")
+]
+CostOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="NAME[=WEIGHT], such as JointAcceleration=0.1. Repeatable; replaces the "
+        "default, JointVelocity."
+    ),
+]
+ClosedOption = Annotated[
+    bool, typer.Option("--closed", help="End as it began, in position and velocity.")
+]
+NoCollisionOption = Annotated[
+    bool, typer.Option("--no-self-collision", help="Do not look at self-collision.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", help="KEY=VALUE of the problem file, such as path.duration=6. Repeatable."
+    ),
+]
+AllowCodeOption = Annotated[
+    bool, typer.Option("--allow-code", help="Import what the file names as module:attribute.")
 ]
 DampedOption = Annotated[
     bool,
@@ -64,7 +110,11 @@ CompareOption = Annotated[
     bool, typer.Option("--compare", help="Tell the distance from the global optimum.")
 ]
 OutOption = Annotated[
-    list[Path] | None, typer.Option(help="Write the plan (.npz) or its motion (.csv).")
+    list[Path] | None,
+    typer.Option(
+        help="Write the plan (.npz), its replay (.html) or motion (.csv, .json, .yaml, .xml, "
+        ".script; see `selfmotion export`). Repeatable."
+    ),
 ]
 HtmlOption = Annotated[Path | None, typer.Option(help="Write a replay to open in a browser.")]
 
@@ -88,7 +138,8 @@ AccelerationOption = Annotated[
     str | None, typer.Option(help="Acceleration limits (rad/s² or m/s²), likewise.")
 ]
 ObstaclesOption = Annotated[
-    Path | None, typer.Option(help="Obstacles: JSON, a list of shapes as a plan has them.")
+    Path | None,
+    typer.Option(help="Obstacles: a list of shapes in JSON, or TOML with [[obstacles]]."),
 ]
 ClearanceOption = Annotated[
     float, typer.Option(help="Distance to keep from obstacles and of links from each other (m).")
@@ -117,7 +168,7 @@ def relaxation(text: str) -> sm.Relaxation:
         ) from None
 
 
-def search_settings(mode: SearchMode | None, compare: bool) -> sm.Search | None:
+def search_of(mode: SearchMode | None, compare: bool) -> sm.Search | None:
     """Return how to search where the user says something about it."""
     if mode is None and not compare:
         return None
@@ -160,26 +211,53 @@ def requirements(
     """Return what a motion of others has to keep besides its path and the arm's own limits."""
     asked: list[sm.Constraint] = []
     if velocity is not None:
-        asked.append(sm.JointVelocityLimits(_one_or_each(velocity, "--velocity")))
+        asked.append(sm.JointVelocityLimits(one_or_each(velocity, "--velocity")))
     if acceleration is not None:
-        asked.append(sm.JointAccelerationLimits(_one_or_each(acceleration, "--acceleration")))
+        asked.append(sm.JointAccelerationLimits(one_or_each(acceleration, "--acceleration")))
     if obstacles is not None or clearance > 0.0 or srdf is not None:
         bodies = () if obstacles is None else read_obstacles(obstacles)
         asked.append(sm.Clearance(bodies, clearance, srdf))
     return tuple(item.requirement(robot) for item in asked)
 
 
-def _one_or_each(text: str, option: str) -> Array | float:
-    found = numbers(text, option)
-    return float(found[0]) if len(found) == 1 else found
+def one_or_each(text: str, option: str) -> list[float] | float:
+    """Return one number, or one for each joint."""
+    found: list[float] = numbers(text, option).tolist()
+    return found[0] if len(found) == 1 else found
+
+
+def pose(text: str, option: str) -> dict[str, Any]:
+    """Return a pose x,y,z,roll,pitch,yaw as files write it."""
+    values = numbers(text, option, 6).tolist()
+    return {"position": values[:3], "rpy": values[3:]}
 
 
 def read_obstacles(file: Path) -> tuple[sm.Obstacle, ...]:
-    """Return the obstacles of a JSON file: a list of what `Obstacle.to_dict` returns."""
-    try:
-        listed = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise sm.FileFormatError(f"{file}: cannot be read as JSON: {error}") from error
+    """Return the obstacles of a file; see `obstacle_tables`."""
+    tables = obstacle_tables(file)
+    return tuple(formats.obstacle(item, lambda name: Path(name)) for item in tables)
+
+
+def obstacle_tables(file: Path) -> list[dict[str, Any]]:
+    """Return the tables of a JSON list of obstacles, or of ``[[obstacles]]`` in TOML or JSON.
+
+    Mesh files are looked for beside the file.
+    """
+    listed = _listed(file)
     if not (isinstance(listed, list) and all(isinstance(item, dict) for item in listed)):
         raise sm.FileFormatError(f"{file}: expected a list of obstacles, each a table of values")
-    return tuple(obstacle_from_dict(item) for item in listed)
+    found = [formats.in_si(item, f"{file}: [{k}].") for k, item in enumerate(listed)]
+    for item in found:
+        if isinstance(item.get("file"), str):
+            item["file"] = str(file.parent / item["file"])
+    return found
+
+
+def _listed(file: Path) -> Any:
+    if file.suffix == ".toml":
+        return formats.read_document(file).get("obstacles")
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise sm.FileFormatError(f"{file}: cannot be read as JSON: {error}") from error
+    return found.get("obstacles") if isinstance(found, dict) else found

@@ -1,9 +1,11 @@
 """Plans, certificates and robots as tables for the terminal; legible in a log as well."""
 
 import dataclasses
+import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -14,6 +16,7 @@ from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
 if TYPE_CHECKING:
+    from selfmotion.batch import Batch
     from selfmotion.study import Claim
 
 
@@ -82,6 +85,88 @@ def show_certificate(certificate: Certificate, console: Console) -> None:
         console.print(remark, style="dim", markup=False)
     style = "green" if certificate.verified else "bold red"
     console.print(certificate.verdict, style=style, markup=False)
+
+
+def show_comparison(plans: Mapping[str, Plan], console: Console) -> None:
+    """Print a column per plan: its costs, and the worst that its check found."""
+    table = Table(box=box.SIMPLE_HEAD, title="plans side by side")
+    table.add_column("")
+    for name in plans:
+        table.add_column(name, justify="right", overflow="fold")
+    shown = list(plans.values())
+    for term in dict.fromkeys(term for plan in shown for term in plan.report.terms):
+        table.add_row(term, *(_number(plan.report.terms.get(term)) for plan in shown))
+    table.add_row("total cost", *(_number(plan.report.cost) for plan in shown))
+    table.add_section()
+    table.add_row("duration [s]", *(_number(plan.trajectory.duration) for plan in shown))
+    length = (float(np.abs(np.diff(plan.trajectory.q, axis=0)).sum()) for plan in shown)
+    table.add_row("joint path [rad, m]", *map(_number, length))
+    for label, name in _WORST.items():
+        worst = [getattr(plan.certificate, name) for plan in shown]
+        if any(item is not None for item in worst):
+            table.add_row(label, *(_number(item and item.value) for item in worst))
+    table.add_row("verified", *("yes" if plan.certificate.verified else "no" for plan in shown))
+    console.print(table)
+    for name, plan in plans.items():
+        if not plan.certificate.verified:
+            console.print(f"{name}: {plan.certificate.verdict}", style="bold red", markup=False)
+
+
+_WORST = {
+    "position error [m]": "position_error",
+    "rotation error [rad]": "rotation_error",
+    "margin to joint limits": "limit_margin",
+    "speed over its limit": "velocity_ratio",
+    "acceleration over its limit": "acceleration_ratio",
+    "smallest singular value": "smallest_singular_value",
+    "clearance [m]": "clearance",
+}
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.5g}"
+
+
+def show_batch(batch: "Batch", console: Console) -> None:
+    """Print the best of many plans, and how many there are."""
+    ranked = sorted(batch.rows, key=lambda row: (bool(row.error), not row.verified, row.cost))
+    keys = list(dict.fromkeys(key for row in ranked for key in row.settings))
+    table = Table(box=box.SIMPLE_HEAD, title="the best of them")
+    for name in ("name", *keys, "cost", "duration", "verified"):
+        table.add_column(name, overflow="fold")
+    for row in ranked[:_SHOWN]:
+        values = [json.dumps(row.settings.get(key, "")) for key in keys]
+        outcome = ["-", "-", "no plan"]
+        if not row.error:
+            state = "yes" if row.verified else "no"
+            outcome = [f"{row.cost:.6g}", f"{row.duration:.4g} s", state]
+        table.add_row(row.name, *values, *outcome)
+    console.print(table)
+    verified = sum(row.verified for row in batch.rows)
+    failed = [row for row in ranked if row.error]
+    console.print(
+        f"{len(ranked)} problems: {verified} verified, {len(failed)} without a plan; "
+        f"{batch.resumed} finished before"
+    )
+    for row in failed[:_SHOWN]:
+        console.print(f"{row.name}: {row.error}", style="red", markup=False, soft_wrap=True)
+    console.print(f"wrote {batch.folder / 'index.html'}", markup=False, soft_wrap=True)
+
+
+# Rows of a batch on the terminal; the files have all of them.
+_SHOWN = 10
+
+
+def batch_json(batch: "Batch") -> dict[str, Any]:
+    """Return the rows of a batch as JSON-safe values."""
+    rows = [
+        {key: str(value) if key == "file" else value for key, value in vars(row).items()}
+        for row in batch.rows
+    ]
+    for row in rows:
+        if row["error"]:
+            row["cost"] = row["initial_cost"] = None
+    return {"folder": str(batch.folder), "resumed": batch.resumed, "rows": rows}
 
 
 def show_robots(robots: Mapping[str, RobotModel], console: Console) -> None:
@@ -154,4 +239,24 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
         "verified": certificate.verified,
         "verdict": certificate.verdict,
         **dataclasses.asdict(certificate),
+    }
+
+
+def plan_json(plan: Plan) -> dict[str, Any]:
+    """Return how a plan was found and what the check says, as JSON-safe values."""
+    report = plan.report
+    return {
+        "robot": plan.robot.name,
+        "task": plan.task.value,
+        "cost": report.cost,
+        "initial_cost": report.initial_cost,
+        "terms": dict(report.terms),
+        "initial_terms": dict(report.initial_terms),
+        "evaluations": report.evaluations,
+        "iterations": report.iterations,
+        "seconds": report.seconds,
+        "status": report.status.value,
+        "message": report.message,
+        "duration": plan.trajectory.duration,
+        "certificate": certificate_json(plan.certificate),
     }

@@ -11,6 +11,7 @@ from selfmotion.collision.obstacles import (
     Obstacle,
     Sphere,
     obstacle_from_dict,
+    obstacle_shapes,
 )
 from selfmotion.collision.pairs import disabled_links
 from selfmotion.collision.solids import Solid
@@ -30,5 +31,6 @@ __all__ = [
     "Sphere",
     "disabled_links",
     "obstacle_from_dict",
+    "obstacle_shapes",
     "srdf_line",
 ]

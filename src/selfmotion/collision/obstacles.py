@@ -244,6 +244,11 @@ class Mesh(Obstacle):
             raise CollisionError(f"{self.label}: {self.file} cannot be read: {error}") from error
 
 
+def obstacle_shapes() -> list[tuple[str, type[Obstacle]]]:
+    """Return the shapes that are known, with their classes."""
+    return list(_shapes.items())
+
+
 def obstacle_from_dict(values: Mapping[str, Any]) -> Obstacle:
     """Build an obstacle from what `Obstacle.to_dict` returns.
 

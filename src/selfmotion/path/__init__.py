@@ -1,7 +1,8 @@
 """Tool motion over time: what the tool frame is to do, as pose and twist at any time."""
 
-from selfmotion.path.base import STILL, Path, PathSamples, as_pose
+from selfmotion.path.base import STILL, Path, PathSamples, TimeLaw, as_pose
 from selfmotion.path.joined import Dwell, Joined
+from selfmotion.path.placed import Placed
 from selfmotion.path.ramped import Ramped
 from selfmotion.path.retimed import Retimed
 from selfmotion.path.shapes import Circle, Line
@@ -17,8 +18,10 @@ __all__ = [
     "Line",
     "Path",
     "PathSamples",
+    "Placed",
     "Ramped",
     "Retimed",
+    "TimeLaw",
     "Truncated",
     "TwistPath",
     "Waypoints",

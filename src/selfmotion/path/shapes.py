@@ -124,7 +124,7 @@ class Circle(Path, kind="circle"):
         away = np.array([0.0, 1.0, 0.0]) if abs(axis[0]) > 0.9 * np.linalg.norm(axis) else None
         away = np.array([1.0, 0.0, 0.0]) if away is None else away
         away = away - axis * (axis @ away) / max(float(axis @ axis), 1e-300)
-        if not radius > 0.0:
+        if not (np.isfinite(radius) and radius > 0.0):
             raise PathError(f"circle: radius is {radius} m, expected a positive number")
         center = pose.translation - radius * away / np.linalg.norm(away)
         return cls(pose, center, axis, duration, **options)

@@ -2,11 +2,13 @@
 
 from selfmotion.plans.paper_problem import sample_problem
 from selfmotion.plans.plan import Plan, Views, load_plan
-from selfmotion.plans.problem import Problem
+from selfmotion.plans.problem import NO_OVERLAP, Problem
 from selfmotion.plans.report import Binding, Gap, Report
 from selfmotion.plans.retiming import retime, slowdown
+from selfmotion.plans.saved_problem import problem_from_dict, problem_to_dict
 
 __all__ = [
+    "NO_OVERLAP",
     "Binding",
     "Gap",
     "Plan",
@@ -14,6 +16,8 @@ __all__ = [
     "Report",
     "Views",
     "load_plan",
+    "problem_from_dict",
+    "problem_to_dict",
     "retime",
     "sample_problem",
     "slowdown",

@@ -17,15 +17,11 @@ from selfmotion.basics import (
     write_archive,
 )
 from selfmotion.certificate import Certificate, DampedStretch, Extreme, Finding, Tolerance
-from selfmotion.constraints import Constraint
-from selfmotion.costs import cost_from_dict
 from selfmotion.motion import NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Status
-from selfmotion.path import Path
 from selfmotion.plans.problem import Problem
 from selfmotion.plans.report import Binding, Gap, Report
-from selfmotion.robot import rebuild_robot
-from selfmotion.task import Damping, Relaxation
+from selfmotion.plans.saved_problem import problem_from_dict, problem_to_dict
 
 # Raised with every change that older versions cannot read.
 FORMAT = 3
@@ -47,7 +43,7 @@ class Archive(NamedTuple):
         history = self.report.history
         description = {
             "format": FORMAT,
-            "problem": _problem_to_dict(self.problem),
+            "problem": problem_to_dict(self.problem),
             "joint_names": list(self.trajectory.joint_names),
             "report": _report_to_dict(self.report),
             "history": [_without(iteration, "x") for iteration in history],
@@ -103,51 +99,6 @@ def _check_format(file: FilePath, description: Mapping[str, Any]) -> None:
     raise FileFormatError(
         f"{file}: has no format number, or one before {FORMAT}: it was written by an earlier "
         f"version of selfmotion, or is no plan; plan anew"
-    )
-
-
-def _problem_to_dict(problem: Problem) -> dict[str, Any]:
-    robot, start = problem.robot, problem.given_start
-    return {
-        "robot": {
-            "text": robot.urdf.text,
-            "package_dirs": list(robot.urdf.package_dirs),
-            "source": robot.urdf.source,
-            "continuous": sorted(robot.urdf.continuous()),
-            "tool": robot.tool,
-            "locked": dict(robot.locked),
-            "touching": [list(pair) for pair in robot.touching],
-            "acceleration_limit": robot.acceleration_limit.tolist(),
-            "jerk_limit": robot.jerk_limit.tolist(),
-        },
-        "path": problem.path.to_dict(),
-        "task": problem.task.value,
-        "start": None if start is None else start.tolist(),
-        "null_motion": problem.null_motion.to_dict(),
-        "costs": [cost.to_dict() for cost in problem.costs],
-        "constraints": [item.to_dict() for item in problem.constraints],
-        "relaxations": [item.to_dict() for item in problem.relaxations],
-        "damping": None if problem.damping is None else dataclasses.asdict(problem.damping),
-        "collision": None if problem.collision is None else problem.collision.to_dict(),
-        "rest": problem.rest,
-    }
-
-
-def _problem_from_dict(values: Mapping[str, Any]) -> Problem:
-    robot = rebuild_robot(**values["robot"])
-    damping, collision = values["damping"], values["collision"]
-    return Problem(
-        robot,
-        restore(Path, values["path"]),
-        values["task"],
-        values["start"],
-        restore(NullMotion, values["null_motion"]),
-        tuple(cost_from_dict(item, robot) for item in values["costs"]),
-        tuple(restore(Constraint, item) for item in values["constraints"]),
-        tuple(Relaxation(**item) for item in values["relaxations"]),
-        None if damping is None else Damping(**damping),
-        None if collision is None else restore(Constraint, collision),
-        values["rest"],
     )
 
 
@@ -214,7 +165,7 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archiv
         for item in report["active"]
     )
     return Archive(
-        problem=_problem_from_dict(description["problem"]),
+        problem=problem_from_dict(description["problem"]),
         trajectory=_trajectory(arrays, "", names),
         initial_trajectory=_trajectory(arrays, "initial_", names),
         coefficients=arrays["coefficients"],

@@ -3,16 +3,19 @@
 from selfmotion.robot.kinematics import ToolKinematics
 from selfmotion.robot.loading import NAMED_ARMS, load_robot, rebuild_robot
 from selfmotion.robot.model import RobotModel
+from selfmotion.robot.mounting import Mounting, mounting_of
 from selfmotion.robot.null_space import null_basis, null_space
 from selfmotion.robot.urdf import Urdf, UrdfJoint
 
 __all__ = [
     "NAMED_ARMS",
+    "Mounting",
     "RobotModel",
     "ToolKinematics",
     "Urdf",
     "UrdfJoint",
     "load_robot",
+    "mounting_of",
     "null_basis",
     "null_space",
     "rebuild_robot",

@@ -11,8 +11,10 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, RobotError, read_only
+from selfmotion.robot.expansion import expand
 from selfmotion.robot.model import RobotModel, locked_configuration
-from selfmotion.robot.urdf import Urdf, parse_urdf, read_urdf
+from selfmotion.robot.mounting import with_base, with_tool_offset
+from selfmotion.robot.urdf import Urdf, package_folders, parse_urdf, read_urdf
 
 
 @dataclass(frozen=True)
@@ -77,18 +79,29 @@ def load_robot(
     robot: str | Path,
     tool: str | None = None,
     lock: Mapping[str, float] | None = None,
+    *,
+    base: pin.SE3 | None = None,
+    tool_offset: pin.SE3 | None = None,
+    arguments: Mapping[str, str] | None = None,
 ) -> RobotModel:
     """Load an arm.
 
     Parameters
     ----------
     robot : str or Path
-        A name from `NAMED_ARMS` (``"panda"``, ``"planar_3r"``, …) or the path of a ``.urdf`` file.
+        A name from `NAMED_ARMS` (``"panda"``, ``"planar_3r"``, …) or the path of a ``.urdf`` or
+        ``.xacro`` file.
     tool : str, optional
         Tool frame (a link). Default: the named arm's usual one; for a file, its only leaf link.
     lock : dict, optional
         Joints to hold, with their coordinate [rad or m]. Joints off the chain to the tool are
         held anyway, at 0 or the nearest limit unless given here.
+    base : SE3, optional
+        Pose of the URDF's root link in the world.
+    tool_offset : SE3, optional
+        Pose of the frame that follows the path in that of `tool`: a pen in a gripper.
+    arguments : dict, optional
+        Of a xacro file.
 
     Returns
     -------
@@ -104,20 +117,22 @@ def load_robot(
     >>> load_robot("panda").dof
     7
     """
+    touching: tuple[tuple[str, str], ...] = ()
     if isinstance(robot, str) and robot in NAMED_ARMS:
         arm = NAMED_ARMS[robot]
-        named = build_robot(_read_named(arm), tool or arm.tool, lock or {})
-        acceleration, jerk = (_published(robot, kind, named) for kind in ("acceleration", "jerk"))
-        return dataclasses.replace(
-            named, touching=arm.touching, acceleration_limit=acceleration, jerk_limit=jerk
-        )
-    path = Path(robot)
-    if path.suffix != ".urdf":
-        raise RobotError(
-            f"unknown robot '{robot}', expected a .urdf file or one of: {', '.join(NAMED_ARMS)}"
-        )
-    urdf = read_urdf(path)
-    return build_robot(urdf, tool or _only_leaf(urdf), lock or {})
+        urdf, frame, touching = _read_named(arm), tool or arm.tool, arm.touching
+    else:
+        urdf = _read_file(Path(robot), arguments or {})
+        frame = tool or _only_leaf(urdf)
+    if base is not None:
+        urdf = with_base(urdf, base)
+    if tool_offset is not None:
+        urdf, frame = with_tool_offset(urdf, frame, tool_offset)
+    built = build_robot(urdf, frame, lock or {})
+    acceleration, jerk = (_published(str(robot), kind, built) for kind in ("acceleration", "jerk"))
+    return dataclasses.replace(
+        built, touching=touching, acceleration_limit=acceleration, jerk_limit=jerk
+    )
 
 
 def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
@@ -208,6 +223,22 @@ def _published(name: str, kind: str, robot: RobotModel) -> Array:
     known = tomllib.loads((Path(__file__).parent / "limits.toml").read_text("utf-8"))
     limits = known.get(name, {}).get(kind, {})
     return read_only([limits.get(joint, np.inf) for joint in robot.joint_names])
+
+
+def _read_file(path: Path, arguments: Mapping[str, str]) -> Urdf:
+    if path.suffix == ".xacro":
+        return parse_urdf(
+            expand(path, arguments),
+            source=str(path),
+            package_dirs=package_folders(path),
+            mesh_folder=path.resolve().parent,
+        )
+    if path.suffix != ".urdf":
+        raise RobotError(
+            f"unknown robot '{path}', expected a .urdf or .xacro file or one of: "
+            f"{', '.join(NAMED_ARMS)}"
+        )
+    return read_urdf(path)
 
 
 def _read_named(arm: NamedArm) -> Urdf:

@@ -24,6 +24,8 @@ _SINGLE_COORDINATE = ("revolute", "prismatic", "continuous")
 _KNOWN_TYPES = (*_SINGLE_COORDINATE, "fixed", "floating", "planar")
 # A limit that no motion reaches; Pinocchio wants finite numbers for a revolute joint.
 _UNLIMITED = 1e6
+# Fixed joints that are ours: where the base stands, and how the tool is held.
+BASE_JOINT, TOOL_JOINT = MOUNTING_JOINTS = ("base_placement", "tool_offset")
 
 
 @dataclass(frozen=True)
@@ -86,12 +88,23 @@ class Urdf:
     def has_changed(self) -> bool:
         """Whether the file that it was read from is there, and other than it was then."""
         file = Path(self.source)
-        if not file.is_file():
+        if not file.is_file() or file.suffix == ".xacro":  # whose arguments are not known here
             return False
         try:
-            return read_urdf(file).sha256 != self.sha256
+            return read_urdf(file).text != self.bare_text()
         except RobotError:
             return True
+
+    def bare_text(self) -> str:
+        """Return the text without base placement and tool offset."""
+        root = ElementTree.fromstring(self.text)
+        for joint in root.findall("joint"):
+            if joint.get("name") in MOUNTING_JOINTS:
+                end = "parent" if joint.get("name") == BASE_JOINT else "child"
+                link = getattr(self.joints[joint.get("name", "")], end)
+                root.remove(joint)
+                root.remove(next(item for item in root.findall("link") if item.get("name") == link))
+        return ElementTree.tostring(root, encoding="unicode")
 
     def continuous(self) -> set[str]:
         """Return the names of joints that the file declares continuous."""
@@ -132,8 +145,14 @@ def read_urdf(path: Path) -> Urdf:
     except (OSError, UnicodeDecodeError) as error:
         raise RobotError(f"{path}: cannot be read as text: {error}") from error
     folder = path.resolve().parent
-    package_dirs = tuple(str(parent) for parent in (folder, *folder.parents) if parent.parts[1:])
-    return parse_urdf(text, source=str(path), package_dirs=package_dirs, mesh_folder=folder)
+    return parse_urdf(
+        text, source=str(path), package_dirs=package_folders(path), mesh_folder=folder
+    )
+
+
+def package_folders(path: Path) -> tuple[str, ...]:
+    """Return the folders above a file, in which ``package://NAME/…`` is looked up."""
+    return tuple(str(parent) for parent in path.resolve().parents if parent.parts[1:])
 
 
 def parse_urdf(
@@ -145,7 +164,7 @@ def parse_urdf(
     except ElementTree.ParseError as error:
         raise RobotError(f"{source}: is not well-formed XML: {error}") from error
     if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
-        raise RobotError(f"{source}: is a xacro file; expand it first: `xacro {source} > arm.urdf`")
+        raise RobotError(f"{source}: is a xacro file; give it the suffix .xacro")
     if root.tag != "robot":
         raise RobotError(f"{source}: the root element is <{root.tag}>, expected <robot>")
     check_collision_elements(root, source)

@@ -1,0 +1,175 @@
+"""A batch on disk: per problem a plan and a row; ranked tables of all of them."""
+
+import csv
+import dataclasses
+import html
+import io
+import json
+import urllib.parse
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from selfmotion.basics import FileFormatError, write_atomically
+from selfmotion.formats import write_text
+from selfmotion.plans import Plan, load_plan
+
+
+@dataclass(frozen=True)
+class Row:
+    """What became of one problem.
+
+    Attributes
+    ----------
+    name : str
+    key : str
+        Digest of the problem and its options.
+    settings : dict
+        Its values of the grid.
+    file : Path
+        The plan's archive; not there where `error` says why.
+    error : str
+        "" where there is a plan.
+    fault : bool
+        Whether the error is a fault of a program rather than of the problem; such are tried again.
+    verified, verdict, cost, initial_cost, duration, evaluations
+        Of the plan.
+    seconds : float
+        Its worker's time.
+    """
+
+    name: str
+    key: str
+    file: Path
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    error: str = ""
+    fault: bool = False
+    verified: bool = False
+    verdict: str = ""
+    cost: float = float("inf")
+    initial_cost: float = float("inf")
+    duration: float = 0.0
+    evaluations: int = 0
+    seconds: float = 0.0
+
+    def plan(self) -> Plan:
+        """Read the plan; FileFormatError where there is none."""
+        if self.error:
+            raise FileFormatError(f"{self.name}: has no plan: {self.error}")
+        return load_plan(self.file)
+
+
+class Folder:
+    """The folder of a batch.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def plan_file(self, name: str) -> Path:
+        """Return where a problem's plan is."""
+        return self.path / "plans" / f"{name}.npz"
+
+    def finished(self, name: str, key: str) -> Row | None:
+        """Return the row of a problem that an earlier run finished; None where it has to be run."""
+        file = self._row_file(name)
+        if not file.is_file():
+            return None
+        try:
+            values = json.loads(file.read_text(encoding="utf-8"))
+            row = Row(file=self.plan_file(name), **values)
+        except (OSError, ValueError, TypeError):
+            return None  # not one of ours, or of another version: it is written anew
+        sound = row.key == key and not row.fault and (bool(row.error) or row.file.is_file())
+        return row if sound else None
+
+    def record(self, row: Row, archive: bytes) -> Row:
+        """Write plan and row, in this order: a row says that all is there."""
+        if archive:
+
+            def write(stream: Any) -> None:
+                stream.write(archive)
+
+            write_atomically(row.file, write)
+        values = {k: v for k, v in dataclasses.asdict(row).items() if k != "file"}
+        write_text(self._row_file(row.name), json.dumps(values) + "\n")
+        return row
+
+    def write_tables(self, rows: Sequence[Row], replays: int) -> None:
+        """Write ``table.csv`` and ``index.html``, the best first, with replays of the best ones."""
+        ranked = sorted(rows, key=lambda row: (bool(row.error), not row.verified, row.cost))
+        planned = [row for row in ranked if not row.error]
+        links = {row.name: self._replay(row, k < replays) for k, row in enumerate(planned)}
+        keys = list(dict.fromkeys(key for row in rows for key in row.settings))
+        header = ["rank", "name", *keys, "verified", "cost", "without self-motion", "duration"]
+        header += ["seconds", "plan", "replay", "verdict"]
+        lines = [self._cells(k, row, keys, links) for k, row in enumerate(ranked, 1)]
+        write_text(self.path / "table.csv", _csv([header, *lines]))
+        write_text(self.path / "index.html", _page(header, lines))
+
+    def _cells(
+        self, rank: int, row: Row, keys: Sequence[str], links: Mapping[str, str]
+    ) -> list[str]:
+        numbers = ["", "", ""]
+        if not row.error:
+            numbers = [f"{v:.8g}" for v in (row.cost, row.initial_cost, row.duration)]
+        settings = [json.dumps(row.settings[key]) if key in row.settings else "" for key in keys]
+        file = "" if row.error else row.file.relative_to(self.path).as_posix()
+        state = "no plan" if row.error else "yes" if row.verified else "no"
+        timing = f"{row.seconds:.3f}"
+        said = row.error or row.verdict
+        start = [str(rank), row.name, *settings, state, *numbers, timing]
+        return [*start, file, links.get(row.name, ""), said]
+
+    def _replay(self, row: Row, wanted: bool) -> str:
+        """Return the address of a plan's replay, made once and only where wanted."""
+        file = self.path / "replays" / f"{row.name}.html"
+        # A plan that was made anew is newer than its replay.
+        sound = file.is_file() and file.stat().st_mtime >= row.file.stat().st_mtime
+        if not sound and wanted:
+            from selfmotion.replay import write_replay
+
+            write_replay(row.plan(), file)
+        return file.relative_to(self.path).as_posix() if sound or wanted else ""
+
+    def _row_file(self, name: str) -> Path:
+        return self.path / "rows" / f"{name}.json"
+
+
+def _csv(lines: Sequence[Sequence[str]]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(lines)
+    return text.getvalue()
+
+
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>selfmotion batch</title>
+<style>body{{font:14px/1.4 system-ui,sans-serif;margin:2em}}table{{border-collapse:collapse}}
+th,td{{padding:.25em .7em;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}}
+</style></head><body><h1>{title}</h1>
+<table><thead><tr>{head}</tr></thead><tbody>
+{body}
+</tbody></table></body></html>
+"""
+
+
+def _page(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    linked = {header.index("plan"), header.index("replay")}
+
+    def cell(k: int, text: str) -> str:
+        safe = html.escape(text)
+        address = urllib.parse.quote(text)
+        shown = f'<a href="{address}">{header[k]}</a>' if k in linked and text else safe
+        return f"<td>{shown}</td>"
+
+    rows = ("".join(cell(k, text) for k, text in enumerate(line)) for line in lines)
+    return _PAGE.format(
+        title=f"{len(lines)} problems, best first",
+        head="".join(f"<th>{html.escape(name)}</th>" for name in header),
+        body="\n".join(f"<tr>{row}</tr>" for row in rows),
+    )

@@ -1,0 +1,103 @@
+"""What a batch plans: problems with names, or what is wrong with them."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from selfmotion.basics import ProblemError, SelfmotionError
+from selfmotion.costs import FunctionCost
+from selfmotion.formats import Job, grid_documents, job_of, read_document
+from selfmotion.plans import Problem, problem_to_dict
+
+
+@dataclass(frozen=True, eq=False)
+class Item:
+    """One of many problems.
+
+    Attributes
+    ----------
+    name : str
+        Of its files.
+    make : callable
+        Returns the job; may raise what is wrong with it.
+    settings : dict
+        What tells it from the others: keys of the grid and their values.
+    """
+
+    name: str
+    make: Callable[[], Job]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def task(self) -> dict[str, Any]:
+        """What a worker is sent.
+
+        Raises
+        ------
+        SelfmotionError
+            The problem is none, or cannot be sent.
+        """
+        job = self.make()
+        lost = [cost.name for cost in job.problem.costs if isinstance(cost, FunctionCost)]
+        if lost:
+            raise ProblemError(
+                f"cost '{lost[0]}' is a function, which cannot be sent to another process; derive "
+                f"a class from selfmotion.Cost"
+            )
+        problem = problem_to_dict(job.problem)
+        parts = (job.problem.path, job.problem.null_motion, *job.problem.costs)
+        own = {type(part).__module__ for part in (*parts, *job.problem.constraints)}
+        modules = sorted(name for name in own if not name.startswith(("selfmotion.", "__main__")))
+        return {"problem": problem, "options": job.settings, "modules": modules}
+
+    def forget(self) -> None:
+        """Let go of the task, which is large and not needed any more."""
+        self.__dict__.pop("task", None)
+
+    @cached_property
+    def key(self) -> str:
+        """A digest of all that decides the plan."""
+        try:
+            task = self.task
+        except SelfmotionError as error:
+            return f"error: {error}"
+        text = json.dumps(task["problem"], sort_keys=True) + repr(task["options"])
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def grid_items(file: Path, *, allow_code: bool = False) -> list[Item]:
+    """Return an item for each problem of a file's ``[grid]``, or the one of a file without.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or its grid is none. What is wrong with single problems is said
+        by their rows.
+    """
+    memory: dict[str, Any] = {}
+    found = grid_documents(read_document(file))
+    digits = len(str(len(found) - 1))
+
+    def maker(document: dict[str, Any]) -> Callable[[], Job]:
+        return lambda: job_of(document, file, allow_code=allow_code, memory=memory)
+
+    return [
+        Item(f"{file.stem}-{k:0{digits}d}" if settings else file.stem, maker(one), settings)
+        for k, (one, settings) in enumerate(found)
+    ]
+
+
+def problem_items(problems: list[Problem | Job], options: Mapping[str, Any]) -> list[Item]:
+    """Return an item for each problem; ProblemError for what is none."""
+    digits = len(str(max(len(problems) - 1, 0)))
+    items = []
+    for k, given in enumerate(problems):
+        if not isinstance(given, Problem | Job):
+            raise ProblemError(f"problems[{k}] is {given!r}, expected a Problem or a Job")
+        job = given if isinstance(given, Job) else Job(given, **options)
+        items.append(Item(f"plan-{k:0{digits}d}", lambda job=job: job))  # type: ignore[misc]
+    return items

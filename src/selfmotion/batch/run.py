@@ -1,0 +1,265 @@
+"""Problems to workers, plans to a folder."""
+
+import os
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from selfmotion.basics import PlanError, SelfmotionError
+from selfmotion.batch.folder import Folder, Row
+from selfmotion.batch.items import Item, problem_items
+from selfmotion.batch.worker import begin_process, plan_task
+from selfmotion.formats import Job
+from selfmotion.plans import Problem
+
+# Each worker has this many problems at hand, so that none waits for the next one.
+_AT_HAND = 2
+# Problems that an executor of unknown size is given at a time.
+_WINDOW = 64
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_Result = tuple[dict[str, Any], bytes]
+
+
+@dataclass(frozen=True)
+class BatchProgress:
+    """How far a batch is.
+
+    Attributes
+    ----------
+    done, total : int
+        Problems, those of earlier runs among them.
+    failed : int
+        Those without a plan.
+    rate : float
+        Problems per second in this run.
+    seconds_left : float
+        Estimated from the rate; infinite before there is one.
+    """
+
+    done: int
+    total: int
+    failed: int
+    rate: float
+    seconds_left: float
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What became of many problems.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+        In the order of the problems.
+    folder : Path
+        Has ``table.csv`` and ``index.html``, and the plans in ``plans``.
+    resumed : int
+        How many of them an earlier run had finished.
+    """
+
+    rows: tuple[Row, ...]
+    folder: Path
+    resumed: int
+
+    @property
+    def best(self) -> Row | None:
+        """The verified plan of the lowest cost, where there is one."""
+        sound = [row for row in self.rows if row.verified]
+        return min(sound, key=lambda row: row.cost, default=None)
+
+
+def _unseen(progress: BatchProgress) -> None:
+    pass
+
+
+def plan_many(
+    problems: Iterable[Problem | Job],
+    executor: Executor | None = None,
+    *,
+    out: str | Path,
+    workers: int | None = None,
+    replays: int = 0,
+    progress: Callable[[BatchProgress], object] = _unseen,
+    **options: Any,
+) -> Batch:
+    """Plan many problems, each in one of several processes, into a folder.
+
+    Plans are written as they end. Run again with the same folder, those that are finished are not
+    planned anew; so a run that was killed goes on where it stopped. A problem that cannot be
+    planned, or that kills its worker, does not stop the others: its row says why.
+
+    Parameters
+    ----------
+    problems : iterable of Problem or Job
+    executor : concurrent.futures.Executor, optional
+        Where to run: for example ``distributed.Client(address).get_executor()``, or mpi4py's
+        ``MPIPoolExecutor()``. selfmotion must be installed there. By default processes on this
+        machine; a script then needs ``if __name__ == "__main__":``.
+    out : path
+        The folder.
+    workers : int, optional
+        How many processes, by default one for each core.
+    replays : int
+        Of how many of the best plans to write a replay.
+    progress : callable, optional
+        Called with a `BatchProgress` whenever a problem is finished.
+    options
+        Of `plan`, for problems that are no jobs: ``search``, ``optimizer``, ``tolerance``,
+        ``max_evaluations``.
+
+    Returns
+    -------
+    Batch
+
+    Raises
+    ------
+    ProblemError
+        An item is no problem.
+    PlanError
+        The executor that was given broke; what was finished by then is in the folder.
+    """
+    items = problem_items(list(problems), options)
+    return plan_items(items, executor, out=out, workers=workers, replays=replays, progress=progress)
+
+
+def plan_items(
+    items: Sequence[Item],
+    executor: Executor | None = None,
+    *,
+    out: str | Path,
+    workers: int | None = None,
+    replays: int = 0,
+    progress: Callable[[BatchProgress], object] = _unseen,
+) -> Batch:
+    """Plan items as `plan_many` plans problems."""
+    folder = Folder(Path(out))
+    run = _Run(folder, items, progress)
+    pending = deque(items)
+    if executor is not None:
+        if run.through(executor, pending, _WINDOW):
+            raise PlanError(
+                f"the executor broke after {len(run.rows)} of {len(items)} problems; what is "
+                f"finished is in '{folder.path}': run again to go on"
+            )
+    else:
+        run.on_this_machine(pending, workers or os.cpu_count() or 1)
+    rows = tuple(run.rows[item.name] for item in items)
+    folder.write_tables(rows, replays)
+    return Batch(rows, folder.path, run.resumed)
+
+
+class _Run:
+    """One run of a batch: what is finished, and how fast it goes."""
+
+    def __init__(
+        self, folder: Folder, items: Sequence[Item], progress: Callable[[BatchProgress], object]
+    ) -> None:
+        self.rows: dict[str, Row] = {}
+        self._folder, self._items, self._progress = folder, items, progress
+        self._began, self.resumed = time.monotonic(), 0
+
+    def through(self, executor: Executor, pending: deque[Item], window: int) -> list[Item]:
+        """Run what is pending; return what was at work when the executor broke, if it did."""
+        flying: dict[Future[_Result], Item] = {}
+        while pending or flying:
+            while pending and len(flying) < window:
+                item = pending.popleft()
+                task = self._task(item)
+                if task is None:
+                    continue
+                try:
+                    flying[executor.submit(plan_task, task)] = item
+                except BrokenExecutor:
+                    return [*self._lost(flying), item]
+            done, _ = wait(flying, return_when=FIRST_COMPLETED)
+            for future in done:
+                fault = future.exception()
+                if isinstance(fault, BrokenExecutor):
+                    return self._lost(flying)
+                item = flying.pop(future)
+                if fault is None:
+                    self._finish(item, *future.result())
+                else:
+                    # The executor's own words: a worker that was lost more often than it allows.
+                    what = f"{type(fault).__name__}: {fault}"
+                    self._finish(item, {"error": what, "fault": True}, b"")
+        return []
+
+    def _task(self, item: Item) -> dict[str, Any] | None:
+        """Return what a worker needs; None where there is nothing to do."""
+        row = self._folder.finished(item.name, item.key)
+        if row is not None:
+            self.rows[item.name] = row
+            self.resumed += 1
+            item.forget()
+            return None
+        try:
+            return item.task
+        except SelfmotionError as wrong:
+            self._finish(item, {"error": str(wrong)}, b"")
+            return None
+
+    def on_this_machine(self, pending: deque[Item], workers: int) -> None:
+        """Run what is pending in processes; where one dies, begin again with what it left."""
+        suspects: deque[Item] = deque()
+        while pending or suspects:
+            with _pool(workers) as pool:
+                # One of these killed its worker: alone, a second death tells which.
+                while suspects:
+                    suspect = suspects.popleft()
+                    if self.through(pool, deque([suspect]), 1):
+                        died = "its process died twice, the second time with nothing else at work"
+                        self._finish(suspect, {"error": died, "fault": True}, b"")
+                        break
+                else:
+                    suspects.extend(self.through(pool, pending, _AT_HAND * workers))
+
+    def _lost(self, flying: dict[Future[_Result], Item]) -> list[Item]:
+        """Keep what had been finished when the executor broke, and return the rest."""
+        lost = []
+        for future, item in flying.items():
+            if future.done() and not future.cancelled() and future.exception() is None:
+                self._finish(item, *future.result())
+            else:
+                lost.append(item)
+        return lost
+
+    def _finish(self, item: Item, found: dict[str, Any], archive: bytes) -> None:
+        file = self._folder.plan_file(item.name)
+        row = Row(item.name, item.key, file, dict(item.settings), **found)
+        self.rows[item.name] = self._folder.record(row, archive)
+        item.forget()
+        done, total = len(self.rows), len(self._items)
+        rate = (done - self.resumed) / max(time.monotonic() - self._began, 1e-9)
+        failed = sum(bool(row.error) for row in self.rows.values())
+        self._progress(BatchProgress(done, total, failed, rate, (total - done) / rate))
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[Executor]:
+    """Return processes of this machine, each with one thread for linear algebra."""
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    # Read by the libraries when they are loaded, in the new processes.
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update({name: value or "1" for name, value in before.items()})
+    try:
+        with ProcessPoolExecutor(
+            workers, multiprocessing.get_context("spawn"), initializer=begin_process
+        ) as pool:
+            try:
+                yield pool
+            except BaseException:
+                # Whoever stops a batch waits for the plans at work, not for those in line.
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)

@@ -1,0 +1,76 @@
+"""What runs in another process: a problem's description in, a plan's file out."""
+
+import importlib
+import os
+import signal
+import tempfile
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from selfmotion.basics import SelfmotionError
+from selfmotion.planning import plan
+from selfmotion.plans import problem_from_dict
+
+# Arms and bodies of problems planned before; forgotten when there are many.
+_known: dict[str, Any] = {}
+_MANY = 64
+
+
+def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
+    """Plan what `Item.task` describes.
+
+    Returns
+    -------
+    row : dict
+        How it ended: the keys of `Row` from ``verified`` on. What goes wrong is in its ``error``.
+    archive : bytes
+        The plan's file; empty where there is none.
+    """
+    began = time.perf_counter()
+    try:
+        for name in task["modules"]:
+            importlib.import_module(name)
+        if len(_known) > _MANY:
+            _known.clear()
+        found = plan(problem_from_dict(task["problem"], _known), **task["options"])
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder, "plan.npz")
+            found.save(file)
+            archive = file.read_bytes()
+    except SelfmotionError as error:
+        return {"error": str(error), "seconds": time.perf_counter() - began}, b""
+    # A fault of ours, or of the user's own code, must not stop the other problems.
+    except Exception as error:
+        what = f"{type(error).__name__}: {error}"
+        return {"error": what, "fault": True, "seconds": time.perf_counter() - began}, b""
+    report = found.report
+    row = {
+        "verified": found.certificate.verified,
+        "verdict": found.certificate.verdict,
+        "cost": report.cost,
+        "initial_cost": report.initial_cost,
+        "duration": found.trajectory.duration,
+        "evaluations": report.evaluations,
+        "seconds": time.perf_counter() - began,
+    }
+    return row, archive
+
+
+def begin_process() -> None:
+    """Leave Ctrl-C to the process that started this one; end when that does, however it ends."""
+    from multiprocessing import parent_process
+
+    # A plan that is interrupted is the best so far, which must not count as finished.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is None:
+        return
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

@@ -1,0 +1,80 @@
+"""How far a batch is, and where it runs."""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+import selfmotion as sm
+
+if TYPE_CHECKING:
+    from selfmotion.batch import BatchProgress
+
+
+class BatchDisplay:
+    """A bar with rate and time left on a terminal, a line per tenth in a log."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        columns = (TextColumn("{task.description}", markup=False), BarColumn())
+        self._progress = Progress(
+            *columns, console=console, transient=True, disable=not console.is_terminal
+        )
+        self._bar = self._progress.add_task("", total=None)
+        self._tenth = 0
+
+    def __enter__(self) -> Self:
+        """Begin to show."""
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Leave the terminal as it was."""
+        self._progress.stop()
+
+    def show(self, found: "BatchProgress") -> None:
+        """Show how far it is."""
+        text = (
+            f"{found.done} of {found.total} problems, {found.failed} without a plan, "
+            f"{found.rate:.2f} per second, {found.seconds_left:.0f} s left"
+        )
+        self._progress.update(self._bar, description=text, completed=found.done, total=found.total)
+        tenth = 10 * found.done // found.total
+        if not self._console.is_terminal and tenth > self._tenth:
+            self._console.print(text, markup=False)
+        self._tenth = tenth
+
+
+@contextmanager
+def executor_at(address: str | None) -> Iterator[Executor | None]:
+    """Give the executor of a Dask cluster; None without an address.
+
+    Raises
+    ------
+    ProblemError
+        distributed is not installed, or no scheduler answers.
+    """
+    if address is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise sm.ProblemError(
+            "--dask needs the package distributed: pip install 'selfmotion[cluster]'"
+        ) from None
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError) as error:
+        raise sm.ProblemError(f"--dask: no scheduler answers at '{address}': {error}") from error
+    with client:
+        yield client.get_executor()

@@ -1,0 +1,177 @@
+"""What the options of ``selfmotion plan`` say, as the table of a problem file."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import typer
+
+import selfmotion as sm
+from selfmotion.cli import options
+from selfmotion.formats import grid_documents, job_of, parse_setting, read_document, set_key
+
+# Costs and their first number, the weight that --cost may give.
+_WEIGHTS = ("weight", "mu")
+
+
+@dataclass
+class Shell:
+    """The options, as typed."""
+
+    path: Path | None
+    circle: float | None
+    line: str | None
+    normal: str
+    duration: float | None
+    feed: float | None
+    jump: float | None
+    frame: str | None
+    corners: str
+    task: str
+    start: str | None
+    warm: Path | None
+    tool: str | None
+    lock: list[str]
+    degree: int
+    mu: float
+    cost: list[str]
+    velocity: str | None
+    acceleration: str | None
+    closed: bool
+    obstacles: Path | None
+    clearance: float
+    srdf: Path | None
+    no_collision: bool
+    relax: list[str]
+    damped: bool
+
+    @classmethod
+    def of(cls, context: typer.Context) -> "Shell":
+        """Return what was typed, of a command that has all these options."""
+        given = {field.name: context.params[field.name] for field in fields(cls)}
+        lists = {name: list(given[name] or []) for name in ("lock", "cost", "relax")}
+        return cls(**{**given, **lists})
+
+    def document(self, robot: str) -> dict[str, Any]:
+        """Return the table."""
+        table: dict[str, Any] = {
+            "robot": {
+                "name" if robot in sm.NAMED_ARMS else "file": robot,
+                "lock": options.locks(self.lock),
+            },
+            "task": self.task,
+            "start": self._start(),
+            "path": self._path(),
+            "null_motion": {"kind": "PolynomialNullMotion", "degree": self.degree},
+            "costs": self._costs(),
+            "constraints": self._constraints(),
+            "relaxations": [_relaxation(text) for text in self.relax],
+            "damping": self.damped,
+            "collision": not self.no_collision,
+        }
+        if self.tool is not None:
+            table["robot"]["tool"] = self.tool
+        return table
+
+    def _start(self) -> Any:
+        if self.start is not None:
+            return options.numbers(self.start, "--start").tolist()
+        if self.warm is not None:
+            return sm.load_plan(self.warm).trajectory.q[0].tolist()
+        return "free" if self.path is not None else "dexterous"
+
+    def _path(self) -> dict[str, Any]:
+        if sum(option is not None for option in (self.path, self.circle, self.line)) != 1:
+            raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
+        if self.path is not None:
+            given = {"feed": self.feed, "duration": self.duration, "jump": self.jump}
+            frame = {} if self.frame is None else {"frame": options.pose(self.frame, "--frame")}
+            return {"kind": "file", "file": str(self.path), "corners": self.corners, **frame} | {
+                key: value for key, value in given.items() if value is not None
+            }
+        if self.feed is not None or self.frame is not None:
+            raise sm.ProblemError("--feed and --frame are for --path; a shape has a --duration")
+        duration = 4.0 if self.duration is None else self.duration
+        if self.circle is not None:
+            axis = [float(self.normal == name) for name in "xyz"]
+            return {"kind": "circle", "radius": self.circle, "normal": axis, "duration": duration}
+        by = options.numbers(self.line or "", "--line", 3).tolist()
+        return {"kind": "line", "by": by, "duration": duration}
+
+    def _costs(self) -> list[dict[str, Any]]:
+        costs = [_cost(text) for text in self.cost] or [{"kind": "JointVelocity"}]
+        if self.mu != 0.0:
+            costs.append({"kind": "InverseManipulability", "mu": self.mu})
+        return costs
+
+    def _constraints(self) -> list[dict[str, Any]]:
+        speed: dict[str, Any] = {"kind": "JointVelocityLimits"}
+        if self.velocity is not None:
+            speed["limit"] = options.one_or_each(self.velocity, "--velocity")
+        found: list[dict[str, Any]] = [{"kind": "JointPositionLimits"}, speed]
+        if self.acceleration is not None:
+            limit = options.one_or_each(self.acceleration, "--acceleration")
+            found.append({"kind": "JointAccelerationLimits", "limit": limit})
+        if self.closed:
+            found.append({"kind": "ClosedPath"})
+        if self.obstacles is not None or self.clearance > 0.0 or self.srdf is not None:
+            bodies = [] if self.obstacles is None else options.obstacle_tables(self.obstacles)
+            clearance = {"kind": "Clearance", "obstacles": bodies, "distance": self.clearance}
+            found.append(clearance if self.srdf is None else {**clearance, "srdf": str(self.srdf)})
+        return found
+
+
+def read(context: typer.Context, given: str, settings: list[str], allow_code: bool) -> sm.Job:
+    """Return the job of a problem file, or of a robot with the options of the shell.
+
+    Options that say what a problem file says itself are refused beside one.
+    """
+    file = Path(given) if Path(given).suffix in (".toml", ".json") else None
+    if file is None:
+        document = Shell.of(context).document(given)
+    else:
+        typed = _typed(context)
+        if typed:
+            raise sm.ProblemError(
+                f"{file}: the problem is in the file, so that {typed[0]} has no effect; change the "
+                f"file, or use --set KEY=VALUE"
+            )
+        document = read_document(file)
+        if "grid" in document:
+            count = len(grid_documents(document))
+            raise sm.ProblemError(f"{file}: grid has {count} problems: use `selfmotion batch`")
+    for text in settings:
+        set_key(document, *parse_setting(text))
+    return job_of(document, file, allow_code=allow_code)
+
+
+def _typed(context: typer.Context) -> list[str]:
+    """Return those of the options of `Shell` that were typed."""
+    names = {field.name for field in fields(Shell)}
+    return [
+        parameter.opts[0]
+        for parameter in context.command.params
+        if parameter.name in names
+        and str(context.get_parameter_source(parameter.name or "")).endswith("COMMANDLINE")
+    ]
+
+
+def _cost(text: str) -> dict[str, Any]:
+    kind, mark, value = text.partition("=")
+    known = sm.Cost.kinds()
+    if kind not in known:
+        raise sm.ProblemError(
+            f"--cost is '{text}', expected NAME or NAME=WEIGHT, NAME one of: {', '.join(known)}"
+        )
+    if not mark:
+        return {"kind": kind}
+    names = [name for name in _WEIGHTS if name in known[kind].__annotations__]
+    names = names or [name for name in _WEIGHTS if hasattr(known[kind], name)]
+    if not names:
+        raise sm.ProblemError(f"--cost: {kind} has no weight; give it without =")
+    return {"kind": kind, names[0]: float(options.numbers(value, "--cost", 1)[0])}
+
+
+def _relaxation(text: str) -> dict[str, Any]:
+    found = options.relaxation(text).to_dict()
+    return {key: value for key, value in found.items() if value is not None}

@@ -1,0 +1,142 @@
+"""TOML, JSON and YAML files as nested tables, with SI units throughout."""
+
+import json
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import IO, Any
+
+from selfmotion.basics import FileFormatError, write_atomically
+
+# Keys with a number for each joint.
+PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "start", "upper")
+# Keys that may end in _deg or _mm: nothing else is an angle or a length.
+ANGLES = frozenset(("band", "corner_angle", "margin", "rotation_vector", "rpy", *PER_JOINT))
+_SIZES = ("length", "radius", "size")
+LENGTHS = frozenset(("band", "by", "center", "distance", "jump", "position", "positions", *_SIZES))
+_SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}
+
+
+def read_document(file: Path) -> dict[str, Any]:
+    """Read a table from a .toml, .json, .yaml or .yml file, units as they are.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, is not of the kind that its suffix says, or holds no table.
+    """
+    try:
+        found = _parse(file, file.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise FileFormatError(f"{file}: is not UTF-8 text: {error}") from error
+    if not isinstance(found, dict):
+        raise FileFormatError(f"{file}: holds a {type(found).__name__}, expected a table of keys")
+    return found
+
+
+def _parse(file: Path, text: str) -> Any:
+    match file.suffix:
+        case ".toml":
+            try:
+                return tomllib.loads(text)
+            except tomllib.TOMLDecodeError as error:
+                raise FileFormatError(f"{file}: is not TOML: {error}") from error
+        case ".json":
+            try:
+                return json.loads(text)
+            except ValueError as error:
+                raise FileFormatError(f"{file}: is not JSON: {error}") from error
+        case ".yaml" | ".yml":
+            return _parse_yaml(file, text)
+    raise FileFormatError(f"{file}: has suffix '{file.suffix}', expected .toml, .json or .yaml")
+
+
+def _parse_yaml(file: Path, text: str) -> Any:
+    import yaml
+
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    try:
+        # `ros2 topic echo` ends each message with a line of its own.
+        return next(iter(yaml.load_all(text, Loader=loader)), None)
+    except yaml.YAMLError as error:
+        raise FileFormatError(f"{file}: is not YAML: {' '.join(str(error).split())}") from error
+
+
+def write_document(file: Path, document: Mapping[str, Any]) -> None:
+    """Write a table as .toml, .json or .yaml, whichever the suffix says; atomically."""
+    match file.suffix:
+        case ".toml":
+            import tomli_w
+
+            text = tomli_w.dumps(document)
+        case ".json":
+            text = json.dumps(document, indent=1) + "\n"
+        case ".yaml" | ".yml":
+            import yaml
+
+            dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+            text = yaml.dump(document, Dumper=dumper, sort_keys=False, default_flow_style=None)
+        case _:
+            raise FileFormatError(f"{file}: has suffix '{file.suffix}', expected .toml or .json")
+    write_text(file, text)
+
+
+def write_text(file: Path, text: str) -> None:
+    """Write a text file, atomically."""
+
+    def write(stream: IO[bytes]) -> None:
+        stream.write(text.encode())
+
+    write_atomically(file, write)
+
+
+def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
+    """Return a table with keys ``NAME_deg`` [°] and ``NAME_mm`` [mm] as ``NAME`` [rad], [m].
+
+    JSON's null counts as a key that is not there.
+
+    Raises
+    ------
+    FileFormatError
+        A key with such an ending is no angle or length, is given twice, or holds no numbers.
+    """
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        if value is None:
+            continue
+        name, factor = key, None
+        for suffix, (allowed, scale) in _SUFFIXES.items():
+            if key.endswith(suffix):
+                name, factor = key.removesuffix(suffix), scale
+                if name not in allowed:
+                    what = "angle" if suffix == "_deg" else "length"
+                    raise FileFormatError(
+                        f"{where}{key}: '{name}' is no {what}, expected one of: "
+                        f"{', '.join(sorted(allowed))}"
+                    )
+        if name in found:
+            raise FileFormatError(f"{where}{key}: '{name}' is given twice, in two units; keep one")
+        inner = _inner(value, f"{where}{name}")
+        found[name] = inner if factor is None else _scaled(inner, factor, f"{where}{key}")
+    return found
+
+
+def _inner(value: Any, where: str) -> Any:
+    if isinstance(value, Mapping):
+        return in_si(value, f"{where}.")
+    if isinstance(value, list):
+        return [_inner(item, f"{where}[{k}]") for k, item in enumerate(value)]
+    return value
+
+
+def _scaled(value: Any, factor: float, where: str) -> Any:
+    if isinstance(value, list):
+        return [_scaled(item, factor, where) for item in value]
+    if isinstance(value, dict):
+        return {key: _scaled(item, factor, where) for key, item in value.items()}
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise FileFormatError(f"{where}: is {value!r}, expected numbers")
+    return value * factor

@@ -1,0 +1,314 @@
+"""What a problem file may hold, as pydantic models made from the signatures of the classes.
+
+So a class is described once, in Python: its keys, defaults and first line of documentation are
+those of its parameters, and a class of one's own is known like ours.
+"""
+
+import dataclasses
+import inspect
+import math
+from collections.abc import Iterable, Mapping
+from functools import lru_cache, reduce
+from operator import or_
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, WithJsonSchema, create_model
+
+from selfmotion.basics import Array, PathError, Saved
+from selfmotion.certificate import Tolerance
+from selfmotion.collision import Obstacle, obstacle_shapes
+from selfmotion.constraints import Clearance, Constraint
+from selfmotion.costs import Cost
+from selfmotion.formats.code import FUNCTION
+from selfmotion.formats.documents import ANGLES, LENGTHS
+from selfmotion.formats.poses import ORIENTATIONS, pose_of
+from selfmotion.motion import NullMotion
+from selfmotion.optimise import QuasiNewton
+from selfmotion.path import Path, TimeLaw
+from selfmotion.planning import Search
+from selfmotion.task import Damping, Relaxation, Task
+
+# Kinds that no file names: what is missing of a plan, a cost that damping adds, functions (which
+# are named by module:attribute).
+_NOT_IN_FILES = {"LostCost", "OffPath", "FunctionCost"}
+# No angle, length, weight or time is beyond this, and its square is a number still.
+_HUGE = 1e15
+_STRICT = ConfigDict(extra="forbid", protected_namespaces=())
+
+
+def _checked(kind: type | tuple[type, ...], what: str, schema: dict[str, Any]) -> Any:
+    """Return a type that accepts values of a kind, and says what was expected otherwise."""
+
+    def check(value: Any) -> Any:
+        sound = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
+        if not sound or (isinstance(value, int | float) and not _is_sensible(value)):
+            raise ValueError(f"is {value!r}, expected {what}")
+        return value
+
+    return Annotated[Any, PlainValidator(check), WithJsonSchema(schema)]
+
+
+def _is_sensible(value: float) -> bool:
+    """Whether float64 can count with a number; infinity may mean that there is no limit."""
+    return not math.isnan(value) and (abs(value) < _HUGE or math.isinf(value))
+
+
+def _are_numbers(value: Any) -> bool:
+    if isinstance(value, list):
+        return bool(value) and all(map(_are_numbers, value))
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _numbers(value: Any) -> Any:
+    if not _are_numbers(value):
+        raise ValueError(f"is {value!r}, expected a number or a list of numbers")
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (ValueError, OverflowError):
+        raise ValueError(f"is {value!r}, expected rows of equal length") from None
+    if not all(map(_is_sensible, array.ravel().tolist())):
+        raise ValueError(f"is {value!r}, expected numbers that are not NaN, nor above {_HUGE:g}")
+    return value
+
+
+def _pose(value: Any) -> Any:
+    try:
+        return pose_of(value)
+    except PathError as error:
+        raise ValueError(str(error)) from error
+
+
+def _names(value: Any) -> Any:
+    listed = [value] if isinstance(value, str) else value
+    if not (isinstance(listed, list) and all(isinstance(item, str) for item in listed)):
+        raise ValueError(f"is {value!r}, expected a name or a list of names")
+    return listed
+
+
+def _coordinates(value: Any) -> Any:
+    """Check a table of joint coordinates."""
+    if not isinstance(value, Mapping) or not all(map(_is_number, value.values())):
+        raise ValueError(f"is {value!r}, expected a table of joints and numbers")
+    return dict(value)
+
+
+def _is_number(value: Any) -> bool:
+    return _are_numbers(value) and not isinstance(value, list) and _is_sensible(value)
+
+
+def _start(value: Any) -> Any:
+    if not (value in ("free", "home", "dexterous") if isinstance(value, str) else True):
+        raise ValueError(f"is {value!r}, expected 'free', 'home', 'dexterous' or numbers")
+    return value if isinstance(value, str) else _numbers(value)
+
+
+_ANY_NUMBERS = {"anyOf": [{"type": "number"}, {"type": "array"}]}
+_TRIPLE = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+_POSE = {
+    "anyOf": [
+        {"type": "array", "minItems": 4, "maxItems": 4},
+        {
+            "type": "object",
+            "properties": {"position": _TRIPLE, **{key: {"type": "array"} for key in ORIENTATIONS}},
+            "additionalProperties": False,
+        },
+    ]
+}
+Number = _checked((int, float), "a number", {"type": "number"})
+Whole = _checked(int, "a whole number", {"type": "integer"})
+Flag = _checked(bool, "true or false", {"type": "boolean"})
+Text = _checked(str, "a text", {"type": "string"})
+Table = _checked(Mapping, "a table", {"type": "object"})
+Numbers = Annotated[Any, PlainValidator(_numbers), WithJsonSchema(_ANY_NUMBERS)]
+Pose = Annotated[Any, PlainValidator(_pose), WithJsonSchema(_POSE)]
+Coordinates = Annotated[Any, PlainValidator(_coordinates), WithJsonSchema({"type": "object"})]
+Names = Annotated[
+    Any, PlainValidator(_names), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "array"}]})
+]
+Start = Annotated[
+    Any,
+    PlainValidator(_start),
+    WithJsonSchema({"anyOf": [{"enum": ["free", "home", "dexterous"]}, {"type": "array"}]}),
+]
+_PLAIN = {bool: Flag, int: Whole, float: Number, str: Text, pin.SE3: Pose}
+
+_Fields = dict[str, tuple[Any, Any]]
+# Where a file says more, or says it otherwise, than the class's own signature.
+_LAWS: Any = Literal[tuple(law.value for law in TimeLaw)]
+_SHAPE: _Fields = {"frame": (Pose, None)}
+_OWN: Mapping[str, _Fields] = {
+    "circle": {"start": (Pose, None), "center": (Numbers, None), "radius": (Number, None),
+               "normal": (Numbers, [0.0, 0.0, 1.0]), **_SHAPE},
+    "line": {"start": (Pose, None), "end": (Pose, None), "by": (Numbers, None), **_SHAPE},
+    "waypoints": _SHAPE,
+    "twist": {"start": (Pose, ...), "breaks": (Numbers, ...), "coefficients": (Numbers, ...)},
+    "retimed": {"path": (Table, ...)},
+    "truncated": {"path": (Table, ...)},
+    "placed": {"path": (Table, ...)},
+    "Relaxation": {"rows": (Names, ...), "during": (Numbers, None)},
+    "Search": {"rng": (Whole, 0)},
+}  # fmt: skip
+_WHOLLY_OWN = {"twist"}
+
+
+# The arm: one known by name, or a URDF or xacro file.
+_ROBOT: _Fields = {
+    **dict.fromkeys(("name", "file", "tool"), (Text, None)),
+    **dict.fromkeys(("base", "tool_offset"), (Pose, None)),
+    "arguments": (Table, None),
+    "lock": (Coordinates, None),
+}
+# A tool motion from a file of poses.
+_PATH_FILE: _Fields = {
+    "kind": (Literal["file"], ...),
+    "file": (Text, ...),
+    "frame": (Pose, None),
+    **dict.fromkeys(("feed", "duration", "jump", "corner_angle"), (Number, None)),
+    "corners": (Text, None),
+}
+# A cost that is a function of one's own.
+_FUNCTION: _Fields = {
+    "kind": (Literal["function"], ...),
+    "code": (Text, ...),
+    "name": (Text, None),
+}
+
+
+def document_model() -> type[BaseModel]:
+    """Return the model of a problem file, with every class that is known by now."""
+    families = (Path, NullMotion, Cost, Constraint)
+    known = (cls for family in families for cls in family.kinds().values())
+    return _document_model((*known, *(cls for _, cls in obstacle_shapes())))
+
+
+@lru_cache(maxsize=1)
+def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
+    # Made anew where a class has come to be known: it takes a tenth of a second.
+    clearance = model_of(Clearance, None, _clearance_fields())
+    constraints = {**_kinds(Constraint), "Clearance": _clearance_model()}
+    paths = {**_kinds(Path), "file": _model("file", _PATH_FILE)}
+    costs = {**_kinds(Cost), FUNCTION: _model(FUNCTION, _FUNCTION)}
+    fields: dict[str, Any] = {
+        "robot": (_model("Robot", _ROBOT), ...),
+        "task": (Literal[tuple(task.value for task in Task)], "pose"),
+        "start": (Start, "free"),
+        "path": (_one_of(paths.values(), "kind"), ...),
+        "null_motion": (_one_of(_kinds(NullMotion).values(), "kind"), None),
+        "costs": (list[_one_of(costs.values(), "kind")], None),  # type: ignore[misc]
+        "constraints": (list[_one_of(constraints.values(), "kind")], None),  # type: ignore[misc]
+        "relaxations": (list[model_of(Relaxation)], None),  # type: ignore[misc]
+        "collision": (clearance, None),
+        "damping": (model_of(Damping), None),
+        "rest": (bool, True),
+        "search": (model_of(Search), None),
+        "optimiser": (model_of(QuasiNewton), None),
+        "tolerance": (model_of(Tolerance), None),
+        "max_evaluations": (Whole, None),
+        "outputs": (Names, None),
+        "grid": (Table, None),
+    }
+    return _model("Problem", fields, "A planning problem.")
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of problem files, for editors."""
+    schema = document_model().model_json_schema()
+    for table in (schema, *schema["$defs"].values()):
+        keys = table.get("properties", {})
+        for suffix, names in (("_deg", ANGLES), ("_mm", LENGTHS)):
+            for name in sorted(names & set(keys)):
+                keys[name + suffix] = keys[name]
+                if name in table.get("required", []):
+                    table["required"].remove(name)
+    for name in ("collision", "damping"):
+        schema["properties"][name] = {"anyOf": [{"type": "boolean"}, schema["properties"][name]]}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def model_of(
+    cls: type, tag: tuple[str, str] | None = None, own: _Fields | None = None
+) -> type[BaseModel]:
+    """Return the model of what a class is made from: its parameters, but for its context."""
+    label = tag[1] if tag else cls.__name__
+    own = _OWN.get(label, {}) if own is None else own
+    fields: _Fields = {} if tag is None else {tag[0]: (Literal[tag[1]], ...)}
+    alone = label in _WHOLLY_OWN or issubclass(cls, Obstacle)
+    parameters = {} if alone else inspect.signature(cls).parameters
+    for name, parameter in parameters.items():
+        if name not in getattr(cls, "context", ()) and name not in own:
+            default = ... if parameter.default is inspect.Parameter.empty else _default(parameter)
+            fields[name] = (_type_of(parameter.annotation), default)
+    about = (inspect.getdoc(cls) or "").partition("\n")[0]
+    return _model(label, {**fields, **own}, about)
+
+
+def _model(label: str, fields: _Fields, about: str = "") -> type[BaseModel]:
+    made: type[BaseModel] = create_model(label, __config__=_STRICT, __doc__=about, **fields)  # type: ignore[call-overload]
+    return made
+
+
+def _kinds(family: type[Saved]) -> dict[str, type[BaseModel]]:
+    known = {kind: cls for kind, cls in family.kinds().items() if kind not in _NOT_IN_FILES}
+    return {kind: model_of(cls, ("kind", kind)) for kind, cls in known.items()}
+
+
+def _clearance_fields() -> _Fields:
+    shapes = [model_of(cls, ("shape", shape), _placed(cls)) for shape, cls in obstacle_shapes()]
+    return {
+        "obstacles": (list[_one_of(shapes, "shape")], None),  # type: ignore[misc]
+        "disabled": (list[Names], None),
+        "srdf": (Text, None),
+    }
+
+
+def _clearance_model() -> type[BaseModel]:
+    return model_of(Clearance, ("kind", "Clearance"), _clearance_fields())
+
+
+def _placed(cls: type[Obstacle]) -> _Fields:
+    """Return an obstacle's fields with its pose as position and orientation."""
+    orientations: _Fields = {key: (Numbers, None) for key in ORIENTATIONS}
+    fields: _Fields = {}
+    for item in dataclasses.fields(cls):
+        if item.name == "pose":
+            fields |= {"position": (Numbers, ...), **orientations}
+        else:
+            default = ... if item.default is dataclasses.MISSING else item.default
+            kind = Text if item.name == "file" else _type_of(item.type)
+            fields[item.name] = (kind, default)
+    return fields
+
+
+def _one_of(models: Iterable[type[BaseModel]], tag: str) -> Any:
+    # A single model cannot be told apart from others, nor need it be.
+    several = list(models)
+    union = reduce(or_, several)
+    return union if len(several) == 1 else Annotated[union, Field(discriminator=tag)]
+
+
+def _default(parameter: inspect.Parameter) -> Any:
+    value = parameter.default
+    if isinstance(value, TimeLaw):
+        return value.value
+    return value if isinstance(value, bool | int | float | str) else None
+
+
+def _type_of(annotation: Any) -> Any:
+    if isinstance(annotation, dataclasses.InitVar):
+        annotation = annotation.type
+    if annotation in _PLAIN:
+        return _PLAIN[annotation]
+    parts = set(get_args(annotation))
+    if annotation is Array or set(get_args(npt.ArrayLike)) <= parts:
+        return Numbers
+    if TimeLaw in parts:
+        return _LAWS
+    if isinstance(annotation, type) and dataclasses.is_dataclass(annotation):
+        return model_of(annotation)
+    # Of a list or a tuple, the parts are those of its items.
+    rest = parts - {type(None)} if get_origin(annotation) in (Union, UnionType) else ()
+    return _type_of(*rest) if len(rest) == 1 else Any

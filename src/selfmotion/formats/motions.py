@@ -1,0 +1,197 @@
+"""Joint motions as the files that controllers and simulators read."""
+
+import io
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import FileFormatError, read_table, write_atomically
+from selfmotion.formats import ros
+from selfmotion.formats.documents import read_document, write_document, write_text
+from selfmotion.formats.mujoco import keyframes
+from selfmotion.formats.samples import MotionSamples
+from selfmotion.formats.urscript import script
+from selfmotion.motion import Trajectory
+from selfmotion.plans import Plan
+from selfmotion.robot import RobotModel
+
+_VELOCITY, _ACCELERATION = "_velocity", "_acceleration"
+
+
+def write_motion(
+    plan: Plan, file: str | Path, *, rate: float | None = None, form: str | None = None
+) -> None:
+    """Write the motion of a plan in a format that others read; atomically.
+
+    ============  ========  ==================================================================
+    form          suffix    what
+    ============  ========  ==================================================================
+    ``csv``       .csv      ``t``, a column per joint, ``NAME_velocity``, ``NAME_acceleration``
+    ``npz``       .npz      arrays ``t``, ``q``, ``qd``, ``qdd``, ``joint_names``
+    ``json``      .json     the same as lists
+    ``ros``       .yaml     ROS 2 ``trajectory_msgs/JointTrajectory``
+    ``moveit``              ``moveit_msgs/RobotTrajectory``
+    ``mujoco``    .xml      keyframes, to include in an MJCF model made from the same URDF
+    ``urscript``  .script   a stream of ``servoj``, its settings in the head
+    ============  ========  ==================================================================
+
+    Parameters
+    ----------
+    plan : Plan
+    file : path
+    rate : float, optional
+        Samples per second; by default those of the plan (URScript: 125).
+    form : str, optional
+        By default the one that has the file's suffix.
+
+    Raises
+    ------
+    FileFormatError
+        The form is unknown, or the file cannot be written.
+    ProblemError
+        The rate gives no samples, or the arm has what the format cannot say.
+    """
+    path = Path(file)
+    name = SUFFIXES.get(path.suffix) if form is None else form
+    if name is None or name not in _WRITERS:
+        known = ", ".join(f"{form} ({suffix})" for suffix, form in SUFFIXES.items())
+        found = f"suffix '{path.suffix}'" if form is None else f"form '{form}'"
+        raise FileFormatError(f"{path}: {found} is no format of motions: {known}, moveit")
+    if name == "urscript" and rate is None:
+        rate = 125.0
+    _WRITERS[name](path, MotionSamples.of(plan.trajectory, rate), plan.robot, rate)
+
+
+def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
+    """Read a motion that `write_motion`, or something else, wrote: csv, npz, json, ros, moveit.
+
+    Accelerations are left out: they follow from the rest. See `Trajectory.from_csv`.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or is no motion; what is missing is named.
+    """
+    path = Path(file)
+    if path.suffix == ".csv":
+        return _read_csv(path, degrees)
+    if path.suffix == ".npz":
+        return _read_npz(path)
+    document = read_document(path)
+    if "t" in document:
+        return _of_tables(path, document)
+    return ros.trajectory(path, document)
+
+
+def _write_csv(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    suffixes = ("", _VELOCITY, _ACCELERATION)
+    names = ["t", *(name + suffix for suffix in suffixes for name in motion.joint_names)]
+    table = np.column_stack([motion.t, motion.q, motion.qd, motion.qdd])
+    rows = (",".join(map(repr, row)) for row in table.tolist())
+    write_text(file, "\n".join([",".join(names), *rows]) + "\n")
+
+
+def _write_npz(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    stream = io.BytesIO()
+    arrays: dict[str, Any] = {"t": motion.t, "q": motion.q, "qd": motion.qd, "qdd": motion.qdd}
+    np.savez_compressed(stream, joint_names=np.array(motion.joint_names), **arrays)
+
+    def write(out: Any) -> None:
+        out.write(stream.getvalue())
+
+    write_atomically(file, write)
+
+
+def _write_json(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    table: dict[str, Any] = {"joint_names": list(motion.joint_names)}
+    table |= {name: getattr(motion, name).tolist() for name in ("t", "q", "qd", "qdd")}
+    write_text(file, json.dumps(table) + "\n")
+
+
+def _write_ros(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    _write_yaml(file, ros.joint_trajectory(motion))
+
+
+def _write_moveit(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    _write_yaml(file, ros.robot_trajectory(motion))
+
+
+def _write_yaml(file: Path, message: Mapping[str, Any]) -> None:
+    if file.suffix not in (".yaml", ".yml", ".json"):
+        raise FileFormatError(f"{file}: messages are written as .yaml or .json")
+    write_document(file, message)
+
+
+def _write_mujoco(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    write_text(file, keyframes(robot, motion.t, motion.q, motion.qd))
+
+
+def _write_urscript(
+    file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None
+) -> None:
+    write_text(file, script(robot, motion.q, rate or 125.0))
+
+
+def _read_csv(file: Path, degrees: bool) -> Trajectory:
+    header, table = read_table(file)
+    if not any(name.endswith(_ACCELERATION) for name in header):
+        return Trajectory.from_csv(file, degrees=degrees)
+    scale = np.pi / 180.0 if degrees else 1.0
+    names = [name.removesuffix(_ACCELERATION) for name in header if name.endswith(_ACCELERATION)]
+    column = {name: table[:, k] for k, name in enumerate(header)}
+    wanted = ["t", *names, *(name + _VELOCITY for name in names)]
+    missing = [name for name in wanted if name not in column]
+    if missing:
+        raise FileFormatError(f"{file}: column '{missing[0]}' is missing")
+    q, qd = (np.stack([column[n + s] for n in names], axis=1) for s in ("", _VELOCITY))
+    return _made(file, column["t"], scale * q, scale * qd, names)
+
+
+def _read_npz(file: Path) -> Trajectory:
+    try:
+        with np.load(file, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except (OSError, ValueError) as error:
+        raise FileFormatError(f"{file}: cannot be read: {error}") from error
+    return _of_tables(file, arrays)
+
+
+def _of_tables(file: Path, tables: Mapping[str, Any]) -> Trajectory:
+    missing = [name for name in ("t", "q", "qd", "joint_names") if name not in tables]
+    if missing:
+        raise FileFormatError(f"{file}: '{missing[0]}' is missing, expected t, q, qd, joint_names")
+    return _made(file, tables["t"], tables["q"], tables["qd"], list(tables["joint_names"]))
+
+
+def _made(file: Path, t: Any, q: Any, qd: Any, names: list[str]) -> Trajectory:
+    try:
+        return Trajectory(t, q, qd, tuple(map(str, names)))
+    except (FileFormatError, TypeError, ValueError) as error:
+        raise FileFormatError(f"{file}: {error}") from error
+
+
+_Writer = Callable[[Path, MotionSamples, RobotModel, float | None], None]
+_WRITERS: Mapping[str, _Writer] = {
+    "csv": _write_csv,
+    "npz": _write_npz,
+    "json": _write_json,
+    "ros": _write_ros,
+    "moveit": _write_moveit,
+    "mujoco": _write_mujoco,
+    "urscript": _write_urscript,
+}
+SUFFIXES = {
+    ".csv": "csv",
+    ".npz": "npz",
+    ".json": "json",
+    ".yaml": "ros",
+    ".yml": "ros",
+    ".xml": "mujoco",
+    ".script": "urscript",
+}
+FORMS = tuple(_WRITERS)
+# Those that say all that a check needs.
+READABLE = ("csv", "npz", "json", "ros", "moveit")

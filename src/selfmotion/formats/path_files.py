@@ -1,0 +1,333 @@
+"""Tool motions from files: tables, arrays, and what ROS writes."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import Array, FileFormatError, PathError, read_rows
+from selfmotion.formats.documents import read_document
+from selfmotion.formats.poses import ORIENTATIONS
+from selfmotion.path import Waypoints
+
+# A coordinate beyond this [m] can only be meant in millimetres; an angle beyond that in degrees.
+_FAR, _ROUND = 50.0, 2.0 * np.pi + 1e-6
+# Poses farther from their predecessor than this [m] are a jump, unless another length is given;
+# so are rotations by more than this [rad], whose direction would be a guess.
+_JUMP, _FLIP = 0.5, 2.6
+_POSITION = ("x", "y", "z")
+# Columns of an orientation → its key in `ORIENTATIONS`.
+_COLUMNS: Mapping[tuple[str, ...], str] = {
+    ("qw", "qx", "qy", "qz"): "quaternion",
+    ("rx", "ry", "rz"): "rotation_vector",
+    ("roll", "pitch", "yaw"): "rpy",
+    ("nx", "ny", "nz"): "normal",
+}
+_KNOWN = {"t", *_POSITION, *(name for names in _COLUMNS for name in names)}
+_UNITS = {"_mm": (_POSITION, 1e-3), "_deg": (("rx", "ry", "rz", "roll", "pitch", "yaw"), None)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Poses as a file has them, and what to call each of them.
+
+    Attributes
+    ----------
+    places : sequence of str
+        "line 7", "poses[6]", …
+    positions : (N, 3)
+    orientation : str
+        Key in `ORIENTATIONS`; "" for none.
+    values : (N, …)
+        Numbers of the orientations.
+    t : (N,) or None
+    """
+
+    places: Sequence[str]
+    positions: Array
+    orientation: str
+    values: Array
+    t: Array | None
+
+
+def read_path(
+    file: str | FilePath,
+    *,
+    feed: float | None = None,
+    duration: float | None = None,
+    jump: float = _JUMP,
+    **options: Any,
+) -> Waypoints:
+    """Read a tool motion through poses.
+
+    ==============  =================================================================
+    .csv .txt .tsv  columns in any order: ``t`` [s], ``x,y,z`` [m], and one of
+                    ``qw,qx,qy,qz``, ``rx,ry,rz`` (rotation vector [rad]),
+                    ``roll,pitch,yaw`` [rad], ``nx,ny,nz`` (the tool's z axis) or
+                    none; ``x_mm`` and ``roll_deg`` are in those units
+    .npy            (N, 4, 4) poses, or a table (N, 3) x,y,z; (N, 4) t,x,y,z;
+                    (N, 7) x,y,z,qw,qx,qy,qz; (N, 8) with t first
+    .yaml .json     ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``
+    ==============  =================================================================
+
+    Parameters
+    ----------
+    file : path
+    feed : float, optional
+        Speed of the tool [m/s] between poses, where the file has no times.
+    duration : float, optional
+        Or the time of the whole motion [s], at constant speed.
+    jump : float
+        Distance from one pose to the next [m] that is refused.
+    options
+        ``corners`` and ``corner_angle`` of `Waypoints`.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or a row cannot be used: not finite, a zero quaternion, times that
+        do not increase, a jump, other units. The line or pose is named.
+    """
+    path = FilePath(file)
+    reader = _READERS.get(path.suffix)
+    if reader is None:
+        raise FileFormatError(
+            f"{path}: has suffix '{path.suffix}', expected one of {', '.join(_READERS)}"
+        )
+    rows = reader(path)
+    if len(rows.positions) < 2:
+        raise FileFormatError(f"{path}: has {len(rows.positions)} poses, expected at least two")
+    _check_rows(path, rows)
+    rotations = _rotations(path, rows)
+    _check_jumps(path, rows, rotations, jump)
+    t = _times(path, rows, feed, duration)
+    try:
+        return Waypoints(t, rows.positions, _quaternions(rotations), **options)
+    except PathError as error:
+        raise FileFormatError(f"{path}: {error}") from error
+
+
+def _read_table(file: FilePath) -> _Rows:
+    header, table, lines = read_rows(file)
+    columns = _columns(file, header, table)
+    missing = [name for name in _POSITION if name not in columns]
+    if missing:
+        raise FileFormatError(
+            f"{file}: column '{missing[0]}' is missing; the header is {','.join(header)}, expected "
+            f"x,y,z [m] (or x_mm,…), t [s], and an orientation"
+        )
+    given = [names for names in _COLUMNS if set(names) & set(columns)]
+    if len(given) > 1:
+        raise FileFormatError(
+            f"{file}: has columns {','.join(given[0])} and {','.join(given[1])}; keep one "
+            f"orientation"
+        )
+    values = np.zeros((len(table), 0))
+    for names in given:
+        lacking = [name for name in names if name not in columns]
+        if lacking:
+            raise FileFormatError(
+                f"{file}: column '{lacking[0]}' is missing, expected {','.join(names)}"
+            )
+        values = np.stack([columns[name] for name in names], axis=1)
+    return _Rows(
+        [f"line {number}" for number in lines],
+        np.stack([columns[name] for name in _POSITION], axis=1),
+        _COLUMNS[given[0]] if given else "",
+        values,
+        columns.get("t"),
+    )
+
+
+def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, Array]:
+    """Return the columns in SI units, by their names without unit."""
+    columns: dict[str, Array] = {}
+    for k, title in enumerate(header):
+        name, scale = title, 1.0
+        for suffix, (names, factor) in _UNITS.items():
+            if title.endswith(suffix) and title.removesuffix(suffix) in names:
+                name, scale = title.removesuffix(suffix), factor or np.pi / 180.0
+        if name not in _KNOWN:
+            raise FileFormatError(
+                f"{file}: unknown column '{title}', expected t, x,y,z and "
+                f"{' or '.join(','.join(names) for names in _COLUMNS)}"
+            )
+        if name in columns:
+            raise FileFormatError(f"{file}: column '{name}' appears twice, in two units")
+        columns[name] = scale * table[:, k]
+    return columns
+
+
+def _read_array(file: FilePath) -> _Rows:
+    try:
+        array = np.load(file, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise FileFormatError(f"{file}: cannot be read as a NumPy array: {error}") from error
+    if not (isinstance(array, np.ndarray) and np.issubdtype(array.dtype, np.number)):
+        raise FileFormatError(f"{file}: holds no array of numbers")
+    places = [f"row {k}" for k in range(len(array) if array.ndim else 0)]
+    if array.ndim == 3 and array.shape[1:] == (4, 4):
+        return _Rows(places, array[:, :3, 3] * 1.0, "rotation", array[:, :3, :3] * 1.0, None)
+    if array.ndim != 2 or array.shape[1] not in (3, 4, 7, 8):
+        raise FileFormatError(
+            f"{file}: has shape {array.shape}, expected (N, 4, 4) poses, or (N, 3) x,y,z, "
+            f"(N, 4) t,x,y,z, (N, 7) x,y,z,qw,qx,qy,qz, (N, 8) with t first"
+        )
+    t = array[:, 0] * 1.0 if array.shape[1] in (4, 8) else None
+    rest = array[:, 1:] * 1.0 if t is not None else array * 1.0
+    return _Rows(places, rest[:, :3], "quaternion" if rest.shape[1] == 7 else "", rest[:, 3:], t)
+
+
+def _read_ros(file: FilePath) -> _Rows:
+    poses = read_document(file).get("poses")
+    if not isinstance(poses, list) or not poses:
+        raise FileFormatError(
+            f"{file}: has no list of poses, expected a nav_msgs/Path or geometry_msgs/PoseArray"
+        )
+    places = [f"poses[{k}]" for k in range(len(poses))]
+    rows = [_ros_pose(file, place, pose) for place, pose in zip(places, poses, strict=True)]
+    stamps = [_stamp(file, place, pose) for place, pose in zip(places, poses, strict=True)]
+    # Publishers that know no times leave all stamps at the same one.
+    t = None if len(set(stamps)) == 1 else np.array(stamps, dtype=np.float64) - (stamps[0] or 0.0)
+    table = np.array(rows)
+    return _Rows(places, table[:, :3], "quaternion", table[:, 3:], t)
+
+
+def _ros_pose(file: FilePath, place: str, given: Any) -> list[float]:
+    pose = given.get("pose", given) if isinstance(given, Mapping) else given
+    found = []
+    for part, keys in (("position", "xyz"), ("orientation", "wxyz")):
+        for key in keys:
+            try:
+                found.append(float(pose[part][key]))
+            except (KeyError, TypeError, ValueError):
+                raise FileFormatError(
+                    f"{file}: {place}: {part}.{key} is missing or no number"
+                ) from None
+    return found
+
+
+def _stamp(file: FilePath, place: str, given: Mapping[str, Any]) -> float | None:
+    header = given.get("header")
+    if header is None:
+        return None
+    try:
+        stamp = header["stamp"]
+        return int(stamp["sec"]) + 1e-9 * int(stamp["nanosec"])
+    except (KeyError, TypeError, ValueError):
+        raise FileFormatError(
+            f"{file}: {place}: header.stamp is incomplete, expected sec and nanosec"
+        ) from None
+
+
+def _check_rows(file: FilePath, rows: _Rows) -> None:
+    parts = [("position", rows.positions), (rows.orientation, rows.values)]
+    if rows.t is not None:
+        parts.append(("time", rows.t[:, None]))
+    for what, values in parts:
+        flat = values.reshape(len(values), -1)
+        bad = np.flatnonzero(~np.all(np.isfinite(flat), axis=1))
+        if bad.size:
+            place = rows.places[int(bad[0])]
+            raise FileFormatError(f"{file}: {place}: the {what} is not finite; mend or drop it")
+    for what, values, bound, remedy in (
+        ("position", rows.positions, _FAR, "metres; say x_mm,y_mm,z_mm if it is millimetres"),
+        ("angle", rows.values, _ROUND, "radians; say roll_deg,… or rx_deg,… if it is degrees"),
+    ):
+        if what == "angle" and rows.orientation not in ("rpy", "rotation_vector"):
+            continue
+        far = np.argwhere(np.abs(values) > bound)
+        if len(far):
+            row, column = far[0]
+            found = f"{what} {values[row, column]:.6g}"
+            raise FileFormatError(f"{file}: {rows.places[row]}: {found} is taken for {remedy}")
+    if rows.t is not None:
+        late = np.flatnonzero(np.diff(rows.t) <= 0.0)
+        if late.size:
+            row = int(late[0]) + 1
+            raise FileFormatError(
+                f"{file}: {rows.places[row]}: time {rows.t[row]:.6g} s does not come after "
+                f"{rows.t[row - 1]:.6g} s; times must increase"
+            )
+
+
+def _rotations(file: FilePath, rows: _Rows) -> Array:
+    if not rows.orientation:
+        return np.tile(np.eye(3), (len(rows.positions), 1, 1))
+    _, rotation = ORIENTATIONS[rows.orientation]
+    found = []
+    for place, values in zip(rows.places, rows.values, strict=True):
+        try:
+            found.append(rotation(values))
+        except (ValueError, PathError) as error:
+            raise FileFormatError(f"{file}: {place}: {error}") from error
+    return np.array(found)
+
+
+def _check_jumps(file: FilePath, rows: _Rows, rotations: Array, jump: float) -> None:
+    steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
+    cosines = np.einsum("kij,kij->k", rotations[:-1], rotations[1:])
+    turns = np.arccos(np.clip(0.5 * (cosines - 1.0), -1.0, 1.0))
+    for what, amounts, bound, unit, remedy in (
+        ("jumps by", steps, jump, "m", _remedy(jump)),
+        ("turns by", turns, _FLIP, "rad", "which has no clear direction; add poses between"),
+    ):
+        far = np.flatnonzero(amounts > bound)
+        if far.size:
+            row = int(far[0]) + 1
+            raise FileFormatError(
+                f"{file}: {rows.places[row]}: the path {what} {amounts[row - 1]:.4g} {unit} from "
+                f"the pose before, {remedy}"
+            )
+
+
+def _remedy(jump: float) -> str:
+    return (
+        f"more than {jump:g} m; give a larger jump if it is meant, or name the columns x_mm,… if "
+        f"they are millimetres"
+    )
+
+
+def _times(file: FilePath, rows: _Rows, feed: float | None, duration: float | None) -> Array:
+    given = {"feed": feed, "duration": duration}
+    for name, value in given.items():
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            raise FileFormatError(f"{file}: {name} is {value}, expected a number above 0")
+    named = [name for name, value in given.items() if value is not None]
+    if rows.t is not None:
+        if named:
+            raise FileFormatError(f"{file}: has times, so that {named[0]} has no effect; drop one")
+        return rows.t
+    if len(named) != 1:
+        raise FileFormatError(
+            f"{file}: has no times; give either a feed [m/s] or a duration [s]"
+            + (", not both" if named else "")
+        )
+    steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
+    still = np.flatnonzero(steps == 0.0)
+    if still.size:
+        raise FileFormatError(
+            f"{file}: {rows.places[int(still[0]) + 1]}: the tool does not move from the pose "
+            f"before, which takes no time by feed or duration; give a column t"
+        )
+    length = np.append(0.0, np.cumsum(steps))
+    return length / feed if feed is not None else length * (float(duration or 0.0) / length[-1])
+
+
+def _quaternions(rotations: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(rotations).as_quat(scalar_first=True))
+
+
+_READERS: Mapping[str, Callable[[FilePath], _Rows]] = {
+    ".csv": _read_table,
+    ".txt": _read_table,
+    ".tsv": _read_table,
+    ".npy": _read_array,
+    ".yaml": _read_ros,
+    ".yml": _read_ros,
+    ".json": _read_ros,
+}

@@ -1,0 +1,374 @@
+"""From a problem file to a problem, and how to plan it."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    ProblemError,
+    RobotError,
+    SelfmotionError,
+    restore,
+)
+from selfmotion.certificate import Tolerance
+from selfmotion.collision import obstacle_from_dict
+from selfmotion.constraints import Clearance, Constraint
+from selfmotion.costs import Cost, FunctionCost
+from selfmotion.formats.code import FUNCTION, name_kinds
+from selfmotion.formats.documents import PER_JOINT, in_si, read_document
+from selfmotion.formats.path_files import read_path
+from selfmotion.formats.poses import ORIENTATIONS
+from selfmotion.motion import NullMotion
+from selfmotion.optimise import LineSearch, Optimizer, QuasiNewton
+from selfmotion.path import Circle, Line, Path, Placed
+from selfmotion.planning import Search, plan
+from selfmotion.plans import Plan, Problem
+from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
+from selfmotion.task import Damping, Relaxation, Task
+
+if TYPE_CHECKING:
+    import pinocchio as pin
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What a problem file says: a problem, and how to plan it.
+
+    Attributes
+    ----------
+    problem : Problem
+    search : Search or None
+    optimizer : Optimizer or None
+    tolerance : Tolerance or None
+    max_evaluations : int or None
+        See `plan`.
+    outputs : tuple of Path
+        Files to write.
+    """
+
+    problem: Problem
+    search: Search | None = None
+    optimizer: Optimizer | None = None
+    tolerance: Tolerance | None = None
+    max_evaluations: int | None = None
+    outputs: tuple[FilePath, ...] = ()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What `plan` is given besides the problem."""
+        names = ("search", "optimizer", "tolerance", "max_evaluations")
+        return {name: getattr(self, name) for name in names}
+
+    def plan(self, **options: Any) -> Plan:
+        """Plan it; `options` are further ones of `plan`."""
+        return plan(self.problem, **self.settings, **options)
+
+
+def read_problem(file: str | FilePath, *, allow_code: bool = False) -> Problem:
+    """Return the problem of a problem file; see `read_job`."""
+    return read_job(file, allow_code=allow_code).problem
+
+
+def read_job(file: str | FilePath, *, allow_code: bool = False) -> Job:
+    """Read a problem file: TOML, or the same as JSON.
+
+    Units are SI; keys that end in ``_deg`` or ``_mm`` are in degrees and millimetres. Files that it
+    names are looked for beside it. `selfmotion.formats.json_schema` describes all keys.
+
+    Parameters
+    ----------
+    file : path
+    allow_code : bool
+        Whether classes and functions that the file names as ``module:attribute`` are imported.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or says something that cannot be planned; the message names the
+        file and the key, what was found and what was expected.
+    """
+    path = FilePath(file)
+    return job_of(read_document(path), path, allow_code=allow_code)
+
+
+def job_of(
+    document: Mapping[str, Any],
+    file: FilePath | None = None,
+    *,
+    allow_code: bool = False,
+    memory: dict[str, Any] | None = None,
+) -> Job:
+    """Return the job that a document describes; `file` is where it comes from. See `read_job`.
+
+    Where many documents are read, those with the same arm share it by `memory`.
+    """
+    from selfmotion.formats.checking import checked
+
+    with _named(file, ""):
+        raw = in_si(document)
+        functions = name_kinds(raw, FilePath() if file is None else file.parent, allow_code)
+        table = checked(raw)
+        return _Reader(
+            file, table, functions, _degrees_per_joint(document), {} if memory is None else memory
+        ).job()
+
+
+@contextmanager
+def _named(file: FilePath | None, key: str) -> Iterator[None]:
+    """Say of each error which file and key it is about, where there is a file."""
+    try:
+        yield
+    except SelfmotionError as error:
+        if file is None:
+            raise
+        text, start = str(error), f"{file}: "
+        if text.startswith(start):
+            raise
+        where = f"{start}{key}: " if key else start
+        raise FileFormatError(f"{where}{text.removeprefix(f'{key}: ')}") from error
+
+
+def _degrees_per_joint(document: Any, where: str = "") -> str:
+    """Return the first key that gives degrees joint by joint, "" for none."""
+    items: Any = ()
+    if isinstance(document, Mapping):
+        items = document.items()
+    elif isinstance(document, list):
+        items = enumerate(document)
+    for key, value in items:
+        # Where a joint slides, degrees make no sense.
+        name = str(key)
+        joints = name.endswith("_deg") and name.removesuffix("_deg") in PER_JOINT
+        if joints and isinstance(value, list):
+            return f"{where}{key}"
+        found = _degrees_per_joint(value, f"{where}{key}.")
+        if found:
+            return found
+    return ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Reader:
+    """Makes the objects that a checked table describes."""
+
+    file: FilePath | None
+    table: Mapping[str, Any]
+    functions: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+    degrees: str = ""
+    memory: dict[str, Any] = field(default_factory=dict)
+
+    def job(self) -> Job:
+        table, file = self.table, self.file
+        with _named(file, "robot"):
+            robot = self._once(table["robot"], self._robot)
+        self._check_degrees(robot)
+        task = Task.of(table.get("task", "pose"))
+        with _named(file, "start"):
+            given = table.get("start", "free")
+            asked = (table["robot"], given, task.value)
+            start = self._once(asked, lambda _: _start(given, robot, task))
+        with _named(file, "path"):
+            path = self._path(dict(table["path"]), robot, start)
+        options: dict[str, Any] = {"rest": table.get("rest", True)}
+        if "null_motion" in table:
+            with _named(file, "null_motion"):
+                options["null_motion"] = restore(NullMotion, table["null_motion"])
+        for name, make in (
+            ("costs", lambda item: self._cost(item, robot)),
+            ("constraints", self._constraint),
+            ("relaxations", lambda item: Relaxation(**item)),
+        ):
+            if name in table:
+                options[name] = self._each(name, make)
+        for name, kind in (("collision", self._clearance), ("damping", lambda v: Damping(**v))):
+            if name in table:
+                with _named(file, name):
+                    options[name] = None if table[name] is None else kind(table[name])
+        with _named(file, ""):
+            problem = Problem(robot, path, task, start, **options)
+        return Job(problem, **self._settings())
+
+    def _once(self, values: Any, make: Callable[[Any], Any]) -> Any:
+        # With all digits of poses, which their own text leaves out.
+        key = json.dumps(values, default=lambda pose: pose.homogeneous.tolist())
+        if key not in self.memory:
+            self.memory[key] = make(values)
+        return self.memory[key]
+
+    def _check_degrees(self, robot: RobotModel) -> None:
+        slides = [name for name in robot.joint_names if robot.is_prismatic(name)]
+        if self.degrees and slides:
+            with _named(self.file, self.degrees):
+                raise ProblemError(
+                    f"joint '{slides[0]}' slides, its coordinate is in metres; give rad and m "
+                    f"under the key without _deg"
+                )
+
+    def _robot(self, given: Mapping[str, Any]) -> RobotModel:
+        values = dict(given)
+        name, file = values.pop("name", None), values.pop("file", None)
+        if (name is None) == (file is None):
+            raise RobotError(
+                f"expected either name (one of {', '.join(NAMED_ARMS)}) or file (.urdf, .xacro)"
+            )
+        if name is not None and name not in NAMED_ARMS:
+            raise RobotError(f"name: unknown robot '{name}', known: {', '.join(NAMED_ARMS)}")
+        arguments = {key: str(value) for key, value in values.pop("arguments", {}).items()}
+        chosen = name if file is None else self._beside(file)
+        return load_robot(chosen, **values, arguments=arguments)
+
+    def _path(self, values: dict[str, Any], robot: RobotModel, start: Array | None) -> Path:
+        kind = values.get("kind")
+        frame = None if kind == Placed.kind else values.pop("frame", None)
+        if kind in ("circle", "line") and "start" not in values:
+            if start is None:
+                raise ProblemError(
+                    "start: is missing, and there is no start configuration whose pose to take; "
+                    "give the pose here, or the problem's start = 'dexterous' or numbers"
+                )
+            if frame is not None:
+                raise ProblemError("frame: needs start, the tool's first pose in that frame")
+            values["start"] = robot.pose(start)
+        match kind:
+            case "file":
+                del values["kind"]
+                path: Path = read_path(self._beside(values.pop("file")), **values)
+            case "circle":
+                path = _circle(values)
+            case "line":
+                path = _line(values)
+            case _:
+                path = _restored(values)
+        return path if frame is None else Placed(path, frame)
+
+    def _cost(self, values: Mapping[str, Any], robot: RobotModel) -> Cost:
+        if values["kind"] == FUNCTION:
+            function = self.functions[values["code"]]
+            name = values.get("name", getattr(function, "__name__", "function"))
+            return FunctionCost(function, name=name)
+        cost: Cost = restore(Cost, values, robot=robot)
+        return cost
+
+    def _constraint(self, values: Mapping[str, Any]) -> Constraint:
+        if values["kind"] == Clearance.kind:
+            return self._clearance({key: v for key, v in values.items() if key != "kind"})
+        constraint: Constraint = restore(Constraint, values)
+        return constraint
+
+    def _clearance(self, values: Mapping[str, Any]) -> Clearance:
+        given = dict(values)
+        bodies = [self._obstacle(item) for item in given.pop("obstacles", [])]
+        if "srdf" in given:
+            given["srdf"] = self._beside(given["srdf"])
+        return Clearance(tuple(bodies), **given)
+
+    def _obstacle(self, values: Mapping[str, Any]) -> Any:
+        return obstacle(values, self._beside)
+
+    def _each(self, name: str, make: Callable[[Any], Any]) -> list[Any]:
+        found = []
+        for k, item in enumerate(self.table[name]):
+            with _named(self.file, f"{name}[{k}]"):
+                found.append(make(item))
+        return found
+
+    def _settings(self) -> dict[str, Any]:
+        table = self.table
+        found: dict[str, Any] = {}
+        kinds: dict[str, Any] = {"search": Search, "tolerance": Tolerance}
+        for name, kind in kinds.items():
+            if name in table:
+                with _named(self.file, name):
+                    found[name] = kind(**table[name])
+        if "optimiser" in table:
+            with _named(self.file, "optimiser"):
+                values = dict(table["optimiser"])
+                if "line_search" in values:
+                    values["line_search"] = LineSearch(**values["line_search"])
+                found["optimizer"] = QuasiNewton(**values)
+        if "max_evaluations" in table:
+            found["max_evaluations"] = table["max_evaluations"]
+        outputs = tuple(self._beside(name) for name in table.get("outputs", ()))
+        return {**found, "outputs": outputs}
+
+    def _beside(self, name: str) -> FilePath:
+        return FilePath(name) if self.file is None else self.file.parent / name
+
+
+def obstacle(values: Mapping[str, Any], beside: Callable[[str], FilePath]) -> Any:
+    """Return an obstacle from a table with its pose in any of the ways of `pose_of`."""
+    from selfmotion.formats.poses import pose_of
+
+    given = dict(values)
+    keys = [key for key in ("position", *ORIENTATIONS) if key in given]
+    try:
+        pose = pose_of({key: given.pop(key) for key in keys})
+    except ValueError as error:
+        raise FileFormatError(f"obstacle '{values.get('name')}': {error}") from error
+    if "file" in given:
+        given["file"] = str(beside(given["file"]))
+    position, rotation = pose.translation.tolist(), pose.rotation.tolist()
+    return obstacle_from_dict({**given, "position": position, "rotation": rotation})
+
+
+def _start(given: Any, robot: RobotModel, task: Task) -> Array | None:
+    if given == "free":
+        return None
+    if given == "dexterous":
+        return robot.dexterous_configuration(task)
+    if given != "home":
+        return robot.configuration(given)
+    for arm in NAMED_ARMS.values():
+        if arm.home is not None and robot.urdf.source.endswith(arm.urdf):
+            return robot.configuration(np.array(arm.home))
+    homes = ", ".join(name for name, arm in NAMED_ARMS.items() if arm.home is not None)
+    raise RobotError(f"is 'home', which is known of {homes} only; give numbers, or 'dexterous'")
+
+
+def _restored(values: Mapping[str, Any]) -> Path:
+    """Return a path of tables of numbers, such as a plan's file has; ProblemError for others."""
+    try:
+        with np.errstate(invalid="raise", over="raise"):
+            path: Path = restore(Path, values)
+            path.samples([0.0, 0.5 * path.duration, path.duration])
+    except (ArithmeticError, IndexError, TypeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise ProblemError(f"{values['kind']}: is no path with these numbers: {reason}") from error
+    return path
+
+
+def _circle(values: dict[str, Any]) -> Path:
+    del values["kind"]
+    values.setdefault("normal", [0.0, 0.0, 1.0])
+    _exactly_one(values, "center", "radius")
+    start = values.pop("start")
+    if "center" in values:
+        return Circle(start, **values)
+    return Circle.around(start, values.pop("radius"), values.pop("duration"), **values)
+
+
+def _line(values: dict[str, Any]) -> Path:
+    del values["kind"]
+    _exactly_one(values, "end", "by")
+    start: pin.SE3 = values["start"]
+    if "by" in values:
+        by = np.asarray(values.pop("by"), dtype=np.float64)
+        if by.shape != (3,):
+            raise ProblemError(f"by: is {by.tolist()}, expected three numbers [m]")
+        values["end"] = start.copy()
+        values["end"].translation = start.translation + by
+    return Line(**values)
+
+
+def _exactly_one(values: Mapping[str, Any], *names: str) -> None:
+    given: Sequence[str] = [name for name in names if name in values]
+    if len(given) != 1:
+        found = " and ".join(given) or "neither"
+        raise ProblemError(f"has {found}, expected either {' or '.join(names)}")

@@ -1,0 +1,124 @@
+"""From a problem back to its file."""
+
+import dataclasses
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+from selfmotion.basics import FileFormatError, ProblemError, Saved
+from selfmotion.constraints import Constraint
+from selfmotion.costs import Cost
+from selfmotion.formats.documents import write_document
+from selfmotion.motion import NullMotion
+from selfmotion.path import Path
+from selfmotion.plans import NO_OVERLAP, Problem
+from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot, mounting_of
+
+if TYPE_CHECKING:
+    from selfmotion.formats.problem_file import Job
+
+
+def write_problem(problem: Problem, file: str | FilePath) -> None:
+    """Write a problem as TOML or JSON that `read_problem` turns into the same problem.
+
+    Raises
+    ------
+    ProblemError
+        It holds a function, which a file cannot carry, or an arm that is in no URDF file.
+    FileFormatError
+        The file cannot be written.
+    """
+    write_document(FilePath(file), problem_table(problem))
+
+
+def write_job(job: "Job", file: str | FilePath) -> None:
+    """Write a problem with its settings; see `write_problem`."""
+    table = problem_table(job.problem)
+    for name, key in (("search", "search"), ("optimizer", "optimiser"), ("tolerance", "tolerance")):
+        value = getattr(job, name)
+        if value is not None:
+            table[key] = dataclasses.asdict(value)
+    if job.max_evaluations is not None:
+        table["max_evaluations"] = job.max_evaluations
+    if job.outputs:
+        table["outputs"] = [str(output.resolve()) for output in job.outputs]
+    write_document(FilePath(file), table)
+
+
+def problem_table(problem: Problem) -> dict[str, Any]:
+    """Return the table of a problem file; see `write_problem`."""
+    start = problem.given_start
+    table: dict[str, Any] = {
+        "task": problem.task.value,
+        "start": "free" if start is None else start.tolist(),
+    }
+    if problem.collision is None:
+        table["collision"] = False
+    if not problem.rest:
+        table["rest"] = False
+    if problem.damping is not None:
+        table["damping"] = dataclasses.asdict(problem.damping)
+    table["robot"] = _robot(problem.robot)
+    table["path"] = _described(problem.path, Path)
+    table["null_motion"] = _described(problem.null_motion, NullMotion)
+    table["costs"] = [_described(cost, Cost) for cost in problem.costs]
+    table["constraints"] = [_described(item, Constraint) for item in problem.constraints]
+    if problem.relaxations:
+        # Those at their defaults would put an infinite band into JSON.
+        table["relaxations"] = [
+            {key: value for key, value in item.to_dict().items() if value != float("inf")}
+            for item in problem.relaxations
+        ]
+    if problem.collision not in (None, NO_OVERLAP):
+        described = _described(problem.collision, Constraint)
+        table["collision"] = {key: value for key, value in described.items() if key != "kind"}
+    return {key: _without_none(value) for key, value in table.items()}
+
+
+def _robot(robot: RobotModel) -> dict[str, Any]:
+    mounting, source = mounting_of(robot.urdf, robot.tool), FilePath(robot.urdf.source)
+    table: dict[str, Any] = {"tool": mounting.tool}
+    names = [name for name, arm in NAMED_ARMS.items() if str(source).endswith(arm.urdf)]
+    named = next((name for name in names if _is_named(robot, name)), None)
+    if named is not None:
+        table["name"] = named
+    elif source.suffix == ".urdf" and source.is_file() and not robot.urdf.has_changed():
+        table["file"] = str(source.resolve())
+    else:
+        raise ProblemError(
+            f"{robot.name}: its URDF is not (or no longer) in the file '{source}', which a problem "
+            f"file could name; write `robot.urdf.text` to a .urdf file and load it from there"
+        )
+    for key, placed in (("base", mounting.base), ("tool_offset", mounting.tool_offset)):
+        if placed is not None:
+            table[key] = {"position": placed[0], "rpy": placed[1]}
+    table["lock"] = dict(robot.locked)
+    return table
+
+
+def _is_named(robot: RobotModel, name: str) -> bool:
+    known = load_robot(name)
+    return known.urdf.text == robot.urdf.bare_text() and known.touching == robot.touching
+
+
+def _described(value: Saved, family: type[Saved]) -> dict[str, Any]:
+    """Return the description of a value, its class named by module where it is the user's own."""
+    described, cls = value.to_dict(), type(value)
+    if described["kind"] != cls.kind:
+        raise ProblemError(
+            f"{cls.__name__} '{getattr(value, 'name', '')}' holds a function, which a file cannot "
+            f"carry; derive a class from selfmotion.{family.__name__}"
+        )
+    if not cls.__module__.startswith("selfmotion."):
+        if cls.__module__ == "__main__":
+            raise FileFormatError(
+                f"{cls.__name__} is defined in the script that runs; move it into a module, which "
+                f"a file can name"
+            )
+        described["kind"] = f"{cls.__module__}:{cls.__qualname__}"
+    return described
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return [_without_none(item) for item in value] if isinstance(value, list) else value

@@ -1,0 +1,54 @@
+"""A tool motion given in a frame of its own, such as that of the workpiece."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from selfmotion.basics import Array, restore
+from selfmotion.path.base import Path, PathSamples, as_pose
+
+
+class Placed(Path, kind="placed"):
+    """A path in a frame that stands somewhere in the world.
+
+    Parameters
+    ----------
+    path : Path
+        Poses in the frame.
+    frame : SE3 or (4, 4)
+        Pose of the frame in the world [m].
+    """
+
+    def __init__(self, path: Path, frame: pin.SE3 | npt.ArrayLike) -> None:
+        self._path, self._frame = path, as_pose(frame)
+        self.duration = path.duration
+
+    @property
+    def knots(self) -> Array:
+        """See `Path.knots`."""
+        return self._path.knots
+
+    @property
+    def marks(self) -> Array:
+        """See `Path.marks`."""
+        return self._path.marks
+
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
+        inner, turn = self._path.evaluate(t), self._frame.rotation
+        twist = np.hstack([inner.twist[:, :3] @ turn.T, inner.twist[:, 3:] @ turn.T])
+        translation = inner.translation @ turn.T + self._frame.translation
+        return PathSamples(t, translation, turn @ inner.rotation, twist)
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Saved.to_dict`."""
+        frame = self._frame.homogeneous.tolist()
+        return {"kind": self.kind, "path": self._path.to_dict(), "frame": frame}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Placed":
+        """See `Saved.from_dict`."""
+        return cls(**{**values, "path": restore(Path, values["path"])})

@@ -1,0 +1,35 @@
+"""The command line in this process, which spares each test the start of Python."""
+
+import io
+import sys
+from contextlib import redirect_stderr
+from pathlib import Path
+from unittest.mock import patch
+
+import pytest
+from typer.testing import CliRunner
+
+from selfmotion.cli import app, main
+
+
+def invoke(*arguments: str | Path) -> tuple[int, str]:
+    """Return exit code and standard output; exceptions come through."""
+    result = CliRunner().invoke(app, list(map(str, arguments)))
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result.exit_code, result.stdout
+
+
+def complaint(*arguments: str | Path) -> str:
+    """Return the one line that the command prints for bad input, with exit code 2."""
+    printed = io.StringIO()
+    with (
+        patch.object(sys, "argv", ["selfmotion", *map(str, arguments)]),
+        redirect_stderr(printed),
+        pytest.raises(SystemExit) as stopped,
+    ):
+        main()
+    assert stopped.value.code == 2
+    (line,) = printed.getvalue().strip().splitlines()
+    assert line.startswith("error: ")
+    return line
