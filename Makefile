@@ -9,8 +9,8 @@ READY := $(VENV)/.ready
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
 
-test: $(READY)  ## the whole test run
-	$(BIN)/pytest
+test: $(READY)  ## the whole test run, on two cores
+	$(BIN)/pytest --numprocesses 2 --dist loadfile
 
 lint: $(READY)  ## style, types and layers
 	$(BIN)/ruff check .
