@@ -27,6 +27,7 @@ from selfmotion.basics.files import (
 from selfmotion.basics.jit import inlined, kernel
 from selfmotion.basics.progress import Progress, silent
 from selfmotion.basics.saved import Saved, is_known, restore
+from selfmotion.basics.threads import one_blas_thread
 
 __all__ = [
     "Array",
@@ -48,6 +49,7 @@ __all__ = [
     "inlined",
     "is_known",
     "kernel",
+    "one_blas_thread",
     "per_joint",
     "read_archive",
     "read_only",

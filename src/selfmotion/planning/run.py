@@ -12,6 +12,7 @@ from selfmotion.basics import (
     ProblemError,
     Progress,
     SelfmotionError,
+    one_blas_thread,
     read_only,
     silent,
 )
@@ -87,6 +88,19 @@ def plan(
         The interruption came before there was a complete motion.
     """
     _check(problem, search, max_evaluations)
+    with one_blas_thread():
+        return _plan(problem, optimizer, search, tolerance, max_evaluations, callback, progress)
+
+
+def _plan(
+    problem: Problem,
+    optimizer: Optimizer | None,
+    search: Search | None,
+    tolerance: Tolerance | None,
+    max_evaluations: int | None,
+    callback: Callback | None,
+    progress: Progress,
+) -> Plan:
     if problem.damping is not None and max_evaluations is None:
         max_evaluations = _PATIENCE
     effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, Counts())
