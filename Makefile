@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-peers suite suite-made fuzz fuzz-certificate fuzz-generated distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-peers bench-starts suite suite-made fuzz fuzz-certificate fuzz-generated distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -28,6 +28,9 @@ bench: $(READY)  ## the figures of the README's performance table
 
 bench-constrained: $(READY)  ## problems whose constraints bind, against an earlier revision
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/constrained.py
+
+bench-starts: $(READY)  ## free starts against the best of everything tried, 60 paths
+	$(BIN)/python benchmarks/starts.py
 
 study: $(READY)  ## the paper re-run, as a report in out/study
 	$(BIN)/selfmotion study --out out/study

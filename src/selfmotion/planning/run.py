@@ -2,7 +2,7 @@
 
 import time
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
@@ -135,8 +135,7 @@ class _Run:
         self._tolerance, self._progress = tolerance, progress
         self._began = time.perf_counter()
         self._reach = cache(self._reachable)
-        begin = partial(Session.begin, problem, effort)
-        self._candidates = Candidates(problem, begin, search, progress, self._reach)
+        self._candidates = Candidates(problem, effort, search, progress, self._reach)
 
     def plan(self) -> Plan:
         """Return the plan of the whole path, or of the largest part of it."""
