@@ -140,7 +140,7 @@ def plan(problem: PathProblem, seed: int, progress: Progress) -> sm.Plan:
             problem.path,
             problem.task,
             null_motion=sm.BSplineNullMotion(40),
-            costs=[sm.PathLength(smoothing=0.005)],
+            costs=[sm.PathLength(smoothing=0.005, joint_weights=robot.joint_weights)],
             constraints=constraints,
         ),
         search=sm.Search(mode="global", rng=seed),

@@ -101,11 +101,12 @@ class Candidates:
     def _search(self) -> None:
         problem, search = self._problem, self._settings
         start = problem.given_start
-        can_search = problem.robot.redundancy(problem.task) == 1
-        if search.compare and not can_search:
+        redundancy = problem.robot.redundancy(problem.task)
+        can_search = redundancy > 0
+        if search.compare and redundancy != 1:
             raise ProblemError(
                 f"compare: the global search needs redundancy 1, but {problem.robot.name} has "
-                f"{problem.robot.redundancy(problem.task)} for task '{problem.task.value}'"
+                f"{redundancy} for task '{problem.task.value}'"
             )
         starts = start is None and (search.mode != "global" or not can_search)
         rng = np.random.default_rng(search.rng)

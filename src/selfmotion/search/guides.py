@@ -3,21 +3,27 @@
 import itertools
 
 import numpy as np
+import pinocchio as pin
 
 from selfmotion.basics import Array, Progress
-from selfmotion.path import Path, Waypoints
+from selfmotion.path import Path
 from selfmotion.plans import Problem
+from selfmotion.search.sampled import sampled_sequences
 from selfmotion.search.sequences import Sequence, best_sequences
 
 # Sequences refined; the shortest among the samples is not always that of the best motion.
 _COUNT = 4
-# A search at fewer times than these would not follow the path, at more it would only take longer;
-# in between, the path's own waypoints are taken.
-_FEWEST, _MOST = 150, 400
+# From one of the search's times to the next the tool moves by so much [m, rad], whatever the path's
+# own waypoints: more times would take longer, and what comes of them is smoothed anyway.
+_STRIDE, _TURN = 0.02, 0.1
+# At fewer times than these a search would miss obstacles, more would take too long.
+_FEWEST, _MOST = 60, 400
+# The path is looked at so often to see how far the tool moves.
+_LOOKS = 2000
 # What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
 _MARGIN = 5e-4
-# The jagged chain of samples is smoothed by a spline with this many waypoints per interval.
-_SMOOTHING = 5
+# The jagged chain of samples is smoothed by a spline with this many of them per interval.
+_SMOOTHING = 2
 
 
 class SequenceGuide:
@@ -48,7 +54,7 @@ class SequenceGuide:
 def guides(
     problem: Problem, rng: np.random.Generator | int | None, progress: Progress
 ) -> list[SequenceGuide]:
-    """Return guides from the best sequences over the self-motions of redundancy 1, shortest first.
+    """Return guides from the best sequences over the self-motions, shortest first.
 
     Raises
     ------
@@ -58,37 +64,52 @@ def guides(
     robot, path, asked = problem.robot, problem.path, problem.envelope
     t = search_times(path)
     step = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
-    sequences = best_sequences(
-        robot,
-        path,
-        problem.task,
-        t,
-        lower=asked.lower,
-        upper=asked.upper,
-        largest_step=step,
-        bodies=[(model, distance + _MARGIN) for model, distance in asked.bodies],
-        count=_COUNT,
-        rng=0 if rng is None else rng,
-        progress=progress,
-    )
+    bodies = [(model, distance + _MARGIN) for model, distance in asked.bodies]
+    rng = 0 if rng is None else rng
+    if robot.redundancy(problem.task) == 1:
+        sequences = best_sequences(
+            robot,
+            path,
+            problem.task,
+            t,
+            lower=asked.lower,
+            upper=asked.upper,
+            largest_step=step,
+            bodies=bodies,
+            count=_COUNT,
+            rng=rng,
+            progress=progress,
+        )
+    else:
+        sequences = sampled_sequences(
+            robot,
+            path,
+            problem.task,
+            t,
+            lower=asked.lower,
+            upper=asked.upper,
+            largest_step=step,
+            bodies=bodies,
+            weights=robot.joint_weights,
+            count=_COUNT,
+            rng=rng,
+            progress=progress,
+        )
     return [SequenceGuide(sequence) for sequence in sequences]
 
 
 def search_times(path: Path) -> Array:
-    """Return the times (W,) [s] at which configurations are searched for.
-
-    The path's waypoints where it has some: without those that follow too soon upon another one,
-    and with more between those that are far apart.
-    """
-    own = path.waypoint_times if isinstance(path, Waypoints) else np.array([0.0, path.duration])
-    shortest, longest = path.duration / _MOST, path.duration / _FEWEST
-    kept = [0.0]
-    for time in own[1:-1]:
-        if time - kept[-1] >= shortest and path.duration - time >= shortest:
-            kept.append(float(time))
-    kept.append(path.duration)
-    pieces = [
-        np.linspace(first, last, int(np.ceil((last - first) / longest)), endpoint=False)
-        for first, last in itertools.pairwise(kept)
-    ]
-    return np.concatenate([*pieces, kept[-1:]])
+    """Return the times (W,) [s] at which configurations are searched for: as the tool moves on."""
+    t = np.linspace(0.0, path.duration, _LOOKS)
+    tool = path.samples(t)
+    moved = np.linalg.norm(np.diff(tool.translation, axis=0), axis=1) / _STRIDE
+    turned = np.array(
+        [np.linalg.norm(pin.log3(a.T @ b)) for a, b in itertools.pairwise(tool.rotation)]
+    )
+    travel = np.concatenate([[0.0], np.cumsum(moved + turned / _TURN)])
+    # Where the tool stands still, time counts, so that there is always one time after another.
+    count = int(np.clip(np.ceil(travel[-1]), _FEWEST, _MOST))
+    travel += t * (1e-3 * count / path.duration)
+    times = np.interp(np.linspace(0.0, travel[-1], count + 1), travel, t)
+    times[-1] = path.duration
+    return np.asarray(times)
