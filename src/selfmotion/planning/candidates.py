@@ -23,6 +23,8 @@ from selfmotion.search import Reach, SequenceGuide, guides, start_candidates
 
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 _SECOND_EFFORT = 4
+# Evaluations of the cost with which each sequence is optimised at first; only the best goes on.
+_FIRST = 16
 # Sequences are not worth refining when longer by this factor than one that keeps all constraints.
 _LONGER = 1.25
 
@@ -168,6 +170,7 @@ class Candidates:
         except NoSequenceError as error:
             self._failure = error
             self.notes.append(f"global search: {error}")
+        begun: list[Session] = []
         for number, guide in enumerate(self.sequences, 1):
             self._progress("refining sequence", number, len(self.sequences))
             try:
@@ -175,32 +178,41 @@ class Candidates:
             except BreakdownError as error:
                 self._failure = error
                 continue
-            if self._hopeless(guide, session):
+            if begun and self._hopeless(guide, session, begun[0]):
                 continue
-            self._try(session, chosen=chosen)
-            if self.rival is None or session.score() < self.rival.score():
-                self.rival = session
+            # What happens to it first tells which one is worth the rest.
+            self._try(session, chosen=chosen, evaluations=_FIRST)
+            begun = sorted([*begun, session], key=Session.score)
+        if begun:
+            self.rival = begun[0]
+            if begun[0].status is Status.MAX_EVALUATIONS:
+                self._try(begun[0], chosen=chosen)
 
-    def _hopeless(self, guide: SequenceGuide, session: Session) -> bool:
+    def _hopeless(self, guide: SequenceGuide, session: Session, best: Session) -> bool:
         """Whether a sequence is much longer than the shortest, and costs more than what there is.
 
         Optimising gains some percent on a sequence.
         """
-        rival = self.rival
-        if rival is None or rival.violations:
+        if best.violations:
             return False
         longer = guide.sequence.length > _LONGER * self.sequences[0].sequence.length
-        return longer and session.merit() > rival.score()[1]
+        return longer and session.merit() > best.score()[1]
 
-    def _try(self, session: Session, *, chosen: bool = True) -> None:
-        """Optimise a session; keep it if it is the best one and may be chosen."""
+    def _try(
+        self, session: Session, *, chosen: bool = True, evaluations: int | None = None
+    ) -> None:
+        """Optimise a session; keep it if it is the best one and may be chosen.
+
+        With so many evaluations at most, which ends nothing else.
+        """
         try:
-            session.minimize()
+            session.minimize(evaluations)
         except KeyboardInterrupt:
             session.end(Status.INTERRUPTED)
         if chosen:
             self._consider(session)
-        if session.cut_short and self.best is not None:
+        unfinished = evaluations is not None and session.status is Status.MAX_EVALUATIONS
+        if session.cut_short and not unfinished and self.best is not None:
             self.best.end(session.status)
             raise _CutShortError
 

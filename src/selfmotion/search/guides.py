@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, Progress
+from selfmotion.costs import PathLength
 from selfmotion.path import Path
 from selfmotion.plans import Problem
 from selfmotion.search.sampled import sampled_sequences
@@ -21,7 +22,7 @@ _FEWEST, _MOST = 60, 400
 # The path is looked at so often to see how far the tool moves.
 _LOOKS = 2000
 # What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
-_MARGIN = 5e-4
+_MARGIN = 2.5e-4
 # The jagged chain of samples is smoothed by a spline with this many of them per interval.
 _SMOOTHING = 2
 
@@ -90,7 +91,7 @@ def guides(
             upper=asked.upper,
             largest_step=step,
             bodies=bodies,
-            weights=robot.joint_weights,
+            weights=_weights(problem),
             count=_COUNT,
             rng=rng,
             progress=progress,
@@ -113,3 +114,11 @@ def search_times(path: Path) -> Array:
     times = np.interp(np.linspace(0.0, travel[-1], count + 1), travel, t)
     times[-1] = path.duration
     return np.asarray(times)
+
+
+def _weights(problem: Problem) -> Array:
+    """Return what a unit of each joint counts, (n,): as the path's length does, if it is a cost."""
+    for cost in problem.costs:
+        if isinstance(cost, PathLength) and cost.joint_weights is not None:
+            return np.asarray(cost.joint_weights, dtype=np.float64)
+    return problem.robot.joint_weights

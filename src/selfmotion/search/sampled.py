@@ -18,13 +18,13 @@ from selfmotion.task import Task
 
 # Motions begin at so many times, evenly, from so many configurations each: of those that inverse
 # kinematics finds from so many seeds.
-_STATIONS, _STARTS, _SEEDS = 7, 40, 300
+_STATIONS, _STARTS, _SEEDS = 7, 30, 200
 # Constant null motions drift so far over the whole path [rad or m], one standard deviation; every
 # other motion has none.
 _DRIFT = 1.0
 # Of the samples that a chain reaches, so many are followed to the next waypoint, those that are so
 # far from each other [rad or m] first, and so many tries around each, about this far off [rad].
-_PARENTS, _APART = 120, (1.6, 0.8, 0.4, 0.2, 0.1)
+_PARENTS, _APART = 80, (1.6, 0.8, 0.4, 0.2, 0.1)
 _STRAYS, _STRAY = 2, 0.15
 # Around a chain, samples at these distances [rad or m], one after the other, so often each at most.
 _RINGS, _ROUNDS = (0.3, 0.1, 0.03, 0.01), 5
