@@ -139,7 +139,8 @@ class SuiteJudge:
         places = self._bodies.createData()
         for row, x in enumerate(q):
             if pin.computeCollisions(model, data, self._bodies, places, x, True):
-                pair = self._bodies.collisionPairs[places.activeCollisionPair]
+                met = [result.isCollision() for result in places.collisionResults].index(True)
+                pair = self._bodies.collisionPairs[met]
                 names = [self._bodies.geometryObjects[i].name for i in (pair.first, pair.second)]
                 return f"'{names[0]}' meets '{names[1]}' at waypoint {row}"
         return ""

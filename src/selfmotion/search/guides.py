@@ -13,18 +13,19 @@ from selfmotion.search.sampled import sampled_sequences
 from selfmotion.search.sequences import Sequence, best_sequences
 
 # Sequences refined; the shortest among the samples is not always that of the best motion.
-_COUNT = 4
+_COUNT = 3
 # From one of the search's times to the next the tool moves by so much [m, rad], whatever the path's
 # own waypoints: more times would take longer, and what comes of them is smoothed anyway.
 _STRIDE, _TURN = 0.02, 0.1
-# At fewer times than these a search would miss obstacles, more would take too long.
-_FEWEST, _MOST = 60, 400
+# At fewer times than these a search would miss obstacles: self-motion curves allow for more than
+# samples of larger spaces do in the same time. More would take too long.
+_FEWEST_OF_CURVES, _FEWEST, _MOST = 150, 60, 400
 # The path is looked at so often to see how far the tool moves.
 _LOOKS = 2000
 # What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
 _MARGIN = 2.5e-4
 # The jagged chain of samples is smoothed by a spline with this many of them per interval.
-_SMOOTHING = 2
+_SMOOTHING = 3
 
 
 class SequenceGuide:
@@ -41,7 +42,8 @@ class SequenceGuide:
         from scipy.interpolate import make_lsq_spline
 
         t, q = sequence.t, sequence.q
-        inner = np.linspace(t[0], t[-1], max(len(t) // _SMOOTHING, 2))
+        # Where samples are dense in time, so are knots.
+        inner = np.append(t[:-_SMOOTHING:_SMOOTHING], t[-1])
         knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
         self._rate = make_lsq_spline(t, q, knots).derivative()
         self.sequence = sequence
@@ -63,11 +65,12 @@ def guides(
         No chain of configurations follows the path; says where it ends and why.
     """
     robot, path, asked = problem.robot, problem.path, problem.envelope
-    t = search_times(path)
+    is_curve = robot.redundancy(problem.task) == 1
+    t = search_times(path, _FEWEST_OF_CURVES if is_curve else _FEWEST)
     step = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
     bodies = [(model, distance + _MARGIN) for model, distance in asked.bodies]
     rng = 0 if rng is None else rng
-    if robot.redundancy(problem.task) == 1:
+    if is_curve:
         sequences = best_sequences(
             robot,
             path,
@@ -99,8 +102,8 @@ def guides(
     return [SequenceGuide(sequence) for sequence in sequences]
 
 
-def search_times(path: Path) -> Array:
-    """Return the times (W,) [s] at which configurations are searched for: as the tool moves on."""
+def search_times(path: Path, fewest: int) -> Array:
+    """Return times (W,) [s] at which to search for configurations, as the tool moves on."""
     t = np.linspace(0.0, path.duration, _LOOKS)
     tool = path.samples(t)
     moved = np.linalg.norm(np.diff(tool.translation, axis=0), axis=1) / _STRIDE
@@ -109,7 +112,7 @@ def search_times(path: Path) -> Array:
     )
     travel = np.concatenate([[0.0], np.cumsum(moved + turned / _TURN)])
     # Where the tool stands still, time counts, so that there is always one time after another.
-    count = int(np.clip(np.ceil(travel[-1]), _FEWEST, _MOST))
+    count = int(np.clip(np.ceil(travel[-1]), fewest, _MOST))
     travel += t * (1e-3 * count / path.duration)
     times = np.interp(np.linspace(0.0, travel[-1], count + 1), travel, t)
     times[-1] = path.duration
