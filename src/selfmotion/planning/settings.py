@@ -22,8 +22,9 @@ class Search:
         How many starts are optimised to the end: those of the best motions among rough ones, which
         are optimised a little (`Heats`). As many as `starts` leave the rough ones out.
     mode : {"auto", "local", "global"}
-        Optimise from many starts (local), or, where the redundancy is 1, from the best sequences
-        over all self-motions (`best_sequences`). ``"auto"``: from many starts first, and from
+        Optimise from many starts (local), or from the best sequences over all self-motions: sampled
+        evenly where the redundancy is 1 (`best_sequences`), at random where it is more
+        (`sampled_sequences`). ``"auto"``: from many starts first, and from
         sequences where none of them leads to a motion that keeps the constraints.
     compare : bool
         Search globally whatever the other search finds, also where the start is given, so that

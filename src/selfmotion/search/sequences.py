@@ -67,7 +67,7 @@ def best_sequences(
     kinematics at many seeds and from the curves of the neighbouring waypoints. The samples inside
     the limits and free of collision are the nodes of a graph; dynamic programming finds the chain
     of least Σ|Δq| with every step within `largest_step`: the global optimum over samples about
-    0.06 rad apart. Each is then moved along the curves, locally and with finer samples, to where
+    0.1 rad apart. Each is then moved along the curves, locally and with finer samples, to where
     it is shorter; it stays a few per cent longer than the continuous problem's optimum.
     Hence several chains, unlike each other by 0.3 rad in some joint at a
     tenth of the waypoints: refine them all and keep the best.
