@@ -2,7 +2,7 @@
 
 The tool's motion is that of a random smooth joint motion, which is then forgotten: it is within the
 limits and clear of the boxes around it, so that there is a valid motion, and its length bounds that
-of the shortest. Every second problem is a Panda among boxes, the others a Fetch arm without meshes.
+of the shortest. Every second problem is a Panda, the others a Fetch arm.
 """
 
 from __future__ import annotations
@@ -35,12 +35,18 @@ STEP_SHARE, EDGE = 0.95, 0.02
 CLEAR, NEAR = 2e-3, 2e-2
 
 
-def joint_motion(robot: sm.RobotModel, rng: np.random.Generator, waypoints: int) -> Array:
+# Pairs of links that are not looked at.
+Pairs = tuple[tuple[str, str], ...]
+
+
+def joint_motion(
+    robot: sm.RobotModel, disabled: Pairs, rng: np.random.Generator, waypoints: int
+) -> Array:
     """Return a random smooth motion (W, n) within limits and steps, clear of itself."""
     lower, upper = robot.finite_limits()
     size, knots = rng.uniform(0.3, 1.2), int(rng.integers(4, 8))
     largest = STEP_SHARE * np.radians(CRITERIA["joint_step_deg"])
-    model = sm.CollisionModel(robot)
+    model = sm.CollisionModel(robot, (), disabled)
     while True:
         first = lower + (upper - lower) * rng.uniform(0.05, 0.95, robot.dof)
         moves = np.cumsum(rng.uniform(-size, size, (knots, robot.dof)), axis=0)
@@ -48,12 +54,12 @@ def joint_motion(robot: sm.RobotModel, rng: np.random.Generator, waypoints: int)
         q = PchipInterpolator(np.linspace(0.0, 1.0, knots), corners)(np.linspace(0, 1, waypoints))
         if np.abs(np.diff(q, axis=0)).max() > largest:
             continue
-        if not (model.has_bodies and model.worst(q).value < CLEAR):
+        if model.worst(q).value >= CLEAR:
             return np.asarray(q)
 
 
 def boxes_around(
-    robot: sm.RobotModel, q: Array, rng: np.random.Generator, count: int
+    robot: sm.RobotModel, disabled: Pairs, q: Array, rng: np.random.Generator, count: int
 ) -> list[tuple[Array, Array]]:
     """Return centres and sizes of boxes that the motion passes closely but does not touch."""
     found: list[tuple[Array, Array]] = []
@@ -62,7 +68,7 @@ def boxes_around(
             break
         center = np.array([*rng.uniform(-0.8, 0.8, 2), rng.uniform(0.05, 1.1)])
         size = rng.uniform(0.05, 0.3, 3)
-        model = sm.CollisionModel(robot, [sm.Box("box", center, size)])
+        model = sm.CollisionModel(robot, [sm.Box("box", center, size)], disabled)
         if model.worst(q[::4]).value < NEAR and model.worst(q).value > CLEAR:
             found.append((center, size))
     return found
@@ -105,11 +111,13 @@ def main(
     fetch = sm.load_robot(DATA / "fetch.urdf", tool="gripper_link", lock={"torso_lift_joint": 0.0})
     for number in range(seed, seed + count):
         rng = np.random.default_rng(number)
-        among_boxes = number % 2 == 0
-        robot = panda if among_boxes else fetch
-        q = joint_motion(robot, rng, int(rng.integers(60, 400)))
-        boxes = boxes_around(robot, q, rng, int(rng.integers(4, 12))) if among_boxes else []
-        template = "panda__1cube" if among_boxes else "fetch_arm__circle"
+        robot, template = (fetch, "fetch_arm__circle") if number % 2 else (panda, "panda__1cube")
+        listed = json.loads((DATA / template / "problem.json").read_text()).get(
+            "disabled_pairs", ()
+        )
+        disabled = tuple((first, second) for first, second in listed)
+        q = joint_motion(robot, disabled, rng, int(rng.integers(60, 400)))
+        boxes = boxes_around(robot, disabled, q, rng, int(rng.integers(4, 12)))
         write(out / f"made_{number:03d}", robot, template, q, boxes)
         Console().print(f"wrote {out / f'made_{number:03d}'}: {len(boxes)} boxes", markup=False)
 

@@ -277,7 +277,7 @@ def _cost(name: str, q: Array, lower: Array, upper: Array) -> sm.Cost:
         "manipulability": sm.InverseManipulability,
         "posture": lambda: sm.Posture(0.5, posture=q),
         "limits": lambda: sm.JointLimitDistance(lower, upper),
-        "length": sm.PathLength,
+        "length": lambda: sm.PathLength(joint_weights=np.ones(len(q))),
         "own": lambda: sm.FunctionCost(lambda qd, q, t: np.sum(qd**2, axis=1), name="own"),
     }[name]()
 

@@ -188,6 +188,14 @@ def test_pairs_of_panda_with_its_srdf(panda: RobotModel) -> None:
     assert len(CollisionModel(panda).pairs) > 44
 
 
+def test_a_pair_left_out_takes_no_other_pair_along(panda: RobotModel) -> None:
+    """The hand and both fingers, which are held, are one rigid part with link 7."""
+    every = set(CollisionModel(panda).pairs)
+    for pair in (("panda_link4", "panda_link7"), ("panda_link4", "panda_hand")):
+        left = set(CollisionModel(panda, disabled=[pair]).pairs)
+        assert every - left == {pair}
+
+
 def test_links_that_touch_by_design_are_no_pair(panda: RobotModel) -> None:
     pairs = set(CollisionModel(panda).pairs)
     joined = {(f"panda_link{i}", f"panda_link{i + 1}") for i in range(7)}

@@ -89,7 +89,7 @@ def test_the_gap_is_saved_and_shown(compared: dict[float, sm.Plan], tmp_path: Pa
     console = Console(file=io.StringIO(), width=120)
     tables.show(plan, console)
     text = console.file.getvalue()
-    assert "global search over self-motions sampled 0.06 rad apart" in text
+    assert "global search over self-motions sampled 0.1 rad apart" in text
     assert f"{100 * plan.report.gap.cost_excess:+.2f} % from its best motion" in text
 
 

@@ -332,3 +332,16 @@ def test_plans_repeat_bit_for_bit(sample: sm.Plan) -> None:
     again = sm.plan(sm.sample_problem())
     np.testing.assert_array_equal(again.trajectory.q, sample.trajectory.q)
     np.testing.assert_array_equal(again.coefficients, sample.coefficients)
+
+
+def test_a_free_start_is_no_dearer_than_a_good_given_one() -> None:
+    """The dexterous start lies on one of the self-motions that a free start looks along."""
+    robot = sm.load_robot("panda")
+    start = robot.dexterous_configuration()
+    for task, normal in (("pose", (1.0, 0.0, 0.0)), ("position", (0.0, 0.0, 1.0))):
+        path = sm.Circle.around(robot.pose(start), 0.1, 4.0, normal=normal)
+        given = sm.plan(sm.Problem(robot, path, task, start=start))
+        free = sm.plan(sm.Problem(robot, path, task))
+        assert free.certificate.verified
+        # Rough optima that differ by less are not told apart.
+        assert free.report.cost <= 1.01 * given.report.cost

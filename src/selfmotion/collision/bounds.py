@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array
 from selfmotion.collision.bodies import Body
@@ -24,15 +23,7 @@ class BoundingBoxes:
     """
 
     def __init__(self, robot: RobotModel, bodies: Sequence[Body]) -> None:
-        model = robot.model
-        axes, is_revolute = joint_axes(robot)
-        places = list(model.jointPlacements)[1:]
-        self._chain = (
-            np.array([place.rotation for place in places]),
-            np.array([place.translation for place in places]),
-            axes,
-            is_revolute,
-        )
+        self._chain = robot.joint_places()
         joints = np.array([body.joint for body in bodies], dtype=np.int64)
         turns = np.array([body.place.rotation for body in bodies]).reshape(-1, 3, 3)
         middles = [body.place.act(0.5 * (body.solid.low + body.solid.high)) for body in bodies]
@@ -60,15 +51,3 @@ class BoundingBoxes:
         from selfmotion.collision import kernels
 
         return kernels.lower_bounds(q, *self._chain, *self._boxes, pairs, limit)
-
-
-def joint_axes(robot: RobotModel) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Return the joints' axes in their own frames, (n, 3), and which joints are revolute, (n,)."""
-    model = robot.model
-    data = model.createData()
-    # Columns [v, ω] at the world's origin; of one joint Pinocchio returns a vector.
-    columns = pin.computeJointJacobians(model, data, np.zeros(robot.dof)).reshape(6, -1).T
-    twists = [data.oMi[j + 1].actInv(pin.Motion(columns[j])) for j in range(robot.dof)]
-    is_revolute = np.array([bool(np.any(twist.angular)) for twist in twists])
-    axes = [t.angular if r else t.linear for t, r in zip(twists, is_revolute, strict=True)]
-    return np.array(axes).reshape(-1, 3), is_revolute

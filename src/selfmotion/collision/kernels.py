@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, kernel
+from selfmotion.robot.chain import Flags, compose, placements
 
 Ints = npt.NDArray[np.int64]
-Flags = npt.NDArray[np.bool_]
 Vector = tuple[float, float, float]
 # Edges whose cosine differs from one by less are parallel: the faces decide about them.
 _PARALLEL = 1e-6
@@ -57,60 +57,6 @@ def separation(a: Array, b: Array, t: Array, g: Array, h: Array) -> float:
 
 
 @kernel
-def _turned(axis: Array, angle: float, rotation: Array) -> None:
-    """Write the rotation by an angle about a unit vector (Rodrigues' formula)."""
-    s, c = math.sin(angle), math.cos(angle)
-    x, y, z, rest = axis[0], axis[1], axis[2], 1.0 - c
-    for a in range(3):
-        for b in range(3):
-            rotation[a, b] = axis[a] * axis[b] * rest
-        rotation[a, a] += c
-    rotation[0, 1] -= z * s
-    rotation[1, 0] += z * s
-    rotation[0, 2] += y * s
-    rotation[2, 0] -= y * s
-    rotation[1, 2] -= x * s
-    rotation[2, 1] += x * s
-
-
-@kernel
-def _compose(first: Array, at: Array, second: Array, there: Array, r: Array, p: Array) -> None:
-    """Write the product of two placements."""
-    for a in range(3):
-        x, y, z = first[a, 0], first[a, 1], first[a, 2]
-        p[a] = at[a] + x * there[0] + y * there[1] + z * there[2]
-        for b in range(3):
-            r[a, b] = x * second[0, b] + y * second[1, b] + z * second[2, b]
-
-
-@kernel
-def placements(
-    q: Array,
-    rotations: Array,
-    positions: Array,
-    axes: Array,
-    is_revolute: Flags,
-    r: Array,
-    p: Array,
-) -> None:
-    """Write where q (n,) places the joints of a chain: (n + 1, 3, 3) and (n + 1, 3).
-
-    Row 0 is the world. Each joint has a place in the frame of the one before, (n, 3, 3) and (n, 3),
-    and an axis in its own, (n, 3).
-    """
-    r[0], p[0] = np.eye(3), 0.0
-    turn, middle, shift = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    identity, none = np.eye(3), np.zeros(3)
-    for j in range(len(q)):
-        _compose(r[j], p[j], rotations[j], positions[j], middle, shift)
-        if is_revolute[j]:
-            _turned(axes[j], q[j], turn)
-            _compose(middle, shift, turn, none, r[j + 1], p[j + 1])
-        else:
-            _compose(middle, shift, identity, q[j] * axes[j], r[j + 1], p[j + 1])
-
-
-@kernel
 def lower_bounds(
     q: Array,
     rotations: Array,
@@ -133,7 +79,7 @@ def lower_bounds(
         placements(q[k], rotations, positions, axes, is_revolute, r, p)
         for i in range(len(joints)):
             j = joints[i]
-            _compose(r[j], p[j], turns[i], middles[i], turned[i], place[i])
+            compose(r[j], p[j], turns[i], middles[i], turned[i], place[i])
         for pair in range(len(pairs)):
             i, j = pairs[pair, 0], pairs[pair, 1]
             for a in range(3):

@@ -25,7 +25,7 @@ def candidate_pairs(
     CollisionError
         A link that is disabled is not the arm's.
     """
-    excluded = _joined_links(urdf)
+    joined, left_out = _joined_links(urdf), set()
     for pair in disabled:
         for link in pair:
             if link not in urdf.links:
@@ -34,7 +34,7 @@ def candidate_pairs(
                     f"collisions of {' and '.join(repr(name) for name in pair)} are disabled, but "
                     f"the URDF has no link '{link}'" + (f"; it has {near}" if near else "")
                 )
-        excluded.add(frozenset(pair))
+        left_out.add(frozenset(pair))
     part = _rigid_parts(urdf)
 
     def can_meet(first: Body, second: Body) -> bool:
@@ -42,9 +42,11 @@ def candidate_pairs(
             return False
         if first.is_obstacle or second.is_obstacle:
             return True
-        links = {frozenset((first.name, second.name))}
-        links.add(frozenset((part[first.name], part[second.name])))
-        return not links & excluded
+        # A pair that is left out is that of two links alone, not of all that is fixed to them.
+        named = frozenset((first.name, second.name))
+        return (
+            named not in left_out and frozenset((part[first.name], part[second.name])) not in joined
+        )
 
     return [
         (i, j)

@@ -1,7 +1,8 @@
 """The best motion of a problem: from its start, from many starts, from global sequences."""
 
 from collections.abc import Callable, Sequence
-from typing import NoReturn, Protocol
+from functools import partial
+from typing import NoReturn
 
 import numpy as np
 
@@ -13,24 +14,19 @@ from selfmotion.basics import (
     Progress,
     SelfmotionError,
 )
-from selfmotion.engine import Guide
 from selfmotion.optimise import Status
-from selfmotion.planning.session import Session
+from selfmotion.planning.heats import Heats
+from selfmotion.planning.session import Effort, Session
 from selfmotion.planning.settings import Search
 from selfmotion.plans import Problem
 from selfmotion.search import Reach, SequenceGuide, guides, start_candidates
 
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 _SECOND_EFFORT = 4
+# Evaluations of the cost with which each sequence is optimised at first; only the best goes on.
+_FIRST = 16
 # Sequences are not worth refining when longer by this factor than one that keeps all constraints.
 _LONGER = 1.25
-
-
-class Begin(Protocol):
-    """Begins the session of a start."""
-
-    def __call__(self, start: Array, *, free: bool, guide: Guide | None = None) -> Session:
-        """Return it; BreakdownError where its motion at x = 0 runs into a singular pose."""
 
 
 class _CutShortError(Exception):
@@ -43,8 +39,8 @@ class Candidates:
     Parameters
     ----------
     problem : Problem
-    begin : callable
-        Begins the session of a start: `Session.begin` for this problem.
+    effort : Effort
+        What all sessions share.
     search : Search
     progress : Progress
     reach : callable
@@ -66,17 +62,19 @@ class Candidates:
     def __init__(
         self,
         problem: Problem,
-        begin: Begin,
+        effort: Effort,
         search: Search,
         progress: Progress,
         reach: Callable[[float], Reach],
     ) -> None:
         self._reach = reach
-        self._problem, self._begin = problem, begin
+        self._problem, self._effort = problem, effort
+        self._begin = partial(Session.begin, problem, effort)
         self._settings, self._progress = search, progress
         self.best: Session | None = None
         # Complete motions that are not optimised yet.
         self._waiting: Sequence[Session] = ()
+        self._heats: Heats | None = None
         self._failure: SelfmotionError | None = None
         self.sequences: list[SequenceGuide] = []
         self.rival: Session | None = None
@@ -105,11 +103,12 @@ class Candidates:
     def _search(self) -> None:
         problem, search = self._problem, self._settings
         start = problem.given_start
-        can_search = problem.robot.redundancy(problem.task) == 1
-        if search.compare and not can_search:
+        redundancy = problem.robot.redundancy(problem.task)
+        can_search = redundancy > 0
+        if search.compare and redundancy != 1:
             raise ProblemError(
                 f"compare: the global search needs redundancy 1, but {problem.robot.name} has "
-                f"{problem.robot.redundancy(problem.task)} for task '{problem.task.value}'"
+                f"{redundancy} for task '{problem.task.value}'"
             )
         starts = start is None and (search.mode != "global" or not can_search)
         rng = np.random.default_rng(search.rng)
@@ -141,19 +140,28 @@ class Candidates:
     def _try_candidates(self, starts: int, finalists: int, rng: np.random.Generator) -> None:
         problem = self._problem
         candidates = start_candidates(problem.robot, problem.path, problem.task, starts, rng)
-        self._waiting = sessions = []
-        for number, candidate in enumerate(candidates, 1):
-            self._progress("start", number, len(candidates))
-            try:
-                sessions.append(self._begin(candidate, free=True))
-            except BreakdownError as error:
-                self._failure = error
-        sessions.sort(key=Session.initial_score)
-        count = min(finalists, len(sessions))
-        for number, session in enumerate(sessions[:count], 1):
-            self._progress("optimising start", number, count)
+        if len(candidates) > finalists:
+            candidates = self._best_of(candidates, finalists) or candidates
+        self._waiting = sessions = self._sessions(candidates)
+        for number, session in enumerate(sessions, 1):
+            self._progress("optimising start", number, len(sessions))
             self._try(session)
         self._waiting = ()
+
+    def _best_of(self, candidates: list[Array], finalists: int) -> list[Array]:
+        """Return the starts of the best rough motions; none where these all break down."""
+        self._heats = Heats(self._problem, self._effort, self._progress)
+        self._heats.run(candidates, finalists)
+        return self._heats.ranked
+
+    def _sessions(self, starts: Sequence[Array]) -> list[Session]:
+        sessions = []
+        for start in starts:
+            try:
+                sessions.append(self._begin(start, free=True))
+            except BreakdownError as error:
+                self._failure = error
+        return sorted(sessions, key=Session.merit)
 
     def _try_sequences(self, chosen: bool) -> None:
         """Optimise from the best sequences over all self-motions."""
@@ -162,6 +170,7 @@ class Candidates:
         except NoSequenceError as error:
             self._failure = error
             self.notes.append(f"global search: {error}")
+        begun: list[Session] = []
         for number, guide in enumerate(self.sequences, 1):
             self._progress("refining sequence", number, len(self.sequences))
             try:
@@ -169,32 +178,41 @@ class Candidates:
             except BreakdownError as error:
                 self._failure = error
                 continue
-            if self._hopeless(guide, session):
+            if begun and self._hopeless(guide, session, begun[0]):
                 continue
-            self._try(session, chosen=chosen)
-            if self.rival is None or session.score() < self.rival.score():
-                self.rival = session
+            # What happens to it first tells which one is worth the rest.
+            self._try(session, chosen=chosen, evaluations=_FIRST)
+            begun = sorted([*begun, session], key=Session.score)
+        if begun:
+            self.rival = begun[0]
+            if begun[0].status is Status.MAX_EVALUATIONS:
+                self._try(begun[0], chosen=chosen)
 
-    def _hopeless(self, guide: SequenceGuide, session: Session) -> bool:
+    def _hopeless(self, guide: SequenceGuide, session: Session, best: Session) -> bool:
         """Whether a sequence is much longer than the shortest, and costs more than what there is.
 
         Optimising gains some percent on a sequence.
         """
-        rival = self.rival
-        if rival is None or rival.violations:
+        if best.violations:
             return False
         longer = guide.sequence.length > _LONGER * self.sequences[0].sequence.length
-        return longer and session.initial_score() > rival.score()[1]
+        return longer and session.merit() > best.score()[1]
 
-    def _try(self, session: Session, *, chosen: bool = True) -> None:
-        """Optimise a session; keep it if it is the best one and may be chosen."""
+    def _try(
+        self, session: Session, *, chosen: bool = True, evaluations: int | None = None
+    ) -> None:
+        """Optimise a session; keep it if it is the best one and may be chosen.
+
+        With so many evaluations at most, which ends nothing else.
+        """
         try:
-            session.minimize()
+            session.minimize(evaluations)
         except KeyboardInterrupt:
             session.end(Status.INTERRUPTED)
         if chosen:
             self._consider(session)
-        if session.cut_short and self.best is not None:
+        unfinished = evaluations is not None and session.status is Status.MAX_EVALUATIONS
+        if session.cut_short and not unfinished and self.best is not None:
             self.best.end(session.status)
             raise _CutShortError
 
@@ -204,6 +222,8 @@ class Candidates:
 
     def _interrupted(self) -> None:
         """Make the best that is known the outcome; raise KeyboardInterrupt where nothing is."""
+        if self.best is None and not self._waiting and self._heats is not None:
+            self._waiting = self._sessions(self._heats.ranked[:1])
         for session in self._waiting if self.best is None else ():
             session.end(Status.INTERRUPTED)
             self._consider(session)

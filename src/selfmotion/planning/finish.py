@@ -40,7 +40,9 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
             progress("checking", 1, 1)
             finished = _check(problem, session, tolerance, part.ending)
             rough = _rough(finished, session)
-            if finished.certificate.on_path and not rough:
+            # Where no evaluations are left, finer grids change nothing.
+            spent = session.status is Status.MAX_EVALUATIONS
+            if finished.certificate.on_path and (spent or not rough):
                 break
             trajectory = finished.motion.trajectory
             # What damping costs stays on any grid: there, the motion stands when the tool does.

@@ -2,7 +2,7 @@
 
 import time
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
@@ -104,16 +104,25 @@ def _plan(
     if problem.damping is not None and max_evaluations is None:
         max_evaluations = _PATIENCE
     effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, Counts())
-    settings = (search or Search(), tolerance or Tolerance(), progress)
-    found = _Run(problem, effort, *settings).plan()
+    search = search or Search()
+    settings = (tolerance or Tolerance(), progress)
+    found = _Run(problem, effort, search, *settings).plan()
     # Few motions take an arm into itself: the others need not wait for distances.
     if not _overlaps(found) or found.report.status in (Status.INTERRUPTED, Status.STOPPED):
         return found
-    try:
-        apart = _Run(problem, replace(effort, apart=True), *settings).plan()
-    except (SelfmotionError, KeyboardInterrupt):
-        return found
-    return found if _overlaps(apart) and not _overlaps(found) else apart
+    efforts = [(replace(effort, apart=True), search)]
+    if problem.given_start is None and search.mode == "auto":
+        # Hulls that overlap by themselves tell the optimiser nothing; nodes of the search are free.
+        whole = replace(search, mode="global")
+        efforts += [(effort, whole), (replace(effort, apart=True), whole)]
+    for another, how in efforts:
+        try:
+            found = _Run(problem, another, how, *settings).plan()
+        except (SelfmotionError, KeyboardInterrupt):
+            return found
+        if not _overlaps(found) or found.report.status in (Status.INTERRUPTED, Status.STOPPED):
+            return found
+    return found
 
 
 def _overlaps(plan: Plan) -> bool:
@@ -149,8 +158,7 @@ class _Run:
         self._tolerance, self._progress = tolerance, progress
         self._began = time.perf_counter()
         self._reach = cache(self._reachable)
-        begin = partial(Session.begin, problem, effort)
-        self._candidates = Candidates(problem, begin, search, progress, self._reach)
+        self._candidates = Candidates(problem, effort, search, progress, self._reach)
 
     def plan(self) -> Plan:
         """Return the plan of the whole path, or of the largest part of it."""

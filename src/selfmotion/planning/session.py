@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, BreakdownError
 from selfmotion.engine import (
     INTERVALS,
     MOST_HALVINGS,
@@ -97,6 +97,7 @@ class Session:
         self._x = np.zeros(objective.size)
         self.null_motion: NullMotion = still.problem.null_motion
         self.remaining: float | None = None
+        self._evaluations: int | None = None
         self.history: list[Iteration] = []
         self.violations: tuple[str, ...] = ()
         self.active: tuple[Binding, ...] = ()
@@ -110,6 +111,7 @@ class Session:
         *,
         free: bool,
         guide: Guide | None = None,
+        grid: Grid | None = None,
     ) -> "Session":
         """Integrate the motion at x = 0 from a start, and return the session around it.
 
@@ -123,13 +125,18 @@ class Session:
             Whether the start may move along its self-motion.
         guide : Guide, optional
             The null motion that stands for x = 0: where the search found one worth starting from.
+        grid : Grid, optional
+            Where a rough motion will do; by default one on which it stays near the path.
 
         Raises
         ------
         BreakdownError
             The motion at x = 0 runs into a singular pose.
         """
-        still, jacobians = settled_still_motion(problem, configuration, guide)
+        if grid is None:
+            still, jacobians = settled_still_motion(problem, configuration, guide)
+        else:
+            still, jacobians = _rough_motion(problem, configuration, grid)
         effort.counts.jacobians += jacobians
         bound = problem.bind_constraints(configuration, still.end, apart=effort.apart)
         objective = Objective.of(problem, still, free=free, constraints=bound, counts=effort.counts)
@@ -162,6 +169,12 @@ class Session:
         """The null motion's coefficients."""
         return self._objective.parts(self._x)[1].copy()
 
+    @property
+    def nodes(self) -> Array:
+        """The motion as it is now, at the nodes of the grid, (N + 1, n)."""
+        samples = self._objective.samples(self._x)
+        return np.array(samples.q[self._objective.grid.node_stages])
+
     def motion(self) -> Evaluation:
         """Return the motion as it is now."""
         return self._objective.at(self._x)
@@ -170,9 +183,9 @@ class Session:
         """Return the motion at x = 0 on the present grid."""
         return self._objective.at(np.zeros_like(self._x))
 
-    def initial_score(self) -> float:
-        """Return the cost of x = 0, much larger where constraints are violated: for ranking."""
-        objective, x = self._objective, np.zeros_like(self._x)
+    def merit(self) -> float:
+        """Return the cost, much larger where constraints are violated: for ranking."""
+        objective, x = self._objective, self._x
         cost = objective.value(x)
         if not np.isfinite(cost):
             return cost
@@ -182,8 +195,15 @@ class Session:
         """Return whether constraints are violated, then the cost: the smaller, the better."""
         return bool(self.violations), self._cost()
 
-    def minimize(self) -> None:
-        """Optimise on the present grid, from the motion that there is."""
+    def minimize(self, evaluations: int | None = None) -> None:
+        """Optimise on the present grid, from the motion that there is.
+
+        Parameters
+        ----------
+        evaluations : int, optional
+            So many of the cost, for a rough optimum; by default what `Effort` allows.
+        """
+        self._evaluations = evaluations
         if not np.isfinite(self._objective.value(self._x)):
             self._objective.require_finite(self._x)
         self._minimum = self._next_minimum()
@@ -248,10 +268,10 @@ class Session:
         t, duration = before.grid.stage_times, self._still.problem.path.duration
         own, new = (kind.functions(t, duration) for kind in (self.null_motion, motion))
         same = np.linalg.lstsq(new, own)[0]
-        self.null_motion, self._minimum = motion, None
-        self._objective = self._on(before.grid)
         rows = x.reshape(before.null_motion.rows, -1) @ same.T
-        self._x = np.concatenate([z, rows.ravel(), c])
+        moved = np.concatenate([z, rows.ravel(), c]), self._on(before.grid, motion)
+        # At once: an interruption finds what belongs together.
+        self._x, self._objective, self.null_motion, self._minimum = *moved, motion, None
 
     def _on(
         self, grid: Grid, motion: NullMotion | None = None, around: Array | None = None
@@ -335,6 +355,8 @@ class Session:
 
     def _limit(self) -> int | None:
         effort = self._effort
+        if self._evaluations is not None:
+            return effort.counts.evaluations + self._evaluations
         if effort.max_evaluations is None:
             return None
         # At least one more, so that there is something to show.
@@ -368,3 +390,14 @@ class Session:
             # Least squares: conditions may depend on each other.
             x = x - spread @ np.linalg.lstsq(rows @ spread, residual)[0]
         self._x = best
+
+
+def _rough_motion(problem: Problem, configuration: Array, grid: Grid) -> tuple[StillMotion, int]:
+    """Return the motion at x = 0 on a grid, however far off the path it is, and its work."""
+    still = StillMotion.on(problem, configuration, grid)
+    if still.broken is not None:
+        raise BreakdownError(
+            f"{problem.robot.name}: the tool reaches a singular pose near t = {still.broken:.4g} s",
+            time=still.broken,
+        )
+    return still, still.jacobian_evaluations

@@ -16,12 +16,15 @@ class Search:
     Parameters
     ----------
     starts : int
-        Seeds of the inverse kinematics.
+        For redundancy 1, starts along all self-motions of the first pose; else seeds of the inverse
+        kinematics.
     finalists : int
-        How many of the starts found are optimised, those of the best motions at x = 0.
+        How many starts are optimised to the end: those of the best motions among rough ones, which
+        are optimised a little (`Heats`). As many as `starts` leave the rough ones out.
     mode : {"auto", "local", "global"}
-        Optimise from many starts (local), or, where the redundancy is 1, from the best sequences
-        over all self-motions (`best_sequences`). ``"auto"``: from many starts first, and from
+        Optimise from many starts (local), or from the best sequences over all self-motions: sampled
+        evenly where the redundancy is 1 (`best_sequences`), at random where it is more
+        (`sampled_sequences`). ``"auto"``: from many starts first, and from
         sequences where none of them leads to a motion that keeps the constraints.
     compare : bool
         Search globally whatever the other search finds, also where the start is given, so that
@@ -35,7 +38,7 @@ class Search:
         A number is below 1, or the mode unknown.
     """
 
-    starts: int = 24
+    starts: int = 48
     finalists: int = 4
     mode: str = "auto"
     compare: bool = False

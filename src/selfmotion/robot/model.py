@@ -94,6 +94,22 @@ class RobotModel:
         ]
         return links + float(np.linalg.norm(tool)) + sum(slides)
 
+    @property
+    def joint_weights(self) -> Array:
+        """What a unit of each joint counts where joints are added up, (n,).
+
+        1 for a revolute joint. A metre of a prismatic one counts as many radians as move the tool
+        by a metre at the arm's mean lever: the mean over revolute joints of the lengths of all
+        links beyond [rad/m].
+        """
+        links = [float(np.linalg.norm(place.translation)) for place in self.model.jointPlacements]
+        tool = float(np.linalg.norm(self.model.frames[self.tool_id].placement.translation))
+        beyond = np.cumsum([*links[2:], tool][::-1])[::-1]
+        slides = np.array([self.is_prismatic(name) for name in self.joint_names])
+        levers = beyond[~slides]
+        mean = float(levers.mean()) if levers.size and levers.max() > 0.0 else 1.0
+        return np.where(slides, 1.0 / mean, 1.0)
+
     def configuration(self, q: npt.ArrayLike) -> Array:
         """Return `q` as a float64 vector of n finite numbers.
 
@@ -124,6 +140,32 @@ class RobotModel:
     def tool_kinematics(self) -> ToolKinematics:
         """Return the kinematics of the tool with data of their own, for whoever asks often."""
         return ToolKinematics(self.model, self.tool_id)
+
+    def joint_places(self) -> tuple[Array, Array, Array, npt.NDArray[np.bool_]]:
+        """Return what `selfmotion.robot.chain` places joints by.
+
+        Returns
+        -------
+        rotations, positions : (n, 3, 3), (n, 3)
+            Of each joint at q = 0 in the frame of the one before [m].
+        axes : (n, 3)
+            In the joints' own frames.
+        is_revolute : (n,)
+        """
+        model = self.model
+        data = model.createData()
+        # Columns [v, ω] at the world's origin; of one joint Pinocchio returns a vector.
+        columns = pin.computeJointJacobians(model, data, np.zeros(self.dof)).reshape(6, -1).T
+        twists = [data.oMi[j + 1].actInv(pin.Motion(columns[j])) for j in range(self.dof)]
+        is_revolute = np.array([bool(np.any(twist.angular)) for twist in twists])
+        axes = [t.angular if r else t.linear for t, r in zip(twists, is_revolute, strict=True)]
+        places = list(model.jointPlacements)[1:]
+        return (
+            np.array([place.rotation for place in places]).reshape(-1, 3, 3),
+            np.array([place.translation for place in places]).reshape(-1, 3),
+            np.array(axes).reshape(-1, 3),
+            is_revolute,
+        )
 
     def pose(self, q: npt.ArrayLike) -> pin.SE3:
         """Return the tool's pose at `q`."""

@@ -53,7 +53,9 @@ class Chains:
         return chain[::-1]
 
 
-def shortest_chains(layers: list[Array], largest_step: Array, turning: Mask) -> Chains:
+def shortest_chains(
+    layers: list[Array], largest_step: Array, turning: Mask, weights: Array | None = None
+) -> Chains:
     """Return the shortest chains from the first layer on (Bellman's recursion, exact).
 
     Parameters
@@ -64,21 +66,37 @@ def shortest_chains(layers: list[Array], largest_step: Array, turning: Mask) -> 
         No joint may move more between waypoints.
     turning : (n,)
         Joints that count modulo turns.
+    weights : (n,), optional
+        Of the joints in the length; 1 by default.
     """
+    weights = np.ones(len(turning)) if weights is None else weights
     cost = [np.zeros(len(layers[0]))]
     parent = [np.full(len(layers[0]), -1, dtype=np.intp)]
     steps = np.broadcast_to(largest_step, (len(layers) - 1, len(turning)))
     for (before, after), step in zip(itertools.pairwise(layers), steps, strict=True):
-        reach, source = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
-        longest = np.ascontiguousarray(step)
-        kernels.extend(before, cost[-1], after, longest, turning, reach, source)
+        reach, source = extended(before, cost[-1], after, step, turning, weights)
         cost.append(reach)
         parent.append(source)
     return Chains(tuple(cost), tuple(parent))
 
 
+def extended(
+    before: Array, cost: Array, after: Array, step: Array, turning: Mask, weights: Array
+) -> tuple[Array, Rows]:
+    """Return the least cost at `after` (M, n), (M,), and the node of `before` it comes from."""
+    reach, source = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
+    longest = np.ascontiguousarray(step)
+    kernels.extend(before, cost, after, longest, turning, weights, reach, source)
+    return reach, source
+
+
 def diverse_chains(
-    layers: list[Array], forward: Chains, largest_step: Array, turning: Mask, count: int
+    layers: list[Array],
+    forward: Chains,
+    largest_step: Array,
+    turning: Mask,
+    count: int,
+    weights: Array | None = None,
 ) -> list[list[int]]:
     """Return up to `count` chains of nodes: the shortest one, then the shortest unlike the others.
 
@@ -87,7 +105,7 @@ def diverse_chains(
     too few others.
     """
     backwards = largest_step if largest_step.ndim == 1 else largest_step[::-1]
-    reverse = shortest_chains(layers[::-1], backwards, turning)
+    reverse = shortest_chains(layers[::-1], backwards, turning, weights)
     stations = np.unique(np.linspace(0, len(layers) - 1, _STATIONS).round().astype(int))
     through = [
         (float(forward.cost[i][k] + reverse.cost[-1 - i][k]), int(i), k)

@@ -3,21 +3,29 @@
 import itertools
 
 import numpy as np
+import pinocchio as pin
 
 from selfmotion.basics import Array, Progress
-from selfmotion.path import Path, Waypoints
+from selfmotion.costs import PathLength
+from selfmotion.path import Path
 from selfmotion.plans import Problem
+from selfmotion.search.sampled import sampled_sequences
 from selfmotion.search.sequences import Sequence, best_sequences
 
 # Sequences refined; the shortest among the samples is not always that of the best motion.
-_COUNT = 4
-# A search at fewer times than these would not follow the path, at more it would only take longer;
-# in between, the path's own waypoints are taken.
-_FEWEST, _MOST = 150, 400
+_COUNT = 3
+# From one of the search's times to the next the tool moves by so much [m, rad], whatever the path's
+# own waypoints: more times would take longer, and what comes of them is smoothed anyway.
+_STRIDE, _TURN = 0.02, 0.1
+# At fewer times than these a search would miss obstacles: self-motion curves allow for more than
+# samples of larger spaces do in the same time. More would take too long.
+_FEWEST_OF_CURVES, _FEWEST, _MOST = 150, 60, 400
+# The path is looked at so often to see how far the tool moves.
+_LOOKS = 2000
 # What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
-_MARGIN = 5e-4
-# The jagged chain of samples is smoothed by a spline with this many waypoints per interval.
-_SMOOTHING = 5
+_MARGIN = 2.5e-4
+# The jagged chain of samples is smoothed by a spline with this many of them per interval.
+_SMOOTHING = 3
 
 
 class SequenceGuide:
@@ -34,7 +42,8 @@ class SequenceGuide:
         from scipy.interpolate import make_lsq_spline
 
         t, q = sequence.t, sequence.q
-        inner = np.linspace(t[0], t[-1], max(len(t) // _SMOOTHING, 2))
+        # Where samples are dense in time, so are knots.
+        inner = np.append(t[:-_SMOOTHING:_SMOOTHING], t[-1])
         knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
         self._rate = make_lsq_spline(t, q, knots).derivative()
         self.sequence = sequence
@@ -48,7 +57,7 @@ class SequenceGuide:
 def guides(
     problem: Problem, rng: np.random.Generator | int | None, progress: Progress
 ) -> list[SequenceGuide]:
-    """Return guides from the best sequences over the self-motions of redundancy 1, shortest first.
+    """Return guides from the best sequences over the self-motions, shortest first.
 
     Raises
     ------
@@ -56,39 +65,63 @@ def guides(
         No chain of configurations follows the path; says where it ends and why.
     """
     robot, path, asked = problem.robot, problem.path, problem.envelope
-    t = search_times(path)
+    is_curve = robot.redundancy(problem.task) == 1
+    t = search_times(path, _FEWEST_OF_CURVES if is_curve else _FEWEST)
     step = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
-    sequences = best_sequences(
-        robot,
-        path,
-        problem.task,
-        t,
-        lower=asked.lower,
-        upper=asked.upper,
-        largest_step=step,
-        bodies=[(model, distance + _MARGIN) for model, distance in asked.bodies],
-        count=_COUNT,
-        rng=0 if rng is None else rng,
-        progress=progress,
-    )
+    bodies = [(model, distance + _MARGIN) for model, distance in asked.bodies]
+    rng = 0 if rng is None else rng
+    if is_curve:
+        sequences = best_sequences(
+            robot,
+            path,
+            problem.task,
+            t,
+            lower=asked.lower,
+            upper=asked.upper,
+            largest_step=step,
+            bodies=bodies,
+            count=_COUNT,
+            rng=rng,
+            progress=progress,
+        )
+    else:
+        sequences = sampled_sequences(
+            robot,
+            path,
+            problem.task,
+            t,
+            lower=asked.lower,
+            upper=asked.upper,
+            largest_step=step,
+            bodies=bodies,
+            weights=_weights(problem),
+            count=_COUNT,
+            rng=rng,
+            progress=progress,
+        )
     return [SequenceGuide(sequence) for sequence in sequences]
 
 
-def search_times(path: Path) -> Array:
-    """Return the times (W,) [s] at which configurations are searched for.
+def search_times(path: Path, fewest: int) -> Array:
+    """Return times (W,) [s] at which to search for configurations, as the tool moves on."""
+    t = np.linspace(0.0, path.duration, _LOOKS)
+    tool = path.samples(t)
+    moved = np.linalg.norm(np.diff(tool.translation, axis=0), axis=1) / _STRIDE
+    turned = np.array(
+        [np.linalg.norm(pin.log3(a.T @ b)) for a, b in itertools.pairwise(tool.rotation)]
+    )
+    travel = np.concatenate([[0.0], np.cumsum(moved + turned / _TURN)])
+    # Where the tool stands still, time counts, so that there is always one time after another.
+    count = int(np.clip(np.ceil(travel[-1]), fewest, _MOST))
+    travel += t * (1e-3 * count / path.duration)
+    times = np.interp(np.linspace(0.0, travel[-1], count + 1), travel, t)
+    times[-1] = path.duration
+    return np.asarray(times)
 
-    The path's waypoints where it has some: without those that follow too soon upon another one,
-    and with more between those that are far apart.
-    """
-    own = path.waypoint_times if isinstance(path, Waypoints) else np.array([0.0, path.duration])
-    shortest, longest = path.duration / _MOST, path.duration / _FEWEST
-    kept = [0.0]
-    for time in own[1:-1]:
-        if time - kept[-1] >= shortest and path.duration - time >= shortest:
-            kept.append(float(time))
-    kept.append(path.duration)
-    pieces = [
-        np.linspace(first, last, int(np.ceil((last - first) / longest)), endpoint=False)
-        for first, last in itertools.pairwise(kept)
-    ]
-    return np.concatenate([*pieces, kept[-1:]])
+
+def _weights(problem: Problem) -> Array:
+    """Return what a unit of each joint counts, (n,): as the path's length does, if it is a cost."""
+    for cost in problem.costs:
+        if isinstance(cost, PathLength) and cost.joint_weights is not None:
+            return np.asarray(cost.joint_weights, dtype=np.float64)
+    return problem.robot.joint_weights

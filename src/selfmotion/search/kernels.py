@@ -15,6 +15,7 @@ from selfmotion.kernels import (
     solve_cholesky,
     task_rows,
 )
+from selfmotion.robot.chain import compose, placements
 
 Mask = npt.NDArray[np.bool_]
 
@@ -215,13 +216,15 @@ def extend(
     after: Array,
     largest_step: Array,
     turning: Mask,
+    weights: Array,
     reach: Array,
     parent: Rows,
 ) -> None:
     """Set `reach` (M,), the least cost at `after` (M, n) over steps from `before` (N, n).
 
-    The cost of a step is Σ|Δq|; `turning` joints count modulo turns. `before` is sorted by its
-    first joint unless that one turns. `parent` is -1 where no step is short enough.
+    The cost of a step is Σ w|Δq| with `weights` (n,); `turning` joints count modulo turns. `before`
+    is sorted by its first joint unless that one turns. `parent` is -1 where no step is short
+    enough.
     """
     n, many = after.shape[1], before.shape[0]
     for j in range(after.shape[0]):
@@ -235,9 +238,106 @@ def extend(
             total = cost[i]
             for k in range(n):
                 step = abs(wrapped(after[j, k] - before[i, k], turning[k]))
-                total += step
+                total += weights[k] * step
                 if step > largest_step[k] or total >= reach[j]:
                     total = np.inf
                     break
             if total < reach[j]:
                 reach[j], parent[j] = total, i
+
+
+@kernel
+def project_all(
+    q: Array,
+    targets: Array,
+    rotations: Array,
+    positions: Array,
+    axes: Array,
+    is_revolute: Mask,
+    tool_rotation: Array,
+    tool_position: Array,
+    rows: Rows,
+    angle_kind: int,
+    lower: Array,
+    upper: Array,
+    longest: float,
+    steps: int,
+    arrived: Mask,
+) -> None:
+    """Put each of q (K, n) onto its target (K, 12) by Newton's method, in place.
+
+    A joint that would leave its limits stays at the limit, and the others do the rest. `arrived`
+    (K,) says of which that was possible within so many steps. The chain is that of
+    `RobotModel.joint_places`, the tool's place that in the frame of the last joint.
+    """
+    n = q.shape[1]
+    r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    rotation, position = np.empty((3, 3)), np.empty(3)
+    jacobian, unused = np.zeros((6, n)), np.empty(n)
+    held = np.zeros(n, dtype=np.bool_)
+    for k in range(len(q)):
+        arrived[k], held[:] = False, False
+        length = np.inf
+        for _ in range(steps):
+            inside = True
+            for j in range(n):
+                if q[k, j] < lower[j] or q[k, j] > upper[j]:
+                    q[k, j] = min(max(q[k, j], lower[j]), upper[j])
+                    held[j], inside = True, False
+            if inside and length < CONVERGED:
+                arrived[k] = True
+                break
+            placements(q[k], rotations, positions, axes, is_revolute, r, p)
+            compose(r[n], p[n], tool_rotation, tool_position, rotation, position)
+            _jacobian(r, p, axes, is_revolute, position, jacobian)
+            for j in range(n):
+                unused[j] = 1.0
+                if held[j]:
+                    jacobian[:, j] = 0.0
+            length = correct(
+                q[k], jacobian, rotation, position, targets[k], rows, angle_kind, unused, longest
+            )
+            # Singular, or not a number.
+            if not length >= 0.0:
+                break
+
+
+@kernel
+def _jacobian(
+    r: Array, p: Array, axes: Array, is_revolute: Mask, tool: Array, jacobian: Array
+) -> None:
+    """Write the Jacobian [v, ω] (6, n) of the tool's origin, world axes."""
+    axis = np.empty(3)
+    for j in range(len(axes)):
+        for a in range(3):
+            axis[a] = 0.0
+            for b in range(3):
+                axis[a] += r[j + 1, a, b] * axes[j, b]
+        if is_revolute[j]:
+            x, y, z = tool[0] - p[j + 1, 0], tool[1] - p[j + 1, 1], tool[2] - p[j + 1, 2]
+            jacobian[0, j] = axis[1] * z - axis[2] * y
+            jacobian[1, j] = axis[2] * x - axis[0] * z
+            jacobian[2, j] = axis[0] * y - axis[1] * x
+            jacobian[3:, j] = axis
+        else:
+            jacobian[:3, j] = axis
+            jacobian[3:, j] = 0.0
+
+
+@kernel
+def tool_place(
+    q: Array,
+    rotations: Array,
+    positions: Array,
+    axes: Array,
+    is_revolute: Mask,
+    tool_rotation: Array,
+    tool_position: Array,
+) -> tuple[Array, Array]:
+    """Return the tool's rotation (3, 3) and position (3,) at q (n,); the chain as for others."""
+    n = len(q)
+    r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    rotation, position = np.empty((3, 3)), np.empty(3)
+    placements(q, rotations, positions, axes, is_revolute, r, p)
+    compose(r[n], p[n], tool_rotation, tool_position, rotation, position)
+    return rotation, position

@@ -99,6 +99,13 @@ class Admissible:
             free[i] = self._clear(first[i])
         return free
 
+    def keep(self, q: Array) -> npt.NDArray[np.bool_]:
+        """Whether each of q (K, n) is inside the limits as it is, and clear of collisions."""
+        kept = np.asarray(np.all((q <= self.upper) & (q >= self.lower), axis=1))
+        for i in np.flatnonzero(kept) if self.bodies else ():
+            kept[i] = self._clear(q[i])
+        return kept
+
     def keeps(self, q: Array) -> bool:
         """Whether q (n,) itself, at its own turn, is inside the limits and clear of collisions."""
         if np.any(q > self.upper) or np.any(q < self.lower):

@@ -19,7 +19,7 @@ from selfmotion.search.tighten import FINELY, ROUGHLY, tighten
 from selfmotion.task import Task
 
 # Largest distance of samples along a curve [rad or m], configuration norm.
-SPACING = 0.06
+SPACING = 0.1
 # Inverse kinematics starts anew at every so manieth waypoint, from so many seeds.
 _EVERY, _SEEDS = 10, 100
 
@@ -35,7 +35,7 @@ class Sequence:
     q : (W, n)
         Configurations [rad or m], each with the tool on the path.
     length : float
-        Σ|Δq| over waypoints and joints [rad or m].
+        Σ w|Δq| over waypoints and joints, w being the joints' weights (`RobotModel.joint_weights`).
     """
 
     t: Array
@@ -67,7 +67,7 @@ def best_sequences(
     kinematics at many seeds and from the curves of the neighbouring waypoints. The samples inside
     the limits and free of collision are the nodes of a graph; dynamic programming finds the chain
     of least Σ|Δq| with every step within `largest_step`: the global optimum over samples about
-    0.06 rad apart. Each is then moved along the curves, locally and with finer samples, to where
+    0.1 rad apart. Each is then moved along the curves, locally and with finer samples, to where
     it is shorter; it stays a few per cent longer than the continuous problem's optimum.
     Hence several chains, unlike each other by 0.3 rad in some joint at a
     tenth of the waypoints: refine them all and keep the best.
@@ -134,9 +134,9 @@ def best_sequences(
         for number, q in enumerate(rough):
             progress(stage, number + 1, len(rough))
             rough[number] = tighten(motion, x, q, bounds, steps, spacings)
-        ranked = _ranked(times, rough, turning)
-        rough = [np.array(sequence.q) for sequence in ranked]
-    return ranked
+        best = ranked(times, rough, turning)
+        rough = [np.array(sequence.q) for sequence in best]
+    return best
 
 
 def _rough_motions(
@@ -170,7 +170,7 @@ def _rough_motions(
             )
         # Unlike chains may become the same one when they are tightened.
         found = diverse_chains(layers, chains, steps, turning, 2 * count)
-        rough = [bounds.turned_inside(_configurations(layers, q, turning)) for q in found]
+        rough = [bounds.turned_inside(connected(layers, q, turning)) for q in found]
         beyond = bounds.beyond(rough[0])
         if not np.any(beyond):
             return [q for q in rough if not np.any(bounds.beyond(q))], turning
@@ -181,9 +181,14 @@ def _rough_motions(
         )
 
 
-def _ranked(times: Array, motions: list[Array], turning: Mask) -> list[Sequence]:
+def ranked(
+    times: Array, motions: list[Array], turning: Mask, weights: Array | None = None
+) -> list[Sequence]:
     """Return the sequences, shortest first, without those that became like a shorter one."""
-    sequences = [Sequence(times, q, float(np.abs(np.diff(q, axis=0)).sum())) for q in motions]
+    weights = np.ones(len(turning)) if weights is None else weights
+    sequences = [
+        Sequence(times, q, float((np.abs(np.diff(q, axis=0)) * weights).sum())) for q in motions
+    ]
     kept: list[Sequence] = []
     for sequence in sorted(sequences, key=lambda sequence: sequence.length):
         if all(unlike(sequence.q, other.q, turning) for other in kept):
@@ -205,7 +210,7 @@ def _free_samples(
     return found
 
 
-def _configurations(layers: list[Array], chain: list[int], turning: Mask) -> Array:
+def connected(layers: list[Array], chain: list[int], turning: Mask) -> Array:
     """Return a chain's configurations (W, n); joints that turn without end do not jump."""
     q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
     steps = unturned(np.diff(q, axis=0), turning)

@@ -7,10 +7,15 @@ import numpy as np
 from selfmotion.basics import Array, InverseKinematicsError
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
+from selfmotion.search.curves import SelfMotion, targets
+from selfmotion.search.nodes import Admissible
 from selfmotion.task import Task
 
 # Solutions nearer than this [rad or m, Euclidean] lead to the same plan once the start may move.
 _SAME = 0.3
+# Where all self-motions of the first pose can be traced: from so many seeds, in steps of this
+# [rad or m].
+_SEEDS, _SPACING = 60, 0.1
 
 
 def start_candidates(
@@ -18,14 +23,16 @@ def start_candidates(
 ) -> list[Array]:
     """Return distinct configurations that put the tool on the start of the path.
 
-    Inverse kinematics from a low-discrepancy sequence over the joint limits; solutions near an
-    earlier one are dropped.
+    For one degree of redundancy they are spread evenly over all self-motion curves of the first
+    pose, as far as these are within the limits, each joint by the whole turns that bring it nearest
+    to the middle of its range. For more, inverse kinematics from a low-discrepancy sequence over
+    the joint limits; solutions near an earlier one are dropped.
 
     Parameters
     ----------
     robot, path, task
     count : int
-        Seeds to try.
+        How many at most; for more than one degree of redundancy, seeds to try.
     rng : Generator
         Shifts the sequence.
 
@@ -39,6 +46,37 @@ def start_candidates(
     InverseKinematicsError
         No seed led to the pose.
     """
+    found: list[Array] = []
+    if robot.redundancy(task) == 1:
+        found = _along_curves(robot, path, task, count, rng)
+    if not found:
+        found = _scattered(robot, path, task, count, rng)
+    if not found:
+        # Many more attempts, and an error that names the miss.
+        found = [robot.inverse_kinematics(path.pose(0.0), task, rng=rng)]
+    return found
+
+
+def _along_curves(
+    robot: RobotModel, path: Path, task: Task, count: int, rng: np.random.Generator
+) -> list[Array]:
+    """Return up to `count` configurations within the limits, evenly over all curves."""
+    motion = SelfMotion(robot, task, _SPACING)
+    bounds = Admissible(robot.lower, robot.upper, motion.revolute, ())
+    curves = motion.curves(targets(path, np.zeros(1))[0], spread(robot, _SEEDS, rng)).curves
+    # The last sample of a closed curve is its first one.
+    samples = [curve.q[: len(curve.q) - curve.closed] for curve in curves]
+    inside = [q[bounds.free(q)] for q in samples]
+    total = sum(map(len, inside))
+    stride = max(1, -(-total // count))
+    every = np.concatenate([np.empty((0, robot.dof)), *inside])[::stride]
+    return [bounds.turned_inside(q[None])[0] for q in bounds.representative(every)]
+
+
+def _scattered(
+    robot: RobotModel, path: Path, task: Task, count: int, rng: np.random.Generator
+) -> list[Array]:
+    """Return what inverse kinematics finds from `count` seeds, without what is near another."""
     pose = path.pose(0.0)
     found: list[Array] = []
     for seed in spread(robot, count, rng):
@@ -48,9 +86,6 @@ def start_candidates(
             continue
         if all(np.linalg.norm(q - other) > _SAME for other in found):
             found.append(q)
-    if not found:
-        # Many more attempts, and an error that names the miss.
-        found = [robot.inverse_kinematics(pose, task, rng=rng)]
     return found
 
 

@@ -1,0 +1,119 @@
+"""Which starts lead to the best motions: rough ones, optimised a little, and the better ones more.
+
+Successive halving (K. Jamieson, A. Talwalkar, "Non-stochastic best arm identification and
+hyperparameter optimization", AISTATS 2016): the cost at x = 0 says little about that of the
+optimum, and optimising from every start would take seconds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from selfmotion.basics import Array, BreakdownError, Progress
+from selfmotion.motion import Grid
+from selfmotion.optimise import Status
+from selfmotion.planning.session import Effort, Session
+from selfmotion.plans import Problem
+
+# Steps of the rough motions.
+_STEPS = 12
+# Heats: so many starts at most, optimised with so many evaluations of the cost more.
+_HEATS = ((16, 4), (8, 8))
+# Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
+# rule; rough optima this near are the same.
+_NEAR, _SAME = 0.6, 0.1
+# A rough optimum that costs more than this many times the best is not worth the rest.
+_HOPELESS = 1.3
+
+
+class Heats:
+    """Ranks starts by what becomes of them.
+
+    Parameters
+    ----------
+    problem : Problem
+    effort : Effort
+    progress : Progress
+    """
+
+    def __init__(self, problem: Problem, effort: Effort, progress: Progress) -> None:
+        self._problem, self._progress = problem, progress
+        self._effort = replace(effort, callback=None, max_evaluations=None)
+        self._turning = np.array(
+            [not problem.robot.is_prismatic(name) for name in problem.robot.joint_names]
+        )
+        self._merits: list[tuple[float, Session]] = []
+
+    @property
+    def ranked(self) -> list[Array]:
+        """Where the motions begin that were found so far, the best first; each (n,)."""
+        return [session.nodes[0] for _, session in self._merits]
+
+    def run(self, starts: Sequence[Array], finalists: int) -> None:
+        """Leave the best `finalists` of the starts (n,), or fewer where they became the same."""
+        problem = self._problem
+        steps = max(_STEPS, problem.null_motion.fewest_steps)
+        # A path of many waypoints is crossed in strides: what is rough needs not stop at each.
+        knots = problem.knots if len(problem.knots) <= steps else problem.knots[[0, -1]]
+        grid = Grid.aligned(knots, steps)
+        for number, start in enumerate(starts, 1):
+            self._progress("start", number, len(starts))
+            try:
+                session = Session.begin(problem, self._effort, start, free=True, grid=grid)
+            except BreakdownError:
+                continue
+            self._note(session)
+        self._put_valleys_first()
+        for heat, (most, evaluations) in enumerate(_HEATS, 1):
+            del self._merits[max(most, finalists) :]
+            running = [session for _, session in self._merits]
+            for number, session in enumerate(running, 1):
+                self._progress(f"heat {heat}", number, len(running))
+                session.minimize(evaluations)
+                if session.status is Status.INTERRUPTED:
+                    raise KeyboardInterrupt
+                self._merits = [pair for pair in self._merits if pair[1] is not session]
+                self._note(session)
+            self._drop()
+        del self._merits[finalists:]
+
+    def _note(self, session: Session) -> None:
+        # Known from now on, whatever interrupts.
+        self._merits.append((np.inf, session))
+        merit = session.merit()
+        self._merits.pop()
+        if np.isfinite(merit):
+            self._merits.append((merit, session))
+            self._merits.sort(key=lambda pair: pair[0])
+
+    def _put_valleys_first(self) -> None:
+        """Let those come last that are near a better one: the start will move there by itself."""
+        valleys: list[tuple[float, Session]] = []
+        slopes: list[tuple[float, Session]] = []
+        motions: list[Array] = []
+        for pair in self._merits:
+            motion = pair[1].nodes
+            alone = all(self._apart(motion, other) > _NEAR for other in motions)
+            (valleys if alone else slopes).append(pair)
+            motions.append(motion)
+        self._merits = valleys + slopes
+
+    def _drop(self) -> None:
+        """Drop what became the same as a better one, and what costs much more than the best."""
+        kept: list[tuple[float, Session]] = []
+        motions: list[Array] = []
+        for merit, session in self._merits:
+            best = self._merits[0][0]
+            if merit > best + (_HOPELESS - 1.0) * abs(best):
+                break
+            motion = session.nodes
+            if all(self._apart(motion, other) > _SAME for other in motions):
+                kept.append((merit, session))
+                motions.append(motion)
+        self._merits = kept
+
+    def _apart(self, motion: Array, other: Array) -> float:
+        difference = motion - other
+        turns = np.round(difference / (2.0 * np.pi))
+        return float(np.abs(difference - 2.0 * np.pi * turns * self._turning).max())

@@ -1,0 +1,64 @@
+"""Where joints are, compiled: for many configurations at once, of which Python would ask singly."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, kernel
+
+Flags = npt.NDArray[np.bool_]
+
+
+@kernel
+def turned(axis: Array, angle: float, rotation: Array) -> None:
+    """Write the rotation by an angle about a unit vector (Rodrigues' formula)."""
+    s, c = math.sin(angle), math.cos(angle)
+    x, y, z, rest = axis[0], axis[1], axis[2], 1.0 - c
+    for a in range(3):
+        for b in range(3):
+            rotation[a, b] = axis[a] * axis[b] * rest
+        rotation[a, a] += c
+    rotation[0, 1] -= z * s
+    rotation[1, 0] += z * s
+    rotation[0, 2] += y * s
+    rotation[2, 0] -= y * s
+    rotation[1, 2] -= x * s
+    rotation[2, 1] += x * s
+
+
+@kernel
+def compose(first: Array, at: Array, second: Array, there: Array, r: Array, p: Array) -> None:
+    """Write the product of two placements."""
+    for a in range(3):
+        x, y, z = first[a, 0], first[a, 1], first[a, 2]
+        p[a] = at[a] + x * there[0] + y * there[1] + z * there[2]
+        for b in range(3):
+            r[a, b] = x * second[0, b] + y * second[1, b] + z * second[2, b]
+
+
+@kernel
+def placements(
+    q: Array,
+    rotations: Array,
+    positions: Array,
+    axes: Array,
+    is_revolute: Flags,
+    r: Array,
+    p: Array,
+) -> None:
+    """Write where q (n,) places the joints of a chain: (n + 1, 3, 3) and (n + 1, 3).
+
+    Row 0 is the world. Each joint has a place in the frame of the one before, (n, 3, 3) and (n, 3),
+    and an axis in its own, (n, 3).
+    """
+    r[0], p[0] = np.eye(3), 0.0
+    turn, middle, shift = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    identity, none = np.eye(3), np.zeros(3)
+    for j in range(len(q)):
+        compose(r[j], p[j], rotations[j], positions[j], middle, shift)
+        if is_revolute[j]:
+            turned(axes[j], q[j], turn)
+            compose(middle, shift, turn, none, r[j + 1], p[j + 1])
+        else:
+            compose(middle, shift, identity, q[j] * axes[j], r[j + 1], p[j + 1])

@@ -1,0 +1,92 @@
+"""Newton's method onto the self-motions of many poses at once."""
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, RobotError
+from selfmotion.kernels import angle_kind
+from selfmotion.robot import RobotModel, null_basis
+from selfmotion.search import kernels
+from selfmotion.task import Task
+
+_NEAR_STEPS, _FAR_STEPS = 10, 60
+# Longest single correction [rad or m].
+_LONGEST = 0.5
+# Compiled kinematics and Pinocchio's differ by rounding alone [m, or rows of a rotation].
+_AGREE = 1e-9
+
+
+class Manifold:
+    """Projects configurations onto {q : F(q) = x} within limits, each by Newton's method.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    task : Task
+    lower, upper : (n,)
+        Joint limits [rad or m], ±inf where there is none. Joints stop there while others go on.
+
+    Attributes
+    ----------
+    revolute : (n,)
+
+    Raises
+    ------
+    RobotError
+        The compiled kinematics are not those of Pinocchio.
+    """
+
+    def __init__(self, robot: RobotModel, task: Task, lower: Array, upper: Array) -> None:
+        self.robot, self.task = robot, task
+        self._limits = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+        places = robot.joint_places()
+        self.revolute: npt.NDArray[np.bool_] = places[3]
+        tool = robot.model.frames[robot.tool_id].placement
+        self._chain = (*places, np.array(tool.rotation), np.array(tool.translation))
+        self._rows = (task.rows, angle_kind(task.rows, task.tool_axes))
+        self._check()
+
+    def project(
+        self, q: Array, target: Array, *, far: bool = False
+    ) -> tuple[Array, npt.NDArray[np.bool_]]:
+        """Return the configurations (K, n) that Newton's method reaches, and where it does, (K,).
+
+        Parameters
+        ----------
+        q : (K, n)
+        target : (12,) or (K, 12)
+            See `targets`.
+        far : bool
+            Whether q is any configuration instead of one near the solution.
+        """
+        found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
+        wanted = np.ascontiguousarray(np.broadcast_to(target, (len(q), 12)))
+        steps = _FAR_STEPS if far else _NEAR_STEPS
+        kernels.project_all(
+            found, wanted, *self._chain, *self._rows, *self._limits, _LONGEST, steps, arrived
+        )
+        return found, arrived
+
+    def carried_bases(self, q: Array) -> Array:
+        """Return null-space bases along a motion (W, n), (W, n, r), each turned to the last one."""
+        robot, task = self.robot, self.task
+        bases = [null_basis(robot, task, q[0])]
+        for here in q[1:]:
+            basis = null_basis(robot, task, here)
+            left, _, right = np.linalg.svd(basis.T @ bases[-1])
+            bases.append(basis @ left @ right)
+        return np.array(bases)
+
+    def _check(self) -> None:
+        lower, upper = self.robot.finite_limits()
+        for q in np.random.default_rng(0).uniform(lower, upper, (3, self.robot.dof)):
+            rotation, position = kernels.tool_place(q, *self._chain)
+            pose = self.robot.pose(q)
+            miss = max(
+                np.abs(rotation - pose.rotation).max(), np.abs(position - pose.translation).max()
+            )
+            if not miss < _AGREE:
+                raise RobotError(
+                    f"{self.robot.name}: compiled kinematics put '{self.robot.tool}' {miss:.3g} "
+                    f"off where Pinocchio does; this is an error of selfmotion's"
+                )

@@ -1,0 +1,245 @@
+"""The search for two and more degrees of redundancy: samples of smooth motions as nodes."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from selfmotion.basics import Array, NoSequenceError, Progress, silent
+from selfmotion.collision import CollisionModel
+from selfmotion.path import Path
+from selfmotion.robot import RobotModel
+from selfmotion.search.chains import diverse_chains, extended, shortest_chains
+from selfmotion.search.curves import targets
+from selfmotion.search.manifold import Manifold
+from selfmotion.search.nodes import Admissible
+from selfmotion.search.sequences import Sequence, connected, ranked
+from selfmotion.search.starts import spread
+from selfmotion.task import Task
+
+# Motions begin at so many times, evenly, from so many configurations each: of those that inverse
+# kinematics finds from so many seeds.
+_STATIONS, _STARTS, _SEEDS = 7, 30, 200
+# Constant null motions drift so far over the whole path [rad or m], one standard deviation; every
+# other motion has none.
+_DRIFT = 1.0
+# Of the samples that a chain reaches, so many are followed to the next waypoint, those that are so
+# far from each other [rad or m] first, and so many tries around each, about this far off [rad].
+_PARENTS, _APART = 80, (1.6, 0.8, 0.4, 0.2, 0.1)
+_STRAYS, _STRAY = 2, 0.15
+# Around a chain, samples at these distances [rad or m], one after the other, so often each at most.
+_RINGS, _ROUNDS = (0.3, 0.1, 0.03, 0.01), 5
+# A round that shortens the chain by less than this share is the last one of its ring.
+_WORTHWHILE = 5e-3
+
+
+def sampled_sequences(
+    robot: RobotModel,
+    path: Path,
+    task: Task,
+    t: Array,
+    *,
+    lower: Array,
+    upper: Array,
+    largest_step: Array,
+    bodies: Iterable[tuple[CollisionModel, float]] = (),
+    weights: Array,
+    count: int,
+    rng: np.random.Generator | int = 0,
+    progress: Progress = silent,
+) -> list[Sequence]:
+    """Return short joint sequences along a path that are unlike each other, for any redundancy.
+
+    Self-motions of two and more dimensions are too large to be sampled evenly at every waypoint.
+    The nodes are those of many smooth motions instead, which begin all over the self-motions of
+    some waypoints and follow the path both ways, with different constant null motions; dynamic
+    programming changes from one to another where that is shorter, or where one ends or meets
+    something. Then samples around the best chains take their place, nearer and nearer.
+
+    Parameters
+    ----------
+    robot, path, task
+    t : (W,)
+        Times of the waypoints [s].
+    lower, upper : (n,)
+        Joint limits [rad or m].
+    largest_step : (W - 1, n)
+        Largest change of each joint from one waypoint to the next [rad or m].
+    bodies : sequence of (CollisionModel, float)
+        Bodies to keep apart at the waypoints, and the distance [m].
+    weights : (n,)
+        Of the joints in a sequence's length.
+    count : int
+        How many sequences at most.
+    rng : Generator or int
+    progress : Progress
+
+    Returns
+    -------
+    list of Sequence
+        Shortest first, at least one.
+
+    Raises
+    ------
+    NoSequenceError
+        No chain exists among the samples; tells the waypoint at which the last one ends.
+    """
+    manifold = Manifold(robot, task, lower, upper)
+    bounds = Admissible(lower, upper, manifold.revolute, tuple(bodies))
+    x = targets(path, t)
+    generator = np.random.default_rng(rng)
+    layers = _layers(manifold, bounds, x, largest_step, weights, generator, progress)
+    turning = bounds.turning
+    chains = shortest_chains(layers, largest_step, turning, weights)
+    if chains.blocked is not None:
+        time = float(t[chains.blocked])
+        reason = (
+            f"none of {len(layers[chains.blocked])} samples that are within the limits and free "
+            f"can be reached from those before within the step limits"
+        )
+        raise NoSequenceError(
+            f"{robot.name}: no motion along the path passes t = {time:.6g} s: {reason}",
+            time=time,
+            reason=reason,
+        )
+    found = diverse_chains(layers, chains, largest_step, turning, count, weights)
+    rough = [connected(layers, chain, turning) for chain in found]
+    for number, q in enumerate(rough):
+        progress("search: shortening sequence", number + 1, len(rough))
+        rough[number] = _shortened(manifold, bounds, x, q, largest_step, weights)
+    return ranked(t, rough, turning, weights)
+
+
+def _layers(
+    manifold: Manifold,
+    bounds: Admissible,
+    x: Array,
+    largest_step: Array,
+    weights: Array,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> list[Array]:
+    """Return free samples at all waypoints, each (K, n), sorted by the first joint.
+
+    Those of smooth motions; what follows from samples that a chain reaches, without self-motion;
+    and what is near that: so there is a way around where smooth motions end.
+    """
+    smooth = _smooth_motions(manifold, bounds, x, rng, progress)
+    turning = bounds.turning
+    layers, cost = [_sorted(smooth[0][bounds.keep(smooth[0])])], np.empty(0)
+    for i in range(1, len(x)):
+        progress("search: what is free at waypoint", i + 1, len(x))
+        before = layers[-1]
+        cost = np.zeros(len(before)) if i == 1 else cost
+        parents = _spread_out(before[np.isfinite(cost)], cost[np.isfinite(cost)], _PARENTS)
+        strays = np.repeat(parents, _STRAYS, axis=0)
+        away = rng.normal(scale=_STRAY, size=strays.shape) / weights
+        step = 0.5 * largest_step[i - 1]
+        guesses = np.concatenate([parents, strays + np.clip(away, -step, step)])
+        q, arrived = manifold.project(guesses, x[i])
+        q = np.concatenate([q[arrived], smooth[i]])
+        layers.append(_sorted(q[bounds.keep(q)]))
+        cost, _ = extended(before, cost, layers[-1], largest_step[i - 1], turning, weights)
+    return layers
+
+
+def _smooth_motions(
+    manifold: Manifold, bounds: Admissible, x: Array, rng: np.random.Generator, progress: Progress
+) -> list[Array]:
+    """Return at all waypoints where motions with constant null motions are, each (K, n)."""
+    dof, last = manifold.robot.dof, len(x) - 1
+    nodes = [[np.empty((0, dof))] for _ in x]
+    stations = np.unique(np.linspace(0, last, _STATIONS).round().astype(int))
+    for number, station in enumerate(stations.tolist(), 1):
+        progress("search: motions from waypoint", number, len(stations))
+        begun = _starts(manifold, bounds, x[station], rng)
+        drift = rng.normal(scale=_DRIFT / max(last, 1), size=begun.shape)
+        drift[::2] = 0.0
+        nodes[station].append(begun)
+        for direction in (1, -1):
+            q, slope = begun, direction * drift
+            for i in range(station + direction, len(x) if direction > 0 else -1, direction):
+                q, arrived = manifold.project(q + slope, x[i])
+                q, slope = q[arrived], slope[arrived]
+                nodes[i].append(q)
+    return [np.concatenate(parts) for parts in nodes]
+
+
+def _spread_out(q: Array, cost: Array, count: int) -> Array:
+    """Return up to `count` of q (K, n), far from each other first, the cheaper of near ones."""
+    left, kept = q[np.argsort(cost, kind="stable")], np.empty((0, q.shape[1]))
+    for apart in _APART:
+        chosen = np.zeros(len(left), dtype=bool)
+        far = np.ones(len(left), dtype=bool)
+        for other in kept:
+            far &= np.abs(left - other).max(axis=1) > apart
+        for k in range(len(left)):
+            if far[k] and len(kept) + chosen.sum() < count:
+                chosen[k] = True
+                far &= np.abs(left - left[k]).max(axis=1) > apart
+        kept, left = np.concatenate([kept, left[chosen]]), left[~chosen]
+    return kept
+
+
+def _sorted(q: Array) -> Array:
+    return np.ascontiguousarray(q[np.argsort(q[:, 0], kind="stable")])
+
+
+def _starts(
+    manifold: Manifold, bounds: Admissible, target: Array, rng: np.random.Generator
+) -> Array:
+    """Return configurations within the limits, free where there are such, (K, n)."""
+    seeds = np.array(list(spread(manifold.robot, _SEEDS, rng)))
+    q, arrived = manifold.project(seeds, target, far=True)
+    q = q[arrived]
+    free = bounds.keep(q)
+    return np.concatenate([q[free], q[~free]])[:_STARTS]
+
+
+def _shortened(
+    manifold: Manifold,
+    bounds: Admissible,
+    x: Array,
+    q: Array,
+    largest_step: Array,
+    weights: Array,
+) -> Array:
+    """Return a shorter chain near q (W, n): never longer."""
+    fixed = np.zeros(q.shape[1], dtype=bool)
+    length = _length(q, weights)
+    for ring in _RINGS:
+        for _ in range(_ROUNDS):
+            layers = _around(manifold, bounds, x, q, ring)
+            chains = shortest_chains(layers, largest_step, fixed, weights)
+            before, length = length, float(chains.cost[-1].min())
+            chain = chains.back(len(q) - 1, int(np.argmin(chains.cost[-1])))
+            q = connected(layers, chain, fixed)
+            if length > (1.0 - _WORTHWHILE) * before:
+                break
+    return q
+
+
+def _around(manifold: Manifold, bounds: Admissible, x: Array, q: Array, ring: float) -> list[Array]:
+    """Return q (W, n) and the free samples around it at each waypoint, each (K, n).
+
+    At one and two times `ring` to both sides along each axis of a basis of the null space that is
+    carried along q: so a chain can move aside as a whole, without zigzag.
+    """
+    basis = manifold.carried_bases(q)
+    offsets = ring * np.array([-2.0, -1.0, 1.0, 2.0])
+    moves = np.einsum("wnr,k->wrkn", basis, offsets).reshape(len(q), -1, q.shape[1])
+    guesses = q[:, None] + moves
+    flat = guesses.reshape(-1, q.shape[1])
+    found, arrived = manifold.project(flat, np.repeat(x, moves.shape[1], axis=0))
+    # Far corrections lead elsewhere.
+    arrived &= np.linalg.norm(found - flat, axis=1) < 1.5 * ring
+    arrived[arrived] = bounds.keep(found[arrived])
+    found, kept = found.reshape(guesses.shape), arrived.reshape(guesses.shape[:2])
+    layers = [
+        np.concatenate([here[None], near[free]])
+        for here, near, free in zip(q, found, kept, strict=True)
+    ]
+    return [_sorted(layer) for layer in layers]
+
+
+def _length(q: Array, weights: Array) -> float:
+    return float((np.abs(np.diff(q, axis=0)) * weights).sum())
