@@ -6,6 +6,7 @@ from selfmotion.certificate.ends import AtRest, ClosedMotion, EndState
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import LIMIT_NAMES, JointLimits, arm_limits
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
+from selfmotion.certificate.torques import JointTorques
 from selfmotion.certificate.verdict import Certificate
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "Finding",
     "FinishedMotion",
     "JointLimits",
+    "JointTorques",
     "KeepsApart",
     "Requirement",
     "Tolerance",

@@ -10,7 +10,6 @@ polynomial plus r. Intervals on which it does not decide are halved.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError
 from selfmotion.certificate.deviation import deviation_from, deviation_size, excess
 from selfmotion.certificate.findings import Extreme, Tolerance
+from selfmotion.certificate.interpolation import stencil
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
@@ -25,8 +25,6 @@ from selfmotion.task import Relaxation, Task
 
 # Points per interval, where there are many intervals and where not.
 _FEW, _MANY, _CROWD = 5, 9, 4096
-# Between them the polynomials are looked at this many times.
-_DENSE = 33
 # No joint moves more than this [rad or m] in one interval: the deviation is smooth on its scale.
 _TRAVEL = 0.2
 # Where joints turn farther from one sample to the next [rad or m], the path is not looked for.
@@ -172,7 +170,7 @@ def _bounds(
     count: int,
 ) -> _Bounds:
     """Measure intervals (I, 2) at `count` points each."""
-    shares, predict, dense_shares, dense = _stencil(count)
+    shares, predict, dense_shares, dense = stencil(count)
     starts, lengths = intervals[:, :1], np.diff(intervals, axis=1)
     t = starts + lengths * shares
     in_tool_axes = any(item.in_tool_axes for item in relaxations)
@@ -203,28 +201,3 @@ def _quantities(miss: Array, t: Array, duration: float, relaxations: Sequence[Re
 
 def _length(rows: Array) -> Array:
     return np.asarray(np.linalg.norm(rows, axis=-1))
-
-
-@cache
-def _stencil(count: int) -> tuple[Array, Array, Array, Array]:
-    """Return the points of [0, 1]; from every other to the rest; points between; from all to them.
-
-    Lagrange interpolation, as matrices.
-    """
-    shares = np.linspace(0.0, 1.0, count)
-    between = np.linspace(0.0, 1.0, _DENSE)
-    return (
-        shares,
-        _lagrange(shares[::2], shares[1::2]),
-        between,
-        _lagrange(shares, between),
-    )
-
-
-def _lagrange(nodes: Array, points: Array) -> Array:
-    """Return the matrix (P, N) from values at nodes (N,) to the polynomial's at points (P,)."""
-    matrix = np.ones((len(points), len(nodes)))
-    for j, node in enumerate(nodes):
-        for other in np.delete(nodes, j):
-            matrix[:, j] *= (points - other) / (node - other)
-    return matrix

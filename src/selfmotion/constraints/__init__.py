@@ -15,6 +15,7 @@ from selfmotion.constraints.limits import (
     JointPositionLimits,
     JointVelocityLimits,
 )
+from selfmotion.constraints.torque import JointTorqueLimits
 
 __all__ = [
     "BoundConstraint",
@@ -27,6 +28,7 @@ __all__ = [
     "JointAccelerationLimits",
     "JointJerkLimits",
     "JointPositionLimits",
+    "JointTorqueLimits",
     "JointVelocityLimits",
     "NodeTangents",
     "StartVelocity",

@@ -1,5 +1,6 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
+from selfmotion.robot.dynamics import Dynamics
 from selfmotion.robot.kinematics import ToolKinematics
 from selfmotion.robot.loading import NAMED_ARMS, load_robot, rebuild_robot
 from selfmotion.robot.model import RobotModel
@@ -9,6 +10,7 @@ from selfmotion.robot.urdf import Urdf, UrdfJoint
 
 __all__ = [
     "NAMED_ARMS",
+    "Dynamics",
     "Mounting",
     "RobotModel",
     "ToolKinematics",

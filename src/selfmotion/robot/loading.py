@@ -175,6 +175,7 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
         )
     continuous = np.array([name in urdf.continuous() for name in names])
     velocity = np.array(model.velocityLimit, dtype=np.float64)
+    effort = np.array(model.upperEffortLimit, dtype=np.float64)
     return RobotModel(
         name=model.name,
         tool=tool,
@@ -186,6 +187,7 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
         model=model,
         tool_id=model.getFrameId(tool, pin.FrameType.BODY),
         urdf=urdf,
+        effort_limit=read_only(np.where(effort > 0.0, effort, np.inf)),
         acceleration_limit=read_only(np.full(len(names), np.inf)),
         jerk_limit=read_only(np.full(len(names), np.inf)),
     )

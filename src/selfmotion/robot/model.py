@@ -44,6 +44,8 @@ class RobotModel:
         What it was made from.
     touching : tuple of (str, str)
         Pairs of links whose bodies overlap as they are made, which no check looks at.
+    effort_limit : (n,)
+        Torque or force limits [Nm or N]; inf where the URDF gives none.
     acceleration_limit, jerk_limit : (n,)
         Limits that the maker of a named arm publishes [rad/s² or m/s², rad/s³ or m/s³]; inf where
         none are known.
@@ -59,6 +61,7 @@ class RobotModel:
     model: Any = field(repr=False)
     tool_id: int = field(repr=False)
     urdf: Urdf = field(repr=False)
+    effort_limit: Array
     acceleration_limit: Array
     jerk_limit: Array
     touching: tuple[tuple[str, str], ...] = ()

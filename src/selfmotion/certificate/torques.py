@@ -1,0 +1,92 @@
+"""Joint torques at all times: bounds, not only samples.
+
+Between the trajectory's samples torques are smooth in time. On each interval they are computed at
+five points; the polynomial through every other of them predicts the rest, and the largest miss of
+these predictions is added to what the polynomial through all points reaches. Intervals on which
+this does not decide are halved.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import Array, read_only
+from selfmotion.certificate.findings import Finding
+from selfmotion.certificate.interpolation import stencil
+from selfmotion.certificate.requirement import FinishedMotion, Requirement
+from selfmotion.motion import Trajectory
+from selfmotion.robot import Dynamics
+
+# Points per interval, and how often one is halved before it counts as undecided.
+_POINTS, _DEPTH = 5, 12
+# At a sample a trajectory belongs to the interval after it: ends are looked at this share before.
+_BEFORE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class JointTorques(Requirement):
+    """|τ| stays below the limit of each joint, at all times.
+
+    Attributes
+    ----------
+    dynamics : Dynamics
+    limit : (n,)
+        [Nm, or N]; inf where there is none.
+    """
+
+    dynamics: Dynamics
+    limit: Array
+    name: str = "joint torque limits"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "limit", read_only(self.limit))
+
+    @property
+    def covers(self) -> tuple[str, ...]:
+        """See `Requirement.covers`."""
+        return ("torques",)
+
+    def judge(self, motion: FinishedMotion) -> Finding:
+        """See `Requirement.judge`: the largest share of a limit."""
+        t = motion.trajectory.t
+        pending = np.stack([t[:-1], t[1:]], axis=1)
+        worst, when, joint = 0.0, float(t[0]), 0
+        for depth in range(_DEPTH + 1):
+            bounds, measured, times = self._bounds(motion.trajectory, pending)
+            # Written so that NaN settles nothing.
+            settled = (bounds.max(axis=1) <= 1.0) | (measured.max(axis=1) > 1.0)
+            if depth == _DEPTH:
+                settled[:] = True
+            if settled.any():
+                rows = np.flatnonzero(settled)
+                row, column = np.unravel_index(int(np.argmax(bounds[rows])), bounds[rows].shape)
+                if not bounds[rows][row, column] <= worst:
+                    worst = float(bounds[rows][row, column])
+                    when, joint = float(times[rows][row, column]), int(column)
+            if settled.all():
+                break
+            open_ = pending[~settled]
+            middle = open_.mean(axis=1)
+            pending = np.stack([open_[:, 0], middle, middle, open_[:, 1]], axis=1).reshape(-1, 2)
+        name = motion.robot.joint_names[joint]
+        text = (
+            f"joint '{name}' needs {worst * self.limit[joint]:.4g} Nm or N at t = {when:.3f} s, "
+            f"{worst:.5g} times its limit of {self.limit[joint]:.4g}"
+        )
+        return Finding(self.name, name, when, worst, 1.0, bool(worst <= 1.0), text)
+
+    def _bounds(self, motion: Trajectory, intervals: Array) -> tuple[Array, Array, Array]:
+        """Return bounds of |τ| / limit, what was measured, and about when, (I, n) each."""
+        shares, predict, between, dense = stencil(_POINTS)
+        starts, lengths = intervals[:, :1], np.diff(intervals, axis=1)
+        t = (starts + lengths * np.minimum(shares, 1.0 - _BEFORE)).ravel()
+        torques = self.dynamics.torques(motion(t), motion(t, 1), motion(t, 2))
+        used = (torques / self.limit).reshape(len(intervals), _POINTS, -1)
+        missed = np.abs(used[:, 1::2] - np.einsum("ab,ibn->ian", predict, used[:, ::2]))
+        inside = np.einsum("ab,ibn->ian", dense, used)
+        # The peak of a parabola is higher than the points beside it by at most this.
+        missed_peaks = 0.125 * np.abs(np.diff(inside, 2, axis=1)).max(axis=1)
+        size = np.abs(inside)
+        times = starts + lengths * between[np.argmax(size, axis=1)]
+        bounds = size.max(axis=1) + missed.max(axis=1) + missed_peaks
+        return bounds, np.abs(used).max(axis=1), times

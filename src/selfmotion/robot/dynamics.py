@@ -1,0 +1,75 @@
+"""Joint torques of a motion, by Pinocchio's recursive Newton-Euler algorithm."""
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from selfmotion.basics import Array, ProblemError
+from selfmotion.robot.model import RobotModel
+
+
+class Dynamics:
+    """τ = M(q)q̈ + C(q, q̇)q̇ + g(q) of an arm that holds something.
+
+    Parameters
+    ----------
+    robot : RobotModel
+        Its URDF must give inertias; gravity is 9.81 m/s² along -z.
+    payload : float
+        Mass that the tool holds [kg].
+    center : (3,)
+        Its centre of mass in the tool frame [m].
+    inertia : (3, 3), optional
+        Its inertia about that centre, along the tool's axes [kg m²]; by default a point mass.
+
+    Raises
+    ------
+    ProblemError
+        The URDF gives no masses, or the payload makes no sense.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        payload: float = 0.0,
+        center: npt.ArrayLike = (0.0, 0.0, 0.0),
+        inertia: npt.ArrayLike | None = None,
+    ) -> None:
+        model = robot.model.copy()
+        if not any(item.mass > 0.0 for item in list(model.inertias)[1:]):
+            raise ProblemError(
+                f"{robot.name}: joint torques are asked for, but its URDF gives no masses; add "
+                f"<inertial> to its links"
+            )
+        if not (np.isfinite(payload) and payload >= 0.0):
+            raise ProblemError(f"payload is {payload} kg, expected a number ≥ 0")
+        where = np.asarray(center, dtype=np.float64)
+        turning = np.zeros((3, 3)) if inertia is None else np.asarray(inertia, dtype=np.float64)
+        for name, value, shape in (("center", where, (3,)), ("inertia", turning, (3, 3))):
+            if value.shape != shape or not np.all(np.isfinite(value)):
+                raise ProblemError(
+                    f"payload: {name} is {value.tolist()}, expected {shape} finite numbers"
+                )
+        if np.abs(turning - turning.T).max() > 0.0 or np.linalg.eigvalsh(turning)[0] < 0.0:
+            raise ProblemError(
+                f"payload: inertia {turning.tolist()} is not symmetric with moments ≥ 0"
+            )
+        tool = model.frames[robot.tool_id]
+        held = pin.Inertia(float(payload), where, turning)
+        model.appendBodyToJoint(tool.parentJoint, held, tool.placement)
+        self._model, self._data = model, model.createData()
+
+    def torques(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Return τ for a motion (K, n) each, (K, n) [Nm, or N of prismatic joints]."""
+        rows = zip(q, qd, qdd, strict=True)
+        found = [pin.rnea(self._model, self._data, *row).copy() for row in rows]
+        return np.array(found).reshape(q.shape)
+
+    def derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+        """Return ∂τ/∂q, ∂τ/∂q̇ and ∂τ/∂q̈ = M, (K, n, n) each."""
+        count, n = q.shape
+        by_q, by_qd, by_qdd = (np.empty((count, n, n)) for _ in range(3))
+        for k in range(count):
+            found = pin.computeRNEADerivatives(self._model, self._data, q[k], qd[k], qdd[k])
+            by_q[k], by_qd[k], by_qdd[k] = found
+        return by_q, by_qd, by_qdd
