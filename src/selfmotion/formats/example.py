@@ -31,9 +31,9 @@ duration = 4.0
 # feed = 0.05          # m/s, where the file has no times
 # frame = {{ position = [0.5, 0, 0.2], rpy_deg = [0, 0, 0] }}  # of the workpiece
 
-[null_motion]
-kind = "PolynomialNullMotion"
-degree = 3
+# [null_motion]        # by default a cubic, refined where that lowers the cost
+# kind = "PolynomialNullMotion"
+# degree = 3
 
 [[costs]]
 kind = "JointVelocity"
@@ -47,6 +47,12 @@ kind = "JointPositionLimits"
 
 [[constraints]]
 kind = "JointVelocityLimits"
+
+[[constraints]]
+kind = "JointAccelerationLimits"  # those of the arm's maker, where known; or limit = …
+
+[[constraints]]
+kind = "JointJerkLimits"
 
 # [[constraints]]
 # kind = "Clearance"
