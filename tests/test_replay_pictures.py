@@ -131,7 +131,7 @@ def test_an_interrupted_picture_leaves_nothing(short_folder):
         wait_until(lambda: len(started.children(recursive=True)) > 3)
         offspring = started.children(recursive=True)
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=30)
+        process.communicate(timeout=60)
         assert process.returncode != 0
         assert psutil.wait_procs(offspring, timeout=10)[1] == []
     finally:

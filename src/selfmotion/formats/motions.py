@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError, read_table, write_atomically
+from selfmotion.basics import FileFormatError, write_atomically
 from selfmotion.formats import ros
 from selfmotion.formats.documents import read_document, write_document, write_text
 from selfmotion.formats.mujoco import keyframes
@@ -68,7 +68,7 @@ def write_motion(
 def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
     """Read a motion that `write_motion`, or something else, wrote: csv, npz, json, ros, moveit.
 
-    Accelerations are left out: they follow from the rest. See `Trajectory.from_csv`.
+    With accelerations where the file has them; see `Trajectory`.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
     """
     path = Path(file)
     if path.suffix == ".csv":
-        return _read_csv(path, degrees)
+        return Trajectory.from_csv(path, degrees=degrees)
     if path.suffix == ".npz":
         return _read_npz(path)
     document = read_document(path)
@@ -135,21 +135,6 @@ def _write_urscript(
     write_text(file, script(robot, motion.q, rate or 125.0))
 
 
-def _read_csv(file: Path, degrees: bool) -> Trajectory:
-    header, table = read_table(file)
-    if not any(name.endswith(_ACCELERATION) for name in header):
-        return Trajectory.from_csv(file, degrees=degrees)
-    scale = np.pi / 180.0 if degrees else 1.0
-    names = [name.removesuffix(_ACCELERATION) for name in header if name.endswith(_ACCELERATION)]
-    column = {name: table[:, k] for k, name in enumerate(header)}
-    wanted = ["t", *names, *(name + _VELOCITY for name in names)]
-    missing = [name for name in wanted if name not in column]
-    if missing:
-        raise FileFormatError(f"{file}: column '{missing[0]}' is missing")
-    q, qd = (np.stack([column[n + s] for n in names], axis=1) for s in ("", _VELOCITY))
-    return _made(file, column["t"], scale * q, scale * qd, names)
-
-
 def _read_npz(file: Path) -> Trajectory:
     try:
         with np.load(file, allow_pickle=False) as archive:
@@ -163,12 +148,9 @@ def _of_tables(file: Path, tables: Mapping[str, Any]) -> Trajectory:
     missing = [name for name in ("t", "q", "qd", "joint_names") if name not in tables]
     if missing:
         raise FileFormatError(f"{file}: '{missing[0]}' is missing, expected t, q, qd, joint_names")
-    return _made(file, tables["t"], tables["q"], tables["qd"], list(tables["joint_names"]))
-
-
-def _made(file: Path, t: Any, q: Any, qd: Any, names: list[str]) -> Trajectory:
+    names = tuple(map(str, tables["joint_names"]))
     try:
-        return Trajectory(t, q, qd, tuple(map(str, names)))
+        return Trajectory(tables["t"], tables["q"], tables["qd"], names, tables.get("qdd"))
     except (FileFormatError, TypeError, ValueError) as error:
         raise FileFormatError(f"{file}: {error}") from error
 

@@ -61,13 +61,14 @@ def trajectory(file: Path, document: Mapping[str, Any]) -> Trajectory:
         raise FileFormatError(
             f"{file}: has no joint_names and points, expected a JointTrajectory or RobotTrajectory"
         ) from None
-    t, q, qd = [], [], []
+    t, q, qd, qdd = [], [], [], []
     for k, point in enumerate(points):
         try:
             since = point["time_from_start"]
             t.append((int(since["sec"]) * _NANO + int(since["nanosec"])) / _NANO)
             q.append([float(value) for value in point["positions"]])
             qd.append([float(value) for value in point["velocities"]])
+            qdd.append([float(value) for value in point.get("accelerations", [])])
         except (KeyError, TypeError, ValueError) as error:
             raise FileFormatError(
                 f"{file}: points[{k}]: {error}; expected positions, velocities and "
@@ -79,6 +80,7 @@ def trajectory(file: Path, document: Mapping[str, Any]) -> Trajectory:
                 f"{len(names)} joints"
             )
     try:
-        return Trajectory(np.array(t), np.array(q), np.array(qd), names)
+        faster = np.array(qdd) if all(len(row) == len(names) for row in qdd) else None
+        return Trajectory(np.array(t), np.array(q), np.array(qd), names, faster)
     except FileFormatError as error:
         raise FileFormatError(f"{file}: {error}") from error
