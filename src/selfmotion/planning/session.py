@@ -378,13 +378,18 @@ class Session:
             if not np.isfinite(sum(objective.terms(x).values())):
                 break
             at = objective.conditions(x)
-            residual, rows = at.h[at.equality], objective.condition_rows(x)[at.equality]
+            residual = at.h[at.equality]
             miss = float(np.max(np.abs(residual), initial=0.0))
             # Conditions that contradict each other, or are out of reach, are not met by more steps.
             if not miss < nearest:
                 break
             best, nearest = x, miss
             if miss < _CLOSED:
+                break
+            # A motion that hardly holds together has derivatives beyond all numbers.
+            with np.errstate(over="ignore", invalid="ignore"):
+                rows = objective.condition_rows(x)[at.equality]
+            if not np.all(np.isfinite(rows)):
                 break
             spread = h @ rows.T
             # Least squares: conditions may depend on each other.
