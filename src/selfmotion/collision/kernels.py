@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, kernel
-from selfmotion.robot.chain import Flags, compose, placements
+from selfmotion.robot import Flags, compose, placements
 
 Ints = npt.NDArray[np.int64]
 Vector = tuple[float, float, float]

@@ -6,7 +6,13 @@ from selfmotion.engine.objective import Evaluation, Objective
 from selfmotion.engine.remaining import INTERVALS, Remaining
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart
-from selfmotion.engine.still import MOST_HALVINGS, Guide, StillMotion, settled_still_motion
+from selfmotion.engine.still import (
+    MOST_HALVINGS,
+    Guide,
+    StillMotion,
+    rough_still_motion,
+    settled_still_motion,
+)
 
 __all__ = [
     "INTERVALS",
@@ -21,5 +27,6 @@ __all__ = [
     "Remaining",
     "Rollout",
     "StillMotion",
+    "rough_still_motion",
     "settled_still_motion",
 ]

@@ -127,6 +127,25 @@ class StillMotion:
         return TransportedFrame(self.grid.nodes, self.jacobians)(t)
 
 
+def rough_still_motion(
+    problem: Problem, configuration: Array, grid: Grid
+) -> tuple[StillMotion, int]:
+    """Return the motion at x = 0 on a grid, however far off the path it is, and its work.
+
+    Raises
+    ------
+    BreakdownError
+        It runs into a singular pose.
+    """
+    still = StillMotion.on(problem, configuration, grid)
+    if still.broken is not None:
+        raise BreakdownError(
+            f"{problem.robot.name}: the tool reaches a singular pose near t = {still.broken:.4g} s",
+            time=still.broken,
+        )
+    return still, still.jacobian_evaluations
+
+
 def settled_still_motion(
     problem: Problem, configuration: Array, guide: Guide | None = None
 ) -> tuple[StillMotion, int]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, BreakdownError
+from selfmotion.basics import Array
 from selfmotion.engine import (
     INTERVALS,
     MOST_HALVINGS,
@@ -14,6 +14,7 @@ from selfmotion.engine import (
     Objective,
     Remaining,
     StillMotion,
+    rough_still_motion,
     settled_still_motion,
 )
 from selfmotion.motion import BSplineNullMotion, Grid, NullMotion
@@ -136,7 +137,7 @@ class Session:
         if grid is None:
             still, jacobians = settled_still_motion(problem, configuration, guide)
         else:
-            still, jacobians = _rough_motion(problem, configuration, grid)
+            still, jacobians = rough_still_motion(problem, configuration, grid)
         effort.counts.jacobians += jacobians
         bound = problem.bind_constraints(configuration, still.end, apart=effort.apart)
         objective = Objective.of(problem, still, free=free, constraints=bound, counts=effort.counts)
@@ -395,14 +396,3 @@ class Session:
             # Least squares: conditions may depend on each other.
             x = x - spread @ np.linalg.lstsq(rows @ spread, residual)[0]
         self._x = best
-
-
-def _rough_motion(problem: Problem, configuration: Array, grid: Grid) -> tuple[StillMotion, int]:
-    """Return the motion at x = 0 on a grid, however far off the path it is, and its work."""
-    still = StillMotion.on(problem, configuration, grid)
-    if still.broken is not None:
-        raise BreakdownError(
-            f"{problem.robot.name}: the tool reaches a singular pose near t = {still.broken:.4g} s",
-            time=still.broken,
-        )
-    return still, still.jacobian_evaluations

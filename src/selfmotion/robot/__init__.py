@@ -1,5 +1,6 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
+from selfmotion.robot.chain import Flags, compose, placements
 from selfmotion.robot.dynamics import Dynamics
 from selfmotion.robot.kinematics import ToolKinematics
 from selfmotion.robot.loading import NAMED_ARMS, load_robot, rebuild_robot
@@ -11,14 +12,17 @@ from selfmotion.robot.urdf import Urdf, UrdfJoint
 __all__ = [
     "NAMED_ARMS",
     "Dynamics",
+    "Flags",
     "Mounting",
     "RobotModel",
     "ToolKinematics",
     "Urdf",
     "UrdfJoint",
+    "compose",
     "load_robot",
     "mounting_of",
     "null_basis",
     "null_space",
+    "placements",
     "rebuild_robot",
 ]

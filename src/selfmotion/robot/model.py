@@ -145,7 +145,7 @@ class RobotModel:
         return ToolKinematics(self.model, self.tool_id)
 
     def joint_places(self) -> tuple[Array, Array, Array, npt.NDArray[np.bool_]]:
-        """Return what `selfmotion.robot.chain` places joints by.
+        """Return what `selfmotion.robot.placements` places joints by.
 
         Returns
         -------

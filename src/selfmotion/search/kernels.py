@@ -15,7 +15,7 @@ from selfmotion.kernels import (
     solve_cholesky,
     task_rows,
 )
-from selfmotion.robot.chain import compose, placements
+from selfmotion.robot import compose, placements
 
 Mask = npt.NDArray[np.bool_]
 
