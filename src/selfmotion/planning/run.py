@@ -222,6 +222,8 @@ class _Run:
             if rival is not None and rival is not best and not best.cut_short:
                 rival.refine_until_settled()
                 rival.enrich()
+                if rival.cut_short:
+                    best.end(rival.status)
                 violated, cost = rival.score()
                 return None if violated else cost
         except KeyboardInterrupt:
