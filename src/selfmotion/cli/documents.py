@@ -108,10 +108,11 @@ class Shell:
         speed: dict[str, Any] = {"kind": "JointVelocityLimits"}
         if self.velocity is not None:
             speed["limit"] = options.one_or_each(self.velocity, "--velocity")
-        found: list[dict[str, Any]] = [{"kind": "JointPositionLimits"}, speed]
+        acceleration: dict[str, Any] = {"kind": "JointAccelerationLimits"}
         if self.acceleration is not None:
-            limit = options.one_or_each(self.acceleration, "--acceleration")
-            found.append({"kind": "JointAccelerationLimits", "limit": limit})
+            acceleration["limit"] = options.one_or_each(self.acceleration, "--acceleration")
+        found: list[dict[str, Any]] = [{"kind": "JointPositionLimits"}, speed, acceleration]
+        found.append({"kind": "JointJerkLimits"})
         if self.closed:
             found.append({"kind": "ClosedPath"})
         if self.obstacles is not None or self.clearance > 0.0 or self.srdf is not None:
