@@ -34,7 +34,8 @@ def test_limits_and_closed_paths(tmp_path: Path) -> None:
     plan = planned(tmp_path, "--velocity", "2", "--acceleration", "9,9,9,9,9,9,8", "--closed")
     asked = {item["kind"]: item for item in kinds(plan)}
     assert set(asked) == {
-        "JointPositionLimits", "JointVelocityLimits", "JointAccelerationLimits", "ClosedPath",
+        "JointPositionLimits", "JointVelocityLimits", "JointAccelerationLimits", "JointJerkLimits",
+        "ClosedPath",
     }  # fmt: skip
     assert asked["JointVelocityLimits"]["limit"] == 2.0
     assert asked["JointAccelerationLimits"]["limit"] == [9, 9, 9, 9, 9, 9, 8]
