@@ -13,6 +13,9 @@ from selfmotion.planning.largest_part import Part
 from selfmotion.planning.session import Session
 from selfmotion.plans import Problem
 
+# Limits that are exceeded between the nodes on more grids than this are so on any.
+_ROUGH = 3
+
 
 @dataclass(frozen=True, eq=False)
 class Finished:
@@ -35,13 +38,15 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
     finished: Finished | None = None
     coarse: Trajectory | None = None
     misses: list[float] = []
+    roughs = 0
     for _ in range(MOST_HALVINGS):
         try:
             progress("checking", 1, 1)
             finished = _check(problem, session, tolerance, part.ending)
             rough = _rough(finished, session)
+            roughs += rough
             # Where no evaluations are left, finer grids change nothing.
-            spent = session.status is Status.MAX_EVALUATIONS
+            spent = session.status is Status.MAX_EVALUATIONS or roughs > _ROUGH
             if finished.certificate.on_path and (spent or not rough):
                 break
             trajectory = finished.motion.trajectory
