@@ -3,7 +3,7 @@
 from selfmotion.engine.counts import Counts
 from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.objective import Evaluation, Objective
-from selfmotion.engine.remaining import INTERVALS, Remaining
+from selfmotion.engine.remaining import Remaining, finest
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart
 from selfmotion.engine.still import (
@@ -15,7 +15,6 @@ from selfmotion.engine.still import (
 )
 
 __all__ = [
-    "INTERVALS",
     "MOST_HALVINGS",
     "Counts",
     "Deviation",
@@ -27,6 +26,7 @@ __all__ = [
     "Remaining",
     "Rollout",
     "StillMotion",
+    "finest",
     "rough_still_motion",
     "settled_still_motion",
 ]

@@ -14,12 +14,19 @@ from selfmotion.engine.objective import Objective
 from selfmotion.motion import BSplineNullMotion
 from selfmotion.optimise import Residuals, best_step
 
-# Intervals of the fine spline, and of coarser ones that it contains.
-INTERVALS = (8, 16, 32, 64)
+# Intervals of the finest spline, and of coarser ones that it contains; coefficients beyond which
+# matrices would take longer than the rest of a plan.
+_INTERVALS, _MOST = (8, 16, 32, 64), 220
 # Directions in which the cost hardly bends are not trusted further than this share allows.
 _FLAT = 1e-9
 # The model is believed within this many times its own step.
 _REACH = 3.0
+
+
+def finest(rows: int) -> BSplineNullMotion:
+    """Return the spline that the estimate is made in: of 64 intervals, or fewer for many rows."""
+    fitting = [count for count in _INTERVALS if rows * (count + 3) <= _MOST]
+    return BSplineNullMotion(max(fitting, default=_INTERVALS[0]))
 
 
 class Remaining:
@@ -37,15 +44,21 @@ class Remaining:
 
     def __init__(self, fine: Objective, x: Array, *, bound: bool) -> None:
         self._fine, self._parts = fine, [len(part) for part in fine.parts(x)]
+        self._finest = fine.null_motion.functions.shape[1] - 3
         self._gradient, self._metric = fine.gradient(x), fine.metric(x)
         none = Residuals(np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool))
         self._at = fine.conditions(x) if bound else none
         self._rows = fine.condition_rows(x) if bound else np.zeros((0, fine.size))
 
+    @property
+    def most(self) -> float:
+        """What the finest spline would save [cost]."""
+        return self.saving(self._finest)
+
     def saving(self, intervals: int) -> float:
-        """Return what a spline of so many intervals (of `INTERVALS`) would save [cost]."""
+        """Return what a spline of so many intervals (8, 16, …) would save [cost]."""
         z, spline, c = self._parts
-        inner = np.kron(np.eye(self._fine.null_motion.rows), _within(intervals))
+        inner = np.kron(np.eye(self._fine.null_motion.rows), _within(intervals, self._finest))
         basis = np.zeros((self._fine.size, z + inner.shape[1] + c))
         basis[:z, :z] = np.eye(z)
         basis[z : z + spline, z : z + inner.shape[1]] = inner
@@ -61,14 +74,13 @@ class Remaining:
 
     def intervals(self, left: float) -> int:
         """Return the fewest intervals that leave no more than `left` of what can be saved."""
-        most = self.saving(INTERVALS[-1])
-        return next(n for n in INTERVALS if n == INTERVALS[-1] or most - self.saving(n) <= left)
+        most, finest = self.most, self._finest
+        return next(n for n in _INTERVALS if n == finest or most - self.saving(n) <= left)
 
 
 @cache
-def _within(intervals: int) -> Array:
+def _within(intervals: int, finest: int) -> Array:
     """Return the matrix from a spline's coefficients to those of the finest one, (K', K)."""
-    finest = INTERVALS[-1]
     t = np.linspace(0.0, 1.0, 8 * finest + 1)
     coarse, fine = (BSplineNullMotion(count).functions(t, 1.0) for count in (intervals, finest))
     return np.asarray(np.linalg.lstsq(fine, coarse)[0])

@@ -6,7 +6,6 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.engine import (
-    INTERVALS,
     MOST_HALVINGS,
     Counts,
     Evaluation,
@@ -14,10 +13,11 @@ from selfmotion.engine import (
     Objective,
     Remaining,
     StillMotion,
+    finest,
     rough_still_motion,
     settled_still_motion,
 )
-from selfmotion.motion import BSplineNullMotion, Grid, NullMotion
+from selfmotion.motion import Grid, NullMotion
 from selfmotion.optimise import Callback, Iteration, Minimum, Optimizer, SequentialQuadratic, Status
 from selfmotion.plans import Binding, Problem
 
@@ -241,7 +241,7 @@ class Session:
         wanted = self._still.problem.null_motion
         while not (self.violations or self.status in (*_CUT_SHORT, *_ADRIFT)):
             left = self._left()
-            self.remaining = left.saving(INTERVALS[-1])
+            self.remaining = left.most
             enough = wanted.gain * abs(self._cost())
             if self.remaining <= enough:
                 return
@@ -258,7 +258,9 @@ class Session:
         objective = self._objective
         z, x, c = objective.parts(self._x)
         around = objective.null_motion.epsilon(x)
-        fine = self._on(objective.grid, BSplineNullMotion(INTERVALS[-1]), around)
+        problem = self._still.problem
+        spline = finest(problem.robot.redundancy(problem.task))
+        fine = self._on(objective.grid, spline, around)
         none = np.zeros(fine.null_motion.size)
         return Remaining(fine, np.concatenate([z, none, c]), bound=self._bound)
 
