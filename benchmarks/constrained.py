@@ -81,6 +81,7 @@ def problem(seed: int, number: int) -> tuple[str, sm.Problem]:
         free.null_motion,
         costs=free.costs,
         constraints=constraints,
+        rest=False,
     )
     return f"{number:02d} {arm} {task}, {kind}{', free start' if start is None else ''}", made
 
@@ -109,7 +110,8 @@ def _without(robot: sm.RobotModel, task: str, kind: str, rng: np.random.Generato
     motions = (sm.PolynomialNullMotion(3), sm.PolynomialNullMotion(5), sm.BSplineNullMotion(8))
     costs = (sm.JointVelocity(), sm.InverseManipulability(float(10 ** rng.uniform(-4.0, -1.5))))
     motion = motions[int(rng.integers(3))]
-    return sm.Problem(robot, path, task, start, motion, costs=costs, constraints=())
+    # Not at rest at the ends: the stored results are of a revision that knew no such thing.
+    return sm.Problem(robot, path, task, start, motion, costs, (), rest=False)
 
 
 def _constraints(
