@@ -6,6 +6,7 @@ Needs a Chromium browser. Takes about a minute.
 from pathlib import Path
 
 import selfmotion as sm
+from selfmotion.cli.showcase import panda_past_a_box
 from selfmotion.replay import render_png
 
 DOCS = Path(__file__).parent
@@ -22,19 +23,12 @@ def plan_of(name: str) -> sm.Plan:
     return sm.plan(sm.Problem(robot, path, task, start))
 
 
-def readme_plan() -> sm.Plan:
-    """Plan the README's first example, where the self-motion is large."""
-    panda = sm.load_robot("panda")
-    start = panda.dexterous_configuration()
-    circle = sm.Circle.around(panda.pose(start), radius=0.15, duration=4.0, normal=(1, 0, 0))
-    return sm.plan(sm.Problem(panda, circle, task="position", start=start))
-
-
 def main() -> None:
     """Draw README's picture, then one of every named arm."""
     shown = ("trace", "triads", "ghost")
     size = (1200, 900)
-    render_png(readme_plan(), DOCS / "replay.png", t=1.4, size=size, layers=shown, whole_page=True)
+    plan = sm.plan(panda_past_a_box())
+    render_png(plan, DOCS / "replay.png", t=2.5, size=size, layers=shown, whole_page=True)
     for name in sm.NAMED_ARMS:
         plan = plan_of(name)
         time = 0.3 * plan.trajectory.duration
