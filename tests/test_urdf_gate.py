@@ -150,3 +150,21 @@ def test_matrices_are_poses_wherever_one_is_taken() -> None:
         panda.pose(panda.inverse_kinematics(matrix)),
     ):
         np.testing.assert_allclose(given.homogeneous, matrix, atol=1e-9)
+
+
+def test_a_start_in_collision_is_called_that() -> None:
+    panda = robot_named("panda")
+    home = np.array(sm.NAMED_ARMS["panda"].home)
+    stay = sm.Dwell(panda.pose(home), 1.0)
+    motion = sm.Trajectory([0.0, 1.0], [home] * 2, [0.0 * home] * 2, panda.joint_names)
+
+    def verdict(at: np.ndarray) -> str:
+        kept = sm.Clearance([sm.Sphere("ball", at, 0.05)], distance=0.02)
+        asked = [kept.requirement(panda)]
+        return sm.certify(panda, stay, "position", motion, requirements=asked).verdict
+
+    place = panda.pose(home).translation
+    assert "the start is in collision: " in verdict(place)
+    assert "'ball'" in verdict(place) or "ball overlap by" in verdict(place)
+    assert "the start is too near already: " in verdict(place - np.array([0.0, 0.0, 0.06]))
+    assert "the start" not in verdict(place + np.array([0.0, 2.0, 0.0]))

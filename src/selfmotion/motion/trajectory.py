@@ -89,6 +89,13 @@ class Trajectory:
                 f"trajectory: t[{row}] = {self.t[row]} does not come after {self.t[row - 1]}"
             )
 
+    def __repr__(self) -> str:
+        """Return one line: samples, times and joints."""
+        return (
+            f"Trajectory({len(self.t)} samples, {self.t[0]:.6g} to {self.t[-1]:.6g} s, joints "
+            f"{', '.join(self.joint_names)})"
+        )
+
     @classmethod
     def from_csv(cls, file: str | Path, *, degrees: bool = False) -> "Trajectory":
         """Read a motion that something else made.

@@ -61,6 +61,16 @@ class Plan:
     certificate: Certificate
     altered: str = ""
 
+    def __repr__(self) -> str:
+        """Return a few lines: what moves, at what cost, and the verdict."""
+        report, verdict = self.report, self.certificate.verdict
+        costs = f"{report.initial_cost:.6g} → {report.cost:.6g}"
+        return (
+            f"Plan({self.robot.name}, task '{self.task.value}', {self.trajectory.duration:.6g} s)\n"
+            f"  cost {costs} in {report.iterations} iterations: {report.status.value}\n"
+            f"  {verdict}"
+        )
+
     @property
     def robot(self) -> RobotModel:
         """The arm."""

@@ -73,6 +73,10 @@ class RobotModel:
     touching: tuple[tuple[str, str], ...] = ()
     _per_thread: threading.local = field(default_factory=threading.local, repr=False)
 
+    def __repr__(self) -> str:
+        """Return one line: name, tool and joints."""
+        return f"RobotModel({self.name}, tool '{self.tool}', joints {', '.join(self.joint_names)})"
+
     def __getstate__(self) -> dict[str, Any]:
         return {key: value for key, value in self.__dict__.items() if key != "_per_thread"}
 
