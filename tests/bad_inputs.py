@@ -1,6 +1,6 @@
 """The table of bad inputs: what users give, and what they see of it.
 
-``python tests/bad_inputs.py`` writes `docs/errors.md`; a test checks that it is current.
+``make errors`` writes `docs/errors.md`; a test checks that it is current.
 """
 
 import tempfile
@@ -16,9 +16,9 @@ from bad_values import cost_rows, path_rows
 PAGE = Path(__file__).parents[1] / "docs" / "errors.md"
 _HEAD = """# What is refused, and how
 
-Written by `python tests/bad_inputs.py`, checked by the tests: {count} inputs that cannot be used,
-each with the error that names it. All of them derive from `SelfmotionError`; only a time or an
-order out of range is a `ValueError`. Indices in brackets are Python's, from 0; rows, lines, pieces
+Written by `make errors`, checked by the tests: {count} inputs that cannot be used,
+each with the error that names it. All of them derive from `SelfmotionError`; only a time, an
+order or a rate out of range is a `ValueError`. Indices in brackets are Python's, from 0; rows, lines, pieces
 and elements of files are counted from 1.
 """
 

@@ -16,7 +16,7 @@ _seen: dict[Row, str] = {}
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row.area}: {row.given}")
 def test_bad_inputs_are_refused_as_the_page_says(row: Row, tmp_path: Path) -> None:
     _seen[row] = line_of(row, row.seen(tmp_path))
-    assert _seen[row] in SHOWN, "run python tests/bad_inputs.py"
+    assert _seen[row] in SHOWN, "run make errors"
 
 
 def test_the_page_has_these_rows_and_no_others() -> None:

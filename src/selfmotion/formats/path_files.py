@@ -91,10 +91,10 @@ def read_path(
         do not increase, a jump, other units. The line or pose is named.
     """
     path = as_path(file)
-    jump = as_number(jump, "jump [m]", above=0.0)
+    jump = as_number(jump, f"{path}: jump", above=0.0, error=FileFormatError)
     for name, value in (("feed", feed), ("duration", duration)):
         if value is not None:
-            as_number(value, name, above=0.0)
+            as_number(value, f"{path}: {name}", above=0.0, error=FileFormatError)
     reader = _READERS.get(path.suffix)
     if reader is None:
         raise FileFormatError(

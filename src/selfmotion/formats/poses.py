@@ -42,7 +42,7 @@ def from_normal(normal: Array) -> Array:
 def _from_matrix(values: Array) -> Array:
     matrix = np.eye(4)
     matrix[:3, :3] = values
-    return np.asarray(path_pose(matrix, "the rotation").rotation)
+    return np.asarray(path_pose(matrix, "the pose").rotation)
 
 
 # Key → shape of its numbers, and what makes a rotation of them.

@@ -287,7 +287,7 @@ class Trajectory:
         ValueError
             The rate is not positive.
         """
-        rate = as_number(rate, "rate [1/s]", above=0.0, error=ValueError)
+        rate = as_number(rate, "rate", above=0.0, error=ValueError)
         if self.duration * rate > _MOST_SAMPLES:
             raise ValueError(
                 f"rate is {rate:g} samples per second, which are {self.duration * rate:.3g} in "
