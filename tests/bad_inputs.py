@@ -18,8 +18,8 @@ _HEAD = """# What is refused, and how
 
 Written by `make errors`, checked by the tests: {count} inputs that cannot be used,
 each with the error that names it. All of them derive from `SelfmotionError`; only a time, an
-order or a rate out of range is a `ValueError`. Indices in brackets are Python's, from 0; rows, lines, pieces
-and elements of files are counted from 1.
+order or a rate out of range is a `ValueError`. Indices in brackets are Python's, from 0; rows,
+lines, pieces and elements of files are counted from 1.
 """
 
 
