@@ -183,7 +183,7 @@ def test_csv_is_read(tmp_path: Path) -> None:
         ("t,x,y,z\n0,0,0,0\n1,0,0\n", "line 3 has 3 values"),
         ("t,x,y,z\n0,0,0,0\n", "at least two poses"),
         ("t,x,y,z\n0,0,0,0\n0,1,0,0\n", r"t\[1\] = 0.0 does not come after"),
-        ("t,x,y,z\n0,0,0,0\n1,nan,0,0\n", r"positions\[1\] is not finite"),
+        ("t,x,y,z\n0,0,0,0\n1,nan,0,0\n", r"positions\[1, 0\] is nan"),
         ("t,x,y,z,qw,qx,qy,qz\n0,0,0,0,0,0,0,0\n1,0,0,0,1,0,0,0\n", r"quaternions\[0\] is zero"),
     ],
 )

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from selfmotion.baselines.integration import PoseFeedback, Rate, integrate
-from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.basics import Array, ProblemError, read_only, shown
 from selfmotion.certificate import Certificate, Tolerance
 from selfmotion.costs import Samples
 from selfmotion.motion import Grid, Trajectory
@@ -75,6 +75,11 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
         Without coefficients. `initial_trajectory` and `initial_cost` are those of the
         pseudo-inverse, as for every plan.
     """
+    if not isinstance(problem, Problem):
+        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")
+    if isinstance(method, type) or not callable(getattr(method, "solve", None)):
+        raise ProblemError(f"method is {shown(method)}, expected one such as PseudoInverse()")
+    tolerance = Tolerance.of(tolerance)
     if problem.damping is not None:
         raise ProblemError(
             "the problem's damping is for the optimised motion; leave it out, or take "
@@ -88,7 +93,6 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
     found = method.solve(problem)
     seconds = time.perf_counter() - began
     still = pseudo_inverse(problem)
-    tolerance = tolerance or Tolerance()
     trajectory, certificate = _sampled(problem, found, tolerance)
     grid = Grid(trajectory.t)
     terms, initial_terms = costs(problem, found, grid), costs(problem, still, grid)

@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmotion.baselines.base import Motion, along_rate, costs, pseudo_inverse
 from selfmotion.baselines.integration import PoseFeedback
-from selfmotion.basics import Array, BreakdownError, ProblemError
+from selfmotion.basics import Array, BreakdownError, ProblemError, as_number
 from selfmotion.costs import Cost, Manipulability, Samples
 from selfmotion.motion import Grid, Sampling
 from selfmotion.plans import Problem
@@ -48,10 +48,9 @@ class DampedLeastSquares:
     threshold: float | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.damping) and self.damping > 0.0):
-            raise ProblemError(f"damped least squares: damping is {self.damping}, expected > 0")
-        if self.threshold is not None and not self.threshold > 0.0:
-            raise ProblemError(f"damped least squares: threshold is {self.threshold}, expected > 0")
+        as_number(self.damping, "damped least squares: damping", above=0.0)
+        if self.threshold is not None:
+            as_number(self.threshold, "damped least squares: threshold", above=0.0)
 
     def solve(self, problem: Problem) -> Motion:
         """See `Method.solve`."""
@@ -93,8 +92,8 @@ class GradientProjection:
     gain: float | None = None
 
     def __post_init__(self) -> None:
-        if self.gain is not None and not (np.isfinite(self.gain) and self.gain >= 0.0):
-            raise ProblemError(f"gradient projection: gain is {self.gain}, expected ≥ 0")
+        if self.gain is not None:
+            as_number(self.gain, "gradient projection: gain", least=0.0)
 
     def solve(self, problem: Problem) -> Motion:
         """See `Method.solve`."""

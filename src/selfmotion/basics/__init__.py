@@ -1,6 +1,6 @@
 """What every part of the package stands on: errors, arrays, progress, files, compilation."""
 
-from selfmotion.basics.arrays import Array, per_joint, read_only
+from selfmotion.basics.arrays import Array, per_joint, plain_numbers, read_only, shown
 from selfmotion.basics.errors import (
     BreakdownError,
     CollisionError,
@@ -17,6 +17,7 @@ from selfmotion.basics.errors import (
     StartError,
 )
 from selfmotion.basics.files import (
+    as_path,
     read_archive,
     read_rows,
     read_table,
@@ -24,7 +25,16 @@ from selfmotion.basics.files import (
     write_atomically,
     write_csv,
 )
+from selfmotion.basics.inputs import (
+    as_choice,
+    as_flag,
+    as_number,
+    as_numbers,
+    as_whole,
+    random_numbers,
+)
 from selfmotion.basics.jit import inlined, kernel
+from selfmotion.basics.names import nearest
 from selfmotion.basics.progress import Progress, silent
 from selfmotion.basics.saved import Saved, is_known, restore
 from selfmotion.basics.threads import one_blas_thread
@@ -46,16 +56,26 @@ __all__ = [
     "Saved",
     "SelfmotionError",
     "StartError",
+    "as_choice",
+    "as_flag",
+    "as_number",
+    "as_numbers",
+    "as_path",
+    "as_whole",
     "inlined",
     "is_known",
     "kernel",
+    "nearest",
     "one_blas_thread",
     "per_joint",
+    "plain_numbers",
+    "random_numbers",
     "read_archive",
     "read_only",
     "read_rows",
     "read_table",
     "restore",
+    "shown",
     "silent",
     "write_archive",
     "write_atomically",

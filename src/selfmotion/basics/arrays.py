@@ -1,11 +1,18 @@
 """The array type of the package, arrays that cannot be written to, and numbers per joint."""
 
+import reprlib
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics.errors import ProblemError
 
 Array = npt.NDArray[np.float64]
+
+_short = reprlib.Repr()
+_short.maxother = _short.maxstring = 60
+_short.maxlist = _short.maxtuple = 8
 
 
 def read_only(values: npt.ArrayLike) -> Array:
@@ -23,13 +30,33 @@ def per_joint(values: npt.ArrayLike, dof: int, what: str, *, positive: bool = Fa
     ProblemError
         There is another number of them, one is NaN, or not positive where that is asked for.
     """
-    try:
-        array = read_only(np.broadcast_to(np.asarray(values, dtype=np.float64), (dof,)))
-    except (TypeError, ValueError):
+    given = plain_numbers(values)
+    if given is None or given.shape not in ((), (dof,)):
+        size = "" if given is None else f" of shape {given.shape}"
         raise ProblemError(
-            f"{what}: {values!r}, expected one number, or one for each of the {dof} joints"
-        ) from None
+            f"{what}: {shown(values)}{size}, expected one number, or one for each of the {dof} "
+            f"joints"
+        )
+    array = read_only(np.broadcast_to(given, (dof,)))
     if np.any(np.isnan(array)) or (positive and not np.all(array > 0.0)):
         kind = "numbers > 0" if positive else "numbers"
-        raise ProblemError(f"{what}: {np.asarray(values).tolist()}, expected {kind}")
+        raise ProblemError(f"{what}: {shown(given)}, expected {kind}")
     return array
+
+
+def plain_numbers(values: Any) -> Array | None:
+    """Return numbers as they are, or None where they are none: texts, booleans, ragged lists."""
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError):
+        return None
+    return np.asarray(array, dtype=np.float64) if array.dtype.kind in "iuf" else None
+
+
+def shown(value: Any) -> str:
+    """Return what a message says of a value: short, on one line."""
+    if isinstance(value, type):
+        return f"the class {value.__name__}, not an object of it"
+    if isinstance(value, np.ndarray):
+        return f"an array of shape {value.shape}" if value.size > 16 else str(value.tolist())
+    return " ".join(_short.repr(value).split())

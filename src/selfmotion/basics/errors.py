@@ -1,4 +1,4 @@
-"""The exceptions of the package; besides them, ValueError for a time or order out of range.
+"""The exceptions of the package; besides them, ValueError for a time, order or rate out of range.
 
 ::
 

@@ -10,7 +10,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from selfmotion.basics.arrays import Array
+from selfmotion.basics.arrays import Array, shown
 from selfmotion.basics.errors import FileFormatError
 
 _DESCRIPTION = "description"
@@ -91,6 +91,13 @@ def read_table(file: Path) -> tuple[list[str], Array]:
     """Read a table of numbers with a header line: names and values of `read_rows`."""
     names, values, _ = read_rows(file)
     return names, values
+
+
+def as_path(file: Any) -> Path:
+    """Return the path of a file; FileFormatError unless it is a text or a path."""
+    if not isinstance(file, str | Path):
+        raise FileFormatError(f"file is {shown(file)}, expected the path of a file")
+    return Path(file)
 
 
 def read_rows(file: Path) -> tuple[list[str], Array, list[int]]:

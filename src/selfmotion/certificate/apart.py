@@ -51,6 +51,8 @@ class KeepsApart(Requirement):
                 f"{found.closest.value * 1e3:.4f} mm"
             )
         kept = found.open_until is None and bool(found.closest.value >= self.distance)
+        if not kept:
+            text += self._of_start(motion.trajectory)
         return Finding(
             self.name, found.names, found.time, found.closest.value, self.distance, kept, text
         )
@@ -80,6 +82,17 @@ class KeepsApart(Requirement):
             open_ = ", ".join(self.model.open_meshes)
             said.append(f"open meshes, in which a body wholly inside may be missed: {open_}")
         return tuple(said)
+
+    def _of_start(self, trajectory: Trajectory) -> str:
+        """Return what is wrong with the start already, in words; "" where it is not."""
+        start = self.model.distance(trajectory.q[0])
+        if start.value >= self.distance:
+            return ""
+        pair = f"{start.first} - {start.second}"
+        if start.value > 0.0:
+            return f"; the start is too near already: {pair} are {start.value * 1e3:.2f} mm apart"
+        depth = -start.value * 1e3
+        return f"; the start is in collision: {pair} overlap by {depth:.2f} mm: choose another one"
 
     def _told(self, found: "Approach") -> str:
         text = (

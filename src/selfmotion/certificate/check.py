@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array, ProblemError, shown
 from selfmotion.certificate.deviation import smallest_singular_values
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import arm_limits
@@ -60,7 +60,8 @@ def certify(
     ProblemError
         A requirement is none, or returns no finding.
     """
-    tolerance, task = tolerance or Tolerance(), Task.of(task)
+    _check_arguments(robot, path, trajectory)
+    tolerance, task = Tolerance.of(tolerance), Task.of(task)
     trajectory = trajectory.of_joints(robot.joint_names)
     motion = FinishedMotion(robot, trajectory)
     path_check = bound_errors(robot, path, task, trajectory, tolerance, relaxations)
@@ -91,11 +92,23 @@ def certify(
     )
 
 
+def _check_arguments(robot: RobotModel, path: Path, trajectory: Trajectory) -> None:
+    for name, value, kind in (
+        ("robot", robot, RobotModel),
+        ("path", path, Path),
+        ("trajectory", trajectory, Trajectory),
+    ):
+        if not isinstance(value, kind):
+            raise ProblemError(f"certify: {name} is {shown(value)}, expected a {kind.__name__}")
+
+
 def _check(requirements: Sequence[Requirement]) -> None:
+    if not isinstance(requirements, list | tuple):
+        raise ProblemError(f"requirements are {shown(requirements)}, expected a list of them")
     for item in requirements:
         if not isinstance(item, Requirement):
             raise ProblemError(
-                f"requirements: {item!r} is no Requirement; derive a class of your own from "
+                f"requirements: {shown(item)} is no Requirement; derive a class of your own from "
                 f"selfmotion.Requirement, or take constraint.requirement(robot)"
             )
 

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from selfmotion.basics import ProblemError
+from selfmotion.basics import as_number
 
 
 @dataclass(frozen=True)
@@ -24,9 +22,24 @@ class Tolerance:
 
     def __post_init__(self) -> None:
         for name in ("position", "rotation"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ProblemError(f"tolerance: {name} is {value}, expected a number > 0")
+            value = as_number(getattr(self, name), f"tolerance: {name}", above=0.0)
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def of(cls, tolerance: "Tolerance | float | None") -> "Tolerance":
+        """Return the tolerance that was given: one number is for both [m and rad].
+
+        Raises
+        ------
+        ProblemError
+            It is neither a tolerance nor a number above 0.
+        """
+        if isinstance(tolerance, cls):
+            return tolerance
+        if tolerance is None:
+            return cls()
+        value = as_number(tolerance, "tolerance", above=0.0)
+        return cls(value, value)
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,10 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import pinocchio as pin
 
-from selfmotion.basics import CollisionError, RobotError
+from selfmotion.basics import CollisionError
 from selfmotion.collision.obstacles import Obstacle
 from selfmotion.collision.solids import Solid
 from selfmotion.robot import RobotModel, Urdf
@@ -48,10 +47,7 @@ def link_bodies(robot: RobotModel) -> list[Body]:
     CollisionError
         An element is no body, or is missing among what Pinocchio made of them.
     """
-    try:
-        pieces = robot.geometry(pin.GeometryType.COLLISION).geometryObjects
-    except RobotError as error:
-        raise _which_mesh(robot.urdf, error) from error
+    pieces = robot.geometry(pin.GeometryType.COLLISION).geometryObjects
     links = [robot.model.frames[piece.parentFrame].name for piece in pieces]
     _check_count(robot.urdf, links)
     bodies = []
@@ -88,17 +84,3 @@ def _check_count(urdf: Urdf, links: Sequence[str]) -> None:
                 f"{urdf.source}: link '{name}' has {wanted} <collision> elements, but Pinocchio "
                 f"made {made[name]} bodies of them; look for a part that is no valid URDF"
             )
-
-
-def _which_mesh(urdf: Urdf, error: RobotError) -> RobotError:
-    """Return an error that names the link and the file that is missing, or the one given."""
-    for link in ElementTree.fromstring(urdf.text).findall("link"):
-        for mesh in link.iterfind("collision/geometry/mesh"):
-            file = mesh.get("filename", "")
-            scheme, _, rest = file.rpartition("://")
-            folders = urdf.package_dirs if scheme in ("package", "model") else ("",)
-            if not any(Path(folder, rest).is_file() for folder in folders):
-                return RobotError(
-                    f"{urdf.source}: link '{link.get('name')}': no such mesh file: {file}"
-                )
-    return error

@@ -11,11 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, CollisionError, read_only
-
-# How far a rotation matrix read from a file may be from orthonormal.
-_ROTATION_TOLERANCE = 1e-6
-
+from selfmotion.basics import Array, CollisionError, as_number, as_numbers, read_only, shown
+from selfmotion.task import as_pose
 
 # Shape → class, filled as the classes are made.
 _shapes: dict[str, type["Obstacle"]] = {}
@@ -101,13 +98,8 @@ class Obstacle(ABC):
 
     def _set_length(self, key: str) -> None:
         """Replace the attribute by a float, which must be positive."""
-        value = getattr(self, key)
-        try:
-            length = float(value)
-        except (TypeError, ValueError):
-            length = np.nan
-        if not (np.isfinite(length) and length > 0):
-            raise CollisionError(f"{self.label}: {key} is {value!r}, expected a number above 0")
+        what = f"{self.label}: {key}"
+        length = as_number(getattr(self, key), what, above=0.0, most=1e6, error=CollisionError)
         object.__setattr__(self, key, length)
 
 
@@ -127,11 +119,10 @@ class Box(Obstacle):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        size = _numbers(self.size)
-        if size.shape != (3,) or not np.all(size > 0) or not np.all(np.isfinite(size)):
-            raise CollisionError(
-                f"{self.label}: size is {self.size!r}, expected three numbers above 0"
-            )
+        expected = "three numbers above 0"
+        size = as_numbers(self.size, f"{self.label}: size", expected, (3,), CollisionError)
+        if not np.all((size > 0.0) & (size <= 1e6)):
+            raise CollisionError(f"{self.label}: size is {size.tolist()}, expected {expected}")
         object.__setattr__(self, "size", read_only(size))
 
     def geometry(self) -> Any:
@@ -231,6 +222,8 @@ class Mesh(Obstacle):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not isinstance(self.file, str | Path):
+            raise CollisionError(f"{self.label}: file is {shown(self.file)}, expected a path")
         object.__setattr__(self, "file", Path(self.file))
         self._set_length("scale")
 
@@ -241,7 +234,9 @@ class Mesh(Obstacle):
         try:
             return coal.MeshLoader().load(str(self.file), np.full(3, self.scale))
         except (RuntimeError, ValueError) as error:
-            raise CollisionError(f"{self.label}: {self.file} cannot be read: {error}") from error
+            # What comes before is where in the source of coal it was found.
+            reason = " ".join(str(error).rpartition("message:")[2].split())
+            raise CollisionError(f"{self.label}: {self.file} cannot be read: {reason}") from error
 
 
 def obstacle_shapes() -> list[tuple[str, type[Obstacle]]]:
@@ -310,14 +305,7 @@ def _numbers(values: npt.ArrayLike) -> Array:
 def _pose(label: str, pose: Any) -> pin.SE3:
     if not isinstance(pose, pin.SE3):
         position = _numbers(pose)
-        if position.shape != (3,):
-            raise CollisionError(f"{label}: pose is {pose!r}, expected an SE3 or a position (3,)")
-        pose = pin.SE3(np.eye(3), position)
-    rotation = pose.rotation
-    skew = np.abs(rotation @ rotation.T - np.eye(3)).max()
-    # Written so that NaN is refused too.
-    if not (skew < _ROTATION_TOLERANCE and np.linalg.det(rotation) > 0):
-        raise CollisionError(f"{label}: rotation is not orthonormal and right-handed")
-    if not np.all(np.isfinite(pose.translation)):
-        raise CollisionError(f"{label}: position is {pose.translation.tolist()}, not finite")
-    return pin.SE3(pose)
+        if position.shape != (4, 4):
+            what, expected = f"{label}: pose", "an SE3, a (4, 4) matrix or a position (3,), finite"
+            pose = pin.SE3(np.eye(3), as_numbers(pose, what, expected, (3,), CollisionError))
+    return as_pose(pose, f"{label}: pose", CollisionError)

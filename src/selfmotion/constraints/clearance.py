@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array, ProblemError, as_number, shown
 from selfmotion.certificate import KeepsApart
 from selfmotion.collision import (
     ClearanceModel,
@@ -63,15 +63,19 @@ class Clearance(Constraint):
             isinstance(listed, list | tuple) and all(isinstance(item, Obstacle) for item in listed)
         ):
             raise ProblemError(
-                f"clearance: obstacles are {self.obstacles!r}, expected Box, Sphere, Cylinder, "
-                f"Capsule or Mesh"
+                f"clearance: obstacles are {shown(self.obstacles)}, expected Box, Sphere, "
+                f"Cylinder, Capsule or Mesh"
             )
         object.__setattr__(self, "obstacles", tuple(listed))
+        if not isinstance(self.disabled, list | tuple):
+            raise ProblemError(
+                f"clearance: disabled is {shown(self.disabled)}, expected pairs of names of links"
+            )
         pairs = [_pair(item) for item in self.disabled]
         read = () if srdf is None else disabled_links(srdf)
         object.__setattr__(self, "disabled", tuple(dict.fromkeys((*pairs, *read))))
-        if not (np.isfinite(self.distance) and self.distance >= 0.0):
-            raise ProblemError(f"clearance: distance is {self.distance} m, expected ≥ 0")
+        distance = as_number(self.distance, "clearance: distance", least=0.0, most=1e6)
+        object.__setattr__(self, "distance", distance)
 
     def model(self, robot: RobotModel) -> CollisionModel:
         """Return the exact model that the certificate measures with, made once per arm.
@@ -122,7 +126,7 @@ def _pair(given: Any) -> tuple[str, str]:
     match given:
         case [str() as first, str() as second]:
             return first, second
-    raise ProblemError(f"clearance: disabled has {given!r}, expected pairs of names of links")
+    raise ProblemError(f"clearance: disabled has {shown(given)}, expected pairs of names of links")
 
 
 class _Models:

@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, per_joint, read_only
+from selfmotion.basics import Array, ProblemError, as_flag, per_joint, read_only
 from selfmotion.certificate import ClosedMotion, EndState
 from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
 from selfmotion.costs import Samples
@@ -174,6 +174,9 @@ class ClosedPath(Constraint):
     pins: ClassVar[tuple[bool, bool]] = (True, True)
 
     velocity: bool = True
+
+    def __post_init__(self) -> None:
+        as_flag(self.velocity, "closed path: velocity")
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
         """See `Constraint.bind`."""

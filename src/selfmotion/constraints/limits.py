@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, per_joint, read_only
+from selfmotion.basics import Array, ProblemError, as_flag, as_number, per_joint, read_only
 from selfmotion.certificate import LIMIT_NAMES, JointLimits
 from selfmotion.constraints.base import (
     Constraint,
@@ -41,6 +41,10 @@ class JointPositionLimits(Constraint):
     margin: float = 2e-4
     replace: bool = False
 
+    def __post_init__(self) -> None:
+        _check_margin(self.margin)
+        as_flag(self.replace, "replace")
+
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
         return BoundLimits.of(robot, LIMIT_NAMES[0], 0, self.limits(robot), self.margin)
@@ -56,14 +60,14 @@ class JointPositionLimits(Constraint):
     def limits(self, robot: RobotModel) -> tuple[Array, Array]:
         """Return lower and upper limits of an arm, (n,) each [rad or m]."""
         own = []
-        for given, arm, tighter in (
-            (self.lower, robot.lower, np.maximum),
-            (self.upper, robot.upper, np.minimum),
+        for side, given, arm, tighter in (
+            ("lower", self.lower, robot.lower, np.maximum),
+            ("upper", self.upper, robot.upper, np.minimum),
         ):
             if given is None:
                 own.append(arm)
                 continue
-            values = per_joint(given, robot.dof, f"{robot.name}: {LIMIT_NAMES[0]}")
+            values = per_joint(given, robot.dof, f"{robot.name}: {LIMIT_NAMES[0]}: {side}")
             _check_radians(robot, values)
             own.append(values if self.replace else read_only(tighter(values, arm)))
         lower, upper = own
@@ -95,6 +99,10 @@ class JointVelocityLimits(Constraint):
     limit: npt.ArrayLike | None = None
     margin: float = 2e-3
     replace: bool = False
+
+    def __post_init__(self) -> None:
+        _check_margin(self.margin)
+        as_flag(self.replace, "replace")
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
@@ -131,6 +139,9 @@ class JointAccelerationLimits(Constraint):
 
     limit: npt.ArrayLike | None = None
     margin: float = 1e-2
+
+    def __post_init__(self) -> None:
+        _check_margin(self.margin)
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
@@ -172,6 +183,9 @@ class JointJerkLimits(Constraint):
     limit: npt.ArrayLike | None = None
     margin: float = 5e-2
 
+    def __post_init__(self) -> None:
+        _check_margin(self.margin)
+
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
         return BoundLimits.symmetric(robot, LIMIT_NAMES[3], 3, self.of(robot), self.margin)
@@ -195,6 +209,10 @@ class JointJerkLimits(Constraint):
             return robot.jerk_limit
         what = f"{robot.name}: {LIMIT_NAMES[3]}"
         return per_joint(self.limit, robot.dof, what, positive=True)
+
+
+def _check_margin(margin: float) -> None:
+    as_number(margin, "limits: margin", above=0.0, most=1.0)
 
 
 def _check_radians(robot: RobotModel, limits: Array) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, Saved, read_only
+from selfmotion.basics import Array, ProblemError, Saved, as_number, as_numbers, shown
 from selfmotion.costs.samples import Samples
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -69,9 +69,11 @@ class Cost(Saved, ABC, family="cost"):
 
 def as_weight(weight: float | npt.ArrayLike, name: str) -> Array:
     """Return a weight read-only; ProblemError unless it is positive semidefinite."""
-    array = read_only(weight)
-    if not np.all(np.isfinite(array)) or array.ndim > 2:
-        raise ProblemError(f"cost '{name}': weight is {array}, expected finite numbers")
+    check_name(name)
+    expected = "a number, one for each joint, or a matrix (n, n), finite"
+    array = as_numbers(weight, f"cost '{name}': weight", expected)
+    if array.ndim > 2 or not array.size:
+        raise ProblemError(f"cost '{name}': weight has shape {array.shape}, expected {expected}")
     symmetric = array.ndim < 2 or (
         array.shape[0] == array.shape[1] and np.allclose(array, array.T, atol=1e-12)
     )
@@ -93,8 +95,14 @@ def check_weight(weight: Array, dof: int, name: str) -> None:
 
 def check_mu(mu: float, name: str) -> None:
     """Raise ProblemError unless the factor is finite and not negative."""
-    if not (np.isfinite(mu) and mu >= 0.0):
-        raise ProblemError(f"cost '{name}': mu is {mu}, expected a finite number ≥ 0")
+    check_name(name)
+    as_number(mu, f"cost '{name}': mu", least=0.0)
+
+
+def check_name(name: str) -> None:
+    """Raise ProblemError unless the name of a cost is a text."""
+    if not (isinstance(name, str) and name):
+        raise ProblemError(f"cost: name is {shown(name)}, expected a text")
 
 
 def weight_matrix(weight: Array, dof: int) -> Array:

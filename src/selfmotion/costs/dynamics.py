@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array, ProblemError, shown
 from selfmotion.costs.base import (
     Cost,
     Partials,
@@ -45,6 +45,7 @@ class KineticEnergy(Cost):
     _model: Any = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        _check_arm(self.robot, self.name)
         model = self.robot.model.copy()
         model.gravity.setZero()
         object.__setattr__(self, "_model", model)
@@ -103,6 +104,7 @@ class GravityTorque(Cost):
     name: str = "gravity torque"
 
     def __post_init__(self) -> None:
+        _check_arm(self.robot, self.name)
         object.__setattr__(self, "weight", as_weight(self.weight, self.name))
 
     def value(self, samples: Samples) -> Array:
@@ -127,6 +129,11 @@ class GravityTorque(Cost):
         """See `Cost.check`."""
         check_weight(np.asarray(self.weight), robot.dof, self.name)
         _check_robot(self.robot, robot, self.name)
+
+
+def _check_arm(robot: RobotModel, name: str) -> None:
+    if not isinstance(robot, RobotModel):
+        raise ProblemError(f"cost '{name}': robot is {shown(robot)}, expected a RobotModel")
 
 
 def _check_robot(made_for: RobotModel, robot: RobotModel, name: str) -> None:

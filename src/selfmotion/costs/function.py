@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, is_known, restore
-from selfmotion.costs.base import Cost, Partials
+from selfmotion.basics import Array, ProblemError, is_known, plain_numbers, restore, shown
+from selfmotion.costs.base import Cost, Partials, check_name
 from selfmotion.costs.samples import Samples
 from selfmotion.robot import RobotModel
 
@@ -32,6 +32,16 @@ class FunctionCost(Cost):
     g: Integrand
     g_gradient: IntegrandGradient | None = None
     name: str = "function"
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
+        for field in ("g", "g_gradient"):
+            given = getattr(self, field)
+            if not callable(given) and not (given is None and field == "g_gradient"):
+                raise ProblemError(
+                    f"cost '{self.name}': {field} is {shown(given)}, expected a function of "
+                    f"(qd, q, t)"
+                )
 
     def value(self, samples: Samples) -> Array:
         """See `Cost.value`."""
@@ -59,7 +69,9 @@ class FunctionCost(Cost):
         return {"kind": LostCost.kind, "name": self.name, "was": self.kind}
 
     def _call(self, qd: Array, q: Array, t: Array) -> Array:
-        value = np.asarray(self.g(qd, q, t), dtype=np.float64)
+        value = plain_numbers(self.g(qd, q, t))
+        if value is None:
+            raise ProblemError(f"cost '{self.name}' returned no numbers, expected {t.shape}")
         if value.shape != t.shape:
             raise ProblemError(
                 f"cost '{self.name}' returned shape {value.shape} for {len(t)} samples, "

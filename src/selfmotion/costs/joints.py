@@ -6,12 +6,22 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.basics import (
+    Array,
+    ProblemError,
+    as_number,
+    as_numbers,
+    as_whole,
+    plain_numbers,
+    read_only,
+    shown,
+)
 from selfmotion.costs.base import (
     Cost,
     Partials,
     as_weight,
     check_mu,
+    check_name,
     check_weight,
     half_square,
     weight_matrix,
@@ -126,7 +136,9 @@ class Posture(_Quadratic):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "posture", read_only(self.posture))
+        object.__setattr__(
+            self, "posture", as_numbers(self.posture, f"cost '{self.name}': posture")
+        )
 
     def value(self, samples: Samples) -> Array:
         """See `Cost.value`."""
@@ -175,12 +187,15 @@ class JointLimitDistance(Cost):
     name: str = "joint limits"
 
     def __post_init__(self) -> None:
-        lower, upper = read_only(self.lower), read_only(self.upper)
+        lower, upper = (_limits(getattr(self, k), f"cost '{self.name}': {k}") for k in _BOTH)
         if lower.shape != upper.shape or not np.all(lower < upper):
-            raise ProblemError(f"cost '{self.name}': lower {lower} is not below upper {upper}")
+            raise ProblemError(
+                f"cost '{self.name}': lower {shown(lower)} is not below upper {shown(upper)}"
+            )
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
-        if self.power < 2 or self.power % 2:
+        check_mu(self.mu, self.name)
+        if as_whole(self.power, f"cost '{self.name}': power", 2, 1000) % 2:
             raise ProblemError(f"cost '{self.name}': power is {self.power}, expected 2, 4, 6, …")
 
     def value(self, samples: Samples) -> Array:
@@ -249,10 +264,8 @@ class PathLength(Cost):
 
     def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
-        if not (np.isfinite(self.smoothing) and self.smoothing > 0.0):
-            raise ProblemError(
-                f"cost '{self.name}': smoothing is {self.smoothing}, expected a number > 0"
-            )
+        check_name(self.name)
+        as_number(self.smoothing, f"cost '{self.name}': smoothing", above=0.0)
         weights = self._w
         if weights.shape not in ((), (robot.dof,)) or not np.all(weights >= 0.0):
             raise ProblemError(
@@ -268,3 +281,16 @@ class PathLength(Cost):
     @property
     def _w(self) -> Array:
         return np.asarray(1.0 if self.joint_weights is None else self.joint_weights)
+
+
+_BOTH = ("lower", "upper")
+
+
+def _limits(values: npt.ArrayLike, what: str) -> Array:
+    """Return limits (n,), infinite where there is none; ProblemError where they are no numbers."""
+    array = plain_numbers(values)
+    if array is None or array.ndim != 1 or np.any(np.isnan(array)):
+        raise ProblemError(
+            f"{what} is {shown(values)}, expected a number for each joint, ±inf for none"
+        )
+    return read_only(array)

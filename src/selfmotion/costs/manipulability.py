@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.basics import Array, ProblemError, as_numbers, as_whole, read_only, shown
 from selfmotion.costs.base import Cost, Partials, check_mu
 from selfmotion.costs.samples import Samples
 from selfmotion.robot import RobotModel
@@ -90,12 +90,11 @@ class DirectionalManipulability(Cost):
     name: str = "directional manipulability"
 
     def __post_init__(self) -> None:
-        direction = np.asarray(self.direction, dtype=np.float64)
+        what, expected = f"cost '{self.name}': direction", "a vector of length > 0"
+        direction = as_numbers(self.direction, what, expected)
         length = float(np.linalg.norm(direction))
         if direction.ndim != 1 or not (np.isfinite(length) and length > 0.0):
-            raise ProblemError(
-                f"cost '{self.name}': direction is {direction}, expected a vector of length > 0"
-            )
+            raise ProblemError(f"{what} is {shown(direction)}, expected {expected}")
         object.__setattr__(self, "direction", read_only(direction / length))
 
     def value(self, samples: Samples) -> Array:
@@ -160,8 +159,7 @@ class SmallestSingularValue(Cost):
     def check(self, robot: RobotModel, task: Task) -> None:
         """See `Cost.check`."""
         check_mu(self.mu, self.name)
-        if not self.power >= 1:
-            raise ProblemError(f"cost '{self.name}': power is {self.power}, expected ≥ 1")
+        as_whole(self.power, f"cost '{self.name}': power", 1, 100)
 
     def _sum(self, values: Array) -> Array:
         return np.asarray(

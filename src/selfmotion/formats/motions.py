@@ -8,7 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError, write_atomically
+from selfmotion.basics import (
+    FileFormatError,
+    ProblemError,
+    as_path,
+    shown,
+    write_atomically,
+)
 from selfmotion.formats import ros
 from selfmotion.formats.documents import read_document, write_document, write_text
 from selfmotion.formats.mujoco import keyframes
@@ -54,7 +60,9 @@ def write_motion(
     ProblemError
         The rate gives no samples, or the arm has what the format cannot say.
     """
-    path = Path(file)
+    if not isinstance(plan, Plan):
+        raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
+    path = as_path(file)
     name = SUFFIXES.get(path.suffix) if form is None else form
     if name is None or name not in _WRITERS:
         known = ", ".join(f"{form} ({suffix})" for suffix, form in SUFFIXES.items())
@@ -75,7 +83,7 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
     FileFormatError
         The file cannot be read, or is no motion; what is missing is named.
     """
-    path = Path(file)
+    path = as_path(file)
     if path.suffix == ".csv":
         return Trajectory.from_csv(path, degrees=degrees)
     if path.suffix == ".npz":

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError, PathError, read_rows
+from selfmotion.basics import Array, FileFormatError, PathError, as_number, as_path, read_rows
 from selfmotion.formats.documents import read_document
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.path import Waypoints
@@ -90,7 +90,11 @@ def read_path(
         The file cannot be read, or a row cannot be used: not finite, a zero quaternion, times that
         do not increase, a jump, other units. The line or pose is named.
     """
-    path = FilePath(file)
+    path = as_path(file)
+    jump = as_number(jump, f"{path}: jump", above=0.0, error=FileFormatError)
+    for name, value in (("feed", feed), ("duration", duration)):
+        if value is not None:
+            as_number(value, f"{path}: {name}", above=0.0, error=FileFormatError)
     reader = _READERS.get(path.suffix)
     if reader is None:
         raise FileFormatError(
@@ -167,7 +171,7 @@ def _read_array(file: FilePath) -> _Rows:
         raise FileFormatError(f"{file}: cannot be read as a NumPy array: {error}") from error
     if not (isinstance(array, np.ndarray) and np.issubdtype(array.dtype, np.number)):
         raise FileFormatError(f"{file}: holds no array of numbers")
-    places = [f"row {k}" for k in range(len(array) if array.ndim else 0)]
+    places = [f"row {k}" for k in range(1, 1 + (len(array) if array.ndim else 0))]
     if array.ndim == 3 and array.shape[1:] == (4, 4):
         return _Rows(places, array[:, :3, 3] * 1.0, "rotation", array[:, :3, :3] * 1.0, None)
     if array.ndim != 2 or array.shape[1] not in (3, 4, 7, 8):

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array
-from selfmotion.path import as_pose
+from selfmotion.path import path_pose
 
 # A quaternion shorter than this has no direction.
 _ZERO = 1e-9
@@ -42,7 +42,7 @@ def from_normal(normal: Array) -> Array:
 def _from_matrix(values: Array) -> Array:
     matrix = np.eye(4)
     matrix[:3, :3] = values
-    return np.asarray(as_pose(matrix).rotation)
+    return np.asarray(path_pose(matrix, "the pose").rotation)
 
 
 # Key → shape of its numbers, and what makes a rotation of them.
@@ -68,7 +68,7 @@ def pose_of(value: Any) -> pin.SE3:
         It is none; the message says what was found and expected.
     """
     if isinstance(value, list):
-        return as_pose(numbers(value, (4, 4), "the matrix"))
+        return path_pose(numbers(value, (4, 4), "the matrix"), "the pose")
     if not isinstance(value, Mapping):
         raise ValueError(f"is {value!r}, expected a table with position, or a 4 × 4 matrix")
     unknown = sorted(set(value) - {"position", *ORIENTATIONS})

@@ -15,6 +15,7 @@ from selfmotion.basics import (
     ProblemError,
     RobotError,
     SelfmotionError,
+    as_path,
     restore,
 )
 from selfmotion.certificate import Tolerance
@@ -94,7 +95,7 @@ def read_job(file: str | FilePath, *, allow_code: bool = False) -> Job:
         The file cannot be read, or says something that cannot be planned; the message names the
         file and the key, what was found and what was expected.
     """
-    path = FilePath(file)
+    path = as_path(file)
     return job_of(read_document(path), path, allow_code=allow_code)
 
 

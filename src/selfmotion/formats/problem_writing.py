@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
-from selfmotion.basics import FileFormatError, ProblemError, Saved
+from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path, shown
 from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost
 from selfmotion.formats.documents import write_document
@@ -27,7 +27,9 @@ def write_problem(problem: Problem, file: str | FilePath) -> None:
     FileFormatError
         The file cannot be written.
     """
-    write_document(FilePath(file), problem_table(problem))
+    if not isinstance(problem, Problem):
+        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")
+    write_document(as_path(file), problem_table(problem))
 
 
 def write_job(job: "Job", file: str | FilePath) -> None:
@@ -41,7 +43,7 @@ def write_job(job: "Job", file: str | FilePath) -> None:
         table["max_evaluations"] = job.max_evaluations
     if job.outputs:
         table["outputs"] = [str(output.resolve()) for output in job.outputs]
-    write_document(FilePath(file), table)
+    write_document(as_path(file), table)
 
 
 def problem_table(problem: Problem) -> dict[str, Any]:

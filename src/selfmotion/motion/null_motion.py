@@ -7,12 +7,15 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial import legendre
 
-from selfmotion.basics import Array, ProblemError, Saved
+from selfmotion.basics import Array, ProblemError, Saved, as_choice, as_number, as_whole, shown
 from selfmotion.robot import null_space
 
 # Intervals of a spline that is worth its while, and coefficients beyond which quadratic programmes
 # take seconds.
 _FEWEST, _MOST_COEFFICIENTS = 8, 110
+# Polynomials of higher degree than this, and splines of more intervals, resolve nothing more and
+# take minutes.
+_HIGHEST, _MOST_INTERVALS = 100, 2000
 
 
 class NullMotion(Saved, ABC, family="null motion"):
@@ -75,10 +78,7 @@ class PolynomialNullMotion(NullMotion):
     def __post_init__(self) -> None:
         _check_degree(self.degree)
         _check_space(self.space)
-        if self.basis not in ("legendre", "monomial"):
-            raise ProblemError(
-                f"null motion: basis is '{self.basis}', expected 'legendre' or 'monomial'"
-            )
+        as_choice(self.basis, "null motion: basis", ("legendre", "monomial"))
 
     @property
     def fewest_steps(self) -> int:
@@ -116,11 +116,7 @@ class BSplineNullMotion(NullMotion):
     def __post_init__(self) -> None:
         _check_degree(self.degree)
         _check_space(self.space)
-        whole = isinstance(self.intervals, int | np.integer)
-        if not (whole and not isinstance(self.intervals, bool) and self.intervals >= 1):
-            raise ProblemError(
-                f"null motion: intervals is {self.intervals}, expected a whole number ≥ 1"
-            )
+        as_whole(self.intervals, "null motion: intervals", 1, _MOST_INTERVALS)
 
     @property
     def fewest_steps(self) -> int:
@@ -146,17 +142,17 @@ class RefinedNullMotion(NullMotion):
         Share of the cost that may be left to save, as far as `Report.remaining` tells.
     most : int
         Largest number of the spline's intervals: 8, 16, 32 or 64; fewer where the redundancy is
-        so large that they would have more than 110 coefficients.
+        so large that they would have more than 110 coefficients. The more there are, the faster
+        an arm starts and stops where it rests, if its cost does not weigh accelerations.
     """
 
     gain: float = 1e-3  # type: ignore[misc]  # fixed for other kinds
-    most: int = 64
+    most: int = 16
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.gain) and self.gain > 0.0):
-            raise ProblemError(f"null motion: gain is {self.gain}, expected a number above 0")
+        as_number(self.gain, "null motion: gain", above=0.0)
         if self.most not in (_FEWEST, 16, 32, 64):
-            raise ProblemError(f"null motion: most is {self.most}, expected 8, 16, 32 or 64")
+            raise ProblemError(f"null motion: most is {shown(self.most)}, expected 8, 16, 32 or 64")
 
     @property
     def fewest_steps(self) -> int:
@@ -270,10 +266,8 @@ def transport(jacobians: Array) -> Array:
 
 
 def _check_degree(degree: int) -> None:
-    if isinstance(degree, bool) or not (isinstance(degree, int | np.integer) and degree >= 0):
-        raise ProblemError(f"null motion: degree is {degree}, expected a whole number ≥ 0")
+    as_whole(degree, "null motion: degree", 0, _HIGHEST)
 
 
 def _check_space(space: str) -> None:
-    if space not in ("null", "joint"):
-        raise ProblemError(f"null motion: space is '{space}', expected 'null' or 'joint'")
+    as_choice(space, "null motion: space", ("null", "joint"))

@@ -8,12 +8,23 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, FileFormatError, read_only, read_table
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    as_number,
+    as_path,
+    plain_numbers,
+    read_only,
+    read_table,
+    shown,
+)
 from selfmotion.motion.polynomials import differentiated, evaluated, inner_roots, may_pass
 
 # What follows a joint's name in the header of the columns of its velocity and acceleration.
 _MANY = {"_velocity": "velocities", "_acceleration": "accelerations"}
 _RATES = tuple(_MANY)
+# More samples than this do not fit into memory, and no controller wants them.
+_MOST_SAMPLES = 1e7
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +61,15 @@ class Trajectory:
     def __post_init__(self) -> None:
         given = ("t", "q", "qd") if self.qdd is None else ("t", "q", "qd", "qdd")
         for name in given:
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+            values = plain_numbers(getattr(self, name))
+            if values is None or (name == "t" and values.ndim != 1):
+                found = shown(getattr(self, name))
+                raise FileFormatError(f"trajectory: {name} is {found}, expected numbers")
+            object.__setattr__(self, name, read_only(values))
+        names = self.joint_names
+        if not (isinstance(names, list | tuple) and all(isinstance(name, str) for name in names)):
+            raise FileFormatError(f"trajectory: joint_names is {shown(names)}, expected texts")
+        object.__setattr__(self, "joint_names", tuple(names))
         shape = (len(self.t), len(self.joint_names))
         if len(self.t) < 2 or self.q.shape != shape or self.qd.shape != shape:
             raise FileFormatError(
@@ -69,6 +88,13 @@ class Trajectory:
             raise FileFormatError(
                 f"trajectory: t[{row}] = {self.t[row]} does not come after {self.t[row - 1]}"
             )
+
+    def __repr__(self) -> str:
+        """Return one line: samples, times and joints."""
+        return (
+            f"Trajectory({len(self.t)} samples, {self.t[0]:.6g} to {self.t[-1]:.6g} s, joints "
+            f"{', '.join(self.joint_names)})"
+        )
 
     @classmethod
     def from_csv(cls, file: str | Path, *, degrees: bool = False) -> "Trajectory":
@@ -90,7 +116,7 @@ class Trajectory:
         FileFormatError
             The file cannot be read, a column is missing, or a row is wrong; it is named.
         """
-        header, table = read_table(Path(file))
+        header, table = read_table(as_path(file))
         column = {name: table[:, i] for i, name in enumerate(header)}
         names = [name for name in header if name != "t" and not name.endswith(_RATES)]
         if "t" not in column or not names:
@@ -241,8 +267,10 @@ class Trajectory:
         ValueError
             A time is outside the motion, or `order` is not 0, 1, 2 or 3.
         """
-        times = np.asarray(t, dtype=np.float64)
-        pieces = self._pieces(order)
+        given = plain_numbers(t)
+        if given is None:
+            raise ValueError(f"t is {shown(t)}, expected times [s]")
+        times, pieces = given, self._pieces(order)
         if not (np.all(times >= self.t[0]) and np.all(times <= self.t[-1])):
             raise ValueError(
                 f"time {times.min()}..{times.max()} s is outside the motion, "
@@ -259,8 +287,12 @@ class Trajectory:
         ValueError
             The rate is not positive.
         """
-        if not (np.isfinite(rate) and rate > 0.0):
-            raise ValueError(f"rate is {rate} samples per second, expected a positive number")
+        rate = as_number(rate, "rate", above=0.0, error=ValueError)
+        if self.duration * rate > _MOST_SAMPLES:
+            raise ValueError(
+                f"rate is {rate:g} samples per second, which are {self.duration * rate:.3g} in "
+                f"all; expected at most {_MOST_SAMPLES:g}"
+            )
         count = int(np.ceil(self.duration * rate - 1e-9))
         t = np.minimum(self.t[0] + np.arange(count + 1) / rate, self.t[-1])
         return Trajectory(t, self(t), self(t, 1), self.joint_names, self(t, 2))
@@ -276,7 +308,7 @@ class Trajectory:
         s goes from 0 to 1 in each.
         """
         if order not in (0, 1, 2, 3):
-            raise ValueError(f"order is {order}, expected 0, 1, 2 or 3")
+            raise ValueError(f"order is {shown(order)}, expected 0, 1, 2 or 3")
         while len(self._derivatives) <= order:
             steps = np.diff(self.t)[:, None]
             self._derivatives.append(differentiated(self._derivatives[-1]) / steps)

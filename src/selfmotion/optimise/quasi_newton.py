@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, read_only
+from selfmotion.basics import Array, ProblemError, as_choice, as_number, as_whole, read_only, shown
 from selfmotion.optimise.base import (
     Callback,
     Function,
@@ -53,17 +53,15 @@ class QuasiNewton:
     initial_metric: str = "gauss-newton"
 
     def __post_init__(self) -> None:
-        if self.update not in ("fletcher", "bfgs", "dfp"):
+        as_choice(self.update, "optimiser: update", ("fletcher", "bfgs", "dfp"))
+        as_choice(self.initial_metric, "optimiser: initial_metric", ("gauss-newton", "identity"))
+        as_number(self.tolerance, "optimiser: tolerance", above=0.0)
+        as_number(self.unbounded, "optimiser: unbounded", above=0.0)
+        as_whole(self.max_iterations, "optimiser: max_iterations", 1, 10**9)
+        if not isinstance(self.line_search, LineSearch):
             raise ProblemError(
-                f"optimiser: update is '{self.update}', expected 'fletcher', 'bfgs' or 'dfp'"
+                f"optimiser: line_search is {shown(self.line_search)}, expected a LineSearch"
             )
-        if self.initial_metric not in ("gauss-newton", "identity"):
-            raise ProblemError(
-                f"optimiser: initial_metric is '{self.initial_metric}', expected 'gauss-newton' or "
-                f"'identity'"
-            )
-        if not self.tolerance > 0.0:
-            raise ProblemError(f"optimiser: tolerance is {self.tolerance}, expected > 0")
 
     def minimize(
         self,

@@ -1,6 +1,6 @@
 """Tool motion over time: what the tool frame is to do, as pose and twist at any time."""
 
-from selfmotion.path.base import STILL, Path, PathSamples, TimeLaw, as_pose
+from selfmotion.path.base import STILL, Path, PathSamples, TimeLaw, path_pose
 from selfmotion.path.joined import Dwell, Joined
 from selfmotion.path.placed import Placed
 from selfmotion.path.ramped import Ramped
@@ -25,5 +25,5 @@ __all__ = [
     "Truncated",
     "TwistPath",
     "Waypoints",
-    "as_pose",
+    "path_pose",
 ]

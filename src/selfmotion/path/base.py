@@ -9,10 +9,22 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, PathError, Saved, read_only
+from selfmotion.basics import (
+    Array,
+    PathError,
+    Saved,
+    as_number,
+    as_numbers,
+    plain_numbers,
+    read_only,
+    shown,
+)
+from selfmotion.task import as_pose
 
 # Rounding of a last time such as 50 * 0.02 must not count as outside the motion.
 _TIME_SLACK = 1e-9
+# Longer motions than this [s] are typing errors.
+_LONGEST = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +92,10 @@ class Path(Saved, ABC, family="path"):
         PathError
             A time is outside [0, duration].
         """
-        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        given = plain_numbers(t)
+        if given is None or given.ndim > 1:
+            raise PathError(f"t is {shown(t)}, expected times [s]")
+        times = np.atleast_1d(given)
         slack = _TIME_SLACK * self.duration
         if not (np.all(times >= -slack) and np.all(times <= self.duration + slack)):
             raise PathError(
@@ -105,27 +120,6 @@ class Path(Saved, ABC, family="path"):
         return twist
 
 
-def as_pose(pose: pin.SE3 | npt.ArrayLike) -> pin.SE3:
-    """Return `pose` (an SE3 or a (4, 4) homogeneous matrix) as an SE3 of its own.
-
-    Raises
-    ------
-    PathError
-        The matrix has another shape, is not finite, or its rotation is not orthonormal.
-    """
-    values = pose.homogeneous if isinstance(pose, pin.SE3) else pose
-    matrix = np.asarray(values, dtype=np.float64)
-    if matrix.shape != (4, 4):
-        raise PathError(f"pose has shape {matrix.shape}, expected an SE3 or a (4, 4) matrix")
-    if not np.all(np.isfinite(matrix)):
-        raise PathError("pose has numbers that are not finite")
-    rotation = matrix[:3, :3]
-    error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
-    if error > 1e-6 or np.linalg.det(rotation) < 0:
-        raise PathError(f"pose: its rotation is not orthonormal and right-handed (by {error:.2g})")
-    return pin.SE3(np.array(rotation), np.array(matrix[:3, 3]))
-
-
 # What is slower than this [m/s, rad/s] is at rest: waypoints and velocity functions come to rest
 # up to their own rounding.
 STILL = 1e-7
@@ -144,7 +138,7 @@ class TimeLaw(Enum):
             return cls(law)
         except ValueError:
             names = ", ".join(member.value for member in cls)
-            raise PathError(f"unknown time law '{law}', expected one of: {names}") from None
+            raise PathError(f"unknown time law {shown(law)}, expected one of: {names}") from None
 
     def __call__(self, tau: Array) -> tuple[Array, Array]:
         """Return s(τ) and ds/dτ.
@@ -168,19 +162,26 @@ _TIME_LAWS: dict[TimeLaw, Callable[[Array], tuple[Array, Array]]] = {
 }
 
 
+def path_pose(pose: pin.SE3 | npt.ArrayLike, name: str) -> pin.SE3:
+    """Return `pose` (an SE3 or a (4, 4) matrix) as an SE3 of its own; PathError otherwise."""
+    return as_pose(pose, name, PathError)
+
+
+def check_path(path: Path, name: str) -> Path:
+    """Return `path`; PathError unless it is one."""
+    if not isinstance(path, Path):
+        raise PathError(f"{name} is {shown(path)}, expected a Path (Line, Circle, Waypoints, …)")
+    return path
+
+
 def check_duration(duration: float) -> float:
     """Return `duration` as a float; PathError unless it is positive and finite."""
-    if not (np.isfinite(duration) and duration > 0):
-        raise PathError(f"duration is {duration} s, expected a positive number")
-    return float(duration)
+    return as_number(duration, "duration", above=0.0, most=_LONGEST, error=PathError)
 
 
 def check_vector(values: npt.ArrayLike, name: str) -> Array:
     """Return `values` as three finite numbers, read-only; PathError otherwise."""
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape != (3,) or not np.all(np.isfinite(array)):
-        raise PathError(f"{name} is {np.array2string(array)}, expected three finite numbers")
-    return read_only(array)
+    return as_numbers(values, name, "three finite numbers", (3,), PathError)
 
 
 def unit(vectors: Array) -> Array:

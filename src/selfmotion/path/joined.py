@@ -1,15 +1,15 @@
 """Tool motions one after the other, and waiting in between."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import Array, PathError, read_only, restore
-from selfmotion.path.base import STILL, Path, PathSamples, as_pose, check_duration
+from selfmotion.basics import Array, PathError, read_only, restore, shown
+from selfmotion.path.base import STILL, Path, PathSamples, check_duration, check_path, path_pose
 
 # Pieces may end this far from where the next one begins [m, rad].
 _GAP = 1e-6
@@ -31,7 +31,7 @@ class Dwell(Path, kind="dwell"):
     duration: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "at", as_pose(self.at))
+        object.__setattr__(self, "at", path_pose(self.at, "dwell: at"))
         object.__setattr__(self, "duration", check_duration(self.duration))
 
     def evaluate(self, t: Array) -> PathSamples:
@@ -60,6 +60,9 @@ class Joined(Path, kind="joined"):
     """
 
     def __init__(self, pieces: Sequence[Path]) -> None:
+        if not isinstance(pieces, Iterable):
+            raise PathError(f"joined path: pieces is {shown(pieces)}, expected a list of paths")
+        pieces = [check_path(piece, "joined path: a piece") for piece in pieces]
         flat = [
             part for one in pieces for part in (one.pieces if isinstance(one, Joined) else [one])
         ]

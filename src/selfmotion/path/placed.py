@@ -8,7 +8,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion.basics import Array, restore
-from selfmotion.path.base import Path, PathSamples, as_pose
+from selfmotion.path.base import Path, PathSamples, check_path, path_pose
 
 
 class Placed(Path, kind="placed"):
@@ -23,7 +23,8 @@ class Placed(Path, kind="placed"):
     """
 
     def __init__(self, path: Path, frame: pin.SE3 | npt.ArrayLike) -> None:
-        self._path, self._frame = path, as_pose(frame)
+        self._path = check_path(path, "placed path")
+        self._frame = path_pose(frame, "placed path: frame")
         self.duration = path.duration
 
     @property

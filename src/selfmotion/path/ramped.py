@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, PathError, read_only, restore
-from selfmotion.path.base import Path, PathSamples
+from selfmotion.basics import Array, PathError, as_number, read_only, restore
+from selfmotion.path.base import Path, PathSamples, check_path
 
 
 class Ramped(Path, kind="ramped"):
@@ -30,7 +30,9 @@ class Ramped(Path, kind="ramped"):
     """
 
     def __init__(self, path: Path, ramp: float = 0.5) -> None:
-        if not (np.isfinite(ramp) and 0.0 < ramp <= path.duration):
+        check_path(path, "ramped path")
+        ramp = as_number(ramp, "ramped path: ramp", above=0.0, error=PathError)
+        if ramp > path.duration:
             raise PathError(
                 f"ramped path: ramp is {ramp} s, expected a time above 0 and up to the path's "
                 f"duration, {path.duration:.6g} s"

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, PathError, read_only, restore
-from selfmotion.path.base import Path, PathSamples
+from selfmotion.basics import Array, PathError, as_numbers, restore
+from selfmotion.path.base import Path, PathSamples, check_path
 
 # Intervals of the pace are halved so often to find when a time of the original is passed.
 _HALVINGS = 52
@@ -33,8 +33,17 @@ class Retimed(Path, kind="retimed"):
     def __init__(
         self, path: Path, t: npt.ArrayLike, sigma: npt.ArrayLike, rate: npt.ArrayLike
     ) -> None:
-        self._path = path
-        self._t, self._sigma, self._rate = map(read_only, (t, sigma, rate))
+        self._path = check_path(path, "retimed path")
+        self._t, self._sigma, self._rate = (
+            as_numbers(values, f"retimed path: {name}", error=PathError)
+            for name, values in (("t", t), ("sigma", sigma), ("rate", rate))
+        )
+        shapes = {self._t.shape, self._sigma.shape, self._rate.shape}
+        if len(shapes) > 1 or self._t.ndim != 1 or len(self._t) < 2:
+            raise PathError(
+                f"retimed path: t, sigma and rate have shapes {self._t.shape}, "
+                f"{self._sigma.shape} and {self._rate.shape}, expected (N,) each with N ≥ 2"
+            )
         if not (np.all(np.diff(self._t) > 0) and np.all(np.diff(self._sigma) >= 0)):
             raise PathError("retimed path: times must increase and σ must not fall")
         self.duration = float(self._t[-1])

@@ -7,14 +7,14 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, PathError, read_only
+from selfmotion.basics import Array, PathError, as_flag, as_number, read_only
 from selfmotion.path.base import (
     Path,
     PathSamples,
     TimeLaw,
-    as_pose,
     check_duration,
     check_vector,
+    path_pose,
     rotations_about,
     unit,
 )
@@ -40,8 +40,8 @@ class Line(Path, kind="line"):
     time_law: TimeLaw | str = TimeLaw.MINIMUM_JERK
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", as_pose(self.start))
-        object.__setattr__(self, "end", as_pose(self.end))
+        object.__setattr__(self, "start", path_pose(self.start, "line: start"))
+        object.__setattr__(self, "end", path_pose(self.end, "line: end"))
         object.__setattr__(self, "duration", check_duration(self.duration))
         object.__setattr__(self, "time_law", TimeLaw.of(self.time_law))
 
@@ -91,7 +91,7 @@ class Circle(Path, kind="circle"):
     time_law: TimeLaw | str = TimeLaw.MINIMUM_JERK
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", as_pose(self.start))
+        object.__setattr__(self, "start", path_pose(self.start, "circle: start"))
         object.__setattr__(self, "center", check_vector(self.center, "circle: center"))
         normal = check_vector(self.normal, "circle: normal")
         if not np.any(normal):
@@ -99,8 +99,9 @@ class Circle(Path, kind="circle"):
         object.__setattr__(self, "normal", read_only(unit(normal)))
         object.__setattr__(self, "duration", check_duration(self.duration))
         object.__setattr__(self, "time_law", TimeLaw.of(self.time_law))
-        if not np.isfinite(self.turns):
-            raise PathError(f"circle: turns is {self.turns}, expected a finite number")
+        turns = as_number(self.turns, "circle: turns", least=-1e6, most=1e6, error=PathError)
+        object.__setattr__(self, "turns", turns)
+        as_flag(self.turn_tool, "circle: turn_tool", PathError)
         if self.radius < 1e-9:
             raise PathError("circle: the tool starts on the axis, so the radius is zero")
 
@@ -119,13 +120,12 @@ class Circle(Path, kind="circle"):
         Its centre lies from the start in the direction of -x, or of -y where the axis is x.
         `options` are those of the class.
         """
-        pose = as_pose(start)
+        pose = path_pose(start, "circle: start")
         axis = check_vector(normal, "circle: normal")
         away = np.array([0.0, 1.0, 0.0]) if abs(axis[0]) > 0.9 * np.linalg.norm(axis) else None
         away = np.array([1.0, 0.0, 0.0]) if away is None else away
         away = away - axis * (axis @ away) / max(float(axis @ axis), 1e-300)
-        if not (np.isfinite(radius) and radius > 0.0):
-            raise PathError(f"circle: radius is {radius} m, expected a positive number")
+        radius = as_number(radius, "circle: radius", above=0.0, error=PathError)
         center = pose.translation - radius * away / np.linalg.norm(away)
         return cls(pose, center, axis, duration, **options)
 

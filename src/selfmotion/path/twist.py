@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pinocchio as pin
 from numpy.polynomial import chebyshev
 
-from selfmotion.basics import Array, PathError, read_only
-from selfmotion.path.base import Path, PathSamples, as_pose, check_duration
+from selfmotion.basics import Array, PathError, as_numbers, read_only, shown
+from selfmotion.path.base import Path, PathSamples, check_duration, path_pose
 
 _DEGREE = 24
 # Chebyshev tail, relative to the largest velocity, at which a piece counts as resolved.
@@ -47,13 +47,20 @@ class TwistPath(Path, kind="twist"):
         velocity: Callable[[float], npt.ArrayLike],
         duration: float,
     ) -> None:
-        self._set(as_pose(start), *_resolve(velocity, check_duration(duration)))
+        pose = path_pose(start, "twist path: start")
+        if not callable(velocity):
+            raise PathError(f"twist path: velocity is {shown(velocity)}, expected a function of t")
+        self._set(pose, *_resolve(velocity, check_duration(duration)))
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "TwistPath":
         """See `Saved.from_dict`: the polynomials, not the function."""
         path = cls.__new__(cls)
-        path._set(as_pose(values["start"]), values["breaks"], values["coefficients"])
+        path._set(
+            path_pose(values["start"], "twist path: start"),
+            values["breaks"],
+            values["coefficients"],
+        )
         return path
 
     def _set(self, start: pin.SE3, breaks: npt.ArrayLike, coefficients: npt.ArrayLike) -> None:
@@ -206,12 +213,8 @@ def _check_ends(
 
 
 def _sample(velocity: Callable[[float], npt.ArrayLike], t: float) -> Array:
-    value = np.asarray(velocity(float(t)), dtype=np.float64)
+    what, expected = f"twist path: velocity({t:.6g})", "[v, ω] (6,) or [v] (3,), finite"
+    value = as_numbers(velocity(float(t)), what, expected, error=PathError)
     if value.shape == (3,):
         value = np.concatenate([value, np.zeros(3)])
-    if value.shape != (6,) or not np.all(np.isfinite(value)):
-        raise PathError(
-            f"twist path: velocity({t:.6g}) is {np.array2string(value)}, "
-            f"expected [v, ω] (6,) or [v] (3,), finite"
-        )
-    return value
+    return as_numbers(value, what, expected, (6,), PathError)

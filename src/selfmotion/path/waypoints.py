@@ -1,5 +1,6 @@
 """A tool motion through given poses at given times."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path as FilePath
@@ -9,8 +10,19 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, FileFormatError, PathError, read_only, read_table
-from selfmotion.path.base import Path, PathSamples, as_pose, unit
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    PathError,
+    as_choice,
+    as_number,
+    as_numbers,
+    as_path,
+    read_only,
+    read_table,
+    shown,
+)
+from selfmotion.path.base import Path, PathSamples, path_pose, unit
 
 _COLUMNS = ("t", "x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
@@ -54,18 +66,14 @@ class Waypoints(Path, kind="waypoints"):
         corners: str = "blend",
         corner_angle: float = np.pi / 6,
     ) -> None:
-        times = np.asarray(t, dtype=np.float64)
-        points = np.asarray(positions, dtype=np.float64)
+        times, points = _numbers(t, "t"), _numbers(positions, "positions")
         if quaternions is None:
-            quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
-        turns = np.asarray(quaternions, dtype=np.float64)
+            quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
+        turns = _numbers(quaternions, "quaternions")
         _check(times, points, turns)
-        if corners not in ("blend", "stop"):
-            raise PathError(f"waypoints: corners is '{corners}', expected 'blend' or 'stop'")
-        if not (np.isfinite(corner_angle) and corner_angle > 0.0):
-            raise PathError(
-                f"waypoints: corner_angle is {corner_angle} rad, expected a number above 0"
-            )
+        as_choice(corners, "waypoints: corners", ("blend", "stop"), PathError)
+        what = "waypoints: corner_angle"
+        corner_angle = as_number(corner_angle, what, above=0.0, error=PathError)
         self._t = read_only(times - times[0])
         self.duration = float(self._t[-1])
         self._points = read_only(points)
@@ -76,7 +84,9 @@ class Waypoints(Path, kind="waypoints"):
     @classmethod
     def from_poses(cls, t: npt.ArrayLike, poses: list[pin.SE3], **options: Any) -> "Waypoints":
         """Return the path through `poses` (SE3 or (4, 4)) at times `t`; options as in the class."""
-        frames = [as_pose(pose) for pose in poses]
+        if not isinstance(poses, Sequence | np.ndarray):
+            raise PathError(f"waypoints: poses is {shown(poses)}, expected a list of poses")
+        frames = [path_pose(pose, f"waypoints: poses[{k}]") for k, pose in enumerate(poses)]
         turns = [np.roll(pin.Quaternion(frame.rotation).coeffs(), 1) for frame in frames]
         return cls(t, [frame.translation for frame in frames], turns, **options)
 
@@ -90,7 +100,7 @@ class Waypoints(Path, kind="waypoints"):
             The file cannot be read, a column is missing or unknown, a row is short or not
             numeric; the row is named.
         """
-        header, table = read_table(FilePath(file))
+        header, table = read_table(as_path(file))
         wanted = {*_COLUMNS, *_QUATERNION} if "qw" in header else {*_COLUMNS}
         if set(header) != wanted:
             raise FileFormatError(
@@ -214,6 +224,10 @@ class Waypoints(Path, kind="waypoints"):
         }
 
 
+def _numbers(values: npt.ArrayLike, name: str) -> Array:
+    return as_numbers(values, f"waypoints: {name}", error=PathError)
+
+
 def _check(t: Array, points: Array, turns: Array) -> None:
     if t.ndim != 1 or len(t) < 2:
         raise PathError(f"waypoints: t has shape {t.shape}, expected (N,) with N ≥ 2")
@@ -222,10 +236,6 @@ def _check(t: Array, points: Array, turns: Array) -> None:
             raise PathError(
                 f"waypoints: {name} has shape {array.shape}, expected ({len(t)}, {width})"
             )
-    for name, array in (("t", t[:, None]), ("positions", points), ("quaternions", turns)):
-        bad = np.flatnonzero(~np.all(np.isfinite(array), axis=1))
-        if bad.size:
-            raise PathError(f"waypoints: {name}[{bad[0]}] is not finite")
     late = np.flatnonzero(np.diff(t) <= 0)
     if late.size:
         row = int(late[0]) + 1

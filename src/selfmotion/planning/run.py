@@ -12,8 +12,10 @@ from selfmotion.basics import (
     ProblemError,
     Progress,
     SelfmotionError,
+    as_whole,
     one_blas_thread,
     read_only,
+    shown,
     silent,
 )
 from selfmotion.certificate import Tolerance
@@ -88,6 +90,9 @@ def plan(
         The interruption came before there was a complete motion.
     """
     _check(problem, search, max_evaluations)
+    is_one = callable(getattr(optimizer, "minimize", None)) and not isinstance(optimizer, type)
+    if optimizer is not None and not is_one:
+        raise ProblemError(f"optimizer is {shown(optimizer)}, expected one such as QuasiNewton()")
     with one_blas_thread():
         return _plan(problem, optimizer, search, tolerance, max_evaluations, callback, progress)
 
@@ -105,7 +110,7 @@ def _plan(
         max_evaluations = _PATIENCE
     effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, Counts())
     search = search or Search()
-    settings = (tolerance or Tolerance(), progress)
+    settings = (Tolerance.of(tolerance), progress)
     found = _Run(problem, effort, search, *settings).plan()
     # Few motions take an arm into itself: the others need not wait for distances.
     if not _overlaps(found) or found.report.status in (Status.INTERRUPTED, Status.STOPPED):
@@ -132,15 +137,17 @@ def _overlaps(plan: Plan) -> bool:
 
 
 def _check(problem: Problem, search: Search | None, max_evaluations: int | None) -> None:
+    if not isinstance(problem, Problem):
+        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")
     if search is not None and not isinstance(search, Search):
-        raise ProblemError(f"search is {search!r}, expected Search(mode=…, starts=…, …)")
+        raise ProblemError(f"search is {shown(search)}, expected Search(mode=…, starts=…, …)")
     if search is not None and problem.given_start is not None and not search.compare:
         raise ProblemError(
             "search= has no effect, since the problem's start is given; leave one of them out, or "
             "ask for Search(compare=True)"
         )
-    if max_evaluations is not None and max_evaluations < 1:
-        raise ProblemError(f"max_evaluations is {max_evaluations}, expected at least 1")
+    if max_evaluations is not None:
+        as_whole(max_evaluations, "max_evaluations", least=1, most=10**9)
 
 
 class _Run:

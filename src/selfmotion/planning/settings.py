@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import ProblemError
+from selfmotion.basics import as_choice, as_whole, random_numbers
 
 _MODES = ("auto", "local", "global")
 
@@ -46,11 +46,6 @@ class Search:
 
     def __post_init__(self) -> None:
         for name in ("starts", "finalists"):
-            value = getattr(self, name)
-            whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-            if not (whole and value >= 1):
-                raise ProblemError(f"search: {name} is {value}, expected a whole number ≥ 1")
-        if self.mode not in _MODES:
-            raise ProblemError(
-                f"search: mode is '{self.mode}', expected one of: {', '.join(_MODES)}"
-            )
+            as_whole(getattr(self, name), f"search: {name}", 1, 10**6)
+        as_choice(self.mode, "search: mode", _MODES)
+        random_numbers(self.rng)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
-from selfmotion.basics import Array, CollisionError, PlanError, RobotError, write_csv
+from selfmotion.basics import Array, CollisionError, PlanError, RobotError, as_path, write_csv
 from selfmotion.certificate import Certificate, Requirement, Tolerance
 from selfmotion.collision import Obstacle
 from selfmotion.motion import Trajectory
@@ -60,6 +60,16 @@ class Plan:
     report: Report
     certificate: Certificate
     altered: str = ""
+
+    def __repr__(self) -> str:
+        """Return a few lines: what moves, at what cost, and the verdict."""
+        report, verdict = self.report, self.certificate.verdict
+        costs = f"{report.initial_cost:.6g} → {report.cost:.6g}"
+        return (
+            f"Plan({self.robot.name}, task '{self.task.value}', {self.trajectory.duration:.6g} s)\n"
+            f"  cost {costs} in {report.iterations} iterations: {report.status.value}\n"
+            f"  {verdict}"
+        )
 
     @property
     def robot(self) -> RobotModel:
@@ -124,7 +134,7 @@ class Plan:
             self.coefficients,
             self.report,
             self.certificate,
-        ).write(FilePath(file))
+        ).write(as_path(file))
 
     def to_csv(self, file: str | FilePath) -> None:
         """Write ``t`` and a column per joint for q, then for q̇ and q̈.
@@ -135,7 +145,7 @@ class Plan:
         endings = ("", "_velocity", "_acceleration")
         names = [name + ending for ending in endings for name in motion.joint_names]
         table = np.column_stack([motion.t, motion.q, motion.qd, motion(motion.t, 2)])
-        write_csv(FilePath(file), ["t", *names], table)
+        write_csv(as_path(file), ["t", *names], table)
 
     def figure(self) -> "Figure":
         """Return joint positions and velocities, manipulability and path error as a figure.
@@ -162,7 +172,7 @@ def load_plan(file: str | FilePath) -> Plan:
     FileFormatError
         The file is missing, is no plan, lacks something, or was written by a newer version.
     """
-    plan = Plan(*Archive.read(FilePath(file)))
+    plan = Plan(*Archive.read(as_path(file)))
     try:
         certificate = plan.check()
     except (CollisionError, RobotError) as error:

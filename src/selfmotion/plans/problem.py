@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, RedundancyError, StartError, read_only
+from selfmotion.basics import (
+    Array,
+    ProblemError,
+    RedundancyError,
+    StartError,
+    as_flag,
+    read_only,
+    shown,
+)
 from selfmotion.certificate import AtRest, Certificate, Requirement, Tolerance, arm_limits, certify
 from selfmotion.constraints import (
     BoundConstraint,
@@ -24,6 +32,7 @@ from selfmotion.constraints import (
 from selfmotion.costs import Cost, JointVelocity, OffPath
 from selfmotion.motion import NullMotion, RefinedNullMotion, Trajectory, resting_window
 from selfmotion.path import Path
+from selfmotion.plans.path_scale import check_pace, check_units
 from selfmotion.plans.relaxed_rows import check_relaxations
 from selfmotion.plans.rest import rest_orders
 from selfmotion.robot import RobotModel
@@ -35,8 +44,6 @@ NO_OVERLAP = Clearance(distance=0.0)
 _ON_PATH = 1e-7
 # A null motion that was found by a search fades in this share of the duration.
 _FADE = 0.05
-# A path that is nowhere nearer than so many times the arm's reach is in other units.
-_FAR = 20.0
 
 
 class _TaskField:
@@ -123,7 +130,7 @@ class Problem:
         for name, kind in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 raise ProblemError(
-                    f"{name} is {getattr(self, name)!r}, expected a {_EXAMPLES[name]}"
+                    f"{name} is {shown(getattr(self, name))}, expected a {_EXAMPLES[name]}"
                 )
         for name, each in _SEQUENCES.items():
             object.__setattr__(self, name, _sequence(getattr(self, name), name, each))
@@ -132,8 +139,10 @@ class Problem:
             if self.start != "free":
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
             object.__setattr__(self, "start", None)
+        object.__setattr__(self, "rest", as_flag(self.rest, "rest"))
         self._check_rank()
-        self._check_units()
+        check_units(self.robot, self.path)
+        check_pace(self.robot, self.path)
         self._check_costs()
         self._check_constraints()
         if self.start is not None:
@@ -306,17 +315,6 @@ class Problem:
                 rows=task.dimension,
             )
 
-    def _check_units(self) -> None:
-        """Refuse a path that can only be meant in millimetres."""
-        times = np.linspace(0.0, self.path.duration, 9)
-        distances = np.linalg.norm(self.path.samples(times).translation, axis=1)
-        reach = self.robot.reach
-        if np.isfinite(reach) and distances.min() > _FAR * reach:
-            raise ProblemError(
-                f"{self.robot.name}: the path is {distances.min():.4g} m away from the arm's root "
-                f"and more, the arm reaches {reach:.4g} m; positions are in metres"
-            )
-
     def _check_costs(self) -> None:
         if not self.costs:
             raise ProblemError("no cost is given, so that nothing tells one motion from another")
@@ -379,11 +377,11 @@ def _sequence(items: Any, name: str, kind: type) -> tuple[Any, ...]:
     """Return one item or several as a tuple; ProblemError for anything else."""
     listed = (items,) if isinstance(items, kind) else items
     if not isinstance(listed, list | tuple):
-        raise ProblemError(f"{name} are {items!r}, expected a list of {name}")
+        raise ProblemError(f"{name} are {shown(items)}, expected a list of {name}")
     for item in listed:
         if not isinstance(item, kind):
             raise ProblemError(
-                f"{name}: {item!r} is no {kind.__name__}; derive a class of your own from "
+                f"{name}: {shown(item)} is no {kind.__name__}; derive a class of your own from "
                 f"selfmotion.{kind.__name__}, which says what it has to give"
             )
     return tuple(listed)

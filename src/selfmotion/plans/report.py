@@ -133,3 +133,10 @@ class Report:
     active: tuple[Binding, ...] = ()
     null_motion: NullMotion | None = None
     remaining: float | None = None
+
+    def __repr__(self) -> str:
+        """Return one line: costs, effort and how it ended."""
+        return (
+            f"Report(cost {self.initial_cost:.6g} → {self.cost:.6g}, {self.iterations} iterations, "
+            f"{self.evaluations} evaluations, {self.seconds:.3g} s: {self.status.value})"
+        )

@@ -8,7 +8,7 @@ from operator import and_
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, PlanError, ProblemError, per_joint
+from selfmotion.basics import Array, PlanError, ProblemError, per_joint, shown
 from selfmotion.constraints import (
     Constraint,
     Envelope,
@@ -43,6 +43,7 @@ def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
     acceleration : (n,) or float, optional
         Acceleration limits [rad/s² or m/s²]; by default only velocities count.
     """
+    _check_plan(plan)
     factor = max(1.0, plan.certificate.velocity_ratio.value)
     if acceleration is not None:
         what = f"{plan.robot.name}: acceleration limits"
@@ -83,6 +84,7 @@ def retime(
     PlanError
         No pace keeps the limits.
     """
+    _check_plan(plan)
     robot, asked = plan.robot, plan.problem.envelope
     velocity = asked.speed if velocity is None else velocity
     wanted = [
@@ -96,6 +98,11 @@ def retime(
         if result.certificate.on_path:
             break
     return result
+
+
+def _check_plan(plan: Plan) -> None:
+    if not isinstance(plan, Plan):
+        raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
 
 
 def _positive(robot: RobotModel, limit: npt.ArrayLike, name: str) -> Array:

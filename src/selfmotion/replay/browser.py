@@ -14,7 +14,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from selfmotion.basics import RenderError, write_atomically
+from selfmotion.basics import RenderError, as_path, write_atomically
 from selfmotion.plans import Plan
 from selfmotion.replay.page import replay_html
 
@@ -61,7 +61,7 @@ def render_png(
     RenderError
         No browser, or it fails; says what to install.
     """
-    path = Path(file)
+    path = as_path(file)
     with _opened(replay_html(plans, **options), size, layers, whole_page, dark) as page:
         duration = float(page.evaluate("replay.duration"))
         if not 0.0 <= t <= duration:
@@ -91,7 +91,7 @@ def render_gif(
     """
     from PIL import Image
 
-    path = Path(file)
+    path = as_path(file)
     with _opened(replay_html(plans, **options), size, layers, False, dark) as page:
         duration = float(page.evaluate("replay.duration"))
         count = max(2, round(duration * frames_per_second) + 1)

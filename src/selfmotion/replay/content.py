@@ -81,8 +81,14 @@ def page_content(
             _plan(motion, name, f"/selfmotion/plan{k}", payload, scale, triads, box.radius)
             for k, (motion, name) in enumerate(zip(motions, names, strict=True))
         ],
-        "table": table(plans),
+        "table": [*_missing(arm, len(plans)), *table(plans)],
     }
+
+
+def _missing(arm: links.Arm, plans: int) -> list[Json]:
+    """Return the row of the table that says what of the arm is not drawn, where there is some."""
+    cells = [("; ".join(arm.missing), ""), *[("", "")] * (plans - 1)]
+    return [{"label": "not drawn", "cells": cells}] if arm.missing else []
 
 
 def _scale(motions: list[_Motion]) -> Json:

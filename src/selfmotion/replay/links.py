@@ -6,7 +6,6 @@ from typing import Any
 
 import coal
 import numpy as np
-import pinocchio as pin
 
 from selfmotion.basics import Array, RobotError
 from selfmotion.replay import three
@@ -61,14 +60,17 @@ class Arm:
         Pieces of all links.
     meshes : list of dict
         The meshes they share, packed.
+    missing : tuple of str
+        What cannot be drawn, and why.
     """
 
     visuals: tuple[Visual, ...]
     meshes: list[Json]
+    missing: tuple[str, ...]
 
 
 def bake(robot: RobotModel, payload: Payload) -> Arm:
-    """Read every visual of `robot` into `payload`, each mesh file once.
+    """Read every visual of `robot` into `payload`, each mesh file once, and tell which are bad.
 
     Parameters
     ----------
@@ -80,9 +82,10 @@ def bake(robot: RobotModel, payload: Payload) -> Arm:
     Raises
     ------
     RobotError
-        A mesh cannot be read, or a shape cannot be drawn; names the visual and the file.
+        A shape cannot be drawn; names the visual.
     """
-    objects = list(robot.geometry(pin.GeometryType.VISUAL).geometryObjects)
+    geometry, missing = robot.visuals()
+    objects = list(geometry.geometryObjects)
     files: dict[str, list[DrawnMesh]] = {}
     for item in objects:
         if _is_mesh(item) and item.meshPath not in files:
@@ -104,7 +107,7 @@ def bake(robot: RobotModel, payload: Payload) -> Arm:
             numbers.get(item.meshPath, []),
         )
     ]
-    return Arm(tuple(visuals), meshes)
+    return Arm(tuple(visuals), meshes, missing)
 
 
 def _is_mesh(item: Any) -> bool:

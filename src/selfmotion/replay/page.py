@@ -14,7 +14,7 @@ from typing import IO, Any
 
 import numpy.typing as npt
 
-from selfmotion.basics import ProblemError, write_atomically
+from selfmotion.basics import ProblemError, as_path, write_atomically
 from selfmotion.plans import Plan
 from selfmotion.replay.content import page_content
 from selfmotion.replay.facts import describe
@@ -80,7 +80,7 @@ def write_replay(
     Path
         The file.
     """
-    path = Path(file)
+    path = as_path(file)
     data = replay_html(plans, **options).encode()
 
     def write(stream: IO[bytes]) -> None:

@@ -24,11 +24,15 @@ def expand(path: Path, arguments: Mapping[str, str]) -> str:
     """
     import xacro
 
+    for key, value in arguments.items():
+        if not (isinstance(key, str) and isinstance(value, str | int | float)):
+            raise RobotError(f"{path}: arguments has {key!r}: {value!r}, expected a text or number")
     if not path.is_file():
         raise RobotError(f"{path}: no such xacro file")
+    mappings = {key: str(value) for key, value in arguments.items()}
     try:
         with contextlib.redirect_stderr(io.StringIO()):
-            document = xacro.process_file(str(path), mappings=dict(arguments))
+            document = xacro.process_file(str(path), mappings=mappings)
     # A xacro file holds expressions of Python, which may raise anything.
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__

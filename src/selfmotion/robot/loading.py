@@ -8,13 +8,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, RobotError, read_only
+from selfmotion.basics import Array, RobotError, as_number, nearest, read_only, shown
 from selfmotion.robot.expansion import expand
-from selfmotion.robot.model import RobotModel, locked_configuration
+from selfmotion.robot.full_model import full_model, name_links
+from selfmotion.robot.held import locked_configuration
+from selfmotion.robot.model import RobotModel
 from selfmotion.robot.mounting import with_base, with_tool_offset
 from selfmotion.robot.urdf import Urdf, package_folders, parse_urdf, read_urdf
+from selfmotion.task import as_pose
 
 
 @dataclass(frozen=True)
@@ -80,8 +84,8 @@ def load_robot(
     tool: str | None = None,
     lock: Mapping[str, float] | None = None,
     *,
-    base: pin.SE3 | None = None,
-    tool_offset: pin.SE3 | None = None,
+    base: pin.SE3 | npt.ArrayLike | None = None,
+    tool_offset: pin.SE3 | npt.ArrayLike | None = None,
     arguments: Mapping[str, str] | None = None,
 ) -> RobotModel:
     """Load an arm.
@@ -96,9 +100,9 @@ def load_robot(
     lock : dict, optional
         Joints to hold, with their coordinate [rad or m]. Joints off the chain to the tool are
         held anyway, at 0 or the nearest limit unless given here.
-    base : SE3, optional
+    base : SE3 or (4, 4), optional
         Pose of the URDF's root link in the world.
-    tool_offset : SE3, optional
+    tool_offset : SE3 or (4, 4), optional
         Pose of the frame that follows the path in that of `tool`: a pen in a gripper.
     arguments : dict, optional
         Of a xacro file.
@@ -117,17 +121,23 @@ def load_robot(
     >>> load_robot("panda").dof
     7
     """
+    if not isinstance(robot, str | Path):
+        raise RobotError(f"robot is {shown(robot)}, expected a name or the path of a file")
+    for name, given in (("lock", lock), ("arguments", arguments)):
+        if not isinstance(given, Mapping | None):
+            raise RobotError(f"{name} is {shown(given)}, expected a dict")
     touching: tuple[tuple[str, str], ...] = ()
     if isinstance(robot, str) and robot in NAMED_ARMS:
         arm = NAMED_ARMS[robot]
         urdf, frame, touching = _read_named(arm), tool or arm.tool, arm.touching
     else:
-        urdf = _read_file(Path(robot), arguments or {})
+        urdf = _read_file(Path(robot), arguments or {}, str(robot))
         frame = tool or _only_leaf(urdf)
     if base is not None:
-        urdf = with_base(urdf, base)
+        urdf = with_base(urdf, as_pose(base, f"{urdf.source}: base", RobotError))
     if tool_offset is not None:
-        urdf, frame = with_tool_offset(urdf, frame, tool_offset)
+        offset = as_pose(tool_offset, f"{urdf.source}: tool_offset", RobotError)
+        urdf, frame = with_tool_offset(urdf, frame, offset)
     built = build_robot(urdf, frame, lock or {})
     acceleration, jerk = (_published(str(robot), kind, built) for kind in ("acceleration", "jerk"))
     return dataclasses.replace(
@@ -137,17 +147,8 @@ def load_robot(
 
 def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
     """Build the chain from the root of a validated URDF to `tool`; see `load_robot`."""
-    if tool not in urdf.links:
-        raise RobotError(
-            f"{urdf.source}: no link '{tool}' to use as tool frame; links: {', '.join(urdf.links)}"
-        )
-    full = pin.buildModelFromXML(urdf.text)
-    for name in full.names[1:]:
-        # Pinocchio then cannot tell which of the two is meant.
-        if name in urdf.links:
-            raise RobotError(
-                f"{urdf.source}: joint '{name}' and a link share their name; rename one of them"
-            )
+    urdf.check_tool(tool)
+    full = full_model(urdf)
     _check_lock(urdf, full, lock)
     chain = [joint for joint in urdf.chain(tool) if joint.kind != "fixed"]
     for joint in chain:
@@ -162,11 +163,19 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
                 f"'{joint.mimics}'; choose a tool before it, or hold it with lock="
             )
     free = [joint.name for joint in chain if joint.name not in lock]
+    if not chain:
+        moved = [link for link in urdf.links if any(j.kind != "fixed" for j in urdf.chain(link))]
+        which = f"one that does, of: {', '.join(moved)}" if moved else "another arm"
+        raise RobotError(f"{urdf.source}: no joint moves the tool '{tool}'; choose {which}")
     if not free:
-        raise RobotError(f"{urdf.source}: no joint is left free between the root and '{tool}'")
+        raise RobotError(
+            f"{urdf.source}: no joint is left free between the root and '{tool}': lock holds all "
+            f"of {', '.join(joint.name for joint in chain)}"
+        )
     locked = _locked_joints(urdf, full, free, lock)
     reference, locked_ids = locked_configuration(full, locked)
     model = pin.buildReducedModel(full, locked_ids, reference)
+    name_links(urdf, model)
     names = tuple(model.names[1:])
     if model.nq != len(free) or set(names) != set(free):
         raise RobotError(
@@ -227,7 +236,9 @@ def _published(name: str, kind: str, robot: RobotModel) -> Array:
     return read_only([limits.get(joint, np.inf) for joint in robot.joint_names])
 
 
-def _read_file(path: Path, arguments: Mapping[str, str]) -> Urdf:
+def _read_file(path: Path, arguments: Mapping[str, str], given: str) -> Urdf:
+    if "://" in given:
+        raise RobotError(f"{given}: is an address, expected a file: download it first")
     if path.suffix == ".xacro":
         return parse_urdf(
             expand(path, arguments),
@@ -235,10 +246,12 @@ def _read_file(path: Path, arguments: Mapping[str, str]) -> Urdf:
             package_dirs=package_folders(path),
             mesh_folder=path.resolve().parent,
         )
+    if arguments:
+        raise RobotError(f"{given}: arguments are given, which only a .xacro file has")
     if path.suffix != ".urdf":
         raise RobotError(
-            f"unknown robot '{path}', expected a .urdf or .xacro file or one of: "
-            f"{', '.join(NAMED_ARMS)}"
+            f"unknown robot '{given}', expected a .urdf or .xacro file or one of: "
+            f"{', '.join(NAMED_ARMS)}{nearest(str(path), NAMED_ARMS)}"
         )
     return read_urdf(path)
 
@@ -274,9 +287,11 @@ def _only_leaf(urdf: Urdf) -> str:
 def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:
     for name, value in lock.items():
         if not model.existJointName(name):
-            raise RobotError(f"{urdf.source}: lock names joint '{name}', which is not movable here")
-        if not np.isfinite(value):
-            raise RobotError(f"{urdf.source}: lock holds joint '{name}' at {value}, not finite")
+            raise RobotError(
+                f"{urdf.source}: lock names joint '{name}', which is not movable here"
+                f"{nearest(name, model.names[1:])}"
+            )
+        as_number(value, f"{urdf.source}: lock['{name}']", error=RobotError)
         joint = model.joints[model.getJointId(name)]
         if joint.nq != 1:
             raise RobotError(

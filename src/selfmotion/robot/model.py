@@ -2,17 +2,27 @@
 
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, InverseKinematicsError, RobotError
+from selfmotion.basics import (
+    Array,
+    InverseKinematicsError,
+    RobotError,
+    as_whole,
+    random_numbers,
+    shown,
+)
+from selfmotion.robot.full_model import full_model, link_geometry
+from selfmotion.robot.held import locked_configuration
 from selfmotion.robot.kinematics import ToolKinematics
+from selfmotion.robot.mesh_files import bad_meshes, without_meshes
 from selfmotion.robot.urdf import Urdf
-from selfmotion.task import Task
+from selfmotion.task import Task, as_pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +76,10 @@ class RobotModel:
     jerk_limit: Array
     touching: tuple[tuple[str, str], ...] = ()
     _per_thread: threading.local = field(default_factory=threading.local, repr=False)
+
+    def __repr__(self) -> str:
+        """Return one line: name, tool and joints."""
+        return f"RobotModel({self.name}, tool '{self.tool}', joints {', '.join(self.joint_names)})"
 
     def __getstate__(self) -> dict[str, Any]:
         return {key: value for key, value in self.__dict__.items() if key != "_per_thread"}
@@ -121,7 +135,13 @@ class RobotModel:
         RobotError
             The shape is not (n,), or a number is not finite; the joint is named.
         """
-        array = np.array(q, dtype=np.float64)
+        try:
+            array = np.array(q, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise RobotError(
+                f"configuration is {shown(q)}, expected {self.dof} numbers, one for each of "
+                f"{', '.join(self.joint_names)}"
+            ) from None
         if array.shape != (self.dof,):
             raise RobotError(
                 f"configuration has shape {array.shape}, expected ({self.dof},) "
@@ -241,7 +261,7 @@ class RobotModel:
 
     def inverse_kinematics(
         self,
-        pose: pin.SE3,
+        pose: pin.SE3 | npt.ArrayLike,
         task: Task | str = Task.POSE,
         seed: npt.ArrayLike | None = None,
         rng: np.random.Generator | int | None = 0,
@@ -254,7 +274,7 @@ class RobotModel:
 
         Parameters
         ----------
-        pose : pinocchio.SE3
+        pose : SE3 or (4, 4)
             Where the tool should be, in world axes.
         task : Task or str
             The rows that count.
@@ -275,15 +295,12 @@ class RobotModel:
         InverseKinematicsError
             No attempt arrived; says what the best one left over.
         RobotError
-            The pose is no SE3.
+            The pose is none.
         """
         task = Task.of(task)
-        if not isinstance(pose, pin.SE3):
-            raise RobotError(
-                f"{self.name}: the pose is a {type(pose).__name__}, expected a pinocchio.SE3; of a "
-                f"(4, 4) matrix that is pinocchio.SE3(matrix)"
-            )
-        rng = np.random.default_rng(rng)
+        pose = as_pose(pose, f"{self.name}: the pose", RobotError)
+        attempts = as_whole(attempts, "attempts", 1, 10**6, RobotError)
+        rng = random_numbers(rng)
         lower, upper = self.finite_limits()
         start = 0.5 * (lower + upper) if seed is None else self.configuration(seed)
         best = (np.inf, np.inf)
@@ -346,13 +363,31 @@ class RobotModel:
         RobotError
             A mesh file is missing or cannot be read.
         """
-        full = pin.buildModelFromXML(self.urdf.text)
+        return self._reduced(self.urdf, kind)
+
+    def visuals(self) -> tuple[Any, tuple[str, ...]]:
+        """Return the visual geometry as far as its meshes can be read, and what is missing.
+
+        Returns
+        -------
+        geometry : pinocchio.GeometryModel
+            See `geometry`.
+        missing : tuple of str
+            Link, file and reason of each mesh that is left out.
+        """
         try:
-            geometry = pin.buildGeomFromUrdfString(
-                full, self.urdf.text, kind, package_dirs=list(self.urdf.package_dirs)
-            )
-        except ValueError as error:
-            raise RobotError(f"{self.urdf.source}: {error}") from error
+            return self.geometry(pin.GeometryType.VISUAL), ()
+        except RobotError:
+            bad = bad_meshes(self.urdf, "visual")
+            if not bad:
+                raise
+        text = without_meshes(self.urdf.text, "visual", {item.file for item in bad})
+        rest = replace(self.urdf, text=text)
+        return self._reduced(rest, pin.GeometryType.VISUAL), tuple(map(str, bad))
+
+    def _reduced(self, urdf: Urdf, kind: pin.GeometryType) -> Any:
+        full = full_model(urdf)
+        geometry = link_geometry(urdf, full, kind)
         reference, locked_ids = locked_configuration(full, self.locked)
         _, reduced = pin.buildReducedModel(full, [geometry], locked_ids, reference)
         return reduced[0]
@@ -363,17 +398,3 @@ _RANK_TOLERANCE = 1e-6
 
 # What an inverse-kinematics solution may miss by, far below what a certificate accepts.
 _IK_TOLERANCE = 1e-10
-
-
-def locked_configuration(model: Any, locked: Mapping[str, float]) -> tuple[Array, list[int]]:
-    """Return a full configuration with the locked joints set, and the indices of those joints."""
-    reference: Array = pin.neutral(model)
-    ids = []
-    for index in range(1, model.njoints):
-        name, joint = model.names[index], model.joints[index]
-        if name in locked:
-            reference[joint.idx_q] = locked[name]
-            ids.append(index)
-        elif joint.nq != 1:
-            ids.append(index)
-    return reference, ids

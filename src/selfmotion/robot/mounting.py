@@ -43,10 +43,7 @@ def with_base(urdf: Urdf, pose: pin.SE3) -> Urdf:
 
 def with_tool_offset(urdf: Urdf, tool: str, pose: pin.SE3) -> tuple[Urdf, str]:
     """Return the URDF with a frame at `pose` in that of the link `tool`, and the frame's name."""
-    if tool not in urdf.links:
-        raise RobotError(
-            f"{urdf.source}: no link '{tool}' to use as tool frame; links: {', '.join(urdf.links)}"
-        )
+    urdf.check_tool(tool)
     frame = f"{tool}_offset"
     return _joined(urdf, TOOL_JOINT, tool, frame, frame, pose), frame
 

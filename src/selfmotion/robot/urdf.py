@@ -1,11 +1,8 @@
-"""Reading a URDF: yourdfpy parses it, this module refuses what Pinocchio would accept silently.
+"""Reading a URDF: its elements are checked one by one, yourdfpy parses it, and it must be a tree.
 
-What yourdfpy cannot do is done on the XML, here and once: telling well-formed from not, finding
-xacro, turning continuous joints into single-angle ones, making mesh addresses absolute.
-
-Pinocchio loads a zero joint axis, reversed limits or a link with two parents without a word, and
-gives continuous joints two coordinates. Here such files are refused with a message that names the
-joint or link, and continuous joints become single-angle joints without limits.
+Pinocchio loads a link with two parents without a word, and gives continuous joints two coordinates.
+Here such files are refused with a message that names the joint or link, and continuous joints
+become single-angle joints without limits; mesh addresses become absolute.
 """
 
 import contextlib
@@ -15,13 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from selfmotion.basics import RobotError, nearest
+from selfmotion.robot.joint_elements import check_joint_elements
+from selfmotion.robot.link_elements import check_link_elements
 
-from selfmotion.basics import RobotError
-from selfmotion.robot.collision_elements import check_collision_elements
-
-_SINGLE_COORDINATE = ("revolute", "prismatic", "continuous")
-_KNOWN_TYPES = (*_SINGLE_COORDINATE, "fixed", "floating", "planar")
 # A limit that no motion reaches; Pinocchio wants finite numbers for a revolute joint.
 _UNLIMITED = 1e6
 # Fixed joints that are ours: where the base stands, and how the tool is held.
@@ -110,6 +104,14 @@ class Urdf:
         """Return the names of joints that the file declares continuous."""
         return {joint.name for joint in self.joints.values() if joint.kind == "continuous"}
 
+    def check_tool(self, tool: str) -> None:
+        """Raise RobotError unless `tool` is one of the links; the nearest names are offered."""
+        if tool not in self.links:
+            raise RobotError(
+                f"{self.source}: no link '{tool}' to use as tool frame{nearest(tool, self.links)}; "
+                f"links: {', '.join(self.links)}"
+            )
+
     def chain(self, link: str) -> list[UrdfJoint]:
         """Return the joints from the root to `link`, root first, fixed ones included."""
         by_child = {joint.child: joint for joint in self.joints.values()}
@@ -143,7 +145,7 @@ def read_urdf(path: Path) -> Urdf:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise RobotError(f"{path}: cannot be read as text: {error}") from error
+        raise RobotError(f"{path}: cannot be read as UTF-8 text: {error}") from error
     folder = path.resolve().parent
     return parse_urdf(
         text, source=str(path), package_dirs=package_folders(path), mesh_folder=folder
@@ -159,22 +161,12 @@ def parse_urdf(
     text: str, *, source: str, package_dirs: tuple[str, ...], mesh_folder: Path | None = None
 ) -> Urdf:
     """Validate URDF text; see `read_urdf`. Relative mesh names are taken from `mesh_folder`."""
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise RobotError(f"{source}: is not well-formed XML: {error}") from error
-    if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
-        raise RobotError(f"{source}: is a xacro file; give it the suffix .xacro")
-    if root.tag != "robot":
-        raise RobotError(f"{source}: the root element is <{root.tag}>, expected <robot>")
-    check_collision_elements(root, source)
+    root = _root(text, source)
+    _check_expanded(root, source)
+    check_link_elements(root, source)
+    check_joint_elements(root, source)
     parsed = _parse_with_yourdfpy(text, source)
     joints = {joint.name: joint for joint in map(_joint, parsed.joints)}
-    _check_names(parsed, source)
-    for joint in parsed.joints:
-        _check_joint(joint, source)
-    for link in parsed.links:
-        _check_inertia(link, source)
     _check_tree(parsed, source)
     _check_mimics(joints, source)
     _single_angle(root)
@@ -183,6 +175,44 @@ def parse_urdf(
     links = tuple(link.name for link in parsed.links)
     prepared = ElementTree.tostring(root, encoding="unicode")
     return Urdf(source, prepared, package_dirs, joints, links)
+
+
+def _root(text: str, source: str) -> ElementTree.Element:
+    """Return the ``<robot>``."""
+    if not text.strip():
+        raise RobotError(f"{source}: is empty, expected a URDF")
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        if "<xacro:" in text:
+            raise RobotError(f"{source}: is a xacro file; give it the suffix .xacro") from error
+        if text.startswith("version https://git-lfs"):
+            raise RobotError(
+                f"{source}: is a pointer of Git LFS, not the file itself; run git lfs pull"
+            ) from error
+        raise RobotError(f"{source}: is not well-formed XML: {error}") from error
+    if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
+        raise RobotError(f"{source}: is a xacro file; give it the suffix .xacro")
+    if root.tag != "robot":
+        raise RobotError(f"{source}: the root element is <{root.tag}>, expected <robot>")
+    if not root.get("name"):
+        raise RobotError(f'{source}: the <robot> has no name; add name="…"')
+    if root.find("link") is None:
+        raise RobotError(f"{source}: has no <link>, expected those of an arm")
+    return root
+
+
+def _check_expanded(root: ElementTree.Element, source: str) -> None:
+    """Refuse what xacro should have replaced."""
+    for part in (root, *root.findall("link"), *root.findall("joint")):
+        for element in [root] if part is root else part.iter():
+            for key, value in element.items():
+                if "${" in value or "$(" in value:
+                    owner = f"<{part.tag}> '{part.get('name')}': " if part is not element else ""
+                    raise RobotError(
+                        f'{source}: {owner}<{element.tag}> has {key}="{value}": xacro is not '
+                        f"expanded; give the file the suffix .xacro"
+                    )
 
 
 def _parse_with_yourdfpy(text: str, source: str) -> Any:
@@ -212,63 +242,6 @@ def _joint(joint: Any) -> UrdfJoint:
     )
 
 
-def _check_names(parsed: Any, source: str) -> None:
-    for kind, items in (("link", parsed.links), ("joint", parsed.joints)):
-        names = [item.name for item in items]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise RobotError(f"{source}: {kind} name '{twice[0]}' is used more than once")
-    links = {link.name for link in parsed.links}
-    for joint in parsed.joints:
-        for end in (joint.parent, joint.child):
-            if end not in links:
-                raise RobotError(
-                    f"{source}: joint '{joint.name}' refers to link '{end}', which does not exist"
-                )
-
-
-def _check_joint(joint: Any, source: str) -> None:
-    where = f"{source}: joint '{joint.name}'"
-    if joint.type not in _KNOWN_TYPES:
-        raise RobotError(f"{where} has type '{joint.type}', expected one of {_KNOWN_TYPES}")
-    if joint.type not in _SINGLE_COORDINATE:
-        return
-    axis = np.asarray(joint.axis, dtype=float)
-    if not (np.all(np.isfinite(axis)) and np.linalg.norm(axis) > 1e-6):
-        raise RobotError(f"{where} has axis {axis.tolist()}, expected a direction of length > 0")
-    limit = joint.limit
-    for name in ("velocity", "effort"):
-        if limit is not None and getattr(limit, name) is None:
-            raise RobotError(
-                f'{where} has a <limit> without {name}; add {name}="…", 0 where there is none'
-            )
-    if joint.type == "continuous":
-        return
-    if limit is None or limit.lower is None or limit.upper is None:
-        raise RobotError(
-            f"{where} is {joint.type} without lower and upper limits; add them, or make it "
-            f"continuous"
-        )
-    if not limit.lower <= limit.upper:
-        raise RobotError(
-            f"{where} has reversed limits: lower {limit.lower} is above upper {limit.upper}"
-        )
-    for name, value in (("lower", limit.lower), ("upper", limit.upper)):
-        if not np.isfinite(value):
-            raise RobotError(
-                f"{where} has {name} limit {value}, expected a number; without limits it is "
-                f"continuous"
-            )
-    if limit.velocity is not None and not limit.velocity >= 0:
-        raise RobotError(f"{where} has velocity limit {limit.velocity}, expected a number ≥ 0")
-
-
-def _check_inertia(link: Any, source: str) -> None:
-    mass = link.inertial.mass if link.inertial is not None else None
-    if mass is not None and mass < 0:
-        raise RobotError(f"{source}: link '{link.name}' has a negative mass {mass} kg")
-
-
 def _check_tree(parsed: Any, source: str) -> None:
     parent_of: dict[str, str] = {}
     for joint in parsed.joints:
@@ -281,7 +254,10 @@ def _check_tree(parsed: Any, source: str) -> None:
     roots = [link.name for link in parsed.links if link.name not in parent_of]
     if len(roots) != 1:
         found = ", ".join(roots) if roots else "none (the joints form a loop)"
-        raise RobotError(f"{source}: expected one root link, found: {found}")
+        raise RobotError(
+            f"{source}: expected one root link, found: {found}; join all links by joints, one "
+            f"parent each"
+        )
     for link in parent_of:
         above, passed = link, {link}
         while above in parent_of:
@@ -300,14 +276,10 @@ def _check_mimics(joints: dict[str, UrdfJoint], source: str) -> None:
         while name is not None:
             if name not in joints or name in passed:
                 what = "which mimics it in turn" if name in passed else "which does not exist"
-                raise RobotError(f"{source}: joint '{joint.name}' mimics '{name}', {what}")
+                hint = "" if name in passed else nearest(name, joints)
+                raise RobotError(f"{source}: joint '{joint.name}' mimics '{name}', {what}{hint}")
             passed.add(name)
             name = joints[name].mimics
-        if not np.all(np.isfinite([joint.multiplier, joint.offset])):
-            raise RobotError(
-                f"{source}: joint '{joint.name}' mimics '{joint.mimics}' with multiplier "
-                f"{joint.multiplier} and offset {joint.offset}, expected finite numbers"
-            )
 
 
 def _single_angle(root: ElementTree.Element) -> None:

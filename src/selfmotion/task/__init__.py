@@ -2,6 +2,7 @@
 
 from selfmotion.task.damping import Damping, DampingLaw
 from selfmotion.task.feedback import feedback_rate
+from selfmotion.task.poses import as_pose
 from selfmotion.task.relaxation import POSITION_ROWS, ROW_NAMES, Relaxation
 from selfmotion.task.rows import Task
 
@@ -12,5 +13,6 @@ __all__ = [
     "DampingLaw",
     "Relaxation",
     "Task",
+    "as_pose",
     "feedback_rate",
 ]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array, as_number
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,8 @@ class Damping:
 
     def __post_init__(self) -> None:
         for name in ("threshold", "strength", "path_weight"):
-            _check_positive(getattr(self, name), name)
+            value = as_number(getattr(self, name), f"damping: {name}", above=0.0)
+            object.__setattr__(self, name, value)
 
     def law(self, singular_value: float) -> "DampingLaw":
         """Return the damping for an arm with this σ [m, rad] at its dexterous configuration."""
@@ -76,14 +77,9 @@ class DampingLaw:
 
     def __post_init__(self) -> None:
         for name in ("threshold", "strength"):
-            _check_positive(getattr(self, name), name)
+            as_number(getattr(self, name), f"damping: {name}", above=0.0)
 
     def factor(self, singular_value: Array) -> Array:
         """Return λ [m, rad] for smallest singular values σ [m, rad] of any shape."""
         rest = 1.0 - np.square(singular_value / self.threshold)
         return self.strength * np.maximum(rest, 0.0)
-
-
-def _check_positive(value: float, name: str) -> None:
-    if not (np.isfinite(value) and value > 0.0):
-        raise ProblemError(f"damping: {name} is {value}, expected a finite number > 0")

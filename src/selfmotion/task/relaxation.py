@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import ProblemError
+from selfmotion.basics import ProblemError, shown
 
 POSITION_ROWS, _ROTATION = ("x", "y", "z"), ("rx", "ry", "rz")
 ROW_NAMES = (*POSITION_ROWS, *_ROTATION)
@@ -58,7 +58,7 @@ class Relaxation:
 
     def __post_init__(self) -> None:
         _check_types(self.rows, self.band, self.during)
-        rows = (self.rows,) if isinstance(self.rows, str) else tuple(self.rows)
+        rows = (self.rows,) if isinstance(self.rows, str) else tuple(map(str, self.rows))
         object.__setattr__(self, "rows", rows)
         if not rows or len(set(rows)) != len(rows) or not set(rows) <= set(ROW_NAMES):
             raise ProblemError(
@@ -128,6 +128,6 @@ def _check_types(rows: Any, band: Any, during: Any) -> None:
         ("during", during, list | tuple | None, "two times"),
     ):
         if not isinstance(value, kind):
-            raise ProblemError(f"relaxation: {name} is {value!r}, expected {wanted}")
+            raise ProblemError(f"relaxation: {name} is {shown(value)}, expected {wanted}")
     if during is not None and not all(isinstance(time, Real) for time in during):
-        raise ProblemError(f"relaxation: during is {during!r}, expected two times")
+        raise ProblemError(f"relaxation: during is {shown(during)}, expected two times")

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array, ProblemError, shown
 
 _ROW_NAMES = ("vx", "vy", "vz", "wx", "wy", "wz")
 
@@ -49,7 +49,7 @@ class Task(Enum):
             return cls(task)
         except ValueError:
             names = ", ".join(member.value for member in cls)
-            raise ProblemError(f"unknown task '{task}', expected one of: {names}") from None
+            raise ProblemError(f"unknown task {shown(task)}, expected one of: {names}") from None
 
     @property
     def rows(self) -> npt.NDArray[np.intp]:

@@ -1,0 +1,129 @@
+"""What users give, made into numbers, or refused in one sentence that says what was given."""
+
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics.arrays import Array, plain_numbers, read_only, shown
+from selfmotion.basics.errors import ProblemError
+
+
+def as_numbers(
+    values: Any,
+    what: str,
+    expected: str = "finite numbers",
+    shape: tuple[int, ...] | None = None,
+    error: type[Exception] = ProblemError,
+) -> Array:
+    """Return `values` as finite numbers, read-only.
+
+    Parameters
+    ----------
+    values : array_like
+    what : str
+        What messages call them.
+    expected : str
+        What they should be, for messages.
+    shape : tuple of int, optional
+    error : type
+        What is raised.
+
+    Raises
+    ------
+    error
+        They are texts, booleans, ragged, of another shape, or one is not finite: it is named.
+    """
+    array = plain_numbers(values)
+    if array is None or (shape is not None and array.shape != shape):
+        found = "" if array is None or array.size <= 1 else f" of shape {array.shape}"
+        raise error(f"{what} is {shown(values)}{found}, expected {expected}")
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        where = f"[{', '.join(map(str, bad[0]))}]" if array.ndim else ""
+        raise error(f"{what}{where} is {array[tuple(bad[0])]}, expected {expected}")
+    return read_only(array)
+
+
+def as_number(
+    value: Any,
+    what: str,
+    *,
+    above: float = -np.inf,
+    least: float = -np.inf,
+    most: float = 1e100,
+    error: type[Exception] = ProblemError,
+) -> float:
+    """Return `value` as a float that is > `above`, ≥ `least` and ≤ `most`.
+
+    Raises
+    ------
+    error
+        It is no such number; `what` is what the message calls it.
+    """
+    array = plain_numbers(value)
+    number = float(array) if array is not None and array.ndim == 0 else np.nan
+    # Written so that NaN is refused too.
+    if not (above < number <= most and number >= least):
+        asked = {f"> {above:g}": np.isfinite(above), f"≥ {least:g}": np.isfinite(least)}
+        asked[f"≤ {most:g}"] = np.isfinite(number) and number > most
+        bounds = [bound for bound, told in asked.items() if told]
+        kind = "number" if bounds and number != np.inf else "finite number"
+        expected = " ".join(["a", kind, " and ".join(bounds)]).strip()
+        raise error(f"{what} is {shown(value)}, expected {expected}")
+    return number
+
+
+def as_whole(
+    value: Any, what: str, least: int, most: int, error: type[Exception] = ProblemError
+) -> int:
+    """Return `value` as an int from `least` to `most`.
+
+    Raises
+    ------
+    error
+        It is no whole number, or out of these bounds.
+    """
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not (whole and least <= value <= most):
+        bounds = f"≥ {least}" if not whole or value < least else f"from {least} to {most}"
+        raise error(f"{what} is {shown(value)}, expected a whole number {bounds}")
+    return int(value)
+
+
+def as_flag(value: Any, what: str, error: type[Exception] = ProblemError) -> bool:
+    """Return `value`, True or False; `error` otherwise, whose message calls it `what`."""
+    if not isinstance(value, bool | np.bool_):
+        raise error(f"{what} is {shown(value)}, expected True or False")
+    return bool(value)
+
+
+def as_choice(
+    value: Any, what: str, choices: tuple[str, ...], error: type[Exception] = ProblemError
+) -> str:
+    """Return `value`, one of `choices`.
+
+    Raises
+    ------
+    error
+        It is none of them.
+    """
+    if not (isinstance(value, str) and value in choices):
+        names = ", ".join(f"'{choice}'" for choice in choices)
+        raise error(f"{what} is {shown(value)}, expected one of: {names}")
+    return value
+
+
+def random_numbers(rng: Any) -> np.random.Generator:
+    """Return a generator of random numbers: itself, or one with that seed.
+
+    Raises
+    ------
+    ProblemError
+        It is neither a generator nor a seed.
+    """
+    try:
+        return np.random.default_rng(rng)
+    except (TypeError, ValueError):
+        raise ProblemError(
+            f"rng is {shown(rng)}, expected a whole number ≥ 0 or a numpy Generator"
+        ) from None

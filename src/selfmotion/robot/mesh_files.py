@@ -1,0 +1,75 @@
+"""Mesh files of a URDF that are missing or cannot be read."""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Collection
+from pathlib import Path
+from typing import NamedTuple
+
+import coal
+import numpy as np
+
+from selfmotion.robot.urdf import Urdf
+
+
+class BadMesh(NamedTuple):
+    """A mesh that is not there.
+
+    Attributes
+    ----------
+    link : str
+        The link that it is of.
+    file : str
+        Its address in the URDF.
+    reason : str
+        Why, in words.
+    """
+
+    link: str
+    file: str
+    reason: str
+
+    def __str__(self) -> str:
+        """Return link, file and reason in words."""
+        return f"link '{self.link}': {self.reason}: {self.file}"
+
+
+def bad_meshes(urdf: Urdf, tag: str) -> tuple[BadMesh, ...]:
+    """Return the meshes of all ``<visual>`` or ``<collision>`` elements (`tag`) that are bad."""
+    known: dict[str, str] = {}
+    found = []
+    for link in ElementTree.fromstring(urdf.text).findall("link"):
+        for mesh in link.iterfind(f"{tag}/geometry/mesh"):
+            file = mesh.get("filename", "")
+            if file not in known:
+                known[file] = _fault(urdf, file)
+            if known[file]:
+                found.append(BadMesh(link.get("name", ""), file, known[file]))
+    return tuple(found)
+
+
+def without_meshes(text: str, tag: str, files: Collection[str]) -> str:
+    """Return a URDF's text without the elements (`tag`) whose meshes are in these `files`."""
+    root = ElementTree.fromstring(text)
+    for link in root.findall("link"):
+        for element in link.findall(tag):
+            if any(mesh.get("filename") in files for mesh in element.iterfind("geometry/mesh")):
+                link.remove(element)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _fault(urdf: Urdf, file: str) -> str:
+    """Return why a mesh cannot be read, "" where it can."""
+    scheme, _, rest = file.rpartition("://")
+    if scheme in ("http", "https", "ftp"):
+        return "the mesh is not on this machine, download it"
+    folders = urdf.package_dirs if scheme in ("package", "model") else ("",)
+    found = next((Path(folder, rest) for folder in folders if Path(folder, rest).is_file()), None)
+    if found is None:
+        return "no such mesh file"
+    try:
+        coal.MeshLoader().load(str(found), np.ones(3))
+    except (RuntimeError, ValueError) as error:
+        # What comes before is where in the source of coal it was found, after it a guess.
+        said = str(error).rpartition("message:")[2].partition("Hint:")[0]
+        return f"the mesh file cannot be read ({' '.join(said.split()[5:])})"
+    return ""
