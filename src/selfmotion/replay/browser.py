@@ -3,13 +3,10 @@
 import io
 import os
 import shutil
-import signal
-import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import FrameType
 from typing import IO, Any
 
 import numpy as np
@@ -95,12 +92,7 @@ def render_gif(
     with _opened(replay_html(plans, **options), size, layers, False, dark) as page:
         duration = float(page.evaluate("replay.duration"))
         count = max(2, round(duration * frames_per_second) + 1)
-        with _interruptible() as check:
-            shots = []
-            for t in np.linspace(0.0, duration, count):
-                check()
-                shots.append(_shot(page, float(t), False))
-            check()
+        shots = [_shot(page, float(t), False) for t in np.linspace(0.0, duration, count)]
     frames = [Image.open(io.BytesIO(shot)).convert("RGB") for shot in shots]
     # One palette for all frames: a palette for each makes plain surfaces shimmer.
     palette = frames[count // 2].quantize(colors=255)
@@ -118,33 +110,6 @@ def render_gif(
 
     write_atomically(path, write)
     return path
-
-
-@contextmanager
-def _interruptible() -> Iterator[Callable[[], None]]:
-    """Yield what raises KeyboardInterrupt after a Ctrl-C, even if Playwright's loop lost it.
-
-    An interruption that arrives within a callback of its event loop may end there.
-    """
-    before = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(before):
-        yield lambda: None
-        return
-    pressed: list[int] = []
-
-    def note(number: int, frame: FrameType | None) -> None:
-        pressed.append(number)
-        before(number, frame)
-
-    def check() -> None:
-        if pressed:
-            raise KeyboardInterrupt
-
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield check
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _shot(page: Any, t: float, whole_page: bool) -> bytes:
