@@ -89,10 +89,17 @@ render_gif(planar_plan(), sys.argv[1] + "/a.gif", frames_per_second=100)
 """
 
 
+ANSWERING = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+"""
+
+
 def start(script, folder, temporary):
     environment = {**os.environ, "PYTHONPATH": os.path.dirname(__file__), "TMPDIR": str(temporary)}
     return subprocess.Popen(
-        [sys.executable, "-c", script, str(folder)],
+        # Workers of a parallel test run ignore Ctrl-C, and so would what they start.
+        [sys.executable, "-c", ANSWERING + script, str(folder)],
         env=environment,
         stderr=subprocess.PIPE,
         text=True,
