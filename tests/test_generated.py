@@ -1,11 +1,15 @@
 """Generated problems end in a plan whose verdict the judge confirms, or in a typed error."""
 
+from dataclasses import replace
+
 import hypothesis
+import numpy as np
 import pytest
 
 import generated
 import selfmotion as sm
 from generated import Generated, end_of
+from selfmotion.optimise import inverse_metric
 from strategies import problems
 
 # `make fuzz-generated` plans 5,000, with more evaluations and looking more closely.
@@ -66,3 +70,48 @@ def test_what_is_wrong_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         end = end_of(SIMPLE, max_evaluations=3, patience=1)
         assert end.kind == kind
         assert end.is_wrong
+
+
+# What once ended in an exception of another's: a matrix without inverse, numbers beyond all others.
+ONCE_UNTYPED = (
+    replace(
+        SIMPLE,
+        joints=(
+            ("revolute", "0 0 1", "sphere"),
+            ("revolute", "0 0 1", "box"),
+            ("prismatic", "0 0 1", "box"),
+        ),
+        gripper=True,
+        path="pause",
+        task="",
+        free=True,
+        constraints=("acceleration", "closed"),
+        costs=("acceleration", "posture"),
+        seed=1127,
+    ),
+    replace(
+        SIMPLE,
+        joints=(
+            ("revolute", "0 1 0", "box"),
+            ("revolute", "0 1 0", ""),
+            ("revolute", "0 0 1", "box"),
+            ("revolute", "0 0 1", ""),
+        ),
+        task="",
+        free=True,
+        obstacles=("cylinder", "mesh"),
+        costs=("limits", "length"),
+        null_motion="spline",
+        seed=4,
+    ),
+)
+
+
+@pytest.mark.parametrize("words", ONCE_UNTYPED)
+def test_what_was_once_untyped_ends_well(words: Generated) -> None:
+    end = end_of(words)
+    assert not end.is_wrong, (end.kind, end.text)
+
+
+def test_a_metric_beyond_all_numbers_says_nothing() -> None:
+    np.testing.assert_array_equal(inverse_metric(np.full((3, 3), np.inf)), np.eye(3))

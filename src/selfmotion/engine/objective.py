@@ -275,8 +275,10 @@ class Objective:
                     tangent = (operator @ nodes).reshape(by_qd.shape)
                 else:
                     tangent = by_q if order == 0 else by_qd
-                weighted = sampling.weights[:, None, None] * (weight @ tangent)
-                metric += tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size)
+                # Near singular poses tangents may be beyond all numbers: see `inverse_metric`.
+                with np.errstate(over="ignore", invalid="ignore"):
+                    weighted = sampling.weights[:, None, None] * (weight @ tangent)
+                    metric += tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size)
         if self._deviation.size:
             # sin s bends as much as it rises: without it, steps would go round many times.
             slope = np.abs(self.parts(self.gradient(x))[2]) * self._deviation.banded

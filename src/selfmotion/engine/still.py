@@ -19,6 +19,8 @@ _FEWEST_STEPS, _DRIFT = 32, 1e-3
 # Trouble that three grids in turn place within this share of the motion, and of which the last has
 # at least half as much as the first, is the motion's own.
 _SAME_PLACE, _SAME_AMOUNT = 1e-3, 0.5
+# A motion in which a joint goes so far [rad or m] has been thrown out of a singular pose.
+_WILD = 1e3
 # The finest grid has 2 to this power times the steps of the first.
 MOST_HALVINGS = 8
 # A path shorter than this [m] is as good as a point.
@@ -80,6 +82,9 @@ class StillMotion:
         if broken is not None:
             drift = np.where((grid.nodes > broken)[:, None], np.nan, drift)
         nodes = grid.node_stages
+        wild = np.abs(samples.q[nodes] - configuration).max(axis=1) > _WILD
+        if broken is None and wild.any():
+            broken = float(grid.nodes[int(np.argmax(wild))])
         return cls(
             problem,
             grid,

@@ -196,10 +196,13 @@ def inverse_metric(metric: Array, floor: float = 1e-4) -> Array:
     """Return the inverse of a positive semidefinite matrix.
 
     Directions without curvature (coefficients that do not act, as in the over-specified joint
-    space) are given that of `floor` times the largest.
+    space) are given that of `floor` times the largest. A matrix that is not finite says nothing:
+    then it is the identity.
     """
     if not len(metric):
         return metric
+    if not np.all(np.isfinite(metric)):
+        return np.eye(len(metric))
     values, vectors = np.linalg.eigh(metric)
     values = np.maximum(values, floor * max(values[-1], np.finfo(float).tiny))
     return np.asarray((vectors / values) @ vectors.T)

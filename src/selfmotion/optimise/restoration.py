@@ -45,7 +45,8 @@ class _Penalised:
         at = self._function.conditions(x)
         violated = _excess(at) != 0.0
         rows = self._function.condition_rows(x)[violated] / at.tolerance[violated, None]
-        return np.asarray(self._function.metric(x) + self._weight * rows.T @ rows)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(self._function.metric(x) + self._weight * rows.T @ rows)
 
 
 def _excess(at: Residuals) -> Array:

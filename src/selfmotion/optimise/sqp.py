@@ -203,7 +203,12 @@ class _Run:
         return step.gain > _DOUBTFUL * abs(self._here.cost)
 
     def _iterate(self) -> Status | None:
-        hessian = np.linalg.inv(self._h)
+        try:
+            hessian = np.linalg.inv(self._h)
+        except np.linalg.LinAlgError:
+            # Steps in which the gradient hardly changed left nothing of it: begin as at first.
+            self._h = np.eye(len(self._h))
+            hessian = self._h
         hessian = 0.5 * (hessian + hessian.T)
         for _ in range(_TRIALS):
             step = best_step(self._gradient, hessian, self._here.at, self._rows, self._region)
