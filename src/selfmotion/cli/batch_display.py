@@ -3,43 +3,24 @@
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
+from rich.progress import BarColumn, TextColumn
 
 import selfmotion as sm
+from selfmotion.cli.stage_display import Display
 
 if TYPE_CHECKING:
     from selfmotion.batch import BatchProgress
 
 
-class BatchDisplay:
+class BatchDisplay(Display):
     """A bar with rate and time left on a terminal, a line per tenth in a log."""
 
     def __init__(self, console: Console) -> None:
-        self._console = console
-        columns = (TextColumn("{task.description}", markup=False), BarColumn())
-        self._progress = Progress(
-            *columns, console=console, transient=True, disable=not console.is_terminal
-        )
-        self._bar = self._progress.add_task("", total=None)
+        super().__init__(console, TextColumn("{task.description}", markup=False), BarColumn())
         self._tenth = 0
-
-    def __enter__(self) -> Self:
-        """Begin to show."""
-        self._progress.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Leave the terminal as it was."""
-        self._progress.stop()
 
     def show(self, found: "BatchProgress") -> None:
         """Show how far it is."""

@@ -4,33 +4,35 @@ from types import TracebackType
 from typing import Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
 
 from selfmotion.optimise import Iteration
 
 
-class StageDisplay:
-    """Shows what `plan` tells: its `stage` is a progress callback, its `iteration` the other one.
+class Display:
+    """A bar on a terminal, gone when it ends; what a log shows instead is for who derives it.
 
     Parameters
     ----------
     console : Console
+    columns : ProgressColumn
+        Of the bar.
     """
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, *columns: ProgressColumn) -> None:
         self._console = console
-        columns = (
-            SpinnerColumn(),
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            TimeElapsedColumn(),
-        )
         # A log would get the bar once, when all is over.
         self._progress = Progress(
             *columns, console=console, transient=True, disable=not console.is_terminal
         )
         self._bar = self._progress.add_task("", total=None)
-        self._stage = self._count = self._cost = ""
 
     def __enter__(self) -> Self:
         """Begin to show."""
@@ -45,6 +47,25 @@ class StageDisplay:
     ) -> None:
         """Leave the terminal as it was."""
         self._progress.stop()
+
+
+class StageDisplay(Display):
+    """Shows what `plan` tells: its `stage` is a progress callback, its `iteration` the other one.
+
+    Parameters
+    ----------
+    console : Console
+    """
+
+    def __init__(self, console: Console) -> None:
+        super().__init__(
+            console,
+            SpinnerColumn(),
+            TextColumn("{task.description}", markup=False),
+            BarColumn(),
+            TimeElapsedColumn(),
+        )
+        self._stage = self._count = self._cost = ""
 
     def stage(self, stage: str, done: int, total: int) -> None:
         """Show that number `done` of `total` in a stage has begun."""

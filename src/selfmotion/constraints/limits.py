@@ -1,6 +1,8 @@
 """Limits of joint position, velocity, acceleration and jerk."""
 
+from abc import abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -82,8 +84,57 @@ class JointPositionLimits(Constraint):
         return lower, upper
 
 
+class _RateLimits(Constraint):
+    """What limits of |q̇|, |q̈| and of the jerk share."""
+
+    order: ClassVar[int]
+    margin: float
+
+    @abstractmethod
+    def of(self, robot: RobotModel) -> Array:
+        """Return the limits for an arm, (n,) [rad or m, per s^order]."""
+
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
+        """See `Constraint.bind`."""
+        name = LIMIT_NAMES[self.order]
+        return BoundLimits.symmetric(robot, name, self.order, self.of(robot), self.margin)
+
+    def requirement(self, robot: RobotModel) -> JointLimits:
+        """See `Constraint.requirement`."""
+        limit = self.of(robot)
+        return JointLimits(self.order, -limit, limit)
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return Envelope.of_limits(self.requirement(robot))
+
+
+class _MakersLimits(_RateLimits):
+    """Limits that no URDF gives: one's own, or else those that the maker publishes, if any."""
+
+    limit: npt.ArrayLike | None
+
+    def __post_init__(self) -> None:
+        _check_margin(self.margin)
+
+    @abstractmethod
+    def published(self, robot: RobotModel) -> Array:
+        """Return the maker's, (n,); inf where none are known."""
+
+    def applies(self, robot: RobotModel) -> bool:
+        """See `Constraint.applies`."""
+        return bool(np.isfinite(self.of(robot)).any())
+
+    def of(self, robot: RobotModel) -> Array:
+        """See `_RateLimits.of`."""
+        if self.limit is None:
+            return self.published(robot)
+        what = f"{robot.name}: {LIMIT_NAMES[self.order]}"
+        return per_joint(self.limit, robot.dof, what, positive=True)
+
+
 @dataclass(frozen=True, eq=False)
-class JointVelocityLimits(Constraint):
+class JointVelocityLimits(_RateLimits):
     """Joint speeds stay below limits.
 
     Parameters
@@ -96,6 +147,8 @@ class JointVelocityLimits(Constraint):
         Whether these stand in place of the URDF's limits. By default both are kept.
     """
 
+    order: ClassVar[int] = 1
+
     limit: npt.ArrayLike | None = None
     margin: float = 2e-3
     replace: bool = False
@@ -103,19 +156,6 @@ class JointVelocityLimits(Constraint):
     def __post_init__(self) -> None:
         _check_margin(self.margin)
         as_flag(self.replace, "replace")
-
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
-        """See `Constraint.bind`."""
-        return BoundLimits.symmetric(robot, LIMIT_NAMES[1], 1, self.of(robot), self.margin)
-
-    def requirement(self, robot: RobotModel) -> JointLimits:
-        """See `Constraint.requirement`."""
-        limit = self.of(robot)
-        return JointLimits(1, -limit, limit)
-
-    def envelope(self, robot: RobotModel) -> Envelope:
-        """See `Constraint.envelope`."""
-        return Envelope.of_limits(self.requirement(robot))
 
     def of(self, robot: RobotModel) -> Array:
         """Return the limits for an arm, (n,) [rad/s or m/s]."""
@@ -126,7 +166,7 @@ class JointVelocityLimits(Constraint):
 
 
 @dataclass(frozen=True, eq=False)
-class JointAccelerationLimits(Constraint):
+class JointAccelerationLimits(_MakersLimits):
     """Joint accelerations stay below limits.
 
     Parameters
@@ -137,39 +177,18 @@ class JointAccelerationLimits(Constraint):
         Share of the limit that is aimed to be left unused; at least half of it is.
     """
 
+    order: ClassVar[int] = 2
+
     limit: npt.ArrayLike | None = None
     margin: float = 1e-2
 
-    def __post_init__(self) -> None:
-        _check_margin(self.margin)
-
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
-        """See `Constraint.bind`."""
-        return BoundLimits.symmetric(robot, LIMIT_NAMES[2], 2, self.of(robot), self.margin)
-
-    def requirement(self, robot: RobotModel) -> JointLimits:
-        """See `Constraint.requirement`."""
-        limit = self.of(robot)
-        return JointLimits(2, -limit, limit)
-
-    def envelope(self, robot: RobotModel) -> Envelope:
-        """See `Constraint.envelope`."""
-        return Envelope.of_limits(self.requirement(robot))
-
-    def applies(self, robot: RobotModel) -> bool:
-        """See `Constraint.applies`."""
-        return bool(np.isfinite(self.of(robot)).any())
-
-    def of(self, robot: RobotModel) -> Array:
-        """Return the limits for an arm, (n,) [rad/s² or m/s²]."""
-        if self.limit is None:
-            return robot.acceleration_limit
-        what = f"{robot.name}: {LIMIT_NAMES[2]}"
-        return per_joint(self.limit, robot.dof, what, positive=True)
+    def published(self, robot: RobotModel) -> Array:
+        """See `_MakersLimits.published`."""
+        return robot.acceleration_limit
 
 
 @dataclass(frozen=True, eq=False)
-class JointJerkLimits(Constraint):
+class JointJerkLimits(_MakersLimits):
     """Joint jerks, the derivatives of accelerations, stay below limits.
 
     Parameters
@@ -180,35 +199,14 @@ class JointJerkLimits(Constraint):
         Share of the limit that is aimed to be left unused; at least half of it is.
     """
 
+    order: ClassVar[int] = 3
+
     limit: npt.ArrayLike | None = None
     margin: float = 5e-2
 
-    def __post_init__(self) -> None:
-        _check_margin(self.margin)
-
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
-        """See `Constraint.bind`."""
-        return BoundLimits.symmetric(robot, LIMIT_NAMES[3], 3, self.of(robot), self.margin)
-
-    def requirement(self, robot: RobotModel) -> JointLimits:
-        """See `Constraint.requirement`."""
-        limit = self.of(robot)
-        return JointLimits(3, -limit, limit)
-
-    def envelope(self, robot: RobotModel) -> Envelope:
-        """See `Constraint.envelope`."""
-        return Envelope.of_limits(self.requirement(robot))
-
-    def applies(self, robot: RobotModel) -> bool:
-        """See `Constraint.applies`."""
-        return bool(np.isfinite(self.of(robot)).any())
-
-    def of(self, robot: RobotModel) -> Array:
-        """Return the limits for an arm, (n,) [rad/s³ or m/s³]."""
-        if self.limit is None:
-            return robot.jerk_limit
-        what = f"{robot.name}: {LIMIT_NAMES[3]}"
-        return per_joint(self.limit, robot.dof, what, positive=True)
+    def published(self, robot: RobotModel) -> Array:
+        """See `_MakersLimits.published`."""
+        return robot.jerk_limit
 
 
 def _check_margin(margin: float) -> None:

@@ -5,7 +5,7 @@ respect to a fine spline that is added to its null motion, the quadratic model f
 where constraints bind, by what the quadratic programme over the linearised conditions finds.
 """
 
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -50,7 +50,7 @@ class Remaining:
         self._at = fine.conditions(x) if bound else none
         self._rows = fine.condition_rows(x) if bound else np.zeros((0, fine.size))
 
-    @property
+    @cached_property
     def most(self) -> float:
         """What the finest spline would save [cost]."""
         return self.saving(self._finest)
@@ -74,8 +74,8 @@ class Remaining:
 
     def intervals(self, left: float) -> int:
         """Return the fewest intervals that leave no more than `left` of what can be saved."""
-        most, finest = self.most, self._finest
-        return next(n for n in _INTERVALS if n == finest or most - self.saving(n) <= left)
+        finest = self._finest
+        return next(n for n in _INTERVALS if n == finest or self.most - self.saving(n) <= left)
 
 
 @cache

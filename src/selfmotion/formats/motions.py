@@ -14,17 +14,16 @@ from selfmotion.basics import (
     as_path,
     shown,
     write_atomically,
+    write_csv,
 )
 from selfmotion.formats import ros
 from selfmotion.formats.documents import read_document, write_document, write_text
 from selfmotion.formats.mujoco import keyframes
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.formats.urscript import script
-from selfmotion.motion import Trajectory
+from selfmotion.motion import Trajectory, column_names
 from selfmotion.plans import Plan
 from selfmotion.robot import RobotModel
-
-_VELOCITY, _ACCELERATION = "_velocity", "_acceleration"
 
 
 def write_motion(
@@ -95,11 +94,8 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
 
 
 def _write_csv(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
-    suffixes = ("", _VELOCITY, _ACCELERATION)
-    names = ["t", *(name + suffix for suffix in suffixes for name in motion.joint_names)]
     table = np.column_stack([motion.t, motion.q, motion.qd, motion.qdd])
-    rows = (",".join(map(repr, row)) for row in table.tolist())
-    write_text(file, "\n".join([",".join(names), *rows]) + "\n")
+    write_csv(file, column_names(motion.joint_names), table)
 
 
 def _write_npz(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:

@@ -296,9 +296,6 @@ def _remedy(jump: float) -> str:
 
 def _times(file: FilePath, rows: _Rows, feed: float | None, duration: float | None) -> Array:
     given = {"feed": feed, "duration": duration}
-    for name, value in given.items():
-        if value is not None and not (np.isfinite(value) and value > 0.0):
-            raise FileFormatError(f"{file}: {name} is {value}, expected a number above 0")
     named = [name for name, value in given.items() if value is not None]
     if rows.t is not None:
         if named:

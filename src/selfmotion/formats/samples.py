@@ -47,9 +47,6 @@ class MotionSamples:
                     f"rate is {rate} Hz, expected a number above {1.0 / motion.duration:.4g}, so "
                     f"that the motion of {motion.duration:.6g} s has samples"
                 )
-            count = int(np.floor(motion.duration * rate * (1.0 + 1e-12)))
-            t = np.round(np.arange(count + 1) / rate, _DIGITS)
-            if motion.duration - t[-1] > 0.5 * 10.0**-_DIGITS:
-                t = np.append(t, np.round(motion.duration, _DIGITS))
+            t = np.round(motion.sample_times(rate), _DIGITS)
         times = np.clip(motion.t[0] + t, motion.t[0], motion.t[-1])
         return cls(motion.joint_names, t, *(motion(times, order) for order in (0, 1, 2)))

@@ -9,9 +9,10 @@ from selfmotion.motion.null_motion import (
     RefinedNullMotion,
     TransportedFrame,
     resting_window,
+    transport,
 )
 from selfmotion.motion.sampling import Sampling
-from selfmotion.motion.trajectory import Trajectory
+from selfmotion.motion.trajectory import Trajectory, column_names
 
 __all__ = [
     "BSplineNullMotion",
@@ -23,5 +24,7 @@ __all__ = [
     "Sampling",
     "Trajectory",
     "TransportedFrame",
+    "column_names",
     "resting_window",
+    "transport",
 ]

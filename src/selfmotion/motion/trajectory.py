@@ -23,8 +23,15 @@ from selfmotion.motion.polynomials import differentiated, evaluated, inner_roots
 # What follows a joint's name in the header of the columns of its velocity and acceleration.
 _MANY = {"_velocity": "velocities", "_acceleration": "accelerations"}
 _RATES = tuple(_MANY)
+# A last sample as near to its end as this [s] is at its end.
+_MOMENT = 0.5e-9
 # More samples than this do not fit into memory, and no controller wants them.
 _MOST_SAMPLES = 1e7
+
+
+def column_names(joint_names: Sequence[str]) -> list[str]:
+    """Return what the columns of a motion's table are called: t, and each joint's q, q̇ and q̈."""
+    return ["t", *(name + ending for ending in ("", *_RATES) for name in joint_names)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,12 +212,12 @@ class Trajectory:
         chosen = pieces[:, some, joints]
         roots = inner_roots(differentiated(chosen))
         inner = evaluated(chosen, roots)
-        rows, t, values = [], np.empty((2, n)), np.empty((2, n))
+        t, values = np.empty((2, n)), np.empty((2, n))
         for joint in range(n):
             here = joints == joint
-            rows = [self.t[:-1], self.t[1:], (self.t[some] + steps[some] * roots)[:, here].ravel()]
+            when = [self.t[:-1], self.t[1:], (self.t[some] + steps[some] * roots)[:, here].ravel()]
             each = [ends[0, :, joint], ends[1, :, joint], inner[:, here].ravel()]
-            times, found = np.concatenate(rows), np.concatenate(each)
+            times, found = np.concatenate(when), np.concatenate(each)
             both = [int(np.argmin(found)), int(np.argmax(found))]
             t[:, joint], values[:, joint] = times[both], found[both]
         return t, values
@@ -279,13 +286,13 @@ class Trajectory:
         k, s = self._place(times)
         return evaluated(pieces[:, k], s[..., None])
 
-    def sample(self, rate: float) -> "Trajectory":
-        """Return the motion at `rate` samples per second [1/s], the last one at its end.
+    def sample_times(self, rate: float) -> Array:
+        """Return the times from the start [s] of `rate` samples per second, and of the end, (K,).
 
         Raises
         ------
         ValueError
-            The rate is not positive.
+            The rate is not positive, or gives too many samples.
         """
         rate = as_number(rate, "rate", above=0.0, error=ValueError)
         if self.duration * rate > _MOST_SAMPLES:
@@ -293,8 +300,20 @@ class Trajectory:
                 f"rate is {rate:g} samples per second, which are {self.duration * rate:.3g} in "
                 f"all; expected at most {_MOST_SAMPLES:g}"
             )
-        count = int(np.ceil(self.duration * rate - 1e-9))
-        t = np.minimum(self.t[0] + np.arange(count + 1) / rate, self.t[-1])
+        count = int(np.floor(self.duration * rate * (1.0 + 1e-12)))
+        t = np.arange(count + 1) / rate
+        return np.append(t, self.duration) if self.duration - t[-1] > _MOMENT else t
+
+    def sample(self, rate: float) -> "Trajectory":
+        """Return the motion at `rate` samples per second [1/s], the last one at its end.
+
+        Raises
+        ------
+        ValueError
+            The rate is not positive, or gives too many samples.
+        """
+        t = np.minimum(self.t[0] + self.sample_times(rate), self.t[-1])
+        t[-1] = self.t[-1]
         return Trajectory(t, self(t), self(t, 1), self.joint_names, self(t, 2))
 
     def _place(self, t: Array) -> tuple[npt.NDArray[np.intp], Array]:

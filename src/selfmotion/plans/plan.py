@@ -9,7 +9,7 @@ import numpy as np
 from selfmotion.basics import Array, CollisionError, PlanError, RobotError, as_path, write_csv
 from selfmotion.certificate import Certificate, Requirement, Tolerance
 from selfmotion.collision import Obstacle
-from selfmotion.motion import Trajectory
+from selfmotion.motion import Trajectory, column_names
 from selfmotion.path import Path
 from selfmotion.plans.archive import Archive
 from selfmotion.plans.problem import Problem
@@ -142,10 +142,8 @@ class Plan:
         They are called ``NAME``, ``NAME_velocity`` and ``NAME_acceleration``.
         """
         motion = self.trajectory
-        endings = ("", "_velocity", "_acceleration")
-        names = [name + ending for ending in endings for name in motion.joint_names]
         table = np.column_stack([motion.t, motion.q, motion.qd, motion(motion.t, 2)])
-        write_csv(as_path(file), ["t", *names], table)
+        write_csv(as_path(file), column_names(motion.joint_names), table)
 
     def figure(self) -> "Figure":
         """Return joint positions and velocities, manipulability and path error as a figure.

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, RobotError, as_number, nearest, read_only, shown
+from selfmotion.basics import RobotError, as_number, nearest, read_only, shown
 from selfmotion.robot.expansion import expand
 from selfmotion.robot.full_model import full_model, name_links
 from selfmotion.robot.held import locked_configuration
@@ -127,9 +127,11 @@ def load_robot(
         if not isinstance(given, Mapping | None):
             raise RobotError(f"{name} is {shown(given)}, expected a dict")
     touching: tuple[tuple[str, str], ...] = ()
+    published: Mapping[str, Any] = {}
     if isinstance(robot, str) and robot in NAMED_ARMS:
         arm = NAMED_ARMS[robot]
         urdf, frame, touching = _read_named(arm), tool or arm.tool, arm.touching
+        published = _published(robot)
     else:
         urdf = _read_file(Path(robot), arguments or {}, str(robot))
         frame = tool or _only_leaf(urdf)
@@ -139,7 +141,10 @@ def load_robot(
         offset = as_pose(tool_offset, f"{urdf.source}: tool_offset", RobotError)
         urdf, frame = with_tool_offset(urdf, frame, offset)
     built = build_robot(urdf, frame, lock or {})
-    acceleration, jerk = (_published(str(robot), kind, built) for kind in ("acceleration", "jerk"))
+    acceleration, jerk = (
+        read_only([published.get(kind, {}).get(joint, np.inf) for joint in built.joint_names])
+        for kind in ("acceleration", "jerk")
+    )
     return dataclasses.replace(
         built, touching=touching, acceleration_limit=acceleration, jerk_limit=jerk
     )
@@ -227,13 +232,13 @@ def rebuild_robot(
     )
 
 
-def _published(name: str, kind: str, robot: RobotModel) -> Array:
-    """Return the limits that the maker of a named arm publishes, (n,); inf where there is none."""
+def _published(name: str) -> Mapping[str, Any]:
+    """Return what the maker of a named arm publishes: limits by kind and joint."""
     import tomllib
 
     known = tomllib.loads((Path(__file__).parent / "limits.toml").read_text("utf-8"))
-    limits = known.get(name, {}).get(kind, {})
-    return read_only([limits.get(joint, np.inf) for joint in robot.joint_names])
+    limits: Mapping[str, Any] = known.get(name, {})
+    return limits
 
 
 def _read_file(path: Path, arguments: Mapping[str, str], given: str) -> Urdf:

@@ -1,6 +1,7 @@
 """Motions worth starting from, found by the global search over self-motions."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -68,37 +69,20 @@ def guides(
     is_curve = robot.redundancy(problem.task) == 1
     t = search_times(path, _FEWEST_OF_CURVES if is_curve else _FEWEST)
     step = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
-    bodies = [(model, distance + _MARGIN) for model, distance in asked.bodies]
-    rng = 0 if rng is None else rng
+    options: dict[str, Any] = {
+        "lower": asked.lower,
+        "upper": asked.upper,
+        "largest_step": step,
+        "bodies": [(model, distance + _MARGIN) for model, distance in asked.bodies],
+        "count": _COUNT,
+        "rng": 0 if rng is None else rng,
+        "progress": progress,
+    }
     if is_curve:
-        sequences = best_sequences(
-            robot,
-            path,
-            problem.task,
-            t,
-            lower=asked.lower,
-            upper=asked.upper,
-            largest_step=step,
-            bodies=bodies,
-            count=_COUNT,
-            rng=rng,
-            progress=progress,
-        )
+        sequences = best_sequences(robot, path, problem.task, t, **options)
     else:
-        sequences = sampled_sequences(
-            robot,
-            path,
-            problem.task,
-            t,
-            lower=asked.lower,
-            upper=asked.upper,
-            largest_step=step,
-            bodies=bodies,
-            weights=_weights(problem),
-            count=_COUNT,
-            rng=rng,
-            progress=progress,
-        )
+        weights = _weights(problem)
+        sequences = sampled_sequences(robot, path, problem.task, t, weights=weights, **options)
     return [SequenceGuide(sequence) for sequence in sequences]
 
 

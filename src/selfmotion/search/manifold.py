@@ -5,7 +5,8 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, RobotError
 from selfmotion.kernels import angle_kind
-from selfmotion.robot import RobotModel, null_basis
+from selfmotion.motion import transport
+from selfmotion.robot import RobotModel
 from selfmotion.search import kernels
 from selfmotion.task import Task
 
@@ -69,13 +70,7 @@ class Manifold:
 
     def carried_bases(self, q: Array) -> Array:
         """Return null-space bases along a motion (W, n), (W, n, r), each turned to the last one."""
-        robot, task = self.robot, self.task
-        bases = [null_basis(robot, task, q[0])]
-        for here in q[1:]:
-            basis = null_basis(robot, task, here)
-            left, _, right = np.linalg.svd(basis.T @ bases[-1])
-            bases.append(basis @ left @ right)
-        return np.array(bases)
+        return transport(np.array([self.robot.task_jacobian(here, self.task) for here in q]))
 
     def _check(self) -> None:
         lower, upper = self.robot.finite_limits()
