@@ -152,7 +152,7 @@ class StartVelocity(Constraint):
         if abs(asked[row] - twist[row]) > _NEAR_END:
             raise ProblemError(
                 f"the start velocity moves '{robot.tool}' at {asked[row]:.6g} m/s or rad/s in row "
-                f"'{task.row_names[row]}', but the path begins at {round(twist[row], 9):g}; give "
+                f"'{task.row_names[row]}', but the path begins at {round(twist[row], 9) + 0.0:g}; give "
                 f"the path that speed, or the arm another one"
             )
 
