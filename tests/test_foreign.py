@@ -75,6 +75,20 @@ def test_a_motion_without_velocities_takes_those_of_a_spline(
     assert code == 0
 
 
+def test_jumps_of_acceleration_pass_every_limit_of_jerk(plan: sm.Plan) -> None:
+    motion, loose = plan.trajectory.sample(200.0), sm.Tolerance(1e-5, 1e-5)
+    cubic = sm.Trajectory(motion.t, motion.q, motion.qd, motion.joint_names)
+    # So close together that its jumps are nothing that a controller sees.
+    assert plan.problem.certify(cubic, loose).verified
+    qd = motion.qd.copy()
+    qd[100] += 1e-4
+    cubic = sm.Trajectory(motion.t, motion.q, qd, motion.joint_names)
+    assert cubic.extremes(3)[1].max() < 0.1 * plan.robot.jerk_limit.min()
+    certificate = plan.problem.certify(cubic, loose)
+    assert not certificate.verified
+    assert "which no limited jerk does" in certificate.verdict
+
+
 def test_limits_and_obstacles_of_a_motion(plan: sm.Plan, seam: Path, tmp_path: Path) -> None:
     plan.to_csv(tmp_path / "motion.csv")
     asked = [tmp_path / "motion.csv", "--robot", "panda", "--path", seam]

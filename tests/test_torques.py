@@ -11,7 +11,7 @@ import yourdfpy
 import selfmotion as sm
 from conftest import PANDA_HOME, robot_named
 from selfmotion import testing
-from selfmotion.certificate import JointTorques
+from selfmotion.certificate import FinishedMotion, JointTorques
 from selfmotion.robot import Dynamics
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -158,6 +158,32 @@ def test_torques_are_kept_and_judged_at_all_times(panda: sm.RobotModel, tmp_path
     assert sm.load_plan(tmp_path / "plan.npz").certificate.verified
 
 
+def test_whole_turns_between_samples_hide_nothing(panda: sm.RobotModel) -> None:
+    # At a quarter, the half and three quarters of the way the arm stands upright each time.
+    upright = np.array([0.0, 0.0, 0.0, -0.1, 0.0, 0.1, 0.0])
+    turned = upright + 8.0 * np.pi * np.eye(7)[1]
+    speed = (turned - upright) / 100.0
+    at_ends = np.array([upright, turned]), np.array([speed, speed])
+    still = np.zeros((2, 7))
+    motion = sm.Trajectory(np.array([0.0, 100.0]), *at_ends, panda.joint_names, still)
+    dynamics, t = Dynamics(panda), np.linspace(0.0, 100.0, 4001)
+    needed = np.abs(dynamics.torques(motion(t), motion(t, 1), motion(t, 2))).max(axis=0)
+    assert needed[1] > 30.0
+    limit = np.full(7, 2.0 * needed.max())
+    assert JointTorques(dynamics, limit).judge(FinishedMotion(panda, motion)).kept
+    limit[1] = 0.5 * needed[1]
+    found = JointTorques(dynamics, limit).judge(FinishedMotion(panda, motion))
+    assert (found.kept, found.subject) == (False, panda.joint_names[1])
+    assert found.amount == pytest.approx(2.0, rel=1e-3)
+    # Too long a way to be looked at is not kept either, and it says so.
+    endless = sm.Trajectory(
+        motion.t, np.array([upright, upright + 1e6]), np.full((2, 7), 1e4), panda.joint_names, still
+    )
+    found = JointTorques(dynamics, limit).judge(FinishedMotion(panda, endless))
+    assert not found.kept
+    assert "check the motion in parts" in found.text
+
+
 def test_a_payload_that_is_too_heavy_is_refused(panda: sm.RobotModel) -> None:
     heavy = sm.JointTorqueLimits(payload=30.0)
     plan = sm.plan(circle(panda, constraints=[heavy]), max_evaluations=30)
@@ -168,9 +194,7 @@ def test_a_payload_that_is_too_heavy_is_refused(panda: sm.RobotModel) -> None:
     )
 
 
-def _finished(plan: sm.Plan):
-    from selfmotion.certificate import FinishedMotion
-
+def _finished(plan: sm.Plan) -> FinishedMotion:
     return FinishedMotion(plan.robot, plan.trajectory)
 
 

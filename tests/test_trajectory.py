@@ -86,6 +86,27 @@ def test_roots_of_polynomials_of_all_degrees() -> None:
         assert not found[degree:].any()
 
 
+def test_small_leading_coefficients_cost_no_digits() -> None:
+    # (s - 1/3) (s - 0.7) (1 + e s²): the companion matrix is then of size 1 / e.
+    for tiny in (1e-4, 1e-8, 1e-11):
+        low = np.array([0.7 / 3.0, -(0.7 + 1.0 / 3.0), 1.0])
+        coefficients = np.append(low, [0.0, 0.0]) + tiny * np.append([0.0, 0.0], low)
+        found = inner_roots(coefficients[:, None])[:, 0]
+        np.testing.assert_allclose(np.sort(found)[-2:], [1.0 / 3.0, 0.7], rtol=0, atol=1e-13)
+
+
+def test_jumps_of_acceleration_are_known() -> None:
+    motion, h = random_motion(quintic=False), 1e-9
+    inner = motion.t[1:-1]
+    expected = np.abs(motion(inner, 2) - motion(inner - h, 2))
+    times, jumps = motion.acceleration_jumps()
+    np.testing.assert_allclose(jumps, expected.max(axis=0), rtol=1e-6)
+    np.testing.assert_array_equal(times, inner[np.argmax(expected, axis=0)])
+    assert not random_motion(quintic=True).acceleration_jumps()[1].any()
+    single = random_motion(quintic=False, count=2)
+    assert not single.acceleration_jumps()[1].any()
+
+
 def test_a_motion_at_a_rate() -> None:
     motion = random_motion(quintic=True)
     dense = motion.sample(1000.0)

@@ -15,7 +15,7 @@ from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
 from selfmotion.plans import Plan, Problem, Report
 
-# Samples of a motion to begin with; doubled until the cubics between them hold the tolerance.
+# Samples of a motion to begin with; doubled until the quintics between them hold the tolerance.
 _FEWEST_STEPS, _MOST_DOUBLINGS = 64, 6
 
 
@@ -111,11 +111,10 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
         message=found.message,
         seconds=seconds,
     )
-    names = problem.robot.joint_names
     return Plan(
         problem=problem,
         trajectory=trajectory,
-        initial_trajectory=Trajectory(grid.nodes, *still.at(grid.nodes), names),
+        initial_trajectory=_smooth(problem, still, grid),
         coefficients=read_only([]),
         report=report,
         certificate=certificate,
@@ -149,11 +148,11 @@ def pseudo_inverse(problem: Problem) -> Motion:
 def _sampled(
     problem: Problem, motion: Motion, tolerance: Tolerance
 ) -> tuple[Trajectory, Certificate]:
-    """Return the motion as cubics, at as many samples as the tolerance needs."""
+    """Return the motion as quintics, at as many samples as the tolerance needs."""
     grid = Grid.aligned(problem.path.knots, _FEWEST_STEPS)
     before = np.inf
     for attempt in range(_MOST_DOUBLINGS + 1):
-        trajectory = Trajectory(grid.nodes, *motion.at(grid.nodes), problem.robot.joint_names)
+        trajectory = _smooth(problem, motion, grid)
         certificate = problem.certify(trajectory, tolerance)
         errors = certificate.position_error.value, certificate.rotation_error.value
         # An error that halving does not change is the motion's own, not that of its samples.
@@ -162,3 +161,9 @@ def _sampled(
         before = sum(errors)
         grid = grid.halved()
     return trajectory, certificate
+
+
+def _smooth(problem: Problem, motion: Motion, grid: Grid) -> Trajectory:
+    """Return the motion as quintics between the nodes of a grid."""
+    q, qd = motion.at(grid.nodes)
+    return Trajectory(grid.nodes, q, qd, problem.robot.joint_names, grid.derivative(qd))

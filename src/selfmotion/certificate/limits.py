@@ -10,6 +10,9 @@ from selfmotion.certificate.findings import Finding
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.robot import RobotModel
 
+# A jump of acceleration counts as one within this time [s]: no controller looks closer.
+_INSTANT = 1e-6
+
 LIMIT_NAMES = (
     "joint position limits",
     "joint velocity limits",
@@ -75,10 +78,27 @@ class JointLimits(Requirement):
             side, joint = np.unravel_index(int(np.argmax(shares)), shares.shape)
             amount, allowed = float(shares[side, joint]), 1.0
             kept = bool(amount <= 1.0)
+            jump = self._jump(motion) if self.order == 3 and kept else None
+            if jump is not None:
+                return jump
         time = float(times[side, joint])
         name = motion.robot.joint_names[int(joint)]
         text = _TEXTS[self.order](name, amount, time)
         return Finding(self.name, name, time, amount, allowed, kept, text)
+
+    def _jump(self, motion: FinishedMotion) -> Finding | None:
+        """Return the worst jump of q̈ that no limited jerk makes, if there is one."""
+        times, jumps = motion.trajectory.acceleration_jumps()
+        shares = jumps / (_INSTANT * self.upper)
+        joint = int(np.argmax(shares))
+        if shares[joint] <= 1.0:
+            return None
+        name, time = motion.robot.joint_names[joint], float(times[joint])
+        text = (
+            f"the acceleration of joint '{name}' jumps by {jumps[joint]:.4g} at t = {time:.3f} s, "
+            f"which no limited jerk does: give the motion's accelerations as well, or more samples"
+        )
+        return Finding(self.name, name, time, float(shares[joint]), 1.0, False, text)
 
 
 def arm_limits(robot: RobotModel, requirements: Sequence[Requirement]) -> tuple[JointLimits, ...]:

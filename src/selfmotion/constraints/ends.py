@@ -150,9 +150,10 @@ class StartVelocity(Constraint):
         twist = task.select(path.twist(0.0)[:, None], robot.pose(start).rotation)[:, 0]
         row = int(np.argmax(np.abs(asked - twist)))
         if abs(asked[row] - twist[row]) > _NEAR_END:
+            begins = round(float(twist[row]), 9) + 0.0
             raise ProblemError(
                 f"the start velocity moves '{robot.tool}' at {asked[row]:.6g} m/s or rad/s in row "
-                f"'{task.row_names[row]}', but the path begins at {round(twist[row], 9) + 0.0:g}; give "
+                f"'{task.row_names[row]}', but the path begins at {begins:g}; give "
                 f"the path that speed, or the arm another one"
             )
 

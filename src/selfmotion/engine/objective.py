@@ -233,8 +233,8 @@ class Objective:
         self._run(x)
         before = self.rollout.jacobian_evaluations
         t, q, qd = self.rollout.polished()
-        qdd = self.grid.sampling.differentiation(1)[self.grid.node_stages] @ qd
-        trajectory = Trajectory(t, q, qd, self.rollout.robot.joint_names, qdd)
+        names = self.rollout.robot.joint_names
+        trajectory = Trajectory(t, q, qd, names, self.grid.derivative(qd))
         self.counts.jacobians += self.rollout.jacobian_evaluations - before
         return Evaluation(x.copy(), dict(self._terms), trajectory, self.rollout.damped)
 

@@ -70,6 +70,10 @@ class Grid:
         """The stages as samples of a motion."""
         return Sampling(self.stage_times, self.weights, self.node_stages)
 
+    def derivative(self, values: Array) -> Array:
+        """Return the derivative at the nodes of what has these values (N + 1, n) there."""
+        return np.asarray(self.sampling.differentiation(1)[self.node_stages] @ values)
+
     @cached_property
     def weights(self) -> Array:
         """Weights (S,) that integrate a function of the stages over time [s].

@@ -12,6 +12,8 @@ from selfmotion.basics import Array
 _NOTHING = 1e-13
 # Roots with a smaller imaginary part are real ones, or two that rounding keeps apart.
 _REAL = 1e-6
+# How far outside a root is still looked at, and Newton's steps that it gets.
+_NEAR, _STEPS = 1e-3, 3
 
 
 def evaluated(coefficients: Array, s: Array) -> Array:
@@ -55,7 +57,24 @@ def inner_roots(coefficients: Array) -> Array:
     rest = scaled[:, ~lower]
     found = _all_roots(rest / rest[-1])
     real = np.where(np.abs(found.imag) <= _REAL, found.real, 0.0)
+    real = _polished(rest, np.where((real > -_NEAR) & (real < 1.0 + _NEAR), real, 0.0))
     roots[:, ~lower] = np.where((real > 0.0) & (real < 1.0), real, 0.0)
+    return roots
+
+
+def _polished(coefficients: Array, roots: Array) -> Array:
+    """Return roots (m, M), but for zeros, after Newton's steps that make |p| smaller.
+
+    Small leading coefficients cost the companion matrix digits.
+    """
+    slopes = differentiated(coefficients)
+    value = evaluated(coefficients, roots)
+    for _ in range(_STEPS):
+        slope = evaluated(slopes, roots)
+        moved = roots - value / np.where(slope == 0.0, np.inf, slope)
+        there = evaluated(coefficients, moved)
+        better = (np.abs(there) < np.abs(value)) & (roots != 0.0)
+        roots, value = np.where(better, moved, roots), np.where(better, there, value)
     return roots
 
 

@@ -222,6 +222,18 @@ class Trajectory:
             t[:, joint], values[:, joint] = times[both], found[both]
         return t, values
 
+    def acceleration_jumps(self) -> tuple[Array, Array]:
+        """Return when q̈ of each joint jumps most, and by how much, (n,) each [s], [rad or m/s²].
+
+        Quintics do not jump, cubics do at their samples.
+        """
+        pieces = self._pieces(2)
+        jumps = np.abs(pieces[0, 1:] - pieces[:, :-1].sum(axis=0))
+        if self.qdd is not None or not len(jumps):
+            return np.full(self.q.shape[1], self.t[0]), np.zeros(self.q.shape[1])
+        worst = np.argmax(jumps, axis=0)
+        return self.t[1 + worst], jumps[worst, np.arange(jumps.shape[1])]
+
     def travelled(self, t: Array) -> Array:
         """Return the way that each joint has made by times (K,), (K, n) [rad or m]: ∫ |q̇| dt.
 
