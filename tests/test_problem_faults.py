@@ -91,6 +91,30 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     assert "--set is 'a', expected KEY=VALUE" in complaint("plan", file, "--set", "a")
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.json", '{"a": 1, "a": 2}', "key 'a' is given twice; keep one"),
+        ("a.yaml", "a: 1\na: 2\n", "key 'a' is given twice; keep one"),
+        ("a.toml", "a = 1\na = 2\n", "is not TOML"),
+        ("a.json", '{"a": ' + "[" * 100_000, "is not JSON: maximum recursion"),
+        ("a.toml", "a = " + "[" * 50_000, "is not TOML: maximum recursion"),
+        # The C library would end the process.
+        ("a.yaml", "a: " + "[" * 100_000, "line 1: more than 50 tables or lists lie in each other"),
+        ("a.yaml", "a: &x [1]\nb: [*x, *x]", "line 2: '*x' stands for something else"),
+        ("a.yaml", "[a]: 1", "unhashable key"),
+        ("a.yaml", "a: !!python/object:os.system 1", "could not determine a constructor"),
+        ("a.yaml", "a: 2026-13-45", "month must be in 1..12"),
+        ("a.toml", "a = " + "1" * 5000, "Exceeds the limit"),
+    ],
+)  # fmt: skip
+def test_documents_that_mislead_or_exhaust(tmp_path: Path, name: str, text: str, said: str) -> None:
+    with pytest.raises(sm.FileFormatError) as refused:
+        read_document(written(tmp_path, text, name))
+    assert said in str(refused.value)
+    assert name in str(refused.value)
+
+
 def test_degrees_are_refused_for_joints_that_slide(tmp_path: Path) -> None:
     text = 'robot = { name = "tiago" }\nstart_deg = [1,2,3,4,5,6,7,8]\ntask = "position"\n'
     file = written(tmp_path, text + 'path = { kind = "line", by = [0, 0, 0.1], duration = 1 }')

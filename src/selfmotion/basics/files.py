@@ -138,8 +138,15 @@ def read_rows(file: Path) -> tuple[list[str], Array, list[int]]:
                 f"{file}: line {number} has {len(cells)} values, expected {len(names)}"
             )
         try:
-            rows.append([float(cell) for cell in cells])
+            rows.append([_number(cell) for cell in cells])
             numbers.append(number)
         except ValueError as error:
             raise FileFormatError(f"{file}: line {number}: {error}") from error
     return names, np.array(rows, dtype=np.float64).reshape(-1, len(names)), numbers
+
+
+def _number(cell: str) -> float:
+    """Return the number in a cell; Python's 1_0 is none."""
+    if "_" in cell:
+        raise ValueError(f"could not convert string to float: {cell.strip()!r}")
+    return float(cell)

@@ -3,7 +3,7 @@
 import json
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from pathlib import Path
 from typing import IO, Any
 
@@ -15,6 +15,8 @@ PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "start", "upper")
 ANGLES = frozenset(("band", "corner_angle", "margin", "rotation_vector", "rpy", *PER_JOINT))
 _SIZES = ("length", "radius", "size")
 LENGTHS = frozenset(("band", "by", "center", "distance", "jump", "position", "positions", *_SIZES))
+# Tables or lists in each other; files of the trade have less than ten.
+_DEEPEST = 50
 _SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}
 
 
@@ -42,12 +44,12 @@ def _parse(file: Path, text: str) -> Any:
         case ".toml":
             try:
                 return tomllib.loads(text)
-            except tomllib.TOMLDecodeError as error:
+            except (ValueError, RecursionError) as error:
                 raise FileFormatError(f"{file}: is not TOML: {error}") from error
         case ".json":
             try:
-                return json.loads(text)
-            except ValueError as error:
+                return json.loads(text, object_pairs_hook=_without_twins)
+            except (ValueError, RecursionError) as error:
                 raise FileFormatError(f"{file}: is not JSON: {error}") from error
         case ".yaml" | ".yml":
             return _parse_yaml(file, text)
@@ -58,11 +60,52 @@ def _parse_yaml(file: Path, text: str) -> Any:
     import yaml
 
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+    class Loader(loader):  # type: ignore[misc, valid-type]  # its base is known when it runs
+        """Reads what the safe one does, but neither keys given twice nor what stands for others."""
+
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            keys = [self.construct_object(key) for key, _ in node.value]
+            _without_twins([(key, None) for key in keys if isinstance(key, Hashable)])
+            return super().construct_mapping(node, deep=deep)
+
     try:
+        _check_events(file, yaml.parse(text, Loader=loader))
         # `ros2 topic echo` ends each message with a line of its own.
-        return next(iter(yaml.load_all(text, Loader=loader)), None)
-    except yaml.YAMLError as error:
+        return next(iter(yaml.load_all(text, Loader=Loader)), None)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise FileFormatError(f"{file}: is not YAML: {' '.join(str(error).split())}") from error
+
+
+def _without_twins(pairs: list[tuple[Any, Any]]) -> dict[Any, Any]:
+    """Return a table of its keys and values; ValueError if a key is there twice."""
+    table: dict[Any, Any] = {}
+    for key, value in pairs:
+        if key in table:
+            raise ValueError(f"key '{key}' is given twice; keep one")
+        table[key] = value
+    return table
+
+
+def _check_events(file: Path, events: Iterable[Any]) -> None:
+    """Refuse what a small file can use up a machine with, before anything is built of it."""
+    import yaml
+
+    depth = 0
+    for event in events:
+        mark: Any = event.start_mark
+        if isinstance(event, yaml.AliasEvent):
+            raise FileFormatError(
+                f"{file}: line {mark.line + 1}: '*{event.anchor}' stands for something "
+                f"else, expected it written out"
+            )
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            raise FileFormatError(
+                f"{file}: line {mark.line + 1}: more than {_DEEPEST} tables or lists "
+                f"lie in each other"
+            )
 
 
 def write_document(file: Path, document: Mapping[str, Any]) -> None:
