@@ -297,7 +297,8 @@ def test_of_two_constraints_of_a_kind_both_are_judged(
     panda_circle: Circle, tight_first: bool
 ) -> None:
     """Whatever their order: the loose one does not stand in for the tight one."""
-    tight, loose = sm.JointAccelerationLimits(0.01), sm.JointAccelerationLimits(100.0)
+    tight = sm.JointAccelerationLimits(0.01)
+    loose = sm.JointAccelerationLimits(100.0, replace=True)
     pair = (tight, loose) if tight_first else (loose, tight)
     free = sm.plan(panda_circle())
     asked = dataclasses.replace(free.problem, constraints=(*LIMITS, *pair))

@@ -143,8 +143,8 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0]]
 
 def test_corners_stop_rests_at_kinks_and_keeps_the_legs() -> None:
     path = sm.Waypoints([0, 1, 2, 3, 4], SQUARE, corners="stop")
-    np.testing.assert_array_equal(path.corner_times, [1.0, 3.0])
-    np.testing.assert_allclose(path.samples([1.0, 3.0]).twist, 0.0, atol=1e-12)
+    np.testing.assert_array_equal(path.corner_times, [0.0, 1.0, 3.0, 4.0])
+    np.testing.assert_allclose(path.samples(path.corner_times).twist, 0.0, atol=1e-12)
     assert np.linalg.norm(path.twist(2.0)) > 0.5
     early = path.samples(np.linspace(0, 1, 20)).translation
     np.testing.assert_allclose(early[:, 1:], 0.0, atol=1e-12)

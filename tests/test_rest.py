@@ -151,3 +151,39 @@ def test_start_velocities_that_contradict_the_path(panda, start, qd, message: st
             start=start,
             constraints=[sm.StartVelocity(qd)],
         )
+
+
+def test_a_motion_in_two_parts_is_handed_over_without_a_jump(panda: sm.RobotModel) -> None:
+    whole = sm.plan(sm.Problem(panda, circle(panda, PANDA_HOME), start=PANDA_HOME))
+    now = 0.3 * whole.path.duration
+    q, qd, qdd = (whole.trajectory(now, order) for order in (0, 1, 2))
+    # What is left of the path, by twists.
+    rest = sm.TwistPath(
+        panda.pose(q), lambda t: whole.path.twist(now + t), whole.path.duration - now
+    )
+    constraints = [sm.JointVelocityLimits(), sm.StartVelocity(qd), sm.StartAcceleration(qdd)]
+    plan = sm.plan(sm.Problem(panda, rest, start=q, constraints=constraints))
+    assert plan.certificate.verified, plan.certificate.verdict
+    # The first part is on the path between its samples up to this only.
+    np.testing.assert_allclose(plan.trajectory(0.0, 1), qd, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(plan.trajectory(0.0, 2), qdd, rtol=0, atol=1e-4)
+    free = sm.plan(sm.Problem(panda, rest, start=q, constraints=constraints[:2]))
+    assert np.abs(free.trajectory(0.0, 2) - qdd).max() > 2e-4
+    judged = sm.certify(
+        panda, rest, "pose", free.trajectory, None, [constraints[2].requirement(panda)]
+    )
+    assert "starts with an acceleration" in judged.verdict
+
+
+def test_an_arm_at_rest_ends_with_the_acceleration_that_is_asked_for(panda: sm.RobotModel) -> None:
+    own = np.linalg.svd(panda.task_jacobian(PANDA_HOME, "pose"))[2][-1]
+    path = circle(panda, PANDA_HOME)
+    start = sm.StartAcceleration(0.05 * own)
+    plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=[start]))
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert np.abs(plan.trajectory.qd[0]).max() <= REST
+    np.testing.assert_allclose(plan.trajectory(0.0, 2), 0.05 * own, rtol=0, atol=1e-4)
+    last = sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=[sm.EndAcceleration()]))
+    assert last.certificate.verified, last.certificate.verdict
+    with pytest.raises(sm.ProblemError, match="needs a given start"):
+        sm.Problem(panda, path, constraints=[start])

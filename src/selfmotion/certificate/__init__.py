@@ -2,15 +2,18 @@
 
 from selfmotion.certificate.apart import KeepsApart
 from selfmotion.certificate.check import certify
-from selfmotion.certificate.ends import AtRest, ClosedMotion, EndState
+from selfmotion.certificate.ends import QUANTITIES, AtRest, ClosedMotion, EndState
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import LIMIT_NAMES, JointLimits, arm_limits
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
+from selfmotion.certificate.tool import TOOL_RATES, ToolMotion, tool_sizes
 from selfmotion.certificate.torques import JointTorques
 from selfmotion.certificate.verdict import Certificate
 
 __all__ = [
     "LIMIT_NAMES",
+    "QUANTITIES",
+    "TOOL_RATES",
     "AtRest",
     "Certificate",
     "ClosedMotion",
@@ -24,6 +27,8 @@ __all__ = [
     "KeepsApart",
     "Requirement",
     "Tolerance",
+    "ToolMotion",
     "arm_limits",
     "certify",
+    "tool_sizes",
 ]

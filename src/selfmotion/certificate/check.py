@@ -12,7 +12,7 @@ from selfmotion.certificate.path_error import bound_errors
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.certificate.verdict import Certificate
 from selfmotion.motion import Trajectory
-from selfmotion.path import Path
+from selfmotion.path import Path, check_oriented
 from selfmotion.robot import RobotModel
 from selfmotion.task import DampingLaw, Relaxation, Task
 
@@ -59,9 +59,12 @@ def certify(
         The trajectory is of other joints.
     ProblemError
         A requirement is none, or returns no finding.
+    PathError
+        The task prescribes orientations, but the path has none.
     """
     _check_arguments(robot, path, trajectory)
     tolerance, task = Tolerance.of(tolerance), Task.of(task)
+    check_oriented(path, task)
     trajectory = trajectory.of_joints(robot.joint_names)
     motion = FinishedMotion(robot, trajectory)
     path_check = bound_errors(robot, path, task, trajectory, tolerance, relaxations)

@@ -8,19 +8,23 @@ from selfmotion.basics import Array
 from selfmotion.certificate.findings import Finding
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 
+# Of orders 0 to 2.
+QUANTITIES = ("configuration", "velocity", "acceleration")
 # What closed paths, end configurations and end velocities may miss by [rad or m, per s].
 ARRIVED = 1e-6
+# Likewise of accelerations [rad/s² or m/s²], which are differences of velocities.
+_ACCELERATED = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class EndState(Requirement):
-    """q(T) (order 0) or q̇(T) (order 1) is the one asked for, or that at the start.
+    """q(T) (order 0), q̇(T) (order 1) or q̈(T) (order 2) is the one asked for, or at the start.
 
     Attributes
     ----------
-    order : {0, 1}
+    order : {0, 1, 2}
     target : (n,)
-        [rad or m], per s for order 1.
+        [rad or m] per s^order.
     at_start : bool
     """
 
@@ -31,15 +35,14 @@ class EndState(Requirement):
     @property
     def name(self) -> str:  # type: ignore[override]  # it follows from the order
         """See `Requirement.name`."""
-        quantity = ("configuration", "velocity")[self.order]
-        return f"{'start' if self.at_start else 'end'} {quantity}"
+        return f"{'start' if self.at_start else 'end'} {QUANTITIES[self.order]}"
 
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: the joint that misses most."""
         row = 0 if self.at_start else -1
-        end = (motion.trajectory.q, motion.trajectory.qd)[self.order][row]
-        words = ("away from where it should", "off the one asked for")[self.order]
-        return _miss(self.name, motion, end - self.target, self.order, words, row)
+        reached = motion.trajectory(motion.trajectory.t[row], self.order)
+        words = "off the one asked for" if self.order else "away from where it should"
+        return _miss(self.name, motion, reached - self.target, self.order, words, row)
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,8 @@ def _miss(
     size = np.abs(miss)
     worst = int(np.argmax(size))
     joint, amount = motion.robot.joint_names[worst], float(size[worst])
-    with_velocity = " with a velocity" if order else ""
-    text = f"joint '{joint}' {'ends' if row else 'starts'}{with_velocity} {amount:.2e} {words}"
+    what = f" with {'an' if order == 2 else 'a'} {QUANTITIES[order]}" if order else ""
+    text = f"joint '{joint}' {'ends' if row else 'starts'}{what} {amount:.2e} {words}"
     time = float(motion.trajectory.t[row])
-    return Finding(name, joint, time, amount, ARRIVED, bool(amount <= ARRIVED), text)
+    allowed = _ACCELERATED if order == 2 else ARRIVED
+    return Finding(name, joint, time, amount, allowed, bool(amount <= allowed), text)

@@ -63,6 +63,7 @@ def plan(
     jump: options.JumpOption = None,
     frame: options.FrameOption = None,
     corners: options.CornersOption = "blend",
+    corner_tolerance: options.CornerToleranceOption = None,
     task: options.TaskOption = "pose",
     relax: options.RelaxOption = None,
     start: options.StartOption = None,
@@ -74,6 +75,7 @@ def plan(
     cost: options.CostOption = None,
     velocity: options.VelocityOption = None,
     acceleration: options.AccelerationOption = None,
+    joint_limits: options.JointLimitsOption = None,
     closed: options.ClosedOption = False,
     obstacles: options.ObstaclesOption = None,
     clearance: options.ClearanceOption = 0.0,
@@ -138,6 +140,7 @@ def check(
     file: options.CheckedArgument,
     robot: options.RobotOption = None,
     path: options.PathOption = None,
+    feed: options.FeedOption = None,
     corners: options.CornersOption = "blend",
     task: options.TaskOption = "pose",
     tool: options.ToolOption = None,
@@ -145,6 +148,7 @@ def check(
     degrees: options.DegreesOption = False,
     velocity: options.VelocityOption = None,
     acceleration: options.AccelerationOption = None,
+    joint_limits: options.JointLimitsOption = None,
     obstacles: options.ObstaclesOption = None,
     clearance: options.ClearanceOption = 0.0,
     srdf: options.SrdfOption = None,
@@ -162,11 +166,13 @@ def check(
         arm = sm.load_robot(robot, tool=tool, lock=options.locks(lock or []))
         certificate = sm.certify(
             arm,
-            formats.read_path(path, corners=corners),
+            formats.read_path(path, feed=feed, corners=corners),
             task,
             sm.read_motion(file, degrees=degrees),
             sm.Tolerance(tolerance, tolerance),
-            options.requirements(arm, velocity, acceleration, obstacles, clearance, srdf),
+            options.requirements(
+                arm, velocity, acceleration, joint_limits, obstacles, clearance, srdf
+            ),
         )
     if as_json:
         _console.print_json(data=tables.certificate_json(certificate))
@@ -209,6 +215,13 @@ def export(
         else:
             verified = verified and saved.certificate.verified
             _console.print(f"wrote {target}", markup=False, soft_wrap=True)
+    miss = formats.linear_miss(saved, rate)
+    _console.print(
+        f"joined by straight lines, the samples stay within {miss.position:.2g} m and "
+        f"{miss.rotation:.2g} rad of the motion; --rate {miss.rate:.0f} keeps the plan's tolerance",
+        markup=False,
+        soft_wrap=True,
+    )
     raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
 
 

@@ -27,6 +27,7 @@ class Shell:
     jump: float | None
     frame: str | None
     corners: str
+    corner_tolerance: float | None
     task: str
     start: str | None
     warm: Path | None
@@ -37,6 +38,7 @@ class Shell:
     cost: list[str]
     velocity: str | None
     acceleration: str | None
+    joint_limits: Path | None
     closed: bool
     obstacles: Path | None
     clearance: float
@@ -69,6 +71,8 @@ class Shell:
             "damping": self.damped,
             "collision": not self.no_collision,
         }
+        if self.joint_limits is not None:
+            table["joint_limits"] = str(self.joint_limits)
         if self.tool is not None:
             table["robot"]["tool"] = self.tool
         return table
@@ -84,19 +88,26 @@ class Shell:
         if sum(option is not None for option in (self.path, self.circle, self.line)) != 1:
             raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
         if self.path is not None:
-            given = {"feed": self.feed, "duration": self.duration, "jump": self.jump}
+            given = {
+                "feed": self.feed,
+                "duration": self.duration,
+                "jump": self.jump,
+                "tolerance": self.corner_tolerance,
+            }
             frame = {} if self.frame is None else {"frame": options.pose(self.frame, "--frame")}
             return {"kind": "file", "file": str(self.path), "corners": self.corners, **frame} | {
                 key: value for key, value in given.items() if value is not None
             }
-        if self.feed is not None or self.frame is not None:
-            raise sm.ProblemError("--feed and --frame are for --path; a shape has a --duration")
-        duration = 4.0 if self.duration is None else self.duration
+        if self.frame is not None:
+            raise sm.ProblemError("--frame is for --path; a shape begins where the arm stands")
+        if self.feed is not None and self.duration is not None:
+            raise sm.ProblemError("give the pace by one of --feed and --duration")
+        pace = {"feed": self.feed} if self.feed is not None else {"duration": self.duration or 4.0}
         if self.circle is not None:
             axis = [float(self.normal == name) for name in "xyz"]
-            return {"kind": "circle", "radius": self.circle, "normal": axis, "duration": duration}
+            return {"kind": "circle", "radius": self.circle, "normal": axis, **pace}
         by = options.numbers(self.line or "", "--line", 3).tolist()
-        return {"kind": "line", "by": by, "duration": duration}
+        return {"kind": "line", "by": by, **pace}
 
     def _costs(self) -> list[dict[str, Any]]:
         costs = [_cost(text) for text in self.cost] or [{"kind": "JointVelocity"}]

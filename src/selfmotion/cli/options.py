@@ -12,7 +12,7 @@ from selfmotion import formats
 from selfmotion.basics import Array
 
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
-Corners = Literal["blend", "stop"]
+Corners = Literal["blend", "stop", "round"]
 Axis = Literal["x", "y", "z"]
 SearchMode = Literal["auto", "local", "global"]
 
@@ -39,7 +39,8 @@ DurationOption = Annotated[
     typer.Option(help="Of circle or line (s; 4 by default), or of poses without times."),
 ]
 FeedOption = Annotated[
-    float | None, typer.Option(help="Tool speed along poses without times (m/s).")
+    float | None,
+    typer.Option(help="Constant tool speed from rest to rest (m/s), for poses without times."),
 ]
 JumpOption = Annotated[
     float | None,
@@ -49,7 +50,17 @@ FrameOption = Annotated[
     str | None,
     typer.Option(help="Pose of the frame that --path is in: x,y,z,roll,pitch,yaw (m, rad)."),
 ]
-CornersOption = Annotated[Corners, typer.Option(help="At kinks of the waypoints.")]
+CornersOption = Annotated[
+    Corners,
+    typer.Option(
+        help="At kinks of --path: swing through the pose, stop there, or, with --feed, round the "
+        "corner between straight legs."
+    ),
+]
+CornerToleranceOption = Annotated[
+    float | None,
+    typer.Option(help="Distance from rounded corners (m; 0.001 by default).", min=1e-6),
+]
 TaskOption = Annotated[TaskName, typer.Option(help="What the path prescribes.")]
 RelaxOption = Annotated[
     list[str] | None,
@@ -137,6 +148,10 @@ VelocityOption = Annotated[
 AccelerationOption = Annotated[
     str | None, typer.Option(help="Acceleration limits (rad/s² or m/s²), likewise.")
 ]
+JointLimitsOption = Annotated[
+    Path | None,
+    typer.Option(help="Limits of joints in MoveIt's joint_limits.yaml, besides the arm's own."),
+]
 ObstaclesOption = Annotated[
     Path | None,
     typer.Option(help="Obstacles: a list of shapes in JSON, or TOML with [[obstacles]]."),
@@ -204,6 +219,7 @@ def requirements(
     robot: sm.RobotModel,
     velocity: str | None,
     acceleration: str | None,
+    joint_limits: Path | None,
     obstacles: Path | None,
     clearance: float,
     srdf: Path | None,
@@ -214,6 +230,8 @@ def requirements(
         asked.append(sm.JointVelocityLimits(one_or_each(velocity, "--velocity")))
     if acceleration is not None:
         asked.append(sm.JointAccelerationLimits(one_or_each(acceleration, "--acceleration")))
+    if joint_limits is not None:
+        asked += formats.read_joint_limits(joint_limits, robot)
     if obstacles is not None or clearance > 0.0 or srdf is not None:
         bodies = () if obstacles is None else read_obstacles(obstacles)
         asked.append(sm.Clearance(bodies, clearance, srdf))

@@ -7,7 +7,14 @@ from selfmotion.constraints.base import (
     easing_of,
 )
 from selfmotion.constraints.clearance import Clearance
-from selfmotion.constraints.ends import ClosedPath, EndConfiguration, EndVelocity, StartVelocity
+from selfmotion.constraints.ends import (
+    ClosedPath,
+    EndAcceleration,
+    EndConfiguration,
+    EndVelocity,
+    StartAcceleration,
+    StartVelocity,
+)
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.constraints.limits import (
     JointAccelerationLimits,
@@ -15,6 +22,7 @@ from selfmotion.constraints.limits import (
     JointPositionLimits,
     JointVelocityLimits,
 )
+from selfmotion.constraints.tool import ToolLimits
 from selfmotion.constraints.torque import JointTorqueLimits
 
 __all__ = [
@@ -22,6 +30,7 @@ __all__ = [
     "Clearance",
     "ClosedPath",
     "Constraint",
+    "EndAcceleration",
     "EndConfiguration",
     "EndVelocity",
     "Envelope",
@@ -31,6 +40,8 @@ __all__ = [
     "JointTorqueLimits",
     "JointVelocityLimits",
     "NodeTangents",
+    "StartAcceleration",
     "StartVelocity",
+    "ToolLimits",
     "easing_of",
 ]

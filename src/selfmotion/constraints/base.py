@@ -62,10 +62,13 @@ class Constraint(Saved, ABC, family="constraint"):
     sets_velocity : (bool, bool)
         Whether it says how fast the arm is at the start and at the end of the motion, which else
         is at rest where the tool is.
+    sets_acceleration : (bool, bool)
+        Likewise whether it says how the arm accelerates there.
     """
 
     pins: ClassVar[tuple[bool, bool]] = (False, False)
     sets_velocity: ClassVar[tuple[bool, bool]] = (False, False)
+    sets_acceleration: ClassVar[tuple[bool, bool]] = (False, False)
 
     @abstractmethod
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundConstraint":

@@ -8,6 +8,7 @@ the reference, and so are two velocities with the same tool velocity; the residu
 the integration leaves of the path error.
 """
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -15,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, as_flag, per_joint, read_only
-from selfmotion.certificate import ClosedMotion, EndState
+from selfmotion.certificate import QUANTITIES, ClosedMotion, EndState
 from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
 from selfmotion.costs import Samples
 from selfmotion.path import STILL, Path
@@ -69,8 +70,42 @@ class EndConfiguration(Constraint):
         """See `Constraint.on_part`: the part ends elsewhere."""
 
 
+class _EndRate(Constraint):
+    """What velocities and accelerations at one end share."""
+
+    order: ClassVar[int]
+    at_start: ClassVar[bool]
+
+    @property
+    @abstractmethod
+    def asked(self) -> npt.ArrayLike:
+        """What is asked for, (n,) or one number."""
+
+    @property
+    def _name(self) -> str:
+        return f"{'start' if self.at_start else 'end'} {QUANTITIES[self.order]}"
+
+    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
+        """See `Constraint.bind`."""
+        null = null_basis(robot, task, start if self.at_start else end)
+        row = 0 if self.at_start else -1
+        return BoundEnd(self._name, (self.order,), self.target(robot), null, row)
+
+    def requirement(self, robot: RobotModel) -> EndState:
+        """See `Constraint.requirement`."""
+        return EndState(self.order, self.target(robot), self.at_start)
+
+    def target(self, robot: RobotModel) -> Array:
+        """Return what is asked for of an arm, (n,) [rad or m, per s^order]."""
+        return per_joint(self.asked, robot.dof, f"{robot.name}: {self._name}")
+
+    def on_part(self) -> Constraint | None:
+        """See `Constraint.on_part`: a part begins as the whole, but ends elsewhere."""
+        return self if self.at_start else None
+
+
 @dataclass(frozen=True, eq=False)
-class EndVelocity(Constraint):
+class EndVelocity(_EndRate):
     """The motion ends with a joint velocity; 0 for rest.
 
     The tool's rows of it have to be those of the path's end: for rest, the path has to end at rest.
@@ -81,18 +116,17 @@ class EndVelocity(Constraint):
         q̇(T) [rad/s or m/s].
     """
 
+    order: ClassVar[int] = 1
+    at_start: ClassVar[bool] = False
     pins: ClassVar[tuple[bool, bool]] = (False, True)
     sets_velocity: ClassVar[tuple[bool, bool]] = (False, True)
 
     qd: npt.ArrayLike = 0.0
 
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
-        """See `Constraint.bind`."""
-        return BoundEnd("end velocity", (1,), self.target(robot), null_basis(robot, task, end))
-
-    def requirement(self, robot: RobotModel) -> EndState:
-        """See `Constraint.requirement`."""
-        return EndState(1, self.target(robot))
+    @property
+    def asked(self) -> npt.ArrayLike:
+        """See `_EndRate.asked`."""
+        return self.qd
 
     def check(self, robot: RobotModel, path: Path, task: Task) -> None:
         """See `Constraint.check`: a motion ends at rest only where its path does."""
@@ -108,16 +142,9 @@ class EndVelocity(Constraint):
                 f"another end velocity"
             )
 
-    def on_part(self) -> None:
-        """See `Constraint.on_part`: the part ends elsewhere."""
-
-    def target(self, robot: RobotModel) -> Array:
-        """Return q̇(T) (n,) for an arm."""
-        return per_joint(self.qd, robot.dof, f"{robot.name}: end velocity")
-
 
 @dataclass(frozen=True, eq=False)
-class StartVelocity(Constraint):
+class StartVelocity(_EndRate):
     """The motion begins with a joint velocity: that of an arm that moves already.
 
     Needs a given start, where the tool's rows of it have to be those of the path's start.
@@ -128,19 +155,17 @@ class StartVelocity(Constraint):
         q̇(0) [rad/s or m/s].
     """
 
+    order: ClassVar[int] = 1
+    at_start: ClassVar[bool] = True
     pins: ClassVar[tuple[bool, bool]] = (True, False)
     sets_velocity: ClassVar[tuple[bool, bool]] = (True, False)
 
     qd: npt.ArrayLike = 0.0
 
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
-        """See `Constraint.bind`."""
-        null = null_basis(robot, task, start)
-        return BoundEnd("start velocity", (1,), self.target(robot), null, row=0)
-
-    def requirement(self, robot: RobotModel) -> EndState:
-        """See `Constraint.requirement`."""
-        return EndState(1, self.target(robot), at_start=True)
+    @property
+    def asked(self) -> npt.ArrayLike:
+        """See `_EndRate.asked`."""
+        return self.qd
 
     def check_start(self, robot: RobotModel, path: Path, task: Task, start: Array | None) -> None:
         """See `Constraint.check_start`: the tool has to begin as the path does."""
@@ -157,9 +182,59 @@ class StartVelocity(Constraint):
                 f"the path that speed, or the arm another one"
             )
 
-    def target(self, robot: RobotModel) -> Array:
-        """Return q̇(0) (n,) for an arm."""
-        return per_joint(self.qd, robot.dof, f"{robot.name}: start velocity")
+
+@dataclass(frozen=True, eq=False)
+class StartAcceleration(_EndRate):
+    """The motion begins with a joint acceleration: with `StartVelocity`, the hand-over of an arm.
+
+    Its part that moves the tool has to be what the path and the velocity make of it. An arm that
+    is not said to move begins at rest.
+
+    Parameters
+    ----------
+    qdd : (n,) or 0
+        q̈(0) [rad/s² or m/s²].
+    """
+
+    order: ClassVar[int] = 2
+    at_start: ClassVar[bool] = True
+    pins: ClassVar[tuple[bool, bool]] = (True, False)
+    sets_acceleration: ClassVar[tuple[bool, bool]] = (True, False)
+
+    qdd: npt.ArrayLike = 0.0
+
+    @property
+    def asked(self) -> npt.ArrayLike:
+        """See `_EndRate.asked`."""
+        return self.qdd
+
+    def check_start(self, robot: RobotModel, path: Path, task: Task, start: Array | None) -> None:
+        """See `Constraint.check_start`: of a free start no acceleration is known."""
+        if start is None:
+            raise ProblemError("a start acceleration needs a given start (start=)")
+
+
+@dataclass(frozen=True, eq=False)
+class EndAcceleration(_EndRate):
+    """The motion ends with a joint acceleration; see `StartAcceleration`.
+
+    Parameters
+    ----------
+    qdd : (n,) or 0
+        q̈(T) [rad/s² or m/s²].
+    """
+
+    order: ClassVar[int] = 2
+    at_start: ClassVar[bool] = False
+    pins: ClassVar[tuple[bool, bool]] = (False, True)
+    sets_acceleration: ClassVar[tuple[bool, bool]] = (False, True)
+
+    qdd: npt.ArrayLike = 0.0
+
+    @property
+    def asked(self) -> npt.ArrayLike:
+        """See `_EndRate.asked`."""
+        return self.qdd
 
 
 @dataclass(frozen=True)
@@ -240,7 +315,7 @@ class BoundEnd:
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""
         order = self.orders[column // self.null.shape[1]]
-        quantity = ("configuration", "velocity")[order]
+        quantity = QUANTITIES[order]
         goal = "that of the start" if self.target is None else "the one asked for"
         miss = np.abs(self.residual(samples)).max()
         where = "end" if self.row else "start"

@@ -110,12 +110,14 @@ class _RateLimits(Constraint):
 
 
 class _MakersLimits(_RateLimits):
-    """Limits that no URDF gives: one's own, or else those that the maker publishes, if any."""
+    """Limits that no URDF gives: one's own, and those that the maker publishes, if any."""
 
     limit: npt.ArrayLike | None
+    replace: bool
 
     def __post_init__(self) -> None:
         _check_margin(self.margin)
+        as_flag(self.replace, "replace")
 
     @abstractmethod
     def published(self, robot: RobotModel) -> Array:
@@ -130,7 +132,8 @@ class _MakersLimits(_RateLimits):
         if self.limit is None:
             return self.published(robot)
         what = f"{robot.name}: {LIMIT_NAMES[self.order]}"
-        return per_joint(self.limit, robot.dof, what, positive=True)
+        own = per_joint(self.limit, robot.dof, what, positive=True)
+        return own if self.replace else read_only(np.minimum(own, self.published(robot)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,12 +178,15 @@ class JointAccelerationLimits(_MakersLimits):
         [rad/s² or m/s²]; by default those of the arm's maker, if known (URDFs give none).
     margin : float
         Share of the limit that is aimed to be left unused; at least half of it is.
+    replace : bool
+        Whether these stand in place of the maker's limits. By default both are kept.
     """
 
     order: ClassVar[int] = 2
 
     limit: npt.ArrayLike | None = None
     margin: float = 1e-2
+    replace: bool = False
 
     def published(self, robot: RobotModel) -> Array:
         """See `_MakersLimits.published`."""
@@ -197,12 +203,15 @@ class JointJerkLimits(_MakersLimits):
         [rad/s³ or m/s³]; by default those of the arm's maker, if known (URDFs give none).
     margin : float
         Share of the limit that is aimed to be left unused; at least half of it is.
+    replace : bool
+        Whether these stand in place of the maker's limits. By default both are kept.
     """
 
     order: ClassVar[int] = 3
 
     limit: npt.ArrayLike | None = None
     margin: float = 5e-2
+    replace: bool = False
 
     def published(self, robot: RobotModel) -> Array:
         """See `_MakersLimits.published`."""

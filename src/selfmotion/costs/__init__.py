@@ -11,6 +11,7 @@ from selfmotion.costs.joints import (
     PathLength,
     Posture,
 )
+from selfmotion.costs.limit_use import LimitUse
 from selfmotion.costs.manipulability import (
     DirectionalManipulability,
     InverseManipulability,
@@ -32,6 +33,7 @@ __all__ = [
     "JointLimitDistance",
     "JointVelocity",
     "KineticEnergy",
+    "LimitUse",
     "LostCost",
     "Manipulability",
     "OffPath",

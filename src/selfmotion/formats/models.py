@@ -140,14 +140,19 @@ _Fields = dict[str, tuple[Any, Any]]
 # Where a file says more, or says it otherwise, than the class's own signature.
 _LAWS: Any = Literal[tuple(law.value for law in TimeLaw)]
 _SHAPE: _Fields = {"frame": (Pose, None)}
+_PACED: _Fields = {"duration": (Number, None), "feed": (Number, None), **_SHAPE}
 _OWN: Mapping[str, _Fields] = {
     "circle": {"start": (Pose, None), "center": (Numbers, None), "radius": (Number, None),
-               "normal": (Numbers, [0.0, 0.0, 1.0]), **_SHAPE},
-    "line": {"start": (Pose, None), "end": (Pose, None), "by": (Numbers, None), **_SHAPE},
+               "normal": (Numbers, [0.0, 0.0, 1.0]), **_PACED},
+    "line": {"start": (Pose, None), "end": (Pose, None), "by": (Numbers, None), **_PACED},
     "waypoints": _SHAPE,
+    "polyline": _SHAPE,
     "twist": {"start": (Pose, ...), "breaks": (Numbers, ...), "coefficients": (Numbers, ...)},
     "retimed": {"path": (Table, ...)},
     "truncated": {"path": (Table, ...)},
+    "feed": {"path": (Table, ...), **_SHAPE},
+    "ramped": {"path": (Table, ...)},
+    "joined": {"pieces": (list[Table], ...)},  # type: ignore[valid-type]
     "placed": {"path": (Table, ...)},
     "Relaxation": {"rows": (Names, ...), "during": (Numbers, None)},
     "Search": {"rng": (Whole, 0)},
@@ -167,7 +172,7 @@ _PATH_FILE: _Fields = {
     "kind": (Literal["file"], ...),
     "file": (Text, ...),
     "frame": (Pose, None),
-    **dict.fromkeys(("feed", "duration", "jump", "corner_angle"), (Number, None)),
+    **dict.fromkeys(("feed", "duration", "jump", "tolerance", "corner_angle"), (Number, None)),
     "corners": (Text, None),
 }
 # A cost that is a function of one's own.
@@ -204,6 +209,7 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
         "collision": (clearance, None),
         "damping": (model_of(Damping), None),
         "rest": (bool, True),
+        "joint_limits": (Text, None),
         "search": (model_of(Search), None),
         "optimiser": (model_of(QuasiNewton), None),
         "tolerance": (model_of(Tolerance), None),

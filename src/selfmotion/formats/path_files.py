@@ -7,16 +7,26 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError, PathError, as_number, as_path, read_rows
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    PathError,
+    as_choice,
+    as_number,
+    as_path,
+    read_rows,
+)
 from selfmotion.formats.documents import read_document
 from selfmotion.formats.poses import ORIENTATIONS
-from selfmotion.path import Waypoints
+from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints
 
 # A coordinate beyond this [m] can only be meant in millimetres; an angle beyond that in degrees.
 _FAR, _ROUND = 50.0, 2.0 * np.pi + 1e-6
 # Poses farther from their predecessor than this [m] are a jump, unless another length is given;
 # so are rotations by more than this [rad], whose direction would be a guess.
 _JUMP, _FLIP = 0.5, 2.6
+# Legs that bend by more than this [rad] make a corner, unless another angle is given.
+_BEND = np.pi / 6
 _POSITION = ("x", "y", "z")
 # Columns of an orientation → its key in `ORIENTATIONS`.
 _COLUMNS: Mapping[tuple[str, ...], str] = {
@@ -58,8 +68,10 @@ def read_path(
     feed: float | None = None,
     duration: float | None = None,
     jump: float = _JUMP,
-    **options: Any,
-) -> Waypoints:
+    corners: str = "blend",
+    tolerance: float = 1e-3,
+    corner_angle: float | None = None,
+) -> Path:
     """Read a tool motion through poses.
 
     ==============  =================================================================
@@ -76,13 +88,18 @@ def read_path(
     ----------
     file : path
     feed : float, optional
-        Speed of the tool [m/s] between poses, where the file has no times.
+        Speed of the tool [m/s], from rest to rest, where the file has no times; see `Feed`.
     duration : float, optional
-        Or the time of the whole motion [s], at constant speed.
+        Or the time of the whole motion [s], at about constant speed.
     jump : float
         Distance from one pose to the next [m] that is refused.
-    options
-        ``corners`` and ``corner_angle`` of `Waypoints`.
+    corners : {"blend", "stop", "round"}
+        What to do in kinks: swing through the pose or rest in it as `Waypoints` do, or, with a
+        feed, pass it within `tolerance` between straight legs as a `Polyline` does.
+    tolerance : float
+        [m].
+    corner_angle : float, optional
+        As in `Waypoints`.
 
     Raises
     ------
@@ -106,11 +123,25 @@ def read_path(
     _check_rows(path, rows)
     rotations = _rotations(path, rows)
     _check_jumps(path, rows, rotations, jump)
+    turns = _quaternions(rotations) if rows.orientation else None
     t = _times(path, rows, feed, duration)
     try:
-        return Waypoints(t, rows.positions, _quaternions(rotations), **options)
+        as_choice(corners, "corners", ("blend", "stop", "round"), PathError)
+        if corners == "round":
+            if feed is None:
+                raise PathError("corners are 'round', which needs a feed [m/s]; give it")
+            return Feed(Polyline(rows.positions, turns, tolerance=tolerance), feed)
+        bend = _BEND if corner_angle is None else corner_angle
+        through = Waypoints(t, rows.positions, turns, corners=corners, corner_angle=bend)
+        return through if feed is None else _at_feed(through, feed)
     except PathError as error:
         raise FileFormatError(f"{path}: {error}") from error
+
+
+def _at_feed(through: Waypoints, feed: float) -> Path:
+    """Return waypoints at a constant feed, from one rest to the next."""
+    pieces = [Feed(piece, feed) for piece in through.between_corners()]
+    return pieces[0] if len(pieces) == 1 else Joined(pieces)
 
 
 def _read_table(file: FilePath) -> _Rows:

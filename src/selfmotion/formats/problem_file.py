@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
@@ -24,11 +24,12 @@ from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost, FunctionCost
 from selfmotion.formats.code import FUNCTION, name_kinds
 from selfmotion.formats.documents import PER_JOINT, in_si, read_document
+from selfmotion.formats.joint_limits import read_joint_limits
 from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import LineSearch, Optimizer, QuasiNewton
-from selfmotion.path import Circle, Line, Path, Placed
+from selfmotion.path import Circle, Feed, Line, Path, Placed
 from selfmotion.planning import Search, plan
 from selfmotion.plans import Plan, Problem
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
@@ -194,6 +195,10 @@ class _Reader:
                     options[name] = None if table[name] is None else kind(table[name])
         with _named(file, ""):
             problem = Problem(robot, path, task, start, **options)
+        if "joint_limits" in table:
+            with _named(file, "joint_limits"):
+                limits = read_joint_limits(self._beside(table["joint_limits"]), robot)
+                problem = replace(problem, constraints=(*problem.constraints, *limits))
         return Job(problem, **self._settings())
 
     def _once(self, values: Any, make: Callable[[Any], Any]) -> Any:
@@ -237,6 +242,11 @@ class _Reader:
             if frame is not None:
                 raise ProblemError("frame: needs start, the tool's first pose in that frame")
             values["start"] = robot.pose(start)
+        feed = values.pop("feed", None) if kind in ("circle", "line") else None
+        if kind in ("circle", "line"):
+            _exactly_one({**values, "feed": feed} if feed else values, "duration", "feed")
+            # At a feed, the shape's own pace does not matter.
+            values.setdefault("duration", 1.0)
         match kind:
             case "file":
                 del values["kind"]
@@ -247,6 +257,7 @@ class _Reader:
                 path = _line(values)
             case _:
                 path = _restored(values)
+        path = path if feed is None else Feed(path, feed)
         return path if frame is None else Placed(path, frame)
 
     def _cost(self, values: Mapping[str, Any], robot: RobotModel) -> Cost:

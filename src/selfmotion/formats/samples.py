@@ -1,14 +1,19 @@
 """A joint motion at the times that a file has it."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
 from selfmotion.motion import Trajectory
+from selfmotion.plans import Plan
+from selfmotion.task import Task
 
 # Messages count whole nanoseconds.
 _DIGITS = 9
+# Where between two samples straight lines are compared with the motion.
+_BETWEEN = (0.25, 0.5, 0.75)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,3 +55,44 @@ class MotionSamples:
             t = np.round(motion.sample_times(rate), _DIGITS)
         times = np.clip(motion.t[0] + t, motion.t[0], motion.t[-1])
         return cls(motion.joint_names, t, *(motion(times, order) for order in (0, 1, 2)))
+
+
+class LinearMiss(NamedTuple):
+    """How far a controller that joins samples by straight lines leaves a plan's motion.
+
+    Attributes
+    ----------
+    position, rotation : float
+        Of the tool, where it is farthest off [m, rad].
+    rate : float
+        Samples per second at which it would stay within the plan's tolerance.
+    """
+
+    position: float
+    rotation: float
+    rate: float
+
+
+def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
+    """Return what linear interpolation between the samples of a file costs; see `write_motion`.
+
+    Raises
+    ------
+    ProblemError
+        The rate is not positive, or gives no two samples.
+    """
+    motion, robot = plan.trajectory, plan.robot
+    samples = MotionSamples.of(motion, rate)
+    spans, tolerance = np.diff(samples.t), plan.tolerance
+    misses = np.zeros((len(spans), 2))
+    for share in _BETWEEN:
+        t = np.minimum(motion.t[0] + samples.t[:-1] + share * spans, motion.t[-1])
+        straight = samples.q[:-1] + share * np.diff(samples.q, axis=0)
+        for k, (line, exact) in enumerate(zip(straight, motion(t), strict=True)):
+            miss = Task.POSE.miss(robot.pose(exact), robot.pose(line))
+            misses[k] = np.maximum(misses[k], miss)
+    # The miss of a line over a span h is that of a parabola: it grows with h².
+    share = (misses / [tolerance.position, tolerance.rotation]).max(axis=1)
+    needed = float((np.sqrt(share) / spans).max())
+    position, rotation = misses.max(axis=0).tolist()
+    return LinearMiss(position, rotation, float(np.ceil(needed)))

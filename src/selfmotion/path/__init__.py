@@ -1,8 +1,11 @@
 """Tool motion over time: what the tool frame is to do, as pose and twist at any time."""
 
-from selfmotion.path.base import STILL, Path, PathSamples, TimeLaw, path_pose
-from selfmotion.path.joined import Dwell, Joined
+from selfmotion.path.base import STILL, Path, PathSamples, TimeLaw, check_oriented, path_pose
+from selfmotion.path.feed import Feed
+from selfmotion.path.joined import Dwell, Joined, with_leads
+from selfmotion.path.pace import Pace, times_along
 from selfmotion.path.placed import Placed
+from selfmotion.path.polyline import Polyline
 from selfmotion.path.ramped import Ramped
 from selfmotion.path.retimed import Retimed
 from selfmotion.path.shapes import Circle, Line
@@ -14,16 +17,22 @@ __all__ = [
     "STILL",
     "Circle",
     "Dwell",
+    "Feed",
     "Joined",
     "Line",
+    "Pace",
     "Path",
     "PathSamples",
     "Placed",
+    "Polyline",
     "Ramped",
     "Retimed",
     "TimeLaw",
     "Truncated",
     "TwistPath",
     "Waypoints",
+    "check_oriented",
     "path_pose",
+    "times_along",
+    "with_leads",
 ]

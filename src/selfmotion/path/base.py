@@ -19,7 +19,7 @@ from selfmotion.basics import (
     read_only,
     shown,
 )
-from selfmotion.task import as_pose
+from selfmotion.task import Task, as_pose
 
 # Rounding of a last time such as 50 * 0.02 must not count as outside the motion.
 _TIME_SLACK = 1e-9
@@ -65,6 +65,11 @@ class Path(Saved, ABC, family="path"):
     duration: float
 
     @property
+    def oriented(self) -> bool:
+        """Whether orientations are prescribed, or stand there only because a pose has one."""
+        return True
+
+    @property
     def knots(self) -> Array:
         """Times [s] between which the motion is C² or better, first 0, last `duration`."""
         return read_only([0.0, self.duration])
@@ -102,6 +107,10 @@ class Path(Saved, ABC, family="path"):
                 f"time {times.min()}..{times.max()} s is outside the path, 0..{self.duration} s"
             )
         return self.evaluate(np.clip(times, 0.0, self.duration))
+
+    def at_constant_speed(self) -> "Path":
+        """Return the same path at a pace at which it rests nowhere, where it knows one."""
+        return self
 
     def __add__(self, other: "Path") -> "Path":
         """Return this path and then the other one; see `Joined`."""
@@ -174,6 +183,15 @@ def check_path(path: Path, name: str) -> Path:
     return path
 
 
+def check_oriented(path: Path, task: Task) -> None:
+    """Raise PathError for a path of positions where a task prescribes orientations."""
+    if task.angular and not path.oriented:
+        raise PathError(
+            f"the path has positions but no orientations, which task '{task.value}' prescribes; "
+            f"give quaternions, or take a task that leaves them free (task='position')"
+        )
+
+
 def check_duration(duration: float) -> float:
     """Return `duration` as a float; PathError unless it is positive and finite."""
     return as_number(duration, "duration", above=0.0, most=_LONGEST, error=PathError)
@@ -198,3 +216,11 @@ def rotations_about(axis: Array, angles: Array) -> Array:
         + np.sin(angles)[:, None, None] * cross
         + (1.0 - np.cos(angles))[:, None, None] * (cross @ cross)
     )
+
+
+def rotvecs(turns: Array) -> Array:
+    """Return how the tool turns from each quaternion (N, 4) to the next, (N - 1, 3) [rad]."""
+    from scipy.spatial.transform import Rotation
+
+    rotations = Rotation.from_quat(turns, scalar_first=True)
+    return np.asarray((rotations[:-1].inv() * rotations[1:]).as_rotvec())

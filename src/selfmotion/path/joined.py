@@ -6,10 +6,20 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, PathError, read_only, restore, shown
-from selfmotion.path.base import STILL, Path, PathSamples, check_duration, check_path, path_pose
+from selfmotion.basics import Array, PathError, as_number, read_only, restore, shown
+from selfmotion.path.base import (
+    STILL,
+    Path,
+    PathSamples,
+    check_duration,
+    check_path,
+    check_vector,
+    path_pose,
+)
+from selfmotion.path.shapes import Line
 
 # Pieces may end this far from where the next one begins [m, rad].
 _GAP = 1e-6
@@ -45,6 +55,38 @@ class Dwell(Path, kind="dwell"):
         )
 
 
+def with_leads(
+    path: Path, length: float, duration: float, *, axis: npt.ArrayLike = (0.0, 0.0, -1.0)
+) -> "Joined":
+    """Return a path with a straight lead-in and lead-out, each from rest to rest.
+
+    Parameters
+    ----------
+    path : Path
+        Begins and ends at rest.
+    length : float
+        Of each lead [m].
+    duration : float
+        Of each lead [s].
+    axis : (3,)
+        Where from and where to, in tool axes at that end: by default back along the tool's z axis.
+
+    Raises
+    ------
+    PathError
+        A number is not above 0, the axis is zero, or the path does not rest at an end.
+    """
+    check_path(path, "path")
+    length = as_number(length, "lead: length", above=0.0, error=PathError)
+    away = check_vector(axis, "lead: axis")
+    if not np.any(away):
+        raise PathError("lead: axis is zero, expected a direction")
+    back = pin.SE3(np.eye(3), length * away / np.linalg.norm(away))
+    first, last = path.pose(0.0), path.pose(path.duration)
+    lead_in, lead_out = Line(first * back, first, duration), Line(last, last * back, duration)
+    return Joined([lead_in, path, lead_out])
+
+
 class Joined(Path, kind="joined"):
     """Paths one after the other; ``first + second`` makes one.
 
@@ -73,6 +115,11 @@ class Joined(Path, kind="joined"):
         self.duration = float(self._ends[-1])
         for number, (one, other) in enumerate(itertools.pairwise(flat), 1):
             _check_joint(one, other, number)
+
+    @property
+    def oriented(self) -> bool:
+        """See `Path.oriented`: as all pieces."""
+        return all(piece.oriented for piece in self.pieces)
 
     @property
     def knots(self) -> Array:

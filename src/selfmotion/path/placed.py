@@ -28,6 +28,11 @@ class Placed(Path, kind="placed"):
         self.duration = path.duration
 
     @property
+    def oriented(self) -> bool:
+        """See `Path.oriented`: as the original."""
+        return self._path.oriented
+
+    @property
     def knots(self) -> Array:
         """See `Path.knots`."""
         return self._path.knots

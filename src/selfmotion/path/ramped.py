@@ -41,6 +41,11 @@ class Ramped(Path, kind="ramped"):
         self.duration = path.duration + self._ramp
 
     @property
+    def oriented(self) -> bool:
+        """See `Path.oriented`: as the original."""
+        return self._path.oriented
+
+    @property
     def knots(self) -> Array:
         """See `Path.knots`."""
         return self._moved(self._path.knots)

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, PathError, as_numbers, restore
+from selfmotion.basics import Array, PathError, as_numbers, read_only, restore
 from selfmotion.path.base import Path, PathSamples, check_path
+from selfmotion.path.pace import Pace
 
 # Intervals of the pace are halved so often to find when a time of the original is passed.
 _HALVINGS = 52
@@ -16,7 +17,7 @@ _HALVINGS = 52
 class Retimed(Path, kind="retimed"):
     """The same geometric path at another pace: pose(t) is that of the original at σ(t).
 
-    σ is a cubic Hermite spline, non-decreasing at its samples.
+    σ is a Hermite spline, non-decreasing at its samples: cubic, or quintic with `bend`.
 
     Parameters
     ----------
@@ -28,67 +29,78 @@ class Retimed(Path, kind="retimed"):
         Original times [s], from 0 to the original's duration.
     rate : (N,)
         dσ/dt ≥ 0.
+    bend : (N,), optional
+        d²σ/dt² [1/s], for a path as smooth as the original.
     """
 
     def __init__(
-        self, path: Path, t: npt.ArrayLike, sigma: npt.ArrayLike, rate: npt.ArrayLike
+        self,
+        path: Path,
+        t: npt.ArrayLike,
+        sigma: npt.ArrayLike,
+        rate: npt.ArrayLike,
+        bend: npt.ArrayLike | None = None,
     ) -> None:
         self._path = check_path(path, "retimed path")
-        self._t, self._sigma, self._rate = (
-            as_numbers(values, f"retimed path: {name}", error=PathError)
-            for name, values in (("t", t), ("sigma", sigma), ("rate", rate))
-        )
-        shapes = {self._t.shape, self._sigma.shape, self._rate.shape}
-        if len(shapes) > 1 or self._t.ndim != 1 or len(self._t) < 2:
+        given = {"t": t, "sigma": sigma, "rate": rate} | ({} if bend is None else {"bend": bend})
+        numbers = {
+            name: as_numbers(values, f"retimed path: {name}", error=PathError)
+            for name, values in given.items()
+        }
+        shapes = {values.shape for values in numbers.values()}
+        if len(shapes) > 1 or numbers["t"].ndim != 1 or len(numbers["t"]) < 2:
+            found = ", ".join(f"{name} {values.shape}" for name, values in numbers.items())
             raise PathError(
-                f"retimed path: t, sigma and rate have shapes {self._t.shape}, "
-                f"{self._sigma.shape} and {self._rate.shape}, expected (N,) each with N ≥ 2"
+                f"retimed path: shapes are {found}, expected (N,) each with the same N ≥ 2"
             )
-        if not (np.all(np.diff(self._t) > 0) and np.all(np.diff(self._sigma) >= 0)):
+        if not (np.all(np.diff(numbers["t"]) > 0) and np.all(np.diff(numbers["sigma"]) >= 0)):
             raise PathError("retimed path: times must increase and σ must not fall")
-        self.duration = float(self._t[-1])
+        self._pace = Pace(**numbers)
+        self.duration = float(self._pace.t[-1])
+
+    @property
+    def oriented(self) -> bool:
+        """See `Path.oriented`: as the original."""
+        return self._path.oriented
 
     @property
     def knots(self) -> Array:
-        """See `Path.knots`."""
-        return self._t
+        """See `Path.knots`: the samples of a cubic pace; else when the original's are passed."""
+        return self._pace.t if self._pace.bend is None else self._passed(self._path.knots)
 
     @property
     def marks(self) -> Array:
         """See `Path.marks`: the samples of the pace, and when the original's are passed."""
-        wanted = self._path.marks
-        k = np.clip(np.searchsorted(self._sigma, wanted) - 1, 0, len(self._t) - 2)
-        early, late = self._t[k], self._t[k + 1]
+        return np.union1d(self._pace.t, self._passed(self._path.marks))
+
+    def _passed(self, wanted: Array) -> Array:
+        """Return when times of the original are passed, (K,), from 0 to the duration."""
+        pace = self._pace
+        k = np.clip(np.searchsorted(pace.sigma, wanted) - 1, 0, len(pace.t) - 2)
+        early, late = pace.t[k], pace.t[k + 1]
         for _ in range(_HALVINGS):
             middle = 0.5 * (early + late)
-            before = self.pace(middle)[0] < wanted
+            before = pace(middle) < wanted
             early, late = np.where(before, middle, early), np.where(before, late, middle)
-        return np.union1d(self._t, late)
+        return read_only([0.0, *late[1:-1], self.duration])
 
-    def pace(self, t: Array) -> tuple[Array, Array]:
-        """Return σ and dσ/dt at times `t` (K,)."""
-        from scipy.interpolate import CubicHermiteSpline
-
-        spline = CubicHermiteSpline(self._t, self._sigma, self._rate)
-        sigma = np.clip(spline(t), 0.0, self._path.duration)
-        return np.asarray(sigma), np.asarray(spline(t, 1))
+    @property
+    def pace(self) -> Pace:
+        """How fast the original is run through: σ(t)."""
+        return self._pace
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
-        sigma, rate = self.pace(t)
-        original = self._path.samples(sigma)
-        twist = original.twist * rate[:, None]
+        original = self._path.samples(np.clip(self._pace(t), 0.0, self._path.duration))
+        twist = original.twist * self._pace(t, 1)[:, None]
         return PathSamples(t, original.translation, original.rotation, twist)
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""
-        return {
-            "kind": self.kind,
-            "path": self._path.to_dict(),
-            "t": self._t.tolist(),
-            "sigma": self._sigma.tolist(),
-            "rate": self._rate.tolist(),
-        }
+        pace = self._pace
+        described = {"t": pace.t, "sigma": pace.sigma, "rate": pace.rate, "bend": pace.bend}
+        numbers = {name: v.tolist() for name, v in described.items() if v is not None}
+        return {"kind": self.kind, "path": self._path.to_dict(), **numbers}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Retimed":

@@ -1,6 +1,6 @@
 """Straight lines and circles."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,10 @@ class Line(Path, kind="line"):
         object.__setattr__(self, "end", path_pose(self.end, "line: end"))
         object.__setattr__(self, "duration", check_duration(self.duration))
         object.__setattr__(self, "time_law", TimeLaw.of(self.time_law))
+
+    def at_constant_speed(self) -> "Line":
+        """See `Path.at_constant_speed`."""
+        return replace(self, time_law=TimeLaw.CONSTANT)
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
@@ -137,6 +141,10 @@ class Circle(Path, kind="circle"):
     @property
     def _arm(self) -> Array:
         return np.asarray(self.start.translation - self.center)
+
+    def at_constant_speed(self) -> "Circle":
+        """See `Path.at_constant_speed`."""
+        return replace(self, time_law=TimeLaw.CONSTANT)
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""

@@ -37,6 +37,11 @@ class Truncated(Path, kind="truncated"):
         self.duration = float(duration)
 
     @property
+    def oriented(self) -> bool:
+        """See `Path.oriented`: as the original."""
+        return self._path.oriented
+
+    @property
     def knots(self) -> Array:
         """See `Path.knots`."""
         given = self._path.knots

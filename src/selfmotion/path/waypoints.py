@@ -22,12 +22,14 @@ from selfmotion.basics import (
     read_table,
     shown,
 )
-from selfmotion.path.base import Path, PathSamples, path_pose, unit
+from selfmotion.path.base import Path, PathSamples, path_pose, rotvecs, unit
 
 _COLUMNS = ("t", "x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
 # Poses nearer than this [m], and cosine of half the angle, are the same.
 _STILL = 1e-12
+# Legs that turn by less than this [rad] have no direction of rotation.
+_TURNED = 1e-3
 
 
 class Waypoints(Path, kind="waypoints"):
@@ -43,13 +45,15 @@ class Waypoints(Path, kind="waypoints"):
     positions : (N, 3)
         [m], world axes.
     quaternions : (N, 4), optional
-        Orientations [w, x, y, z]; normalised, either sign. By default that of the world.
+        Orientations [w, x, y, z]; normalised, either sign. By default none is prescribed, for
+        tasks that leave it free ('position').
     corners : {"blend", "stop"}
         What to do where the path has a kink (see `corner_angle`): swing smoothly through the
-        waypoint, leaving the straight legs a little on both sides, or come to rest in it and keep
-        the legs. Either way each waypoint is met at its time.
+        waypoint, leaving the straight legs a little on both sides, or come to rest in it, and at
+        both ends, and keep the legs. Either way each waypoint is met at its time.
     corner_angle : float
-        Change of direction from one leg to the next that counts as a kink [rad].
+        Change of direction from one leg to the next, of motion or of rotation, that counts as a
+        kink [rad].
 
     Raises
     ------
@@ -67,6 +71,7 @@ class Waypoints(Path, kind="waypoints"):
         corner_angle: float = np.pi / 6,
     ) -> None:
         times, points = _numbers(t, "t"), _numbers(positions, "positions")
+        self._oriented = quaternions is not None
         if quaternions is None:
             quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
         turns = _numbers(quaternions, "quaternions")
@@ -120,6 +125,11 @@ class Waypoints(Path, kind="waypoints"):
             raise FileFormatError(f"{file}: {error}") from error
 
     @property
+    def oriented(self) -> bool:
+        """See `Path.oriented`: where quaternions are given."""
+        return self._oriented
+
+    @property
     def knots(self) -> Array:
         """The corners' times [s], with start and end; in between the path is C²."""
         return read_only(self._t[self._bounds])
@@ -139,16 +149,24 @@ class Waypoints(Path, kind="waypoints"):
         """Times [s] of the waypoints where the tool comes to rest: corners and pauses."""
         return self._t[self._stops]
 
+    def between_corners(self) -> list["Waypoints"]:
+        """Return the path in pieces that rest nowhere, from one corner to the next."""
+        turns = self._turns if self._oriented else None
+        parts = [slice(first, last + 1) for first, last in pairwise(self._bounds)]
+        return [
+            Waypoints(self._t[part], self._points[part], None if turns is None else turns[part])
+            for part in parts
+        ]
+
     @cached_property
     def _stops(self) -> npt.NDArray[np.bool_]:
         legs = np.diff(self._points, axis=0)
         lengths = np.linalg.norm(legs, axis=1)
         stops = np.zeros(len(self._t), dtype=bool)
         if self._corners == "stop":
-            cosine = np.einsum("ki,ki->k", legs[:-1], legs[1:])
-            bound = np.cos(self._corner_angle) * lengths[:-1] * lengths[1:]
-            # A tool that rests on one side has no direction there, hence no kink.
-            stops[1:-1] = (cosine < bound) & (lengths[:-1] > 0) & (lengths[1:] > 0)
+            stops[1:-1] = _bends(legs, self._corner_angle, 0.0)
+            stops[1:-1] |= _bends(rotvecs(self._turns), self._corner_angle, _TURNED)
+            stops[[0, -1]] = True
         # Two equal poses in a row are a pause: the tool comes to rest, and stays.
         alike = np.abs(np.einsum("ki,ki->k", self._turns[:-1], self._turns[1:]))
         pauses = (lengths <= _STILL) & (alike >= 1.0 - _STILL)
@@ -218,10 +236,19 @@ class Waypoints(Path, kind="waypoints"):
             "kind": self.kind,
             "t": self._t.tolist(),
             "positions": self._points.tolist(),
-            "quaternions": self._turns.tolist(),
+            "quaternions": self._turns.tolist() if self._oriented else None,
             "corners": self._corners,
             "corner_angle": self._corner_angle,
         }
+
+
+def _bends(legs: Array, angle: float, least: float) -> npt.NDArray[np.bool_]:
+    """Return where legs (N - 1, 3) change their direction by more than `angle`, (N - 2,)."""
+    lengths = np.linalg.norm(legs, axis=1)
+    cosine = np.einsum("ki,ki->k", legs[:-1], legs[1:])
+    # What hardly moves on one side has no direction there, hence no kink.
+    moves = (lengths[:-1] > least) & (lengths[1:] > least)
+    return np.asarray((cosine < np.cos(angle) * lengths[:-1] * lengths[1:]) & moves)
 
 
 def _numbers(values: npt.ArrayLike, name: str) -> Array:

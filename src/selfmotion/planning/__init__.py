@@ -1,6 +1,7 @@
 """From a problem to a plan."""
 
+from selfmotion.planning.fastest import Fastest, fastest
 from selfmotion.planning.run import plan
 from selfmotion.planning.settings import Search
 
-__all__ = ["Search", "plan"]
+__all__ = ["Fastest", "Search", "fastest", "plan"]

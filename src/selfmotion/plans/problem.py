@@ -31,7 +31,7 @@ from selfmotion.constraints import (
 )
 from selfmotion.costs import Cost, JointVelocity, OffPath
 from selfmotion.motion import NullMotion, RefinedNullMotion, Trajectory, resting_window
-from selfmotion.path import Path
+from selfmotion.path import Path, check_oriented
 from selfmotion.plans.path_scale import check_pace, check_units
 from selfmotion.plans.relaxed_rows import check_relaxations
 from selfmotion.plans.rest import rest_orders
@@ -134,6 +134,7 @@ class Problem:
                 )
         for name, each in _SEQUENCES.items():
             object.__setattr__(self, name, _sequence(getattr(self, name), name, each))
+        check_oriented(self.path, self.task)
         check_relaxations(self.relaxations, self.path, self.task)
         if isinstance(self.start, str):
             if self.start != "free":
@@ -203,9 +204,14 @@ class Problem:
         """How smoothly the arm comes to rest at the start and at the end; see `rest_orders`."""
         if not self.rest:
             return 0, 0
-        moves = [item.sets_velocity for item in self.constraints]
         start, end = rest_orders(self.path, self.task)
-        return start * (not any(m[0] for m in moves)), end * (not any(m[1] for m in moves))
+        return self._rest_order(0, start), self._rest_order(1, end)
+
+    def _rest_order(self, end: int, order: int) -> int:
+        if any(item.sets_velocity[end] for item in self.constraints):
+            return 0
+        accelerates = any(item.sets_acceleration[end] for item in self.constraints)
+        return min(order, 1) if accelerates else order
 
     @property
     def rests(self) -> tuple[bool, bool]:

@@ -1,7 +1,7 @@
 """The same joint path in the time that velocity and acceleration limits allow."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 from operator import and_
 
@@ -16,7 +16,7 @@ from selfmotion.constraints import (
     JointVelocityLimits,
 )
 from selfmotion.motion import Trajectory
-from selfmotion.path import Retimed
+from selfmotion.path import Pace, Retimed, times_along
 from selfmotion.plans.plan import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Relaxation
@@ -28,8 +28,6 @@ _ROUNDING = 1e-9
 # Grid points of toppra, and samples of the new motion, per sample of the old one: the first that
 # keeps the plan's tolerance.
 _DENSITIES = (4, 8, 16)
-# Samples nearer to each other than this share of the window are one: their jerk would be rounding.
-_CLOSE = 0.1
 
 
 def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
@@ -112,16 +110,15 @@ def _positive(robot: RobotModel, limit: npt.ArrayLike, name: str) -> Array:
 
 def _retimed(plan: Plan, wanted: Sequence[Constraint], kept: Envelope, density: int) -> Plan:
     pace = _slowed(_smoothed(_pace(plan.trajectory, kept, density), kept), plan.trajectory, kept)
-    t, sigma, rate = pace.t, pace.sigma, pace.rate
-    trajectory = pace.along(plan.trajectory)
+    trajectory = _along(pace, plan.trajectory)
     old = plan.problem
     # What asks for something of the end asks for it of the whole motion.
     asked = (item.on_part() if plan.report.ending else item for item in old.constraints)
     problem = replace(
         old,
-        path=Retimed(plan.path, t, sigma, rate),
+        path=Retimed(plan.path, pace.t, pace.sigma, pace.rate, pace.bend),
         constraints=(*(item for item in asked if item is not None), *wanted),
-        relaxations=[_moved(item, t, sigma) for item in old.relaxations],
+        relaxations=[_moved(item, pace.t, pace.sigma) for item in old.relaxations],
     )
     retimed = replace(plan, problem=problem, trajectory=trajectory, initial_trajectory=trajectory)
     return replace(retimed, certificate=retimed.check())
@@ -136,34 +133,15 @@ def _moved(item: Relaxation, t: Array, sigma: Array) -> Relaxation:
     return replace(item, during=(first, last))
 
 
-@dataclass(frozen=True, eq=False)
-class _Pace:
-    """New times t, and the old time σ, dσ/dt and d²σ/dt² there; None for the last where it jumps.
-
-    All (K,).
-    """
-
-    t: Array
-    sigma: Array
-    rate: Array
-    bend: Array | None = None
-
-    def along(self, motion: Trajectory) -> Trajectory:
-        """Return a motion at this pace."""
-        at = self.sigma + motion.t[0]
-        q, qd, rate = motion(at), motion(at, 1), self.rate[:, None]
-        faster = None
-        if self.bend is not None:
-            faster = motion(at, 2) * rate**2 + qd * self.bend[:, None]
-        return Trajectory(self.t, q, qd * rate, motion.joint_names, faster)
-
-    def slower(self, factor: float) -> "_Pace":
-        """Return the same, taking `factor` times as long."""
-        bend = None if self.bend is None else self.bend / factor**2
-        return _Pace(factor * self.t, self.sigma, self.rate / factor, bend)
+def _along(pace: Pace, motion: Trajectory) -> Trajectory:
+    """Return a motion at a pace."""
+    at = pace.sigma + motion.t[0]
+    q, qd, rate = motion(at), motion(at, 1), pace.rate[:, None]
+    faster = None if pace.bend is None else motion(at, 2) * rate**2 + qd * pace.bend[:, None]
+    return Trajectory(pace.t, q, qd * rate, motion.joint_names, faster)
 
 
-def _pace(motion: Trajectory, kept: Envelope, density: int) -> _Pace:
+def _pace(motion: Trajectory, kept: Envelope, density: int) -> Pace:
     """Return the fastest pace by limits of speed and acceleration at the grid points of toppra."""
     count = density * (len(motion.t) - 1)
     sigma = np.interp(np.arange(count + 1) / density, np.arange(len(motion.t)), motion.t)
@@ -174,41 +152,24 @@ def _pace(motion: Trajectory, kept: Envelope, density: int) -> _Pace:
     stretch = np.hypot(speed, _STILL * max(float(speed.max()), np.finfo(float).tiny))
     length = np.append(0.0, np.cumsum(0.5 * (stretch[1:] + stretch[:-1]) * np.diff(sigma)))
     rates = _toppra(length, q, kept.speed, kept.acceleration)
-    # Between grid points the squared rate is linear in the length, so that the times are exact.
-    t = np.append(0.0, np.cumsum(2.0 * np.diff(length) / (rates[:-1] + rates[1:])))
-    return _Pace(t, sigma - sigma[0], rates / stretch)
+    t = times_along(length, rates)
+    return Pace(t, sigma - sigma[0], rates / stretch)
 
 
-def _smoothed(pace: _Pace, kept: Envelope) -> _Pace:
-    """Return the mean of a pace over a window in time, so that its acceleration jumps no more.
+def _smoothed(pace: Pace, kept: Envelope) -> Pace:
+    """Return a pace so smooth that jerks keep their limits, where there are any.
 
     From one limit of the acceleration to the other within the window, the jerk keeps its limit.
     """
-    from scipy.interpolate import CubicHermiteSpline
-
     limited = np.isfinite(kept.jerk) & np.isfinite(kept.acceleration)
     if not limited.any():
         return pace
-    window = float((2.0 * kept.acceleration[limited] / kept.jerk[limited]).max())
-    # Before its start and after its end the motion rests.
-    t = np.concatenate([[-window], pace.t, [pace.t[-1] + window]])
-    sigma = np.concatenate([pace.sigma[:1], pace.sigma, pace.sigma[-1:]])
-    rate = np.concatenate([[0.0], pace.rate, [0.0]])
-    spline = CubicHermiteSpline(t, sigma, rate)
-    way = spline.antiderivative()
-    new = np.union1d(pace.t, pace.t + window)
-    new = new[np.append(True, np.diff(new) > _CLOSE * window)]
-    new[-1] = pace.t[-1] + window
-    before = new - window
-    mean = np.clip((way(new) - way(before)) / window, 0.0, pace.sigma[-1])
-    mean[0], mean[-1] = 0.0, pace.sigma[-1]
-    speed = np.maximum((spline(new) - spline(before)) / window, 0.0)
-    return _Pace(new, mean, speed, (spline(new, 1) - spline(before, 1)) / window)
+    return pace.smoothed(float((2.0 * kept.acceleration[limited] / kept.jerk[limited]).max()))
 
 
-def _slowed(pace: _Pace, motion: Trajectory, kept: Envelope) -> _Pace:
+def _slowed(pace: Pace, motion: Trajectory, kept: Envelope) -> Pace:
     """Return a pace so much slower that limits are kept between its samples as well."""
-    trial = pace.along(motion)
+    trial = _along(pace, motion)
     factors = [1.0]
     for order, limit in ((1, kept.speed), (2, kept.acceleration), (3, kept.jerk)):
         if order < 3 or pace.bend is not None:

@@ -7,6 +7,7 @@ from selfmotion.robot.loading import NAMED_ARMS, load_robot, rebuild_robot
 from selfmotion.robot.model import RobotModel
 from selfmotion.robot.mounting import Mounting, mounting_of
 from selfmotion.robot.null_space import null_basis, null_space
+from selfmotion.robot.tool_rates import ToolRates
 from selfmotion.robot.urdf import Urdf, UrdfJoint
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "Mounting",
     "RobotModel",
     "ToolKinematics",
+    "ToolRates",
     "Urdf",
     "UrdfJoint",
     "compose",

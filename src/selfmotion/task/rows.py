@@ -67,6 +67,11 @@ class Task(Enum):
         return self is Task.POINTING
 
     @property
+    def angular(self) -> bool:
+        """Whether it prescribes anything of the orientation."""
+        return bool(np.any(self.rows >= 3))
+
+    @property
     def row_names(self) -> Sequence[str]:
         """Names of the prescribed rows."""
         return [_ROW_NAMES[i] for i in _ROWS[self]]

@@ -1,0 +1,277 @@
+"""A path at a constant feed."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import Array, PathError, as_number, read_only, restore
+from selfmotion.path.base import STILL, Path, PathSamples, check_path
+from selfmotion.path.pace import Pace, times_along
+
+# Nodes of the pace between two knots of the original, at least, and in all, about.
+_FEWEST, _ABOUT = 16, 1000
+# How far from a node, by the distance of knots, the original's accelerations are measured, and how
+# far from a knot whether its twist jumps there.
+_BESIDE, _AT = 1e-4, 1e-8
+# A tool that is slower than this share of what it may be rests.
+_RESTS = 1e-6
+# The twist before and after a knot may differ by this share of it: by rounding.
+_KINK = 1e-6
+# Intervals of the pace are halved so often to find when a time of the original is passed.
+_HALVINGS = 52
+
+
+class Feed(Path, kind="feed"):
+    """A path at a constant feed, from rest to rest.
+
+    The tool keeps its feed wherever turn rate and accelerations allow: it is slower in bends, at
+    both ends, and rests where the path has a kink. As much of the acceleration as is spent on
+    bends, and as much as is spent on changes of speed, is at most half of what is allowed.
+
+    Over the length λ of the path, measured by the time that it takes at the feed, dλ/dt is the
+    largest by these limits, forwards and backwards from node to node (J. E. Bobrow, S. Dubowsky,
+    J. S. Gibson, Int. J. Robotics Research 4(3), 1985), and then its mean over `smoothing`, so that
+    accelerations do not jump.
+
+    Parameters
+    ----------
+    path : Path
+        Where the tool goes; its own pace does not matter.
+    feed : float
+        Speed of the tool [m/s].
+    turn_rate : float
+        The tool turns no faster than this [rad/s].
+    acceleration : float
+        [m/s²].
+    turn_acceleration : float
+        [rad/s²].
+    smoothing : float
+        How long an acceleration takes to build up [s].
+
+    Raises
+    ------
+    PathError
+        A number is not above 0, or the path rests on its way.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        feed: float,
+        *,
+        turn_rate: float = 1.0,
+        acceleration: float = 1.0,
+        turn_acceleration: float = 10.0,
+        smoothing: float = 0.05,
+    ) -> None:
+        self._path = check_path(path, "feed: path").at_constant_speed()
+        given = {
+            "feed": feed,
+            "turn_rate": turn_rate,
+            "acceleration": acceleration,
+            "turn_acceleration": turn_acceleration,
+            "smoothing": smoothing,
+        }
+        self._limits = {
+            name: as_number(value, f"feed: {name}", above=0.0, error=PathError)
+            for name, value in given.items()
+        }
+        self.duration = float(self._paces[-1][1])
+
+    @property
+    def feed(self) -> float:
+        """Speed of the tool where nothing is in its way [m/s]."""
+        return self._limits["feed"]
+
+    @property
+    def rest_times(self) -> Array:
+        """When the tool rests: at both ends and in kinks [s]."""
+        return read_only([self._paces[0][0], *(end for _, end, _ in self._paces)])
+
+    @property
+    def oriented(self) -> bool:
+        """See `Path.oriented`: as the original."""
+        return self._path.oriented
+
+    @property
+    def knots(self) -> Array:
+        """See `Path.knots`: when those of the original are passed."""
+        return self._moved(self._path.knots)
+
+    @property
+    def marks(self) -> Array:
+        """See `Path.marks`."""
+        inner = [pace.t + start for start, _, pace in self._paces]
+        inner.append(self._moved(self._path.marks))
+        return _apart(np.concatenate(inner), self.duration)
+
+    def _moved(self, wanted: Array) -> Array:
+        """Return when times of the original are passed."""
+        early, late = np.zeros(len(wanted)), np.full(len(wanted), self.duration)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (early + late)
+            before = self.pace(middle)[0] < wanted
+            early, late = np.where(before, middle, early), np.where(before, late, middle)
+        return _apart(np.concatenate([late[1:-1], self.rest_times]), self.duration)
+
+    def pace(self, t: Array) -> tuple[Array, Array]:
+        """Return the original's time σ and dσ/dt at times `t` (K,)."""
+        which = np.searchsorted([end for _, end, _ in self._paces[:-1]], t, side="right")
+        reached, rate = np.empty(len(t)), np.empty(len(t))
+        for number, (start, end, pace) in enumerate(self._paces):
+            here = which == number
+            own = np.clip(t[here] - start, 0.0, end - start)
+            reached[here], rate[here] = pace(own), np.maximum(pace(own, 1), 0.0)
+        sigma = np.clip(self._original(reached), 0.0, self._path.duration)
+        return sigma, rate * np.maximum(self._original(reached, nu=1), 0.0)
+
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
+        sigma, rate = self.pace(t)
+        # In a kink the original has two directions, but the tool rests.
+        original = self._path.samples(sigma)
+        twist = original.twist * rate[:, None]
+        return PathSamples(t, original.translation, original.rotation, twist)
+
+    @cached_property
+    def _paces(self) -> list[tuple[float, float, Pace]]:
+        """Start, end and pace of each stretch from rest to rest, the pace over `_lengths`."""
+        sigma, lengths = self._sigma, self._lengths
+        stretches, start = [], 0.0
+        for first, last in pairwise(np.searchsorted(sigma, self._stops)):
+            part = slice(first, last + 1)
+            most, gain = self._most[part], self._gain[part]
+            pace = _ramped(lengths[part], most, gain).smoothed(self._limits["smoothing"])
+            end = start + float(pace.t[-1])
+            stretches.append((start, end, pace))
+            start = end
+        return stretches
+
+    @cached_property
+    def _stops(self) -> list[float]:
+        """The original's times between which it has no kink."""
+        knots = self._path.knots
+        inner = knots[1:-1]
+        if not len(inner):
+            return [0.0, self._path.duration]
+        beside = _AT * np.diff(knots)
+        before = self._path.samples(inner - beside[:-1]).twist
+        after = self._path.samples(inner + beside[1:]).twist
+        jump = np.abs(after - before).max(axis=1)
+        size = np.maximum(np.abs(before), np.abs(after)).max(axis=1)
+        kinks = inner[jump > _KINK * size + STILL]
+        return [0.0, *kinks.tolist(), self._path.duration]
+
+    @cached_property
+    def _sigma(self) -> Array:
+        """The original's times at the nodes, (K,)."""
+        parts = []
+        for start, end in pairwise(self._path.knots):
+            count = max(_FEWEST, int(np.ceil(_ABOUT * (end - start) / self._path.duration)))
+            parts.append(np.linspace(start, end, count, endpoint=False))
+        return np.append(np.concatenate(parts), self._path.duration)
+
+    @cached_property
+    def _shares(self) -> Array:
+        """What the original's own pace takes of the feed or the turn rate at the nodes, (K,)."""
+        share = self._share_of(self._sigma)
+        if share.min() <= _RESTS * share.max():
+            at = self._sigma[int(np.argmin(share))]
+            raise PathError(
+                f"feed: the path rests at {at:.6g} s of its own time, where it has no direction; "
+                f"take one that does not rest (Polyline, corners='blend'), or join several: "
+                f"Feed(first, …) + Dwell(…) + Feed(second, …)"
+            )
+        return share
+
+    def _share_of(self, sigma: Array) -> Array:
+        speeds = _sizes(self._path.samples(sigma).twist)
+        allowed = np.array([self._limits["feed"], self._limits["turn_rate"]])
+        return np.asarray((speeds / allowed).max(axis=1))
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """How long the way to each node takes at the feed [s], (K,), by Simpson's rule."""
+        sigma, share = self._sigma, self._shares
+        middle = self._share_of(0.5 * (sigma[:-1] + sigma[1:]))
+        parts = np.diff(sigma) * (share[:-1] + 4.0 * middle + share[1:]) / 6.0
+        return np.append(0.0, np.cumsum(parts))
+
+    @cached_property
+    def _original(self) -> Any:
+        """The original's time as a function of the length."""
+        from scipy.interpolate import CubicHermiteSpline
+
+        return CubicHermiteSpline(self._lengths, self._sigma, 1.0 / self._shares)
+
+    @cached_property
+    def _bends(self) -> Array:
+        """|dv/dλ| and |dω/dλ| over the length λ with velocities per length too, (K, 2)."""
+        sigma, share = self._sigma, self._shares[:, None]
+        beside = float(_BESIDE * np.diff(self._path.knots).min())
+        inner = np.clip(sigma, sigma[0] + beside, sigma[-1] - beside)
+        early, late = (
+            self._path.samples(at).twist / self._share_of(at)[:, None]
+            for at in (inner - beside, inner + beside)
+        )
+        return _sizes((late - early) / (2.0 * beside) / share)
+
+    @cached_property
+    def _most(self) -> Array:
+        """What the square of the pace may be by the feed and by bends near each node, (K,)."""
+        bend = (self._bends / self._half).max(axis=1)
+        most = np.minimum(1.0, 1.0 / np.maximum(bend, 1e-300))
+        # What is kept half a window before and after is kept by the mean in the middle.
+        lengths, reach = self._lengths, 0.5 * self._limits["smoothing"] * np.sqrt(most)
+        first = np.searchsorted(lengths, lengths - reach)
+        after = np.searchsorted(lengths, lengths + reach, side="right")
+        return np.array([most[k:m].min() for k, m in zip(first, after, strict=True)])
+
+    @cached_property
+    def _gain(self) -> Array:
+        """How much the square of the pace may change per length by changes of speed, (K,)."""
+        speeds = _sizes(self._path.samples(self._sigma).twist) / self._shares[:, None]
+        return np.asarray(2.0 / np.maximum((speeds / self._half).max(axis=1), 1e-300))
+
+    @property
+    def _half(self) -> Array:
+        return 0.5 * np.array([self._limits["acceleration"], self._limits["turn_acceleration"]])
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Saved.to_dict`."""
+        return {"kind": self.kind, "path": self._path.to_dict(), **self._limits}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Feed":
+        """See `Saved.from_dict`."""
+        return cls(**{**values, "path": restore(Path, values["path"])})
+
+
+def _sizes(twists: Array) -> Array:
+    """Return the sizes of the linear and the angular part of (K, 6), (K, 2)."""
+    parts = twists[:, :3], twists[:, 3:]
+    return np.stack([np.sqrt(np.sum(part**2, axis=1)) for part in parts], axis=1)
+
+
+def _ramped(lengths: Array, most: Array, gain: Array) -> Pace:
+    """Return the largest pace from rest to rest, its square ≤ `most`, changing by ≤ `gain`."""
+    squared = most.copy()
+    squared[0] = squared[-1] = 0.0
+    steps = np.diff(lengths) * np.minimum(gain[:-1], gain[1:])
+    for k in range(len(steps)):
+        squared[k + 1] = min(squared[k + 1], squared[k] + steps[k])
+    for k in reversed(range(len(steps))):
+        squared[k] = min(squared[k], squared[k + 1] + steps[k])
+    rates = np.sqrt(squared)
+    return Pace(times_along(lengths, rates), lengths, rates)
+
+
+def _apart(times: Array, duration: float) -> Array:
+    """Return times in order, but for those that differ by rounding."""
+    unique = np.unique(np.clip(times, 0.0, duration))
+    unique = unique[np.append(True, np.diff(unique) > 1e-9 * duration)]
+    unique[-1] = duration
+    return read_only(unique)

@@ -1,0 +1,80 @@
+"""How fast something is run through: a time σ of its own as a function of the time t."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import Array
+
+# Of samples within this share of a window the first is kept: the jerk of more would be rounding.
+_CLOSE = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Pace:
+    """σ(t) at times, and what it is in between.
+
+    Quintic where the second derivative is known, cubic where it jumps.
+
+    Attributes
+    ----------
+    t : (K,)
+        Times [s], increasing from 0.
+    sigma : (K,)
+        The original time [s], not falling.
+    rate : (K,)
+        dσ/dt ≥ 0.
+    bend : (K,), optional
+        d²σ/dt² [1/s].
+    """
+
+    t: Array
+    sigma: Array
+    rate: Array
+    bend: Array | None = None
+
+    def slower(self, factor: float) -> "Pace":
+        """Return the same, taking `factor` times as long."""
+        bend = None if self.bend is None else self.bend / factor**2
+        return Pace(factor * self.t, self.sigma, self.rate / factor, bend)
+
+    def smoothed(self, window: float) -> "Pace":
+        """Return the mean over a window in time [s]: its second derivative jumps no more.
+
+        It rests before its start and after its end, and takes a window longer. From one bend to
+        another the third derivative is at most their difference by the window.
+        """
+        from scipy.interpolate import CubicHermiteSpline
+
+        t = np.concatenate([[-window], self.t, [self.t[-1] + window]])
+        sigma = np.concatenate([self.sigma[:1], self.sigma, self.sigma[-1:]])
+        rate = np.concatenate([[0.0], self.rate, [0.0]])
+        spline = CubicHermiteSpline(t, sigma, rate)
+        way = spline.antiderivative()
+        new = np.union1d(self.t, self.t + window)
+        new = new[np.unique(np.floor(new / (_CLOSE * window)), return_index=True)[1]]
+        new[-1] = self.t[-1] + window
+        before = new - window
+        mean = np.clip((way(new) - way(before)) / window, self.sigma[0], self.sigma[-1])
+        mean[0], mean[-1] = self.sigma[0], self.sigma[-1]
+        speed = np.maximum((spline(new) - spline(before)) / window, 0.0)
+        return Pace(new, mean, speed, (spline(new, 1) - spline(before, 1)) / window)
+
+    def __call__(self, t: Array, order: int = 0) -> Array:
+        """Return σ (`order` 0), dσ/dt (1) or d²σ/dt² (2) at times (K,)."""
+        found: Array = self._spline(t, nu=order)
+        return np.clip(found, self.sigma[0], self.sigma[-1]) if order == 0 else found
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import BPoly
+
+        given = [self.sigma, self.rate] + ([] if self.bend is None else [self.bend])
+        return BPoly.from_derivatives(self.t, np.stack(given, axis=1))
+
+
+def times_along(places: Array, rates: Array) -> Array:
+    """Return when places (K,) are reached at rates (K,) whose squares are linear in between."""
+    return np.append(0.0, np.cumsum(2.0 * np.diff(places) / (rates[:-1] + rates[1:])))

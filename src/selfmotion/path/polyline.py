@@ -1,0 +1,212 @@
+"""Straight legs with rounded corners."""
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from selfmotion.basics import Array, PathError, as_number, as_numbers, read_only
+from selfmotion.path.base import Path, PathSamples, path_pose, rotvecs, unit
+
+# The pace of a polyline itself, to be replaced by `Feed`: [m/s], and [rad/s] where it only turns.
+_SPEED, _TURN_RATE = 1.0, 10.0
+# Poses nearer than this [s of the pace above] are the same.
+_SAME = 1e-9
+# The corner is passed at this share of d |Δv|, where the velocity changes by Δv within ± d.
+_MISS = 5.0 / 32.0
+
+
+class Polyline(Path, kind="polyline"):
+    """Straight legs from pose to pose; corners are rounded, and missed by no more than tolerances.
+
+    In a leg the tool moves at a constant speed and turns about a fixed axis. Within a time ± d
+    of a corner its velocity goes over from that of one leg to that of the next by v₁ + Δv m'(x)
+    with m''(x) ∝ (1 - x²/d²)²: the path is C³, and its miss of the corner is 5/32 d |Δv|.
+
+    Its own pace is 1 m/s, or 10 rad/s where it mostly turns: `Feed` gives it one that fits.
+
+    Parameters
+    ----------
+    positions : (N, 3)
+        [m], world axes.
+    quaternions : (N, 4), optional
+        Orientations [w, x, y, z]; normalised, either sign. By default none is prescribed, for
+        tasks that leave it free ('position').
+    tolerance : float
+        How far the tool may pass from a corner [m].
+    turn_tolerance : float
+        Likewise [rad].
+
+    Raises
+    ------
+    PathError
+        Shapes do not agree, fewer than two poses, two equal ones in a row, a zero quaternion, a
+        leg that turns back on the one before.
+    """
+
+    def __init__(
+        self,
+        positions: npt.ArrayLike,
+        quaternions: npt.ArrayLike | None = None,
+        *,
+        tolerance: float = 1e-3,
+        turn_tolerance: float = 1e-2,
+    ) -> None:
+        points = as_numbers(positions, "polyline: positions", error=PathError)
+        self._oriented = quaternions is not None
+        if quaternions is None:
+            quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
+        turns = as_numbers(quaternions, "polyline: quaternions", error=PathError)
+        if points.ndim != 2 or points.shape[1:] != (3,) or len(points) < 2:
+            raise PathError(
+                f"polyline: positions have shape {points.shape}, expected (N, 3) with N ≥ 2"
+            )
+        if turns.shape != (len(points), 4):
+            raise PathError(
+                f"polyline: quaternions have shape {turns.shape}, expected ({len(points)}, 4)"
+            )
+        zero = np.flatnonzero(~np.any(turns, axis=1))
+        if zero.size:
+            raise PathError(f"polyline: quaternions[{zero[0]}] is zero, expected an orientation")
+        what = "polyline: tolerance"
+        self._tolerance = as_number(tolerance, what, above=0.0, error=PathError)
+        what = "polyline: turn_tolerance"
+        self._turn_tolerance = as_number(turn_tolerance, what, above=0.0, error=PathError)
+        self._points, self._turns = read_only(points), read_only(unit(turns))
+        lasts = self._lasts
+        still = np.flatnonzero(lasts <= _SAME)
+        if still.size:
+            raise PathError(
+                f"polyline: poses {still[0]} and {still[0] + 1} are the same; leave one out, or "
+                f"join two polylines with a Dwell"
+            )
+        self._times = read_only(np.append(0.0, np.cumsum(lasts)))
+        self.duration = float(self._times[-1])
+        self._check_reversals()
+
+    @classmethod
+    def from_poses(cls, poses: list[pin.SE3], **options: Any) -> "Polyline":
+        """Return the path through `poses` (SE3 or (4, 4)); options as in the class."""
+        frames = [path_pose(pose, f"polyline: poses[{k}]") for k, pose in enumerate(poses)]
+        turns = [np.roll(pin.Quaternion(frame.rotation).coeffs(), 1) for frame in frames]
+        return cls([frame.translation for frame in frames], turns, **options)
+
+    @property
+    def oriented(self) -> bool:
+        """See `Path.oriented`: where quaternions are given."""
+        return self._oriented
+
+    @property
+    def knots(self) -> Array:
+        """See `Path.knots`: where corners begin and end, so that steps end there."""
+        return read_only(self._edges)
+
+    @property
+    def corner_times(self) -> Array:
+        """When the corners are passed, without both ends [s], (N - 2,)."""
+        return self._times[1:-1]
+
+    @cached_property
+    def _edges(self) -> Array:
+        legs = self._corners
+        inner = self._times[1:-1]
+        edges = np.concatenate([inner - legs.half[1:-1], inner + legs.half[1:-1]])
+        edges = np.sort(np.concatenate([[0.0, self.duration], edges]))
+        return np.asarray(edges[np.append(True, np.diff(edges) > _SAME * self.duration)])
+
+    @cached_property
+    def _lasts(self) -> Array:
+        """How long each leg lasts, (N - 1,)."""
+        way = np.linalg.norm(np.diff(self._points, axis=0), axis=1) / _SPEED
+        turning = np.linalg.norm(self._rotvecs, axis=1) / _TURN_RATE
+        return np.asarray(np.maximum(way, turning))
+
+    @cached_property
+    def _rotvecs(self) -> Array:
+        """How each leg turns, in tool axes [rad], (N - 1, 3)."""
+        return rotvecs(self._turns)
+
+    @cached_property
+    def _rotations(self) -> Any:
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_quat(self._turns, scalar_first=True)
+
+    @cached_property
+    def _corners(self) -> "_Corners":
+        # The ends are corners without a change.
+        lasts = self._lasts
+        speeds = np.diff(self._points, axis=0) / lasts[:, None]
+        rates = self._rotvecs / lasts[:, None]
+        before, after = np.r_[0, : len(lasts)], np.r_[: len(lasts), len(lasts) - 1]
+        jumps = np.linalg.norm(speeds[after] - speeds[before], axis=1)
+        turns = np.linalg.norm(rates[after] - rates[before], axis=1)
+        tiny = np.finfo(float).tiny
+        half = np.minimum(
+            self._tolerance / (_MISS * np.maximum(jumps, tiny)),
+            self._turn_tolerance / (_MISS * np.maximum(turns, tiny)),
+        )
+        half = np.minimum(half, 0.5 * np.minimum(lasts[before], lasts[after]))
+        return _Corners(speeds[before], speeds[after], rates[before], rates[after], half)
+
+    def _check_reversals(self) -> None:
+        corners = self._corners
+        middle = np.linalg.norm(corners.speed_in + corners.speed_out, axis=1) / _SPEED
+        middle += np.linalg.norm(corners.rate_in + corners.rate_out, axis=1) / _TURN_RATE
+        back = np.flatnonzero(middle < 1e-6)
+        if back.size:
+            raise PathError(
+                f"polyline: in pose {back[0]} the tool turns straight back; end one polyline there "
+                f"and begin another: Feed(first, …) + Feed(second, …)"
+            )
+
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
+        from scipy.spatial.transform import Rotation
+
+        middles = 0.5 * (self._times[:-1] + self._times[1:])
+        k = np.searchsorted(middles, t, side="right")
+        corners, x = self._corners, t - self._times[k]
+        after, share = _passed(x, corners.half[k])
+        before = (x - after)[:, None]
+        after, share = after[:, None], share[:, None]
+        slow, fast = corners.speed_in[k], corners.speed_out[k]
+        position = self._points[k] + slow * before + fast * after
+        first = self._rotations[k] * Rotation.from_rotvec(corners.rate_in[k] * before)
+        rotation = first * Rotation.from_rotvec(corners.rate_out[k] * after)
+        turning = self._rotations[k].apply(corners.rate_in[k]) * (1.0 - share)
+        turning += first.apply(corners.rate_out[k]) * share
+        twist = np.hstack([slow + (fast - slow) * share, turning])
+        return PathSamples(t, position, rotation.as_matrix(), twist)
+
+    def to_dict(self) -> dict[str, Any]:
+        """See `Saved.to_dict`."""
+        return {
+            "kind": self.kind,
+            "positions": self._points.tolist(),
+            "quaternions": self._turns.tolist() if self._oriented else None,
+            "tolerance": self._tolerance,
+            "turn_tolerance": self._turn_tolerance,
+        }
+
+
+class _Corners(NamedTuple):
+    """Velocities [m/s], rates in tool axes [rad/s] before and after each pose, and d [s]."""
+
+    speed_in: Array
+    speed_out: Array
+    rate_in: Array
+    rate_out: Array
+    half: Array
+
+
+def _passed(x: Array, half: Array) -> tuple[Array, Array]:
+    """Return m(x), which goes over from 0 to x within ± d, and m'(x)."""
+    u = np.clip(x / np.where(half > 0.0, half, 1.0), -1.0, 1.0)
+    # ∫ 15/16 (1 - u²)² du, and the integral of that.
+    share = 0.5 + 15.0 / 16.0 * (u - 2.0 / 3.0 * u**3 + u**5 / 5.0)
+    way = 0.5 * u + 15.0 / 16.0 * (u**2 / 2.0 - u**4 / 6.0 + u**6 / 30.0) + _MISS
+    inside = np.abs(x) < half
+    return np.where(inside, half * way, np.maximum(x, 0.0)), np.where(inside, share, x > 0.0)

@@ -1,0 +1,158 @@
+"""The fastest motion along a path: pace and null motion, each in its turn."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import make_interp_spline
+
+from selfmotion.basics import Array, PlanError, ProblemError, Progress, per_joint, shown, silent
+from selfmotion.constraints import (
+    Constraint,
+    JointAccelerationLimits,
+    JointJerkLimits,
+    JointVelocityLimits,
+)
+from selfmotion.costs import LimitUse
+from selfmotion.path import Path, Retimed
+from selfmotion.planning.run import plan
+from selfmotion.plans import Plan, Problem, retime
+
+# What limits the pace rather than the way.
+_OF_PACE = (JointVelocityLimits, JointAccelerationLimits, JointJerkLimits)
+# Rounds end when one gains less than this share, or after so many.
+_GAIN, _ROUNDS = 2e-3, 8
+# The power of the cost: the larger, the nearer to the largest share, and the harder to minimise.
+_POWER = 16.0
+# Intervals of the pace at which a round plans, and its degree.
+_COARSE, _DEGREE = 32, 5
+
+
+@dataclass(frozen=True, eq=False)
+class Fastest:
+    """The fastest motion found, and what it began with.
+
+    Attributes
+    ----------
+    plan : Plan
+        The motion, from rest to rest.
+    duration : float
+        Its time [s].
+    pseudo_inverse : float
+        Time of the motion x = 0 at its fastest [s]; inf where that keeps other limits at no pace.
+    times : tuple of float
+        After each round [s].
+    """
+
+    plan: Plan
+    pseudo_inverse: float
+    times: tuple[float, ...]
+
+    @property
+    def duration(self) -> float:
+        """Time of the motion [s]."""
+        return self.plan.path.duration
+
+
+def fastest(
+    problem: Problem,
+    acceleration: npt.ArrayLike | None = None,
+    velocity: npt.ArrayLike | None = None,
+    *,
+    progress: Progress = silent,
+) -> Fastest:
+    """Return the fastest motion along the problem's path, whatever its own pace and costs.
+
+    In turn, the pace is the fastest for the joint path (`retime`), and the null motion minimises
+    what is used of the limits at that pace (`LimitUse`); rounds go on while they gain, and the best
+    motion is returned. It is never slower than the pseudo-inverse's motion at its own fastest pace
+    is, where that can be driven at all.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its constraints are kept, its costs are not used.
+    acceleration : (n,) or float, optional
+        Limits [rad/s² or m/s²]; by default those of the arm's maker.
+    velocity : (n,) or float, optional
+        Limits [rad/s or m/s]; by default those that the problem asks for, or the URDF's.
+    progress : callable, optional
+        Called with ``("fastest", round, rounds)``.
+
+    Raises
+    ------
+    ProblemError
+        No limits of acceleration are given or known, or toppra is not installed.
+    PlanError
+        No motion that was found keeps all limits at any pace; says the last verdict.
+    """
+    if not isinstance(problem, Problem):
+        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")
+    v, a = _limits(problem, acceleration, velocity)
+    geometric = tuple(item for item in problem.constraints if not isinstance(item, _OF_PACE))
+    free = replace(problem, constraints=geometric, costs=(LimitUse(v, a, _POWER),))
+    best: Plan | None = None
+    path, times, verdict, still = problem.path, [], "", np.inf
+    for number in range(_ROUNDS):
+        progress("fastest", number, _ROUNDS)
+        planned = plan(replace(free, path=path))
+        found = _at_its_fastest(planned, problem, v, a)
+        if number == 0:
+            slow = replace(planned, trajectory=planned.initial_trajectory)
+            other = _at_its_fastest(slow, problem, v, a)
+            if other.certificate.verified:
+                still, best = other.path.duration, other
+        before = np.inf if best is None else best.path.duration
+        if found.certificate.verified and found.path.duration < before:
+            best = found
+        verdict = found.certificate.verdict
+        if best is not None:
+            times.append(best.path.duration)
+            if times[-1] > (1.0 - _GAIN) * before:
+                break
+        path = _stand_in(problem.path, path, found.path)
+    if best is None:
+        raise PlanError(f"no motion keeps all limits at any pace: {verdict}")
+    return Fastest(best, still, tuple(times))
+
+
+def _limits(
+    problem: Problem, acceleration: npt.ArrayLike | None, velocity: npt.ArrayLike | None
+) -> tuple[Array, Array]:
+    robot, asked = problem.robot, problem.envelope
+    v = asked.speed if velocity is None else velocity
+    a = asked.acceleration if acceleration is None else acceleration
+    v = per_joint(v, robot.dof, f"{robot.name}: velocity limits", positive=True)
+    a = per_joint(a, robot.dof, f"{robot.name}: acceleration limits", positive=True)
+    if not np.all(np.isfinite(a)):
+        joint = robot.joint_names[int(np.argmax(~np.isfinite(a)))]
+        raise ProblemError(
+            f"{robot.name}: no limit of acceleration is known of joint '{joint}', without which "
+            f"no pace is the fastest; give acceleration="
+        )
+    return np.minimum(v, asked.speed), np.minimum(a, asked.acceleration)
+
+
+def _at_its_fastest(planned: Plan, problem: Problem, v: Array, a: Array) -> Plan:
+    """Return a motion at the fastest pace that keeps all that the problem asks for."""
+    constraints: tuple[Constraint, ...] = tuple(problem.constraints)
+    whole = replace(planned, problem=replace(planned.problem, constraints=constraints))
+    return retime(whole, a, v)
+
+
+def _stand_in(original: Path, current: Path, found: Path) -> Path:
+    """Return the original path at about the pace of `found`, which is a pace of `current`.
+
+    As smooth as the original: its accelerations do not jump from limit to limit.
+    """
+    if not isinstance(found, Retimed):
+        raise TypeError(f"a retimed motion has a {type(found).__name__}")
+    t = np.linspace(0.0, found.duration, _COARSE + 1)
+    sigma = np.clip(found.pace(t), 0.0, current.duration)
+    if isinstance(current, Retimed) and current is not original:
+        sigma = current.pace(sigma)
+    sigma = np.maximum.accumulate(sigma)
+    sigma[0], sigma[-1] = 0.0, original.duration
+    still = [(1, 0.0), (2, 0.0)]
+    spline = make_interp_spline(t, sigma, _DEGREE, bc_type=(still, still))
+    return Retimed(original, t, sigma, np.maximum(spline(t, 1), 0.0), spline(t, 2))
