@@ -54,6 +54,7 @@ from selfmotion.collision import (
     Sphere,
 )
 from selfmotion.constraints import (
+    Band,
     BoundConstraint,
     Clearance,
     ClosedPath,
@@ -90,6 +91,7 @@ from selfmotion.costs import (
     Posture,
     Samples,
     SmallestSingularValue,
+    Towards,
 )
 from selfmotion.formats import (
     Job,
@@ -152,7 +154,11 @@ from selfmotion.plans import (
 )
 from selfmotion.robot import (
     NAMED_ARMS,
+    Coordinate,
+    FrameCoordinate,
+    JointCoordinate,
     RobotModel,
+    SwivelAngle,
     load_robot,
 )
 from selfmotion.task import (
@@ -167,6 +173,7 @@ if TYPE_CHECKING:
 __all__ = [
     "NAMED_ARMS",
     "BSplineNullMotion",
+    "Band",
     "Batch",
     "Binding",
     "BoundConstraint",
@@ -180,6 +187,7 @@ __all__ = [
     "CollisionError",
     "CollisionModel",
     "Constraint",
+    "Coordinate",
     "Cost",
     "Cylinder",
     "DampedLeastSquares",
@@ -197,6 +205,7 @@ __all__ = [
     "FileFormatError",
     "Finding",
     "FinishedMotion",
+    "FrameCoordinate",
     "Function",
     "FunctionCost",
     "Gap",
@@ -209,6 +218,7 @@ __all__ = [
     "Joined",
     "JointAcceleration",
     "JointAccelerationLimits",
+    "JointCoordinate",
     "JointJerk",
     "JointJerkLimits",
     "JointLimitDistance",
@@ -265,9 +275,11 @@ __all__ = [
     "StartError",
     "StartVelocity",
     "Status",
+    "SwivelAngle",
     "Task",
     "Tolerance",
     "ToolLimits",
+    "Towards",
     "Trajectory",
     "TwistPath",
     "Waypoints",

@@ -1,6 +1,7 @@
 """Re-checks finished motions: the path, and each requirement."""
 
 from selfmotion.certificate.apart import KeepsApart
+from selfmotion.certificate.band import CoordinateBand
 from selfmotion.certificate.check import certify
 from selfmotion.certificate.ends import QUANTITIES, AtRest, ClosedMotion, EndState
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
@@ -17,6 +18,7 @@ __all__ = [
     "AtRest",
     "Certificate",
     "ClosedMotion",
+    "CoordinateBand",
     "DampedStretch",
     "EndState",
     "Extreme",

@@ -1,5 +1,6 @@
 """What a motion must keep: limits, end conditions, closed paths, clearance."""
 
+from selfmotion.constraints.band import Band
 from selfmotion.constraints.base import (
     BoundConstraint,
     Constraint,
@@ -26,6 +27,7 @@ from selfmotion.constraints.tool import ToolLimits
 from selfmotion.constraints.torque import JointTorqueLimits
 
 __all__ = [
+    "Band",
     "BoundConstraint",
     "Clearance",
     "ClosedPath",

@@ -20,6 +20,7 @@ from selfmotion.costs.manipulability import (
 )
 from selfmotion.costs.off_path import OffPath
 from selfmotion.costs.samples import Samples
+from selfmotion.costs.towards import Towards
 
 __all__ = [
     "ERROR",
@@ -42,6 +43,7 @@ __all__ = [
     "Posture",
     "Samples",
     "SmallestSingularValue",
+    "Towards",
     "cost_from_dict",
     "weight_matrix",
 ]

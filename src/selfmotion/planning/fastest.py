@@ -1,6 +1,7 @@
 """The fastest motion along a path: pace and null motion, each in its turn."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -153,6 +154,6 @@ def _stand_in(original: Path, current: Path, found: Path) -> Path:
         sigma = current.pace(sigma)
     sigma = np.maximum.accumulate(sigma)
     sigma[0], sigma[-1] = 0.0, original.duration
-    still = [(1, 0.0), (2, 0.0)]
+    still: Any = [(1, 0.0), (2, 0.0)]
     spline = make_interp_spline(t, sigma, _DEGREE, bc_type=(still, still))
     return Retimed(original, t, sigma, np.maximum(spline(t, 1), 0.0), spline(t, 2))

@@ -1,6 +1,7 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
 from selfmotion.robot.chain import Flags, compose, placements
+from selfmotion.robot.coordinates import Coordinate, FrameCoordinate, JointCoordinate, SwivelAngle
 from selfmotion.robot.dynamics import Dynamics
 from selfmotion.robot.kinematics import ToolKinematics
 from selfmotion.robot.loading import NAMED_ARMS, load_robot, rebuild_robot
@@ -12,10 +13,14 @@ from selfmotion.robot.urdf import Urdf, UrdfJoint
 
 __all__ = [
     "NAMED_ARMS",
+    "Coordinate",
     "Dynamics",
     "Flags",
+    "FrameCoordinate",
+    "JointCoordinate",
     "Mounting",
     "RobotModel",
+    "SwivelAngle",
     "ToolKinematics",
     "ToolRates",
     "Urdf",
