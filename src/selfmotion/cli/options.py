@@ -63,7 +63,8 @@ StartOption = Annotated[
     str | None, typer.Option(help="q1,q2,… (rad or m); default: one that suits the path.")
 ]
 FromOption = Annotated[
-    Path | None, typer.Option("--from", help="Start where this plan (.npz) starts.")
+    Path | None,
+    typer.Option("--from", help="Begin with the start and the null motion of this plan (.npz)."),
 ]
 ToolOption = Annotated[str | None, typer.Option(help="Tool frame (a link).")]
 DegreeOption = Annotated[int, typer.Option(help="Degree of the null motion's polynomial.")]

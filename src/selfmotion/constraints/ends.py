@@ -152,8 +152,8 @@ class StartVelocity(Constraint):
         if abs(asked[row] - twist[row]) > _NEAR_END:
             raise ProblemError(
                 f"the start velocity moves '{robot.tool}' at {asked[row]:.6g} m/s or rad/s in row "
-                f"'{task.row_names[row]}', but the path begins at {round(twist[row], 9) + 0.0:g}; give "
-                f"the path that speed, or the arm another one"
+                f"'{task.row_names[row]}', but the path begins at {round(twist[row], 9) + 0.0:g}; "
+                f"give the path that speed, or the arm another one"
             )
 
     def target(self, robot: RobotModel) -> Array:
