@@ -11,7 +11,7 @@ import sys
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -234,8 +234,9 @@ def _length(rad: float | None, metres: float | None) -> str:
 
 def _table(scores: list[Score]) -> Table:
     table = Table(box=tables.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for name in ("problem", "valid", "length", "reference", "step", "first", "end"):
-        table.add_column(name, justify="left" if name in ("problem", "valid") else "right")
+    for name in ("problem", "valid", "length", "published", "step", "first", "end"):
+        side: Literal["left", "right"] = "left" if name in ("problem", "valid") else "right"
+        table.add_column(name, justify=side, overflow="fold")
     for item in scores:
         judged = item.judged
         table.add_row(
