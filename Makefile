@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-batch bench-peers bench-starts errors suite suite-made fuzz fuzz-certificate fuzz-generated acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-batch bench-peers bench-starts docs errors suite suite-made fuzz fuzz-certificate fuzz-generated acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -34,6 +34,9 @@ bench-batch: $(READY)  ## two processes against one, and what a plan costs besid
 
 bench-starts: $(READY)  ## free starts against the best of everything tried, 60 paths
 	$(BIN)/python benchmarks/starts.py
+
+docs: $(READY)  ## the site, into out/site
+	$(BIN)/mkdocs build --quiet --strict --config-file docs/mkdocs.yml
 
 errors: $(READY)  ## docs/errors.md: every bad input of the tests, and what the user sees
 	$(BIN)/python tests/bad_inputs.py
