@@ -36,7 +36,7 @@ bench-starts: $(READY)  ## free starts against the best of everything tried, 60 
 	$(BIN)/python benchmarks/starts.py
 
 docs: $(READY)  ## the site, into out/site
-	$(BIN)/mkdocs build --quiet --strict --config-file docs/mkdocs.yml
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --config-file docs/mkdocs.yml
 
 errors: $(READY)  ## docs/errors.md: every bad input of the tests, and what the user sees
 	$(BIN)/python tests/bad_inputs.py

@@ -32,16 +32,16 @@ def draw_all() -> dict[str, str]:
 
 def self_motion() -> str:
     """Draw one tool position of the planar arm with several configurations."""
-    arm = sm.load_robot("planar_3r")
+    # The joints are where the next link begins.
+    ends = [sm.load_robot("planar_3r", tool=link) for link in ("link2", "link3", "tool")]
+    arm = ends[-1]
     pose = arm.pose(arm.dexterous_configuration("planar"))
     figure, axes = _axes()
     for seed in range(12):
-        q = arm.inverse_kinematics(pose, "planar", rng=seed, seed=_random(arm, seed))
-        angles = np.cumsum(q)
-        joints = [np.zeros(2)]
-        for angle in angles:
-            joints.append(joints[-1] + _link(arm) * np.array([np.cos(angle), np.sin(angle)]))
-        axes.plot(*np.array(joints).T, marker="o", markersize=3, linewidth=1)
+        guess = np.random.default_rng(seed).uniform(-np.pi, np.pi, arm.dof)
+        q = arm.inverse_kinematics(pose, "planar", seed=guess)
+        joints = [each.pose(q[: each.dof]).translation[:2] for each in ends]
+        axes.plot(*np.array([np.zeros(2), *joints]).T, marker="o", markersize=3, linewidth=1)
     axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
     return _svg(figure)
 
@@ -94,15 +94,6 @@ def path_error(plan: sm.Plan) -> str:
     axes.set(xlabel="t [s]", ylabel="distance from the path [m]")
     axes.legend(title="samples", frameon=False)
     return _svg(figure)
-
-
-def _random(arm: sm.RobotModel, seed: int) -> np.ndarray:
-    return np.random.default_rng(seed).uniform(-np.pi, np.pi, arm.dof)
-
-
-def _link(arm: sm.RobotModel) -> float:
-    """Return the length of each of the arm's links, which are alike [m]."""
-    return float(np.linalg.norm(arm.pose(np.zeros(arm.dof)).translation) / arm.dof)
 
 
 def _axes() -> tuple[Figure, "Axes"]:
