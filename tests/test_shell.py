@@ -116,7 +116,7 @@ def test_a_plan_is_written_in_any_format(tmp_path: Path, name: str) -> None:
         (("--cost", "Speed"), "--cost is 'Speed', expected NAME or NAME=WEIGHT"),
         (("--cost", "PathLength=1"), "--cost: PathLength has no weight"),
         (("--cost", "JointVelocity=a"), "--cost is 'a', expected numbers"),
-        (("--feed", "0.1"), "--feed and --frame are for --path"),
+        (("--feed", "0.1"), "--feed, --frame and --ramp are for --path"),
         (("--lock", "a"), "--lock is 'a', expected NAME=VALUE"),
         (("--lock", "a=1"), "lock names joint 'a'"),
         (("--from", "no.npz"), "no.npz: no such file"),

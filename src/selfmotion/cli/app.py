@@ -62,6 +62,7 @@ def plan(
     feed: options.FeedOption = None,
     jump: options.JumpOption = None,
     frame: options.FrameOption = None,
+    ramp: options.RampOption = None,
     corners: options.CornersOption = "blend",
     task: options.TaskOption = "pose",
     relax: options.RelaxOption = None,

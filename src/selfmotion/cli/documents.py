@@ -26,6 +26,7 @@ class Shell:
     feed: float | None
     jump: float | None
     frame: str | None
+    ramp: float | None
     corners: str
     task: str
     start: str | None
@@ -84,13 +85,15 @@ class Shell:
         if sum(option is not None for option in (self.path, self.circle, self.line)) != 1:
             raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
         if self.path is not None:
-            given = {"feed": self.feed, "duration": self.duration, "jump": self.jump}
+            given = {name: getattr(self, name) for name in ("feed", "duration", "jump", "ramp")}
             frame = {} if self.frame is None else {"frame": options.pose(self.frame, "--frame")}
             return {"kind": "file", "file": str(self.path), "corners": self.corners, **frame} | {
                 key: value for key, value in given.items() if value is not None
             }
-        if self.feed is not None or self.frame is not None:
-            raise sm.ProblemError("--feed and --frame are for --path; a shape has a --duration")
+        if any(option is not None for option in (self.feed, self.frame, self.ramp)):
+            raise sm.ProblemError(
+                "--feed, --frame and --ramp are for --path; a shape has a --duration and rests"
+            )
         duration = 4.0 if self.duration is None else self.duration
         if self.circle is not None:
             axis = [float(self.normal == name) for name in "xyz"]

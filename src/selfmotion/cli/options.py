@@ -49,6 +49,10 @@ FrameOption = Annotated[
     str | None,
     typer.Option(help="Pose of the frame that --path is in: x,y,z,roll,pitch,yaw (m, rad)."),
 ]
+RampOption = Annotated[
+    float | None,
+    typer.Option(help="Run --path up to its speed from rest, and down again, in so long (s)."),
+]
 CornersOption = Annotated[Corners, typer.Option(help="At kinks of the waypoints.")]
 TaskOption = Annotated[TaskName, typer.Option(help="What the path prescribes.")]
 RelaxOption = Annotated[

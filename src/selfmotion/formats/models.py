@@ -167,7 +167,7 @@ _PATH_FILE: _Fields = {
     "kind": (Literal["file"], ...),
     "file": (Text, ...),
     "frame": (Pose, None),
-    **dict.fromkeys(("feed", "duration", "jump", "corner_angle"), (Number, None)),
+    **dict.fromkeys(("feed", "duration", "jump", "ramp", "corner_angle"), (Number, None)),
     "corners": (Text, None),
 }
 # A cost that is a function of one's own.
