@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-batch bench-peers bench-starts bench-fastest errors suite suite-made fuzz fuzz-certificate fuzz-generated acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-batch bench-peers bench-starts bench-fastest docs errors suite suite-made fuzz fuzz-certificate fuzz-generated acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -37,6 +37,9 @@ bench-starts: $(READY)  ## free starts against the best of everything tried, 60 
 
 bench-fastest: $(READY)  ## the fastest motions of 20 paths, and retimed plans, against limits
 	$(BIN)/python benchmarks/fastest.py
+
+docs: $(READY)  ## the site, into out/site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --config-file docs/mkdocs.yml
 
 errors: $(READY)  ## docs/errors.md: every bad input of the tests, and what the user sees
 	$(BIN)/python tests/bad_inputs.py

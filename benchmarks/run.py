@@ -16,6 +16,8 @@ from rich.table import Table
 
 HERE = Path(__file__).parent
 OUT = HERE.parent / "out"
+# Between these the README has the table; the site shows it from there.
+BEGIN, END = "<!-- --8<-- [start:bench] -->", "<!-- --8<-- [end:bench] -->"
 
 
 def main() -> int:
@@ -42,10 +44,10 @@ def main() -> int:
 
 def _put_into_readme(lines: list[str]) -> None:
     readme = HERE.parent / "README.md"
-    before, rest = readme.read_text().split("<!-- bench -->")
-    after = rest.split("<!-- /bench -->")[1]
+    before, rest = readme.read_text().split(BEGIN)
+    after = rest.split(END)[1]
     table = "\n".join(lines)
-    readme.write_text(f"{before}<!-- bench -->\n{table}\n<!-- /bench -->{after}")
+    readme.write_text(f"{before}{BEGIN}\n{table}\n{END}{after}")
 
 
 def figures(report: dict[str, Any]) -> list[tuple[str, str]]:

@@ -11,18 +11,18 @@ import sys
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pinocchio as pin
 import typer
 from rich import box as tables
-from rich.console import Console
 from rich.table import Table
 from suite_judge import Judged, SuiteJudge
 
 import selfmotion as sm
 from selfmotion.basics import Array, Progress, write_atomically, write_csv
+from selfmotion.cli.tables import console
 
 DATA = Path(__file__).parent / "data"
 
@@ -222,7 +222,7 @@ def main(
             print(item.name, f"{item.seconds:.1f} s", item.judged.reason or "valid", flush=True)
     text = json.dumps([asdict(item) for item in scores], indent=1)
     write_atomically(out / "suite.json", lambda stream: stream.write(text.encode()) and None)
-    Console().print(_table(scores))
+    console().print(_table(scores))
     sys.exit(0 if all(not item.judged.reason for item in scores) else 1)
 
 
@@ -233,9 +233,10 @@ def _length(rad: float | None, metres: float | None) -> str:
 
 
 def _table(scores: list[Score]) -> Table:
-    table = Table(box=tables.SIMPLE_HEAD)
-    for name in ("problem", "valid", "length", "reference", "step", "first", "end"):
-        table.add_column(name, justify="left" if name in ("problem", "valid") else "right")
+    table = Table(box=tables.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in ("problem", "valid", "length", "published", "step", "first", "end"):
+        side: Literal["left", "right"] = "left" if name in ("problem", "valid") else "right"
+        table.add_column(name, justify=side, overflow="fold")
     for item in scores:
         judged = item.judged
         table.add_row(

@@ -251,3 +251,18 @@ def test_the_schema_accepts_what_is_read_and_refuses_what_is_not(tmp_path: Path)
         assert not check.is_valid({**good, key: value})
     assert invoke("schema", "--out", tmp_path / "schema.json")[0] == 0
     assert json.loads((tmp_path / "schema.json").read_text()) == schema
+
+
+def test_a_path_from_a_file_is_run_up_to_its_speed(tmp_path: Path) -> None:
+    (tmp_path / "seam.csv").write_text("x,y,z\n0.5,-0.1,0.4\n0.5,0.0,0.4\n0.5,0.1,0.4\n")
+    file = tmp_path / "cell.toml"
+    text = 'task = "position"\nrobot.name = "panda"\n[path]\nkind = "file"\nfile = "seam.csv"\n'
+    file.write_text(text + "feed = 0.05\n")
+    seam = sm.read_problem(file).path
+    file.write_text(text + "feed = 0.05\nramp = 0.5\n")
+    path = sm.read_problem(file).path
+    assert path.duration == pytest.approx(seam.duration + 0.5)
+    assert np.linalg.norm(seam.twist(0.0)[:3]) == pytest.approx(0.05)
+    assert not path.twist(0.0).any()
+    assert not path.twist(path.duration).any()
+    np.testing.assert_allclose(path.twist(1.0), seam.twist(0.75), atol=1e-12)

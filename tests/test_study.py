@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -200,6 +201,18 @@ def test_optimum_stops_where_coefficients_run_away(joint_space: sm.Problem) -> N
     _, found = optimum(wild, max_iterations=400, unbounded=100.0)
     assert found.status is sm.Status.UNBOUNDED
     assert "JointVelocity" in found.status.message
+
+
+def test_missing_matplotlib_is_said_before_any_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    from selfmotion import study
+    from shell import complaint
+
+    def work(*_: object) -> Study:
+        raise AssertionError("it began")
+
+    monkeypatch.setattr(study, "run", work)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert complaint("study") == "error: figures need matplotlib: pip install 'selfmotion[plots]'"
 
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-_console = Console(highlight=False)
+_console = tables.console()
 # Apart from the results, so that these can be piped.
 _stages = Console(stderr=True, highlight=False)
 
@@ -62,6 +62,7 @@ def plan(
     feed: options.FeedOption = None,
     jump: options.JumpOption = None,
     frame: options.FrameOption = None,
+    ramp: options.RampOption = None,
     corners: options.CornersOption = "blend",
     corner_tolerance: options.CornerToleranceOption = None,
     task: options.TaskOption = "pose",
@@ -92,11 +93,12 @@ def plan(
     as_json: options.JsonOption = False,
 ) -> None:
     """Plan a motion, check it, and write it."""
-    job = documents.read(context, problem, settings or [], allow_code)
+    warm_start = None if warm is None else sm.load_plan(warm)
+    job = documents.read(context, problem, settings or [], allow_code, warm_start)
     check_suffixes([*job.outputs, *(out or [])])
     asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
     given = {key: value for key, value in asked.items() if value is not None}
-    result = _plan_with_progress(job.problem, **{**job.settings, **given})
+    result = _plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
     if as_json:
         _console.print_json(data=tables.plan_json(result))
     else:
@@ -117,7 +119,7 @@ def init(
     if file.exists() and not force:
         raise sm.FileFormatError(f"{file}: is there already; give --out or --force")
     formats.write_text(file, text)
-    _console.print(f"wrote {file}", markup=False)
+    _console.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 
 @app.command(epilog="Example: selfmotion schema --out problem.schema.json")
@@ -130,7 +132,7 @@ def schema(
         typer.echo(text)
         return
     formats.write_text(out, text + "\n")
-    _console.print(f"wrote {out}", markup=False)
+    _console.print(f"wrote {out}", markup=False, soft_wrap=True)
 
 
 @app.command(
@@ -263,7 +265,7 @@ def replay(
     if gif is not None:
         written.append(render_gif(saved[0], gif))
     for file in written:
-        _console.print(f"wrote {file}", markup=False)
+        _console.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 
 @app.command(epilog="Example: selfmotion batch cell.toml --workers 2 --out out/batch")
@@ -324,14 +326,16 @@ def demo(
     problems = {"planar": sm.sample_problem(), "panda": panda_past_a_box()}
     verified = True
     for name, problem in problems.items():
-        _console.rule(name)
+        _console.print(name, style="bold", markup=False)
         result = _plan_with_progress(problem)
         tables.show(result, _console)
         files = [out / f"{name}.npz", out / f"{name}.csv"]
         _write(result, files, out / f"{name}.html")
         verified = verified and result.certificate.verified
     tracked = sm.plan_by(problem, sm.PseudoInverse()).certificate
-    _console.print(f"the pseudo-inverse on the same problem: {tracked.verdict}", markup=False)
+    _console.print(
+        f"the pseudo-inverse on the same problem: {tracked.verdict}", markup=False, soft_wrap=True
+    )
     raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
 
 
@@ -346,8 +350,10 @@ def study(
 
     Takes minutes. Needs matplotlib (the extra `plots`).
     """
-    from selfmotion.study import PARTS, Scale, run, write
+    from selfmotion.study import PARTS, Scale, require_matplotlib, run, write
 
+    # Before minutes of work that could not be shown.
+    require_matplotlib()
     scale = Scale.reduced() if reduced else Scale.full()
     with StageDisplay(_stages) as display:
         result = run(scale, lambda part: display.stage(part, PARTS.index(part) + 1, len(PARTS)))
@@ -375,7 +381,7 @@ def _write(result: sm.Plan, out: list[Path], html: Path | None, *, quiet: bool =
         _replay(result, html)
     for file in [*out, *([] if html is None else [html])]:
         if not quiet:
-            _console.print(f"wrote {file}", markup=False)
+            _console.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 
 def _replay(result: sm.Plan, file: Path) -> None:

@@ -26,11 +26,11 @@ class Shell:
     feed: float | None
     jump: float | None
     frame: str | None
+    ramp: float | None
     corners: str
     corner_tolerance: float | None
     task: str
     start: str | None
-    warm: Path | None
     tool: str | None
     lock: list[str]
     degree: int
@@ -54,7 +54,7 @@ class Shell:
         lists = {name: list(given[name] or []) for name in ("lock", "cost", "relax")}
         return cls(**{**given, **lists})
 
-    def document(self, robot: str) -> dict[str, Any]:
+    def document(self, robot: str, warm_start: sm.Plan | None) -> dict[str, Any]:
         """Return the table."""
         table: dict[str, Any] = {
             "robot": {
@@ -62,7 +62,7 @@ class Shell:
                 "lock": options.locks(self.lock),
             },
             "task": self.task,
-            "start": self._start(),
+            "start": self._start(warm_start),
             "path": self._path(),
             "null_motion": {"kind": "PolynomialNullMotion", "degree": self.degree},
             "costs": self._costs(),
@@ -77,29 +77,26 @@ class Shell:
             table["robot"]["tool"] = self.tool
         return table
 
-    def _start(self) -> Any:
+    def _start(self, warm_start: sm.Plan | None) -> Any:
         if self.start is not None:
             return options.numbers(self.start, "--start").tolist()
-        if self.warm is not None:
-            return sm.load_plan(self.warm).trajectory.q[0].tolist()
-        return "free" if self.path is not None else "dexterous"
+        if self.path is not None:
+            return "free"
+        # Shapes are drawn from where the arm starts.
+        return "dexterous" if warm_start is None else warm_start.trajectory.q[0].tolist()
 
     def _path(self) -> dict[str, Any]:
         if sum(option is not None for option in (self.path, self.circle, self.line)) != 1:
             raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
         if self.path is not None:
-            given = {
-                "feed": self.feed,
-                "duration": self.duration,
-                "jump": self.jump,
-                "tolerance": self.corner_tolerance,
-            }
+            given = {name: getattr(self, name) for name in ("feed", "duration", "jump", "ramp")}
+            given["tolerance"] = self.corner_tolerance
             frame = {} if self.frame is None else {"frame": options.pose(self.frame, "--frame")}
             return {"kind": "file", "file": str(self.path), "corners": self.corners, **frame} | {
                 key: value for key, value in given.items() if value is not None
             }
-        if self.frame is not None:
-            raise sm.ProblemError("--frame is for --path; a shape begins where the arm stands")
+        if self.frame is not None or self.ramp is not None:
+            raise sm.ProblemError("--frame and --ramp are for --path; a shape rests at its ends")
         if self.feed is not None and self.duration is not None:
             raise sm.ProblemError("give the pace by one of --feed and --duration")
         pace = {"feed": self.feed} if self.feed is not None else {"duration": self.duration or 4.0}
@@ -133,14 +130,20 @@ class Shell:
         return found
 
 
-def read(context: typer.Context, given: str, settings: list[str], allow_code: bool) -> sm.Job:
+def read(
+    context: typer.Context,
+    given: str,
+    settings: list[str],
+    allow_code: bool,
+    warm_start: sm.Plan | None = None,
+) -> sm.Job:
     """Return the job of a problem file, or of a robot with the options of the shell.
 
     Options that say what a problem file says itself are refused beside one.
     """
     file = Path(given) if Path(given).suffix in (".toml", ".json") else None
     if file is None:
-        document = Shell.of(context).document(given)
+        document = Shell.of(context).document(given, warm_start)
     else:
         typed = _typed(context)
         if typed:

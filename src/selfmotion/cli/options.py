@@ -50,6 +50,10 @@ FrameOption = Annotated[
     str | None,
     typer.Option(help="Pose of the frame that --path is in: x,y,z,roll,pitch,yaw (m, rad)."),
 ]
+RampOption = Annotated[
+    float | None,
+    typer.Option(help="Run --path up to its speed from rest, and down again, in so long (s)."),
+]
 CornersOption = Annotated[
     Corners,
     typer.Option(
@@ -74,7 +78,8 @@ StartOption = Annotated[
     str | None, typer.Option(help="q1,q2,… (rad or m); default: one that suits the path.")
 ]
 FromOption = Annotated[
-    Path | None, typer.Option("--from", help="Start where this plan (.npz) starts.")
+    Path | None,
+    typer.Option("--from", help="Begin with the start and the null motion of this plan (.npz)."),
 ]
 ToolOption = Annotated[str | None, typer.Option(help="Tool frame (a link).")]
 DegreeOption = Annotated[int, typer.Option(help="Degree of the null motion's polynomial.")]

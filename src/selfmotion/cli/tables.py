@@ -2,12 +2,15 @@
 
 import dataclasses
 import json
+import os
+import sys
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from selfmotion.certificate import LIMIT_NAMES, Certificate
@@ -20,10 +23,20 @@ if TYPE_CHECKING:
     from selfmotion.study import Claim
 
 
+# Columns of a log, which has no width of its own: those of the widest table.
+_LOG_WIDTH = 120
+
+
+def console() -> Console:
+    """Return the console of the results: as wide as the terminal, or as a log may be."""
+    measured = sys.stdout.isatty() or "COLUMNS" in os.environ
+    return Console(highlight=False, width=None if measured else _LOG_WIDTH)
+
+
 def show(plan: Plan, console: Console) -> None:
     """Print the cost of x = 0 against the plan, the work done, and the certificate."""
     report = plan.report
-    table = Table(box=box.SIMPLE_HEAD, title=f"{plan.robot.name}, task {plan.task.value}")
+    table = _table(f"{plan.robot.name}, task {plan.task.value}")
     table.add_column("cost")
     table.add_column("without self-motion", justify="right")
     table.add_column("plan", justify="right")
@@ -37,7 +50,8 @@ def show(plan: Plan, console: Console) -> None:
     console.print(
         f"{report.evaluations} evaluations of the cost, {report.gradient_evaluations} of its "
         f"gradient;\n{report.jacobian_evaluations} Jacobians, {report.steps} steps, "
-        f"{report.seconds:.2f} s\n{report.status.value}: {report.message}"
+        f"{report.seconds:.2f} s\n{report.status.value}: {report.message}",
+        markup=False,
     )
     if report.remaining is not None and report.cost:
         share = 100.0 * report.remaining / abs(report.cost)
@@ -52,11 +66,11 @@ def show(plan: Plan, console: Console) -> None:
 def show_certificate(certificate: Certificate, console: Console) -> None:
     """Print what forward kinematics found, and the verdict."""
     title = f"checked at all times, with {certificate.samples} poses"
-    table = Table(box=box.SIMPLE_HEAD, title=title)
+    table = _table(title)
     table.add_column("worst")
-    table.add_column("value", justify="right")
-    table.add_column("at", justify="right")
-    table.add_column("where")
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("at", justify="right", no_wrap=True)
+    table.add_column("where", overflow="fold")
     rows = (
         ("position error", certificate.position_error, "{:.2e} m"),
         ("rotation error", certificate.rotation_error, "{:.2e} rad"),
@@ -69,12 +83,14 @@ def show_certificate(certificate: Certificate, console: Console) -> None:
     for name, worst, form in rows:
         if worst is None:
             continue
-        table.add_row(name, form.format(worst.value), f"{worst.time:.3f} s", worst.name)
+        value = form.format(worst.value)
+        table.add_row(name, value, f"{worst.time:.3f} s", escape(worst.name))
     shown = {"clearance", *LIMIT_NAMES}
     for finding in certificate.findings:
         if finding.requirement not in shown:
-            value = f"{finding.amount:.4g} (allowed: {finding.allowed:.4g})"
-            table.add_row(finding.requirement, value, f"{finding.time:.3f} s", finding.subject)
+            name = f"{finding.requirement} (allowed: {finding.allowed:.4g})"
+            value, time = f"{finding.amount:.4g}", f"{finding.time:.3f} s"
+            table.add_row(escape(name), value, time, escape(finding.subject))
     for worst in certificate.deviations:
         unit = "rad" if "r" in worst.name else "m"
         value, time = f"{worst.value:.4g} {unit}", f"{worst.time:.3f} s"
@@ -82,25 +98,26 @@ def show_certificate(certificate: Certificate, console: Console) -> None:
     table.add_row("end to start", f"{certificate.closure:.4g}", "", "")
     console.print(table)
     for remark in certificate.remarks:
-        console.print(remark, style="dim", markup=False)
+        console.print(remark, style="dim", markup=False, soft_wrap=not console.is_terminal)
     style = "green" if certificate.verified else "bold red"
-    console.print(certificate.verdict, style=style, markup=False)
+    # One line of a log; words are kept whole on a terminal.
+    console.print(certificate.verdict, style=style, markup=False, soft_wrap=not console.is_terminal)
 
 
 def show_comparison(plans: Mapping[str, Plan], console: Console) -> None:
     """Print a column per plan: its costs, and the worst that its check found."""
-    table = Table(box=box.SIMPLE_HEAD, title="plans side by side")
+    table = _table("plans side by side")
     table.add_column("")
     for name in plans:
-        table.add_column(name, justify="right", overflow="fold")
+        table.add_column(escape(name), justify="right", overflow="fold")
     shown = list(plans.values())
     for term in dict.fromkeys(term for plan in shown for term in plan.report.terms):
         table.add_row(term, *(_number(plan.report.terms.get(term)) for plan in shown))
     table.add_row("total cost", *(_number(plan.report.cost) for plan in shown))
     table.add_section()
-    table.add_row("duration [s]", *(_number(plan.trajectory.duration) for plan in shown))
+    table.add_row("duration, s", *(_number(plan.trajectory.duration) for plan in shown))
     length = (float(np.abs(np.diff(plan.trajectory.q, axis=0)).sum()) for plan in shown)
-    table.add_row("joint path [rad, m]", *map(_number, length))
+    table.add_row("joint path, rad or m", *map(_number, length))
     for label, name in _WORST.items():
         worst = [getattr(plan.certificate, name) for plan in shown]
         if any(item is not None for item in worst):
@@ -109,17 +126,22 @@ def show_comparison(plans: Mapping[str, Plan], console: Console) -> None:
     console.print(table)
     for name, plan in plans.items():
         if not plan.certificate.verified:
-            console.print(f"{name}: {plan.certificate.verdict}", style="bold red", markup=False)
+            console.print(
+                f"{name}: {plan.certificate.verdict}",
+                style="bold red",
+                markup=False,
+                soft_wrap=not console.is_terminal,
+            )
 
 
 _WORST = {
-    "position error [m]": "position_error",
-    "rotation error [rad]": "rotation_error",
+    "position error, m": "position_error",
+    "rotation error, rad": "rotation_error",
     "margin to joint limits": "limit_margin",
     "speed over its limit": "velocity_ratio",
     "acceleration over its limit": "acceleration_ratio",
     "smallest singular value": "smallest_singular_value",
-    "clearance [m]": "clearance",
+    "clearance, m": "clearance",
 }
 
 
@@ -131,16 +153,18 @@ def show_batch(batch: "Batch", console: Console) -> None:
     """Print the best of many plans, and how many there are."""
     ranked = sorted(batch.rows, key=lambda row: (bool(row.error), not row.verified, row.cost))
     keys = list(dict.fromkeys(key for row in ranked for key in row.settings))
-    table = Table(box=box.SIMPLE_HEAD, title="the best of them")
-    for name in ("name", *keys, "cost", "duration", "verified"):
-        table.add_column(name, overflow="fold")
+    table = _table("the best of them")
+    for name in ("name", *keys):
+        table.add_column(escape(name), overflow="fold")
+    for name in ("cost", "duration", "verified"):
+        table.add_column(name, no_wrap=True)
     for row in ranked[:_SHOWN]:
-        values = [json.dumps(row.settings.get(key, "")) for key in keys]
+        values = [escape(json.dumps(row.settings.get(key, ""))) for key in keys]
         outcome = ["-", "-", "no plan"]
         if not row.error:
             state = "yes" if row.verified else "no"
             outcome = [f"{row.cost:.6g}", f"{row.duration:.4g} s", state]
-        table.add_row(row.name, *values, *outcome)
+        table.add_row(escape(row.name), *values, *outcome)
     console.print(table)
     verified = sum(row.verified for row in batch.rows)
     failed = [row for row in ranked if row.error]
@@ -171,25 +195,20 @@ def batch_json(batch: "Batch") -> dict[str, Any]:
 
 def show_robots(robots: Mapping[str, RobotModel], console: Console) -> None:
     """Print a row per arm: joints, tool frame, and the freedom each task leaves."""
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        caption="n: joints; then the self-motion that each task leaves, - where none",
-    )
+    table = _table()
+    table.caption = "n: joints; tasks with the self-motion that each leaves"
     table.add_column("robot", no_wrap=True)
-    table.add_column("n", justify="right")
+    table.add_column("n", justify="right", no_wrap=True)
     table.add_column("tool frame", no_wrap=True)
-    for task in Task:
-        table.add_column(task.value.replace("_", "\n"), justify="right")
+    table.add_column("tasks")
     for name, robot in robots.items():
-        freedom = [_freedom(robot, task) for task in Task]
-        table.add_row(name, str(robot.dof), robot.tool, *freedom)
+        table.add_row(name, str(robot.dof), robot.tool, ", ".join(_freedom(robot)))
     console.print(table)
 
 
 def show_claims(claims: Sequence["Claim"], console: Console) -> None:
     """Print a row per claim of the paper: verdict, and the number that decides."""
-    table = Table(box=box.SIMPLE_HEAD, title="the paper's claims")
+    table = _table("the paper's claims")
     table.add_column("claim", overflow="fold")
     table.add_column("verdict", no_wrap=True)
     table.add_column("decided by", overflow="fold")
@@ -198,9 +217,15 @@ def show_claims(claims: Sequence["Claim"], console: Console) -> None:
     console.print(table)
 
 
-def _freedom(robot: RobotModel, task: Task) -> str:
-    redundancy = robot.redundancy(task)
-    return str(redundancy) if robot.can_follow(task) and redundancy > 0 else "-"
+def _table(title: str | None = None) -> Table:
+    """Return an empty table without ornament, so that narrow terminals have room for words."""
+    return Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), title=title, title_justify="left")
+
+
+def _freedom(robot: RobotModel) -> list[str]:
+    """Return the tasks that leave self-motion, with how much."""
+    left = {task: robot.redundancy(task) for task in Task if robot.can_follow(task)}
+    return [f"{task.value} {freedom}" for task, freedom in left.items() if freedom > 0]
 
 
 def _distance(gap: Gap) -> str:
@@ -217,14 +242,14 @@ def _distance(gap: Gap) -> str:
 
 def _prices(report: Report) -> Table:
     """Return what each binding constraint costs."""
-    table = Table(box=box.SIMPLE_HEAD, title="constraints that bind")
+    table = _table("constraints that bind")
     table.add_column("with")
     table.add_column("the cost would fall by", justify="right")
     table.add_column("binds at")
     for item in report.active:
         share = f"{100.0 * item.saving / abs(report.cost):.3g} %" if report.cost else ""
         spans = ", ".join(f"{a:.2f} s" if a == b else f"{a:.2f}-{b:.2f} s" for a, b in item.spans)
-        table.add_row(item.easing, share, spans)
+        table.add_row(escape(item.easing), share, spans)
     return table
 
 

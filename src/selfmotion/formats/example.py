@@ -29,6 +29,7 @@ duration = 4.0
 # kind = "file"        # CSV, ROS Path or PoseArray, NumPy
 # file = "seam.csv"
 # feed = 0.05          # m/s, where the file has no times
+# ramp = 0.5           # s, in which it is run up to that from rest, and down again
 # frame = {{ position = [0.5, 0, 0.2], rpy_deg = [0, 0, 0] }}  # of the workpiece
 
 # [null_motion]        # by default a cubic, refined where that lowers the cost

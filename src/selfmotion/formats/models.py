@@ -172,7 +172,8 @@ _PATH_FILE: _Fields = {
     "kind": (Literal["file"], ...),
     "file": (Text, ...),
     "frame": (Pose, None),
-    **dict.fromkeys(("feed", "duration", "jump", "tolerance", "corner_angle"), (Number, None)),
+    **dict.fromkeys(("feed", "duration", "jump", "ramp"), (Number, None)),
+    **dict.fromkeys(("tolerance", "corner_angle"), (Number, None)),
     "corners": (Text, None),
 }
 # A cost that is a function of one's own.

@@ -29,7 +29,7 @@ from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import LineSearch, Optimizer, QuasiNewton
-from selfmotion.path import Circle, Feed, Line, Path, Placed
+from selfmotion.path import Circle, Feed, Line, Path, Placed, Ramped
 from selfmotion.planning import Search, plan
 from selfmotion.plans import Plan, Problem
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
@@ -250,7 +250,9 @@ class _Reader:
         match kind:
             case "file":
                 del values["kind"]
+                ramp = values.pop("ramp", None)
                 path: Path = read_path(self._beside(values.pop("file")), **values)
+                path = path if ramp is None else Ramped(path, ramp)
             case "circle":
                 path = _circle(values)
             case "line":

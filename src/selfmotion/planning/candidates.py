@@ -9,16 +9,19 @@ import numpy as np
 from selfmotion.basics import (
     Array,
     BreakdownError,
+    InverseKinematicsError,
     NoSequenceError,
     ProblemError,
     Progress,
     SelfmotionError,
 )
 from selfmotion.optimise import Status
+from selfmotion.planning.effort import Effort
 from selfmotion.planning.heats import Heats
-from selfmotion.planning.session import Effort, Session
+from selfmotion.planning.session import Session
 from selfmotion.planning.settings import Search
-from selfmotion.plans import Problem
+from selfmotion.planning.warm_start import start_of
+from selfmotion.plans import Plan, Problem
 from selfmotion.search import Reach, SequenceGuide, guides, start_candidates
 
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
@@ -46,6 +49,8 @@ class Candidates:
     reach : callable
         Returns how far single poses are in reach, looking closely at a time [s]: what is beyond is
         so from any start.
+    warm_start : Plan, optional
+        Tried first; where its motion will do, nothing else is.
 
     Attributes
     ----------
@@ -66,8 +71,9 @@ class Candidates:
         search: Search,
         progress: Progress,
         reach: Callable[[float], Reach],
+        warm_start: Plan | None = None,
     ) -> None:
-        self._reach = reach
+        self._reach, self._warm_start = reach, warm_start
         self._problem, self._effort = problem, effort
         self._begin = partial(Session.begin, problem, effort)
         self._settings, self._progress = search, progress
@@ -112,8 +118,15 @@ class Candidates:
             )
         starts = start is None and (search.mode != "global" or not can_search)
         rng = np.random.default_rng(search.rng)
+        if self._warm_start is not None and start is None:
+            self._try_again(self._warm_start)
+            if not self._fell_short and not search.compare:
+                return
         if start is not None:
-            self._try(self._begin(start, free=False))
+            session = self._begin(start, free=False)
+            if self._warm_start is not None:
+                session.adopt(self._warm_start)
+            self._try(session)
         elif starts:
             self._try_candidates(search.starts, search.finalists, rng)
         if self._is_out_of_reach():
@@ -125,6 +138,17 @@ class Candidates:
         if starts and self._fell_short and not self.notes:
             more = _SECOND_EFFORT
             self._try_candidates(more * search.starts, more * search.finalists, rng)
+
+    def _try_again(self, plan: Plan) -> None:
+        """Optimise from a plan of this problem or of one like it, if it leads to a motion."""
+        try:
+            session = self._begin(start_of(plan, self._problem), free=True)
+        except (BreakdownError, InverseKinematicsError) as error:
+            self._failure = error
+            return
+        session.adopt(plan)
+        self._progress("warm start", 1, 1)
+        self._try(session)
 
     @property
     def _fell_short(self) -> bool:

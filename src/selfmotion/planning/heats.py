@@ -13,7 +13,8 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError, Progress
 from selfmotion.motion import Grid
 from selfmotion.optimise import Status
-from selfmotion.planning.session import Effort, Session
+from selfmotion.planning.effort import Effort
+from selfmotion.planning.session import Session
 from selfmotion.plans import Problem
 
 # Steps of the rough motions.

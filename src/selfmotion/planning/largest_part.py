@@ -9,7 +9,8 @@ from selfmotion.engine import Evaluation, Guide, StillMotion
 from selfmotion.motion import Grid, Sampling
 from selfmotion.optimise import Status
 from selfmotion.path import Truncated
-from selfmotion.planning.session import Effort, Session
+from selfmotion.planning.effort import Effort
+from selfmotion.planning.session import Session
 from selfmotion.plans import Problem
 from selfmotion.robot import null_basis
 from selfmotion.search import Reach

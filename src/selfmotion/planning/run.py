@@ -22,10 +22,12 @@ from selfmotion.certificate import Tolerance
 from selfmotion.engine import Counts
 from selfmotion.optimise import Callback, Optimizer, QuasiNewton, Status
 from selfmotion.planning.candidates import Candidates
+from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import Finished, finish
 from selfmotion.planning.largest_part import Part, largest_part
-from selfmotion.planning.session import Effort, Session
+from selfmotion.planning.session import Session
 from selfmotion.planning.settings import Search
+from selfmotion.planning.warm_start import check_warm_start
 from selfmotion.plans import Gap, Plan, Problem, Report
 from selfmotion.search import SPACING, Reach, reachable
 
@@ -38,6 +40,7 @@ def plan(
     *,
     optimizer: Optimizer | None = None,
     search: Search | None = None,
+    warm_start: Plan | None = None,
     tolerance: Tolerance | None = None,
     max_evaluations: int | None = None,
     callback: Callback | None = None,
@@ -53,6 +56,9 @@ def plan(
         they begin to count, `SequentialQuadratic` goes on.
     search : Search, optional
         How to search where the start is free, and whether to compare with a global search.
+    warm_start : Plan, optional
+        A plan of this problem or of one like it, whose null motion is begun with, unless x = 0 is
+        better. Where the start is free, its start too; others are tried only if that falls short.
     tolerance : Tolerance, optional
         What the motion may miss the path by, between samples as well. The number of steps
         follows from it.
@@ -90,27 +96,25 @@ def plan(
         The interruption came before there was a complete motion.
     """
     _check(problem, search, max_evaluations)
+    if warm_start is not None:
+        check_warm_start(warm_start, problem)
     is_one = callable(getattr(optimizer, "minimize", None)) and not isinstance(optimizer, type)
     if optimizer is not None and not is_one:
         raise ProblemError(f"optimizer is {shown(optimizer)}, expected one such as QuasiNewton()")
+    if problem.damping is not None and max_evaluations is None:
+        max_evaluations = _PATIENCE
+    effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, Counts())
     with one_blas_thread():
-        return _plan(problem, optimizer, search, tolerance, max_evaluations, callback, progress)
+        settings = (Tolerance.of(tolerance), progress, warm_start)
+        return _plan(problem, effort, search or Search(), settings)
 
 
 def _plan(
     problem: Problem,
-    optimizer: Optimizer | None,
-    search: Search | None,
-    tolerance: Tolerance | None,
-    max_evaluations: int | None,
-    callback: Callback | None,
-    progress: Progress,
+    effort: Effort,
+    search: Search,
+    settings: tuple[Tolerance, Progress, Plan | None],
 ) -> Plan:
-    if problem.damping is not None and max_evaluations is None:
-        max_evaluations = _PATIENCE
-    effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, Counts())
-    search = search or Search()
-    settings = (Tolerance.of(tolerance), progress)
     found = _Run(problem, effort, search, *settings).plan()
     # Few motions take an arm into itself: the others need not wait for distances.
     if not _overlaps(found) or found.report.status in (Status.INTERRUPTED, Status.STOPPED):
@@ -160,12 +164,13 @@ class _Run:
         search: Search,
         tolerance: Tolerance,
         progress: Progress,
+        warm_start: Plan | None,
     ) -> None:
         self._problem, self._effort, self._search = problem, effort, search
         self._tolerance, self._progress = tolerance, progress
         self._began = time.perf_counter()
         self._reach = cache(self._reachable)
-        self._candidates = Candidates(problem, effort, search, progress, self._reach)
+        self._candidates = Candidates(problem, effort, search, progress, self._reach, warm_start)
 
     def plan(self) -> Plan:
         """Return the plan of the whole path, or of the largest part of it."""

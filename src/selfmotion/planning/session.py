@@ -1,7 +1,5 @@
 """One start of one problem, optimised on a grid that becomes finer."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from selfmotion.basics import Array
@@ -18,8 +16,10 @@ from selfmotion.engine import (
     settled_still_motion,
 )
 from selfmotion.motion import Grid, NullMotion
-from selfmotion.optimise import Callback, Iteration, Minimum, Optimizer, SequentialQuadratic, Status
-from selfmotion.plans import Binding, Problem
+from selfmotion.optimise import Iteration, Minimum, SequentialQuadratic, Status
+from selfmotion.planning.effort import Effort
+from selfmotion.planning.warm_start import coefficients_of
+from selfmotion.plans import Binding, Plan, Problem
 
 # Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands.
 _COST_AGREEMENT = 1e-4
@@ -33,31 +33,6 @@ _LEAST_SAVING = 1e-6
 _ADRIFT = (Status.UNBOUNDED, Status.GRADIENT)
 # After these the user has no more time to give.
 _CUT_SHORT = (Status.INTERRUPTED, Status.STOPPED, Status.MAX_EVALUATIONS)
-
-
-@dataclass(frozen=True)
-class Effort:
-    """What the sessions of a plan share.
-
-    Attributes
-    ----------
-    optimizer : Optimizer
-        Minimises as long as conditions are kept.
-    callback : callable or None
-        Called with each `Iteration`.
-    max_evaluations : int or None
-        Limit on evaluations of each session.
-    counts : Counts
-        Where work is added up.
-    apart : bool
-        Whether the optimisation keeps the arm apart from itself where only the default asks for it.
-    """
-
-    optimizer: Optimizer
-    callback: Callback | None
-    max_evaluations: int | None
-    counts: Counts
-    apart: bool = False
 
 
 class Session:
@@ -195,6 +170,24 @@ class Session:
     def score(self) -> tuple[bool, float]:
         """Return whether constraints are violated, then the cost: the smaller, the better."""
         return bool(self.violations), self._cost()
+
+    def adopt(self, plan: Plan) -> None:
+        """Begin at a plan's null motion instead of x = 0, unless that would be worse."""
+        problem, grid, still = self._still.problem, self._objective.grid, self.merit()
+        motion = self.null_motion
+        if plan.report.null_motion is not None and plan.problem.null_motion == motion:
+            motion = plan.report.null_motion
+        while grid.steps < max(motion.fewest_steps, plan.report.steps):
+            grid = grid.halved()
+        objective = self._on(grid, motion)
+        t = grid.stage_times
+        x = coefficients_of(plan, problem, t, objective.null_motion)
+        z, _, c = objective.parts(np.zeros(objective.size))
+        before = self._x, self._objective, self.null_motion
+        self._x, self._objective = np.concatenate([z, x, c]), objective
+        self.null_motion = motion
+        if not self.merit() <= still:
+            self._x, self._objective, self.null_motion = before
 
     def minimize(self, evaluations: int | None = None) -> None:
         """Optimise on the present grid, from the motion that there is.

@@ -40,6 +40,14 @@ _STYLE: Any = {
 }
 
 
+def require_matplotlib() -> None:
+    """Raise RenderError where matplotlib is not installed."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        raise RenderError("figures need matplotlib: pip install 'selfmotion[plots]'") from None
+
+
 def draw(plot: Plot) -> "Figure":
     """Return a plot as a matplotlib figure, unknown to pyplot.
 
@@ -48,11 +56,10 @@ def draw(plot: Plot) -> "Figure":
     RenderError
         matplotlib is not installed.
     """
-    try:
-        import matplotlib
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise RenderError("figures need matplotlib: pip install 'selfmotion[plots]'") from None
+    require_matplotlib()
+    import matplotlib
+    from matplotlib.figure import Figure
+
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(4.8, 4.2 if plot.equal else 3.2), layout="constrained")
         axes = figure.subplots()

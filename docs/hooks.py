@@ -1,0 +1,89 @@
+"""What is made while the site is built: pictures, replays, and pages with the examples' output."""
+
+import sys
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import drawings
+import shown
+from mathml import MathMl
+
+DOCS = Path(__file__).parent
+# Made by `make errors` and `pictures.py`, and read on their own as well.
+BESIDE = ("arms.md", "errors.md", "replay.png", *(f"arms/{f.name}" for f in DOCS.glob("arms/*")))
+GALLERY = ("weld_seam", "painting", "own_obstacle", "rail", "closed_loop", "ur5_pointing")
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Let equations be written, and README's tables be shown."""
+    config.markdown_extensions.append(MathMl())  # type: ignore[arg-type]  # as Markdown takes it
+    config.mdx_configs["pymdownx.snippets"]["base_path"] = [str(DOCS.parent)]
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add what is not in the folder of the pages."""
+    for name in BESIDE:
+        files.append(File.generated(config, name, abs_src_path=str(DOCS / name)))
+    ran = shown.run_all()
+    made: dict[str, str] = {
+        "examples.md": examples_page(ran),
+        "gallery.md": gallery_page(ran),
+        **{f"replays/{name}.html": ran[name].replay() for name in GALLERY},
+        **{f"drawings/{name}.svg": text for name, text in drawings.draw_all().items()},
+    }
+    for name, content in made.items():
+        files.append(File.generated(config, name, content=content))
+    return files
+
+
+def examples_page(ran: dict[str, shown.Shown]) -> str:
+    """Return the page with the code and the output of each example."""
+    parts = [
+        "# Examples",
+        "Each file of `examples/` is run when this site is built; below each is what it printed. "
+        "Copy one and change it.",
+    ]
+    for group, names in shown.GROUPS.items():
+        parts.append(f"## {group}")
+        for name in names:
+            each = ran[name]
+            parts += [f"### {name}.py", each.title, _fenced(each.code, "python", f"{name}.py")]
+            parts.append(_fenced(each.output, "text", "prints"))
+            if name in GALLERY:
+                parts.append(_replay(name))
+    cell = (shown.EXAMPLES / "cell.toml").read_text()
+    parts += [
+        "## From the shell",
+        _fenced(cell, "toml", "cell.toml"),
+        _fenced(f"selfmotion {shown.SHELL}", "console"),
+        _fenced(shown.run_shell(), "text", "prints"),
+    ]
+    return "\n\n".join(parts)
+
+
+def gallery_page(ran: dict[str, shown.Shown]) -> str:
+    """Return the page with replays."""
+    parts = [
+        "# Gallery",
+        "Replays of the [examples](examples.md): each is one HTML file that plays offline. Turn "
+        "the scene by dragging.",
+    ]
+    for name in GALLERY:
+        parts += [f"## {name.replace('_', ' ')}", ran[name].title, _replay(name)]
+    return "\n\n".join(parts)
+
+
+def _replay(name: str) -> str:
+    return (
+        f'<iframe class="replay" loading="lazy" title="{name}" src="replays/{name}.html"></iframe>'
+    )
+
+
+def _fenced(text: str, language: str, title: str = "") -> str:
+    mark = f' title="{title}"' if title else ""
+    return f"````{language}{mark}\n{text.rstrip()}\n````"

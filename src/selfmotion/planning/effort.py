@@ -1,0 +1,31 @@
+"""What the optimisations of one plan share."""
+
+from dataclasses import dataclass
+
+from selfmotion.engine import Counts
+from selfmotion.optimise import Callback, Optimizer
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What the sessions of a plan share.
+
+    Attributes
+    ----------
+    optimizer : Optimizer
+        Minimises as long as conditions are kept.
+    callback : callable or None
+        Called with each `Iteration`.
+    max_evaluations : int or None
+        Limit on evaluations of each session.
+    counts : Counts
+        Where work is added up.
+    apart : bool
+        Whether the optimisation keeps the arm apart from itself where only the default asks for it.
+    """
+
+    optimizer: Optimizer
+    callback: Callback | None
+    max_evaluations: int | None
+    counts: Counts
+    apart: bool = False

@@ -1,0 +1,59 @@
+"""The null motion of a plan that is there, as one to begin another with."""
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError, shown
+from selfmotion.motion import NullMotionTable
+from selfmotion.plans import Plan, Problem
+from selfmotion.robot import null_basis
+
+
+def check_warm_start(plan: object, problem: Problem) -> None:
+    """Raise ProblemError where a plan is none, or one of another arm."""
+    if not isinstance(plan, Plan):
+        raise ProblemError(f"warm_start is {shown(plan)}, expected a Plan; load_plan reads one")
+    theirs, ours = plan.robot.joint_names, problem.robot.joint_names
+    if theirs != ours:
+        raise ProblemError(
+            f"warm_start: its joints are {', '.join(theirs)}, expected those of "
+            f"{problem.robot.name}: {', '.join(ours)}"
+        )
+
+
+def start_of(plan: Plan, problem: Problem) -> Array:
+    """Return the configuration (n,) near a plan's first one that is on the start of the path.
+
+    Raises
+    ------
+    InverseKinematicsError
+        There is none.
+    """
+    seed = plan.trajectory.q[0]
+    return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task, seed)
+
+
+def coefficients_of(plan: Plan, problem: Problem, t: Array, table: NullMotionTable) -> Array:
+    """Return the coefficients x whose null motion is nearest to a plan's, (size,).
+
+    By least squares over the times. Of a null motion only Nᵀε acts, with N (n, r) a basis of the
+    null space of the task: it is fitted to Nᵀq̇, with N and q̇ those of the plan at the same share
+    of its path.
+
+    Parameters
+    ----------
+    plan : Plan
+    problem : Problem
+        The other one.
+    t : (S,)
+        Times on its path [s].
+    table : NullMotionTable
+        Its null motion at these times.
+    """
+    pace = plan.path.duration / problem.path.duration
+    # A plan of a part of its path ends earlier.
+    theirs = np.minimum(t * pace, plan.trajectory.t[-1])
+    q, qd = plan.trajectory(theirs), pace * plan.trajectory(theirs, 1)
+    null = np.array([null_basis(problem.robot, problem.task, each).T for each in q])
+    acting = null @ table.matrix()
+    wanted = np.einsum("srn,sn->sr", null, qd)
+    return np.asarray(np.linalg.lstsq(acting.reshape(-1, table.size), wanted.ravel())[0])
