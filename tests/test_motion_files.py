@@ -260,3 +260,24 @@ def test_plans_side_by_side(saved: Path, tmp_path: Path) -> None:
         assert word in text
     code, text = invoke("compare", saved, other, "--json")
     assert list(json.loads(text)) == [str(saved), str(other)]
+
+
+@pytest.mark.parametrize("rate", [None, 20.0, 100.0])
+def test_what_straight_lines_between_samples_cost(plan: sm.Plan, rate: float | None) -> None:
+    from selfmotion.formats import linear_miss
+    from selfmotion.formats.samples import MotionSamples
+
+    miss = linear_miss(plan, rate)
+    samples = MotionSamples.of(plan.trajectory, rate)
+    worst = 0.0
+    for t in np.linspace(0.0, plan.trajectory.duration, 1501):
+        line = np.array([np.interp(t, samples.t, column) for column in samples.q.T])
+        there = plan.robot.pose(plan.trajectory(t)).translation
+        worst = max(worst, float(np.linalg.norm(plan.robot.pose(line).translation - there)))
+    assert 0.9 * worst <= miss.position
+    assert miss.position <= 1.1 * worst
+    # At the rate that is named, lines stay within the plan's tolerance, and not at half of it.
+    assert linear_miss(plan, miss.rate).position <= 1.05 * plan.tolerance.position
+    slower = linear_miss(plan, 0.5 * miss.rate)
+    limits = (plan.tolerance.position, plan.tolerance.rotation)
+    assert max(np.divide(slower[:2], limits)) > 2.0

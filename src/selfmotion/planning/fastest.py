@@ -97,6 +97,10 @@ def fastest(
     for number in range(_ROUNDS):
         progress("fastest", number, _ROUNDS)
         planned = plan(replace(free, path=path))
+        if not planned.certificate.verified:
+            # Whatever the pace: it is out of reach, in the way, or beyond a joint's limit.
+            verdict = planned.certificate.verdict
+            break
         found = _at_its_fastest(planned, problem, v, a)
         if number == 0:
             slow = replace(planned, trajectory=planned.initial_trajectory)
