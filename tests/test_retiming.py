@@ -1,10 +1,13 @@
 """Retimed plans keep their geometry and the limits."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import selfmotion as sm
 from conftest import PANDA_HOME, robot_named
+from selfmotion.robot import Dynamics
 
 ACCELERATION = 6.0
 
@@ -75,3 +78,19 @@ def test_a_retimed_plan_keeps_what_the_plan_was_asked_to_keep(panda: sm.RobotMod
             sm.slowdown(plan, bad)
         with pytest.raises(sm.ProblemError):
             sm.retime(plan, bad)
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_retiming_keeps_torques_and_what_the_tool_may(panda: sm.RobotModel) -> None:
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.12, 4.0, normal=(1.0, 0.0, 0.0))
+    slow = sm.plan(sm.Problem(panda, path, start=PANDA_HOME)).require()
+    dynamics, t = Dynamics(panda), np.linspace(0.0, 4.0, 2001)
+    motion = slow.trajectory
+    needed = np.abs(dynamics.torques(motion(t), motion(t, 1), motion(t, 2))).max(axis=0)
+    for limit in (sm.JointTorqueLimits(1.1 * needed + 0.5), sm.ToolLimits(speed=0.6)):
+        problem = dataclasses.replace(slow.problem, constraints=(*slow.problem.constraints, limit))
+        asked = dataclasses.replace(slow, problem=problem)
+        assert asked.check().verified
+        free, kept = sm.retime(slow, 15.0), sm.retime(asked, 15.0)
+        assert kept.certificate.verified, kept.certificate.verdict
+        assert free.path.duration < kept.path.duration < slow.path.duration

@@ -97,8 +97,8 @@ def fastest(
     for number in range(_ROUNDS):
         progress("fastest", number, _ROUNDS)
         planned = plan(replace(free, path=path))
-        if not planned.certificate.verified:
-            # Whatever the pace: it is out of reach, in the way, or beyond a joint's limit.
+        if planned.report.ending or not planned.certificate.on_path:
+            # At no pace can it be followed to its end.
             verdict = planned.certificate.verdict
             break
         found = _at_its_fastest(planned, problem, v, a)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, PlanError, ProblemError, per_joint, shown
+from selfmotion.certificate import LIMIT_NAMES
 from selfmotion.constraints import (
     Constraint,
     Envelope,
@@ -28,6 +29,9 @@ _ROUNDING = 1e-9
 # Grid points of toppra, and samples of the new motion, per sample of the old one: the first that
 # keeps the plan's tolerance.
 _DENSITIES = (4, 8, 16)
+# Requirements that a slower pace may keep, by how much slower it is tried, and how often.
+_OF_PACE = {*LIMIT_NAMES[1:], "joint torque limits", "tool limits"}
+_FACTOR, _SLOWER = 1.15, 16
 
 
 def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
@@ -92,9 +96,17 @@ def retime(
     # The problem's own limits stay: the tighter of both is kept.
     kept = reduce(and_, (item.envelope(robot) for item in wanted), asked)
     for density in _DENSITIES:
-        result = _retimed(plan, wanted, kept, density)
+        pace = _smoothed(_pace(plan.trajectory, kept, density), kept)
+        pace = _slowed(pace, plan.trajectory, kept)
+        result = _retimed(plan, wanted, pace)
         if result.certificate.on_path:
             break
+    # Torques, and what else depends on the pace, are seen only now.
+    for _ in range(_SLOWER):
+        if not _is_too_fast(result):
+            break
+        pace = pace.slower(_FACTOR)
+        result = _retimed(plan, wanted, pace)
     return result
 
 
@@ -108,8 +120,13 @@ def _positive(robot: RobotModel, limit: npt.ArrayLike, name: str) -> Array:
     return per_joint(limit, robot.dof, what, positive=True)
 
 
-def _retimed(plan: Plan, wanted: Sequence[Constraint], kept: Envelope, density: int) -> Plan:
-    pace = _slowed(_smoothed(_pace(plan.trajectory, kept, density), kept), plan.trajectory, kept)
+def _is_too_fast(plan: Plan) -> bool:
+    """Return whether a plan breaks nothing but what a slower pace may keep."""
+    broken = {item.requirement for item in plan.certificate.findings if not item.kept}
+    return bool(broken) and broken <= _OF_PACE and plan.certificate.on_path
+
+
+def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
     trajectory = _along(pace, plan.trajectory)
     old = plan.problem
     # What asks for something of the end asks for it of the whole motion.
