@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import make_interp_spline
 
 from selfmotion.basics import Array, PlanError, ProblemError, Progress, per_joint, shown, silent
 from selfmotion.constraints import (
@@ -150,6 +149,8 @@ def _stand_in(original: Path, current: Path, found: Path) -> Path:
 
     As smooth as the original: its accelerations do not jump from limit to limit.
     """
+    from scipy.interpolate import make_interp_spline
+
     if not isinstance(found, Retimed):
         raise TypeError(f"a retimed motion has a {type(found).__name__}")
     t = np.linspace(0.0, found.duration, _COARSE + 1)
