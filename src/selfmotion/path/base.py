@@ -1,9 +1,10 @@
 """What every tool motion offers."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,7 @@ from selfmotion.basics import (
     as_numbers,
     plain_numbers,
     read_only,
+    restore,
     shown,
 )
 from selfmotion.task import Task, as_pose
@@ -127,6 +129,22 @@ class Path(Saved, ABC, family="path"):
         """Return [v, ω] at time `t` [s], (6,) in [m/s, rad/s]."""
         twist: Array = self.samples(t).twist[0]
         return twist
+
+
+class _Derived(Path):
+    """A tool motion made of another one."""
+
+    _path: Path
+
+    @property
+    def oriented(self) -> bool:
+        """See `Path.oriented`: as the original."""
+        return self._path.oriented
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
+        """See `Saved.from_dict`."""
+        return cls(**{**values, "path": restore(Path, values["path"])})
 
 
 # What is slower than this [m/s, rad/s] is at rest: waypoints and velocity functions come to rest

@@ -1,14 +1,13 @@
 """A path at a constant feed."""
 
-from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, PathError, as_number, read_only, restore
-from selfmotion.path.base import STILL, Path, PathSamples, check_path
+from selfmotion.basics import Array, PathError, as_number, read_only
+from selfmotion.path.base import STILL, Path, PathSamples, _Derived, check_path
 from selfmotion.path.pace import Pace, times_along
 
 # Nodes of the pace between two knots of the original, at least, and in all, about.
@@ -24,7 +23,7 @@ _KINK = 1e-6
 _HALVINGS = 52
 
 
-class Feed(Path, kind="feed"):
+class Feed(_Derived, kind="feed"):
     """A path at a constant feed, from rest to rest.
 
     The tool keeps its feed wherever turn rate and accelerations allow: it is slower in bends, at
@@ -90,11 +89,6 @@ class Feed(Path, kind="feed"):
     def rest_times(self) -> Array:
         """When the tool rests: at both ends and in kinks [s]."""
         return read_only([self._paces[0][0], *(end for _, end, _ in self._paces)])
-
-    @property
-    def oriented(self) -> bool:
-        """See `Path.oriented`: as the original."""
-        return self._path.oriented
 
     @property
     def knots(self) -> Array:
@@ -243,11 +237,6 @@ class Feed(Path, kind="feed"):
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""
         return {"kind": self.kind, "path": self._path.to_dict(), **self._limits}
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Feed":
-        """See `Saved.from_dict`."""
-        return cls(**{**values, "path": restore(Path, values["path"])})
 
 
 def _sizes(twists: Array) -> Array:

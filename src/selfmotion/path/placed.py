@@ -1,17 +1,16 @@
 """A tool motion given in a frame of its own, such as that of the workpiece."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, restore
-from selfmotion.path.base import Path, PathSamples, check_path, path_pose
+from selfmotion.basics import Array
+from selfmotion.path.base import Path, PathSamples, _Derived, check_path, path_pose
 
 
-class Placed(Path, kind="placed"):
+class Placed(_Derived, kind="placed"):
     """A path in a frame that stands somewhere in the world.
 
     Parameters
@@ -26,11 +25,6 @@ class Placed(Path, kind="placed"):
         self._path = check_path(path, "placed path")
         self._frame = path_pose(frame, "placed path: frame")
         self.duration = path.duration
-
-    @property
-    def oriented(self) -> bool:
-        """See `Path.oriented`: as the original."""
-        return self._path.oriented
 
     @property
     def knots(self) -> Array:
@@ -53,8 +47,3 @@ class Placed(Path, kind="placed"):
         """See `Saved.to_dict`."""
         frame = self._frame.homogeneous.tolist()
         return {"kind": self.kind, "path": self._path.to_dict(), "frame": frame}
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Placed":
-        """See `Saved.from_dict`."""
-        return cls(**{**values, "path": restore(Path, values["path"])})

@@ -1,15 +1,14 @@
 """A tool motion that is run up to speed, and brought to rest again."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, PathError, as_number, read_only, restore
-from selfmotion.path.base import Path, PathSamples, check_path
+from selfmotion.basics import Array, PathError, as_number, read_only
+from selfmotion.path.base import Path, PathSamples, _Derived, check_path
 
 
-class Ramped(Path, kind="ramped"):
+class Ramped(_Derived, kind="ramped"):
     """The same path from rest to rest: only its ends are slower.
 
     The time τ of the original has dτ/dt = u²(3 - 2u) with u = t / ramp at the start, likewise at
@@ -39,11 +38,6 @@ class Ramped(Path, kind="ramped"):
             )
         self._path, self._ramp = path, float(ramp)
         self.duration = path.duration + self._ramp
-
-    @property
-    def oriented(self) -> bool:
-        """See `Path.oriented`: as the original."""
-        return self._path.oriented
 
     @property
     def knots(self) -> Array:
@@ -89,8 +83,3 @@ class Ramped(Path, kind="ramped"):
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""
         return {"kind": self.kind, "path": self._path.to_dict(), "ramp": self._ramp}
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Ramped":
-        """See `Saved.from_dict`."""
-        return cls(restore(Path, values["path"]), values["ramp"])

@@ -1,20 +1,19 @@
 """A tool motion run through at another pace."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, PathError, as_numbers, read_only, restore
-from selfmotion.path.base import Path, PathSamples, check_path
+from selfmotion.basics import Array, PathError, as_numbers, read_only
+from selfmotion.path.base import Path, PathSamples, _Derived, check_path
 from selfmotion.path.pace import Pace
 
 # Intervals of the pace are halved so often to find when a time of the original is passed.
 _HALVINGS = 52
 
 
-class Retimed(Path, kind="retimed"):
+class Retimed(_Derived, kind="retimed"):
     """The same geometric path at another pace: pose(t) is that of the original at σ(t).
 
     σ is a Hermite spline, non-decreasing at its samples: cubic, or quintic with `bend`.
@@ -59,11 +58,6 @@ class Retimed(Path, kind="retimed"):
         self.duration = float(self._pace.t[-1])
 
     @property
-    def oriented(self) -> bool:
-        """See `Path.oriented`: as the original."""
-        return self._path.oriented
-
-    @property
     def knots(self) -> Array:
         """See `Path.knots`: the samples of a cubic pace; else when the original's are passed."""
         return self._pace.t if self._pace.bend is None else self._passed(self._path.knots)
@@ -101,8 +95,3 @@ class Retimed(Path, kind="retimed"):
         described = {"t": pace.t, "sigma": pace.sigma, "rate": pace.rate, "bend": pace.bend}
         numbers = {name: v.tolist() for name, v in described.items() if v is not None}
         return {"kind": self.kind, "path": self._path.to_dict(), **numbers}
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Retimed":
-        """See `Saved.from_dict`."""
-        return cls(**{**values, "path": restore(Path, values["path"])})

@@ -1,12 +1,11 @@
 """The first part of a tool motion."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, PathError, read_only, restore
-from selfmotion.path.base import Path, PathSamples
+from selfmotion.basics import Array, PathError, read_only
+from selfmotion.path.base import Path, PathSamples, _Derived
 
 # The knots crowd towards the end by halves, down to about this share of the duration.
 _GRADES = 14
@@ -14,7 +13,7 @@ _GRADES = 14
 _CLOSE = 1e-3
 
 
-class Truncated(Path, kind="truncated"):
+class Truncated(_Derived, kind="truncated"):
     """A tool motion up to a time, for what the arm can follow of it.
 
     Its knots crowd towards the end: a motion that ends near a singular pose changes there faster
@@ -35,11 +34,6 @@ class Truncated(Path, kind="truncated"):
             )
         self._path = path
         self.duration = float(duration)
-
-    @property
-    def oriented(self) -> bool:
-        """See `Path.oriented`: as the original."""
-        return self._path.oriented
 
     @property
     def knots(self) -> Array:
@@ -64,8 +58,3 @@ class Truncated(Path, kind="truncated"):
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""
         return {"kind": self.kind, "path": self._path.to_dict(), "duration": self.duration}
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Truncated":
-        """See `Saved.from_dict`."""
-        return cls(**{**values, "path": restore(Path, values["path"])})
