@@ -1,0 +1,1 @@
+"""Motions planned while the arm moves."""

@@ -1,0 +1,70 @@
+"""Limits of the joints, as the loop keeps them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError
+from selfmotion.constraints import (
+    Clearance,
+    Constraint,
+    JointAccelerationLimits,
+    JointPositionLimits,
+    JointVelocityLimits,
+)
+from selfmotion.robot import RobotModel
+
+# What a plan leaves of the limits to the command: distance from the ends [rad or m], and share of
+# speed and acceleration. The tool's feedback and the time between nodes need some.
+_ENDS, _SPEED, _ACCELERATION = 5e-3, 0.98, 0.9
+_KEPT = (JointPositionLimits, JointVelocityLimits, JointAccelerationLimits, Clearance)
+
+
+def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
+    """Return lower, upper, speed and acceleration limits of an arm, (4, n).
+
+    Those of the arm and its maker, and of the constraints.
+
+    Raises
+    ------
+    ProblemError
+        A constraint is not of the kinds that are kept while moving; a joint has no limit of
+        acceleration.
+    """
+    for item in constraints:
+        if not isinstance(item, _KEPT):
+            names = ", ".join(kind.__name__ for kind in _KEPT)
+            raise ProblemError(
+                f"constraint {type(item).__name__} is not kept while moving; expected of {names}"
+            )
+    position, speed, acceleration = (
+        [item for item in constraints if isinstance(item, kind)] for kind in _KEPT[:3]
+    )
+    places = [item.limits(robot) for item in position or [JointPositionLimits()]]  # type: ignore[attr-defined]
+    speeds = [item.of(robot) for item in speed or [JointVelocityLimits()]]  # type: ignore[attr-defined]
+    hardest = [item.of(robot) for item in acceleration or [JointAccelerationLimits()]]  # type: ignore[attr-defined]
+    limits = np.array(
+        [
+            np.max([lower for lower, _ in places], axis=0),
+            np.min([upper for _, upper in places], axis=0),
+            np.min(speeds, axis=0),
+            np.min(hardest, axis=0),
+        ]
+    )
+    endless = np.flatnonzero(~np.isfinite(limits[2:]).all(axis=0))
+    if endless.size:
+        raise ProblemError(
+            f"{robot.name}: joint '{robot.joint_names[int(endless[0])]}' has no limit of speed or "
+            f"acceleration, which a stop in time needs; give JointVelocityLimits(…) and "
+            f"JointAccelerationLimits(…)"
+        )
+    return limits
+
+
+def planned_limits(limits: Array) -> Array:
+    """Return what plans aim at, within the limits (4, n) of commands."""
+    lower, upper = limits[:2]
+    margin = np.minimum(_ENDS, 0.1 * (upper - lower))
+    return np.stack(
+        [lower + margin, upper - margin, _SPEED * limits[2], _ACCELERATION * limits[3]]
+    )
