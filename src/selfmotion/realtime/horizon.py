@@ -25,6 +25,11 @@ from selfmotion.task import Task
 _REACH = 1.0
 # Added to the Gauss-Newton matrix, relative to its trace: directions that do not act stay put.
 _REGULAR = 1e-8
+# Where a cost does not tell its curvature, that of the joints' speed is added, so many times: less
+# where the cost falls as predicted, more where it does not, from the least to the most.
+_LESS, _MORE, _LEAST, _MOST = 0.3, 4.0, 1e-3, 1e6
+# Of the predicted fall, what counts as well predicted, and as badly.
+_WELL, _BADLY = 0.75, 0.25
 # Programmes of a cycle: each has the rows that the one before broke.
 _ROUNDS = 4
 # What rows may be broken by, relative to their range.
@@ -84,7 +89,9 @@ class Horizon:
         self._first = now / (now @ now)
         self._rest = null_space(now[None])
         self._shifts: dict[float, Array] = {}
-        self._metrics = self._curvatures(robot.dof)
+        self._metrics = [item for cost in costs for item in cost.curvature(robot.dof).items()]
+        # Costs whose curvature is not known.
+        self._guesses = any(not cost.curvature(robot.dof) for cost in costs)
         pace = np.tile(np.concatenate([limits[2], limits[3]])[None], (steps, 1))
         places = np.tile(limits[:2].ravel()[None], (steps, 1)).reshape(steps, 2, -1)
         speeds, hardest = pace[:, : robot.dof], pace[:, robot.dof :]
@@ -100,6 +107,7 @@ class Horizon:
         """Begin anew: without self-motion, in a frame of the next configuration."""
         self._frames: Array | None = None
         self._coefficients = np.zeros((self.redundancy, self._functions.shape[1]))
+        self._damping = 1.0
         self.relaxed = False
 
     @property
@@ -151,6 +159,11 @@ class Horizon:
         bool
             Whether there is a motion: if not, nothing has changed but what `forget` forgets.
         """
+        # Near singular poses numbers may be beyond all bounds: what is not finite is no motion.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._improve(q, rate, jacobian, reference)
+
+    def _improve(self, q: Array, rate: Array, jacobian: Array, reference: PathSamples) -> bool:
         self.rollout.aim(reference)
         if not self.redundancy:
             return self._run(q, np.zeros((len(self._functions), len(q))))
@@ -172,17 +185,39 @@ class Horizon:
         )
         tangents = self.rollout.sensitivities(by_epsilon, np.zeros((len(q), self.size)))
         samples = self.rollout.samples()
-        step = self._step(samples, *tangents)
-        if step is None:
+        cost = self._cost(samples) if self._guesses else 0.0
+        found = self._step(samples, *tangents)
+        if found is None:
             self.forget()
             return False
-        change = step.reshape(self.redundancy, -1)
-        self._coefficients = self._coefficients + change @ self._rest.T
-        nodes = self.grid.node_stages
-        transport_frame(
-            first[0], np.ascontiguousarray(samples.task_jacobian[nodes]), self._frames
-        )
+        step, predicted = found
+        here = np.ascontiguousarray(samples.task_jacobian[self.grid.node_stages])
+        better = self._coefficients + step.reshape(self.redundancy, -1) @ self._rest.T
+        if not self._guesses or self._falls(q, stages, better, cost, predicted):
+            self._coefficients = better
+        transport_frame(first[0], here, self._frames)
         return True
+
+    def _cost(self, samples: Samples) -> float:
+        return float(samples.weights @ sum(cost.value(samples) for cost in self._costs))
+
+    def _falls(
+        self, q: Array, stages: Array, better: Array, cost: float, predicted: float
+    ) -> bool:
+        """Return whether to take a step whose fall of the cost was guessed; learn from it."""
+        if predicted <= 0.0:
+            # It is for the limits.
+            return True
+        outer = stages @ (self._functions @ better.T)[:, :, None]
+        fall = -np.inf
+        if self._run(q, outer[:, :, 0]):
+            fall = cost - self._cost(self.rollout.samples())
+        ratio = fall / predicted if np.isfinite(fall) else -np.inf
+        if not ratio >= _BADLY:
+            self._damping = min(_MORE * self._damping, _MOST)
+        elif ratio > _WELL:
+            self._damping = max(_LESS * self._damping, _LEAST)
+        return bool(ratio > 0.0)
 
     def _begin(self, q: Array) -> bool:
         if not self._run(q, np.zeros((len(self._functions), len(q)))):
@@ -205,24 +240,36 @@ class Horizon:
         frames = self._frames
         return np.asarray((1.0 - share) * frames[node] + share * frames[node + 1])  # type: ignore[index]
 
-    def _curvatures(self, n: int) -> list[tuple[int, Array]]:
-        """Return by which matrix W each derivative of q counts, as in `Objective.metric`."""
-        found = [item for cost in self._costs for item in cost.curvature(n).items()]
-        return [item for item in found if item[0] >= 0] or [(1, np.eye(n))]
+    def _step(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, float] | None:
+        """Return the step of the coefficients (d,), and by how much the cost is to fall.
 
-    def _step(self, samples: Samples, by_q: Array, by_qd: Array) -> Array | None:
-        """Return the step of the coefficients, (d,); None where numbers are not finite."""
+        None where numbers are not finite.
+        """
         gradient, metric = self._model(samples, by_q, by_qd)
         if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(metric))):
             return None
         d = self.size
         metric[np.diag_indices(d)] += _REGULAR * (np.trace(metric) + 1e-12)
+        limits = self._conditions(samples, by_q, by_qd)
+        step = self._solve(metric, gradient, *limits)
+        return step, float(-gradient @ step - 0.5 * step @ metric @ step)
+
+    def _conditions(
+        self, samples: Samples, by_q: Array, by_qd: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return rows (R, d) of the limits and distances, and what they may be, (R,) each."""
         rows, low, high = self._rows(samples, by_q, by_qd)
         if self._around is not None:
             more, room = self._around.rows(samples, by_q)
             rows, high = np.vstack([rows, more]), np.concatenate([high, room])
             low = np.concatenate([low, np.full(len(more), -np.inf)])
-        reach = np.full(d, _REACH)
+        return rows, low, high
+
+    def _solve(
+        self, metric: Array, gradient: Array, rows: Array, low: Array, high: Array
+    ) -> Array:
+        """Return the step of least cost that keeps the rows, found by the few that bind."""
+        reach = np.full(self.size, _REACH)
         self.relaxed = False
         chosen = np.zeros(len(rows), dtype=bool)
         step: Array | None = None
@@ -234,13 +281,13 @@ class Horizon:
             else:
                 step = self._programme(metric, gradient, rows, low, high, reach, chosen)
             if step is None:
-                return np.zeros(d)
+                break
             value = rows @ step
             broken = (value < low) | (value > high)
             if not (broken & ~chosen).any():
                 return step
             chosen |= broken
-        return step
+        return np.zeros(self.size) if step is None else step
 
     def _programme(
         self,
@@ -289,6 +336,10 @@ class Horizon:
                 -1, d
             )
             metric += one.T @ heavy
+        if self._guesses:
+            one = tangent(1)
+            heavy = (weights[:, :, None] * one.reshape(*samples.q.shape, d)).reshape(-1, d)
+            metric += self._damping * (one.T @ heavy)
         return gradient, metric
 
     def _rows(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array, Array]:

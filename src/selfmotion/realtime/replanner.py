@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion import kernels
-from selfmotion.basics import Array, ProblemError, StartError, as_number, as_whole
+from selfmotion.basics import Array, ProblemError, StartError, as_number, as_whole, one_blas_thread
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost, JointVelocity
 from selfmotion.motion import NullMotion, PolynomialNullMotion
@@ -126,7 +126,7 @@ class Replanner:
         reserve: float = 0.03,
         steps: int = 20,
         latency: float = 0.0,
-        settling: float = 0.1,
+        settling: float = 0.05,
         patience: float = 0.2,
         approach: Approach | None = None,
     ) -> None:
@@ -239,13 +239,24 @@ class Replanner:
         ProblemError
             `t` lies before the last step, or an obstacle is not known.
         """
+        with one_blas_thread():
+            return self._step(float(t), q, qd, path, obstacles or {})
+
+    def _step(
+        self,
+        t: float,
+        q: npt.ArrayLike,
+        qd: npt.ArrayLike,
+        path: Path,
+        obstacles: Mapping[str, pin.SE3],
+    ) -> Segment:
         q, qd = np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64)
         if not self._begun:
-            self._begin(float(t), q, qd)
-        t, passed = self._go_on(float(t))
+            self._begin(t, q, qd)
+        t, passed = self._go_on(t)
         reasons: list[str] = []
         if self._around is not None:
-            self._around.move(obstacles or {})
+            self._around.move(obstacles)
         moving = self._measure(q, passed, reasons)
         target = self._target(t, path, passed, reasons)
         error, flag, follows = np.zeros(2), Flag.STOPPING, False
@@ -431,9 +442,11 @@ class Replanner:
     def _segment(
         self, t: float, end: int, flag: Flag, reasons: list[str], follows: bool, error: Array
     ) -> Segment:
-        h, states = self.cycle, self._states[: end + 1]
+        h = self.cycle
         # What comes after the end is rest, too.
         self._states[end + 1 :] = self._states[end]
+        end = max(end, 1)
+        states = self._states[: end + 1]
         return Segment(
             t=t + h * np.arange(end + 1),
             q=self._positions(states),
