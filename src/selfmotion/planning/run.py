@@ -3,15 +3,18 @@
 import time
 from dataclasses import replace
 from functools import cache
+from math import inf
 
 import numpy as np
 
 from selfmotion.basics import (
     BreakdownError,
     NoSequenceError,
+    PlanError,
     ProblemError,
     Progress,
     SelfmotionError,
+    as_number,
     as_whole,
     one_blas_thread,
     read_only,
@@ -19,9 +22,9 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.engine import Counts
 from selfmotion.optimise import Callback, Optimizer, QuasiNewton, Status
 from selfmotion.planning.candidates import Candidates
+from selfmotion.planning.deadline import Deadline, TimedCounts
 from selfmotion.planning.finish import Finished, finish
 from selfmotion.planning.largest_part import Part, largest_part
 from selfmotion.planning.session import Effort, Session
@@ -29,6 +32,8 @@ from selfmotion.planning.settings import Search
 from selfmotion.plans import Gap, Plan, Problem, Report
 from selfmotion.search import SPACING, Reach, reachable
 
+# After these no other way is tried.
+_ENDED = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
 # Evaluations of the cost that a damped motion may take, and each of many on parts of the path.
 _PATIENCE, _PART_PATIENCE = 400, 150
 
@@ -40,6 +45,7 @@ def plan(
     search: Search | None = None,
     tolerance: Tolerance | None = None,
     max_evaluations: int | None = None,
+    deadline: float | None = None,
     callback: Callback | None = None,
     progress: Progress = silent,
 ) -> Plan:
@@ -60,6 +66,9 @@ def plan(
         Limit on evaluations of the cost while optimising one start; the finished motion is
         evaluated a few times more. By default none, but 400 with damping and 150 on each part of
         the path, where limits of joint speed often cannot be met and trying would take minutes.
+    deadline : float, optional
+        After so many seconds the best so far has to do: no worse than x = 0, or what the search
+        began with. It is judged like any other plan, which takes some time more.
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
     progress : callable, optional
@@ -84,6 +93,8 @@ def plan(
         The start is free and no configuration reaches the start of the path.
     NoSequenceError
         The global search finds that no motion follows the path; says where it ends and why.
+    PlanError
+        The deadline came before there was a complete motion.
     ProblemError
         An argument is not what it should be, or has no effect on this problem.
     KeyboardInterrupt
@@ -93,27 +104,35 @@ def plan(
     is_one = callable(getattr(optimizer, "minimize", None)) and not isinstance(optimizer, type)
     if optimizer is not None and not is_one:
         raise ProblemError(f"optimizer is {shown(optimizer)}, expected one such as QuasiNewton()")
-    with one_blas_thread():
-        return _plan(problem, optimizer, search, tolerance, max_evaluations, callback, progress)
+    clock = Deadline(inf)
+    if deadline is not None:
+        clock = Deadline.after(as_number(deadline, "deadline", above=0.0))
+    if problem.damping is not None and max_evaluations is None:
+        max_evaluations = _PATIENCE
+    counts = TimedCounts(deadline=clock)
+    effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, counts)
+    settings = (Tolerance.of(tolerance), clock.telling(progress), clock)
+    try:
+        with one_blas_thread():
+            return _plan(problem, effort, search or Search(), settings)
+    except KeyboardInterrupt:
+        if not clock.passed:
+            raise
+        raise PlanError(
+            f"the deadline of {deadline} s came before there was a complete motion; allow more "
+            f"time, or give a start"
+        ) from None
 
 
 def _plan(
     problem: Problem,
-    optimizer: Optimizer | None,
-    search: Search | None,
-    tolerance: Tolerance | None,
-    max_evaluations: int | None,
-    callback: Callback | None,
-    progress: Progress,
+    effort: Effort,
+    search: Search,
+    settings: tuple[Tolerance, Progress, Deadline],
 ) -> Plan:
-    if problem.damping is not None and max_evaluations is None:
-        max_evaluations = _PATIENCE
-    effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, Counts())
-    search = search or Search()
-    settings = (Tolerance.of(tolerance), progress)
     found = _Run(problem, effort, search, *settings).plan()
     # Few motions take an arm into itself: the others need not wait for distances.
-    if not _overlaps(found) or found.report.status in (Status.INTERRUPTED, Status.STOPPED):
+    if not _overlaps(found) or found.report.status in _ENDED:
         return found
     efforts = [(replace(effort, apart=True), search)]
     if problem.given_start is None and search.mode == "auto":
@@ -122,12 +141,28 @@ def _plan(
         efforts += [(effort, whole), (replace(effort, apart=True), whole)]
     for another, how in efforts:
         try:
-            found = _Run(problem, another, how, *settings).plan()
+            rival = _Run(problem, another, how, *settings).plan()
         except (SelfmotionError, KeyboardInterrupt):
             return found
-        if not _overlaps(found) or found.report.status in (Status.INTERRUPTED, Status.STOPPED):
+        if rival.report.status in _ENDED:
+            return _better(found, rival)
+        found = rival
+        if not _overlaps(found):
             return found
     return found
+
+
+def _better(before: Plan, cut_short: Plan) -> Plan:
+    """Return the one of which less is wrong, then the cheaper; its report says what cut it short."""
+    if _standing(cut_short) < _standing(before):
+        return cut_short
+    status = cut_short.report.status
+    message = f"{status.message}; before: {before.report.message}"
+    return replace(before, report=replace(before.report, status=status, message=message))
+
+
+def _standing(plan: Plan) -> tuple[int, float]:
+    return len(plan.certificate.failures), plan.report.cost
 
 
 def _overlaps(plan: Plan) -> bool:
@@ -160,9 +195,11 @@ class _Run:
         search: Search,
         tolerance: Tolerance,
         progress: Progress,
+        deadline: Deadline,
     ) -> None:
         self._problem, self._effort, self._search = problem, effort, search
         self._tolerance, self._progress = tolerance, progress
+        self._deadline = deadline
         self._began = time.perf_counter()
         self._reach = cache(self._reachable)
         self._candidates = Candidates(problem, effort, search, progress, self._reach)
@@ -239,6 +276,8 @@ class _Run:
 
     def _gather(self, part: Part, finished: Finished, gap: Gap | None) -> Plan:
         session, motion, still = part.session, finished.motion, finished.still
+        if self._deadline.passed and session.status is Status.INTERRUPTED:
+            session.end(Status.DEADLINE)
         counts = session.counts
         report = Report(
             cost=motion.cost,
