@@ -142,8 +142,11 @@ def _plan(
     for another, how in efforts:
         try:
             rival = _Run(problem, another, how, *settings).plan()
-        except (SelfmotionError, KeyboardInterrupt):
+        except SelfmotionError:
             return found
+        except KeyboardInterrupt:
+            clock = settings[2]
+            return _told(found, Status.DEADLINE if clock.passed else Status.INTERRUPTED)
         if rival.report.status in _ENDED:
             return _better(found, rival)
         found = rival
@@ -156,9 +159,13 @@ def _better(before: Plan, cut_short: Plan) -> Plan:
     """Return the one of which less is wrong, then the cheaper; its report says what cut it short."""
     if _standing(cut_short) < _standing(before):
         return cut_short
-    status = cut_short.report.status
-    message = f"{status.message}; before: {before.report.message}"
-    return replace(before, report=replace(before.report, status=status, message=message))
+    return _told(before, cut_short.report.status)
+
+
+def _told(plan: Plan, status: Status) -> Plan:
+    """Return a plan whose report says what kept another one from being tried to the end."""
+    message = f"{status.message}; before: {plan.report.message}"
+    return replace(plan, report=replace(plan.report, status=status, message=message))
 
 
 def _standing(plan: Plan) -> tuple[int, float]:

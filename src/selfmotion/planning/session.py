@@ -214,6 +214,9 @@ class Session:
             self._objective.require_finite(self._x)
         self._minimum = self._next_minimum()
         self._x = np.array(self._minimum.x)
+        if self._minimum.status is Status.INTERRUPTED:
+            # For good, whatever is minimised later.
+            self.end(Status.INTERRUPTED)
         self._close()
         self.violations = self._objective.violations(self._x)
 
