@@ -9,14 +9,14 @@ import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
-from selfmotion.realtime import Flag, Plant, Replanner, SimulatedArm
+from selfmotion.realtime import Approach, Flag, Plant, Replanner, SimulatedArm
 
 # The tool is back on its path when it is this near [m]; and has this long to come back [s].
 BACK, TIME_TO_COME_BACK = 1e-3, 1.0
 # What rounding of a spline's samples may show beyond a limit, relative to it.
 ROUNDING = 1e-9
-# Speeds are differences of positions, accelerations of speeds: what these lose to rounding.
-_DURATION = 4.0
+# What becomes of a scenario [s]; its events begin early enough to be over a second before the end.
+_DURATION, _FIRST, _LAST = 4.0, 1.1, 2.2
 
 
 class Broken(sm.Path):
@@ -61,14 +61,17 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
     replanner.reset()
     path = target_near(robot, home, rng, 0.08)
     events = sorted(
-        (float(rng.uniform(1.1, _DURATION - 1.5)), str(rng.choice(EVENTS))) for _ in range(2)
+        (float(rng.uniform(_FIRST, _LAST)), str(rng.choice(EVENTS))) for _ in range(2)
     )
     disturbed_until, wanted, kind, until = 0.0, path, "", 0.0
+    planned = replanner._horizon.improve
     off_since: float | None = 0.0
     while arm.t < _DURATION - 1e-9:
         t = arm.t
         if events and t >= events[0][0]:
             kind, until = events.pop(0)[1], t + float(rng.uniform(0.05, 0.4))
+            if kind == "out of reach":
+                until += 0.4
             if kind == "jump":
                 path = target_near(robot, home, rng, 0.08)
             elif kind == "push":
@@ -83,13 +86,19 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
         if kind in LASTING and active:
             disturbed_until = t
         wanted = path
+        if active and kind in ("no plan", "out of reach"):
+            # The tool may be far by then: the time that the approach takes comes on top.
+            off = sm.Task.of(task).miss(path.pose(t), robot.pose(arm.q))[0]
+            disturbed_until = t + off / Approach().speed
+        failing = active and kind == "no plan"
+        replanner._horizon.improve = no_plan(replanner) if failing else planned  # type: ignore[method-assign]
         q, qd = arm.measure()
         if active and kind == "no state":
             q = np.full(robot.dof, np.nan)
         if active and kind == "broken path":
             wanted = Broken(nan=bool(rng.integers(2)))
         if active and kind == "out of reach":
-            wanted = sm.Line(robot.pose(home), _beyond(robot.pose(home)), 0.5)
+            wanted = sm.Line(robot.pose(home), beyond(robot.pose(home)), 0.5)
         if not (active and kind == "late"):
             segment = replanner.step(t, q, qd, wanted)
             arm.write(segment)
@@ -108,11 +117,22 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
             outcome.faults.append(f"{miss * 1e3:.2f} mm off at {arm.t:.2f} s")
             outcome.slowest = np.inf
             break
-    outcome.faults += limits_broken(replanner, home, arm)
+    replanner._horizon.improve = planned  # type: ignore[method-assign]
+    outcome.faults += limits_broken(replanner, arm)
     return outcome
 
 
-def limits_broken(replanner: Replanner, start, arm: SimulatedArm) -> list[str]:
+def no_plan(replanner):
+    """What stands for a plan that fails."""
+
+    def improve(*_):
+        replanner._horizon.forget()
+        return False
+
+    return improve
+
+
+def limits_broken(replanner: Replanner, arm: SimulatedArm) -> list[str]:
     """What the commands did beyond limits, from the commands alone."""
     q, qd, qdd = (np.array(values) for values in zip(*arm.commanded, strict=True))
     lower, upper, speed, hardest = replanner.limits
@@ -133,10 +153,10 @@ def limits_broken(replanner: Replanner, start, arm: SimulatedArm) -> list[str]:
     return faults
 
 
-def _beyond(pose: pin.SE3) -> pin.SE3:
+def beyond(pose: pin.SE3) -> pin.SE3:
     return pin.SE3(pose.rotation, 3.0 * pose.translation)
 
 
-# What happens; the last four as long as they last.
-LASTING = ("late", "no state", "broken path", "out of reach", "knock")
-EVENTS = ("jump", "push", "knock", "late", "no state", "broken path", "out of reach")
+# What happens; these for as long as they last.
+LASTING = ("late", "no state", "broken path", "no plan", "out of reach", "knock")
+EVENTS = ("jump", "push", *LASTING)

@@ -16,10 +16,10 @@ from selfmotion.basics import Array
 _REACH, _TURN = 0.12, 12.0
 # The tool draws this circle on it [m], in so many seconds.
 _RADIUS, _ROUND = 0.06, 6.0
-# From when to when the arm is pushed off its command [s], and how far [rad].
-PUSHED, _FAR = (3.0, 4.5), 0.03
+# From when to when the arm is pushed off its command [s], how far [rad], and how fast [s].
+PUSHED, _FAR, _RISE = (3.0, 4.5), 0.03, 0.2
 # When the ball appears [s], how large it is [m], and the distance that is kept from it [m].
-APPEARS, _BALL, _DISTANCE = 6.0, 0.06, 0.02
+APPEARS, _BALL, _DISTANCE = 6.0, 0.06, 0.005
 # Where it is before [m].
 _AWAY = pin.SE3(np.eye(3), np.array([0.0, 0.0, 50.0]))
 
@@ -63,7 +63,9 @@ class Conveyor:
 
     def pushed(self, t: float) -> Array:
         """Return the push."""
-        return self._push if PUSHED[0] <= t < PUSHED[1] else np.zeros_like(self._push)
+        since = np.clip((t - np.array(PUSHED)) / _RISE, 0.0, 1.0)
+        share = since * since * (3.0 - 2.0 * since)
+        return np.asarray(self._push * (share[0] - share[1]))
 
 
 def conveyor_run(
@@ -75,7 +77,7 @@ def conveyor_run(
     elbow = robot.model, robot.model.createData()
     pin.forwardKinematics(*elbow, start)
     # In the way of the elbow, not of the tool.
-    ball = elbow[1].oMi[4].translation + np.array([0.0, 0.2, 0.0])
+    ball = elbow[1].oMi[4].translation + np.array([0.0, 0.19, 0.0])
     limits = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits())
     clearance = sm.Clearance([sm.Sphere("ball", ball, _BALL)], distance=_DISTANCE)
     replanner = realtime.Replanner(robot, task, constraints=(*limits, clearance), horizon=horizon)
@@ -83,11 +85,16 @@ def conveyor_run(
     arm = realtime.SimulatedArm(start, replanner.cycle, rng=seed)
     record = realtime.track(replanner, arm, Conveyor(robot, start, ball, seconds), seconds)
     shown = sm.Clearance([sm.Sphere("ball", ball, _BALL)], distance=0.0)
-    return replanner, record, record.as_plan(replanner, constraints=(*limits, shown))
+    return replanner, record, record.as_plan(replanner, constraints=(limits[0], shown))
 
 
-def show(replanner: realtime.Replanner, record: realtime.Record, console: Console) -> bool:
-    """Print what came of it; return whether all limits were kept."""
+def show(
+    replanner: realtime.Replanner, record: realtime.Record, apart: float, console: Console
+) -> bool:
+    """Print what came of it; return whether all limits were kept.
+
+    `apart` is the least distance of bodies once the ball is there [m].
+    """
     table = Table(show_header=False, box=None)
     milliseconds = 1e3 * np.quantile(record.seconds, [0.5, 0.99, 1.0])
     table.add_row("steps", f"{len(record.t)}, every {1e3 * replanner.period:g} ms")
@@ -98,14 +105,17 @@ def show(replanner: realtime.Replanner, record: realtime.Record, console: Consol
     table.add_row("segments", ", ".join(f"{count} {name}" for name, count in record.flags.items()))
     for reason, count in record.reasons.items():
         table.add_row("", f"{count} times: {reason}")
-    times = [("on the way", 1.0, PUSHED[0])]
-    times += [("while pushed", PUSHED[0], PUSHED[0] + 1.0), ("a second later", 0.0, 0.0)]
-    times[-1] = ("a second after it began", PUSHED[0] + 1.0, PUSHED[1])
-    times.append(("once the ball is there", APPEARS, np.inf))
+    times = (
+        ("on the way", 1.0, PUSHED[0]),
+        ("while pushed", PUSHED[0], PUSHED[0] + 1.0),
+        ("a second after the push began", PUSHED[0] + 1.0, PUSHED[1]),
+        ("once the ball is there", APPEARS, np.inf),
+    )
     for name, since, until in times:
         here = (record.t >= since) & (record.t < until)
         if here.any():
             table.add_row(f"tool error {name}", f"at most {1e3 * record.error[here, 0].max():.3f} mm")
+    table.add_row("distance to the ball, and of links", f"at least {1e3 * apart:.1f} mm")
     q, qd, qdd = record.commanded.transpose(1, 0, 2)
     lower, upper, speed, hardest = replanner.limits
     least = float(np.minimum(q - lower, upper - q).min())
@@ -114,7 +124,16 @@ def show(replanner: realtime.Replanner, record: realtime.Record, console: Consol
     table.add_row("acceleration", f"at most {100 * (np.abs(qdd) / hardest).max():.1f} %")
     console.print(table)
     over = (np.abs(qd) / speed).max() > 1.0 or (np.abs(qdd) / hardest).max() > 1.0
-    return bool(least >= 0.0 and not over)
+    return bool(least >= 0.0 and apart > 0.0 and not over)
+
+
+def least_distance(result: sm.Plan) -> float:
+    """Return how near bodies come from when the ball is there [m]."""
+    clearance = result.problem.constraints[-1]
+    model = clearance.model(result.robot)  # type: ignore[attr-defined]
+    motion = result.trajectory
+    here = motion.t >= min(APPEARS, motion.t[-1])
+    return float(min(model.distance(q).value for q in motion.q[here][::10]))
 
 
 def write(record: realtime.Record, result: sm.Plan, folder: Path) -> list[Path]:

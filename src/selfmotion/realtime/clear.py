@@ -15,9 +15,11 @@ from selfmotion.task import as_pose
 # Plans aim at this much more than the distance that is asked for [m]: nodes are apart.
 _MARGIN = 5e-3
 # From so much beyond on, distances level off [m].
-_NEAR = 0.03
+_NEAR = 0.01
 # A plan that comes too near within this time [s] is not begun: the arm can stop in less.
 _SOON = 0.5
+# How fast what came too near is to be left [m/s].
+_LEAVING = 0.05
 # What is no more than this nearer than now comes no nearer [m].
 _NEARER = 1e-4
 
@@ -47,6 +49,8 @@ class Surroundings:
         self._model = ClearanceModel(exact, clearance.distance + _NEAR)
         self._distance = clearance.distance
         self._names = [item.name for item in clearance.obstacles]
+        # Obstacles that came too near are to be left again, at this speed; links need not.
+        self._leaving = np.array([_LEAVING * (pair[1] in self._names) for pair in self._model.pairs])
         self.blocked, self.message = False, ""
 
     def move(self, obstacles: Mapping[str, pin.SE3]) -> None:
@@ -83,6 +87,8 @@ class Surroundings:
                 f"{times[row + 1]:.2f} s, wanted {self._distance * 1e3:.1f} mm"
             )
         rows = -(found.slopes[:, None] @ by_q[nodes[found.rows]])[:, 0]
-        room = values[found.rows, found.columns] - self._distance - _MARGIN
+        # From where the arm is, no more can be asked for than to come no nearer.
+        reached = values[0] + times[:, None] * self._leaving
+        room = values - np.minimum(self._distance + _MARGIN, reached)
         later = found.rows > 0
-        return rows[later], room[later]
+        return rows[later], room[found.rows, found.columns][later]

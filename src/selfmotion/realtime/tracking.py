@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, read_only
+from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost, JointVelocity, Samples
 from selfmotion.motion import Sampling, Trajectory
@@ -20,6 +21,10 @@ from selfmotion.realtime.loop import State, follow
 from selfmotion.realtime.replanner import Replanner
 from selfmotion.realtime.segment import Segment
 from selfmotion.realtime.simulation import SimulatedArm
+
+
+# What counts as on the path for an arm that is measured [m, rad].
+_BACK = 1e-3, 1e-2
 
 
 class Scene(Protocol):
@@ -105,7 +110,8 @@ class Record:
             message="tracked in a closed loop, planned anew at each step",
             seconds=float(self.seconds.sum()),
         )
-        return Plan(problem, motion, motion, read_only([]), report, problem.certify(motion))
+        certificate = problem.certify(motion, Tolerance(*_BACK))
+        return Plan(problem, motion, motion, read_only([]), report, certificate)
 
 
 def track(replanner: Replanner, arm: SimulatedArm, scene: Scene, seconds: float) -> Record:

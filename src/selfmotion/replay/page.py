@@ -66,6 +66,9 @@ def replay_html(
         payload,
         triads=triads,
     )
+    if description is not None:
+        for shown_plan in content["plans"]:
+            shown_plan["description"] = description
     heading = title or f"{shown[0].robot.name}, {shown[0].task.value} task"
     sentences = [describe(plan) for plan in shown]
     if len(shown) > 1:
