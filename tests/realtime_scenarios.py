@@ -9,14 +9,20 @@ import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
-from selfmotion.realtime import Approach, Flag, Plant, Replanner, SimulatedArm
+from selfmotion.realtime import Flag, Plant, Replanner, SimulatedArm
 
 # The tool is back on its path when it is this near [m]; and has this long to come back [s].
 BACK, TIME_TO_COME_BACK = 1e-3, 1.0
+# From farther than this [m] the limit of the approach's speed decides.
+NEAR = 0.1
 # What rounding of a spline's samples may show beyond a limit, relative to it.
 ROUNDING = 1e-9
 # What becomes of a scenario [s]; its events begin early enough to be over a second before the end.
 _DURATION, _FIRST, _LAST = 4.0, 1.1, 2.2
+
+
+# How far the configurations of targets are from each other [rad].
+_SPREAD = 0.08
 
 
 class Broken(sm.Path):
@@ -42,7 +48,7 @@ class Outcome:
     flags: dict[Flag, int] = field(default_factory=dict)
 
 
-def target_near(robot, q, rng, spread):
+def target_near(robot, q, rng, spread=_SPREAD):
     """A slow motion of the tool through a pose that a configuration near `q` has."""
     middle = 0.5 * (robot.lower + robot.upper)
     near = q + rng.uniform(-spread, spread, robot.dof) + 0.1 * spread * np.sign(middle - q)
@@ -59,13 +65,14 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
     plant = Plant(rng.uniform(0.0, 0.015), rng.uniform(0.0, 4e-3), rng.uniform(0.0, 1e-4))
     arm = SimulatedArm(home, replanner.cycle, plant, rng)
     replanner.reset()
-    path = target_near(robot, home, rng, 0.08)
+    path = target_near(robot, home, rng)
     events = sorted(
         (float(rng.uniform(_FIRST, _LAST)), str(rng.choice(EVENTS))) for _ in range(2)
     )
     disturbed_until, wanted, kind, until = 0.0, path, "", 0.0
-    planned = replanner._horizon.improve
+    planned, recovering = replanner._horizon.improve, False
     off_since: float | None = 0.0
+    miss = 0.0
     while arm.t < _DURATION - 1e-9:
         t = arm.t
         if events and t >= events[0][0]:
@@ -73,7 +80,7 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
             if kind == "out of reach":
                 until += 0.4
             if kind == "jump":
-                path = target_near(robot, home, rng, 0.08)
+                path = target_near(robot, home, rng)
             elif kind == "push":
                 arm.pushed = rng.uniform(-0.05, 0.05, robot.dof)
             elif kind == "knock":
@@ -86,10 +93,9 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
         if kind in LASTING and active:
             disturbed_until = t
         wanted = path
-        if active and kind in ("no plan", "out of reach"):
-            # The tool may be far by then: the time that the approach takes comes on top.
-            off = sm.Task.of(task).miss(path.pose(t), robot.pose(arm.q))[0]
-            disturbed_until = t + off / Approach().speed
+        # After a chase to the edge of the workspace the tool is far off, its approach has a limit
+        # of speed, and the joints have theirs: time counts from when it is near and can follow.
+        recovering = off_since is not None and (recovering or kind == "out of reach")
         failing = active and kind == "no plan"
         replanner._horizon.improve = no_plan(replanner) if failing else planned  # type: ignore[method-assign]
         q, qd = arm.measure()
@@ -102,6 +108,8 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
         if not (active and kind == "late"):
             segment = replanner.step(t, q, qd, wanted)
             arm.write(segment)
+            if recovering and (miss > NEAR or not segment.follows):
+                disturbed_until = t
             outcome.flags[segment.flag] = outcome.flags.get(segment.flag, 0) + 1
         arm.run(replanner.period)
         goal = path.pose(min(arm.t, path.duration))
@@ -117,6 +125,9 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
             outcome.faults.append(f"{miss * 1e3:.2f} mm off at {arm.t:.2f} s")
             outcome.slowest = np.inf
             break
+    else:
+        if off_since is not None:
+            outcome.faults.append(f"ends {miss * 1e3:.2f} mm off")
     replanner._horizon.improve = planned  # type: ignore[method-assign]
     outcome.faults += limits_broken(replanner, arm)
     return outcome

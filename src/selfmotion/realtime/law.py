@@ -56,9 +56,23 @@ def saturated_rates(
 ) -> bool:
     """Set `rates` (n,) within low..high, so that Jq̇ is `wanted` (m,) where that is possible.
 
-    With q̇ = J⁺u + (I - J⁺J) ε where no bound is in the way. Returns whether the tool moves as
-    wanted.
+    With q̇ = J⁺u + (I - J⁺J) ε where no bound is in the way. Where the tool would not move as
+    wanted, the self-motion gives: the middle of the bounds is tried in place of ε. Returns whether
+    the tool moves as wanted.
     """
+    if saturate(jacobian, wanted, epsilon, low, high, rates):
+        return True
+    middle = np.empty(rates.shape[0])
+    for k in range(rates.shape[0]):
+        middle[k] = 0.5 * (low[k] + high[k])
+    return saturate(jacobian, wanted, middle, low, high, rates)
+
+
+@inlined
+def saturate(
+    jacobian: Array, wanted: Array, epsilon: Array, low: Array, high: Array, rates: Array
+) -> bool:
+    """Hold joints at their bounds, the one farthest out first, until the others are within."""
     m, n = jacobian.shape
     moving, factor, y = jacobian.copy(), np.empty((m, m)), np.empty(m)
     held = np.zeros(n, dtype=np.bool_)
