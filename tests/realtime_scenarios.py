@@ -19,6 +19,8 @@ NEAR = 0.1
 ROUNDING = 1e-9
 # What becomes of a scenario [s]; its events begin early enough to be over a second before the end.
 _DURATION, _FIRST, _LAST = 4.0, 1.1, 2.2
+# After a chase it takes so much longer [s].
+_CHASE = 2.0
 
 
 # How far the configurations of targets are from each other [rad].
@@ -73,7 +75,8 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
     planned, recovering = replanner._horizon.improve, False
     off_since: float | None = 0.0
     miss = 0.0
-    while arm.t < _DURATION - 1e-9:
+    end = _DURATION + _CHASE * any(name == "out of reach" for _, name in events)
+    while arm.t < end - 1e-9:
         t = arm.t
         if events and t >= events[0][0]:
             kind, until = events.pop(0)[1], t + float(rng.uniform(0.05, 0.4))

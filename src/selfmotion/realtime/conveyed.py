@@ -1,11 +1,13 @@
 """A tool motion on something that moves, such as a conveyor."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, restore
 from selfmotion.path import Path, PathSamples
 
 
@@ -46,3 +48,8 @@ class Conveyed(Path):
         translation = inner.translation + np.asarray(self.offset) + t[:, None] * velocity
         twist = inner.twist + np.concatenate([velocity, np.zeros(3)])
         return PathSamples(t, translation, inner.rotation, twist)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
+        """See `Saved.from_dict`."""
+        return cls(**{**values, "carried": restore(Path, values["carried"])})

@@ -32,6 +32,10 @@ _LESS, _MORE, _LEAST, _MOST = 0.3, 4.0, 1e-3, 1e6
 _WELL, _BADLY = 0.75, 0.25
 # Programmes of a cycle: each has the rows that the one before broke.
 _ROUNDS = 4
+# What breaking a row by all of its range costs, next to a step's cost; and the range of distances [m].
+_BREAKING, _DISTANCES = 1e3, 0.1
+# A joint that moves so many times as fast as it may has been thrown out of a singular pose.
+_WILD = 20.0
 # What rows may be broken by, relative to their range.
 _BROKEN = 1e-6
 
@@ -97,6 +101,7 @@ class Horizon:
         speeds, hardest = pace[:, : robot.dof], pace[:, robot.dof :]
         self._low = np.stack([places[:, 0], -speeds, -hardest]).ravel()
         self._high = np.stack([places[:, 1], speeds, hardest]).ravel()
+        self._wild = _WILD * limits[2]
         self._range = np.where(np.isfinite(self._high - self._low), self._high - self._low, 1.0)
         # The stages' places among the nodes, for frames between them.
         step = duration / steps
@@ -228,7 +233,10 @@ class Horizon:
         return True
 
     def _run(self, q: Array, epsilon: Array) -> bool:
-        return self.rollout.run(q, epsilon) is None
+        """Integrate; return whether there is a motion, and one that an arm could think of."""
+        if self.rollout.run(q, epsilon) is not None:
+            return False
+        return bool(np.all(np.abs(self.rollout.samples().qd) <= self._wild))
 
     def _between(self, t: Array, step: float, steps: int) -> tuple[Array, Array]:
         """Return between which nodes times lie, and how far: the last one stands for all later."""
@@ -251,7 +259,10 @@ class Horizon:
         d = self.size
         metric[np.diag_indices(d)] += _REGULAR * (np.trace(metric) + 1e-12)
         limits = self._conditions(samples, by_q, by_qd)
-        step = self._solve(metric, gradient, *limits)
+        try:
+            step = self._solve(metric, gradient, *limits)
+        except np.linalg.LinAlgError:
+            return None
         return step, float(-gradient @ step - 0.5 * step @ metric @ step)
 
     def _conditions(
@@ -268,48 +279,51 @@ class Horizon:
     def _solve(
         self, metric: Array, gradient: Array, rows: Array, low: Array, high: Array
     ) -> Array:
-        """Return the step of least cost that keeps the rows, found by the few that bind."""
+        """Return the step of least cost that keeps the rows, found by the few that bind.
+
+        Where they contradict each other, the step that breaks them little.
+        """
         reach = np.full(self.size, _REACH)
         self.relaxed = False
         chosen = np.zeros(len(rows), dtype=bool)
-        step: Array | None = None
+        step = np.linalg.solve(metric, -gradient)
+        bounded = bool(np.all(np.abs(step) <= reach))
         for _ in range(_ROUNDS):
-            if step is None and not chosen.any():
-                step = np.linalg.solve(metric, -gradient)
-                if np.any(np.abs(step) > reach):
-                    step = self._programme(metric, gradient, rows, low, high, reach, chosen)
-            else:
-                step = self._programme(metric, gradient, rows, low, high, reach, chosen)
-            if step is None:
-                break
+            if not bounded or chosen.any():
+                some = rows[chosen], low[chosen], high[chosen]
+                found = minimize_quadratic(metric, gradient, *some, reach)
+                if found is None:
+                    self.relaxed = True
+                    return self._elastic(metric, gradient, rows, low, high)
+                step, bounded = found[0], True
             value = rows @ step
             broken = (value < low) | (value > high)
             if not (broken & ~chosen).any():
-                return step
+                break
             chosen |= broken
-        return np.zeros(self.size) if step is None else step
+        return step
 
-    def _programme(
-        self,
-        metric: Array,
-        gradient: Array,
-        rows: Array,
-        low: Array,
-        high: Array,
-        reach: Array,
-        chosen: Array,
-    ) -> Array | None:
-        """Solve a programme with the chosen rows; where they contradict each other, relaxed ones.
+    def _elastic(
+        self, metric: Array, gradient: Array, rows: Array, low: Array, high: Array
+    ) -> Array:
+        """Return the step of least cost and least squares of what rows are broken by.
 
-        Relaxed, they ask for no more than is kept now: no step keeps them.
+        Limits are the command's to keep: what counts here is that the motion gets better.
         """
-        some = rows[chosen], low[chosen], high[chosen]
-        found = minimize_quadratic(metric, gradient, *some, reach)
-        if found is None:
-            self.relaxed = True
-            some = some[0], np.minimum(some[1], 0.0), np.maximum(some[2], 0.0)
-            found = minimize_quadratic(metric, gradient, *some, reach)
-        return None if found is None else found[0]
+        width = high - low
+        scale = np.where(np.isfinite(width) & (width > 0.0), width, _DISTANCES)[:, None]
+        weight = _BREAKING * np.trace(metric) / len(metric)
+        step = np.zeros(len(metric))
+        for _ in range(_ROUNDS):
+            value = rows @ step
+            broken = (value < low) | (value > high)
+            near = np.clip(value, low, high)[broken]
+            scaled = rows[broken] / scale[broken]
+            wanted = scaled.T @ (near / scale[broken, 0])
+            step = np.linalg.solve(
+                metric + weight * (scaled.T @ scaled), weight * wanted - gradient
+            )
+        return np.asarray(step * min(1.0, _REACH / max(float(np.abs(step).max()), 1e-12)))
 
     def _model(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array]:
         """Return the gradient of the cost and its Gauss-Newton matrix, (d,) and (d, d)."""

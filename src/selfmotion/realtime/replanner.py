@@ -406,7 +406,7 @@ class Replanner:
             table[stages, 12:],
         )
         flag = Flag.PLANNED
-        if horizon.improve(place, rate, self._jacobian, reference):
+        if self._improved(place, rate, reference, reasons):
             kept = horizon.epsilon(self._ahead, self._functions)
             if horizon.relaxed:
                 reasons.append("no self-motion keeps all limits over the horizon")
@@ -414,11 +414,23 @@ class Replanner:
                 reasons.append(self._around.message)
                 flag = Flag.STOPPING
         else:
-            reasons.append("the motion over the horizon runs into a singular pose")
             flag = Flag.KEPT if np.any(kept) else Flag.TRACKING
         self._table[:, n : 2 * n] = kept
         self._table[:, 2 * n :] = table[-self._cycles :]
         return flag
+
+    def _improved(
+        self, place: Array, rate: Array, reference: PathSamples, reasons: list[str]
+    ) -> bool:
+        try:
+            if self._horizon.improve(place, rate, self._jacobian, reference):
+                return True
+            reasons.append("the motion over the horizon runs into a singular pose")
+        # Costs are the user's code: whatever they raise must not leave the arm without a command.
+        except Exception as error:
+            reasons.append(f"planning failed: {type(error).__name__}: {error}")
+            self._horizon.forget()
+        return False
 
     def _follow(self) -> bool:
         """Command the cycles one after the other; return whether the tool moves as asked."""
