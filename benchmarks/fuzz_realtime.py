@@ -10,7 +10,6 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import realtime_scenarios as scenarios
-
 import selfmotion as sm
 from selfmotion.realtime import Replanner
 

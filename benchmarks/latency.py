@@ -22,7 +22,7 @@ HOME = np.array(sm.NAMED_ARMS["panda"].home)
 
 def obstacle(robot):
     """Return a clearance from a ball beside the arm."""
-    away = sm.Sphere("ball", robot.pose(HOME).translation + [0.0, 0.35, 0.0], 0.1)
+    away = sm.Sphere("ball", robot.pose(HOME).translation + np.array([0.0, 0.35, 0.0]), 0.1)
     return sm.Clearance([away], distance=0.02)
 
 
@@ -45,7 +45,9 @@ class Bare:
 
 def timed(robot, task, steps, *, collect, constraints=(), null_motion=None, horizon=2.0, ahead=20):
     """Return wall and processor time of each step [s], and of the bare calls now and then."""
-    replanner = Replanner(robot, task, (sm.JointVelocity(),), constraints, horizon, null_motion, steps=ahead)
+    replanner = Replanner(
+        robot, task, (sm.JointVelocity(),), constraints, horizon, null_motion, steps=ahead
+    )
     warm_up(replanner)
     bare, rng = Bare(robot, replanner), np.random.default_rng(0)
     duration = steps * replanner.period

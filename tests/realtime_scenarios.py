@@ -68,9 +68,7 @@ def run(seed: int, task: str, robot: sm.RobotModel, replanner: Replanner) -> Out
     arm = SimulatedArm(home, replanner.cycle, plant, rng)
     replanner.reset()
     path = target_near(robot, home, rng)
-    events = sorted(
-        (float(rng.uniform(_FIRST, _LAST)), str(rng.choice(EVENTS))) for _ in range(2)
-    )
+    events = sorted((float(rng.uniform(_FIRST, _LAST)), str(rng.choice(EVENTS))) for _ in range(2))
     disturbed_until, wanted, kind, until = 0.0, path, "", 0.0
     planned, recovering = replanner._horizon.improve, False
     off_since: float | None = 0.0

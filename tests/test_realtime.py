@@ -1,16 +1,18 @@
 """The loop's laws: viable commands, no jumps, the tool on its path, and what happens when not."""
 
 import gc
+import sys
 import tracemalloc
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
-import realtime_scenarios as scenarios
 from numba.core import event
 from scipy.optimize import linprog
 
+import realtime_scenarios as scenarios
 import selfmotion as sm
 from selfmotion import realtime
 from selfmotion.realtime import Flag, Replanner, Segment, SimulatedArm, State
@@ -185,7 +187,7 @@ def test_segments_go_on_without_a_jump_and_the_tool_stays_on_its_path(arm: str, 
     path = sm.Circle.around(robot.pose(start), 0.05, 4.0, normal=(1.0, 0.0, 0.0))
     replanner = Replanner(robot, task)
     segments, places = closed_loop(replanner, path, start, 1.5)
-    for one, other in zip(segments, segments[1:], strict=False):
+    for one, other in pairwise(segments):
         here = one.index(other.t[0])
         for name in ("q", "qd", "qdd"):
             before, after = getattr(one, name)[here], getattr(other, name)[0]
@@ -359,7 +361,7 @@ def test_time_does_not_go_back(panda: sm.RobotModel, slow_circle: sm.Circle) -> 
 def beside_the_elbow(panda: sm.RobotModel) -> Array:
     data = panda.model.createData()
     pin.forwardKinematics(panda.model, data, HOME)
-    return np.array(data.oMi[4].translation + [0.0, 0.3, 0.0])
+    return np.array(data.oMi[4].translation + np.array([0.0, 0.3, 0.0]))
 
 
 def test_a_ball_that_comes_near_is_avoided_by_the_self_motion(panda: sm.RobotModel) -> None:
@@ -388,10 +390,10 @@ def test_where_no_self_motion_helps_the_arm_stops_before_the_obstacle(
     panda: sm.RobotModel,
 ) -> None:
     pose = panda.pose(HOME)
-    ahead = pin.SE3(np.eye(3), pose.translation + [0.0, 0.3, 0.0])
+    ahead = pin.SE3(np.eye(3), pose.translation + np.array([0.0, 0.3, 0.0]))
     clearance = sm.Clearance([sm.Sphere("ball", ahead, 0.05)], distance=0.01)
     replanner = Replanner(panda, constraints=[clearance])
-    goal = pin.SE3(pose.rotation, pose.translation + [0.0, 0.3, 0.0])
+    goal = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.3, 0.0]))
     path = sm.Line(pose, goal, 2.0, time_law="minimum_jerk")
     segments, places = closed_loop(replanner, path, HOME, 2.5)
     exact = sm.CollisionModel(panda, clearance.obstacles)
@@ -451,8 +453,8 @@ def test_after_warming_up_nothing_is_compiled_and_no_memory_grows(
         finally:
             tracemalloc.stop()
     assert listener.count == 0
-    # Less is left behind than the smallest of a step's arrays would be; caches of Python may fill.
-    assert sizes[-1] - sizes[0] < 200 * np.zeros(7).nbytes
+    # Less is left behind than the smallest of a step's arrays would be; Python's free lists fill.
+    assert sizes[-1] - sizes[0] < 200 * sys.getsizeof(np.zeros(7))
 
 
 def test_the_loop_reads_until_there_is_no_state(

@@ -325,8 +325,12 @@ def demo(
 @app.command(epilog="Example: selfmotion track --seconds 12 --out out/track")
 def track(
     task: options.TaskOption = "pose",
-    seconds: Annotated[float, typer.Option(help="How long, in seconds.", min=1.0, max=600.0)] = 12.0,
-    horizon: Annotated[float, typer.Option(help="How far ahead is planned, in seconds.", min=0.1)] = 2.0,
+    seconds: Annotated[
+        float, typer.Option(help="How long, in seconds.", min=1.0, max=600.0)
+    ] = 12.0,
+    horizon: Annotated[
+        float, typer.Option(help="How far ahead is planned, in seconds.", min=0.1)
+    ] = 2.0,
     seed: Annotated[int, typer.Option(help="Of the noise.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for replay and histogram.")] = Path("out/track"),
 ) -> None:

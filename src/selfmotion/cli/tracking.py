@@ -79,12 +79,12 @@ def conveyor_run(
     # In the way of the elbow, not of the tool.
     ball = elbow[1].oMi[4].translation + np.array([0.0, 0.19, 0.0])
     limits = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits())
-    clearance = sm.Clearance([sm.Sphere("ball", ball, _BALL)], distance=_DISTANCE)
+    clearance = sm.Clearance((sm.Sphere("ball", ball, _BALL),), distance=_DISTANCE)
     replanner = realtime.Replanner(robot, task, constraints=(*limits, clearance), horizon=horizon)
     realtime.warm_up(replanner)
     arm = realtime.SimulatedArm(start, replanner.cycle, rng=seed)
     record = realtime.track(replanner, arm, Conveyor(robot, start, ball, seconds), seconds)
-    shown = sm.Clearance([sm.Sphere("ball", ball, _BALL)], distance=0.0)
+    shown = sm.Clearance((sm.Sphere("ball", ball, _BALL),), distance=0.0)
     return replanner, record, record.as_plan(replanner, constraints=(limits[0], shown))
 
 
@@ -114,7 +114,9 @@ def show(
     for name, since, until in times:
         here = (record.t >= since) & (record.t < until)
         if here.any():
-            table.add_row(f"tool error {name}", f"at most {1e3 * record.error[here, 0].max():.3f} mm")
+            table.add_row(
+                f"tool error {name}", f"at most {1e3 * record.error[here, 0].max():.3f} mm"
+            )
     table.add_row("distance to the ball, and of links", f"at least {1e3 * apart:.1f} mm")
     q, qd, qdd = record.commanded.transpose(1, 0, 2)
     lower, upper, speed, hardest = replanner.limits
@@ -165,7 +167,7 @@ def _draw_histogram(record: realtime.Record, file: Path) -> bool:
     axes = figure.add_subplot()
     # Of a step that the machine had no time for, the picture shows that it was one.
     most = max(5.0, float(np.quantile(milliseconds, 0.999)))
-    axes.hist(np.minimum(milliseconds, most), bins=np.linspace(0.0, most, 80), color="#4878a8")
+    axes.hist(np.minimum(milliseconds, most), bins=80, range=(0.0, most), color="#4878a8")
     axes.set_yscale("log")
     axes.set_xlabel("time of a step [ms]")
     axes.set_ylabel("steps")

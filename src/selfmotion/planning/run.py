@@ -156,7 +156,7 @@ def _plan(
 
 
 def _better(before: Plan, cut_short: Plan) -> Plan:
-    """Return the one of which less is wrong, then the cheaper; its report says what cut it short."""
+    """Return the one of which less is wrong, then the cheaper; its report says what cut it."""
     if _standing(cut_short) < _standing(before):
         return cut_short
     return _told(before, cut_short.report.status)

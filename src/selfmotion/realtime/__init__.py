@@ -2,7 +2,8 @@
 
 from selfmotion.realtime.conveyed import Conveyed
 from selfmotion.realtime.loop import State, follow
-from selfmotion.realtime.replanner import Approach, Replanner
+from selfmotion.realtime.reference import Approach
+from selfmotion.realtime.replanner import Replanner
 from selfmotion.realtime.segment import Flag, Segment
 from selfmotion.realtime.simulation import Plant, SimulatedArm
 from selfmotion.realtime.tracking import Record, Scene, track

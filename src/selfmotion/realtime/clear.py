@@ -50,7 +50,9 @@ class Surroundings:
         self._distance = clearance.distance
         self._names = [item.name for item in clearance.obstacles]
         # Obstacles that came too near are to be left again, at this speed; links need not.
-        self._leaving = np.array([_LEAVING * (pair[1] in self._names) for pair in self._model.pairs])
+        self._leaving = np.array(
+            [_LEAVING * (pair[1] in self._names) for pair in self._model.pairs]
+        )
         self.blocked, self.message = False, ""
 
     def move(self, obstacles: Mapping[str, pin.SE3]) -> None:

@@ -14,15 +14,13 @@ from selfmotion.basics import Array
 from selfmotion.costs import Cost, Samples
 from selfmotion.engine import Rollout
 from selfmotion.motion import Grid, NullMotion
-from selfmotion.optimise import minimize_quadratic
 from selfmotion.path import Dwell, PathSamples
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.law import transport_frame
+from selfmotion.realtime.programme import best_step
 from selfmotion.robot import RobotModel, null_space
 from selfmotion.task import Task
 
-# How far coefficients may go in one cycle [rad/s √s].
-_REACH = 1.0
 # Added to the Gauss-Newton matrix, relative to its trace: directions that do not act stay put.
 _REGULAR = 1e-8
 # Where a cost does not tell its curvature, that of the joints' speed is added, so many times: less
@@ -30,10 +28,6 @@ _REGULAR = 1e-8
 _LESS, _MORE, _LEAST, _MOST = 0.3, 4.0, 1e-3, 1e6
 # Of the predicted fall, what counts as well predicted, and as badly.
 _WELL, _BADLY = 0.75, 0.25
-# Programmes of a cycle: each has the rows that the one before broke.
-_ROUNDS = 4
-# What breaking a row by all of its range costs, next to a step's cost; and the range of distances [m].
-_BREAKING, _DISTANCES = 1e3, 0.1
 # A joint that moves so many times as fast as it may has been thrown out of a singular pose.
 _WILD = 20.0
 # What rows may be broken by, relative to their range.
@@ -110,7 +104,8 @@ class Horizon:
 
     def forget(self) -> None:
         """Begin anew: without self-motion, in a frame of the next configuration."""
-        self._frames: Array | None = None
+        # None as long as it has no row.
+        self._frames = np.zeros((0, self.rollout.robot.dof, self.redundancy))
         self._coefficients = np.zeros((self.redundancy, self._functions.shape[1]))
         self._damping = 1.0
         self.relaxed = False
@@ -122,7 +117,7 @@ class Horizon:
 
     def shift(self, seconds: float) -> None:
         """Go on from so much later: coefficients and frame are those of the same motion."""
-        if seconds <= 0.0 or self._frames is None:
+        if seconds <= 0.0 or not len(self._frames):
             return
         if seconds not in self._shifts:
             self._shifts.clear()
@@ -137,13 +132,11 @@ class Horizon:
     def epsilon(self, t: Array, functions: Array) -> Array:
         """Return ε at times `t` (M,) from now [s], for φ there (M, K), (M, n)."""
         n = self.rollout.robot.dof
-        if self._frames is None:
+        if not len(self._frames):
             return np.zeros((len(t), n))
         steps = self.grid.steps
         frames = self._blend(*self._between(t, self._duration / steps, steps))
-        return np.asarray(
-            (frames @ (functions @ self._coefficients.T)[:, :, None])[:, :, 0]
-        )
+        return np.asarray((frames @ (functions @ self._coefficients.T)[:, :, None])[:, :, 0])
 
     def functions(self, t: Array) -> Array:
         """Return φ at times `t` (M,), (M, K)."""
@@ -172,11 +165,11 @@ class Horizon:
         self.rollout.aim(reference)
         if not self.redundancy:
             return self._run(q, np.zeros((len(self._functions), len(q))))
-        if self._frames is None and not self._begin(q):
+        if not len(self._frames) and not self._begin(q):
             return False
-        first = np.empty((1, *self._frames.shape[1:]))  # type: ignore[union-attr]
-        transport_frame(self._frames[0], jacobian[None], first)  # type: ignore[index]
-        self._frames[0] = first[0]  # type: ignore[index]
+        first = np.empty((1, *self._frames.shape[1:]))
+        transport_frame(self._frames[0], jacobian[None], first)
+        self._frames[0] = first[0]
         free = self._coefficients @ self._rest
         self._coefficients = np.outer(first[0].T @ rate, self._first) + free @ self._rest.T
         stages = self._blend(self._node, self._share)
@@ -206,9 +199,7 @@ class Horizon:
     def _cost(self, samples: Samples) -> float:
         return float(samples.weights @ sum(cost.value(samples) for cost in self._costs))
 
-    def _falls(
-        self, q: Array, stages: Array, better: Array, cost: float, predicted: float
-    ) -> bool:
+    def _falls(self, q: Array, stages: Array, better: Array, cost: float, predicted: float) -> bool:
         """Return whether to take a step whose fall of the cost was guessed; learn from it."""
         if predicted <= 0.0:
             # It is for the limits.
@@ -246,7 +237,7 @@ class Horizon:
 
     def _blend(self, node: Array, share: Array) -> Array:
         frames = self._frames
-        return np.asarray((1.0 - share) * frames[node] + share * frames[node + 1])  # type: ignore[index]
+        return np.asarray((1.0 - share) * frames[node] + share * frames[node + 1])
 
     def _step(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, float] | None:
         """Return the step of the coefficients (d,), and by how much the cost is to fall.
@@ -260,7 +251,7 @@ class Horizon:
         metric[np.diag_indices(d)] += _REGULAR * (np.trace(metric) + 1e-12)
         limits = self._conditions(samples, by_q, by_qd)
         try:
-            step = self._solve(metric, gradient, *limits)
+            step, self.relaxed = best_step(metric, gradient, *limits)
         except np.linalg.LinAlgError:
             return None
         return step, float(-gradient @ step - 0.5 * step @ metric @ step)
@@ -275,55 +266,6 @@ class Horizon:
             rows, high = np.vstack([rows, more]), np.concatenate([high, room])
             low = np.concatenate([low, np.full(len(more), -np.inf)])
         return rows, low, high
-
-    def _solve(
-        self, metric: Array, gradient: Array, rows: Array, low: Array, high: Array
-    ) -> Array:
-        """Return the step of least cost that keeps the rows, found by the few that bind.
-
-        Where they contradict each other, the step that breaks them little.
-        """
-        reach = np.full(self.size, _REACH)
-        self.relaxed = False
-        chosen = np.zeros(len(rows), dtype=bool)
-        step = np.linalg.solve(metric, -gradient)
-        bounded = bool(np.all(np.abs(step) <= reach))
-        for _ in range(_ROUNDS):
-            if not bounded or chosen.any():
-                some = rows[chosen], low[chosen], high[chosen]
-                found = minimize_quadratic(metric, gradient, *some, reach)
-                if found is None:
-                    self.relaxed = True
-                    return self._elastic(metric, gradient, rows, low, high)
-                step, bounded = found[0], True
-            value = rows @ step
-            broken = (value < low) | (value > high)
-            if not (broken & ~chosen).any():
-                break
-            chosen |= broken
-        return step
-
-    def _elastic(
-        self, metric: Array, gradient: Array, rows: Array, low: Array, high: Array
-    ) -> Array:
-        """Return the step of least cost and least squares of what rows are broken by.
-
-        Limits are the command's to keep: what counts here is that the motion gets better.
-        """
-        width = high - low
-        scale = np.where(np.isfinite(width) & (width > 0.0), width, _DISTANCES)[:, None]
-        weight = _BREAKING * np.trace(metric) / len(metric)
-        step = np.zeros(len(metric))
-        for _ in range(_ROUNDS):
-            value = rows @ step
-            broken = (value < low) | (value > high)
-            near = np.clip(value, low, high)[broken]
-            scaled = rows[broken] / scale[broken]
-            wanted = scaled.T @ (near / scale[broken, 0])
-            step = np.linalg.solve(
-                metric + weight * (scaled.T @ scaled), weight * wanted - gradient
-            )
-        return np.asarray(step * min(1.0, _REACH / max(float(np.abs(step).max()), 1e-12)))
 
     def _model(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array]:
         """Return the gradient of the cost and its Gauss-Newton matrix, (d,) and (d, d)."""

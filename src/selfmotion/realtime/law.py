@@ -150,12 +150,12 @@ def command(
     jacobian, task, error = np.empty((6, n)), np.empty((m, n)), np.zeros(6)
     for k in range(n):
         for i in range(3):
-            j, l = (i + 1) % 3, (i + 2) % 3
+            j, other = (i + 1) % 3, (i + 2) % 3
             jacobian[3 + i, k] = world_jacobian[3 + i, k]
             # The velocity of the tool's origin is v = v_0 + ω × x.
             jacobian[i, k] = world_jacobian[i, k] + (
-                world_jacobian[3 + j, k] * translation[l]
-                - world_jacobian[3 + l, k] * translation[j]
+                world_jacobian[3 + j, k] * translation[other]
+                - world_jacobian[3 + other, k] * translation[j]
             )
     target = row[2 * n + 3 : 2 * n + 12].copy().reshape(3, 3)
     pose_error(angle_kind, row[2 * n : 2 * n + 3], target, translation, rotation, error)
@@ -218,13 +218,11 @@ def brake(states: Array, first: int, limits: Array, h: float) -> int:
             if longest <= 1.0 and low <= wish <= high:
                 # To rest, not to rounding.
                 states[cycle + 1, 1, k], states[cycle + 1, 0, k] = 0.0, c
-    return states.shape[0] - 1
+    return int(states.shape[0] - 1)
 
 
 @kernel
-def approach(
-    offset: Array, rate: Array, law: Array, step: float, table: Array
-) -> None:
+def approach(offset: Array, rate: Array, law: Array, step: float, table: Array) -> None:
     """Set `table` (G, 12) to how an offset (6,) [m, rad] and its rate fade away, every `step`.
 
     Of second order, apart for position and rotation: the rate goes to that of the offset's speed
@@ -294,17 +292,15 @@ def shift_reference(
                 square[i, j] = phi[i] * phi[j] - (angle * angle if i == j else 0.0)
         for i in range(3):
             for j in range(3):
-                turn[i, j] = (
-                    (1.0 if i == j else 0.0) + first * skew[i, j] + second * square[i, j]
-                )
+                turn[i, j] = (1.0 if i == j else 0.0) + first * skew[i, j] + second * square[i, j]
         for i in range(3):
             rate = slope[i]
             for j in range(3):
                 rate += (second * skew[i, j] + third * square[i, j]) * slope[j]
                 rate += turn[i, j] * twist[k, 3 + j]
                 total = 0.0
-                for l in range(3):
-                    total += turn[i, l] * rotation[k, l, j]
+                for a in range(3):
+                    total += turn[i, a] * rotation[k, a, j]
                 out[k, 3 + 3 * i + j] = total
             out[k, 15 + i] = rate
 

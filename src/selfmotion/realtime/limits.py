@@ -37,12 +37,12 @@ def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
             raise ProblemError(
                 f"constraint {type(item).__name__} is not kept while moving; expected of {names}"
             )
-    position, speed, acceleration = (
-        [item for item in constraints if isinstance(item, kind)] for kind in _KEPT[:3]
-    )
-    places = [item.limits(robot) for item in position or [JointPositionLimits()]]  # type: ignore[attr-defined]
-    speeds = [item.of(robot) for item in speed or [JointVelocityLimits()]]  # type: ignore[attr-defined]
-    hardest = [item.of(robot) for item in acceleration or [JointAccelerationLimits()]]  # type: ignore[attr-defined]
+    kinds = {type(item) for item in constraints}
+    # Where none are given, those of the arm and its maker.
+    asked = [*constraints, *(kind() for kind in _KEPT[:3] if kind not in kinds)]
+    places = [item.limits(robot) for item in asked if isinstance(item, JointPositionLimits)]
+    speeds = [item.of(robot) for item in asked if isinstance(item, JointVelocityLimits)]
+    hardest = [item.of(robot) for item in asked if isinstance(item, JointAccelerationLimits)]
     limits = np.array(
         [
             np.max([lower for lower, _ in places], axis=0),
@@ -65,6 +65,4 @@ def planned_limits(limits: Array) -> Array:
     """Return what plans aim at, within the limits (4, n) of commands."""
     lower, upper = limits[:2]
     margin = np.minimum(_ENDS, 0.1 * (upper - lower))
-    return np.stack(
-        [lower + margin, upper - margin, _SPEED * limits[2], _ACCELERATION * limits[3]]
-    )
+    return np.stack([lower + margin, upper - margin, _SPEED * limits[2], _ACCELERATION * limits[3]])

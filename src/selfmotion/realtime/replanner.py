@@ -1,8 +1,6 @@
 """Plans the next seconds again and again while the arm moves."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +16,7 @@ from selfmotion.realtime import law
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.horizon import Horizon
 from selfmotion.realtime.limits import joint_limits, planned_limits
+from selfmotion.realtime.reference import Approach, Reference, resting
 from selfmotion.realtime.segment import Flag, Segment
 from selfmotion.realtime.viable import braking_distance, tightened
 from selfmotion.robot import RobotModel
@@ -27,38 +26,6 @@ from selfmotion.task import Task
 _GAIN = 20.0
 # A command that is this far from the arm [rad or m] is not what the arm does.
 _FARTHEST = 0.5
-# An offset of the tool is known every so many seconds.
-_OFFSET_STEP = 2e-3
-
-
-@dataclass(frozen=True)
-class Approach:
-    """How the tool comes back to a path that jumped, or that it was pushed off.
-
-    Attributes
-    ----------
-    rate : float
-        Near the path, what is left fades with this rate [1/s].
-    speed, acceleration : float
-        Limits of the approach, on top of the path's own motion [m/s, m/s²].
-    turning, turning_acceleration : float
-        The same of rotation [rad/s, rad/s²].
-    """
-
-    rate: float = 10.0
-    speed: float = 0.5
-    acceleration: float = 3.0
-    turning: float = 2.0
-    turning_acceleration: float = 10.0
-
-    def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:
-            as_number(getattr(self, name), f"approach: {name}", above=0.0)
-
-    @property
-    def numbers(self) -> Array:
-        """All of them, (5,)."""
-        return np.array([float(getattr(self, name)) for name in self.__dataclass_fields__])
 
 
 class Replanner:
@@ -162,36 +129,28 @@ class Replanner:
             steps,
             self._around,
         )
-        self._approach = (approach or Approach()).numbers
-        self._kinematics = robot.tool_kinematics()
         self._data = robot.model.createData()
         self._rows = self.task.rows
         self._kind = kernels.angle_kind(self._rows, self.task.tool_axes)
         self._delay = round(latency / self.cycle)
         self._prepare(round(self.period / self.cycle) + round(reserve / self.cycle))
+        self._reference = Reference(robot, self.task, approach or Approach(), self._times)
         self._begun = False
 
     def _prepare(self, cycles: int) -> None:
         """Make all tables of a step, for so many cycles that follow the path."""
         n, h, grid = self.robot.dof, self.cycle, self._horizon.grid
         # In so many cycles every joint comes to rest from its highest speed.
-        speed = np.where(np.isfinite(self.limits[2]), self.limits[2], 0.0)
-        self._stopping = int(np.ceil((speed / (self.limits[3] * h)).max())) + 3
+        stopping = int(np.ceil((self.limits[2] / (self.limits[3] * h)).max())) + 3
         self._cycles = cycles
-        self._states = np.zeros((cycles + self._stopping + 1, 3, n))
+        self._states = np.zeros((cycles + stopping + 1, 3, n))
         self._table = np.zeros((cycles, 2 * n + law.REFERENCE))
-        ahead = (np.arange(cycles) + 1.5) * h
+        ahead = h * np.arange(1.5, cycles + 1.0)
         halves = 0.5 * grid.nodes[1] * np.arange(2 * grid.steps + 1)
         self._ahead, self._times = ahead, np.concatenate([halves, ahead])
         self._functions = self._horizon.functions(ahead)
         four = np.tile([0, 1, 1, 2], (grid.steps, 1)) + 2 * np.arange(grid.steps)[:, None]
         self._stages = np.append(four.ravel(), 2 * grid.steps)
-        self._offsets = np.zeros((int(np.ceil(self.horizon / _OFFSET_STEP)) + 2, 12))
-        self._reference = np.zeros((len(self._times), law.REFERENCE))
-        self._free = np.ones(6, dtype=bool)
-        self._free[self._rows] = False
-        if self.task.tool_axes:
-            self._free[:] = False
         self._sent = np.zeros((self._delay + 1, n))
 
     def reset(self) -> None:
@@ -201,7 +160,7 @@ class Replanner:
     @property
     def deviation(self) -> Array:
         """What the arm is off its command, filtered, (n,) [rad or m]."""
-        return self._inner[4].copy()
+        return np.array(self._inner[4])
 
     def step(
         self,
@@ -262,7 +221,9 @@ class Replanner:
         error, flag, follows = np.zeros(2), Flag.STOPPING, False
         first = 0
         if target is not None:
-            error, rate, place = self._anchor(target)
+            rate = self._states[0, 1] - 0.5 * self.cycle * self._states[0, 2]
+            place = self._positions(self._states[:1])[0] + self._inner[4]
+            error = self._reference.begin(place, rate, target)
             flag = self._plan(passed, rate, place, reasons)
             if moving and flag is not Flag.STOPPING:
                 follows = self._follow()
@@ -284,7 +245,7 @@ class Replanner:
         if bad.size:
             k = int(bad[0])
             raise StartError(
-                f"joint '{self.robot.joint_names[k]}' is at {q[k]:.6g} with {qd[k]:.6g} per second, "
+                f"joint '{self.robot.joint_names[k]}' is at {q[k]:.6g}, {qd[k]:.6g} per second, "
                 f"from where it cannot stop within {lower[k]:.6g}..{upper[k]:.6g}; bring the arm "
                 f"within its limits first",
                 position_miss=0.0,
@@ -302,7 +263,7 @@ class Replanner:
         self._begun = True
 
     def _go_on(self, t: float) -> tuple[float, float]:
-        """Make the state that is commanded at `t` the first one; return its time and what passed."""
+        """Make the state that is commanded at `t` the first one; return its time, what passed."""
         passed = round((t - self._time) / self.cycle) if np.isfinite(t) else -1
         if passed < 0:
             raise ProblemError(f"t is {t} s, expected no less than the last step's {self._time} s")
@@ -347,7 +308,7 @@ class Replanner:
         None after too long.
         """
         try:
-            target = _rested(path, t + self._times)
+            target = resting(path, t + self._times)
             self._path, self._without_path = path, 0.0
             return target
         # A path is the user's code: whatever it raises must not leave the arm without a command.
@@ -356,49 +317,14 @@ class Replanner:
         self._without_path += max(passed, self.cycle)
         if self._path is None or self._without_path > self._patience:
             return None
-        return _rested(self._path, t + self._times)
-
-    def _anchor(self, target: PathSamples) -> tuple[Array, Array, Array]:
-        """Let the reference begin where the tool is, and fade to the target.
-
-        Returns the tool's error (2,), the arm's rate (n,) and its place (n,).
-        """
-        h, state = self.cycle, self._states[0]
-        place = self._positions(state[None])[0] + self._inner[4]
-        rate = state[1] - 0.5 * h * state[2]
-        jacobian = self._kinematics.at(place)
-        rotation, translation = self._kinematics.rotation, self._kinematics.translation
-        twist = jacobian @ rate
-        goal = pin.SE3(target.rotation[0], target.translation[0])
-        # The twist that takes the target to the tool.
-        offset = -self.task.twist_error(goal, pin.SE3(rotation, translation))
-        slope = np.empty(6)
-        slope[:3] = twist[:3] - target.twist[0, :3]
-        turn = pin.exp3(offset[3:])
-        relative = twist[3:] - turn @ target.twist[0, 3:]
-        if self.task.tool_axes:
-            relative -= rotation[:, 2] * (rotation[:, 2] @ relative)
-        slope[3:] = np.linalg.solve(_left_jacobian(offset[3:]), relative)
-        offset[self._free] = slope[self._free] = 0.0
-        self._jacobian = self.task.select(jacobian, rotation)
-        law.approach(offset, slope, self._approach, _OFFSET_STEP, self._offsets)
-        law.shift_reference(
-            self._times,
-            target.translation,
-            target.rotation,
-            target.twist,
-            self._offsets,
-            _OFFSET_STEP,
-            self._reference,
-        )
-        return np.array([np.linalg.norm(offset[:3]), np.linalg.norm(offset[3:])]), rate, place
+        return resting(self._path, t + self._times)
 
     def _plan(self, passed: float, rate: Array, place: Array, reasons: list[str]) -> Flag:
         """Improve the plan; write ε of the cycles into the table."""
         n, horizon, stages = self.robot.dof, self._horizon, self._stages
         horizon.shift(passed)
         kept = horizon.epsilon(self._ahead, self._functions)
-        table = self._reference
+        table = self._reference.table
         reference = PathSamples(
             horizon.grid.stage_times,
             table[stages, :3],
@@ -423,7 +349,7 @@ class Replanner:
         self, place: Array, rate: Array, reference: PathSamples, reasons: list[str]
     ) -> bool:
         try:
-            if self._horizon.improve(place, rate, self._jacobian, reference):
+            if self._horizon.improve(place, rate, self._reference.jacobian, reference):
                 return True
             reasons.append("the motion over the horizon runs into a singular pose")
         # Costs are the user's code: whatever they raise must not leave the arm without a command.
@@ -460,7 +386,7 @@ class Replanner:
         end = max(end, 1)
         states = self._states[: end + 1]
         return Segment(
-            t=t + h * np.arange(end + 1),
+            t=np.asarray(t + h * np.arange(end + 1), dtype=np.float64),
             q=self._positions(states),
             qd=states[:, 1] - 0.5 * h * states[:, 2],
             qdd=states[:, 2],
@@ -478,27 +404,3 @@ def _in_null_space(motion: NullMotion) -> NullMotion:
             f"self-motions are in the null space"
         )
     return motion
-
-
-def _rested(path: Path, t: Array) -> PathSamples:
-    """Return a path at times that may lie outside of it, where it rests; finite, or ValueError."""
-    inside = np.clip(t, 0.0, path.duration)
-    found = path.samples(inside)
-    twist = np.where((t == inside)[:, None], found.twist, 0.0)
-    for name, values in (("pose", found.translation), ("pose", found.rotation), ("twist", twist)):
-        if not np.all(np.isfinite(values)):
-            raise ValueError(f"its {name} is not finite")
-    return PathSamples(
-        t,
-        np.ascontiguousarray(found.translation),
-        np.ascontiguousarray(found.rotation),
-        np.ascontiguousarray(twist),
-    )
-
-
-def _left_jacobian(phi: Array) -> Array:
-    """Return Jl(φ), which takes φ̇ to the angular velocity of exp(φ), world axes."""
-    return np.asarray(pin.Jexp3(-phi))
-
-
-__all__: list[Any] = ["Approach", "Replanner"]

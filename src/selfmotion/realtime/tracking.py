@@ -22,7 +22,6 @@ from selfmotion.realtime.replanner import Replanner
 from selfmotion.realtime.segment import Segment
 from selfmotion.realtime.simulation import SimulatedArm
 
-
 # What counts as on the path for an arm that is measured [m, rad].
 _BACK = 1e-3, 1e-2
 
