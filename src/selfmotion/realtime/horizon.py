@@ -60,6 +60,8 @@ class Horizon:
     ----------
     relaxed : bool
         Whether the last step could not keep all limits and distances.
+    breakdown : float
+        When the last motion ran into a singular pose [s]; inf where it did not.
     """
 
     def __init__(
@@ -108,7 +110,7 @@ class Horizon:
         self._frames = np.zeros((0, self.rollout.robot.dof, self.redundancy))
         self._coefficients = np.zeros((self.redundancy, self._functions.shape[1]))
         self._damping = 1.0
-        self.relaxed = False
+        self.relaxed, self.breakdown = False, np.inf
 
     @property
     def size(self) -> int:
@@ -175,7 +177,9 @@ class Horizon:
         stages = self._blend(self._node, self._share)
         outer = stages @ (self._functions @ self._coefficients.T)[:, :, None]
         if not self._run(q, outer[:, :, 0]):
+            when = self.breakdown
             self.forget()
+            self.breakdown = when
             return False
         basis = self._functions @ self._rest
         by_epsilon = (stages[:, :, :, None] * basis[:, None, None, :]).reshape(
@@ -225,9 +229,13 @@ class Horizon:
 
     def _run(self, q: Array, epsilon: Array) -> bool:
         """Integrate; return whether there is a motion, and one that an arm could think of."""
-        if self.rollout.run(q, epsilon) is not None:
-            return False
-        return bool(np.all(np.abs(self.rollout.samples().qd) <= self._wild))
+        broken = self.rollout.run(q, epsilon)
+        self.breakdown = np.inf if broken is None else broken
+        wild = (np.abs(self.rollout.samples().qd) > self._wild).any(axis=1)
+        if wild.any():
+            first = float(self.grid.stage_times[int(np.argmax(wild))])
+            self.breakdown = min(self.breakdown, first)
+        return self.breakdown == np.inf
 
     def _between(self, t: Array, step: float, steps: int) -> tuple[Array, Array]:
         """Return between which nodes times lie, and how far: the last one stands for all later."""

@@ -75,14 +75,17 @@ class Reference:
         self._free = np.full(6, not task.tool_axes)
         self._free[task.rows] = False
 
-    def begin(self, q: Array, rate: Array, target: PathSamples) -> Array:
+    def begin(
+        self, q: Array, rate: Array, target: PathSamples, twist: Array | None = None
+    ) -> Array:
         """Let the motion begin at q with q̇ = `rate`, and fade to a path given at the times.
 
-        Returns how far the tool is off the path, (2,) [m, rad].
+        With `twist` (6,) in place of the tool's own. Returns how far the tool is off the path, (2,)
+        [m, rad].
         """
         jacobian = self._kinematics.at(q)
         rotation, translation = self._kinematics.rotation, self._kinematics.translation
-        twist = jacobian @ rate
+        twist = jacobian @ rate if twist is None else twist
         goal = pin.SE3(target.rotation[0], target.translation[0])
         # The twist that takes the target to the tool.
         offset = -self._task.twist_error(goal, pin.SE3(rotation, translation))

@@ -24,6 +24,8 @@ from selfmotion.task import Task
 
 # The pose feedback between two steps [1/s].
 _GAIN = 20.0
+# A motion that breaks down within this time [s] is not followed: the arm can stop in less.
+_SOON = 0.5
 # A command that is this far from the arm [rad or m] is not what the arm does.
 _FARTHEST = 0.5
 
@@ -68,7 +70,8 @@ class Replanner:
         Time constant [s] of the filter of what the arm is off its command: no shorter than its
         own time constant and delay.
     patience : float
-        Without a path or a measured state for this long [s], the arm is brought to rest.
+        Without a path or a measured state for this long [s], or with a singular pose right ahead,
+        the arm is brought to rest.
     approach : Approach
         How the tool comes back to the path.
 
@@ -223,13 +226,14 @@ class Replanner:
         if target is not None:
             rate = self._states[0, 1] - 0.5 * self.cycle * self._states[0, 2]
             place = self._positions(self._states[:1])[0] + self._inner[4]
-            error = self._reference.begin(place, rate, target)
+            error = self._reference.begin(place, rate, target, self._held_up(passed))
             flag = self._plan(passed, rate, place, reasons)
             if moving and flag is not Flag.STOPPING:
                 follows = self._follow()
                 first = self._cycles
             else:
                 flag = Flag.STOPPING
+        self._follows = follows or flag is Flag.STOPPING
         end = law.brake(self._states, first, self._inner, self.cycle)
         return self._segment(t, end, flag, reasons, follows, error)
 
@@ -257,10 +261,10 @@ class Replanner:
         self._time, self._last = t, 0
         self._inner[4] = 0.0
         self._sent[:] = q
-        self._without_path = self._without_state = 0.0
+        self._without_path = self._without_state = self._without_way = 0.0
         self._path: Path | None = None
         self._horizon.forget()
-        self._begun = True
+        self._follows = self._begun = True
 
     def _go_on(self, t: float) -> tuple[float, float]:
         """Make the state that is commanded at `t` the first one; return its time, what passed."""
@@ -276,6 +280,18 @@ class Replanner:
         self._states[0] = self._states[here]
         self._time += passed * self.cycle
         return self._time, passed * self.cycle
+
+    def _held_up(self, passed: float) -> Array | None:
+        """Return the twist that the reference had come to, where limits kept the tool from it.
+
+        Begun anew with the tool's own, it would never get faster than in one period: too little to
+        leave a singular pose by.
+        """
+        cycle = round(passed / self.cycle)
+        if self._follows or not 2 <= cycle <= self._cycles:
+            return None
+        rows = self._table[cycle - 2 : cycle, -6:]
+        return np.asarray(0.5 * (rows[0] + rows[1]))
 
     def _positions(self, states: Array) -> Array:
         """Return q of states: the spline at its knots, (c⁻ + 4 c + c⁺)/6."""
@@ -341,6 +357,11 @@ class Replanner:
                 flag = Flag.STOPPING
         else:
             flag = Flag.KEPT if np.any(kept) else Flag.TRACKING
+        # On the way into a singular pose an arm may end up on its other side.
+        soon = horizon.breakdown < _SOON
+        self._without_way = self._without_way + max(passed, self.cycle) if soon else 0.0
+        if self._without_way > self._patience:
+            flag = Flag.STOPPING
         self._table[:, n : 2 * n] = kept
         self._table[:, 2 * n :] = table[-self._cycles :]
         return flag
