@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-batch bench-peers bench-starts errors suite suite-made fuzz fuzz-certificate fuzz-generated acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-batch bench-peers bench-starts errors bench-latency suite suite-made fuzz fuzz-certificate fuzz-generated fuzz-realtime acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -34,6 +34,9 @@ bench-batch: $(READY)  ## two processes against one, and what a plan costs besid
 
 bench-starts: $(READY)  ## free starts against the best of everything tried, 60 paths
 	$(BIN)/python benchmarks/starts.py
+
+bench-latency: $(READY)  ## 10,000 steps of the replanner: percentiles, misses, and the cost of short sight
+	$(BIN)/python benchmarks/latency.py
 
 errors: $(READY)  ## docs/errors.md: every bad input of the tests, and what the user sees
 	$(BIN)/python tests/bad_inputs.py
@@ -65,6 +68,9 @@ fuzz-certificate: $(READY)  ## 900 motions made to deceive, judged independently
 
 fuzz-generated: $(READY)  ## 5,000 generated problems: confirmed verdicts and typed errors only
 	$(BIN)/python benchmarks/generated.py
+
+fuzz-realtime: $(READY)  ## 1,000 scenarios of pushes, late steps, jumps and faults, in a closed loop
+	$(BIN)/python benchmarks/fuzz_realtime.py
 
 acceptance: $(READY)  ## 200 random plans, driven at 1 kHz by what the makers publish of their arms
 	$(BIN)/python benchmarks/acceptance.py

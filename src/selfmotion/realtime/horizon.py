@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, ProblemError
 from selfmotion.costs import Cost, Samples
 from selfmotion.engine import Rollout
 from selfmotion.motion import Grid, NullMotion
@@ -315,3 +315,13 @@ class Horizon:
         rows = np.stack([by_q[nodes[1:]], moves[1:], np.diff(moves, axis=0) / pause]).reshape(-1, d)
         slack = _BROKEN * self._range
         return rows, self._low - value - slack, self._high - value + slack
+
+
+def in_null_space(motion: NullMotion) -> NullMotion:
+    """Return a null motion; ProblemError unless it is one in the null space."""
+    if motion.space != "null":
+        raise ProblemError(
+            f"null motion: space is '{motion.space}', expected 'null': while the arm moves, "
+            f"self-motions are in the null space"
+        )
+    return motion

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array, ProblemError, StartError
 from selfmotion.constraints import (
     Clearance,
     Constraint,
@@ -12,6 +12,7 @@ from selfmotion.constraints import (
     JointPositionLimits,
     JointVelocityLimits,
 )
+from selfmotion.realtime.viable import braking_distance
 from selfmotion.robot import RobotModel
 
 # What a plan leaves of the limits to the command: distance from the ends [rad or m], and share of
@@ -66,3 +67,30 @@ def planned_limits(limits: Array) -> Array:
     lower, upper = limits[:2]
     margin = np.minimum(_ENDS, 0.1 * (upper - lower))
     return np.stack([lower + margin, upper - margin, _SPEED * limits[2], _ACCELERATION * limits[3]])
+
+
+def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: float) -> Array:
+    """Return the control point c (n,) of a motion that begins at q with q̇, see `viable`.
+
+    Raises
+    ------
+    StartError
+        A joint cannot stop within the limits (4, n) from there.
+    """
+    c = q + cycle * qd
+    lower, upper, speed, hardest = limits[:4]
+    room = np.where(qd > 0.0, upper - c, c - lower)
+    need = np.array(
+        [braking_distance(abs(w), most, cycle) for w, most in zip(qd, hardest, strict=True)]
+    )
+    bad = np.flatnonzero((c < lower) | (c > upper) | (np.abs(qd) > speed) | (need > room))
+    if bad.size:
+        k = int(bad[0])
+        raise StartError(
+            f"joint '{robot.joint_names[k]}' is at {q[k]:.6g}, {qd[k]:.6g} per second, from where "
+            f"it cannot stop within {lower[k]:.6g}..{upper[k]:.6g} at up to {speed[k]:.6g}; bring "
+            f"the arm within its limits first",
+            position_miss=0.0,
+            rotation_miss=0.0,
+        )
+    return np.asarray(c)

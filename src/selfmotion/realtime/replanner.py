@@ -7,18 +7,18 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion import kernels
-from selfmotion.basics import Array, ProblemError, StartError, as_number, as_whole, one_blas_thread
+from selfmotion.basics import Array, ProblemError, as_number, as_whole, one_blas_thread
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost, JointVelocity
 from selfmotion.motion import NullMotion, PolynomialNullMotion
 from selfmotion.path import Path, PathSamples
 from selfmotion.realtime import law
 from selfmotion.realtime.clear import Surroundings
-from selfmotion.realtime.horizon import Horizon
-from selfmotion.realtime.limits import joint_limits, planned_limits
+from selfmotion.realtime.horizon import Horizon, in_null_space
+from selfmotion.realtime.limits import joint_limits, planned_limits, stoppable
 from selfmotion.realtime.reference import Approach, Reference, resting
 from selfmotion.realtime.segment import Flag, Segment
-from selfmotion.realtime.viable import braking_distance, tightened
+from selfmotion.realtime.viable import tightened
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
@@ -118,7 +118,7 @@ class Replanner:
         limits = joint_limits(robot, constraints)
         self.limits = limits
         self._inner = np.vstack([tightened(limits), np.zeros(robot.dof)])
-        null_motion = _in_null_space(null_motion or PolynomialNullMotion())
+        null_motion = in_null_space(null_motion or PolynomialNullMotion())
         steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
         clearances = [item for item in constraints if isinstance(item, Clearance)]
         self._around = Surroundings(robot, clearances[0]) if clearances else None
@@ -239,30 +239,13 @@ class Replanner:
 
     def _begin(self, t: float, q: Array, qd: Array) -> None:
         q, qd = self.robot.configuration(q), self.robot.configuration(qd)
-        c = q + self.cycle * qd
-        lower, upper, speed, most = self._inner[:4]
-        room = np.where(qd > 0.0, upper - c, c - lower)
-        need = np.array(
-            [braking_distance(abs(w), a, self.cycle) for w, a in zip(qd, most, strict=True)]
-        )
-        bad = np.flatnonzero((c < lower) | (c > upper) | (np.abs(qd) > speed) | (need > room))
-        if bad.size:
-            k = int(bad[0])
-            raise StartError(
-                f"joint '{self.robot.joint_names[k]}' is at {q[k]:.6g}, {qd[k]:.6g} per second, "
-                f"from where it cannot stop within {lower[k]:.6g}..{upper[k]:.6g}; bring the arm "
-                f"within its limits first",
-                position_miss=0.0,
-                rotation_miss=0.0,
-            )
+        c = stoppable(self.robot, self._inner, q, qd, self.cycle)
         self._states[:] = 0.0
         self._states[:, 0], self._states[0, 1] = c, qd
         law.brake(self._states, 0, self._inner, self.cycle)
-        self._time, self._last = t, 0
-        self._inner[4] = 0.0
-        self._sent[:] = q
-        self._without_path = self._without_state = self._without_way = 0.0
+        self._time, self._inner[4], self._sent[:] = t, 0.0, q
         self._path: Path | None = None
+        self._without_path = self._without_state = self._without_way = 0.0
         self._horizon.forget()
         self._follows = self._begun = True
 
@@ -416,12 +399,3 @@ class Replanner:
             follows=follows,
             tool_error=error,
         )
-
-
-def _in_null_space(motion: NullMotion) -> NullMotion:
-    if motion.space != "null":
-        raise ProblemError(
-            f"null motion: space is '{motion.space}', expected 'null': while the arm moves, "
-            f"self-motions are in the null space"
-        )
-    return motion
