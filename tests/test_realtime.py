@@ -4,6 +4,7 @@ import gc
 import sys
 import tracemalloc
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +12,12 @@ import pinocchio as pin
 import pytest
 from numba.core import event
 from scipy.optimize import linprog
+from typer.testing import CliRunner
 
 import realtime_scenarios as scenarios
 import selfmotion as sm
 from selfmotion import realtime
+from selfmotion.cli import app
 from selfmotion.realtime import Flag, Replanner, Segment, SimulatedArm, State
 from selfmotion.realtime.law import brake, saturated_rates
 from selfmotion.realtime.viable import (
@@ -484,3 +487,14 @@ def test_a_conveyed_path_is_a_path(panda: sm.RobotModel, slow_circle: sm.Circle)
 def test_a_simulated_arm_wants_a_segment() -> None:
     with pytest.raises(sm.ProblemError, match="no segment"):
         SimulatedArm(HOME, 1e-3).run(0.1)
+
+
+def test_the_command_writes_replay_plan_and_histogram(tmp_path: Path) -> None:
+    shown = CliRunner().invoke(app, ["track", "--seconds", "1.2", "--out", str(tmp_path)])
+    assert shown.exit_code == 0, shown.output
+    assert "120, every 10 ms" in shown.output
+    for name in ("track.html", "track.npz", "latency.png"):
+        assert (tmp_path / name).stat().st_size > 1000
+    assert "keeps up with a circle on a conveyor" in (tmp_path / "track.html").read_text()
+    plan = sm.load_plan(tmp_path / "track.npz")
+    assert plan.trajectory.duration == pytest.approx(1.19)

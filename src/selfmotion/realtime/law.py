@@ -114,6 +114,19 @@ def saturate(
     return True
 
 
+@inlined
+def at_tool(world_jacobian: Array, translation: Array, out: Array) -> None:
+    """Set `out` (6, n) to the Jacobian of the tool's origin: v = v_0 + ω × x."""
+    for k in range(out.shape[1]):
+        for i in range(3):
+            j, other = (i + 1) % 3, (i + 2) % 3
+            out[3 + i, k] = world_jacobian[3 + i, k]
+            out[i, k] = world_jacobian[i, k] + (
+                world_jacobian[3 + j, k] * translation[other]
+                - world_jacobian[3 + other, k] * translation[j]
+            )
+
+
 @kernel
 def command(
     cycle: int,
@@ -148,15 +161,7 @@ def command(
     n, m = world_jacobian.shape[1], rows.shape[0]
     row, pointing = table[cycle], angle_kind == POINTING
     jacobian, task, error = np.empty((6, n)), np.empty((m, n)), np.zeros(6)
-    for k in range(n):
-        for i in range(3):
-            j, other = (i + 1) % 3, (i + 2) % 3
-            jacobian[3 + i, k] = world_jacobian[3 + i, k]
-            # The velocity of the tool's origin is v = v_0 + ω × x.
-            jacobian[i, k] = world_jacobian[i, k] + (
-                world_jacobian[3 + j, k] * translation[other]
-                - world_jacobian[3 + other, k] * translation[j]
-            )
+    at_tool(world_jacobian, translation, jacobian)
     target = row[2 * n + 3 : 2 * n + 12].copy().reshape(3, 3)
     pose_error(angle_kind, row[2 * n : 2 * n + 3], target, translation, rotation, error)
     twist, wanted = np.empty(6), np.empty(m)
