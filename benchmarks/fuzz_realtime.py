@@ -43,6 +43,8 @@ def main():
             if outcome.faults:
                 broken.append(outcome.seed)
                 print(f"seed {outcome.seed}: {'; '.join(outcome.faults)}", flush=True)
+            if len(slowest) % 100 == 0:
+                print(f"… {len(slowest)}", flush=True)
     print(f"{len(seeds)} scenarios, {sum(flags.values())} segments: "
           f"{', '.join(f'{count} {name}' for name, count in flags.items())}")  # fmt: skip
     print(f"back within {scenarios.BACK * 1e3:g} mm: the slowest took {max(slowest):.2f} s of the "

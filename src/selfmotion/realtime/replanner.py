@@ -343,7 +343,8 @@ class Replanner:
         # On the way into a singular pose an arm may end up on its other side.
         soon = horizon.breakdown < _SOON
         self._without_way = self._without_way + max(passed, self.cycle) if soon else 0.0
-        if self._without_way > self._patience:
+        held_up = horizon.breakdown < np.inf and not self._follows
+        if held_up or self._without_way > self._patience:
             flag = Flag.STOPPING
         self._table[:, n : 2 * n] = kept
         self._table[:, 2 * n :] = table[-self._cycles :]
