@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-batch bench-peers bench-starts bench-fastest docs errors suite suite-made fuzz fuzz-certificate fuzz-generated acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-certificate fuzz-generated fuzz-realtime acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -37,6 +37,9 @@ bench-starts: $(READY)  ## free starts against the best of everything tried, 60 
 
 bench-fastest: $(READY)  ## the fastest motions of 20 paths, and retimed plans, against limits
 	$(BIN)/python benchmarks/fastest.py
+
+bench-latency: $(READY)  ## 10,000 steps of the replanner: percentiles, misses, and the cost of short sight
+	$(BIN)/python benchmarks/latency.py
 
 docs: $(READY)  ## the site, into out/site
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --config-file docs/mkdocs.yml
@@ -71,6 +74,9 @@ fuzz-certificate: $(READY)  ## 900 motions made to deceive, judged independently
 
 fuzz-generated: $(READY)  ## 5,000 generated problems: confirmed verdicts and typed errors only
 	$(BIN)/python benchmarks/generated.py
+
+fuzz-realtime: $(READY)  ## 1,000 scenarios of pushes, late steps, jumps and faults, in a closed loop
+	$(BIN)/python benchmarks/fuzz_realtime.py
 
 acceptance: $(READY)  ## 200 random plans, driven at 1 kHz by what the makers publish of their arms
 	$(BIN)/python benchmarks/acceptance.py

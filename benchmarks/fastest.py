@@ -50,7 +50,7 @@ def retimed_circles() -> tuple[int, int]:
     """Return how many of the retimed free-start circles are verified, and how many there are."""
     robot, verified, total = sm.load_robot("panda"), 0, 0
     start = robot.pose(np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]))
-    for radius in (0.05, 0.1, 0.15):
+    for radius in (0.05, 0.1, 0.12):
         for normal in np.eye(3):
             for share in (0.3, 1.0):
                 path = sm.Circle.around(start, radius, 4.0, normal=normal)

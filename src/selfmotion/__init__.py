@@ -4,7 +4,7 @@ The tool motion holds by construction; what is optimised is the self-motion, the
 the null space of the task.
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from selfmotion.baselines import (
     DampedLeastSquares,
@@ -170,6 +170,8 @@ from selfmotion.task import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from selfmotion.realtime import Replanner, warm_up
+
 __all__ = [
     "NAMED_ARMS",
     "BSplineNullMotion",
@@ -261,6 +263,7 @@ __all__ = [
     "RefinedNullMotion",
     "Relaxation",
     "RenderError",
+    "Replanner",
     "Report",
     "Requirement",
     "Retimed",
@@ -298,10 +301,20 @@ __all__ = [
     "retime",
     "sample_problem",
     "slowdown",
+    "warm_up",
     "with_leads",
     "write_motion",
     "write_problem",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Return what is imported when it is first asked for: not every plan is made in a loop."""
+    if name in ("Replanner", "warm_up"):
+        from selfmotion import realtime
+
+        return getattr(realtime, name)
+    raise AttributeError(f"module 'selfmotion' has no attribute '{name}'")
 
 
 class _Views:

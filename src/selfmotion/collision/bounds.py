@@ -31,6 +31,12 @@ class BoundingBoxes:
         self._halves = np.array(halves).reshape(-1, 3)
         self._boxes = (joints, turns, np.array(middles).reshape(-1, 3), self._halves)
 
+    def move(self, index: int, body: Body) -> None:
+        """Take the place of a body anew."""
+        _, turns, middles, _ = self._boxes
+        turns[index] = body.place.rotation
+        middles[index] = body.place.act(0.5 * (body.solid.low + body.solid.high))
+
     @property
     def radii(self) -> Array:
         """Half the diagonals of the boxes, (B,) [m]."""

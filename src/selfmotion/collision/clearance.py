@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from selfmotion.basics import Array
 from selfmotion.collision.distances import Ints
@@ -115,6 +116,13 @@ class ClearanceModel:
         values = np.minimum(values, self._near) + beyond * (1.0 - 0.5 * beyond / self._width)
         values.setflags(write=False)
         return Clearances(values, rows, columns, slopes)
+
+    def move(self, obstacle: str, pose: pin.SE3) -> None:
+        """Put an obstacle somewhere else, for this model and the hulls of its `exact` one.
+
+        The meshes of `exact` stay where they are: it is not for measuring any more.
+        """
+        self._exact.hulls.move(obstacle, pose)
 
     def _useful(self) -> Ints:
         """Return the indices of pairs whose hulls overlap hardly more often than the bodies."""

@@ -4,7 +4,7 @@ import math
 import threading
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import coal
@@ -90,7 +90,7 @@ class HullDistances:
         bodies: Sequence[Body],
         pairs: Ints,
     ) -> None:
-        self.pairs, self._robot, self._bodies = pairs, robot, bodies
+        self.pairs, self._robot, self._bodies = pairs, robot, tuple(bodies)
         self._boxes = BoundingBoxes(robot, bodies)
         self._sizes = (2.0 * self._boxes.radii[pairs].sum(axis=1) + _ROUNDING).tolist()
         self._model = pin.GeometryModel()
@@ -104,6 +104,16 @@ class HullDistances:
     def lower_bounds(self, q: Array, limit: float = math.inf) -> Array:
         """Return what the distances at q (K, n) are at least, (K, P); see `BoundingBoxes`."""
         return self._boxes.lower_bounds(q, self.pairs, limit)
+
+    def move(self, obstacle: str, pose: pin.SE3) -> None:
+        """Put an obstacle somewhere else."""
+        index = next(
+            i for i, body in enumerate(self._bodies) if body.is_obstacle and body.name == obstacle
+        )
+        body = replace(self._bodies[index], place=pose)
+        self._bodies = (*self._bodies[:index], body, *self._bodies[index + 1 :])
+        self._model.geometryObjects[index].placement = pose
+        self._boxes.move(index, body)
 
     def place(self, q: Array) -> Any:
         """Place the hulls at q (n,), and return their placements in world axes, by body."""

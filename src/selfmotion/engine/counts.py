@@ -18,3 +18,7 @@ class Counts:
     evaluations: int = 0
     gradients: int = 0
     jacobians: int = 0
+
+    def evaluated(self) -> None:
+        """Count an evaluation of F that begins."""
+        self.evaluations += 1

@@ -313,7 +313,7 @@ class Objective:
         """Make x the motion that the rollout holds."""
         if self._at is not None and np.array_equal(self._at, x):
             return
-        self.counts.evaluations += 1
+        self.counts.evaluated()
         # An interruption on the way must not leave half a motion as that of x.
         self._at = None
         self._terms = {cost.name: np.inf for cost in self._costs}

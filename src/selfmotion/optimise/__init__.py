@@ -12,6 +12,7 @@ from selfmotion.optimise.base import (
     inverse_metric,
 )
 from selfmotion.optimise.line_search import LineSearch
+from selfmotion.optimise.quadratic import minimize_quadratic
 from selfmotion.optimise.quasi_newton import QuasiNewton
 from selfmotion.optimise.sqp import SequentialQuadratic
 from selfmotion.optimise.step import Step, best_step
@@ -31,4 +32,5 @@ __all__ = [
     "Step",
     "best_step",
     "inverse_metric",
+    "minimize_quadratic",
 ]

@@ -80,6 +80,7 @@ class Status(Enum):
     GRADIENT = "gradient"
     STOPPED = "stopped"
     INTERRUPTED = "interrupted"
+    DEADLINE = "deadline"
 
     @property
     def message(self) -> str:
@@ -101,6 +102,7 @@ _MESSAGES = {
     "(selfmotion.testing.check_cost tells), or the cost has a kink here",
     Status.STOPPED: "the callback asked to stop",
     Status.INTERRUPTED: "interrupted; this is the best found so far",
+    Status.DEADLINE: "the deadline has passed; this is the best found so far",
 }
 
 

@@ -60,7 +60,7 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
             if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
                 break
             session.refine()
-            if rough:
+            if rough and not session.cut_short:
                 session.minimize()
         except KeyboardInterrupt:
             session.end(Status.INTERRUPTED)

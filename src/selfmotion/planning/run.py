@@ -3,15 +3,18 @@
 import time
 from dataclasses import replace
 from functools import cache
+from math import inf
 
 import numpy as np
 
 from selfmotion.basics import (
     BreakdownError,
     NoSequenceError,
+    PlanError,
     ProblemError,
     Progress,
     SelfmotionError,
+    as_number,
     as_whole,
     one_blas_thread,
     read_only,
@@ -19,9 +22,9 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.engine import Counts
 from selfmotion.optimise import Callback, Optimizer, QuasiNewton, Status
 from selfmotion.planning.candidates import Candidates
+from selfmotion.planning.deadline import Deadline, TimedCounts
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import Finished, finish
 from selfmotion.planning.largest_part import Part, largest_part
@@ -31,6 +34,8 @@ from selfmotion.planning.warm_start import check_warm_start
 from selfmotion.plans import Gap, Plan, Problem, Report
 from selfmotion.search import SPACING, Reach, reachable
 
+# After these no other way is tried.
+_ENDED = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
 # Evaluations of the cost that a damped motion may take, and each of many on parts of the path.
 _PATIENCE, _PART_PATIENCE = 400, 150
 
@@ -43,6 +48,7 @@ def plan(
     warm_start: Plan | None = None,
     tolerance: Tolerance | None = None,
     max_evaluations: int | None = None,
+    deadline: float | None = None,
     callback: Callback | None = None,
     progress: Progress = silent,
 ) -> Plan:
@@ -66,6 +72,9 @@ def plan(
         Limit on evaluations of the cost while optimising one start; the finished motion is
         evaluated a few times more. By default none, but 400 with damping and 150 on each part of
         the path, where limits of joint speed often cannot be met and trying would take minutes.
+    deadline : float, optional
+        After so many seconds the best so far has to do: no worse than x = 0, or what the search
+        began with. It is judged like any other plan, which takes some time more.
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
     progress : callable, optional
@@ -90,6 +99,8 @@ def plan(
         The start is free and no configuration reaches the start of the path.
     NoSequenceError
         The global search finds that no motion follows the path; says where it ends and why.
+    PlanError
+        The deadline came before there was a complete motion.
     ProblemError
         An argument is not what it should be, or has no effect on this problem.
     KeyboardInterrupt
@@ -101,23 +112,35 @@ def plan(
     is_one = callable(getattr(optimizer, "minimize", None)) and not isinstance(optimizer, type)
     if optimizer is not None and not is_one:
         raise ProblemError(f"optimizer is {shown(optimizer)}, expected one such as QuasiNewton()")
+    clock = Deadline(inf)
+    if deadline is not None:
+        clock = Deadline.after(as_number(deadline, "deadline", above=0.0))
     if problem.damping is not None and max_evaluations is None:
         max_evaluations = _PATIENCE
-    effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, Counts())
-    with one_blas_thread():
-        settings = (Tolerance.of(tolerance), progress, warm_start)
-        return _plan(problem, effort, search or Search(), settings)
+    counts = TimedCounts(deadline=clock)
+    effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, counts)
+    settings = (Tolerance.of(tolerance), clock.telling(progress), warm_start, clock)
+    try:
+        with one_blas_thread():
+            return _plan(problem, effort, search or Search(), settings)
+    except KeyboardInterrupt:
+        if not clock.passed:
+            raise
+        raise PlanError(
+            f"the deadline of {deadline} s came before there was a complete motion; allow more "
+            f"time, or give a start"
+        ) from None
 
 
 def _plan(
     problem: Problem,
     effort: Effort,
     search: Search,
-    settings: tuple[Tolerance, Progress, Plan | None],
+    settings: tuple[Tolerance, Progress, Plan | None, Deadline],
 ) -> Plan:
     found = _Run(problem, effort, search, *settings).plan()
     # Few motions take an arm into itself: the others need not wait for distances.
-    if not _overlaps(found) or found.report.status in (Status.INTERRUPTED, Status.STOPPED):
+    if not _overlaps(found) or found.report.status in _ENDED:
         return found
     efforts = [(replace(effort, apart=True), search)]
     if problem.given_start is None and search.mode == "auto":
@@ -126,12 +149,35 @@ def _plan(
         efforts += [(effort, whole), (replace(effort, apart=True), whole)]
     for another, how in efforts:
         try:
-            found = _Run(problem, another, how, *settings).plan()
-        except (SelfmotionError, KeyboardInterrupt):
+            rival = _Run(problem, another, how, *settings).plan()
+        except SelfmotionError:
             return found
-        if not _overlaps(found) or found.report.status in (Status.INTERRUPTED, Status.STOPPED):
+        except KeyboardInterrupt:
+            clock = settings[-1]
+            return _told(found, Status.DEADLINE if clock.passed else Status.INTERRUPTED)
+        if rival.report.status in _ENDED:
+            return _better(found, rival)
+        found = rival
+        if not _overlaps(found):
             return found
     return found
+
+
+def _better(before: Plan, cut_short: Plan) -> Plan:
+    """Return the one of which less is wrong, then the cheaper; its report says what cut it."""
+    if _standing(cut_short) < _standing(before):
+        return cut_short
+    return _told(before, cut_short.report.status)
+
+
+def _told(plan: Plan, status: Status) -> Plan:
+    """Return a plan whose report says what kept another one from being tried to the end."""
+    message = f"{status.message}; before: {plan.report.message}"
+    return replace(plan, report=replace(plan.report, status=status, message=message))
+
+
+def _standing(plan: Plan) -> tuple[int, float]:
+    return len(plan.certificate.failures), plan.report.cost
 
 
 def _overlaps(plan: Plan) -> bool:
@@ -165,9 +211,11 @@ class _Run:
         tolerance: Tolerance,
         progress: Progress,
         warm_start: Plan | None,
+        deadline: Deadline,
     ) -> None:
         self._problem, self._effort, self._search = problem, effort, search
         self._tolerance, self._progress = tolerance, progress
+        self._deadline = deadline
         self._began = time.perf_counter()
         self._reach = cache(self._reachable)
         self._candidates = Candidates(problem, effort, search, progress, self._reach, warm_start)
@@ -244,6 +292,8 @@ class _Run:
 
     def _gather(self, part: Part, finished: Finished, gap: Gap | None) -> Plan:
         session, motion, still = part.session, finished.motion, finished.still
+        if self._deadline.passed and session.status is Status.INTERRUPTED:
+            session.end(Status.DEADLINE)
         counts = session.counts
         report = Report(
             cost=motion.cost,

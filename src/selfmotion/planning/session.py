@@ -32,7 +32,12 @@ _LEAST_SAVING = 1e-6
 # After these there is nothing to go on from.
 _ADRIFT = (Status.UNBOUNDED, Status.GRADIENT)
 # After these the user has no more time to give.
-_CUT_SHORT = (Status.INTERRUPTED, Status.STOPPED, Status.MAX_EVALUATIONS)
+_CUT_SHORT = (
+    Status.INTERRUPTED,
+    Status.DEADLINE,
+    Status.STOPPED,
+    Status.MAX_EVALUATIONS,
+)
 
 
 class Session:
@@ -202,6 +207,9 @@ class Session:
             self._objective.require_finite(self._x)
         self._minimum = self._next_minimum()
         self._x = np.array(self._minimum.x)
+        if self._minimum.status is Status.INTERRUPTED:
+            # For good, whatever is minimised later.
+            self.end(Status.INTERRUPTED)
         self._close()
         self.violations = self._objective.violations(self._x)
 

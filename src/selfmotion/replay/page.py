@@ -30,6 +30,7 @@ def replay_html(
     *,
     title: str | None = None,
     labels: Sequence[str] | None = None,
+    description: str | None = None,
     triads: int | npt.ArrayLike = _TRIADS,
 ) -> str:
     """Return a page that replays plans: complete, offline, the same bytes for the same plans.
@@ -44,6 +45,8 @@ def replay_html(
         Heading of the page. Default: the robot's name and the task.
     labels : sequence of str, optional
         Names of the plans on the switch. Default: A, B, C, …
+    description : str, optional
+        What the page shows, in words. Default: arm, task, cost and verdict.
     triads : int or array of float
         Where the tool's axes are drawn: how many, evenly spaced in time, or at which times [s].
 
@@ -63,11 +66,14 @@ def replay_html(
         payload,
         triads=triads,
     )
+    if description is not None:
+        for shown_plan in content["plans"]:
+            shown_plan["description"] = description
     heading = title or f"{shown[0].robot.name}, {shown[0].task.value} task"
     sentences = [describe(plan) for plan in shown]
     if len(shown) > 1:
         sentences = [f"{name}: {said}." for name, said in zip(names, sentences, strict=True)]
-    return _assemble(heading, " ".join(sentences), payload.pack(content))
+    return _assemble(heading, description or " ".join(sentences), payload.pack(content))
 
 
 def write_replay(

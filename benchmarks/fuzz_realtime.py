@@ -1,0 +1,57 @@
+"""Random scenarios for the loop: pushes, late steps, jumps of the target and faults."""
+
+import argparse
+import sys
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+import realtime_scenarios as scenarios
+import selfmotion as sm
+from selfmotion.realtime import Replanner
+
+TASKS = ("pose", "position", "pointing")
+
+
+@cache
+def loop(task):
+    robot = sm.load_robot("panda")
+    return robot, Replanner(robot, task)
+
+
+def judged(seed):
+    """Return what the scenario of a seed showed."""
+    task = TASKS[seed % len(TASKS)]
+    return scenarios.run(seed, task, *loop(task))
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--count", type=int, default=1000)
+    arguments.add_argument("--first", type=int, default=0)
+    arguments.add_argument("--workers", type=int, default=2)
+    given = arguments.parse_args()
+    seeds = range(given.first, given.first + given.count)
+    flags, broken, slowest = Counter(), [], []
+    with ProcessPoolExecutor(given.workers) as pool:
+        for outcome in pool.map(judged, seeds, chunksize=10):
+            flags.update({flag.value: count for flag, count in outcome.flags.items()})
+            slowest.append(outcome.slowest)
+            if outcome.faults:
+                broken.append(outcome.seed)
+                print(f"seed {outcome.seed}: {'; '.join(outcome.faults)}", flush=True)
+            if len(slowest) % 100 == 0:
+                print(f"… {len(slowest)}", flush=True)
+    print(f"{len(seeds)} scenarios, {sum(flags.values())} segments: "
+          f"{', '.join(f'{count} {name}' for name, count in flags.items())}")  # fmt: skip
+    print(f"back within {scenarios.BACK * 1e3:g} mm: the slowest took {max(slowest):.2f} s of the "
+          f"{scenarios.TIME_TO_COME_BACK:g} s allowed")  # fmt: skip
+    print(f"{len(broken)} broke a law")
+    sys.exit(bool(broken))
+
+
+if __name__ == "__main__":
+    main()

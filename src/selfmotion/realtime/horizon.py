@@ -1,0 +1,327 @@
+"""The self-motion over the next seconds: one Gauss-Newton step for each cycle.
+
+The real-time iteration scheme (M. Diehl, H. Bock, J. Schlöder, "A real-time iteration scheme for
+nonlinear optimization in optimal feedback control", SIAM J. Control Optim. 43, 2005): a cycle
+linearises the motion around the last coefficients, shifted in time, solves one quadratic programme,
+and the next cycle goes on from there.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError
+from selfmotion.costs import Cost, Samples
+from selfmotion.engine import Rollout
+from selfmotion.motion import Grid, NullMotion
+from selfmotion.path import Dwell, PathSamples
+from selfmotion.realtime.clear import Surroundings
+from selfmotion.realtime.law import transport_frame
+from selfmotion.realtime.programme import best_step
+from selfmotion.robot import RobotModel, null_space
+from selfmotion.task import Task
+
+# Added to the Gauss-Newton matrix, relative to its trace: directions that do not act stay put.
+_REGULAR = 1e-8
+# Where a cost does not tell its curvature, that of the joints' speed is added, so many times: less
+# where the cost falls as predicted, more where it does not, from the least to the most.
+_LESS, _MORE, _LEAST, _MOST = 0.3, 4.0, 1e-3, 1e6
+# Of the predicted fall, what counts as well predicted, and as badly.
+_WELL, _BADLY = 0.75, 0.25
+# A joint that moves so many times as fast as it may has been thrown out of a singular pose.
+_WILD = 20.0
+# What rows may be broken by, relative to their range.
+_BROKEN = 1e-6
+
+
+class Horizon:
+    """Plans ε(t) = R(τ) C φ(τ) for times τ from now on.
+
+    C is r × K for K functions φ. Its part along φ(0) is given by the self-motion that the arm has
+    now, so that the rate is continuous; the rest is optimised.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    task : Task
+    costs : sequence of Cost
+    limits : (4, n)
+        Lower, upper, speed, acceleration: what is aimed at.
+    null_motion : NullMotion
+        φ, in the null space.
+    duration : float
+        How far ahead it plans [s].
+    steps : int
+        Runge-Kutta steps.
+    surroundings : Surroundings, optional
+        What the arm keeps apart from.
+
+    Attributes
+    ----------
+    relaxed : bool
+        Whether the last step could not keep all limits and distances.
+    breakdown : float
+        When the last motion ran into a singular pose [s]; inf where it did not.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        task: Task,
+        costs: Sequence[Cost],
+        limits: Array,
+        null_motion: NullMotion,
+        duration: float,
+        steps: int,
+        surroundings: Surroundings | None = None,
+    ) -> None:
+        self.grid = Grid(np.linspace(0.0, duration, steps + 1))
+        self.rollout = Rollout(
+            robot, Dwell(robot.pose(robot.dexterous_configuration()), duration), task, self.grid
+        )
+        self.redundancy = robot.redundancy(task)
+        self._costs, self._duration = tuple(costs), duration
+        self._null_motion, self._around = null_motion, surroundings
+        t = self.grid.stage_times
+        self._functions = null_motion.functions(t, duration)
+        self._inverse = np.linalg.pinv(self._functions)
+        now = self._functions[0]
+        self._first = now / (now @ now)
+        self._rest = null_space(now[None])
+        self._shifts: dict[float, Array] = {}
+        self._metrics = [item for cost in costs for item in cost.curvature(robot.dof).items()]
+        # Costs whose curvature is not known.
+        self._guesses = any(not cost.curvature(robot.dof) for cost in costs)
+        pace = np.tile(np.concatenate([limits[2], limits[3]])[None], (steps, 1))
+        places = np.tile(limits[:2].ravel()[None], (steps, 1)).reshape(steps, 2, -1)
+        speeds, hardest = pace[:, : robot.dof], pace[:, robot.dof :]
+        self._low = np.stack([places[:, 0], -speeds, -hardest]).ravel()
+        self._high = np.stack([places[:, 1], speeds, hardest]).ravel()
+        self._wild = _WILD * limits[2]
+        self._range = np.where(np.isfinite(self._high - self._low), self._high - self._low, 1.0)
+        # The stages' places among the nodes, for frames between them.
+        step = duration / steps
+        self._node, self._share = self._between(t, step, steps)
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew: without self-motion, in a frame of the next configuration."""
+        # None as long as it has no row.
+        self._frames = np.zeros((0, self.rollout.robot.dof, self.redundancy))
+        self._coefficients = np.zeros((self.redundancy, self._functions.shape[1]))
+        self._damping = 1.0
+        self.relaxed, self.breakdown = False, np.inf
+
+    @property
+    def size(self) -> int:
+        """Number of variables of a cycle's programme."""
+        return int(self.redundancy * self._rest.shape[1])
+
+    def shift(self, seconds: float) -> None:
+        """Go on from so much later: coefficients and frame are those of the same motion."""
+        if seconds <= 0.0 or not len(self._frames):
+            return
+        if seconds not in self._shifts:
+            self._shifts.clear()
+            later = np.minimum(self.grid.stage_times + seconds, self._duration)
+            moved = self._null_motion.functions(later, self._duration)
+            self._shifts[seconds] = (self._inverse @ moved).T
+        self._coefficients = self._coefficients @ self._shifts[seconds]
+        steps = self.grid.steps
+        node, share = self._between(self.grid.nodes + seconds, self._duration / steps, steps)
+        self._frames = self._blend(node, share)
+
+    def epsilon(self, t: Array, functions: Array) -> Array:
+        """Return ε at times `t` (M,) from now [s], for φ there (M, K), (M, n)."""
+        n = self.rollout.robot.dof
+        if not len(self._frames):
+            return np.zeros((len(t), n))
+        steps = self.grid.steps
+        frames = self._blend(*self._between(t, self._duration / steps, steps))
+        return np.asarray((frames @ (functions @ self._coefficients.T)[:, :, None])[:, :, 0])
+
+    def functions(self, t: Array) -> Array:
+        """Return φ at times `t` (M,), (M, K)."""
+        return self._null_motion.functions(np.minimum(t, self._duration), self._duration)
+
+    def improve(self, q: Array, rate: Array, jacobian: Array, reference: PathSamples) -> bool:
+        """Make one step from a configuration and rate, along a reference given at the stages.
+
+        Parameters
+        ----------
+        q, rate : (n,)
+        jacobian : (m, n)
+            Task Jacobian at q.
+        reference : PathSamples
+
+        Returns
+        -------
+        bool
+            Whether there is a motion: if not, nothing has changed but what `forget` forgets.
+        """
+        # Near singular poses numbers may be beyond all bounds: what is not finite is no motion.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._improve(q, rate, jacobian, reference)
+
+    def _improve(self, q: Array, rate: Array, jacobian: Array, reference: PathSamples) -> bool:
+        self.rollout.aim(reference)
+        if not self.redundancy:
+            return self._run(q, np.zeros((len(self._functions), len(q))))
+        if not len(self._frames) and not self._begin(q):
+            return False
+        first = np.empty((1, *self._frames.shape[1:]))
+        transport_frame(self._frames[0], jacobian[None], first)
+        self._frames[0] = first[0]
+        free = self._coefficients @ self._rest
+        self._coefficients = np.outer(first[0].T @ rate, self._first) + free @ self._rest.T
+        stages = self._blend(self._node, self._share)
+        outer = stages @ (self._functions @ self._coefficients.T)[:, :, None]
+        if not self._run(q, outer[:, :, 0]):
+            when = self.breakdown
+            self.forget()
+            self.breakdown = when
+            return False
+        basis = self._functions @ self._rest
+        by_epsilon = (stages[:, :, :, None] * basis[:, None, None, :]).reshape(
+            len(basis), len(q), self.size
+        )
+        tangents = self.rollout.sensitivities(by_epsilon, np.zeros((len(q), self.size)))
+        samples = self.rollout.samples()
+        cost = self._cost(samples) if self._guesses else 0.0
+        found = self._step(samples, *tangents)
+        if found is None:
+            self.forget()
+            return False
+        step, predicted = found
+        here = np.ascontiguousarray(samples.task_jacobian[self.grid.node_stages])
+        better = self._coefficients + step.reshape(self.redundancy, -1) @ self._rest.T
+        if not self._guesses or self._falls(q, stages, better, cost, predicted):
+            self._coefficients = better
+        transport_frame(first[0], here, self._frames)
+        return True
+
+    def _cost(self, samples: Samples) -> float:
+        return float(samples.weights @ sum(cost.value(samples) for cost in self._costs))
+
+    def _falls(self, q: Array, stages: Array, better: Array, cost: float, predicted: float) -> bool:
+        """Return whether to take a step whose fall of the cost was guessed; learn from it."""
+        if predicted <= 0.0:
+            # It is for the limits.
+            return True
+        outer = stages @ (self._functions @ better.T)[:, :, None]
+        fall = -np.inf
+        if self._run(q, outer[:, :, 0]):
+            fall = cost - self._cost(self.rollout.samples())
+        ratio = fall / predicted if np.isfinite(fall) else -np.inf
+        if not ratio >= _BADLY:
+            self._damping = min(_MORE * self._damping, _MOST)
+        elif ratio > _WELL:
+            self._damping = max(_LESS * self._damping, _LEAST)
+        return bool(ratio > 0.0)
+
+    def _begin(self, q: Array) -> bool:
+        if not self._run(q, np.zeros((len(self._functions), len(q)))):
+            return False
+        jacobians = self.rollout.samples().task_jacobian[self.grid.node_stages]
+        self._frames = np.empty((len(jacobians), len(q), self.redundancy))
+        transport_frame(null_space(jacobians[0]), np.ascontiguousarray(jacobians), self._frames)
+        return True
+
+    def _run(self, q: Array, epsilon: Array) -> bool:
+        """Integrate; return whether there is a motion, and one that an arm could think of."""
+        broken = self.rollout.run(q, epsilon)
+        self.breakdown = np.inf if broken is None else broken
+        wild = (np.abs(self.rollout.samples().qd) > self._wild).any(axis=1)
+        if wild.any():
+            first = float(self.grid.stage_times[int(np.argmax(wild))])
+            self.breakdown = min(self.breakdown, first)
+        return self.breakdown == np.inf
+
+    def _between(self, t: Array, step: float, steps: int) -> tuple[Array, Array]:
+        """Return between which nodes times lie, and how far: the last one stands for all later."""
+        place = np.minimum(t / step, float(steps))
+        node = np.minimum(place.astype(np.intp), steps - 1)
+        return node, (place - node)[:, None, None]
+
+    def _blend(self, node: Array, share: Array) -> Array:
+        frames = self._frames
+        return np.asarray((1.0 - share) * frames[node] + share * frames[node + 1])
+
+    def _step(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, float] | None:
+        """Return the step of the coefficients (d,), and by how much the cost is to fall.
+
+        None where numbers are not finite.
+        """
+        gradient, metric = self._model(samples, by_q, by_qd)
+        if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(metric))):
+            return None
+        d = self.size
+        metric[np.diag_indices(d)] += _REGULAR * (np.trace(metric) + 1e-12)
+        limits = self._conditions(samples, by_q, by_qd)
+        try:
+            step, self.relaxed = best_step(metric, gradient, *limits)
+        except np.linalg.LinAlgError:
+            return None
+        return step, float(-gradient @ step - 0.5 * step @ metric @ step)
+
+    def _conditions(
+        self, samples: Samples, by_q: Array, by_qd: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return rows (R, d) of the limits and distances, and what they may be, (R,) each."""
+        rows, low, high = self._rows(samples, by_q, by_qd)
+        if self._around is not None:
+            more, room = self._around.rows(samples, by_q)
+            rows, high = np.vstack([rows, more]), np.concatenate([high, room])
+            low = np.concatenate([low, np.full(len(more), -np.inf)])
+        return rows, low, high
+
+    def _model(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array]:
+        """Return the gradient of the cost and its Gauss-Newton matrix, (d,) and (d, d)."""
+        d, sampling = self.size, samples.sampling
+        weights = samples.weights[:, None]
+        nodes = by_qd[sampling.nodes].reshape(len(sampling.nodes), -1)
+        flat = {0: by_q.reshape(-1, d), 1: by_qd.reshape(-1, d)}
+
+        def tangent(order: int) -> Array:
+            if order not in flat:
+                flat[order] = (sampling.differentiation(order - 1) @ nodes).reshape(-1, d)
+            return flat[order]
+
+        gradient, metric = np.zeros(d), np.zeros((d, d))
+        for cost in self._costs:
+            partials = cost.gradient(samples)
+            parts = partials.q, partials.qd, partials.qdd, partials.qddd
+            for order, part in enumerate(parts):
+                if part is not None:
+                    gradient += (weights * part).ravel() @ tangent(order)
+        for order, weight in self._metrics:
+            one = tangent(order)
+            heavy = (weights[:, :, None] * (weight @ one.reshape(*samples.q.shape, d))).reshape(
+                -1, d
+            )
+            metric += one.T @ heavy
+        if self._guesses:
+            one = tangent(1)
+            heavy = (weights[:, :, None] * one.reshape(*samples.q.shape, d)).reshape(-1, d)
+            metric += self._damping * (one.T @ heavy)
+        return gradient, metric
+
+    def _rows(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array, Array]:
+        """Return the limits at the nodes as rows of the step, with what they may be."""
+        nodes, d = samples.nodes, self.size
+        pause = (self._duration / self.grid.steps,)
+        qd, moves = samples.qd[nodes], by_qd[nodes]
+        value = np.stack([samples.q[nodes[1:]], qd[1:], np.diff(qd, axis=0) / pause]).ravel()
+        rows = np.stack([by_q[nodes[1:]], moves[1:], np.diff(moves, axis=0) / pause]).reshape(-1, d)
+        slack = _BROKEN * self._range
+        return rows, self._low - value - slack, self._high - value + slack
+
+
+def in_null_space(motion: NullMotion) -> NullMotion:
+    """Return a null motion; ProblemError unless it is one in the null space."""
+    if motion.space != "null":
+        raise ProblemError(
+            f"null motion: space is '{motion.space}', expected 'null': while the arm moves, "
+            f"self-motions are in the null space"
+        )
+    return motion

@@ -1,0 +1,356 @@
+"""One control cycle, compiled: the rate that keeps the tool on its reference, within limits.
+
+The rates that viable commands allow are a box. As long as eq. 4 stays in it, it is what is
+commanded. Where a joint would leave it, that joint is held at its bound and eq. 4 is solved again
+for the others, one joint after the other: saturation in the null space (F. Flacco, A. De Luca,
+O. Khatib, "Control of redundant robots under hard joint constraints", IEEE Transactions on
+Robotics 31, 2015), with the self-motion as what may give first. Near singular poses the inverse is
+damped, by the smallest pivot of JJᵀ.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from selfmotion.basics import Array, inlined, kernel
+from selfmotion.kernels import (
+    POINTING,
+    Rows,
+    cholesky,
+    gram,
+    pose_error,
+    select,
+    solve_cholesky,
+    task_rows,
+)
+from selfmotion.realtime.viable import viable_accelerations
+
+# Below this pivot of JJᵀ [m², rad²] the inverse is damped, by up to λ² = the same.
+_PIVOT = 1e-3
+# What the tool may lack of the rate that was asked for, and count as following [m/s, rad/s].
+_FOLLOWED = 1e-3
+# Entries of a cycle's row besides its n-vectors: the reference's position, rotation and twist.
+REFERENCE = 18
+
+
+@inlined
+def factor_damped(jacobian: Array, factor: Array) -> None:
+    """Set `factor` to the Cholesky factor of JJᵀ + λ²I, λ = 0 unless a pivot is small."""
+    gram(jacobian, factor)
+    least = np.inf
+    if cholesky(factor):
+        for i in range(factor.shape[0]):
+            least = min(least, 1.0 / (factor[i, i] * factor[i, i]))
+    else:
+        least = 0.0
+    if least < _PIVOT:
+        gram(jacobian, factor)
+        for i in range(factor.shape[0]):
+            factor[i, i] += _PIVOT - least
+        cholesky(factor)
+
+
+@kernel
+def saturated_rates(
+    jacobian: Array, wanted: Array, epsilon: Array, low: Array, high: Array, rates: Array
+) -> bool:
+    """Set `rates` (n,) within low..high, so that Jq̇ is `wanted` (m,) where that is possible.
+
+    With q̇ = J⁺u + (I - J⁺J) ε where no bound is in the way. Where the tool would not move as
+    wanted, the self-motion gives: the middle of the bounds is tried in place of ε. Returns whether
+    the tool moves as wanted.
+    """
+    if saturate(jacobian, wanted, epsilon, low, high, rates):
+        return True
+    middle = np.empty(rates.shape[0])
+    for k in range(rates.shape[0]):
+        middle[k] = 0.5 * (low[k] + high[k])
+    return saturate(jacobian, wanted, middle, low, high, rates)
+
+
+@inlined
+def saturate(
+    jacobian: Array, wanted: Array, epsilon: Array, low: Array, high: Array, rates: Array
+) -> bool:
+    """Hold joints at their bounds, the one farthest out first, until the others are within."""
+    m, n = jacobian.shape
+    moving, factor, y = jacobian.copy(), np.empty((m, m)), np.empty(m)
+    held = np.zeros(n, dtype=np.bool_)
+    for _ in range(n + 1):
+        for i in range(m):
+            y[i] = wanted[i]
+            for k in range(n):
+                y[i] -= jacobian[i, k] * (rates[k] if held[k] else epsilon[k])
+        factor_damped(moving, factor)
+        solve_cholesky(factor, y)
+        worst, most = -1, 0.0
+        for k in range(n):
+            if held[k]:
+                continue
+            rates[k] = epsilon[k]
+            for i in range(m):
+                rates[k] += moving[i, k] * y[i]
+            beyond = max(rates[k] - high[k], low[k] - rates[k]) / (high[k] - low[k] + 1e-12)
+            # NaN is beyond every bound.
+            if not beyond <= most:
+                worst, most = k, beyond
+                if beyond != beyond:
+                    break
+        if worst < 0:
+            break
+        held[worst] = True
+        if not rates[worst] >= low[worst]:
+            rates[worst] = low[worst]
+        elif not rates[worst] <= high[worst]:
+            rates[worst] = high[worst]
+        for i in range(m):
+            moving[i, worst] = 0.0
+    for i in range(m):
+        miss = wanted[i]
+        for k in range(n):
+            miss -= jacobian[i, k] * rates[k]
+        if not abs(miss) <= _FOLLOWED:
+            return False
+    return True
+
+
+@inlined
+def at_tool(world_jacobian: Array, translation: Array, out: Array) -> None:
+    """Set `out` (6, n) to the Jacobian of the tool's origin: v = v_0 + ω × x."""
+    for k in range(out.shape[1]):
+        for i in range(3):
+            j, other = (i + 1) % 3, (i + 2) % 3
+            out[3 + i, k] = world_jacobian[3 + i, k]
+            out[i, k] = world_jacobian[i, k] + (
+                world_jacobian[3 + j, k] * translation[other]
+                - world_jacobian[3 + other, k] * translation[j]
+            )
+
+
+@kernel
+def command(
+    cycle: int,
+    world_jacobian: Array,
+    rotation: Array,
+    translation: Array,
+    table: Array,
+    states: Array,
+    limits: Array,
+    rows: Rows,
+    angle_kind: int,
+    gain: float,
+    h: float,
+) -> bool:
+    """Choose the acceleration of a cycle, and set the states of its end.
+
+    Parameters
+    ----------
+    world_jacobian, rotation, translation : (6, n), (3, 3), (3,)
+        Pinocchio's Jacobian at the world's origin and the tool's pose, at the middle of the rate's
+        interval: where `table` says.
+    table : (M, 2n + 18)
+        Per cycle: where the arm is expected then (n), ε (n), position, rotation and twist of the
+        reference. The next row's first entries are set.
+    states : (M + 1, 3, n)
+        c, w and a; those of `cycle` are given.
+    limits : (5, n)
+        Lower, upper, speed, acceleration, and how far the arm is from its command.
+
+    Returns whether the tool moves as the reference asks.
+    """
+    n, m = world_jacobian.shape[1], rows.shape[0]
+    row, pointing = table[cycle], angle_kind == POINTING
+    jacobian, task, error = np.empty((6, n)), np.empty((m, n)), np.zeros(6)
+    at_tool(world_jacobian, translation, jacobian)
+    target = row[2 * n + 3 : 2 * n + 12].copy().reshape(3, 3)
+    pose_error(angle_kind, row[2 * n : 2 * n + 3], target, translation, rotation, error)
+    twist, wanted = np.empty(6), np.empty(m)
+    for i in range(6):
+        twist[i] = row[2 * n + 12 + i] + gain * error[i]
+    task_rows(rows, pointing, rotation, jacobian, task)
+    select(rows, pointing, rotation, twist, wanted)
+    c, w = states[cycle, 0], states[cycle, 1]
+    low, high, rates = np.empty(n), np.empty(n), np.empty(n)
+    for k in range(n):
+        low[k], high[k] = viable_accelerations(
+            c[k], w[k], limits[0, k], limits[1, k], limits[2, k], limits[3, k], h
+        )
+        low[k], high[k] = w[k] + h * low[k], w[k] + h * high[k]
+    follows = saturated_rates(task, wanted, row[n : 2 * n], low, high, rates)
+    for k in range(n):
+        rate = min(max(rates[k], low[k]), high[k])
+        move(states, cycle, k, (rate - w[k]) / h, h)
+        if cycle + 1 < table.shape[0]:
+            ahead = states[cycle + 1, 0, k] + 0.5 * h * states[cycle + 1, 1, k]
+            table[cycle + 1, k] = ahead + limits[4, k]
+    return follows
+
+
+@inlined
+def move(states: Array, cycle: int, k: int, acceleration: float, h: float) -> None:
+    """Set joint k's state at the end of a cycle."""
+    rate = states[cycle, 1, k] + h * acceleration
+    states[cycle + 1, 2, k] = acceleration
+    states[cycle + 1, 1, k] = rate
+    states[cycle + 1, 0, k] = states[cycle, 0, k] + h * rate
+
+
+@kernel
+def brake(states: Array, first: int, limits: Array, h: float) -> int:
+    """Bring all joints to rest from cycle `first` on; return the cycle at which they rest.
+
+    Together, so that the arm stays on the line that it is on, as far as viable commands allow.
+    Where `states` (M + 1, 3, n) end before that: the last cycle.
+    """
+    n = states.shape[2]
+    for cycle in range(first, states.shape[0] - 1):
+        longest, moves = 0.0, False
+        for k in range(n):
+            w = states[cycle, 1, k]
+            longest = max(longest, abs(w) / (limits[3, k] * h))
+            moves = moves or w != 0.0 or states[cycle, 2, k] != 0.0
+        if not moves:
+            return cycle
+        # In so many cycles the slowest to brake can rest.
+        share = 1.0 / max(1.0, longest)
+        for k in range(n):
+            c, w = states[cycle, 0, k], states[cycle, 1, k]
+            low, high = viable_accelerations(
+                c, w, limits[0, k], limits[1, k], limits[2, k], limits[3, k], h
+            )
+            wish = -w / h if longest <= 1.0 else -w * share / h
+            move(states, cycle, k, min(max(wish, low), high), h)
+            if longest <= 1.0 and low <= wish <= high:
+                # To rest, not to rounding.
+                states[cycle + 1, 1, k], states[cycle + 1, 0, k] = 0.0, c
+    return int(states.shape[0] - 1)
+
+
+@kernel
+def approach(offset: Array, rate: Array, law: Array, step: float, table: Array) -> None:
+    """Set `table` (G, 12) to how an offset (6,) [m, rad] and its rate fade away, every `step`.
+
+    Of second order, apart for position and rotation: the rate goes to that of the offset's speed
+    min(K d, √(A d), V) towards zero, with time constant 1/(4K), by at most A. `law` (5,) are K, V
+    and A of positions, V and A of rotations.
+    """
+    now, speed = offset.copy(), rate.copy()
+    for g in range(table.shape[0]):
+        for i in range(6):
+            table[g, i], table[g, 6 + i] = now[i], speed[i]
+        for part in range(2):
+            most, hardest, distance, change = law[1 + 2 * part], law[2 + 2 * part], 0.0, 0.0
+            for i in range(3 * part, 3 * part + 3):
+                distance += now[i] * now[i]
+            distance = sqrt(distance)
+            pace = min(law[0], min(most, sqrt(hardest * distance)) / max(distance, 1e-12))
+            for i in range(3 * part, 3 * part + 3):
+                change += (-pace * now[i] - speed[i]) ** 2
+            change = sqrt(change) * 4.0 * law[0]
+            share = 4.0 * law[0] * step * min(1.0, hardest / max(change, 1e-12))
+            for i in range(3 * part, 3 * part + 3):
+                before = speed[i]
+                speed[i] += share * (-pace * now[i] - speed[i])
+                now[i] += 0.5 * step * (before + speed[i])
+
+
+@kernel
+def shift_reference(
+    times: Array,
+    translation: Array,
+    rotation: Array,
+    twist: Array,
+    table: Array,
+    step: float,
+    out: Array,
+) -> None:
+    """Set `out` (M, 18) to position, rotation and twist of a target moved by a fading offset.
+
+    `times` (M,) count from the first row of `table`, see `approach`. The target is turned by
+    exp(φ) and moved by δ: ω = Jl(φ) φ̇ + exp(φ) ω_target.
+    """
+    turn = np.empty((3, 3))
+    for k in range(times.shape[0]):
+        place = times[k] / step
+        g = min(int(place), table.shape[0] - 2)
+        share = min(place - g, 1.0)
+        phi, slope = np.empty(3), np.empty(3)
+        for i in range(3):
+            out[k, i] = translation[k, i] + (1.0 - share) * table[g, i] + share * table[g + 1, i]
+            out[k, 12 + i] = (
+                twist[k, i] + (1.0 - share) * table[g, 6 + i] + share * table[g + 1, 6 + i]
+            )
+            phi[i] = (1.0 - share) * table[g, 3 + i] + share * table[g + 1, 3 + i]
+            slope[i] = (1.0 - share) * table[g, 9 + i] + share * table[g + 1, 9 + i]
+        angle = sqrt(phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
+        if angle > 1e-4:
+            first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / (angle * angle)
+            third = (1.0 - first) / (angle * angle)
+        else:
+            first, second, third = 1.0, 0.5, 1.0 / 6.0
+        square = np.empty((3, 3))
+        skew = np.zeros((3, 3))
+        skew[0, 1], skew[0, 2], skew[1, 2] = -phi[2], phi[1], -phi[0]
+        skew[1, 0], skew[2, 0], skew[2, 1] = phi[2], -phi[1], phi[0]
+        for i in range(3):
+            for j in range(3):
+                square[i, j] = phi[i] * phi[j] - (angle * angle if i == j else 0.0)
+        for i in range(3):
+            for j in range(3):
+                turn[i, j] = (1.0 if i == j else 0.0) + first * skew[i, j] + second * square[i, j]
+        for i in range(3):
+            rate = slope[i]
+            for j in range(3):
+                rate += (second * skew[i, j] + third * square[i, j]) * slope[j]
+                rate += turn[i, j] * twist[k, 3 + j]
+                total = 0.0
+                for a in range(3):
+                    total += turn[i, a] * rotation[k, a, j]
+                out[k, 3 + 3 * i + j] = total
+            out[k, 15 + i] = rate
+
+
+@kernel
+def transport_frame(first: Array, jacobians: Array, frames: Array) -> None:
+    """Carry a basis (n, r) of the null space along task Jacobians (N, m, n): `frames` (N, n, r).
+
+    Each is the orthonormal basis nearest to its predecessor's projection onto the null space (the
+    polar factor, by the Newton-Schulz iteration), as in `selfmotion.motion.transport`.
+    """
+    count, m, n = jacobians.shape
+    r = first.shape[1]
+    factor, y, inner = np.empty((m, m)), np.empty(m), np.empty((r, r))
+    basis, better = first.copy(), np.empty((n, r))
+    for s in range(count):
+        jacobian = jacobians[s]
+        factor_damped(jacobian, factor)
+        for x in range(r):
+            for i in range(m):
+                y[i] = 0.0
+                for k in range(n):
+                    y[i] += jacobian[i, k] * basis[k, x]
+            solve_cholesky(factor, y)
+            for k in range(n):
+                for i in range(m):
+                    basis[k, x] -= jacobian[i, k] * y[i]
+        for _ in range(_POLAR):
+            off = 0.0
+            for a in range(r):
+                for b in range(r):
+                    inner[a, b] = 0.0
+                    for k in range(n):
+                        inner[a, b] += basis[k, a] * basis[k, b]
+                    off = max(off, abs(inner[a, b] - (1.0 if a == b else 0.0)))
+            if not off > 1e-12:
+                break
+            for k in range(n):
+                for a in range(r):
+                    better[k, a] = 1.5 * basis[k, a]
+                    for b in range(r):
+                        better[k, a] -= 0.5 * basis[k, b] * inner[b, a]
+            basis[:] = better
+        frames[s] = basis
+
+
+# Steps of the iteration: it converges quadratically once a basis is nearly orthonormal.
+_POLAR = 20

@@ -1,0 +1,96 @@
+"""Limits of the joints, as the loop keeps them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError, StartError
+from selfmotion.constraints import (
+    Clearance,
+    Constraint,
+    JointAccelerationLimits,
+    JointPositionLimits,
+    JointVelocityLimits,
+)
+from selfmotion.realtime.viable import braking_distance
+from selfmotion.robot import RobotModel
+
+# What a plan leaves of the limits to the command: distance from the ends [rad or m], and share of
+# speed and acceleration. The tool's feedback and the time between nodes need some.
+_ENDS, _SPEED, _ACCELERATION = 5e-3, 0.98, 0.9
+_KEPT = (JointPositionLimits, JointVelocityLimits, JointAccelerationLimits, Clearance)
+
+
+def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
+    """Return lower, upper, speed and acceleration limits of an arm, (4, n).
+
+    Those of the arm and its maker, and of the constraints.
+
+    Raises
+    ------
+    ProblemError
+        A constraint is not of the kinds that are kept while moving; a joint has no limit of
+        acceleration.
+    """
+    for item in constraints:
+        if not isinstance(item, _KEPT):
+            names = ", ".join(kind.__name__ for kind in _KEPT)
+            raise ProblemError(
+                f"constraint {type(item).__name__} is not kept while moving; expected of {names}"
+            )
+    kinds = {type(item) for item in constraints}
+    # Where none are given, those of the arm and its maker.
+    asked = [*constraints, *(kind() for kind in _KEPT[:3] if kind not in kinds)]
+    places = [item.limits(robot) for item in asked if isinstance(item, JointPositionLimits)]
+    speeds = [item.of(robot) for item in asked if isinstance(item, JointVelocityLimits)]
+    hardest = [item.of(robot) for item in asked if isinstance(item, JointAccelerationLimits)]
+    limits = np.array(
+        [
+            np.max([lower for lower, _ in places], axis=0),
+            np.min([upper for _, upper in places], axis=0),
+            np.min(speeds, axis=0),
+            np.min(hardest, axis=0),
+        ]
+    )
+    endless = np.flatnonzero(~np.isfinite(limits[2:]).all(axis=0))
+    if endless.size:
+        raise ProblemError(
+            f"{robot.name}: joint '{robot.joint_names[int(endless[0])]}' has no limit of speed or "
+            f"acceleration, which a stop in time needs; give JointVelocityLimits(…) and "
+            f"JointAccelerationLimits(…)"
+        )
+    return limits
+
+
+def planned_limits(limits: Array) -> Array:
+    """Return what plans aim at, within the limits (4, n) of commands."""
+    lower, upper = limits[:2]
+    margin = np.minimum(_ENDS, 0.1 * (upper - lower))
+    return np.stack([lower + margin, upper - margin, _SPEED * limits[2], _ACCELERATION * limits[3]])
+
+
+def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: float) -> Array:
+    """Return the control point c (n,) of a motion that begins at q with q̇, see `viable`.
+
+    Raises
+    ------
+    StartError
+        A joint cannot stop within the limits (4, n) from there.
+    """
+    c = q + cycle * qd
+    lower, upper, speed, hardest = limits[:4]
+    room = np.where(qd > 0.0, upper - c, c - lower)
+    need = np.array(
+        [braking_distance(abs(w), most, cycle) for w, most in zip(qd, hardest, strict=True)]
+    )
+    bad = np.flatnonzero((c < lower) | (c > upper) | (np.abs(qd) > speed) | (need > room))
+    if bad.size:
+        k = int(bad[0])
+        raise StartError(
+            f"joint '{robot.joint_names[k]}' is at {q[k]:.6g}, {qd[k]:.6g} per second, from where "
+            f"it cannot stop within {lower[k]:.6g}..{upper[k]:.6g} at up to {speed[k]:.6g}; bring "
+            f"the arm within its limits first",
+            position_miss=0.0,
+            rotation_miss=0.0,
+        )
+    return np.asarray(c)
