@@ -1,6 +1,5 @@
 """Options of the commands, and what their texts mean."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -257,8 +256,13 @@ def pose(text: str, option: str) -> dict[str, Any]:
 
 def read_obstacles(file: Path) -> tuple[sm.Obstacle, ...]:
     """Return the obstacles of a file; see `obstacle_tables`."""
-    tables = obstacle_tables(file)
-    return tuple(formats.obstacle(item, lambda name: Path(name)) for item in tables)
+    found = []
+    for k, item in enumerate(obstacle_tables(file)):
+        try:
+            found.append(formats.obstacle(item, lambda name: Path(name)))
+        except sm.SelfmotionError as error:
+            raise sm.FileFormatError(f"{file}: [{k}]: {error}") from error
+    return tuple(found)
 
 
 def obstacle_tables(file: Path) -> list[dict[str, Any]]:
@@ -277,10 +281,5 @@ def obstacle_tables(file: Path) -> list[dict[str, Any]]:
 
 
 def _listed(file: Path) -> Any:
-    if file.suffix == ".toml":
-        return formats.read_document(file).get("obstacles")
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise sm.FileFormatError(f"{file}: cannot be read as JSON: {error}") from error
+    found = formats.read_values(file)
     return found.get("obstacles") if isinstance(found, dict) else found

@@ -165,7 +165,9 @@ def parse_urdf(
     _check_expanded(root, source)
     check_link_elements(root, source)
     check_joint_elements(root, source)
-    parsed = _parse_with_yourdfpy(text, source)
+    parsed = _parse_with_yourdfpy(ElementTree.tostring(root, encoding="unicode"), source)
+    if [joint.name for joint in parsed.joints] != [j.get("name") for j in root.findall("joint")]:
+        raise RobotError(f"{source}: is XML that parsers read differently; write it plainly")
     joints = {joint.name: joint for joint in map(_joint, parsed.joints)}
     _check_tree(parsed, source)
     _check_mimics(joints, source)
@@ -221,13 +223,14 @@ def _parse_with_yourdfpy(text: str, source: str) -> Any:
 
     import yourdfpy
 
-    logging.getLogger("yourdfpy").setLevel(logging.ERROR)
+    logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             return yourdfpy.URDF.load(
                 io.BytesIO(text.encode()), load_meshes=False, build_scene_graph=False
             ).robot
-    except (ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
+    # It raises what its parsers do, of which there are several.
+    except Exception as error:
         raise RobotError(f"{source}: is not a valid URDF: {error}") from error
 
 
