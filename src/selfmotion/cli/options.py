@@ -30,9 +30,17 @@ PathOption = Annotated[
         "(s, m, rad; x_mm, roll_deg, …), .npy, or ROS Path and PoseArray as .yaml and .json."
     ),
 ]
-CircleOption = Annotated[float | None, typer.Option(help="Or a circle of this radius (m).")]
-LineOption = Annotated[str | None, typer.Option(help="Or a straight line by dx,dy,dz (m).")]
-NormalOption = Annotated[Axis, typer.Option(help="Axis of the circle.")]
+_FROM = "from the tool's pose at --start (by default a dexterous configuration)"
+CircleOption = Annotated[
+    float | None, typer.Option(help=f"Or a circle of this radius (m), {_FROM}.")
+]
+LineOption = Annotated[
+    str | None, typer.Option(help=f"Or a straight line by dx,dy,dz (m), {_FROM}.")
+]
+NormalOption = Annotated[
+    Axis | None,
+    typer.Option(help="Axis of the circle; x by default, of a planar arm that of its plane."),
+]
 DurationOption = Annotated[
     float | None,
     typer.Option(help="Of circle or line (s; 4 by default), or of poses without times."),
@@ -65,6 +73,10 @@ CornerToleranceOption = Annotated[
     typer.Option(help="Distance from rounded corners (m; 0.001 by default).", min=1e-6),
 ]
 TaskOption = Annotated[TaskName, typer.Option(help="What the path prescribes.")]
+PlannedTaskOption = Annotated[
+    TaskName | None,
+    typer.Option(help="What the path prescribes; pose by default, of a planar arm planar."),
+]
 RelaxOption = Annotated[
     list[str] | None,
     typer.Option(

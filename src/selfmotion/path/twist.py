@@ -19,7 +19,7 @@ _SHORTEST = 2.0**-12
 # What two pieces may differ by where they meet, relative to the largest velocity.
 _JUMP = 1e-9
 # A path that turns farther than this [rad] is not meant.
-_MOST_TURNED = 1000.0
+_MOST_TURNED = 300.0
 
 
 class TwistPath(Path, kind="twist"):

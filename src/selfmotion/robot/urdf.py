@@ -18,6 +18,8 @@ from selfmotion.robot.link_elements import check_link_elements
 
 # A limit that no motion reaches; Pinocchio wants finite numbers for a revolute joint.
 _UNLIMITED = 1e6
+# Elements in each other; URDFs have six.
+_DEEPEST = 100
 # Fixed joints that are ours: where the base stands, and how the tool is held.
 BASE_JOINT, TOOL_JOINT = MOUNTING_JOINTS = ("base_placement", "tool_offset")
 
@@ -193,6 +195,11 @@ def _root(text: str, source: str) -> ElementTree.Element:
                 f"{source}: is a pointer of Git LFS, not the file itself; run git lfs pull"
             ) from error
         raise RobotError(f"{source}: is not well-formed XML: {error}") from error
+    level = [root]
+    for _ in range(_DEEPEST):
+        level = [child for element in level for child in element]
+    if level:
+        raise RobotError(f"{source}: more than {_DEEPEST} elements lie in each other")
     if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
         raise RobotError(f"{source}: is a xacro file; give it the suffix .xacro")
     if root.tag != "robot":
