@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-certificate fuzz-generated fuzz-realtime acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-certificate fuzz-generated fuzz-realtime fuzz-files acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -77,6 +77,9 @@ fuzz-generated: $(READY)  ## 5,000 generated problems: confirmed verdicts and ty
 
 fuzz-realtime: $(READY)  ## 1,000 scenarios of pushes, late steps, jumps and faults, in a closed loop
 	$(BIN)/python benchmarks/fuzz_realtime.py
+
+fuzz-files: $(READY)  ## 20,000 spoiled files of all kinds: read, or refused in one line
+	$(BIN)/python benchmarks/fuzz_files.py
 
 acceptance: $(READY)  ## 200 random plans, driven at 1 kHz by what the makers publish of their arms
 	$(BIN)/python benchmarks/acceptance.py

@@ -7,6 +7,7 @@ import tempfile
 from itertools import groupby
 from pathlib import Path
 
+from bad_additions import addition_rows
 from bad_constraints import constraint_rows
 from bad_problems import problem_rows, setting_rows
 from bad_rows import Row
@@ -33,6 +34,7 @@ def all_rows() -> list[Row]:
         *cost_rows(),
         *constraint_rows(),
         *setting_rows(),
+        *addition_rows(),
     ]
     areas = list(dict.fromkeys(row.area for row in found))
     return sorted(found, key=lambda row: areas.index(row.area))

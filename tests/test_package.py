@@ -1,5 +1,6 @@
 """What `import selfmotion` offers and what it leaves alone."""
 
+import inspect
 import subprocess
 import sys
 
@@ -32,3 +33,15 @@ def test_the_one_liner() -> None:
         [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True
     )
     assert float(result.stdout) < 10.5145
+
+
+def test_objects_show_themselves_in_a_few_lines() -> None:
+    """Neither arrays nor the whole URDF, which a session in a terminal would drown in."""
+    problem = sm.sample_problem()
+    plan = sm.plan(problem, max_evaluations=2)
+    shown = [problem, problem.robot, problem.path, plan, plan.report, plan.trajectory]
+    for item in (*shown, plan.certificate, *problem.costs, *problem.constraints):
+        text = repr(item)
+        assert len(text) < 600
+        assert " object at " not in text
+    assert "_TaskField" not in str(inspect.signature(sm.Problem))

@@ -257,9 +257,9 @@ def test_a_path_from_a_file_is_run_up_to_its_speed(tmp_path: Path) -> None:
     (tmp_path / "seam.csv").write_text("x,y,z\n0.5,-0.1,0.4\n0.5,0.0,0.4\n0.5,0.1,0.4\n")
     file = tmp_path / "cell.toml"
     text = 'task = "position"\nrobot.name = "panda"\n[path]\nkind = "file"\nfile = "seam.csv"\n'
-    file.write_text(text + "feed = 0.05\n")
+    file.write_text(text + "duration = 4\n")
     seam = sm.read_problem(file).path
-    file.write_text(text + "feed = 0.05\nramp = 0.5\n")
+    file.write_text(text + "duration = 4\nramp = 0.5\n")
     path = sm.read_problem(file).path
     assert path.duration == pytest.approx(seam.duration + 0.5)
     assert np.linalg.norm(seam.twist(0.0)[:3]) == pytest.approx(0.05)

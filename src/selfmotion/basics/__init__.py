@@ -19,6 +19,7 @@ from selfmotion.basics.errors import (
 from selfmotion.basics.files import (
     as_path,
     read_archive,
+    read_arrays,
     read_rows,
     read_table,
     write_archive,
@@ -71,6 +72,7 @@ __all__ = [
     "plain_numbers",
     "random_numbers",
     "read_archive",
+    "read_arrays",
     "read_only",
     "read_rows",
     "read_table",

@@ -19,9 +19,31 @@
 Each message names the thing, what was found, what was expected and what to do about it.
 """
 
+import re
+
+# Words and messages that are longer come from damaged files; of them the ends are shown.
+_WORD, _MESSAGE = 120, 1500
+
 
 class SelfmotionError(Exception):
     """Root of the package's exceptions."""
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(_legible(str(message)))
+
+
+def _legible(message: str) -> str:
+    """Return a message without what a file may do to a terminal: control codes, endless words."""
+    plain = "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in message)
+    words = re.sub(rf"[^\s/]{{{_WORD},}}", lambda found: _ends(found.group(), _WORD), plain)
+    return _ends(words, _MESSAGE)
+
+
+def _ends(text: str, length: int) -> str:
+    """Return a text, or its beginning and end if it is longer."""
+    if len(text) <= length:
+        return text
+    return f"{text[: length // 2]} … {text[-length // 3 :]}"
 
 
 class RobotError(SelfmotionError):

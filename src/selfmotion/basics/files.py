@@ -1,6 +1,7 @@
 """Archives and tables on disk: written atomically, read with errors that name the place."""
 
 import json
+import math
 import os
 import tempfile
 import zipfile
@@ -14,6 +15,8 @@ from selfmotion.basics.arrays import Array, shown
 from selfmotion.basics.errors import FileFormatError
 
 _DESCRIPTION = "description"
+# Files of arrays beyond this many bytes are not read: 250,000 samples of a plan are a tenth.
+_LARGEST = 250_000_000
 
 
 def write_atomically(file: Path, write: Callable[[IO[bytes]], None]) -> None:
@@ -65,15 +68,70 @@ def read_archive(file: Path) -> tuple[dict[str, Any], dict[str, Array]]:
     """
     if file.exists() and not zipfile.is_zipfile(file):
         raise FileFormatError(f"{file}: is no plan written by selfmotion (.npz)")
+    arrays = read_arrays(file)
+    if _DESCRIPTION not in arrays:
+        raise FileFormatError(f"{file}: is no plan written by selfmotion: it has no description")
     try:
-        with np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
         description = json.loads(arrays.pop(_DESCRIPTION).tobytes())
+    except (ValueError, RecursionError) as error:
+        raise FileFormatError(f"{file}: is no plan written by selfmotion: {error}") from error
+    if not isinstance(description, dict):
+        raise FileFormatError(f"{file}: is no plan written by selfmotion: its description is none")
+    return description, arrays
+
+
+def read_arrays(file: Path) -> dict[str, Array]:
+    """Return the arrays of an ``.npz`` file by name, or that of an ``.npy`` file as ``""``.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, damaged, holds objects, or says that it holds more than it does, or
+        more than this reads.
+    """
+    try:
+        if file.suffix != ".npz":
+            with file.open("rb") as stream:
+                return {"": _read_array(stream, file.stat().st_size, "")}
+        with zipfile.ZipFile(file) as archive:
+            sizes = {item.filename: item.file_size for item in archive.infolist()}
+            if sum(sizes.values()) > _LARGEST:
+                raise ValueError(f"it unpacks to {sum(sizes.values()):.3g} bytes")
+            arrays = {}
+            for member, size in sizes.items():
+                with archive.open(member) as packed:
+                    arrays[member.removesuffix(".npy")] = _read_array(packed, size, member)
+            return arrays
     except FileNotFoundError:
         raise FileFormatError(f"{file}: no such file") from None
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise FileFormatError(f"{file}: is no plan written by selfmotion: {error}") from error
-    return description, arrays
+    except OSError as error:
+        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
+    # What is wrong with archives, heads and bodies is raised as whatever it meets first.
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        what = "NumPy arrays" if file.suffix == ".npz" else "a NumPy array"
+        raise FileFormatError(f"{file}: cannot be read as {what}: {reason}") from error
+
+
+def _read_array(stream: Any, size: int, name: str) -> Array:
+    """Return an array of a stream of so many bytes; ValueError if its head says another size."""
+    form = np.lib.format
+    reads = {(1, 0): form.read_array_header_1_0, (2, 0): form.read_array_header_2_0}
+    version = form.read_magic(stream)
+    if version not in reads:
+        raise ValueError(f"{name}: its format {version} is not known")
+    shape, fortran, kind = reads[version](stream)
+    if kind.hasobject:
+        raise ValueError(f"{name}: holds objects of Python, expected numbers")
+    announced = math.prod(shape) * kind.itemsize
+    # Before room is made for what is announced.
+    if min(shape, default=0) < 0 or announced > min(size, _LARGEST):
+        raise ValueError(f"{name}: announces an array of shape {shape}, which it does not hold")
+    body = stream.read(announced)
+    if len(body) < announced:
+        raise ValueError(f"{name}: ends after {len(body)} of {announced} bytes")
+    flat: Any = np.frombuffer(body, dtype=kind, count=math.prod(shape)).copy()
+    return np.asarray(flat.reshape(shape, order="F" if fortran else "C"))
 
 
 def write_csv(file: Path, header: Sequence[str], table: Array) -> None:

@@ -1,5 +1,6 @@
 """Compiling the numerical kernels with numba: once per machine, announced when it happens."""
 
+import contextlib
 import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -39,7 +40,30 @@ def kernel(function: _Function) -> _Function:
         if "no locator available" not in str(error):
             raise
         compiled = numba.njit(cache=False, error_model="numpy")(function)
+    else:
+        _forgive(compiled)
     return compiled
+
+
+def _forgive(compiled: Any) -> None:
+    """Let a cache that is damaged, or on a full disk, cost time instead of the run."""
+    cache = compiled._cache
+    load, save = cache.load_overload, cache.save_overload
+
+    def load_or_compile(*given: Any) -> Any:
+        # A garbled file raises whatever unpickling it meets.
+        try:
+            return load(*given)
+        except Exception:
+            with contextlib.suppress(OSError):
+                cache.flush()
+            return None
+
+    def save_if_possible(*given: Any) -> None:
+        with contextlib.suppress(OSError):
+            save(*given)
+
+    cache.load_overload, cache.save_overload = load_or_compile, save_if_possible
 
 
 def inlined(function: _Function) -> _Function:

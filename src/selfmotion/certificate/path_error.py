@@ -150,7 +150,9 @@ def _edges(path: Path, trajectory: Trajectory, relaxations: Sequence[Relaxation]
     kept = np.append(True, gaps > _SAME * path.duration)
     marks = marks[kept]
     marks[-1] = end
-    travel = np.minimum(_travel(trajectory, marks), _WILD)
+    travel = _travel(trajectory, marks)
+    # What is wild is not settled however finely it is cut.
+    travel = np.where(travel <= _WILD, travel, 0.0)
     pieces = np.maximum(np.ceil(travel / _TRAVEL), 1.0).astype(int)
     fine = [
         first + (last - first) * np.arange(number) / number

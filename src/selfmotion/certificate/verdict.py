@@ -92,6 +92,9 @@ class Certificate:
         position = self.position_error.value <= self.tolerance.position
         return position and self.rotation_error.value <= self.tolerance.rotation
 
+    def __repr__(self) -> str:
+        return f"Certificate({self.verdict})"
+
     @property
     def verified(self) -> bool:
         """Whether the motion follows the path within tolerance and keeps what is required."""

@@ -11,8 +11,9 @@ from rich.console import Console
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.cli import documents, options, tables
+from selfmotion.cli import documents, options, outputs, tables
 from selfmotion.cli.batch_display import BatchDisplay, executor_at
+from selfmotion.cli.remedies import in_shell
 from selfmotion.cli.showcase import panda_past_a_box
 from selfmotion.cli.stage_display import StageDisplay
 
@@ -34,7 +35,7 @@ def main() -> None:
     try:
         app()
     except sm.SelfmotionError as error:
-        _complain(f"error: {error}")
+        _complain(f"error: {in_shell(str(error))}")
         sys.exit(BAD_INPUT)
     except Exception:
         # Not bad input, and no verdict: whoever reads exit codes must not take it for one.
@@ -57,7 +58,7 @@ def plan(
     path: options.PathOption = None,
     circle: options.CircleOption = None,
     line: options.LineOption = None,
-    normal: options.NormalOption = "x",
+    normal: options.NormalOption = None,
     duration: options.DurationOption = None,
     feed: options.FeedOption = None,
     jump: options.JumpOption = None,
@@ -65,7 +66,7 @@ def plan(
     ramp: options.RampOption = None,
     corners: options.CornersOption = "blend",
     corner_tolerance: options.CornerToleranceOption = None,
-    task: options.TaskOption = "pose",
+    task: options.PlannedTaskOption = None,
     relax: options.RelaxOption = None,
     start: options.StartOption = None,
     warm: options.FromOption = None,
@@ -95,7 +96,7 @@ def plan(
     """Plan a motion, check it, and write it."""
     warm_start = None if warm is None else sm.load_plan(warm)
     job = documents.read(context, problem, settings or [], allow_code, warm_start)
-    check_suffixes([*job.outputs, *(out or [])])
+    outputs.check_suffixes([*job.outputs, *(out or [])])
     asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
     given = {key: value for key, value in asked.items() if value is not None}
     result = _plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
@@ -103,7 +104,7 @@ def plan(
         _console.print_json(data=tables.plan_json(result))
     else:
         tables.show(result, _console)
-    _write(result, [*job.outputs, *(out or [])], html, quiet=as_json)
+    outputs.write(result, [*job.outputs, *(out or [])], html, _console, quiet=as_json)
     raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
 
 
@@ -200,10 +201,11 @@ def export(
         str | None,
         typer.Option("--format", help=f"Whatever the suffix: {', '.join(formats.FORMS)}."),
     ] = None,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write a plan's motion for controllers and simulators, and check what was written."""
     saved = sm.load_plan(file)
-    verified = not saved.altered
+    verified, verdicts = not saved.altered, dict[str, str]()
     for target in out:
         sm.write_motion(saved, target, rate=rate, form=form)
         if form in formats.READABLE or (form is None and target.suffix not in (".xml", ".script")):
@@ -211,13 +213,18 @@ def export(
                 sm.read_motion(target), saved.tolerance, saved.report.ending
             )
             verified = verified and found.verified
-            _console.print(
-                f"wrote {target}; read back: {found.verdict}", markup=False, soft_wrap=True
-            )
+            verdicts[str(target)] = f"read back: {found.verdict}"
         else:
             verified = verified and saved.certificate.verified
-            _console.print(f"wrote {target}", markup=False, soft_wrap=True)
+            verdicts[str(target)] = ""
     miss = formats.linear_miss(saved, rate)
+    if as_json:
+        _console.print_json(
+            data={"verified": verified, "written": verdicts, "linear_miss": miss._asdict()}
+        )
+        raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
+    for name, verdict in verdicts.items():
+        _console.print(f"wrote {name}{verdict and '; '}{verdict}", markup=False, soft_wrap=True)
     _console.print(
         f"joined by straight lines, the samples stay within {miss.position:.2g} m and "
         f"{miss.rotation:.2g} rad of the motion; --rate {miss.rate:.0f} keeps the plan's tolerance",
@@ -313,9 +320,13 @@ def batch(
 
 
 @app.command(epilog="Example: selfmotion robots")
-def robots() -> None:
+def robots(as_json: options.JsonOption = False) -> None:
     """List the arms known by name: joints, tool frame, and redundancy for each task."""
-    tables.show_robots({name: sm.load_robot(name) for name in sm.NAMED_ARMS}, _console)
+    arms = {name: sm.load_robot(name) for name in sm.NAMED_ARMS}
+    if as_json:
+        _console.print_json(data=tables.robots_json(arms))
+    else:
+        tables.show_robots(arms, _console)
 
 
 @app.command(epilog="Example: selfmotion demo --out out")
@@ -330,7 +341,7 @@ def demo(
         result = _plan_with_progress(problem)
         tables.show(result, _console)
         files = [out / f"{name}.npz", out / f"{name}.csv"]
-        _write(result, files, out / f"{name}.html")
+        outputs.write(result, files, out / f"{name}.html", _console)
         verified = verified and result.certificate.verified
     tracked = sm.plan_by(problem, sm.PseudoInverse()).certificate
     _console.print(
@@ -342,12 +353,8 @@ def demo(
 @app.command(epilog="Example: selfmotion track --seconds 12 --out out/track")
 def track(
     task: options.TaskOption = "pose",
-    seconds: Annotated[
-        float, typer.Option(help="How long, in seconds.", min=1.0, max=600.0)
-    ] = 12.0,
-    horizon: Annotated[
-        float, typer.Option(help="How far ahead is planned, in seconds.", min=0.1)
-    ] = 2.0,
+    seconds: Annotated[float, typer.Option(help="How long (s).", min=1.0, max=600.0)] = 12.0,
+    horizon: Annotated[float, typer.Option(help="Planned ahead (s).", min=0.1)] = 2.0,
     seed: Annotated[int, typer.Option(help="Of the noise.", min=0)] = 0,
     out: Annotated[Path, typer.Option(help="Folder for replay and histogram.")] = Path("out/track"),
 ) -> None:
@@ -391,36 +398,3 @@ def study(
 def _plan_with_progress(problem: sm.Problem, **options: Any) -> sm.Plan:
     with StageDisplay(_stages) as display:
         return sm.plan(problem, callback=display.iteration, progress=display.stage, **options)
-
-
-def _write(result: sm.Plan, out: list[Path], html: Path | None, *, quiet: bool = False) -> None:
-    for file in out:
-        if file.suffix == ".csv":
-            result.to_csv(file)
-        elif file.suffix == ".html":
-            _replay(result, file)
-        elif file.suffix == ".npz":
-            result.save(file)
-        else:
-            sm.write_motion(result, file)
-    if html is not None:
-        _replay(result, html)
-    for file in [*out, *([] if html is None else [html])]:
-        if not quiet:
-            _console.print(f"wrote {file}", markup=False, soft_wrap=True)
-
-
-def _replay(result: sm.Plan, file: Path) -> None:
-    from selfmotion.replay import write_replay
-
-    write_replay(result, file)
-
-
-def check_suffixes(files: list[Path]) -> None:
-    """Raise FileFormatError for a file that --out cannot write."""
-    for file in files:
-        if file.suffix not in (".npz", ".html", *formats.SUFFIXES):
-            known = ", ".join(formats.SUFFIXES)
-            raise sm.FileFormatError(
-                f"{file}: --out writes .npz (the plan), .html (its replay) or its motion ({known})"
-            )

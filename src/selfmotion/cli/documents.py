@@ -21,7 +21,7 @@ class Shell:
     path: Path | None
     circle: float | None
     line: str | None
-    normal: str
+    normal: str | None
     duration: float | None
     feed: float | None
     jump: float | None
@@ -29,7 +29,7 @@ class Shell:
     ramp: float | None
     corners: str
     corner_tolerance: float | None
-    task: str
+    task: str | None
     start: str | None
     tool: str | None
     lock: list[str]
@@ -56,14 +56,19 @@ class Shell:
 
     def document(self, robot: str, warm_start: sm.Plan | None) -> dict[str, Any]:
         """Return the table."""
+        held = options.locks(self.lock)
+        # Loaded only where it decides what is meant.
+        planar = self.task is None and _is_planar(sm.load_robot(robot, self.tool, held))
+        task = self.task or ("planar" if planar else "pose")
+        normal = self.normal or ("z" if task.startswith("planar") else "x")
         table: dict[str, Any] = {
             "robot": {
                 "name" if robot in sm.NAMED_ARMS else "file": robot,
-                "lock": options.locks(self.lock),
+                "lock": held,
             },
-            "task": self.task,
+            "task": task,
             "start": self._start(warm_start),
-            "path": self._path(),
+            "path": self._path(normal),
             "null_motion": {"kind": "PolynomialNullMotion", "degree": self.degree},
             "costs": self._costs(),
             "constraints": self._constraints(),
@@ -85,7 +90,7 @@ class Shell:
         # Shapes are drawn from where the arm starts.
         return "dexterous" if warm_start is None else warm_start.trajectory.q[0].tolist()
 
-    def _path(self) -> dict[str, Any]:
+    def _path(self, normal: str) -> dict[str, Any]:
         if sum(option is not None for option in (self.path, self.circle, self.line)) != 1:
             raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
         if self.path is not None:
@@ -101,7 +106,7 @@ class Shell:
             raise sm.ProblemError("give the pace by one of --feed and --duration")
         pace = {"feed": self.feed} if self.feed is not None else {"duration": self.duration or 4.0}
         if self.circle is not None:
-            axis = [float(self.normal == name) for name in "xyz"]
+            axis = [float(normal == name) for name in "xyz"]
             return {"kind": "circle", "radius": self.circle, "normal": axis, **pace}
         by = options.numbers(self.line or "", "--line", 3).tolist()
         return {"kind": "line", "by": by, **pace}
@@ -128,6 +133,12 @@ class Shell:
             clearance = {"kind": "Clearance", "obstacles": bodies, "distance": self.clearance}
             found.append(clearance if self.srdf is None else {**clearance, "srdf": str(self.srdf)})
         return found
+
+
+def _is_planar(robot: sm.RobotModel) -> bool:
+    """Whether an arm moves its tool in the plane of x and y only."""
+    tasks = sm.Task
+    return robot.can_follow(tasks.PLANAR) and not robot.can_follow(tasks.POSITION)
 
 
 def read(

@@ -1,6 +1,5 @@
 """Options of the commands, and what their texts mean."""
 
-import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -31,9 +30,17 @@ PathOption = Annotated[
         "(s, m, rad; x_mm, roll_deg, …), .npy, or ROS Path and PoseArray as .yaml and .json."
     ),
 ]
-CircleOption = Annotated[float | None, typer.Option(help="Or a circle of this radius (m).")]
-LineOption = Annotated[str | None, typer.Option(help="Or a straight line by dx,dy,dz (m).")]
-NormalOption = Annotated[Axis, typer.Option(help="Axis of the circle.")]
+_FROM = "from the tool's pose at --start (by default a dexterous configuration)"
+CircleOption = Annotated[
+    float | None, typer.Option(help=f"Or a circle of this radius (m), {_FROM}.")
+]
+LineOption = Annotated[
+    str | None, typer.Option(help=f"Or a straight line by dx,dy,dz (m), {_FROM}.")
+]
+NormalOption = Annotated[
+    Axis | None,
+    typer.Option(help="Axis of the circle; x by default, of a planar arm that of its plane."),
+]
 DurationOption = Annotated[
     float | None,
     typer.Option(help="Of circle or line (s; 4 by default), or of poses without times."),
@@ -66,6 +73,10 @@ CornerToleranceOption = Annotated[
     typer.Option(help="Distance from rounded corners (m; 0.001 by default).", min=1e-6),
 ]
 TaskOption = Annotated[TaskName, typer.Option(help="What the path prescribes.")]
+PlannedTaskOption = Annotated[
+    TaskName | None,
+    typer.Option(help="What the path prescribes; pose by default, of a planar arm planar."),
+]
 RelaxOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -257,8 +268,13 @@ def pose(text: str, option: str) -> dict[str, Any]:
 
 def read_obstacles(file: Path) -> tuple[sm.Obstacle, ...]:
     """Return the obstacles of a file; see `obstacle_tables`."""
-    tables = obstacle_tables(file)
-    return tuple(formats.obstacle(item, lambda name: Path(name)) for item in tables)
+    found = []
+    for k, item in enumerate(obstacle_tables(file)):
+        try:
+            found.append(formats.obstacle(item, lambda name: Path(name)))
+        except sm.SelfmotionError as error:
+            raise sm.FileFormatError(f"{file}: [{k}]: {error}") from error
+    return tuple(found)
 
 
 def obstacle_tables(file: Path) -> list[dict[str, Any]]:
@@ -277,10 +293,5 @@ def obstacle_tables(file: Path) -> list[dict[str, Any]]:
 
 
 def _listed(file: Path) -> Any:
-    if file.suffix == ".toml":
-        return formats.read_document(file).get("obstacles")
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise sm.FileFormatError(f"{file}: cannot be read as JSON: {error}") from error
+    found = formats.read_values(file)
     return found.get("obstacles") if isinstance(found, dict) else found

@@ -206,6 +206,20 @@ def show_robots(robots: Mapping[str, RobotModel], console: Console) -> None:
     console.print(table)
 
 
+def robots_json(robots: Mapping[str, RobotModel]) -> dict[str, Any]:
+    """Return arms by name, as JSON-safe values."""
+    return {
+        name: {
+            "joints": list(robot.joint_names),
+            "tool": robot.tool,
+            "redundancy": {
+                task.value: robot.redundancy(task) for task in Task if robot.can_follow(task)
+            },
+        }
+        for name, robot in robots.items()
+    }
+
+
 def show_claims(claims: Sequence["Claim"], console: Console) -> None:
     """Print a row per claim of the paper: verdict, and the number that decides."""
     table = _table("the paper's claims")

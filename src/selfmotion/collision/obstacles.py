@@ -298,7 +298,7 @@ def _numbers(values: npt.ArrayLike) -> Array:
     """Return `values` as floats, or NaN where they are none, for one check to refuse."""
     try:
         return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         return np.array(np.nan)
 
 

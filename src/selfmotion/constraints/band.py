@@ -45,7 +45,8 @@ class Band(Constraint):
                 f"FrameCoordinate or SwivelAngle"
             )
         as_number(self.center, "band: center")
-        as_number(self.half, "band: half", above=0.0, most=0.5 * self.coordinate.period)
+        most = min(0.5 * self.coordinate.period, 1e100)
+        as_number(self.half, "band: half", above=0.0, most=most)
         as_number(self.margin, "band: margin", above=0.0, most=1.0)
 
     @classmethod
@@ -59,6 +60,11 @@ class Band(Constraint):
         if side not in _SIDES:
             raise ProblemError(
                 f"elbow: side is {shown(side)}, expected one of: {', '.join(_SIDES)}"
+            )
+        unknown = sorted(set(names) - {"shoulder", "elbow", "wrist"})
+        if unknown:
+            raise ProblemError(
+                f"elbow: unknown argument '{unknown[0]}', expected shoulder, elbow or wrist"
             )
         return cls(SwivelAngle(**names), _SIDES[side], half)
 

@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, as_flag, per_joint, read_only
+from selfmotion.basics import Array, ProblemError, as_flag, as_numbers, per_joint, read_only
 from selfmotion.certificate import QUANTITIES, ClosedMotion, EndState
 from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
 from selfmotion.costs import Samples
@@ -97,7 +97,8 @@ class _EndRate(Constraint):
 
     def target(self, robot: RobotModel) -> Array:
         """Return what is asked for of an arm, (n,) [rad or m, per s^order]."""
-        return per_joint(self.asked, robot.dof, f"{robot.name}: {self._name}")
+        what = f"{robot.name}: {self._name}"
+        return as_numbers(per_joint(self.asked, robot.dof, what), what)
 
     def on_part(self) -> Constraint | None:
         """See `Constraint.on_part`: a part begins as the whole, but ends elsewhere."""

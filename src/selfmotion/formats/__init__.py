@@ -2,7 +2,13 @@
 
 from typing import Any
 
-from selfmotion.formats.documents import in_si, read_document, write_document, write_text
+from selfmotion.formats.documents import (
+    in_si,
+    read_document,
+    read_values,
+    write_document,
+    write_text,
+)
 from selfmotion.formats.example import example_text
 from selfmotion.formats.joint_limits import read_joint_limits
 from selfmotion.formats.motions import FORMS, READABLE, SUFFIXES, read_motion, write_motion
@@ -34,6 +40,7 @@ __all__ = [
     "read_motion",
     "read_path",
     "read_problem",
+    "read_values",
     "set_key",
     "write_document",
     "write_job",

@@ -28,14 +28,27 @@ def read_document(file: Path) -> dict[str, Any]:
     FileFormatError
         The file is missing, is not of the kind that its suffix says, or holds no table.
     """
+    found = read_values(file)
+    if not isinstance(found, dict):
+        raise FileFormatError(f"{file}: holds a {type(found).__name__}, expected a table of keys")
+    return found
+
+
+def read_values(file: Path) -> Any:
+    """Read a table, or a list; see `read_document`."""
     try:
         found = _parse(file, file.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         raise FileFormatError(f"{file}: is not UTF-8 text: {error}") from error
-    if not isinstance(found, dict):
-        raise FileFormatError(f"{file}: holds a {type(found).__name__}, expected a table of keys")
+    level = [found]
+    for _ in range(_DEEPEST):
+        inner = [list(item.values()) if isinstance(item, dict) else item for item in level]
+        level = [value for item in inner if isinstance(item, list) for value in item]
+        level = [item for item in level if isinstance(item, dict | list)]
+    if level:
+        raise FileFormatError(f"{file}: more than {_DEEPEST} tables or lists lie in each other")
     return found
 
 
@@ -182,4 +195,7 @@ def _scaled(value: Any, factor: float, where: str) -> Any:
         return {key: _scaled(item, factor, where) for key, item in value.items()}
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise FileFormatError(f"{where}: is {value!r}, expected numbers")
-    return value * factor
+    try:
+        return value * factor
+    except OverflowError:
+        raise FileFormatError(f"{where}: is {value!r}, expected finite numbers") from None

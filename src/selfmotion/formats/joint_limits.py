@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError, as_path, nearest
+from selfmotion.basics import Array, FileFormatError, ProblemError, as_path, nearest, shown
 from selfmotion.constraints import (
     Constraint,
     JointAccelerationLimits,
@@ -22,6 +22,8 @@ from selfmotion.formats.documents import read_document
 from selfmotion.robot import RobotModel
 
 _JOINTS = "joint_limits"
+# What float64 can count with.
+_MOST = 1e100
 # has_NAME_limits → the keys that it announces.
 _KINDS: Mapping[str, tuple[str, ...]] = {
     "position": ("min_position", "max_position"),
@@ -73,6 +75,8 @@ def read_joint_limits(
         and the key are named.
     """
     path = as_path(file)
+    if not isinstance(robot, RobotModel):
+        raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel (load_robot)")
     document: Any = read_document(path)
     # As a parameter file of a node, it lies in tables of nothing else.
     while len(document) == 1 and _JOINTS not in document:
@@ -155,7 +159,7 @@ def _joint(file: Path, joint: str, values: Any) -> dict[str, float]:
 
 
 def _number(file: Path, where: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _MOST:
         raise FileFormatError(f"{file}: {where} is {value!r}, expected a finite number")
     return float(value)
 

@@ -54,7 +54,7 @@ def _checked(kind: type | tuple[type, ...], what: str, schema: dict[str, Any]) -
 
 def _is_sensible(value: float) -> bool:
     """Whether float64 can count with a number; infinity may mean that there is no limit."""
-    return not math.isnan(value) and (abs(value) < _HUGE or math.isinf(value))
+    return value == value and (abs(value) < _HUGE or value in (math.inf, -math.inf))
 
 
 def _are_numbers(value: Any) -> bool:

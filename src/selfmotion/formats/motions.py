@@ -12,6 +12,7 @@ from selfmotion.basics import (
     FileFormatError,
     ProblemError,
     as_path,
+    read_arrays,
     shown,
     write_atomically,
     write_csv,
@@ -140,20 +141,15 @@ def _write_urscript(
 
 
 def _read_npz(file: Path) -> Trajectory:
-    try:
-        with np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except (OSError, ValueError) as error:
-        raise FileFormatError(f"{file}: cannot be read: {error}") from error
-    return _of_tables(file, arrays)
+    return _of_tables(file, read_arrays(file))
 
 
 def _of_tables(file: Path, tables: Mapping[str, Any]) -> Trajectory:
     missing = [name for name in ("t", "q", "qd", "joint_names") if name not in tables]
     if missing:
         raise FileFormatError(f"{file}: '{missing[0]}' is missing, expected t, q, qd, joint_names")
-    names = tuple(map(str, tables["joint_names"]))
     try:
+        names = tuple(map(str, tables["joint_names"]))
         return Trajectory(tables["t"], tables["q"], tables["qd"], names, tables.get("qdd"))
     except (FileFormatError, TypeError, ValueError) as error:
         raise FileFormatError(f"{file}: {error}") from error

@@ -14,6 +14,7 @@ from selfmotion.basics import (
     as_choice,
     as_number,
     as_path,
+    read_arrays,
     read_rows,
 )
 from selfmotion.formats.documents import read_document
@@ -133,8 +134,10 @@ def read_path(
             return Feed(Polyline(rows.positions, turns, tolerance=tolerance), feed)
         bend = _BEND if corner_angle is None else corner_angle
         through = Waypoints(t, rows.positions, turns, corners=corners, corner_angle=bend)
+        through.samples([0.0])
         return through if feed is None else _at_feed(through, feed)
-    except PathError as error:
+    # Splines refuse times that differ, but by less than they can divide by.
+    except (PathError, ValueError) as error:
         raise FileFormatError(f"{path}: {error}") from error
 
 
@@ -196,11 +199,8 @@ def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, A
 
 
 def _read_array(file: FilePath) -> _Rows:
-    try:
-        array = np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise FileFormatError(f"{file}: cannot be read as a NumPy array: {error}") from error
-    if not (isinstance(array, np.ndarray) and np.issubdtype(array.dtype, np.number)):
+    (array,) = read_arrays(file).values()
+    if array.dtype.kind not in "iuf":
         raise FileFormatError(f"{file}: holds no array of numbers")
     places = [f"row {k}" for k in range(1, 1 + (len(array) if array.ndim else 0))]
     if array.ndim == 3 and array.shape[1:] == (4, 4):
@@ -237,7 +237,7 @@ def _ros_pose(file: FilePath, place: str, given: Any) -> list[float]:
         for key in keys:
             try:
                 found.append(float(pose[part][key]))
-            except (KeyError, TypeError, ValueError):
+            except (KeyError, OverflowError, TypeError, ValueError):
                 raise FileFormatError(
                     f"{file}: {place}: {part}.{key} is missing or no number"
                 ) from None
@@ -251,7 +251,7 @@ def _stamp(file: FilePath, place: str, given: Mapping[str, Any]) -> float | None
     try:
         stamp = header["stamp"]
         return int(stamp["sec"]) + 1e-9 * int(stamp["nanosec"])
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, OverflowError, TypeError, ValueError):
         raise FileFormatError(
             f"{file}: {place}: header.stamp is incomplete, expected sec and nanosec"
         ) from None

@@ -92,7 +92,7 @@ def numbers(value: Any, shape: tuple[int, ...], what: str) -> Array:
     size = " × ".join(map(str, shape))
     try:
         array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         raise ValueError(f"{what} is {value!r}, expected {size} numbers") from None
     if array.shape != shape or not np.all(np.abs(array) < _HUGE):
         raise ValueError(f"{what} is {value!r}, expected {size} finite numbers")

@@ -69,7 +69,7 @@ def trajectory(file: Path, document: Mapping[str, Any]) -> Trajectory:
             q.append([float(value) for value in point["positions"]])
             qd.append([float(value) for value in point["velocities"]])
             qdd.append([float(value) for value in point.get("accelerations", [])])
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, OverflowError, TypeError, ValueError) as error:
             raise FileFormatError(
                 f"{file}: points[{k}]: {error}; expected positions, velocities and "
                 f"time_from_start with sec and nanosec"

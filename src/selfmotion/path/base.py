@@ -66,6 +66,9 @@ class Path(Saved, ABC, family="path"):
 
     duration: float
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.duration:.6g} s)"
+
     @property
     def oriented(self) -> bool:
         """Whether orientations are prescribed, or stand there only because a pose has one."""

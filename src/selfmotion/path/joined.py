@@ -76,7 +76,8 @@ def with_leads(
     PathError
         A number is not above 0, the axis is zero, or the path does not rest at an end.
     """
-    check_path(path, "path")
+    check_path(path, "lead: path")
+    duration = as_number(duration, "lead: duration", above=0.0, error=PathError)
     length = as_number(length, "lead: length", above=0.0, error=PathError)
     away = check_vector(axis, "lead: axis")
     if not np.any(away):

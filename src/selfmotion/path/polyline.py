@@ -1,5 +1,6 @@
 """Straight legs with rounded corners."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -7,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, PathError, as_number, as_numbers, read_only
+from selfmotion.basics import Array, PathError, as_number, as_numbers, read_only, shown
 from selfmotion.path.base import Path, PathSamples, path_pose, rotvecs, unit
 
 # The pace of a polyline itself, to be replaced by `Feed`: [m/s], and [rad/s] where it only turns.
@@ -89,6 +90,8 @@ class Polyline(Path, kind="polyline"):
     @classmethod
     def from_poses(cls, poses: list[pin.SE3], **options: Any) -> "Polyline":
         """Return the path through `poses` (SE3 or (4, 4)); options as in the class."""
+        if not isinstance(poses, Sequence | np.ndarray):
+            raise PathError(f"polyline: poses is {shown(poses)}, expected a list of poses")
         frames = [path_pose(pose, f"polyline: poses[{k}]") for k, pose in enumerate(poses)]
         turns = [np.roll(pin.Quaternion(frame.rotation).coeffs(), 1) for frame in frames]
         return cls([frame.translation for frame in frames], turns, **options)

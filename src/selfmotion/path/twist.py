@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pinocchio as pin
 from numpy.polynomial import chebyshev
 
-from selfmotion.basics import Array, PathError, as_numbers, read_only, shown
+from selfmotion.basics import Array, PathError, as_numbers, shown
 from selfmotion.path.base import Path, PathSamples, check_duration, path_pose
 
 _DEGREE = 24
@@ -18,6 +18,8 @@ _TAIL = 1e-13
 _SHORTEST = 2.0**-12
 # What two pieces may differ by where they meet, relative to the largest velocity.
 _JUMP = 1e-9
+# A path that turns farther than this [rad] is not meant.
+_MOST_TURNED = 300.0
 
 
 class TwistPath(Path, kind="twist"):
@@ -65,9 +67,18 @@ class TwistPath(Path, kind="twist"):
 
     def _set(self, start: pin.SE3, breaks: npt.ArrayLike, coefficients: npt.ArrayLike) -> None:
         self._start = start
-        self._breaks = read_only(breaks)
-        self._coefficients = read_only(coefficients)
+        self._breaks = as_numbers(breaks, "twist path: breaks", error=PathError)
+        what = "twist path: coefficients"
+        self._coefficients = as_numbers(coefficients, what, error=PathError)
         self.duration = float(self._breaks[-1])
+        # |T_k| ≤ 1. A number that cannot be meant would be integrated for ever.
+        rates = np.abs(self._coefficients[:, :, 3:]).sum(axis=(1, 2))
+        angle = float(np.diff(self._breaks) @ rates)
+        if not angle <= _MOST_TURNED:
+            raise PathError(
+                f"twist path: turns by up to {angle:.3g} rad on its way, expected at most "
+                f"{_MOST_TURNED:g}; join shorter ones"
+            )
 
     @property
     def start(self) -> pin.SE3:

@@ -32,12 +32,7 @@ _LEAST_SAVING = 1e-6
 # After these there is nothing to go on from.
 _ADRIFT = (Status.UNBOUNDED, Status.GRADIENT)
 # After these the user has no more time to give.
-_CUT_SHORT = (
-    Status.INTERRUPTED,
-    Status.DEADLINE,
-    Status.STOPPED,
-    Status.MAX_EVALUATIONS,
-)
+_CUT_SHORT = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED, Status.MAX_EVALUATIONS)
 
 
 class Session:

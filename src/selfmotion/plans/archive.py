@@ -12,6 +12,7 @@ import numpy as np
 from selfmotion.basics import (
     Array,
     FileFormatError,
+    SelfmotionError,
     read_archive,
     restore,
     write_archive,
@@ -73,7 +74,10 @@ class Archive(NamedTuple):
             altered = f"{file.name} was changed after the plan was written: its digest differs"
         try:
             return _restore(description, arrays)._replace(altered=altered)
-        except (KeyError, TypeError, ValueError) as error:
+        except SelfmotionError as error:
+            raise FileFormatError(f"{file}: is a damaged plan: {error}") from error
+        # Any number or key of a damaged plan may be any other, and fail anywhere.
+        except Exception as error:
             raise FileFormatError(f"{file}: is no plan, or a damaged one: {error!r}") from error
 
 

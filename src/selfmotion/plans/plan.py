@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
-from selfmotion.basics import Array, CollisionError, PlanError, RobotError, as_path, write_csv
+from selfmotion.basics import (
+    Array,
+    CollisionError,
+    FileFormatError,
+    PlanError,
+    RobotError,
+    SelfmotionError,
+    as_path,
+    write_csv,
+)
 from selfmotion.certificate import Certificate, Requirement, Tolerance
 from selfmotion.collision import Obstacle
 from selfmotion.motion import Trajectory, column_names
@@ -176,6 +185,8 @@ def load_plan(file: str | FilePath) -> Plan:
     except (CollisionError, RobotError) as error:
         unknown = f"it could not be measured anew: {error}"
         certificate = replace(plan.certificate, failures=(unknown, *plan.certificate.failures))
+    except (SelfmotionError, ArithmeticError, ValueError) as error:
+        raise FileFormatError(f"{file}: is a damaged plan: {error}") from error
     if plan.robot.urdf.has_changed():
         note = f"{plan.robot.urdf.source} has changed since the plan was made"
         certificate = replace(certificate, notes=(*certificate.notes, note))

@@ -153,6 +153,9 @@ class Problem:
         for item in self.constraints:
             item.check_start(self.robot, self.path, self.task, self.given_start)
 
+    def __repr__(self) -> str:
+        return f"Problem({self.robot.name}, {self.path!r}, task '{self.task.value}')"
+
     @property
     def given_start(self) -> Array | None:
         """The start configuration (n,), or None where it is free."""
@@ -355,6 +358,8 @@ class Problem:
             )
 
 
+# What help() shows of a field that is a descriptor.
+Problem.__init__.__annotations__["task"] = Task | str
 _KINDS: dict[str, Any] = {
     "robot": RobotModel,
     "path": Path,

@@ -18,6 +18,8 @@ from selfmotion.robot.link_elements import check_link_elements
 
 # A limit that no motion reaches; Pinocchio wants finite numbers for a revolute joint.
 _UNLIMITED = 1e6
+# Elements in each other; URDFs have six.
+_DEEPEST = 100
 # Fixed joints that are ours: where the base stands, and how the tool is held.
 BASE_JOINT, TOOL_JOINT = MOUNTING_JOINTS = ("base_placement", "tool_offset")
 
@@ -165,7 +167,9 @@ def parse_urdf(
     _check_expanded(root, source)
     check_link_elements(root, source)
     check_joint_elements(root, source)
-    parsed = _parse_with_yourdfpy(text, source)
+    parsed = _parse_with_yourdfpy(ElementTree.tostring(root, encoding="unicode"), source)
+    if [joint.name for joint in parsed.joints] != [j.get("name") for j in root.findall("joint")]:
+        raise RobotError(f"{source}: is XML that parsers read differently; write it plainly")
     joints = {joint.name: joint for joint in map(_joint, parsed.joints)}
     _check_tree(parsed, source)
     _check_mimics(joints, source)
@@ -191,6 +195,11 @@ def _root(text: str, source: str) -> ElementTree.Element:
                 f"{source}: is a pointer of Git LFS, not the file itself; run git lfs pull"
             ) from error
         raise RobotError(f"{source}: is not well-formed XML: {error}") from error
+    level = [root]
+    for _ in range(_DEEPEST):
+        level = [child for element in level for child in element]
+    if level:
+        raise RobotError(f"{source}: more than {_DEEPEST} elements lie in each other")
     if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
         raise RobotError(f"{source}: is a xacro file; give it the suffix .xacro")
     if root.tag != "robot":
@@ -221,13 +230,14 @@ def _parse_with_yourdfpy(text: str, source: str) -> Any:
 
     import yourdfpy
 
-    logging.getLogger("yourdfpy").setLevel(logging.ERROR)
+    logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             return yourdfpy.URDF.load(
                 io.BytesIO(text.encode()), load_meshes=False, build_scene_graph=False
             ).robot
-    except (ValueError, TypeError, KeyError, AttributeError, IndexError) as error:
+    # It raises what its parsers do, of which there are several.
+    except Exception as error:
         raise RobotError(f"{source}: is not a valid URDF: {error}") from error
 
 

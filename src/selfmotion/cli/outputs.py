@@ -1,0 +1,65 @@
+"""The files that a plan is written to."""
+
+import tempfile
+from pathlib import Path
+
+from rich.console import Console
+
+import selfmotion as sm
+from selfmotion import formats
+
+
+def write(
+    result: sm.Plan, out: list[Path], html: Path | None, console: Console, *, quiet: bool = False
+) -> None:
+    """Write all files that can be written, and tell; the plan itself in any case.
+
+    Raises
+    ------
+    FileFormatError
+        A file could not be written; says where the plan is.
+    """
+    written, faults = list[Path](), list[str]()
+    for file in [*out, *([] if html is None else [html])]:
+        try:
+            _write_one(result, file, page=file is html)
+            written.append(file)
+        except sm.SelfmotionError as error:
+            faults.append(str(error))
+    if faults and not any(file.suffix == ".npz" for file in written):
+        rescued = Path(tempfile.mkdtemp(prefix="selfmotion-")) / "plan.npz"
+        result.save(rescued)
+        written.append(rescued)
+    for file in written:
+        if not quiet:
+            console.print(f"wrote {file}", markup=False, soft_wrap=True)
+    if faults:
+        kept = next(file for file in written if file.suffix == ".npz")
+        raise sm.FileFormatError(f"{'; '.join(faults)}; the plan is in {kept}")
+
+
+def _write_one(result: sm.Plan, file: Path, *, page: bool) -> None:
+    if page or file.suffix == ".html":
+        _replay(result, file)
+    elif file.suffix == ".csv":
+        result.to_csv(file)
+    elif file.suffix == ".npz":
+        result.save(file)
+    else:
+        sm.write_motion(result, file)
+
+
+def _replay(result: sm.Plan, file: Path) -> None:
+    from selfmotion.replay import write_replay
+
+    write_replay(result, file)
+
+
+def check_suffixes(files: list[Path]) -> None:
+    """Raise FileFormatError for a file that --out cannot write."""
+    for file in files:
+        if file.suffix not in (".npz", ".html", *formats.SUFFIXES):
+            known = ", ".join(formats.SUFFIXES)
+            raise sm.FileFormatError(
+                f"{file}: --out writes .npz (the plan), .html (its replay) or its motion ({known})"
+            )

@@ -1,0 +1,34 @@
+"""What messages of the library advise, in the words of the shell."""
+
+import re
+
+# As the library says it → as the shell does, in this order.
+_WORDS = (
+    (r"take robot\.inverse_kinematics\(.*?\), task, seed=start\)", "give another --start"),
+    (r"\b(task|corners)='(\w+)'", r"--\1 \2"),
+    (r"\(?\brelaxations=\)?", "with --relax"),
+    (r"\b(tool|lock|start|acceleration|velocity|duration|feed)=(?=[\s;,.)]|$)", r"--\1"),
+    (r"give a larger jump", "give a larger --jump"),
+    (r"either a feed \[m/s\] or a duration \[s\]", "either --feed (m/s) or --duration (s)"),
+    (
+        r"so that (feed|duration) has no effect; drop one",
+        r"so that --\1 has no effect; drop it",
+    ),
+    (r"which needs a feed \[m/s\]; give it", "which needs --feed (m/s)"),
+    (r"choose another task \('planar' for", "choose another --task (planar for"),
+    (
+        r"choose a task with fewer rows \('pointing', 'position'\)",
+        "take --task pointing or position",
+    ),
+)
+# Such a message is about a key of the file, and advises what can be written there.
+_OF_PROBLEM_FILE = re.compile(r"^\S+\.(toml|json): ")
+
+
+def in_shell(message: str) -> str:
+    """Return a message with the names of options for those of arguments."""
+    if _OF_PROBLEM_FILE.match(message):
+        return message
+    for words, option in _WORDS:
+        message = re.sub(words, option, message)
+    return message

@@ -1,0 +1,410 @@
+"""Files that were right once: good ones of each kind, and what becomes of them on the way."""
+
+import io
+import json
+import re
+import tempfile
+import zipfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import selfmotion as sm
+from selfmotion.cli.options import read_obstacles
+
+# Numbers that no file means, and tokens that stand where numbers should.
+_ODD = (
+    *("nan", "inf", "-inf", "1e309", "-1e308", "1e300", "1e-320", "0", "-1", "-0.0", "1e19"),
+    *("9" * 400, "9" * 5000, "0x10", "1_000", "1,5", "", "null", "true", "~", "[]", "{}", '""'),
+    *("1j", "٣", "${x}", "*a", "- -", "2001-01-01", "0o7", "!!python/name:os.system", "<a/>"),
+)
+_TOKEN = re.compile(rb"[A-Za-z_]\w*|-?\d+\.?\d*(?:e-?\d+)?|[^\s\w]")
+_NUMBER = re.compile(rb"-?\d+\.?\d*(?:e-?\d+)?")
+_ENTITIES = (
+    b'<!DOCTYPE robot [<!ENTITY a "'
+    + b"a" * 1000
+    + b'">'
+    + b"".join(b'<!ENTITY %c "%s">' % (98 + k, b"&%c;" % (97 + k) * 50) for k in range(8))
+    + b"]>"
+)
+_ANCHORS = b"a: &a [x,x,x,x,x,x,x,x,x]\n" + b"".join(
+    b"%c: &%c [%s]\n" % (98 + k, 98 + k, b",".join([b"*%c" % (97 + k)] * 9)) for k in range(9)
+)
+_DEEP = (b"[" * 20000, b'{"a":' * 20000, b"<a>" * 20000, b"- " * 5000, b"a.b" * 5000, b"(" * 5000)
+_DEEP = (*_DEEP, b"<a>" * 3000 + b"</a>" * 3000, b"[" * 200 + b"]" * 200)
+
+
+class Good(NamedTuple):
+    """A file that can be read.
+
+    Attributes
+    ----------
+    kind : str
+        What it is of, as the counts call it.
+    suffix : str
+    content : bytes
+    read : callable
+        Reads such a file.
+    """
+
+    kind: str
+    suffix: str
+    content: bytes
+    read: Callable[[Path], object]
+
+
+@cache
+def good_files() -> tuple[Good, ...]:
+    """Return files of all kinds, the same whenever they are made."""
+    arm = sm.load_robot("planar_3r")
+    problem = sm.sample_problem()
+    plan = sm.plan(problem, max_evaluations=2)
+    found = [
+        Good("URDF", ".urdf", arm.urdf.bare_text().encode(), sm.load_robot),
+        Good("URDF", ".urdf", _URDF, sm.load_robot),
+        *(Good("path", suffix, content, _path) for suffix, content in _paths()),
+        Good("SRDF", ".srdf", _SRDF, lambda file: sm.Clearance(srdf=file)),
+        Good("obstacles", ".json", json.dumps(_OBSTACLES, indent=1).encode(), read_obstacles),
+        Good("obstacles", ".toml", _OBSTACLES_TOML, read_obstacles),
+        Good("limits", ".yaml", _LIMITS, lambda file: sm.read_joint_limits(file, arm)),
+    ]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for suffix in (".csv", ".npz", ".json", ".yaml"):
+            sm.write_motion(plan, folder / f"motion{suffix}", rate=10.0)
+            content = (folder / f"motion{suffix}").read_bytes()
+            found.append(Good("motion", suffix, content, sm.read_motion))
+        for suffix in (".toml", ".json"):
+            sm.write_problem(problem, folder / f"problem{suffix}")
+            content = (folder / f"problem{suffix}").read_bytes()
+            found.append(Good("problem", suffix, content, sm.read_problem))
+        found.append(Good("problem", ".toml", _PROBLEM, sm.read_problem))
+        plan.save(folder / "plan.npz")
+        content = (folder / "plan.npz").read_bytes()
+        found += [Good("plan", ".npz", content, sm.load_plan)] * 2
+    return tuple(found)
+
+
+def mutated(good: Good, rng: np.random.Generator) -> bytes:
+    """Return the content of a file, changed in one to three ways."""
+    content = good.content
+    packed = good.suffix in (".npz", ".npy")
+    if good.suffix == ".npz" and rng.random() < 0.75:
+        return _repacked(content, rng)
+    if good.suffix == ".npy" and rng.random() < 0.5:
+        return _announced(content, rng)
+    for _ in range(int(rng.integers(1, 4))):
+        ways = _BYTES if packed else (*_BYTES, *_TEXT)
+        content = ways[int(rng.integers(len(ways)))](content, rng)
+    return content
+
+
+def _flip(content: bytes, rng: np.random.Generator) -> bytes:
+    changed = bytearray(content)
+    for _ in range(int(rng.integers(1, 9)) if changed else 0):
+        changed[int(rng.integers(len(changed)))] = int(rng.integers(256))
+    return bytes(changed)
+
+
+def _cut(content: bytes, rng: np.random.Generator) -> bytes:
+    return content[: int(rng.integers(len(content) + 1))]
+
+
+def _hole(content: bytes, rng: np.random.Generator) -> bytes:
+    first, last = np.sort(rng.integers(len(content) + 1, size=2))
+    return content[:first] + content[last:]
+
+
+def _nul(content: bytes, rng: np.random.Generator) -> bytes:
+    return _put(content, b"\0" * int(rng.integers(1, 9)), rng)
+
+
+def _encoded(content: bytes, rng: np.random.Generator) -> bytes:
+    text = content.decode("utf-8", "replace")
+    text = text.replace("a", "ä", 1)
+    name = ("utf-16", "utf-8-sig", "latin-1", "utf-32", "utf-7")[int(rng.integers(5))]
+    return text.encode(name, "replace")
+
+
+def _put(content: bytes, inserted: bytes, rng: np.random.Generator) -> bytes:
+    at = int(rng.integers(len(content) + 1))
+    return content[:at] + inserted + content[at:]
+
+
+def _lines(content: bytes, rng: np.random.Generator) -> bytes:
+    """Delete, double or swap lines."""
+    lines = content.split(b"\n")
+    first, second = (int(k) for k in rng.integers(len(lines), size=2))
+    match int(rng.integers(4)):
+        case 0:
+            del lines[first]
+        case 1:
+            lines.insert(second, lines[first])
+        case 2:
+            lines[first], lines[second] = lines[second], lines[first]
+        case 3:
+            lines[first:first] = [lines[first]] * int(rng.integers(2, 200))
+    return b"\n".join(lines)
+
+
+def _tokens(content: bytes, rng: np.random.Generator) -> bytes:
+    """Put another of its tokens where one was."""
+    found = list(_TOKEN.finditer(content[:100_000]))
+    if not found:
+        return content
+    at, other = (found[int(k)] for k in rng.integers(len(found), size=2))
+    return content[: at.start()] + other.group() + content[at.end() :]
+
+
+def _number(content: bytes, rng: np.random.Generator) -> bytes:
+    found = list(_NUMBER.finditer(content[:100_000]))
+    if not found:
+        return content
+    at = found[int(rng.integers(len(found)))]
+    odd = _ODD[int(rng.integers(len(_ODD)))].encode()
+    return content[: at.start()] + odd + content[at.end() :]
+
+
+def _long(content: bytes, rng: np.random.Generator) -> bytes:
+    return _put(content, b"x" * int(rng.integers(1000, 200_000)), rng)
+
+
+def _deep(content: bytes, rng: np.random.Generator) -> bytes:
+    nested = _DEEP[int(rng.integers(len(_DEEP)))]
+    found = list(_NUMBER.finditer(content[:100_000]))
+    if not found or rng.random() < 0.3:
+        return _put(content, nested, rng)
+    at = found[int(rng.integers(len(found)))]
+    return content[: at.start()] + nested + content[at.end() :]
+
+
+def _bomb(content: bytes, rng: np.random.Generator) -> bytes:
+    """Let few characters stand for very many."""
+    if b"<robot" in content:
+        text = content[content.index(b"<robot") :]
+        found = list(re.finditer(rb'="[^"]*"|>\s*<', text))
+        at = found[int(rng.integers(len(found)))] if found else None
+        if at is None:
+            return content
+        name = b"&%c;" % int(rng.integers(97, 106))
+        inner = b'="' + name + b'"' if at.group()[:1] == b"=" else b">" + name + b"<"
+        return _ENTITIES + text[: at.start()] + inner + text[at.end() :]
+    return _ANCHORS + content
+
+
+_BYTES = (_flip, _cut, _hole, _nul)
+_TEXT = (_encoded, _lines, _lines, _tokens, _tokens, _tokens, _number, _number, _number)
+_TEXT = (*_TEXT, _long, _deep, _bomb)
+
+
+def _repacked(content: bytes, rng: np.random.Generator) -> bytes:
+    """Change a member of an archive, so that the archive itself is sound."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    names = list(members)
+    name, other = (names[int(k)] for k in rng.integers(len(names), size=2))
+    match int(rng.integers(7)):
+        case 0:
+            del members[name]
+        case 1:
+            members[name], members[other] = members[other], members[name]
+        case 2:
+            members[name] = _announced(members[name], rng)
+        case 3:
+            members[name] = _flip(members[name], rng)
+        case 4:
+            return _zip_bomb(name)
+        case _:
+            name = "description.npy" if "description.npy" in members else name
+            members[name] = _described(members[name], rng)
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for member, values in members.items():
+            archive.writestr(member, values)
+    return out.getvalue()
+
+
+def _described(member: bytes, rng: np.random.Generator) -> bytes:
+    """Change the text that an array of bytes holds, or numbers of one that holds numbers."""
+    array = np.load(io.BytesIO(member))
+    if array.dtype == np.uint8:
+        text = array.tobytes()
+        for _ in range(int(rng.integers(1, 3))):
+            text = (_tokens, _number, _number, _deep)[int(rng.integers(4))](text, rng)
+        array = np.frombuffer(text, np.uint8)
+    elif array.size and array.dtype.kind == "f":
+        array = array.copy()
+        array.flat[int(rng.integers(array.size))] = rng.choice([np.nan, np.inf, 1e300, -1.0])
+    else:
+        array = array[: int(rng.integers(len(array) + 1))] if array.ndim else array
+    out = io.BytesIO()
+    np.save(out, array)
+    return out.getvalue()
+
+
+_SHAPES = ("(1000000000,)", "(9000000000000000000, 9)", "(-1,)", "()", "(0, 0)", "(3, 1, 1, 1)")
+_TYPES = ("|O", "<f2", "<c16", "<U1000000", "<M8[s]", "|V0", "<f16", ">f8", "<i8", "|b1")
+
+
+def _announced(member: bytes, rng: np.random.Generator) -> bytes:
+    """Let the head of an array announce another shape or type than its body has."""
+    shape = _SHAPES[int(rng.integers(len(_SHAPES)))].encode()
+    kind = _TYPES[int(rng.integers(len(_TYPES)))].encode()
+    if rng.random() < 0.5:
+        head = re.sub(rb"'shape': \([^)]*\)", b"'shape': " + shape, member[10:])
+    else:
+        head = re.sub(rb"'descr': '[^']*'", b"'descr': '" + kind + b"'", member[10:])
+    before = member[10:].index(b"\n") + 1
+    after = head.index(b"\n") + 1
+    return member[:8] + after.to_bytes(2, "little") + head if before else member
+
+
+@cache
+def _zip_bomb(name: str) -> bytes:
+    """Return an archive of a megabyte whose one member has a gigabyte."""
+    out, chunk = io.BytesIO(), b"\0" * (1 << 24)
+    head = {"descr": "<f8", "fortran_order": False, "shape": (8 * len(chunk),)}
+    with (
+        zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
+        archive.open(name, "w", force_zip64=True) as member,
+    ):
+        np.lib.format.write_array_header_1_0(member, head)
+        for _ in range(64):
+            member.write(chunk)
+    return out.getvalue()
+
+
+def _path(file: Path) -> object:
+    """Read a path, and draw it: what is wrong with it must be said before it is followed."""
+    try:
+        path = sm.read_path(file)
+    except sm.FileFormatError as error:
+        if "has no times" not in str(error):
+            raise
+        path = sm.read_path(file, feed=0.1)
+    return path.samples([0.0, 0.5 * path.duration, path.duration])
+
+
+def _paths() -> list[tuple[str, bytes]]:
+    """Return paths of all kinds of files."""
+    t = np.linspace(0.0, 2.0, 9)
+    table = np.stack([t, 0.1 * t, 0.05 * np.sin(t), 0.0 * t], axis=1)
+    turned = np.hstack([table, np.tile([1.0, 0.0, 0.0, 0.0], (len(t), 1))])
+    rows = [",".join(f"{value:.6g}" for value in row) for row in turned.tolist()]
+    found = [(".csv", "\n".join(["t,x,y,z,qw,qx,qy,qz", *rows, ""]).encode())]
+    rows = [";".join(f"{1e3 * v:.6g}" for v in row[1:]) + ";0;0;90" for row in table.tolist()]
+    head = "x_mm;y_mm;z_mm;roll_deg;pitch_deg;yaw_deg"
+    found.append((".csv", "\n".join(["# seam", head, *rows, ""]).encode()))
+    poses = [
+        {
+            "header": {"stamp": {"sec": int(row[0]), "nanosec": int(1e9 * (row[0] % 1.0))}},
+            "pose": {
+                "position": dict(zip("xyz", row[1:], strict=True)),
+                "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+            },
+        }
+        for row in table.tolist()
+    ]
+    import yaml
+
+    found.append((".yaml", yaml.safe_dump({"poses": poses}).encode()))
+    bare = [pose["pose"] for pose in poses]
+    found.append((".json", json.dumps({"header": {}, "poses": bare}, indent=1).encode()))
+    for array in (turned, table[:, 1:], np.tile(np.eye(4), (3, 1, 1)) + 0.0):
+        if array.ndim == 3:
+            array[:, 0, 3] = [0.0, 0.1, 0.2]
+        out = io.BytesIO()
+        np.save(out, array)
+        found.append((".npy", out.getvalue()))
+    return found
+
+
+_SRDF = b"""<?xml version="1.0"?>
+<robot name="arm">
+  <group name="arm"><chain base_link="base" tip_link="tool"/></group>
+  <disable_collisions link1="base" link2="link1" reason="Adjacent"/>
+  <disable_collisions link1="link1" link2="link2" reason="Never"/>
+</robot>
+"""
+_LIMITS = b"""default_velocity_scaling_factor: 0.5
+default_acceleration_scaling_factor: 0.5
+joint_limits:
+  joint1:
+    has_position_limits: true
+    min_position: -2.0
+    max_position: 2.0
+    has_velocity_limits: true
+    max_velocity: 1.5
+  joint2:
+    has_acceleration_limits: true
+    max_acceleration: 4.0
+    has_jerk_limits: false
+"""
+_OBSTACLES = [
+    {"shape": "box", "name": "post", "position": [1, 0, 0], "size": [0.1, 0.1, 1.2]},
+    {"shape": "sphere", "name": "ball", "position_mm": [10, 20, 30], "radius_mm": 50},
+    {"shape": "cylinder", "name": "can", "position": [0, 1, 0], "rpy": [0, 0, 1],
+     "radius": 0.1, "length": 0.3},
+]  # fmt: skip
+_OBSTACLES_TOML = b"""[[obstacles]]
+shape = "capsule"
+name = "rail"
+position = [1.0, 0.0, 0.2]
+rpy_deg = [0, 90, 0]
+radius = 0.05
+length_mm = 500
+"""
+_PROBLEM = b"""task = "planar"
+start = "dexterous"
+rest = true
+max_evaluations = 20
+
+[robot]
+name = "planar_3r"
+lock = { }
+
+[robot.base]
+position_mm = [0, 0, 100]
+rpy_deg = [0, 0, 90]
+
+[path]
+kind = "circle"
+radius = 0.1
+normal = [0, 0, 1]
+duration = 4
+
+[[costs]]
+kind = "JointVelocity"
+
+[[costs]]
+kind = "InverseManipulability"
+mu = 0.01
+
+[[constraints]]
+kind = "JointPositionLimits"
+margin_deg = 5
+
+[search]
+starts = 4
+"""
+_LINK = """<link name="link{k}"><inertial><origin xyz="0 0 0.1" rpy="0 0 0"/><mass value="1.5"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><origin xyz="0 0 0.1"/><geometry><cylinder radius="0.05" length="0.2"/></geometry>
+</collision></link>
+<joint name="joint{k}" type="{kind}"><origin xyz="0 0 0.2" rpy="0 0.1 0"/><parent link="{parent}"/>
+<child link="link{k}"/><axis xyz="0 {k} 1"/><limit lower="-2" upper="2" velocity="2" effort="50"/>
+<dynamics damping="0.1" friction="0"/></joint>
+"""
+_URDF = (
+    '<?xml version="1.0"?>\n<robot name="arm">\n<link name="base"/>\n'
+    + "".join(
+        _LINK.format(k=k, kind=kind, parent="base" if k == 1 else f"link{k - 1}")
+        for k, kind in enumerate(("revolute", "continuous", "prismatic", "revolute"), 1)
+    )
+    + '<link name="finger"><visual><geometry><mesh filename="finger.stl" scale="1 1 1"/></geometry>'
+    '</visual></link>\n<joint name="grip" type="fixed"><parent link="link4"/>'
+    '<child link="finger"/></joint>\n</robot>\n'
+).encode()

@@ -1,0 +1,52 @@
+"""Machine code on disk that is damaged, or cannot be written, costs time and nothing else."""
+
+import errno
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+SOURCE = """
+from selfmotion.basics.jit import kernel
+
+@kernel
+def twice(x):
+    return 2.0 * x
+"""
+
+
+def loaded(folder: Path) -> Any:
+    """Return a module with a kernel of its own, whose cache is beside it."""
+    file = folder / "kernels_of_a_test.py"
+    if not file.is_file():
+        file.write_text(SOURCE)
+    spec = importlib.util.spec_from_file_location("kernels_of_a_test", file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
+@pytest.mark.parametrize("content", [b"", b"garbled", b"half"])
+def test_a_damaged_cache_heals(suffix: str, content: bytes, tmp_path: Path) -> None:
+    assert loaded(tmp_path).twice(1.5) == 3.0
+    damaged = [file for file in tmp_path.rglob("*") if file.suffix == suffix]
+    assert damaged
+    for file in damaged:
+        whole = file.read_bytes()
+        file.write_bytes(whole[: len(whole) // 2] if content == b"half" else content)
+    assert loaded(tmp_path).twice(2.5) == 5.0
+    healed = loaded(tmp_path)
+    assert healed.twice(3.5) == 7.0
+    assert sum(healed.twice.stats.cache_hits.values()) == 1
+
+
+def test_a_full_disk_ends_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = loaded(tmp_path)
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(module.twice._cache._cache_file, "save", full)
+    assert module.twice(1.5) == 3.0
