@@ -22,11 +22,9 @@ from selfmotion.realtime.viable import tightened
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
-# The pose feedback between two steps [1/s].
-_GAIN = 20.0
-# A motion that breaks down within this time [s] is not followed: the arm can stop in less. A command
-# that is this far from the arm [rad or m] is not what the arm does.
-_SOON, _FARTHEST = 0.5, 0.5
+# The pose feedback between two steps [1/s]. A motion that breaks down within this time [s] is not
+# followed: the arm can stop in less. A command so far from the arm [rad or m] is not what it does.
+_GAIN, _SOON, _FARTHEST = 20.0, 0.5, 0.5
 
 
 class Replanner:
