@@ -10,7 +10,7 @@ demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, in
 	$(BIN)/selfmotion demo --out out
 
 test: $(READY)  ## the whole test run, on two cores
-	$(BIN)/pytest --numprocesses 2 --dist loadfile
+	$(BIN)/pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
 
 lint: $(READY)  ## style, types and layers
 	$(BIN)/ruff check .

@@ -32,6 +32,9 @@ CASES = [
     ("z1", "position"),
 ]
 
+# Files that take longest, each by itself.
+LONGEST = {"test_site", "test_readme", "test_study", "test_acceptance", "test_realtime"}
+
 _robots: dict[str, sm.RobotModel] = {}
 
 
@@ -120,3 +123,8 @@ def central_difference(function: Callable[[Array], float], x: Array, step: float
         shift[i] = step
         gradient[i] = (function(x + shift) - function(x - shift)) / (2.0 * step)
     return gradient
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the files that take longest, so that no worker is left alone with one."""
+    items.sort(key=lambda item: item.path.stem not in LONGEST)

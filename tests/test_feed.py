@@ -212,6 +212,6 @@ def test_files_at_a_feed(tmp_path) -> None:
         np.testing.assert_allclose(speeds, 0.05, rtol=WITHIN)
         t[corners] = path.duration
     assert t["round"] < t["stop"]
-    assert "corners are 'round', which needs a feed" in complaint(
+    assert "corners are 'round', which needs --feed" in complaint(
         "plan", "panda", "--path", file, "--duration", "4", "--corners", "round"
     )

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import selfmotion as sm
-from selfmotion import replay, testing
+from selfmotion import realtime, replay, testing
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = sorted(file.stem for file in (ROOT / "examples").glob("*.py"))
@@ -88,6 +88,8 @@ def test_every_public_name_is_on_one_page_of_the_api(site: Path) -> None:
     wanted = [f"selfmotion.{name}" for name in sm.__all__]
     wanted += [f"selfmotion.testing.{name}" for name in testing.__all__]
     wanted += [f"selfmotion.replay.{name}" for name in replay.__all__]
+    own = set(realtime.__all__) - set(sm.__all__)
+    wanted += [f"selfmotion.realtime.{name}" for name in own]
     assert sorted(listed) == sorted(wanted)
     shown = "\n".join(page.read_text() for page in (site / "api").glob("*.html"))
     for name in sm.__all__:
