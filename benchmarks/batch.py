@@ -1,11 +1,19 @@
-"""How much faster two processes plan than one, and what a batch costs besides planning."""
+"""How much faster two processes plan than one, and what a batch costs besides planning.
+
+Before that: whether one process, two, and a Dask cluster of two workers, one of which is killed in
+between, give the same motions to the last bit, each of them once.
+"""
 
 import argparse
 import multiprocessing
+import os
 import resource
+import signal
 import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
 
 import selfmotion as sm
 
@@ -18,6 +26,36 @@ def problems(count):
     return [
         sm.Problem(panda, sm.Circle.around(pose, 0.1, 4.0 + k / count), start=start)
         for k in range(count)
+    ]
+
+
+def identical(count):
+    """Return how many motions of two processes and of a cluster differ from those of one."""
+    import distributed
+
+    given, killed = problems(count), []
+    with tempfile.TemporaryDirectory() as out:
+        one = sm.plan_many(given, out=f"{out}/one", workers=1)
+        two = sm.plan_many(given, out=f"{out}/two", workers=2)
+        cluster = distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None,
+            silence_logs=50, local_directory=f"{out}/dask",
+        )  # fmt: skip
+        with cluster, distributed.Client(cluster) as client:
+            pids = list(client.run(os.getpid).values())
+
+            def kill_one(found):
+                if found.done >= count // 2 and not killed:
+                    killed.append(pids[0])
+                    os.kill(pids[0], signal.SIGKILL)
+
+            dask = sm.plan_many(given, client.get_executor(), out=f"{out}/dask", progress=kill_one)
+        assert killed
+        motions = [[row.plan().trajectory for row in batch.rows] for batch in (one, two, dask)]
+    assert all(len(each) == count for each in motions)
+    return [
+        sum(not np.array_equal(a.q, b.q) for a, b in zip(motions[0], other, strict=True))
+        for other in motions[1:]
     ]
 
 
@@ -76,7 +114,15 @@ def possible(count):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=150)
-    count = parser.parse_args().count
+    parser.add_argument("--same", type=int, default=200, help="plans compared, 0 for none")
+    given = parser.parse_args()
+    count = given.count
+    if given.same:
+        two, cluster = identical(given.same)
+        print(
+            f"of {given.same} motions {two} differ between one and two processes, {cluster} "
+            f"between one and a cluster of two, one of which was killed"
+        )
     timed(8, 1)  # compiles, where nothing has
     one, overhead, own, alone, begin = timed(count, 1)
     two, _, _, together, _ = timed(count, 2)

@@ -39,9 +39,7 @@ class Part:
 
 
 constraints = [
-    sm.JointPositionLimits(),
-    sm.JointVelocityLimits(),
-    sm.JointAccelerationLimits(),
+    *(sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits()),
     sm.Clearance([sm.Sphere("ball", BALL, 0.06)], distance=0.005),
 ]
 # Plans anew every 10 ms, from where the arm is.
@@ -53,9 +51,8 @@ record = realtime.track(replanner, arm, Part(), 8.0)
 took = 1e3 * np.quantile(record.seconds, [0.5, 0.99])
 before = record.error[(record.t > 1.0) & (record.t < 3.8), 0].max()
 print(f"{len(record.t)} steps; half of them took {took[0]:.2f} ms or less, 99 % {took[1]:.2f} ms")
-print(
-    f"tool error: {1e3 * before:.3f} mm before the push, {1e3 * record.error[-1, 0]:.3f} at the end"
-)
+end = record.error[-1, 0]
+print(f"tool error: {1e3 * before:.3f} mm before the push, {1e3 * end:.3f} mm at the end")
 print(f"segments: {dict(record.flags)}")
 
 shown = record.as_plan(replanner, constraints=[constraints[0], constraints[3]])

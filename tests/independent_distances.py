@@ -175,9 +175,9 @@ class Trial:
     def made(cls, robot: RobotModel, rng: np.random.Generator, each: int) -> "Trial":
         """Return `each` bodies of every kind that move, and as many that do not."""
         shapes = [[random_body(kind, rng) for kind in KINDS for _ in range(each)] for _ in range(2)]
-        places = [pin.SE3(pin.SE3.Random()) for _ in shapes[1]]
-        for place in places:
-            place.translation = rng.uniform(-0.3, 0.3, 3)
+        places = [
+            pin.SE3(pin.exp3(rng.normal(size=3)), rng.uniform(-0.3, 0.3, 3)) for _ in shapes[1]
+        ]
         bodies = [body("moving", 6, pin.SE3.Identity(), shape) for shape in shapes[0]]
         bodies += [
             body("still", 0, place, shape) for place, shape in zip(places, shapes[1], strict=True)

@@ -164,7 +164,7 @@ def test_code_of_the_user_is_loaded_only_where_allowed(tmp_path: Path) -> None:
         return 1.0 - np.cos(q[:, 3])
 
     @dataclass(frozen=True)
-    class Elbow(sm.Cost):
+    class BendOfATest(sm.Cost):
         mu: float = 1.0
         name: str = "elbow class"
         def value(self, samples):
@@ -175,7 +175,7 @@ def test_code_of_the_user_is_loaded_only_where_allowed(tmp_path: Path) -> None:
             return sm.Partials(q=by_q)
     """
     written(tmp_path, "\n".join(line[4:] for line in code.splitlines()), "own_costs_of_a_test.py")
-    own = CELL.replace('"InverseManipulability"\nmu', '"own_costs_of_a_test:Elbow"\nmu')
+    own = CELL.replace('"InverseManipulability"\nmu', '"own_costs_of_a_test:BendOfATest"\nmu')
     own += '\n[[costs]]\nkind = "own_costs_of_a_test:elbow"\nname = "elbow function"\n'
     file = written(tmp_path, own)
     with pytest.raises(sm.FileFormatError, match=r"costs\[1\]\.kind.*--allow-code"):
