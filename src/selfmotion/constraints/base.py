@@ -144,3 +144,9 @@ def motion_of_order(samples: Samples, order: int) -> Array:
     table = (samples.q, samples.qd)[order] if order < 2 else (samples.qdd, samples.qddd)[order - 2]
     nodes: Array = table[samples.nodes]
     return nodes
+
+
+def motion_at_nodes(samples: Samples) -> tuple[Array, Array, Array]:
+    """Return q, q̇ and q̈ at the nodes, (N + 1, n) each."""
+    q, qd, qdd = (motion_of_order(samples, order) for order in range(3))
+    return q, qd, qdd

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, as_number
 from selfmotion.certificate import TOOL_RATES, ToolMotion, tool_sizes
-from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
+from selfmotion.constraints.base import Constraint, NodeTangents, motion_at_nodes
 from selfmotion.costs import Samples
 from selfmotion.robot import RobotModel, ToolRates
 from selfmotion.task import Task
@@ -91,12 +91,12 @@ class BoundToolLimits:
 
     def residual(self, samples: Samples) -> Array:
         """See `BoundConstraint.residual`."""
-        shares = tool_sizes(self.rates, *self._motion(samples)) / self.limit**2
+        shares = tool_sizes(self.rates, *motion_at_nodes(samples)) / self.limit**2
         return np.asarray(shares[:, self._limited] - (1.0 - self.margin) ** 2)
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
-        state = self._motion(samples)
+        state = motion_at_nodes(samples)
         values, changes = self.rates(*state), self.rates.derivatives(*state)
         found = []
         for value, by in zip(values, changes, strict=True):
@@ -117,14 +117,10 @@ class BoundToolLimits:
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""
         which = int(self._limited[column])
-        state = (part[row : row + 1] for part in self._motion(samples))
+        state = (part[row : row + 1] for part in motion_at_nodes(samples))
         reached = tool_sizes(self.rates, *state)[0, which] ** 0.5
         name, unit = TOOL_RATES[which]
         return (
             f"the tool '{self.tool}' has a {name} of {reached:.4g} {unit} at t = "
             f"{samples.sampling.node_times[row]:.3f} s, limit {self.limit[which]:.4g}"
         )
-
-    def _motion(self, samples: Samples) -> tuple[Array, Array, Array]:
-        q, qd, qdd = (motion_of_order(samples, order) for order in range(3))
-        return q, qd, qdd

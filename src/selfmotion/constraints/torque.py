@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, per_joint
 from selfmotion.certificate import JointTorques
-from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
+from selfmotion.constraints.base import Constraint, NodeTangents, motion_at_nodes
 from selfmotion.costs import Samples
 from selfmotion.robot import Dynamics, RobotModel
 from selfmotion.task import Task
@@ -82,12 +82,12 @@ class BoundTorques:
 
     def residual(self, samples: Samples) -> Array:
         """See `BoundConstraint.residual`."""
-        used = self.dynamics.torques(*self._motion(samples))[:, self.joints] / self.limit
+        used = self.dynamics.torques(*motion_at_nodes(samples))[:, self.joints] / self.limit
         return np.hstack([used, -used]) - 1.0 + self.margin
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
-        changes = self.dynamics.derivatives(*self._motion(samples))
+        changes = self.dynamics.derivatives(*motion_at_nodes(samples))
         pairs = zip(changes, (motion.of_order(k) for k in range(3)), strict=True)
         by = sum(np.einsum("kij,kjd->kid", change[:, self.joints], x) for change, x in pairs)
         above = np.asarray(by) / self.limit[:, None]
@@ -100,12 +100,8 @@ class BoundTorques:
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""
         joint = column % len(self.joints)
-        torques = self.dynamics.torques(*(part[row : row + 1] for part in self._motion(samples)))
+        torques = self.dynamics.torques(*(part[row : row + 1] for part in motion_at_nodes(samples)))
         return (
             f"joint '{self.joint_names[joint]}' needs {torques[0, self.joints[joint]]:.4g} Nm or N "
             f"at t = {samples.sampling.node_times[row]:.3f} s, limit {self.limit[joint]:.4g}"
         )
-
-    def _motion(self, samples: Samples) -> tuple[Array, Array, Array]:
-        q, qd, qdd = (motion_of_order(samples, order) for order in range(3))
-        return q, qd, qdd

@@ -144,6 +144,12 @@ class _Derived(Path):
         """See `Path.oriented`: as the original."""
         return self._path.oriented
 
+    def _at_pace(self, t: Array, sigma: Array, rate: Array) -> PathSamples:
+        """Return the original at its times σ (K,), run through at dσ/dt (K,), as samples at t."""
+        original = self._path.samples(sigma)
+        twist = original.twist * rate[:, None]
+        return PathSamples(t, original.translation, original.rotation, twist)
+
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
         """See `Saved.from_dict`."""

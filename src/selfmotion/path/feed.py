@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array, PathError, as_number, read_only
 from selfmotion.path.base import STILL, Path, PathSamples, _Derived, check_path
-from selfmotion.path.pace import Pace, times_along
+from selfmotion.path.pace import Pace, times_along, times_when
 
 # Nodes of the pace between two knots of the original, at least, and in all, about.
 _FEWEST, _ABOUT = 16, 1000
@@ -19,8 +19,6 @@ _BESIDE, _AT = 1e-4, 1e-8
 _RESTS = 1e-6
 # The twist before and after a knot may differ by this share of it: by rounding.
 _KINK = 1e-6
-# Intervals of the pace are halved so often to find when a time of the original is passed.
-_HALVINGS = 52
 
 
 class Feed(_Derived, kind="feed"):
@@ -90,12 +88,12 @@ class Feed(_Derived, kind="feed"):
         """When the tool rests: at both ends and in kinks [s]."""
         return read_only([self._paces[0][0], *(end for _, end, _ in self._paces)])
 
-    @property
+    @cached_property
     def knots(self) -> Array:
         """See `Path.knots`: when those of the original are passed."""
         return self._moved(self._path.knots)
 
-    @property
+    @cached_property
     def marks(self) -> Array:
         """See `Path.marks`."""
         inner = [pace.t + start for start, _, pace in self._paces]
@@ -104,12 +102,9 @@ class Feed(_Derived, kind="feed"):
 
     def _moved(self, wanted: Array) -> Array:
         """Return when times of the original are passed."""
-        early, late = np.zeros(len(wanted)), np.full(len(wanted), self.duration)
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (early + late)
-            before = self.pace(middle)[0] < wanted
-            early, late = np.where(before, middle, early), np.where(before, late, middle)
-        return _apart(np.concatenate([late[1:-1], self.rest_times]), self.duration)
+        ends = np.zeros(len(wanted)), np.full(len(wanted), self.duration)
+        passed = times_when(lambda t: self.pace(t)[0], wanted, *ends)
+        return _apart(np.concatenate([passed[1:-1], self.rest_times]), self.duration)
 
     def pace(self, t: Array) -> tuple[Array, Array]:
         """Return the original's time σ and dσ/dt at times `t` (K,)."""
@@ -124,11 +119,8 @@ class Feed(_Derived, kind="feed"):
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
-        sigma, rate = self.pace(t)
         # In a kink the original has two directions, but the tool rests.
-        original = self._path.samples(sigma)
-        twist = original.twist * rate[:, None]
-        return PathSamples(t, original.translation, original.rotation, twist)
+        return self._at_pace(t, *self.pace(t))
 
     @cached_property
     def _paces(self) -> list[tuple[float, float, Pace]]:

@@ -1,5 +1,6 @@
 """How fast something is run through: a time σ of its own as a function of the time t."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,6 +11,8 @@ from selfmotion.basics import Array
 
 # Of samples within this share of a window the first is kept: the jerk of more would be rounding.
 _CLOSE = 0.1
+# Intervals of time are halved so often to find when something is reached.
+_HALVINGS = 52
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,3 +81,14 @@ class Pace:
 def times_along(places: Array, rates: Array) -> Array:
     """Return when places (K,) are reached at rates (K,) whose squares are linear in between."""
     return np.append(0.0, np.cumsum(2.0 * np.diff(places) / (rates[:-1] + rates[1:])))
+
+
+def times_when(
+    reached: Callable[[Array], Array], wanted: Array, early: Array, late: Array
+) -> Array:
+    """Return when a function that does not fall reaches values (K,), between times (K,) each."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (early + late)
+        before = reached(middle) < wanted
+        early, late = np.where(before, middle, early), np.where(before, late, middle)
+    return late

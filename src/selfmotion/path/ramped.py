@@ -75,10 +75,7 @@ class Ramped(_Derived, kind="ramped"):
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
-        tau, rate = self.pace(t)
-        original = self._path.samples(tau)
-        twist = original.twist * rate[:, None]
-        return PathSamples(t, original.translation, original.rotation, twist)
+        return self._at_pace(t, *self.pace(t))
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""

@@ -7,10 +7,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, PathError, as_numbers, read_only
 from selfmotion.path.base import Path, PathSamples, _Derived, check_path
-from selfmotion.path.pace import Pace
-
-# Intervals of the pace are halved so often to find when a time of the original is passed.
-_HALVINGS = 52
+from selfmotion.path.pace import Pace, times_when
 
 
 class Retimed(_Derived, kind="retimed"):
@@ -71,12 +68,8 @@ class Retimed(_Derived, kind="retimed"):
         """Return when times of the original are passed, (K,), from 0 to the duration."""
         pace = self._pace
         k = np.clip(np.searchsorted(pace.sigma, wanted) - 1, 0, len(pace.t) - 2)
-        early, late = pace.t[k], pace.t[k + 1]
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (early + late)
-            before = pace(middle) < wanted
-            early, late = np.where(before, middle, early), np.where(before, late, middle)
-        return read_only([0.0, *late[1:-1], self.duration])
+        passed = times_when(pace, wanted, pace.t[k], pace.t[k + 1])
+        return read_only([0.0, *passed[1:-1], self.duration])
 
     @property
     def pace(self) -> Pace:
@@ -85,9 +78,8 @@ class Retimed(_Derived, kind="retimed"):
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
-        original = self._path.samples(np.clip(self._pace(t), 0.0, self._path.duration))
-        twist = original.twist * self._pace(t, 1)[:, None]
-        return PathSamples(t, original.translation, original.rotation, twist)
+        sigma = np.clip(self._pace(t), 0.0, self._path.duration)
+        return self._at_pace(t, sigma, self._pace(t, 1))
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""
