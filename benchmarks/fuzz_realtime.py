@@ -1,4 +1,7 @@
-"""Random scenarios for the loop: pushes, late steps, jumps of the target and faults."""
+"""Random scenarios for the loop: pushes, late steps, jumps of the target and faults.
+
+Every second one looks 2 s ahead, the others 8 s.
+"""
 
 import argparse
 import sys
@@ -14,18 +17,19 @@ import selfmotion as sm
 from selfmotion.realtime import Replanner
 
 TASKS = ("pose", "position", "pointing")
+FAR = {"horizon": 8.0, "null_motion": sm.BSplineNullMotion(6), "steps": 24}
 
 
 @cache
-def loop(task):
+def loop(task, far):
     robot = sm.load_robot("panda")
-    return robot, Replanner(robot, task)
+    return robot, Replanner(robot, task, **(FAR if far else {}))
 
 
 def judged(seed):
     """Return what the scenario of a seed showed."""
     task = TASKS[seed % len(TASKS)]
-    return scenarios.run(seed, task, *loop(task))
+    return scenarios.run(seed, task, *loop(task, seed % 2 == 1))
 
 
 def main():

@@ -182,13 +182,22 @@ def test_a_box_without_any_acceleration_to_choose_is_no_trouble() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arm", "task"), [("panda", "pose"), ("panda", "position"), ("xarm7", "pointing")]
+    ("arm", "task", "horizon"),
+    [
+        ("panda", "pose", 2.0),
+        ("panda", "position", 2.0),
+        # Steps far ahead are longer than near ones.
+        ("panda", "position", 8.0),
+        ("xarm7", "pointing", 2.0),
+    ],
 )
-def test_segments_go_on_without_a_jump_and_the_tool_stays_on_its_path(arm: str, task: str) -> None:
+def test_segments_go_on_without_a_jump_and_the_tool_stays_on_its_path(
+    arm: str, task: str, horizon: float
+) -> None:
     robot = sm.load_robot(arm)
     start = robot.dexterous_configuration()
     path = sm.Circle.around(robot.pose(start), 0.05, 4.0, normal=(1.0, 0.0, 0.0))
-    replanner = Replanner(robot, task)
+    replanner = Replanner(robot, task, horizon=horizon)
     segments, places = closed_loop(replanner, path, start, 1.5)
     for one, other in pairwise(segments):
         here = one.index(other.t[0])
@@ -292,6 +301,15 @@ def test_without_a_plan_the_tool_is_tracked(
     assert {item.flag for item in segments} == {Flag.TRACKING}
     miss = np.linalg.norm(panda.pose(places[-1]).translation - slow_circle.pose(0.5).translation)
     assert miss < TRACKED
+
+
+def test_a_cost_that_is_not_finite_is_told_and_the_tool_is_tracked(
+    panda: sm.RobotModel, slow_circle: sm.Circle
+) -> None:
+    cost = sm.FunctionCost(lambda qd, q, t: np.full(len(t), np.nan))
+    segments, _ = closed_loop(Replanner(panda, "position", [cost]), slow_circle, HOME, 0.1)
+    assert {item.flag for item in segments} == {Flag.TRACKING}
+    assert all("not finite" in reason for item in segments for reason in item.reasons)
 
 
 def test_a_late_step_goes_on_from_what_was_commanded_meanwhile(

@@ -30,6 +30,8 @@ _LESS, _MORE, _LEAST, _MOST = 0.3, 4.0, 1e-3, 1e6
 _WELL, _BADLY = 0.75, 0.25
 # A joint that moves so many times as fast as it may has been thrown out of a singular pose.
 _WILD = 20.0
+# The first nodes are so far apart [s], unless there are enough for less.
+_NEAR = 0.1
 # What rows may be broken by, relative to their range.
 _BROKEN = 1e-6
 
@@ -75,7 +77,7 @@ class Horizon:
         steps: int,
         surroundings: Surroundings | None = None,
     ) -> None:
-        self.grid = Grid(np.linspace(0.0, duration, steps + 1))
+        self.grid = Grid(_graded(duration, steps))
         self.rollout = Rollout(
             robot, Dwell(robot.pose(robot.dexterous_configuration()), duration), task, self.grid
         )
@@ -100,8 +102,7 @@ class Horizon:
         self._wild = _WILD * limits[2]
         self._range = np.where(np.isfinite(self._high - self._low), self._high - self._low, 1.0)
         # The stages' places among the nodes, for frames between them.
-        step = duration / steps
-        self._node, self._share = self._between(t, step, steps)
+        self._node, self._share = self._between(t)
         self.forget()
 
     def forget(self) -> None:
@@ -117,6 +118,13 @@ class Horizon:
         """Number of variables of a cycle's programme."""
         return int(self.redundancy * self._rest.shape[1])
 
+    @property
+    def failure(self) -> str:
+        """Why the last step of the optimisation found no motion."""
+        if self.breakdown < np.inf:
+            return "the motion over the horizon runs into a singular pose"
+        return "a cost or its derivative is not finite over the horizon"
+
     def shift(self, seconds: float) -> None:
         """Go on from so much later: coefficients and frame are those of the same motion."""
         if seconds <= 0.0 or not len(self._frames):
@@ -127,17 +135,14 @@ class Horizon:
             moved = self._null_motion.functions(later, self._duration)
             self._shifts[seconds] = (self._inverse @ moved).T
         self._coefficients = self._coefficients @ self._shifts[seconds]
-        steps = self.grid.steps
-        node, share = self._between(self.grid.nodes + seconds, self._duration / steps, steps)
-        self._frames = self._blend(node, share)
+        self._frames = self._blend(*self._between(self.grid.nodes + seconds))
 
     def epsilon(self, t: Array, functions: Array) -> Array:
         """Return ε at times `t` (M,) from now [s], for φ there (M, K), (M, n)."""
         n = self.rollout.robot.dof
         if not len(self._frames):
             return np.zeros((len(t), n))
-        steps = self.grid.steps
-        frames = self._blend(*self._between(t, self._duration / steps, steps))
+        frames = self._blend(*self._between(t))
         return np.asarray((frames @ (functions @ self._coefficients.T)[:, :, None])[:, :, 0])
 
     def functions(self, t: Array) -> Array:
@@ -212,6 +217,8 @@ class Horizon:
         fall = -np.inf
         if self._run(q, outer[:, :, 0]):
             fall = cost - self._cost(self.rollout.samples())
+        # What is not taken does not break down.
+        self.breakdown = np.inf
         ratio = fall / predicted if np.isfinite(fall) else -np.inf
         if not ratio >= _BADLY:
             self._damping = min(_MORE * self._damping, _MOST)
@@ -237,11 +244,12 @@ class Horizon:
             self.breakdown = min(self.breakdown, first)
         return self.breakdown == np.inf
 
-    def _between(self, t: Array, step: float, steps: int) -> tuple[Array, Array]:
+    def _between(self, t: Array) -> tuple[Array, Array]:
         """Return between which nodes times lie, and how far: the last one stands for all later."""
-        place = np.minimum(t / step, float(steps))
-        node = np.minimum(place.astype(np.intp), steps - 1)
-        return node, (place - node)[:, None, None]
+        nodes = self.grid.nodes
+        node = np.clip(np.searchsorted(nodes, t, side="right") - 1, 0, self.grid.steps - 1)
+        share = np.minimum((t - nodes[node]) / (nodes[node + 1] - nodes[node]), 1.0)
+        return np.asarray(node), share[:, None, None]
 
     def _blend(self, node: Array, share: Array) -> Array:
         frames = self._frames
@@ -309,12 +317,24 @@ class Horizon:
     def _rows(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array, Array]:
         """Return the limits at the nodes as rows of the step, with what they may be."""
         nodes, d = samples.nodes, self.size
-        pause = (self._duration / self.grid.steps,)
+        pause = np.diff(self.grid.nodes)[:, None]
         qd, moves = samples.qd[nodes], by_qd[nodes]
         value = np.stack([samples.q[nodes[1:]], qd[1:], np.diff(qd, axis=0) / pause]).ravel()
-        rows = np.stack([by_q[nodes[1:]], moves[1:], np.diff(moves, axis=0) / pause]).reshape(-1, d)
+        harder = np.diff(moves, axis=0) / pause[:, :, None]
+        rows = np.stack([by_q[nodes[1:]], moves[1:], harder]).reshape(-1, d)
         slack = _BROKEN * self._range
         return rows, self._low - value - slack, self._high - value + slack
+
+
+def _graded(duration: float, steps: int) -> Array:
+    """Return nodes from 0 to `duration` [s]: the first ones `_NEAR` apart, later ones farther.
+
+    Even ones where there are enough for that. What comes next is commanded, what comes later is
+    what it is to be good for.
+    """
+    s = np.linspace(0.0, 1.0, steps + 1)
+    even = np.clip((_NEAR / duration * steps**2 - 1.0) / (steps - 1.0), 0.0, 1.0)
+    return np.asarray(duration * (even * s + (1.0 - even) * s * s))
 
 
 def in_null_space(motion: NullMotion) -> NullMotion:

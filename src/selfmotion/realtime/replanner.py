@@ -23,8 +23,9 @@ from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
 # The pose feedback between two steps [1/s]. A motion that breaks down within this time [s] is not
-# followed: the arm can stop in less. A command so far from the arm [rad or m] is not what it does.
-_GAIN, _SOON, _FARTHEST = 20.0, 0.5, 0.5
+# followed: the arm can stop in less; nor within the second, where limits already hold it up. A
+# command so far from the arm [rad or m] is not what it does.
+_GAIN, _SOON, _AHEAD, _FARTHEST = 20.0, 0.5, 2.0, 0.5
 
 
 class Replanner:
@@ -146,7 +147,7 @@ class Replanner:
         self._states = np.zeros((cycles + stopping + 1, 3, n))
         self._table = np.zeros((cycles, 2 * n + law.REFERENCE))
         ahead = h * np.arange(1.5, cycles + 1.0)
-        halves = 0.5 * grid.nodes[1] * np.arange(2 * grid.steps + 1)
+        halves = np.interp(np.arange(2 * grid.steps + 1), 2 * np.arange(grid.steps + 1), grid.nodes)
         self._ahead, self._times = ahead, np.concatenate([halves, ahead])
         self._functions = self._horizon.functions(ahead)
         four = np.tile([0, 1, 1, 2], (grid.steps, 1)) + 2 * np.arange(grid.steps)[:, None]
@@ -340,7 +341,7 @@ class Replanner:
         # On the way into a singular pose an arm may end up on its other side.
         soon = horizon.breakdown < _SOON
         self._without_way = self._without_way + max(passed, self.cycle) if soon else 0.0
-        held_up = horizon.breakdown < np.inf and not self._follows
+        held_up = horizon.breakdown < _AHEAD and not self._follows
         if held_up or self._without_way > self._patience:
             flag = Flag.STOPPING
         self._table[:, n : 2 * n] = kept
@@ -353,7 +354,7 @@ class Replanner:
         try:
             if self._horizon.improve(place, rate, self._reference.jacobian, reference):
                 return True
-            reasons.append("the motion over the horizon runs into a singular pose")
+            reasons.append(self._horizon.failure)
         # Costs are the user's code: whatever they raise must not leave the arm without a command.
         except Exception as error:
             reasons.append(f"planning failed: {type(error).__name__}: {error}")
