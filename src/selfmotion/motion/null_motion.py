@@ -41,6 +41,13 @@ class NullMotion(Saved, ABC, family="null motion"):
         """
         return self
 
+    def detours(self, rows: int) -> tuple["NullMotion", ...]:
+        """Return others to try in turn where conditions cannot be met from x = 0: by default none.
+
+        With too few functions there may be no such motion, with many small steps may get stuck.
+        """
+        return ()
+
     @property
     @abstractmethod
     def fewest_steps(self) -> int:
@@ -118,6 +125,10 @@ class BSplineNullMotion(NullMotion):
         _check_space(self.space)
         as_whole(self.intervals, "null motion: intervals", 1, _MOST_INTERVALS)
 
+    def detours(self, rows: int) -> tuple[NullMotion, ...]:
+        """See `NullMotion.detours`: one polynomial."""
+        return (PolynomialNullMotion(self.degree, self.space),) if self.intervals > 1 else ()
+
     @property
     def fewest_steps(self) -> int:
         """See `NullMotion.fewest_steps`: four for each interval."""
@@ -162,6 +173,10 @@ class RefinedNullMotion(NullMotion):
     def functions(self, t: Array, duration: float) -> Array:
         """See `NullMotion.functions`: those of the cubic."""
         return PolynomialNullMotion().functions(t, duration)
+
+    def detours(self, rows: int) -> tuple[NullMotion, ...]:
+        """See `NullMotion.detours`: splines of more and more intervals."""
+        return tuple(dict.fromkeys(self.finer(count, rows) for count in (_FEWEST, 2 * _FEWEST)))
 
     def finer(self, intervals: int, rows: int) -> "BSplineNullMotion":
         """See `NullMotion.finer`: a spline that can be any cubic, of not too many coefficients."""

@@ -1,17 +1,22 @@
 """Where linearised conditions pull in opposite directions: out by a quadratic penalty."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.optimise.base import Callback, ConstrainedFunction, Iteration, Residuals, Status
-from selfmotion.optimise.quasi_newton import QuasiNewton
 
 # The violation at the start weighs this many times the cost there.
 _WEIGHT = 10.0
 # This exact, and no more evaluations than that: the rest is for sequential quadratic programming.
 _TOLERANCE, _EVALUATIONS = 1e-4, 60
+# λ at first, at least, and beyond which nothing leads down; what multiplies it after a step that
+# fell by more than foreseen's first share, or less than its second; and what a step has to fall by.
+_DAMPING, _SOFTEST, _STIFFEST = 1e-3, 1e-9, 1e9
+_SOFTER, _STIFFER, _GOOD, _POOR, _TAKEN = 0.2, 5.0, 0.75, 0.25, 1e-3
+# Steps of a scan, and the axes that they are made along.
+_STEPS, _AXES = (1.0, -1.0, 2.0, -2.0, 3.0, -3.0), 3
+# Added to the metric that λ weighs, relative to its trace.
+_REGULAR = 1e-9
 
 
 class _Penalised:
@@ -61,10 +66,11 @@ def restored(
     limit: float,
     note: Callback,
 ) -> tuple[Array, Status | None]:
-    """Return where the quasi-Newton method takes F and a penalty on what is violated.
+    """Return where the Levenberg-Marquardt method takes F and a penalty on what is violated.
 
     Unlike the largest violation, the sum of squares falls also where one condition has to wait for
-    the others. F keeps it from going far.
+    the others. F keeps it from going far. (J. J. Moré, "The Levenberg-Marquardt algorithm:
+    implementation and theory", Numerical Analysis, Lecture Notes in Mathematics 630, 1978.)
 
     Parameters
     ----------
@@ -81,24 +87,73 @@ def restored(
     Returns
     -------
     x : (size,)
+        Where all conditions are kept, or where nothing is left to gain.
     status : Status or None
         What ends the optimisation; None where it can go on from x.
     """
-    penalised = _Penalised(function, 1.0)
+    if function.conditions(x).worst <= 1.0:
+        return x, None
+    penalised = _Penalised(function, weight * _usual_weight(function, x))
+    ground = function.metric(x)
+    ground += _REGULAR * np.trace(ground) * np.eye(len(x))
+    most = min(limit, function.evaluations + _EVALUATIONS)
+    value, damping = penalised.value(x), _DAMPING
+    try:
+        while function.conditions(x).worst > 1.0:
+            step = _fall(penalised, x, value, ground, damping, most)
+            if step is None:
+                break
+            before, (x, value, damping) = value, step
+            size = float(np.linalg.norm(function.gradient(x)))
+            if note(Iteration(x, function.value(x), size, "none", 1.0, function.evaluations)):
+                return x, Status.STOPPED
+            if before - value <= _TOLERANCE * abs(before):
+                break
+    except KeyboardInterrupt:
+        return x, Status.INTERRUPTED
+    return x, Status.MAX_EVALUATIONS if function.evaluations >= limit else None
+
+
+def scanned(function: ConstrainedFunction, x: Array, axes: Array) -> Array:
+    """Return the point of least penalty some steps from `x` along the first of `axes`, both ways.
+
+    Where conditions bend back, no small step tells which way leads out.
+
+    Parameters
+    ----------
+    function : ConstrainedFunction
+    x : (size,)
+        Where a condition is violated.
+    axes : (size, D)
+        Directions, the first ones first; a step along one would lower a quadratic cost to nothing.
+    """
+    penalised = _Penalised(function, _usual_weight(function, x))
+    steps = [size * axis for axis in axes.T[:_AXES] for size in _STEPS]
+    return min((x + step for step in steps), key=penalised.value)
+
+
+def _usual_weight(function: ConstrainedFunction, x: Array) -> float:
+    """Return the weight at which the penalty at x is `_WEIGHT` times the cost there."""
     cost = function.value(x)
-    amount = penalised.value(x) - cost
-    penalised = _Penalised(function, weight * _WEIGHT * max(abs(cost), 1e-3) / amount)
-    asked = [False]
+    return _WEIGHT * max(abs(cost), 1e-3) / (_Penalised(function, 1.0).value(x) - cost)
 
-    def told(iteration: Iteration) -> bool:
-        asked[0] = bool(note(replace(iteration, cost=function.value(iteration.x))))
-        return asked[0]
 
-    most = int(min(limit, function.evaluations + _EVALUATIONS))
-    method = QuasiNewton(tolerance=_TOLERANCE)
-    found = method.minimize(penalised, x, max_evaluations=most, callback=told)
-    if asked[0]:
-        return found.x, Status.STOPPED
-    if found.status is Status.INTERRUPTED:
-        return found.x, found.status
-    return found.x, Status.MAX_EVALUATIONS if function.evaluations >= limit else None
+def _fall(
+    penalised: _Penalised, x: Array, value: float, ground: Array, damping: float, most: float
+) -> tuple[Array, float, float] | None:
+    """Return a point with a lower value, that value, and the damping to go on with; None for none.
+
+    The step -(M + λ M_0)⁻¹ g, with λ raised until it leads down.
+    """
+    gradient, metric = penalised.gradient(x), penalised.metric(x)
+    if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(metric))):
+        return None
+    while penalised.evaluations < most and damping < _STIFFEST:
+        p = -np.linalg.solve(metric + damping * ground, gradient)
+        there = penalised.value(x + p)
+        ratio = (value - there) / -float(gradient @ p + 0.5 * p @ metric @ p)
+        if ratio > _TAKEN:
+            factor = _SOFTER if ratio > _GOOD else _STIFFER if ratio < _POOR else 1.0
+            return x + p, there, max(factor * damping, _SOFTEST)
+        damping *= _STIFFER
+    return None

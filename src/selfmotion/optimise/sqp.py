@@ -16,7 +16,7 @@ from selfmotion.optimise.base import (
 )
 from selfmotion.optimise.derivative import is_misleading
 from selfmotion.optimise.penalty import IGNORED, ExactPenalty, Point
-from selfmotion.optimise.restoration import restored
+from selfmotion.optimise.restoration import restored, scanned
 from selfmotion.optimise.step import Step, best_step
 from selfmotion.optimise.update import damped, renewed
 
@@ -48,8 +48,9 @@ class SequentialQuadratic:
     (`best_step`), is judged by an exact penalty function (`ExactPenalty`) and corrected once for
     the curvature of the conditions (second-order correction). The model's matrix is renewed by
     Broyden's family with Fletcher's switch on the Lagrangian, damped. Variables are scaled by the
-    first estimate of the inverse Hessian. Where conditions stay violated because they pull in
-    opposite directions, a quadratic penalty leads elsewhere (`restored`).
+    first estimate of the inverse Hessian; far from where that was made, the matrix is made anew.
+    Where conditions stay violated because they pull in opposite directions, a quadratic penalty
+    leads elsewhere (`restored`).
 
     J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., chapter 18; R. H. Byrd,
     J. Nocedal and R. A. Waltz, "Steering exact penalty methods for nonlinear programming",
@@ -125,7 +126,7 @@ class _Run:
         here = self._point(np.array(x0, dtype=np.float64))
         if here is None:
             raise ProblemError("optimiser: the cost or a condition at the start is not finite")
-        self._here = self._best = here
+        self._here = self._best = self._begun = here
         self._gradient, self._rows = np.zeros(len(x0)), np.zeros((len(here.at.h), len(x0)))
         self._multipliers = np.zeros(len(here.at.h))
         self._begin(np.eye(len(x0)))
@@ -136,6 +137,7 @@ class _Run:
         least = _FLATTEST * float(np.max(values, initial=0.0))
         self._scale = vectors * np.sqrt(np.maximum(values, least))
         self._h, self._penalty = np.eye(len(values)), ExactPenalty()
+        self._modelled = self._here.x
         self._region = _FIRST_REGION * max(np.sqrt(2.0 * abs(self._here.cost)), 1e-3)
         self._first_region, self._smallest = self._region, _LAST_REGION * self._region
         # The violations that relaxed steps in turn arrived at.
@@ -147,20 +149,29 @@ class _Run:
             if status is not Status.INFEASIBLE:
                 return status
             before = self._best.at.worst
-            status = self._begin_again(10.0**attempt)
-            if self._best.at.worst > _PROGRESS * before:
+            status = self._begin_again(attempt)
+            if attempt and self._best.at.worst > _PROGRESS * before:
                 break
         went_astray = status is Status.INFEASIBLE and self._best.kept
         return Status.PRECISION if went_astray else status
 
-    def _begin_again(self, weight: float) -> Status:
-        """Go on from the best point, after restoring its conditions if they are violated."""
-        self._here = self._best
-        if self._here.kept:
-            return self._descend(None)
-        x, ended = restored(self._function, self._here.x, weight, self._limit, self._note)
-        self._go(self._point(x) or self._here)
+    def _begin_again(self, attempt: int) -> Status:
+        """Go on from the best point, after restoring its conditions if they are violated.
+
+        At the second time from a point far away: small steps have led nowhere.
+        """
+        self._here, ended = self._best, None
+        if not self._here.kept:
+            x = self._afar() if attempt == 1 else self._here.x
+            x, ended = restored(self._function, x, 10.0**attempt, self._limit, self._note)
+            self._go(self._point(x) or self._here)
         return self._descend(None) if ended is None else ended
+
+    def _afar(self) -> Array:
+        """Return the best of some points around the first one, along the flattest directions."""
+        order = np.argsort(-np.linalg.norm(self._first_scale, axis=0))
+        full = np.sqrt(2.0 * abs(self._begun.cost)) * self._first_scale[:, order]
+        return scanned(self._function, self._begun.x, full)
 
     def minimum(self, status: Status) -> Minimum:
         end = self._here if status is Status.CONVERGED else self._best
@@ -178,6 +189,8 @@ class _Run:
         if inverse_hessian is None:
             inverse_hessian = inverse_metric(self._function.metric(self._here.x))
         self._begin(inverse_hessian)
+        if self._here is self._begun:
+            self._first_scale = self._scale
         self._derive()
         if self._record("none", 0.0):
             return Status.STOPPED
@@ -295,7 +308,20 @@ class _Run:
             self._relaxed.clear()
         y = self._gradient + self._rows.T @ step.multipliers - before
         self._h, update = renewed(self._h, p, damped(y, p, hessian), "fletcher")
+        if there.kept and self._is_far():
+            self._model_anew()
         return update
+
+    def _is_far(self) -> bool:
+        """Whether a quadratic cost would have fallen to nothing on the way from the last metric."""
+        way = np.linalg.solve(self._scale, self._here.x - self._modelled)
+        return float(way @ way) > 2.0 * abs(self._here.cost)
+
+    def _model_anew(self) -> None:
+        """Take the Gauss-Newton matrix of here: steps from far away have bent the present one."""
+        inward = np.linalg.inv(self._scale)
+        self._h = inward @ inverse_metric(self._function.metric(self._here.x)) @ inward.T
+        self._modelled = self._here.x
 
     def _reach(self, p: Array) -> Point | None:
         return self._point(self._here.x + self._scale @ p)

@@ -224,7 +224,7 @@ class _Run:
         """Return the plan of the whole path, or of the largest part of it."""
         candidates = self._candidates
         try:
-            best = candidates.run()
+            best = self._met(candidates.run())
         except (BreakdownError, NoSequenceError) as error:
             # Chains of configurations end at obstacles and step limits as well: these stay errors.
             blocked = isinstance(error, NoSequenceError) and not self._reach(error.time).reason
@@ -245,6 +245,21 @@ class _Run:
         except KeyboardInterrupt:
             best.end(Status.INTERRUPTED)
             return self._gather(whole, finished, None)
+
+    def _met(self, best: Session) -> Session:
+        """Return a session of another null motion where one meets more of the constraints."""
+        if not best.violations or best.status in (*_ENDED, Status.MAX_EVALUATIONS):
+            return best
+        for detour in best.detours():
+            if detour.cut_short:
+                best.end(detour.status)
+            rank = [(bool(one.violations), one.merit()) for one in (best, detour)]
+            if rank[0] <= rank[1]:
+                return best
+            best = detour
+            if not best.violations or best.cut_short:
+                break
+        return best
 
     def _stands(self, best: Session, finished: Finished) -> bool:
         """Whether a part of the path is no better answer than this motion along all of it."""

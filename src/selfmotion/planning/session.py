@@ -1,5 +1,7 @@
 """One start of one problem, optimised on a grid that becomes finer."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from selfmotion.basics import Array
@@ -17,6 +19,7 @@ from selfmotion.engine import (
 )
 from selfmotion.motion import Grid, NullMotion
 from selfmotion.optimise import Iteration, Minimum, SequentialQuadratic, Status
+from selfmotion.planning.closing import closed
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.warm_start import coefficients_of
 from selfmotion.plans import Binding, Plan, Problem
@@ -25,8 +28,6 @@ from selfmotion.plans import Binding, Plan, Problem
 _COST_AGREEMENT = 1e-4
 # A cost that rises this much on two grids in turn has no limit.
 _RISE, _RISES = 1.5, 2
-# Equalities are met to this [rad, rad/s], which Newton's method needs a few steps for.
-_CLOSED, _CLOSING_STEPS = 1e-11, 12
 # What would save less than this share of the cost does not bind.
 _LEAST_SAVING = 1e-6
 # After these there is nothing to go on from.
@@ -208,6 +209,27 @@ class Session:
         self._close()
         self.violations = self._objective.violations(self._x)
 
+    def detours(self) -> Iterator["Session"]:
+        """Yield sessions around the same motion at x = 0 whose null motions may meet conditions.
+
+        Where that of the problem is to be had in the end: with it.
+        """
+        wanted = self._still.problem.null_motion
+        for motion in wanted.detours(self._objective.null_motion.rows):
+            grid = self._still.grid
+            while grid.steps < motion.fewest_steps:
+                grid = grid.halved()
+            session = Session(self._effort, self._still, self._on(grid, motion), free=self._free)
+            session.null_motion, session._before = motion, self._before
+            session.history = self.history
+            session.minimize()
+            if wanted.gain == np.inf and not (session.violations or session.cut_short):
+                while session._objective.grid.steps < wanted.fewest_steps:
+                    session.refine()
+                session._change(wanted)
+                session.minimize()
+            yield session
+
     def refine_until_settled(self) -> None:
         """Optimise on halved grids until the cost agrees."""
         rises = 0
@@ -363,34 +385,5 @@ class Session:
         return max(used_up, effort.counts.evaluations + 1)
 
     def _close(self) -> None:
-        """Meet the equalities to rounding by Newton's method.
-
-        The step is the smallest in the metric of H⁻¹ that takes out the residual, so that it
-        hardly changes the cost: -H Gᵀ(G H Gᵀ)⁻¹ h with G = ∂h/∂x.
-        """
-        objective = self._objective
-        if not objective.constraints.has_equalities or self._minimum is None:
-            return
-        h = self._minimum.inverse_hessian
-        best, x, nearest = self._x, self._x, np.inf
-        for _ in range(_CLOSING_STEPS):
-            if not np.isfinite(sum(objective.terms(x).values())):
-                break
-            at = objective.conditions(x)
-            residual = at.h[at.equality]
-            miss = float(np.max(np.abs(residual), initial=0.0))
-            # Conditions that contradict each other, or are out of reach, are not met by more steps.
-            if not miss < nearest:
-                break
-            best, nearest = x, miss
-            if miss < _CLOSED:
-                break
-            # A motion that hardly holds together has derivatives beyond all numbers.
-            with np.errstate(over="ignore", invalid="ignore"):
-                rows = objective.condition_rows(x)[at.equality]
-            if not np.all(np.isfinite(rows)):
-                break
-            spread = h @ rows.T
-            # Least squares: conditions may depend on each other.
-            x = x - spread @ np.linalg.lstsq(rows @ spread, residual)[0]
-        self._x = best
+        if self._objective.constraints.has_equalities and self._minimum is not None:
+            self._x = closed(self._objective, self._x, self._minimum.inverse_hessian)
