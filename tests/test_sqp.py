@@ -10,7 +10,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.optimise import Residuals, SequentialQuadratic, Status
 from selfmotion.optimise.quadratic import minimize_quadratic
-from selfmotion.optimise.restoration import _Penalised, restored
+from selfmotion.optimise.restoration import _Penalised, restored, scanned
 from selfmotion.optimise.step import AIM, best_step
 
 # Conditions of these functions may be violated by so much.
@@ -255,6 +255,89 @@ def test_restoration_leaves_where_the_largest_violation_is_stationary() -> None:
     x, status = restored(detour(), np.array([0.02, 0.01, 0.05]), 100.0, np.inf, lambda _: None)
     assert status is None
     assert detour().conditions(x).worst < 0.2 * detour().conditions(start).worst
+
+
+def outside(size: int) -> Constrained:
+    """The points from 1 on away from the line x₀ = 0, on which the condition has no slope."""
+    return Constrained(
+        lambda x: float(1.0 + 0.5 * x @ x),
+        lambda x: np.array(x),
+        lambda x: np.array([1.0 - x[0] ** 2]),
+        lambda x: -2.0 * x[0] * np.eye(1, size),
+    )
+
+
+@pytest.mark.parametrize("size", [1, 2, 5])
+def test_conditions_without_a_slope_are_met_far_away(size: int) -> None:
+    found = SequentialQuadratic().minimize(outside(size), np.zeros(size))
+    assert found.status is Status.CONVERGED
+    np.testing.assert_allclose(np.abs(found.x), np.eye(1, size)[0], atol=1e-5)
+
+
+def test_a_scan_finds_the_least_penalty_on_both_sides_of_the_first_axes() -> None:
+    x, axes = np.array([0.1, 0.0, 0.0, 0.0]), 0.4 * np.eye(4)
+    found = scanned(outside(4), x, axes[:, ::-1])
+    # The axis that helps is not among the first ones: every step is as bad as the shortest.
+    assert abs(found - x).max() == pytest.approx(0.4)
+    # The nearest of those that are outside, on either side.
+    assert scanned(outside(4), x, axes)[0] == pytest.approx(0.1 - 3 * 0.4)
+    assert scanned(outside(4), -x, axes)[0] == pytest.approx(-0.1 + 3 * 0.4)
+
+
+def test_a_restoration_takes_steps_down_until_the_cost_holds_it_back() -> None:
+    function, notes = curved(h=lambda x: np.append(circle(x), 2.0 * x[0] + 1.0)), []
+    function._rows = lambda x: np.array([2.0 * x, [2.0, 0.0]])
+    far = np.array([3.0, -2.0])
+    x, status = restored(function, far, 1.0, np.inf, notes.append)
+    assert status is None
+    assert function.conditions(x).worst < 1e-3 * function.conditions(far).worst
+    assert [note.cost for note in notes] == [function.value(note.x) for note in notes]
+
+    def violated(x: Array) -> float:
+        return float(np.sum(np.maximum(function.conditions(x).h, 0.0) ** 2))
+
+    # At the start the violation weighs ten times the cost.
+    weight = 10.0 * function.value(far) / violated(far)
+    totals = [function.value(x) + weight * violated(x) for x in [far, *(one.x for one in notes)]]
+    assert all(np.diff(totals) < 0.0)
+    # As told to: not a step more.
+    assert restored(function, far, 1.0, np.inf, lambda _: True)[1] is Status.STOPPED
+    assert restored(function, far, 1.0, function.evaluations, lambda _: True) == (
+        far,
+        Status.MAX_EVALUATIONS,
+    )
+    # Where all is kept, nothing is done.
+    assert restored(function, np.array([-0.6, 0.3]), 1.0, np.inf, lambda _: True)[1] is None
+
+
+def test_far_from_where_it_was_made_the_matrix_is_made_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A chain of residuals that bends: the matrix of the start is of no use at the end."""
+
+    def residuals(x: Array) -> Array:
+        return np.concatenate([10.0 * (x[1:] - x[:-1] ** 2), 1.0 - x])
+
+    def slopes(x: Array) -> Array:
+        bends = np.eye(len(x))[1:] - 2.0 * np.diag(x)[:-1]
+        return np.vstack([10.0 * bends, -np.eye(len(x))])
+
+    function = Constrained(
+        lambda x: 0.5 * float(residuals(x) @ residuals(x)) + 1e-3,
+        lambda x: residuals(x) @ slopes(x),
+        lambda x: np.array([x[0] - 2.0]),
+        lambda x: np.eye(1, len(x)),
+    )
+    function.metric = lambda x: slopes(x).T @ slopes(x)  # type: ignore[method-assign]
+    counts = []
+    for never in (False, True):
+        if never:
+            monkeypatch.setattr("selfmotion.optimise.sqp._Run._is_far", lambda _: False)
+        before = function.evaluations
+        found = SequentialQuadratic().minimize(function, np.array([3.0, -1.0, 2.0, -1.0]))
+        np.testing.assert_allclose(found.x, 1.0, atol=1e-3)
+        counts.append(function.evaluations - before)
+    assert counts[0] < 0.7 * counts[1]
 
 
 def test_the_penalty_of_a_restoration_has_its_own_gradient_and_metric() -> None:

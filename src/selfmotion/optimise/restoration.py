@@ -150,8 +150,11 @@ def _fall(
         return None
     while penalised.evaluations < most and damping < _STIFFEST:
         p = -np.linalg.solve(metric + damping * ground, gradient)
+        expected = -float(gradient @ p + 0.5 * p @ metric @ p)
+        if not expected > 0.0:
+            return None
         there = penalised.value(x + p)
-        ratio = (value - there) / -float(gradient @ p + 0.5 * p @ metric @ p)
+        ratio = (value - there) / expected
         if ratio > _TAKEN:
             factor = _SOFTER if ratio > _GOOD else _STIFFER if ratio < _POOR else 1.0
             return x + p, there, max(factor * damping, _SOFTEST)

@@ -1,6 +1,7 @@
 """The best motion of a problem: from its start, from many starts, from global sequences."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import NoReturn
 
@@ -163,7 +164,9 @@ class Candidates:
 
     def _try_candidates(self, starts: int, finalists: int, rng: np.random.Generator) -> None:
         problem = self._problem
-        candidates = start_candidates(problem.robot, problem.path, problem.task, starts, rng)
+        asked = problem.envelope
+        arm = replace(problem.robot, lower=asked.lower, upper=asked.upper)
+        candidates = start_candidates(arm, problem.path, problem.task, starts, rng)
         if len(candidates) > finalists:
             candidates = self._best_of(candidates, finalists) or candidates
         self._waiting = sessions = self._sessions(candidates)

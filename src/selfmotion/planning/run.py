@@ -253,10 +253,7 @@ class _Run:
         for detour in best.detours():
             if detour.cut_short:
                 best.end(detour.status)
-            rank = [(bool(one.violations), one.merit()) for one in (best, detour)]
-            if rank[0] <= rank[1]:
-                return best
-            best = detour
+            best = min(best, detour, key=lambda one: (bool(one.violations), one.merit()))
             if not best.violations or best.cut_short:
                 break
         return best
