@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-certificate fuzz-generated fuzz-realtime fuzz-files acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-certificate fuzz-generated fuzz-realtime fuzz-files acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -28,6 +28,9 @@ bench: $(READY)  ## the figures of the README's performance table
 
 bench-constrained: $(READY)  ## problems whose constraints bind, against an earlier revision
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/constrained.py
+
+bench-remaining: $(READY)  ## what plans say is left to save, against splines of 64 intervals
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/remaining.py
 
 bench-batch: $(READY)  ## two processes against one, and what a plan costs besides planning
 	$(BIN)/python benchmarks/batch.py
