@@ -27,6 +27,19 @@ def test_every_exported_name_exists_and_is_documented() -> None:
         assert getattr(sm, name).__doc__, name
 
 
+def test_signatures_show_what_one_would_type() -> None:
+    """In help(): no factories, functions or addresses, of anything public."""
+    for name in sm.__all__:
+        found = getattr(sm, name)
+        members = vars(found) if inspect.isclass(found) else {}
+        public = [getattr(found, key) for key in members if not key.startswith("_")]
+        for item in [found, *public]:
+            if inspect.isfunction(item) or inspect.isclass(item):
+                shown = str(inspect.signature(item))
+                for strange in ("<factory>", "<function", "<object", " object at", "0x", "<lambda"):
+                    assert strange not in shown, f"{name}: {shown}"
+
+
 def test_the_one_liner() -> None:
     code = "import selfmotion as sm; p = sm.plan(sm.sample_problem()); print(p.report.cost)"
     result = subprocess.run(

@@ -30,7 +30,7 @@ def test_remedies_name_options(text: str, options: str, said: str, tmp_path: Pat
 
 def test_remedies_for_arms_name_options(tmp_path: Path) -> None:
     line = complaint("plan", "ur5", "--circle", "0.05", "--task", "pose")
-    assert "take --task pointing or position, relax some with --relax" in line
+    assert "take another --task (position, pointing, planar), relax some" in line
     urdf = tmp_path / "two.urdf"
     parts = ['<link name="base"/>']
     for name in "ab":

@@ -1,14 +1,14 @@
 """The extended Jacobian: rows added to the task until it is square."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from selfmotion.baselines.base import Motion, along_rate
 from selfmotion.baselines.integration import PoseFeedback
-from selfmotion.baselines.local import pose_gradient
+from selfmotion.baselines.local import MANIPULABILITY, pose_gradient
 from selfmotion.basics import Array, BreakdownError
-from selfmotion.costs import Cost, Manipulability
+from selfmotion.costs import Cost
 from selfmotion.plans import Problem
 from selfmotion.robot import null_space
 
@@ -37,7 +37,7 @@ class ExtendedJacobian:
         κ [1/s]; 20 over the duration by default.
     """
 
-    criterion: Cost = field(default_factory=Manipulability)
+    criterion: Cost = MANIPULABILITY
     attraction: float | None = None
 
     def solve(self, problem: Problem) -> Motion:

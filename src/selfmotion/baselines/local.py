@@ -1,6 +1,6 @@
 """Methods that decide from the present pose alone: pseudo-inverse, gradient projection, damping."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +13,8 @@ from selfmotion.plans import Problem
 
 # Steps of the quadrature that compares gains, and cost evaluations of the search for the best.
 _STEPS, _TRIALS = 64, 16
+# The criterion that is followed where none is given.
+MANIPULABILITY = Manipulability()
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ class GradientProjection:
         k ≥ 0. By default the one that minimises the problem's costs: a search over k.
     """
 
-    criterion: Cost = field(default_factory=Manipulability)
+    criterion: Cost = MANIPULABILITY
     gain: float | None = None
 
     def __post_init__(self) -> None:

@@ -9,5 +9,14 @@ It may raise `KeyboardInterrupt` to stop the work, as the keyboard does.
 """
 
 
-def silent(stage: str, done: int, total: int) -> None:
-    """Tell nothing."""
+class _Silent:
+    """Tells nothing; an object, so that signatures show it as `silent`."""
+
+    def __call__(self, *told: object) -> None:
+        pass
+
+    def __repr__(self) -> str:
+        return "silent"
+
+
+silent = _Silent()

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import PlanError, SelfmotionError
+from selfmotion.basics import PlanError, SelfmotionError, silent
 from selfmotion.batch.folder import Folder, Row
 from selfmotion.batch.items import Item, problem_items
 from selfmotion.batch.worker import begin_process, plan_task
@@ -73,10 +73,6 @@ class Batch:
         return min(sound, key=lambda row: row.cost, default=None)
 
 
-def _unseen(progress: BatchProgress) -> None:
-    pass
-
-
 def plan_many(
     problems: Iterable[Problem | Job],
     executor: Executor | None = None,
@@ -84,7 +80,7 @@ def plan_many(
     out: str | Path,
     workers: int | None = None,
     replays: int = 0,
-    progress: Callable[[BatchProgress], object] = _unseen,
+    progress: Callable[[BatchProgress], object] = silent,
     **options: Any,
 ) -> Batch:
     """Plan many problems, each in one of several processes, into a folder.
@@ -134,7 +130,7 @@ def plan_items(
     out: str | Path,
     workers: int | None = None,
     replays: int = 0,
-    progress: Callable[[BatchProgress], object] = _unseen,
+    progress: Callable[[BatchProgress], object] = silent,
 ) -> Batch:
     """Plan items as `plan_many` plans problems."""
     folder = Folder(Path(out))

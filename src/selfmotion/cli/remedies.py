@@ -16,10 +16,7 @@ _WORDS = (
     ),
     (r"which needs a feed \[m/s\]; give it", "which needs --feed (m/s)"),
     (r"choose another task \('planar' for", "choose another --task (planar for"),
-    (
-        r"choose a task with fewer rows \('pointing', 'position'\)",
-        "take --task pointing or position",
-    ),
+    (r"choose a task with fewer rows \(", "take another --task ("),
 )
 # Such a message is about a key of the file, and advises what can be written there.
 _OF_PROBLEM_FILE = re.compile(r"^\S+\.(toml|json): ")

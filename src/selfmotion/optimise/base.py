@@ -1,14 +1,14 @@
 """What is minimised, what minimises it, and what comes of it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, read_only
 
 
 class Function(Protocol):
@@ -159,7 +159,10 @@ class Minimum:
     inverse_hessian: Array
     history: tuple[Iteration, ...]
     status: Status
-    multipliers: Array = field(default_factory=lambda: np.zeros(0))
+    multipliers: Array = ()  # type: ignore[assignment]  # made an array below
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "multipliers", read_only(self.multipliers))
 
 
 class Optimizer(Protocol):

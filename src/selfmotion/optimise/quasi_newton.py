@@ -1,6 +1,6 @@
 """The Broyden-family quasi-Newton method with Fletcher's switch; knows only x → (F, ∇F)."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from selfmotion.optimise.base import (
 from selfmotion.optimise.derivative import is_misleading
 from selfmotion.optimise.line_search import LineSearch
 from selfmotion.optimise.update import renewed
+
+_FLETCHER = LineSearch()
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class QuasiNewton:
     update: str = "fletcher"
     tolerance: float = 1e-8
     max_iterations: int = 200
-    line_search: LineSearch = field(default_factory=LineSearch)
+    line_search: LineSearch = _FLETCHER
     unbounded: float = 1e8
     initial_metric: str = "gauss-newton"
 

@@ -1,7 +1,7 @@
 """What to plan: an arm, a tool motion, the rows that count, and what to minimise."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, reduce
 from operator import and_
 from typing import Any
@@ -40,6 +40,9 @@ from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 
 # Links must not overlap; one object, so that its bodies are made once for each arm.
 NO_OVERLAP = Clearance(distance=0.0)
+# Defaults of a problem; values, meant to be shared.
+_REFINED, _SPEED = RefinedNullMotion(), (JointVelocity(),)
+_KEPT = (JointPositionLimits(), JointVelocityLimits(), JointAccelerationLimits(), JointJerkLimits())
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
 # A null motion that was found by a search fades in this share of the duration.
@@ -105,22 +108,20 @@ class Problem:
     ProblemError
         The arm cannot move in all the rows, two costs share a name, a cost, constraint or
         relaxation does not fit the arm, the path or the task.
+
+    Notes
+    -----
+    What it has besides its parameters and `certify` is what planners ask it, and may change with
+    them.
     """
 
     robot: RobotModel
     path: Path
     task: _TaskField = _TaskField()  # a descriptor, meant to be shared
     start: npt.ArrayLike | str | None = None
-    null_motion: NullMotion = field(default_factory=RefinedNullMotion)
-    costs: Sequence[Cost] = field(default_factory=lambda: (JointVelocity(),))
-    constraints: Sequence[Constraint] = field(
-        default_factory=lambda: (
-            JointPositionLimits(),
-            JointVelocityLimits(),
-            JointAccelerationLimits(),
-            JointJerkLimits(),
-        )
-    )
+    null_motion: NullMotion = _REFINED
+    costs: Sequence[Cost] = _SPEED
+    constraints: Sequence[Constraint] = _KEPT
     relaxations: Sequence[Relaxation] = ()
     damping: Damping | None = None
     collision: Clearance | None = NO_OVERLAP
@@ -315,11 +316,12 @@ class Problem:
                 f"all of them; choose another task ('planar' for a planar arm)"
             )
         if redundancy == 0 and not self.relaxations:
+            fewer = [x.value for x in Task if x.dimension < robot.dof and robot.can_follow(x)]
+            choice = f"choose a task with fewer rows ({', '.join(fewer)}), " if fewer else ""
             raise RedundancyError(
                 f"{robot.name}: {robot.dof} joints and task '{task.value}' with "
-                f"{task.dimension} rows leave no self-motion; choose a task with fewer rows "
-                f"('pointing', 'position'), relax some (relaxations=), or take an arm with more "
-                f"joints",
+                f"{task.dimension} rows leave no self-motion; {choice}relax some (relaxations=), "
+                f"or take an arm with more joints",
                 dof=robot.dof,
                 rows=task.dimension,
             )

@@ -107,9 +107,10 @@ class Replanner:
         latency = as_number(latency, "latency", least=0.0)
         as_number(reserve, "reserve", least=0.0, most=self.horizon)
         if not robot.can_follow(self.task):
+            able = [other.value for other in Task if robot.can_follow(other)]
             raise ProblemError(
                 f"{robot.name}: cannot move the tool in every row of task '{self.task.value}'; "
-                f"choose a task with fewer rows"
+                f"expected one of those that it can: {', '.join(able) or 'none'}"
             )
         for cost in costs:
             cost.check(robot, self.task)

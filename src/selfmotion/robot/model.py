@@ -75,7 +75,7 @@ class RobotModel:
     acceleration_limit: Array
     jerk_limit: Array
     touching: tuple[tuple[str, str], ...] = ()
-    _per_thread: threading.local = field(default_factory=threading.local, repr=False)
+    _per_thread: threading.local = field(default_factory=threading.local, init=False, repr=False)
 
     def __repr__(self) -> str:
         """Return one line: name, tool and joints."""
