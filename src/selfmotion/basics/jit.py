@@ -33,7 +33,10 @@ def kernel(function: _Function) -> _Function:
 
     The machine code is kept in numba's cache; where neither the package folder nor the user's
     cache folder can be written, each process compiles anew. Division follows NumPy (no error).
+    With NUMBA_DISABLE_JIT=1 kernels run as they are written, for a debugger.
     """
+    if numba.config.DISABLE_JIT:
+        return function
     try:
         compiled: _Function = numba.njit(cache=True, error_model="numpy")(function)
     except RuntimeError as error:
