@@ -15,7 +15,7 @@ _WORDS = (
         r"so that --\1 has no effect; drop it",
     ),
     (r"which needs a feed \[m/s\]; give it", "which needs --feed (m/s)"),
-    (r"choose another task \('planar' for", "choose another --task (planar for"),
+    (r"choose another task \(", "choose another --task ("),
     (r"choose a task with fewer rows \(", "take another --task ("),
 )
 # Such a message is about a key of the file, and advises what can be written there.

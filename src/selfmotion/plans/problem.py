@@ -12,7 +12,6 @@ import numpy.typing as npt
 from selfmotion.basics import (
     Array,
     ProblemError,
-    RedundancyError,
     StartError,
     as_flag,
     read_only,
@@ -33,6 +32,7 @@ from selfmotion.costs import Cost, JointVelocity, OffPath
 from selfmotion.motion import NullMotion, RefinedNullMotion, Trajectory, resting_window
 from selfmotion.path import Path, check_oriented
 from selfmotion.plans.path_scale import check_pace, check_units
+from selfmotion.plans.redundancy import check_redundancy
 from selfmotion.plans.relaxed_rows import check_relaxations
 from selfmotion.plans.rest import rest_orders
 from selfmotion.robot import RobotModel
@@ -142,7 +142,7 @@ class Problem:
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
             object.__setattr__(self, "start", None)
         object.__setattr__(self, "rest", as_flag(self.rest, "rest"))
-        self._check_rank()
+        check_redundancy(self.robot, self.task, bool(self.relaxations))
         check_units(self.robot, self.path)
         check_pace(self.robot, self.path)
         self._check_costs()
@@ -305,26 +305,6 @@ class Problem:
         """Whether the tool has to be on the path itself at its start and at its end."""
         pins = [(self.start is not None, False), *(item.pins for item in self.constraints)]
         return any(start for start, _ in pins), any(end for _, end in pins)
-
-    def _check_rank(self) -> None:
-        robot, task = self.robot, self.task
-        redundancy = robot.redundancy(task)
-        if not robot.can_follow(task):
-            raise ProblemError(
-                f"{robot.name}: task '{task.value}' prescribes {task.dimension} rows "
-                f"({', '.join(task.row_names)}), but the arm cannot move '{robot.tool}' freely in "
-                f"all of them; choose another task ('planar' for a planar arm)"
-            )
-        if redundancy == 0 and not self.relaxations:
-            fewer = [x.value for x in Task if x.dimension < robot.dof and robot.can_follow(x)]
-            choice = f"choose a task with fewer rows ({', '.join(fewer)}), " if fewer else ""
-            raise RedundancyError(
-                f"{robot.name}: {robot.dof} joints and task '{task.value}' with "
-                f"{task.dimension} rows leave no self-motion; {choice}relax some (relaxations=), "
-                f"or take an arm with more joints",
-                dof=robot.dof,
-                rows=task.dimension,
-            )
 
     def _check_costs(self) -> None:
         if not self.costs:
