@@ -93,6 +93,42 @@ def test_gradient_and_tangents_equal_central_differences(
     np.testing.assert_allclose(tangents.qd @ direction, expected, atol=1e-6 * scale)
 
 
+@pytest.mark.parametrize("free", [False, True])
+def test_the_metric_counts_the_path_error_of_a_damped_motion(free: bool) -> None:
+    """∫ Σ (∂y/∂x)ᵀ W (∂y/∂x) dt over q, q̇ and the error S e, by central differences of motions."""
+    objective = objective_with("pose", "a window", free=free, damped=True)
+    x = 0.01 * np.random.default_rng(7).normal(size=objective.size)
+    weights = objective.grid.sampling.weights
+
+    def motion(x: Array) -> list[Array]:
+        samples = objective.samples(x)
+        return [samples.qd.copy(), samples.q.copy(), samples.error.copy()]
+
+    ends = [[motion(x + sign * e) for sign in (1.0, -1.0)] for e in 1e-6 * np.eye(len(x))]
+    expected = np.zeros((len(x), len(x)))
+    for which, weight in enumerate((1.0, 1.0, 100.0)):
+        rows = np.stack([(a[which] - b[which]) / 2e-6 for a, b in ends], axis=2)
+        expected += weight * np.einsum("s,sid,sie->de", weights, rows, rows)
+    # To first order in the error, which damping makes a few degrees.
+    np.testing.assert_allclose(objective.metric(x), expected, atol=0.02 * np.abs(expected).max())
+
+
+def test_the_metric_bends_where_bands_hold() -> None:
+    """Besides the Gauss-Newton matrix |∂F/∂c|, for what is within a band and for nothing else."""
+    objective = objective_with("pose", "several", free=False, damped=False)
+    x = 0.02 * np.random.default_rng(8).normal(size=objective.size)
+    z, coefficients, c = objective.parts(x)
+    assert (len(z), len(coefficients) + len(c)) == (0, len(x))
+    weights, metric = objective.grid.sampling.weights, objective.metric(x)
+    tangents = objective._sensitivities(x)
+    plain = sum(np.einsum("s,sid,sie->de", weights, rows, rows) for rows in tangents)
+    extra = metric - plain
+    bent = np.abs(objective.gradient(x))[-len(c) :] * objective._deviation.banded
+    assert 0 < np.count_nonzero(bent) < len(c)
+    expected = np.diag(np.concatenate([np.zeros(len(coefficients)), bent]))
+    np.testing.assert_allclose(extra, expected, atol=1e-9 * np.abs(plain).max())
+
+
 @pytest.mark.parametrize("name", RELAXATIONS)
 def test_twist_is_the_derivative_of_the_displaced_pose(name: str) -> None:
     robot = robot_named("panda")

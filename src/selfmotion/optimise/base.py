@@ -201,13 +201,13 @@ def inverse_metric(metric: Array, floor: float = 1e-4) -> Array:
     """Return the inverse of a positive semidefinite matrix.
 
     Directions without curvature (coefficients that do not act, as in the over-specified joint
-    space) are given that of `floor` times the largest. A matrix that is not finite says nothing:
-    then it is the identity.
+    space) are given that of `floor` times the largest. A matrix that is not finite, or 0, says
+    nothing: then it is the identity.
     """
     if not len(metric):
         return metric
-    if not np.all(np.isfinite(metric)):
+    if not (np.all(np.isfinite(metric)) and np.any(metric)):
         return np.eye(len(metric))
     values, vectors = np.linalg.eigh(metric)
-    values = np.maximum(values, floor * max(values[-1], np.finfo(float).tiny))
+    values = np.maximum(values, max(floor * values[-1], np.finfo(float).tiny))
     return np.asarray((vectors / values) @ vectors.T)

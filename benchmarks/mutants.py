@@ -1,0 +1,311 @@
+"""Puts faults into the parts that all else stands on, and counts those that tests catch.
+
+`make mutants`: a sample, by a seed, of the mutants that cosmic-ray's operators make of the rollout,
+the kernels, the objective, the optimiser and the certificate. Each is judged by the tests of its
+part, in a process of its own, the cheapest first, until one fails. Survivors are told with what was
+changed. Those that change no result are listed in data/equivalent_mutants.toml with the reason, and
+are not counted.
+
+Left out, because every test or none would see them: decorators, annotations, and replacements that
+nobody writes for numbers (bits, shifts, remainders, identity).
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import importlib.abc
+import importlib.machinery
+import os
+import random
+import shlex
+import signal
+import sys
+import tempfile
+import time
+import tomllib
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from importlib.machinery import ModuleSpec
+from importlib.util import spec_from_file_location
+from pathlib import Path
+from typing import Annotated, NamedTuple, NoReturn
+
+import numba
+import pytest
+import typer
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator, operator_names
+from rich.console import Console
+from rich.table import Table
+
+HERE = Path(__file__).parent
+SOURCE = HERE.parent / "src" / "selfmotion"
+TESTS = HERE.parent / "tests"
+EQUIVALENT = HERE / "data" / "equivalent_mutants.toml"
+
+_BINARY = (
+    *("Add_Sub", "Add_Mul", "Sub_Add", "Sub_Mul", "Mul_Add", "Mul_Div", "Div_Mul", "Div_Sub"),
+    *("Pow_Mul", "Mod_Add", "FloorDiv_Mul", "BitAnd_BitOr", "BitOr_BitAnd"),
+)
+_COMPARISONS = (
+    *("Lt_LtE", "Lt_GtE", "LtE_Lt", "LtE_Gt", "Gt_GtE", "Gt_LtE", "GtE_Gt", "GtE_Lt"),
+    *("Eq_NotEq", "NotEq_Eq", "Is_IsNot", "IsNot_Is"),
+)
+OPERATORS = {
+    f"core/{name}"
+    for name in (
+        *("AddNot", "ReplaceAndWithOr", "ReplaceOrWithAnd", "NumberReplacer", "ExceptionReplacer"),
+        *("ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ZeroIterationForLoop"),
+        *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak"),
+        *(f"ReplaceUnaryOperator_Delete_{what}" for what in ("Not", "USub", "Invert")),
+        *(f"ReplaceBinaryOperator_{what}" for what in _BINARY),
+        *(f"ReplaceComparisonOperator_{what}" for what in _COMPARISONS),
+    )
+}
+
+
+class Part(NamedTuple):
+    """What is mutated, and the tests that judge it: arguments of pytest, the cheapest first."""
+
+    name: str
+    files: tuple[str, ...]
+    tests: tuple[str, ...]
+    compiled: bool = True
+
+
+PARTS = (
+    Part(
+        "rollout",
+        ("engine/rollout.py",),
+        (
+            "test_rollout.py",
+            "test_laws.py -k 'planar_3r or panda or breakdown'",
+            "test_damping.py",
+        ),
+    ),
+    Part(
+        "kernels",
+        ("kernels/*.py",),
+        (
+            "test_kernels.py",
+            "test_rollout.py",
+            "test_laws.py -k '(planar_3r or kinova) and not cost and not order'",
+            "test_damping.py -k planar_3r",
+        ),
+        compiled=False,
+    ),
+    Part(
+        "objective",
+        ("engine/objective.py", "engine/conditions.py"),
+        (
+            "test_conditions.py",
+            "test_constraints.py -k 'metric or equality or finite or rows'",
+            "test_relaxation.py -k 'metric or (equal_central and (several or window))'",
+            "test_laws.py -k 'gradient_equals and (planar_3r or panda-pose)'",
+            "test_damping.py -k gradient",
+        ),
+    ),
+    Part(
+        "optimiser",
+        ("optimise/*.py",),
+        ("test_optimiser_parts.py", "test_quasi_newton.py", "test_sqp.py"),
+    ),
+    Part(
+        "certificate",
+        ("certificate/*.py",),
+        (
+            "test_tool_limits.py",
+            "test_verdicts.py",
+            "test_clearance_proof.py",
+            "test_torques.py",
+            "test_rest.py -k 'refused or asked_for or rests_where'",
+            "test_constraints.py -k 'judged or refused or named or broken or one_side or reached'",
+            "test_certificate.py",
+        ),
+    ),
+)
+
+
+class Mutant(NamedTuple):
+    """One fault: where, by which operator, and the line before and after."""
+
+    part: str
+    file: str
+    operator: str
+    line: int
+    before: str
+    after: str
+    source: str
+
+
+def sample_of(part: Part, count: int, seed: int) -> tuple[list[Mutant], int]:
+    """Return `count` mutants of a part, by a seed, and how many there are in all."""
+    places = [
+        (file, name, occurrence)
+        for file in sorted(file for pattern in part.files for file in SOURCE.glob(pattern))
+        for name, occurrence in _places(file.read_text())
+    ]
+    chosen = random.Random(f"{part.name} {seed}").sample(places, min(count, len(places)))
+    return [_mutant(part, *place) for place in sorted(chosen)], len(places)
+
+
+def _places(text: str) -> Iterator[tuple[str, int]]:
+    """Return what operators can do to a file: their names, and the number of the place."""
+    nodes, noise = list(ast_nodes(get_ast(text))), _noise(text)
+    for name in sorted(OPERATORS & set(operator_names())):
+        operator = get_operator(name)()
+        places = (start for node in nodes for start, _ in operator.mutation_positions(node))
+        for occurrence, start in enumerate(places):
+            if not any(first <= start < last for first, last in noise):
+                yield name, occurrence
+
+
+def _noise(text: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """Return where decorators and annotations are, and stars between parameters."""
+    found: list[ast.AST] = []
+    for node in ast.walk(ast.parse(text)):
+        found += getattr(node, "decorator_list", [])
+        found += [
+            x for x in (getattr(node, "annotation", None), getattr(node, "returns", None)) if x
+        ]
+    lines = list(enumerate(text.splitlines(), start=1))
+    stars = [((k, 0), (k, len(line))) for k, line in lines if line.strip() == "*,"]
+    return [((x.lineno, x.col_offset), (x.end_lineno, x.end_col_offset)) for x in found] + stars
+
+
+def _mutant(part: Part, file: Path, operator: str, occurrence: int) -> Mutant:
+    text = file.read_text()
+    source = str(mutate_code(text, get_operator(operator)(), occurrence))
+    pairs = list(zip(text.splitlines(), source.splitlines(), strict=False))
+    row = next(k for k, (before, after) in enumerate(pairs) if before != after)
+    before, after = (" ".join(line.split()) for line in pairs[row])
+    name = file.relative_to(SOURCE).as_posix()
+    return Mutant(part.name, name, operator.split("/")[1], row + 1, before, after, source)
+
+
+class _Instead(importlib.abc.MetaPathFinder):
+    """Imports a module of ours from another source than its file's."""
+
+    def __init__(self, mutant: Mutant) -> None:
+        self._file, self._source = SOURCE / mutant.file, mutant.source
+        self._name = "selfmotion." + mutant.file.removesuffix(".py").replace("/", ".")
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        if name != self._name:
+            return None
+        loader = importlib.machinery.SourceFileLoader(name, str(self._file))
+        # Without its time no compiled file is looked for, and none written.
+        loader.path_stats = self._no_stats  # type: ignore[method-assign]
+        loader.get_data = self._data  # type: ignore[method-assign]
+        return spec_from_file_location(name, self._file, loader=loader)
+
+    def _no_stats(self, path: str) -> Mapping[str, float]:
+        raise OSError
+
+    def _data(self, path: str) -> bytes:
+        return self._source.encode()
+
+
+def fails(part: Part, tests: str, mutant: Mutant | None, patience: float, log: Path) -> str:
+    """Return why tests fail on a mutant, "" where they pass; in a process of their own."""
+    child = os.fork()
+    if child == 0:
+        _test(part, tests, mutant, log)
+    ends = time.monotonic() + patience
+    while time.monotonic() < ends:
+        pid, status = os.waitpid(child, os.WNOHANG)
+        if pid:
+            return "" if status == 0 else "a test fails"
+        time.sleep(0.01)
+    os.killpg(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return "no end"
+
+
+def _test(part: Part, tests: str, mutant: Mutant | None, log: Path) -> NoReturn:
+    """Run tests in this process, and end it."""
+    os.setpgrp()
+    with log.open("w") as out:
+        os.dup2(out.fileno(), 1)
+        os.dup2(out.fileno(), 2)
+    if mutant is not None:
+        sys.meta_path.insert(0, _Instead(mutant))
+    given = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", f"--rootdir={TESTS.parent}"]
+    if not part.compiled:
+        # Kernels as they are written: faults compile slowly. NumPy's scalars warn, kernels do not.
+        numba.config.DISABLE_JIT = True
+        given += ["-W", "ignore::RuntimeWarning"]
+    file, *options = shlex.split(tests)
+    code = 1
+    try:
+        code = int(pytest.main([str(TESTS / file), *options, *given]))
+    finally:
+        sys.stdout.flush()
+        os._exit(min(code, 127))
+
+
+def equivalent() -> dict[tuple[str, str, str], str]:
+    """Return the reasons of mutants that change no result, by file and line before and after."""
+    entries = tomllib.loads(EQUIVALENT.read_text())["mutant"]
+    return {(x["file"], x["before"], x["after"]): x["reason"] for x in entries}
+
+
+def main(
+    count: Annotated[int, typer.Option(help="Mutants of each part.")] = 55,
+    seed: Annotated[int, typer.Option(help="Of the sample.")] = 0,
+    part: Annotated[list[str] | None, typer.Option(help="Only these parts.")] = None,
+) -> None:
+    """Mutate, test, and tell what survives."""
+    console = Console(soft_wrap=True, markup=False, highlight=False)
+    parts, reasons = [x for x in PARTS if not part or x.name in part], equivalent()
+    table = Table("part", "mutants", "sample", "caught", "survived", "equivalent", "score")
+    totals = Counter[str]()
+    _warm()
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "log"
+        for one in parts:
+            patience = {}
+            for tests in one.tests:
+                began = time.monotonic()
+                if fails(one, tests, None, 600.0, log):
+                    sys.exit(f"{tests} fails on the code as it is:\n{log.read_text()}")
+                patience[tests] = 10.0 + 5.0 * (time.monotonic() - began)
+            sample, of_all = sample_of(one, count, seed)
+            ends = Counter[str]()
+            for mutant in sample:
+                reason = reasons.get((mutant.file, mutant.before, mutant.after))
+                if reason is not None:
+                    ends["equivalent"] += 1
+                    continue
+                is_caught = any(fails(one, x, mutant, patience[x], log) for x in one.tests)
+                ends["caught" if is_caught else "survived"] += 1
+                if not is_caught:
+                    console.print(f"{mutant.file}:{mutant.line} {mutant.operator}")
+                    console.print(f"    - {mutant.before}\n    + {mutant.after}")
+            table.add_row(*_row(one.name, of_all, ends))
+            totals += ends + Counter(all=of_all)
+    table.add_row(*_row("all", totals.pop("all"), totals))
+    console.print(f"seed {seed}", table, sep="\n")
+
+
+def _row(name: str, of_all: int, ends: Counter[str]) -> list[str]:
+    judged = ends["caught"] + ends["survived"]
+    share = f"{100.0 * ends['caught'] / max(judged, 1):.0f} %"
+    numbers = (of_all, ends.total(), ends["caught"], ends["survived"], ends["equivalent"])
+    return [name, *map(str, numbers), share]
+
+
+def _warm() -> None:
+    """Import what others made once for all processes, and ours in each anew."""
+    os.chdir(TESTS.parent)
+    sys.path.insert(0, str(TESTS))
+    for name in ("conftest", "scipy.optimize", "scipy.interpolate", "daqp", "selfmotion.testing"):
+        importlib.import_module(name)
+    for name in [x for x in sys.modules if x.split(".")[0] in ("selfmotion", "conftest")]:
+        del sys.modules[name]
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,320 @@
+"""Laws of the optimiser's parts: each by itself, on numbers that can be followed by hand."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics.arrays import Array
+from selfmotion.optimise import Residuals, SequentialQuadratic, Status
+from selfmotion.optimise.base import inverse_metric
+from selfmotion.optimise.derivative import is_misleading
+from selfmotion.optimise.penalty import IGNORED, ExactPenalty, Point
+from selfmotion.optimise.quadratic import minimize_quadratic
+from selfmotion.optimise.restoration import restored
+from selfmotion.optimise.step import AIM, Step, best_step
+from selfmotion.optimise.update import renewed
+from test_sqp import Constrained
+
+X, STEP = np.array([1.0, -2.0]), np.array([0.5, 0.25])
+
+
+def residuals(h: list[float], tolerance: float = 1.0, equalities: int = 0) -> Residuals:
+    count = len(h)
+    return Residuals(np.array(h), np.full(count, tolerance), np.arange(count) >= count - equalities)
+
+
+def point(cost: float, *h: float) -> Point:
+    return Point(X, cost, residuals(list(h)))
+
+
+@pytest.mark.parametrize("share", [-1.0, 0.0, 0.3, 0.49, 0.51, 1.0, 1.9, 2.1, 10.0])
+def test_a_gradient_misleads_where_it_is_wrong_by_more_than_a_factor_of_two(share: float) -> None:
+    gradient = np.array([3.0, 1.0])
+    curved = 40.0
+
+    def value(x: Array) -> float:
+        s = x - X
+        return 5.0 + float(gradient @ s) + curved * float(s @ s)
+
+    claimed = float(gradient @ STEP) / share if share else 1e9
+    assert is_misleading(value, X, 5.0, STEP, claimed) is not (0.5 <= share <= 2.0)
+
+
+@pytest.mark.parametrize(("cost", "slope", "says"), [(1e9, -1e-3, False), (1e9, -1e5, True)])
+def test_what_rounding_hides_does_not_mislead(cost: float, slope: float, says: bool) -> None:
+    """Of a constant; and nothing is said where F is infinite nearby."""
+    assert is_misleading(lambda x: cost, X, cost, STEP, slope) is says
+    assert not is_misleading(lambda x: np.inf if x[0] > 1.0 else cost, X, cost, STEP, slope)
+    # A difference counts from a thousand roundings on.
+    least = 1e3 * np.finfo(float).eps * cost / 1e-4
+    assert is_misleading(lambda x: cost, X, cost, STEP, 1.01 * least)
+    assert not is_misleading(lambda x: cost, X, cost, STEP, 0.99 * least)
+
+
+def test_the_line_search_has_fletchers_constants() -> None:
+    assert sm.LineSearch() == sm.LineSearch(rho=0.01, sigma=0.9, tau1=9.0, tau2=0.1, tau3=0.5)
+
+
+@pytest.mark.parametrize("tau1", [2.0, 9.0])
+def test_bracketing_goes_tau1_times_as_far_while_the_slope_stays(tau1: float) -> None:
+    tried: list[float] = []
+
+    def value(a: float) -> float:
+        tried.append(a)
+        return -a
+
+    found = sm.LineSearch(tau1=tau1).search(
+        value, lambda a: -1.0, 0.0, -1.0, first=1.0, longest=1e3, more=lambda: True
+    )
+    assert found == (1e3, -1e3)
+    advances = np.diff([0.0, *tried])[:-1]
+    np.testing.assert_allclose(advances[1:] / advances[:-1], tau1)
+
+
+@pytest.mark.parametrize(("tau2", "tau3"), [(0.1, 0.5), (0.2, 0.3)])
+def test_sectioning_keeps_away_from_the_ends_of_the_bracket(tau2: float, tau3: float) -> None:
+    """Towards a minimum at either end: φ is least at 1e-3 or at 0.999 of the first step."""
+    for least in (1e-3, 0.999):
+        tried: list[float] = []
+
+        def value(a: float, least: float = least, tried: list[float] = tried) -> float:
+            tried.append(a)
+            return np.inf if a >= 1.0 else (a - least) ** 2
+
+        sm.LineSearch(sigma=0.1, tau2=tau2, tau3=tau3).search(
+            value,
+            lambda a, least=least: 2.0 * (a - least),
+            least**2,
+            -2.0 * least,
+            first=1.0,
+            longest=10.0,
+            more=lambda: True,
+        )
+        # Beside an infinite value the shortest step that is allowed.
+        assert tried[:2] == [1.0, pytest.approx(tau2)]
+        assert tried[2] <= (1.0 - tau3) * tried[1] if least < tau2 else tried[2] > tried[1]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_penalty_makes_a_step_worth_its_cost(seed: int) -> None:
+    """gain + π fall ≥ 0.3 π fall, with equality where that is what raised π; π never falls."""
+    rng = np.random.default_rng(seed)
+    penalty, before = ExactPenalty(), 0.0
+    for _ in range(5):
+        here = point(1.0, *rng.uniform(1.0, 5.0, 3))
+        left, gain = rng.uniform(0.0, here.at.worst - 0.2), rng.normal()
+        step = Step(STEP, np.zeros(3), gain, left, relaxed=True)
+        penalty.raise_for(here, step)
+        fall = here.excess - max(left - IGNORED, 0.0)
+        assert gain + penalty.weight * fall >= 0.3 * penalty.weight * fall - 1e-12
+        if penalty.weight > before:
+            assert gain + penalty.weight * fall == pytest.approx(0.3 * penalty.weight * fall)
+        assert penalty.weight >= before
+        before = penalty.weight
+
+
+def test_the_penalty_is_above_the_multipliers_sum_where_steps_are_not_relaxed() -> None:
+    here = Point(X, 1.0, Residuals(np.array([0.5, -3.0]), np.array([2.0, 0.5]), np.zeros(2) > 0))
+    prices, penalty = np.array([3.0, -4.0]), ExactPenalty()
+    penalty.raise_for(here, Step(STEP, prices, 1.0, 0.0, relaxed=True))
+    assert penalty.weight == 0.0
+    penalty.raise_for(here, Step(STEP, prices, 1.0, 0.0, relaxed=False))
+    assert penalty.weight == pytest.approx(1.2 * (3.0 * 2.0 + 4.0 * 0.5))
+
+
+def test_a_steps_share_is_its_fall_by_the_expected_one() -> None:
+    penalty = ExactPenalty()
+    penalty.weight = 2.0
+    here, step = point(10.0, 3.0), Step(STEP, np.zeros(1), 4.0, 1.85, relaxed=True)
+    # Expected: 4 of F, and 2 (2.15 - 1) of the penalty.
+    assert penalty.share(here, point(7.0, 2.85), step) == pytest.approx((3.0 + 2.0 * 0.15) / 6.3)
+    assert penalty.share(here, None, step) == -np.inf
+    useless = Step(STEP, np.zeros(1), -2.3, 1.85, relaxed=True)
+    assert penalty.share(here, point(7.0, 2.85), useless) == -np.inf
+
+
+def test_of_two_points_the_cheaper_or_the_less_violated_is_better() -> None:
+    cheap, dear, bad, worse = point(1.0, 1.0), point(2.0, 0.5), point(0.0, 1.1), point(-1.0, 2.0)
+    order = [cheap, dear, bad, worse]
+    for i, first in enumerate(order):
+        for j, second in enumerate(order):
+            assert first.better(second) is (i < j) or first is dear or second is dear
+    assert cheap.better(dear)
+    assert not dear.better(cheap)
+    assert dear.better(bad)
+    assert [p.kept for p in order] == [True, True, False, False]
+    assert bad.excess == pytest.approx(1.1 - IGNORED)
+    assert point(0.0, 0.5).excess == 0.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_conditions_out_of_reach_are_brought_as_near_as_a_tenth_more_than_possible(
+    sign: float,
+) -> None:
+    """An equality on either side: of 10, a region of 1 takes out 1; nine tenths of it are taken."""
+    at, rows = residuals([sign * 10.0], equalities=1), np.array([[1.0, 0.0]])
+    step = best_step(np.zeros(2), np.eye(2), at, rows, 1.0)
+    assert step.relaxed
+    assert step.worst == pytest.approx(9.1, abs=0.01)
+    np.testing.assert_allclose(step.p, [-sign * 0.9, 0.0], atol=0.01)
+    assert step.gain == pytest.approx(-0.5 * step.p @ step.p)
+
+
+def test_an_inequality_out_of_reach_is_relaxed_alone() -> None:
+    at, rows = residuals([10.0, -0.5]), np.array([[1.0, 0.0], [0.0, 1.0]])
+    step = best_step(np.array([0.0, -10.0]), np.eye(2), at, rows, 1.0)
+    assert step.relaxed
+    assert step.worst == pytest.approx(9.1, abs=0.01)
+    # The other one may use what the first one has to be given.
+    assert step.p[1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_equalities_that_repeat_each_other_do_not_contradict(sign: float) -> None:
+    """Met to a thousandth of their tolerance, as two rows of one condition may need."""
+    rows = np.array([[1.0, 0.0], [1.0, 0.0]])
+    for apart, relaxed in ((1.8e-3, False), (2.2e-3, True)):
+        at = residuals([sign * 0.3, sign * (0.3 + apart)], equalities=2)
+        assert best_step(np.zeros(2), np.eye(2), at, rows, 5.0).relaxed is relaxed
+
+
+def test_inequalities_are_met_within_the_share_that_is_aimed_at() -> None:
+    at, rows = residuals([-1.0, -50.0], 0.1), np.array([[1.0, 0.0], [0.0, 1.0]])
+    step = best_step(np.array([-3.0, -4.0]), np.eye(2), at, rows, 20.0)
+    np.testing.assert_allclose(step.p, [1.0 + AIM * 0.1, 4.0])
+    np.testing.assert_allclose(step.multipliers, [3.0 - step.p[0], 0.0], atol=1e-9)
+    assert step.gain == pytest.approx(3.0 * step.p[0] + 16.0 - 0.5 * (step.p[0] ** 2 + 16.0))
+    assert step.worst == pytest.approx(AIM)
+    assert not step.relaxed
+
+
+def test_a_step_of_nothing_tells_what_is_violated() -> None:
+    for h, relaxed in (([0.5, -3.0], False), ([1.5, -3.0], True)):
+        step = best_step(np.zeros(0), np.zeros((0, 0)), residuals(h), np.zeros((2, 0)), 1.0)
+        assert step.worst == max(h)
+        assert step.relaxed is relaxed
+        assert (step.gain, len(step.p), step.multipliers.tolist()) == (0.0, 0, [0.0, 0.0])
+
+
+def test_rows_of_any_size_are_kept() -> None:
+    """Scaled by their largest entry, but for rows of nothing; and multipliers go with rows."""
+    for size in (1e-90, 1e-6, 1.0, 1e6):
+        rows = size * np.array([[1.0, 1.0], [0.0, 0.0]])
+        upper = np.array([size, 1.0])
+        found = minimize_quadratic(
+            np.eye(2), -2.0 * np.ones(2), rows, np.full(2, -np.inf), upper, np.full(2, np.inf)
+        )
+        assert found is not None
+        np.testing.assert_allclose(found[0], 0.5)
+        np.testing.assert_allclose(found[1] * size, [1.5, 0.0])
+    rows = np.array([[0.0, 0.0]])
+    lower, upper = np.array([1.0]), np.array([2.0])
+    assert minimize_quadratic(np.eye(2), X, rows, lower, upper, np.ones(2)) is None
+
+
+@pytest.mark.parametrize("update", ["bfgs", "dfp"])
+def test_an_update_is_its_duals_inverse(update: str) -> None:
+    """DFP of H is BFGS of H⁻¹ with s and y exchanged, and the other way round."""
+    rng = np.random.default_rng(0)
+    factor, s = rng.normal(size=(4, 4)), rng.normal(size=4)
+    h = factor @ factor.T + 0.1 * np.eye(4)
+    y = np.linalg.solve(h, s) + 0.1 * rng.normal(size=4)
+    dual = {"bfgs": "dfp", "dfp": "bfgs"}[update]
+    there, name = renewed(h, s, y, update)
+    assert name == update
+    back, _ = renewed(np.linalg.inv(h), y, s, dual)
+    np.testing.assert_allclose(there, np.linalg.inv(back), rtol=1e-8)
+
+
+def test_little_curvature_is_enough_and_none_is_not() -> None:
+    """A share of 1e-14 of |s| |y| is rounding."""
+    s = np.array([2.0, 0.0])
+    for share, name in ((3e-14, "bfgs"), (3e-15, "none"), (-1.0, "none")):
+        y = np.array([5.0 * share, 5.0])
+        assert renewed(np.eye(2), s, y, "bfgs")[1] == name
+
+
+def test_directions_without_curvature_get_a_share_of_the_largest() -> None:
+    basis = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    metric = (basis * [4.0, 1.0, 0.0]) @ basis.T
+    expected = (basis * [0.25, 1.0, 1.0 / (4.0 * 1e-4)]) @ basis.T
+    np.testing.assert_allclose(inverse_metric(metric), expected, rtol=1e-9)
+    assert inverse_metric(np.zeros((0, 0))).shape == (0, 0)
+    np.testing.assert_array_equal(inverse_metric(np.full((2, 2), np.nan)), np.eye(2))
+    np.testing.assert_array_equal(inverse_metric(np.zeros((2, 2))), np.eye(2))
+    assert np.all(np.isfinite(inverse_metric(np.diag([1e-320, 0.0]))))
+
+
+def test_a_residual_is_measured_in_its_tolerance() -> None:
+    at = Residuals(
+        np.array([-4.0, 3.0, -2.0]), np.array([1.0, 2.0, 0.5]), np.array([False, False, True])
+    )
+    np.testing.assert_array_equal(at.excess, [-4.0, 1.5, 4.0])
+    assert at.worst == 4.0
+    assert residuals([-1.0]).worst == 0.0
+    assert residuals([]).worst == 0.0
+
+
+def bowl(equalities: int = 0) -> Constrained:
+    """Return ½ |x|² + 3 where x₀ ≥ 1, or = 1."""
+    return Constrained(
+        lambda x: 0.5 * float(x @ x) + 3.0,
+        lambda x: x,
+        lambda x: np.array([1.0 - x[0]]),
+        lambda x: np.array([[-1.0, 0.0]]),
+        equalities,
+    )
+
+
+@pytest.mark.parametrize("inverse", [np.diag([1.0, -1e-18]), np.diag([1.0, 0.0])])
+def test_estimates_that_rounding_made_indefinite_are_used(inverse: Array) -> None:
+    found = SequentialQuadratic().minimize(bowl(), np.array([3.0, 0.0]), inverse)
+    assert found.status is Status.CONVERGED
+    np.testing.assert_allclose(found.x, [1.0, 0.0], atol=1e-5)
+    assert np.all(np.isfinite(found.inverse_hessian))
+
+
+@pytest.mark.parametrize("equalities", [0, 1])
+def test_a_restoration_ends_near_the_conditions_and_tells_f_alone(equalities: int) -> None:
+    """The penalty weighs ten times F at the start: ½ |x|² + 3 + w (1 - x₀)² is least near 1."""
+    function, told = bowl(equalities), list[sm.Iteration]()
+    start = np.array([-1.0, 2.0])
+    x, status = restored(function, start, 1.0, np.inf, lambda step: told.append(step))
+    assert status is None
+    # w (1 - x₀)² = 10 F = 55 at the start, x₀ = -1: 13.75.
+    assert x[0] == pytest.approx(27.5 / 28.5, abs=1e-3)
+    assert x[1] == pytest.approx(0.0, abs=0.02)
+    for step in told:
+        assert step.cost == pytest.approx(function.value(step.x))
+
+
+@pytest.mark.parametrize("limit", [1, 2])
+def test_a_restoration_ends_with_the_evaluations(limit: int) -> None:
+    function = bowl()
+    _, status = restored(function, np.array([-1.0, 2.0]), 1.0, limit, lambda step: None)
+    assert status is Status.MAX_EVALUATIONS
+    assert function.evaluations <= limit + 1
+
+
+def test_a_restoration_stops_when_it_is_asked_to() -> None:
+    _, status = restored(bowl(), np.array([-1.0, 2.0]), 1.0, np.inf, lambda step: True)
+    assert status is Status.STOPPED
+
+
+def test_the_multiplier_and_the_estimate_are_those_of_the_unscaled_problem() -> None:
+    """F = ½ (x - c)ᵀ G (x - c) on x₀ = 0: λ = -∂F/∂x₀, and the curvature left is G's."""
+    g, c = np.diag([100.0, 0.01]), np.array([1.0, 2.0])
+    function = Constrained(
+        lambda x: 0.5 * float((x - c) @ g @ (x - c)) + 1.0,
+        lambda x: g @ (x - c),
+        lambda x: np.array([x[0]]),
+        lambda x: np.array([[1.0, 0.0]]),
+        1,
+    )
+    function.metric = lambda x: g  # type: ignore[method-assign]
+    found = SequentialQuadratic(tolerance=1e-12).minimize(function, np.array([0.3, -3.0]))
+    assert found.status is Status.CONVERGED
+    np.testing.assert_allclose(found.x, [0.0, 2.0], atol=1e-5)
+    assert found.multipliers[0] == pytest.approx(100.0, rel=1e-4)
+    np.testing.assert_allclose(found.inverse_hessian, np.linalg.inv(g), rtol=1e-3, atol=1e-6)
+    assert function.evaluations <= 4
