@@ -23,9 +23,12 @@ def test_a_breakdown_has_the_time_of_the_first_number_that_is_not_finite(
     stage = len(times) - 1 if last else 13
     epsilon = np.zeros((len(times), robot.dof))
     assert rollout.run(start, epsilon) is None
+    assert rollout.jacobian_evaluations == len(times)
     for broken in (np.nan, np.inf):
         epsilon[stage, 0] = broken
+        before = rollout.jacobian_evaluations
         assert rollout.run(start, epsilon) == times[stage]
+        assert rollout.jacobian_evaluations == before + stage + 1
 
 
 @pytest.mark.parametrize(("name", "task"), [("panda", "pointing"), ("ur5", "pointing")])
@@ -59,7 +62,9 @@ def test_polishing_leaves_the_run_as_it_is(panda: sm.RobotModel) -> None:
     rollout = Rollout(panda, path, sm.Task.POSE, Grid.aligned(path.knots, 8))
     assert rollout.run(start, 0.1 * np.ones((33, 7))) is None
     before, drift = rollout.samples().q.copy(), rollout.drift
+    counted = rollout.jacobian_evaluations
     _, q, _ = rollout.polished()
+    assert rollout.jacobian_evaluations == counted + len(q)
     assert not np.array_equal(q, before[rollout.grid.node_stages])
     np.testing.assert_array_equal(rollout.samples().q, before)
     np.testing.assert_array_equal(rollout.drift, drift)

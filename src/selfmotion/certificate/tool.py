@@ -54,8 +54,9 @@ class ToolMotion(Requirement):
         share = worst.share**0.5
         (what, unit), limit = TOOL_RATES[worst.column], self.limit[worst.column]
         slower = share if worst.column < 2 else share**0.5
+        size = share * limit if share > 0.0 else 0.0  # there may be no limit on what is 0
         text = (
-            f"the tool '{self.robot.tool}' has a {what} of {share * limit:.4g} {unit} at t = "
+            f"the tool '{self.robot.tool}' has a {what} of {size:.4g} {unit} at t = "
             f"{worst.time:.3f} s, {share:.5g} times its limit: give it {slower:.5g} times the "
             f"duration"
         )

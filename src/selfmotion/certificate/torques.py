@@ -41,8 +41,9 @@ class JointTorques(Requirement):
             return too_far(self.name, motion)
         share, time, joint = worst
         name = motion.robot.joint_names[joint]
+        torque = share * self.limit[joint] if share > 0.0 else 0.0  # 0 may have no limit
         text = (
-            f"joint '{name}' needs {share * self.limit[joint]:.4g} Nm or N at t = {time:.3f} s, "
+            f"joint '{name}' needs {torque:.4g} Nm or N at t = {time:.3f} s, "
             f"{share:.5g} times its limit of {self.limit[joint]:.4g}"
         )
         return Finding(self.name, name, time, share, 1.0, bool(share <= 1.0), text)

@@ -1,0 +1,485 @@
+"""Laws of the certificate's parts: each by itself, on motions whose extremes are known."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from conftest import PANDA_HOME, robot_named
+from selfmotion.basics.arrays import Array
+from selfmotion.certificate import AtRest, ClosedMotion, EndState, JointLimits
+from selfmotion.certificate.apart import KeepsApart, closest_at_all_times
+from selfmotion.certificate.band import CoordinateBand
+from selfmotion.certificate.check import _because, _damped_stretches
+from selfmotion.certificate.deviation import _turns, deviation_from, deviation_size, excess
+from selfmotion.certificate.interpolation import stencil
+from selfmotion.certificate.path_error import bound_errors
+from selfmotion.certificate.shares import largest_share, too_far
+from selfmotion.certificate.tool import ToolMotion
+from selfmotion.collision import Closest
+from selfmotion.task import DampingLaw
+
+ROUNDING = 1e-12
+
+
+def rotation(rng: np.random.Generator, size: float = 1.5) -> Array:
+    return np.asarray(pin.exp3(rng.uniform(-size, size, 3)))
+
+
+def motion_of(
+    q: Array | list[list[float]], qd: Array | list[list[float]], t: list[float] | None = None
+) -> sm.FinishedMotion:
+    """Return a motion of the planar arm, by default in 1 s steps."""
+    robot = robot_named("planar_3r")
+    times = [float(k) for k in range(len(q))] if t is None else t
+    return sm.FinishedMotion(robot, sm.Trajectory(times, q, qd, robot.joint_names))
+
+
+# --- deviation from the path
+
+
+@pytest.mark.parametrize("count", [5, 9])
+def test_polynomials_are_known_from_their_points(count: int) -> None:
+    """Of as high a degree as the points determine, and of no higher one."""
+    shares, predict, between, dense = stencil(count)
+    assert (between[0], between[-1], len(between)) == (0.0, 1.0, 33)
+    np.testing.assert_allclose(np.diff(between), 1.0 / 32.0)
+    half = (count - 1) // 2
+    np.testing.assert_allclose(predict @ shares[::2] ** half, shares[1::2] ** half, atol=ROUNDING)
+    full = shares ** (count - 1)
+    np.testing.assert_allclose(dense @ full, between ** (count - 1), atol=ROUNDING)
+    missed = predict @ shares[::2] ** (half + 1) - shares[1::2] ** (half + 1)
+    assert np.abs(missed).max() > 1e-4
+
+
+@pytest.mark.parametrize("in_tool_axes", [False, True])
+@pytest.mark.parametrize("task", list(sm.Task))
+def test_the_deviation_is_that_of_the_poses(task: sm.Task, in_tool_axes: bool) -> None:
+    """Against Pinocchio's logarithm; the tool's axis alone by the turn between two vectors."""
+    panda, rng = robot_named("panda"), np.random.default_rng(1)
+    lower, upper = panda.finite_limits()
+    q = rng.uniform(lower, upper, (6, 7))
+    targets = [(rotation(rng) @ panda.pose(x).rotation, rng.normal(size=3)) for x in q]
+    turns, places = (np.array(part) for part in zip(*targets, strict=True))
+    path: Any = SimpleNamespace(
+        samples=lambda t: SimpleNamespace(rotation=turns, translation=places)
+    )
+    found = deviation_from(panda, path, task, np.zeros(6), q, in_tool_axes)
+    for k, configuration in enumerate(q):
+        pose = panda.pose(configuration)
+        miss = (pose.translation - places[k]) * np.isin(range(3), task.rows)
+        expected = turns[k].T @ miss if in_tool_axes else miss
+        np.testing.assert_allclose(found[k, :3], expected, atol=ROUNDING)
+        relative = turns[k].T @ pose.rotation
+        turn = np.zeros(3)
+        if task.tool_axes:
+            axis = relative[:, 2]
+            normal = np.cross([0.0, 0.0, 1.0], axis)
+            turn = normal / np.linalg.norm(normal) * np.arccos(axis[2])
+        elif np.any(task.rows >= 3):
+            turn = pin.log3(relative)
+        np.testing.assert_allclose(found[k, 3:], turn, atol=1e-9)
+
+
+@pytest.mark.parametrize("task", ["pose", "pointing"])
+def test_half_a_turn_and_none_are_what_they_are(task: str) -> None:
+    half = np.diag([1.0, -1.0, -1.0])
+    actual = np.array([half, np.eye(3)])
+    found = _turns(sm.Task.of(task), np.tile(np.eye(3), (2, 1, 1)), actual)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=1), [np.pi, 0.0])
+
+
+def test_what_is_relaxed_is_taken_off_its_rows_in_its_window() -> None:
+    item = sm.Relaxation(("x", "y"), 0.5, during=(1.0, 2.0))
+    deviation = np.tile([3.0, 4.0, 7.0, 0.1, 0.2, 0.3], (6, 1))
+    deviation[4] *= 0.1
+    deviation[5, :2] = 0.0
+    t = np.array([0.5, 1.0, 2.0, 2.5, 1.5, 1.5])
+    size = deviation_size(item, 3.0, t, deviation)
+    np.testing.assert_allclose(size, [0.0, 5.0, 5.0, 0.0, 0.5, 0.0])
+    beyond = excess([item], 3.0, t, deviation)
+    expected = deviation.copy()
+    expected[1:3, :2] *= 0.9
+    expected[4:, :2] = 0.0
+    np.testing.assert_allclose(beyond, expected)
+
+
+def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:
+    """A tool at rest, and a path that swings beside it between the trajectory's two samples."""
+    robot = robot_named("planar_3r")
+    q = robot.dexterous_configuration("planar")
+    pose = robot.pose(q)
+
+    class Swinging(sm.Path):
+        """Sideways by a tenth of a millimetre, most at 0.8 s."""
+
+        duration = 1.0
+        knots = np.array([0.0, 1.0])
+
+        def evaluate(self, t: Array) -> sm.PathSamples:
+            swing = 1e-4 * np.exp(-((t - 0.8) ** 2) / 0.02)
+            twist = np.outer(-swing * 100.0 * (t - 0.8), np.eye(6)[1])
+            places = pose.translation + np.outer(swing, [0.0, 1.0, 0.0])
+            return sm.PathSamples(t, places, np.tile(pose.rotation, (len(t), 1, 1)), twist)
+
+    trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 3)), robot.joint_names)
+
+    def check(tolerance: float, *relaxed: sm.Relaxation) -> Any:
+        given = sm.Tolerance(tolerance, 1e-6)
+        return bound_errors(robot, Swinging(), sm.Task.PLANAR, trajectory, given, relaxed)
+
+    for tolerance in (1.001e-4, 1e-4 / 1.001):
+        found = check(tolerance)
+        assert 1e-4 - 1e-9 <= found.position.value <= 1.03e-4
+        assert found.position.time == pytest.approx(0.8, abs=0.05)
+        assert found.position.name == "tool"
+        assert (found.rotation.value, found.undecided) == (0.0, ())
+    settled = check(1.001e-4)
+    assert settled.position.value <= 1.001e-4
+    within = check(5.05e-5, sm.Relaxation("y", 5e-5, during=(0.5, 1.0)))
+    assert 5e-5 - 1e-9 <= within.position.value <= 5.1e-5
+    assert within.deviations[0].value == pytest.approx(1e-4, rel=0.03)
+    assert (within.deviations[0].name, within.undecided) == ("(y)", ())
+    outside = check(1e-6, sm.Relaxation("y", 1e-3, during=(0.0, 0.5)))
+    # So far beyond the tolerance nothing has to be known more closely.
+    assert 1e-4 - 1e-9 <= outside.position.value <= 1.2e-4
+    # One pose less per interval than is looked at, and the last one.
+    assert check(1.0).samples == 9
+
+
+# --- limits of joints
+
+
+def test_margins_are_those_of_the_nearest_side() -> None:
+    """A cubic from 0 to 0 with speeds ± 4 reaches 1 in the middle."""
+    motion = motion_of([[0.0, 0.2, 0.0]] * 2, [[4.0, 0.0, -4.0], [-4.0, 0.0, 4.0]])
+    infinite = np.full(3, np.inf)
+    for lower, upper, joint, amount, time in (
+        (-infinite, np.array([1.5, 1.0, np.inf]), 0, 0.5, 0.5),
+        (-infinite, np.array([0.75, 1.0, np.inf]), 0, -0.25, 0.5),
+        (np.array([-np.inf, -np.inf, -0.9]), infinite, 2, -0.1, 0.5),
+        (np.array([-0.3, -0.05, -9.0]), np.array([9.0, 0.3, 9.0]), 1, 0.1, 0.0),
+    ):
+        found = JointLimits(0, lower, upper).judge(motion)
+        assert found.subject == motion.robot.joint_names[joint]
+        assert (found.amount, found.allowed) == (pytest.approx(amount), 0.0)
+        assert found.kept is (amount >= 0.0)
+        assert found.time == pytest.approx(time)
+        assert f"is {-amount:.3g} beyond its limit" in found.text
+    kept = JointLimits(0, np.array([0.0, 0.0, -1.0]), np.array([1.0, 1.0, 0.0])).judge(motion)
+    assert (kept.kept, kept.amount) == (True, pytest.approx(0.0, abs=ROUNDING))
+
+
+@pytest.mark.parametrize(("order", "longer"), [(1, 2.0), (2, 2.0**0.5), (3, 2.0 ** (1.0 / 3.0))])
+def test_shares_of_rates_say_how_much_longer_it_takes(order: int, longer: float) -> None:
+    """From rest to rest by 1 in 1 s: 1.5 of speed, 6 of acceleration, 12 of jerk at most."""
+    most = {1: 1.5, 2: 6.0, 3: 12.0}[order]
+    motion = motion_of([[0.0] * 3, [0.0, -1.0, 0.0]], np.zeros((2, 3)))
+    limit = np.array([1e-3, 0.5 * most, np.inf])
+    limits = JointLimits(order, -limit, limit)
+    found = limits.judge(motion)
+    assert (found.subject, found.allowed, found.kept) == (motion.robot.joint_names[1], 1.0, False)
+    assert found.amount == pytest.approx(2.0)
+    assert f"{found.amount:.5g} times its limit" in found.text
+    assert f"give it {longer:.5g} times the duration" in found.text
+    known = ("speeds", "accelerations", "jerks")[order - 1]
+    assert limits.covers == ((known,) if order == 1 else ())
+    exact = JointLimits(order, np.full(3, -most), np.full(3, most))
+    assert exact.covers == (known,)
+    assert exact.judge(motion).amount == pytest.approx(1.0)
+    one_sided = JointLimits(order, np.full(3, -0.5 * most), np.full(3, 9.0 * most)).judge(motion)
+    # The jerk of such a motion has one sign.
+    assert one_sided.amount == pytest.approx(2.0 if order < 3 else 1.0 / 9.0)
+
+
+def test_a_jump_of_acceleration_breaks_any_limit_of_jerk() -> None:
+    """Two cubics from rest to rest: from -6 to 6 at the middle sample."""
+    motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], np.zeros((3, 3)))
+    wide = np.full(3, 1e3)
+    found = JointLimits(3, -wide, wide).judge(motion)
+    assert (found.kept, found.subject, found.time) == (False, motion.robot.joint_names[0], 1.0)
+    assert found.amount == pytest.approx(12.0 / (1e-6 * 1e3))
+    assert "jumps by 12" in found.text
+    assert JointLimits(3, -1e8 * wide, 1e8 * wide).judge(motion).kept
+
+
+@pytest.mark.parametrize(
+    ("order", "lower", "upper"),
+    [
+        (4, -1.0, 1.0),
+        (0, 1.0, -1.0),
+        (0, np.nan, 1.0),
+        (1, 0.0, 1.0),
+        (1, -1.0, 0.0),
+        (2, 0.5, 1.0),
+    ],
+)
+def test_limits_that_cannot_be_kept_are_refused(order: int, lower: float, upper: float) -> None:
+    with pytest.raises(sm.ProblemError, match="expected"):
+        JointLimits(order, np.full(3, lower), np.full(3, upper))
+    assert JointLimits(0, np.zeros(3), np.zeros(3)).order == 0
+    with pytest.raises(sm.ProblemError, match="expected"):
+        JointLimits(0, np.zeros(3), np.ones(2))
+
+
+# --- ends
+
+
+@pytest.mark.parametrize("miss", [0.9e-6, 1.1e-6, -1.1e-6])
+def test_ends_are_judged_to_a_micrometre(miss: float) -> None:
+    rest = np.zeros((2, 3))
+    q = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])
+    motion, kept = motion_of(q, rest), abs(miss) <= 1e-6
+    off = np.array([0.0, miss, 0.0])
+    cases: list[tuple[sm.Requirement, sm.FinishedMotion, float]] = [
+        (EndState(0, q[1] + off), motion, 1.0),
+        (EndState(0, q[0] + off, at_start=True), motion, 0.0),
+        (EndState(1, off), motion, 1.0),
+        (EndState(1, off, at_start=True), motion, 0.0),
+        (AtRest(True, True), motion_of(q, [off, 0.0 * off]), 0.0),
+        (AtRest(False, True), motion_of(q, [9.0 * np.ones(3), off]), 1.0),
+        (AtRest(True, False), motion_of(q, [off, 9.0 * np.ones(3)]), 0.0),
+        (ClosedMotion(False), motion_of([q[0], q[0] + off], [off, 9.0 * np.ones(3)]), 1.0),
+        (ClosedMotion(True), motion_of([q[0], q[0]], [q[0], q[0] + off]), 1.0),
+    ]
+    for requirement, given, time in cases:
+        found = requirement.judge(given)
+        assert found.kept is kept, requirement
+        assert (found.subject, found.time) == (given.robot.joint_names[1], time)
+        assert (found.amount, found.allowed) == (pytest.approx(abs(miss), rel=1e-6), 1e-6)
+        assert f"{'ends' if time else 'starts'}" in found.text
+    given = motion_of([q[0], q[0] + 1e-3], [q[0], q[0]])
+    assert "away from the start" in ClosedMotion(True).judge(given).text
+
+
+def test_end_accelerations_are_judged_less_closely() -> None:
+    motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0]], np.zeros((2, 3)))
+    for miss, kept in ((0.9e-4, True), (1.1e-4, False)):
+        found = EndState(2, np.array([-6.0, miss, 0.0])).judge(motion)
+        assert (found.kept, found.allowed) == (kept, 1e-4)
+        assert "with an acceleration" in found.text
+    assert EndState(2, np.array([6.0, 0.0, 0.0]), at_start=True).judge(motion).kept
+
+
+def test_rest_covers_the_ends_that_it_is_asked_for() -> None:
+    assert AtRest(True, True).covers == ("rest at both ends",)
+    assert AtRest(True, False).covers == ("rest at the start",)
+    assert AtRest(False, True).covers == ("rest at the end",)
+
+
+# --- distances
+
+
+class Bodies:
+    """Pairs of bodies whose distances are given functions of q, with one lever on all joints."""
+
+    open_meshes = overlapping = disabled = obstacles = ()
+    checks_links = True
+
+    def __init__(self, *distances: Callable[[Array], Array], lever: float = 1.0) -> None:
+        self._given, self._lever, self.asked = distances, lever, 0
+        self.pairs = tuple((f"first{k}", f"second{k}") for k in range(len(distances)))
+
+    def pair_levers_up_to(self, farthest: Array) -> Array:
+        return np.full((len(self.pairs), len(farthest)), self._lever)
+
+    def distances(self, q: Array, below: Array) -> Array:
+        self.asked += len(q)
+        exact = np.stack([given(q) for given in self._given], axis=1)
+        # As GJK does: beyond what matters, any number that is not smaller.
+        return np.where(exact < below, exact, np.maximum(below, exact - 0.01))
+
+    def worst(self, q: Array) -> Closest:
+        if not self.pairs:
+            return Closest(np.inf, "", "")
+        exact = np.stack([given(q) for given in self._given], axis=1)
+        row, pair = np.unravel_index(int(np.argmin(exact)), exact.shape)
+        return Closest(float(exact[row, pair]), *self.pairs[pair], int(row))
+
+    def distance(self, q: Array) -> Closest:
+        return self.worst(q[None])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_closest_approach_is_found_wherever_it_is(seed: int) -> None:
+    """Dips as narrow as levers allow, at times that nothing looks at by itself."""
+    rng = np.random.default_rng(seed)
+    motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
+    place, depth = rng.uniform(0.0, 3.0), rng.uniform(0.01, 0.2)
+    bodies = Bodies(
+        lambda q: np.full(len(q), 0.35), lambda q: depth + np.minimum(np.abs(q[:, 0] - place), 0.3)
+    )
+    found = closest_at_all_times(bodies, motion.trajectory, 0.0)  # type: ignore[arg-type]
+    assert depth <= found.closest.value <= depth + max(0.021 * depth, 1e-4)
+    assert found.names == "first1 - second1"
+    assert found.time == pytest.approx(place / 3.0, abs=0.01)
+    assert found.open_until is None
+    assert bodies.asked < 3000
+    for distance, kept in ((0.999 * depth, True), (1.001 * depth, False)):
+        judged = KeepsApart(bodies, distance).judge(motion)  # type: ignore[arg-type]
+        assert judged.kept is kept
+        assert (judged.subject, judged.allowed) == ("first1 - second1", distance)
+
+
+def test_a_distance_that_is_grazed_is_undecided_and_said_to_be() -> None:
+    motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
+    bodies = Bodies(lambda q: 0.1 + np.minimum(np.abs(q[:, 0] - 1.0), 0.3), lever=2.0)
+    judged = KeepsApart(bodies, 0.1).judge(motion)  # type: ignore[arg-type]
+    assert not judged.kept
+    assert "is not decided" in judged.text
+    assert judged.time == pytest.approx(1.0 / 3.0, abs=1e-3)
+
+
+def test_nothing_to_be_near_to_is_far_enough() -> None:
+    motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
+    found = KeepsApart(Bodies(), 0.1).judge(motion)  # type: ignore[arg-type]
+    assert (found.kept, found.subject, found.amount) == (True, "nothing", np.inf)
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [(0.05, "too near already: first0 - second0 are 50.00 mm"), (-0.01, "overlap by 10.00 mm")],
+)
+def test_a_start_that_is_too_near_is_told(value: float, words: str) -> None:
+    motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
+    bodies = Bodies(lambda q: np.full(len(q), value))
+    assert words in KeepsApart(bodies, 0.1).judge(motion).text  # type: ignore[arg-type]
+    assert words not in KeepsApart(bodies, -1.0).judge(motion).text  # type: ignore[arg-type]
+
+
+# --- shares of limits
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("most", [0.5, 0.99, 0.9999, 1.0001, 1.01, 3.0])
+def test_the_largest_share_is_bounded_and_hardly_more(most: float, sign: float) -> None:
+    """Of forces that swing ten times, with a peak between all samples."""
+    motion = motion_of([[0.0] * 3, [0.0, 6.2, 0.0]], [[0.0, 6.2, 0.0]] * 2).trajectory
+
+    def shares(q: Array, qd: Array, qdd: Array) -> Array:
+        swing = sign * most * np.cos(10.0 * (q[:, 1] - 2.345)) * np.exp(-((q[:, 1] - 2.345) ** 2))
+        return np.stack([0.0 * swing, swing], axis=1)
+
+    found = largest_share(motion, shares)
+    assert found is not None
+    assert most - ROUNDING <= found.share <= 1.05 * most
+    assert (found.share <= 1.0) is (most <= 1.0)
+    assert found.column == 1
+    assert motion(np.array([found.time]))[0, 1] == pytest.approx(2.345, abs=0.05)
+
+
+def test_rates_are_seen_on_both_sides_of_a_sample() -> None:
+    """Accelerations jump there: from -6 to 6."""
+    motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], np.zeros((3, 3))).trajectory
+    for sign in (1.0, -1.0):
+        found = largest_share(motion, lambda q, qd, qdd, sign=sign: np.maximum(sign * qdd, 0.0))
+        assert found is not None
+        assert found.share == pytest.approx(6.0, rel=1e-3)
+
+
+def test_what_is_not_a_number_is_no_share() -> None:
+    motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0]], np.zeros((2, 3))).trajectory
+    found = largest_share(motion, lambda q, qd, qdd: np.where(q > 0.99, np.nan, 0.1))
+    assert found is not None
+    assert not found.share <= 1.0
+
+
+def test_joints_that_go_too_far_are_not_looked_at() -> None:
+    far = motion_of([[0.0] * 3, [0.0, 1e6, 3.0]], np.zeros((2, 3)))
+    assert largest_share(far.trajectory, lambda *state: state[0]) is None
+    found = too_far("it", far)
+    assert (found.kept, found.subject) == (False, far.robot.joint_names[1])
+    assert "travels 1e+06 rad" in found.text
+
+
+def test_a_band_is_half_its_width_from_its_middle() -> None:
+    robot = robot_named("planar_3r")
+    name = robot.joint_names[1]
+    motion = motion_of([[0.0, 0.2, 0.0], [0.0, 0.5, 0.0]], [[0.0, 0.3, 0.0]] * 2)
+    for center, half, share in ((0.1, 0.5, 0.8), (0.1, 0.3, 4.0 / 3.0), (0.7, 1.0, 0.5)):
+        found = CoordinateBand(robot, sm.JointCoordinate(name), center, half).judge(motion)
+        assert found.amount == pytest.approx(share, rel=1e-3)
+        assert found.kept is (share <= 1.0)
+        assert f"expected {center - half:.4g} to {center + half:.4g}" in found.text
+
+
+@pytest.mark.parametrize("column", range(4))
+def test_the_tools_rates_are_told_with_the_time_they_take(column: int) -> None:
+    """The stretched arm turning about its base at 2 rad/s: ω r, ω, ω² r, and no turn faster."""
+    robot = robot_named("planar_3r")
+    reach = float(np.linalg.norm(robot.pose(np.zeros(3)).translation[:2]))
+    motion = motion_of([[0.0] * 3, [2.0, 0.0, 0.0]], [[2.0, 0.0, 0.0]] * 2)
+    rates = [2.0 * reach, 2.0, 4.0 * reach, 0.0]
+    limit = np.full(4, np.inf)
+    limit[column] = rates[column] / 4.0 if column < 3 else 1.0
+    requirement = ToolMotion(robot, limit)
+    found = requirement.judge(motion)
+    names = ("speed", "turn rate", "acceleration", "turn acceleration")
+    assert requirement.covers == (f"tool {names[column]}",)
+    assert found.amount == pytest.approx(4.0 if column < 3 else 0.0, rel=1e-3, abs=1e-6)
+    assert found.kept is (column == 3)
+    if column < 3:
+        longer = found.amount if column < 2 else found.amount**0.5
+        assert f"a {names[column]} of {found.amount * limit[column]:.4g}" in found.text
+        assert f"give it {longer:.5g} times the duration" in found.text
+
+
+# --- the words of the verdict
+
+
+def test_where_damping_acts_is_told_stretch_by_stretch() -> None:
+    law, t = DampingLaw(0.2, 0.1), np.arange(8.0)
+    singular = np.array([0.1, 0.3, 0.3, 0.15, 0.05, 0.2, 0.3, 0.1])
+    damped = _damped_stretches(law, t, singular)
+    assert [(x.start, x.end, x.singular_value) for x in damped] == [
+        (0.0, 0.0, 0.1),
+        (3.0, 4.0, 0.05),
+        (7.0, 7.0, 0.1),
+    ]
+    np.testing.assert_allclose([x.factor for x in damped], law.factor(np.array([0.1, 0.05, 0.1])))
+    assert _damped_stretches(law, t, np.full(8, 0.2)) == ()
+    for time, words in (
+        (0.0, "where"),
+        (1.0, "after"),
+        (3.0, "where"),
+        (4.0, "where"),
+        (5.0, "after"),
+    ):
+        last = damped[0] if time < 3.0 else damped[1]
+        assert _because(time, damped) == f", {words} damping was active, {last}"
+    assert _because(2.0, damped[1:]) == ""
+
+
+def test_a_verdict_names_each_fault_and_what_was_looked_at() -> None:
+    """Off the path in place and angle, too short, with limits: and nothing of that when kept."""
+    robot = robot_named("panda")
+    pose = robot.pose(PANDA_HOME)
+    still = sm.Waypoints.from_poses([0.0, 1.0], [pose, pose])
+    motion = sm.Trajectory([0.0, 1.0], [PANDA_HOME] * 2, np.zeros((2, 7)), robot.joint_names)
+    good = sm.certify(robot, still, "pose", motion)
+    assert good.verified
+    assert good.on_path
+    assert good.closure == 0.0
+    assert "verified at all times (path, joint limits, speeds)" in good.verdict
+    assert good.not_checked == ("accelerations", "self-collision")
+    aside = pose.copy()
+    aside.translation = pose.translation + np.array([0.0, 3e-6, 4e-6])
+    aside.rotation = pose.rotation @ pin.exp3(np.array([0.0, 0.0, 2e-6]))
+    beside = sm.Waypoints.from_poses([0.0, 2.0], [aside, aside])
+    bad = sm.certify(robot, beside, "pose", motion)
+    assert bad.position_error.value == pytest.approx(5e-6, rel=1e-3)
+    assert bad.rotation_error.value == pytest.approx(2e-6, rel=1e-3)
+    assert len(bad.failures) == 3
+    for words in ("5.00e-06 m off", "2.00e-06 rad off", "lasts 1 s, the path 2 s"):
+        assert words in bad.verdict
+    for tolerance, kept in ((sm.Tolerance(6e-6, 1e-6), False), (sm.Tolerance(6e-6, 3e-6), True)):
+        assert sm.certify(robot, beside, "pose", motion, tolerance).on_path is kept
+    moved = motion.q + np.outer([0.0, 1.0], [0.0, 0.3, 0.0, -0.1, 0.0, 0.0, 0.0])
+    gone = sm.Trajectory([0.0, 1.0], moved, np.zeros((2, 7)), robot.joint_names)
+    assert sm.certify(robot, still, "pose", gone).closure == pytest.approx(0.3)
+    ended = sm.certify(robot, still, "pose", motion, ending="it stops here")
+    assert ended.failures == ("it stops here",)
