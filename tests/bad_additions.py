@@ -42,6 +42,7 @@ def addition_rows() -> list[Row]:
         *_constraint_rows(),
         *_planning_rows(),
         *_limit_file_rows(),
+        *_replanner_rows(),
     ]
 
 
@@ -282,6 +283,47 @@ def _planning_rows() -> list[Row]:
             area,
             "fastest() of an arm without known accelerations",
             lambda _: sm.fastest(sm.sample_problem()),
+        ),
+    ]
+
+
+def _replanner_rows() -> list[Row]:
+    area, arm = "While the arm moves", robot_named("panda")
+    others = {"1": 1, "'fast'": "fast", "None": None}
+    asked = {"[ToolLimits]": [sm.ToolLimits(speed=1.0)], "[1]": [1], **others}
+    state = {"None": None, "'home'": "home", "of six joints": PANDA_HOME[:6], "NaN": [NAN] * 7}
+
+    def stepped(**given: Any) -> object:
+        first = {"t": 0.0, "q": PANDA_HOME, "qd": np.zeros(7), "path": line(), **given}
+        return sm.Replanner(arm).step(**first)
+
+    return [
+        *bad_values_of(
+            area,
+            "Replanner",
+            sound(sm.Replanner, robot=arm),
+            robot={"'panda'": "panda", "None": None},
+            task={"3": 3, "'poses'": "poses"},
+            costs={"[1]": [1], **others},
+            constraints=asked,
+            null_motion={"3": 3, "'cubic'": "cubic"},
+            approach={"3": 3, "'slow'": "slow"},
+            horizon=POSITIVE,
+            cycle=POSITIVE,
+            settling=POSITIVE,
+            period={"0": 0, "5 s of a horizon of 2 s": 5.0},
+            reserve={"-1": -1, "NaN": NAN, "9": 9.0},
+            steps={"1": 1, "2.5": 2.5, "None": None},
+            latency={"-1": -1, "NaN": NAN},
+            patience={"-1": -1, "NaN": NAN},
+        ),
+        *bad_values_of(
+            area, "replanner.step", sound(stepped), t={"NaN": NAN, "None": None}, q=state, qd=state
+        ),
+        Row(
+            area,
+            "a replanner of a planar arm for a full pose",
+            lambda _: sm.Replanner(robot_named("planar_3r")),
         ),
     ]
 

@@ -31,6 +31,7 @@ from selfmotion.basics.inputs import (
     as_flag,
     as_number,
     as_numbers,
+    as_several,
     as_whole,
     random_numbers,
 )
@@ -62,6 +63,7 @@ __all__ = [
     "as_number",
     "as_numbers",
     "as_path",
+    "as_several",
     "as_whole",
     "inlined",
     "is_known",

@@ -53,6 +53,13 @@ def plain_numbers(values: Any) -> Array | None:
     return np.asarray(array, dtype=np.float64) if array.dtype.kind in "iuf" else None
 
 
+def is_ragged(values: Any) -> bool:
+    """Return whether it is a list of lists of which some are longer than others."""
+    rows = values if isinstance(values, list | tuple) else ()
+    lengths = {len(row) for row in rows if isinstance(row, list | tuple | np.ndarray)}
+    return len(lengths) > 1
+
+
 def shown(value: Any) -> str:
     """Return what a message says of a value: short, on one line."""
     if isinstance(value, type):

@@ -1,11 +1,14 @@
 """What users give, made into numbers, or refused in one sentence that says what was given."""
 
-from typing import Any
+from inspect import isabstract
+from typing import Any, TypeVar
 
 import numpy as np
 
-from selfmotion.basics.arrays import Array, plain_numbers, read_only, shown
+from selfmotion.basics.arrays import Array, is_ragged, plain_numbers, read_only, shown
 from selfmotion.basics.errors import ProblemError
+
+_Kind = TypeVar("_Kind")
 
 
 def as_numbers(
@@ -36,6 +39,8 @@ def as_numbers(
     array = plain_numbers(values)
     if array is None or (shape is not None and array.shape != shape):
         found = "" if array is None or array.size <= 1 else f" of shape {array.shape}"
+        if array is None and is_ragged(values):
+            found = ", whose rows have different lengths"
         raise error(f"{what} is {shown(values)}{found}, expected {expected}")
     bad = np.argwhere(~np.isfinite(array))
     if len(bad):
@@ -111,6 +116,24 @@ def as_choice(
         names = ", ".join(f"'{choice}'" for choice in choices)
         raise error(f"{what} is {shown(value)}, expected one of: {names}")
     return value
+
+
+def as_several(items: Any, name: str, kind: type[_Kind]) -> tuple[_Kind, ...]:
+    """Return one item or several of a kind as a tuple; ProblemError for anything else."""
+    listed = (items,) if isinstance(items, kind) else items
+    if not isinstance(listed, list | tuple):
+        raise ProblemError(f"{name} are {shown(items)}, expected a list of {name}")
+    for item in listed:
+        if not isinstance(item, kind):
+            remedy = (
+                f"is no {kind.__name__}; derive a class of your own from "
+                f"selfmotion.{kind.__name__}, which says what it has to give"
+                if isabstract(kind)
+                else f"expected a {kind.__name__}"
+            )
+            parted = " " if isabstract(kind) else ", "
+            raise ProblemError(f"{name}: {shown(item)}{parted}{remedy}")
+    return tuple(listed)
 
 
 def random_numbers(rng: Any) -> np.random.Generator:

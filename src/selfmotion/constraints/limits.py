@@ -45,7 +45,7 @@ class JointPositionLimits(Constraint):
 
     def __post_init__(self) -> None:
         _check_margin(self.margin)
-        as_flag(self.replace, "replace")
+        as_flag(self.replace, f"{type(self).__name__}: replace")
 
     def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
@@ -117,7 +117,7 @@ class _MakersLimits(_RateLimits):
 
     def __post_init__(self) -> None:
         _check_margin(self.margin)
-        as_flag(self.replace, "replace")
+        as_flag(self.replace, f"{type(self).__name__}: replace")
 
     @abstractmethod
     def published(self, robot: RobotModel) -> Array:
@@ -158,7 +158,7 @@ class JointVelocityLimits(_RateLimits):
 
     def __post_init__(self) -> None:
         _check_margin(self.margin)
-        as_flag(self.replace, "replace")
+        as_flag(self.replace, f"{type(self).__name__}: replace")
 
     def of(self, robot: RobotModel) -> Array:
         """Return the limits for an arm, (n,) [rad/s or m/s]."""

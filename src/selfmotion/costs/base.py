@@ -81,7 +81,9 @@ def as_weight(weight: float | npt.ArrayLike, name: str) -> Array:
         raise ProblemError(f"cost '{name}': weight is not a symmetric matrix")
     smallest = np.linalg.eigvalsh(array)[0] if array.ndim == 2 else array.min()
     if smallest < -1e-12:
-        raise ProblemError(f"cost '{name}': weight has the negative value {smallest}")
+        raise ProblemError(
+            f"cost '{name}': weight has the negative value {smallest}, expected none below 0"
+        )
     return array
 
 

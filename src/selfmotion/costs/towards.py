@@ -39,7 +39,10 @@ class Towards(Cost):
     def __post_init__(self) -> None:
         check_name(self.name)
         if not isinstance(self.robot, RobotModel):
-            raise ProblemError(f"cost '{self.name}': robot is {shown(self.robot)}, expected an arm")
+            raise ProblemError(
+                f"cost '{self.name}': robot is {shown(self.robot)}, expected a "
+                f"RobotModel (load_robot)"
+            )
         if not isinstance(self.coordinate, Coordinate):
             raise ProblemError(
                 f"cost '{self.name}': coordinate is {shown(self.coordinate)}, expected a "

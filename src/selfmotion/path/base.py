@@ -109,7 +109,7 @@ class Path(Saved, ABC, family="path"):
         slack = _TIME_SLACK * self.duration
         if not (np.all(times >= -slack) and np.all(times <= self.duration + slack)):
             raise PathError(
-                f"time {times.min()}..{times.max()} s is outside the path, 0..{self.duration} s"
+                f"{_said(times)} s is outside the path, which lasts from 0 to {self.duration:.6g} s"
             )
         return self.evaluate(np.clip(times, 0.0, self.duration))
 
@@ -251,3 +251,8 @@ def rotvecs(turns: Array) -> Array:
 
     rotations = Rotation.from_quat(turns, scalar_first=True)
     return np.asarray((rotations[:-1].inv() * rotations[1:]).as_rotvec())
+
+
+def _said(times: Array) -> str:
+    low, high = f"{np.min(times):.6g}", f"{np.max(times):.6g}"
+    return f"time {low}" if low == high else f"times {low} to {high}"

@@ -80,8 +80,8 @@ class Polyline(Path, kind="polyline"):
         still = np.flatnonzero(lasts <= _SAME)
         if still.size:
             raise PathError(
-                f"polyline: poses {still[0]} and {still[0] + 1} are the same; leave one out, or "
-                f"join two polylines with a Dwell"
+                f"polyline: poses[{still[0]}] and poses[{still[0] + 1}] are the same; leave one "
+                f"out, or join two polylines with a Dwell"
             )
         self._times = read_only(np.append(0.0, np.cumsum(lasts)))
         self.duration = float(self._times[-1])
@@ -161,8 +161,8 @@ class Polyline(Path, kind="polyline"):
         back = np.flatnonzero(middle < 1e-6)
         if back.size:
             raise PathError(
-                f"polyline: in pose {back[0]} the tool turns straight back; end one polyline there "
-                f"and begin another: Feed(first, …) + Feed(second, …)"
+                f"polyline: at poses[{back[0]}] the tool turns straight back; end one polyline "
+                f"there and begin another: Feed(first, …) + Feed(second, …)"
             )
 
     def evaluate(self, t: Array) -> PathSamples:

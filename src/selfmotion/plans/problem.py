@@ -14,6 +14,7 @@ from selfmotion.basics import (
     ProblemError,
     StartError,
     as_flag,
+    as_several,
     read_only,
     shown,
 )
@@ -134,7 +135,7 @@ class Problem:
                     f"{name} is {shown(getattr(self, name))}, expected a {_EXAMPLES[name]}"
                 )
         for name, each in _SEQUENCES.items():
-            object.__setattr__(self, name, _sequence(getattr(self, name), name, each))
+            object.__setattr__(self, name, as_several(getattr(self, name), name, each))
         check_oriented(self.path, self.task)
         check_relaxations(self.relaxations, self.path, self.task)
         if isinstance(self.start, str):
@@ -364,17 +365,3 @@ def _fade(s: Array) -> Array:
     """Return a function of s (S,) that rises smoothly from 0 to 1 and stays there."""
     u = np.minimum(s / _FADE, 1.0)
     return np.asarray(u * u * (3.0 - 2.0 * u))
-
-
-def _sequence(items: Any, name: str, kind: type) -> tuple[Any, ...]:
-    """Return one item or several as a tuple; ProblemError for anything else."""
-    listed = (items,) if isinstance(items, kind) else items
-    if not isinstance(listed, list | tuple):
-        raise ProblemError(f"{name} are {shown(items)}, expected a list of {name}")
-    for item in listed:
-        if not isinstance(item, kind):
-            raise ProblemError(
-                f"{name}: {shown(item)} is no {kind.__name__}; derive a class of your own from "
-                f"selfmotion.{kind.__name__}, which says what it has to give"
-            )
-    return tuple(listed)

@@ -36,7 +36,7 @@ def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
         if not isinstance(item, _KEPT):
             names = ", ".join(kind.__name__ for kind in _KEPT)
             raise ProblemError(
-                f"constraint {type(item).__name__} is not kept while moving; expected of {names}"
+                f"constraint {type(item).__name__} is not kept while moving, expected: {names}"
             )
     kinds = {type(item) for item in constraints}
     # Where none are given, those of the arm and its maker.

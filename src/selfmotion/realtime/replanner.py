@@ -13,6 +13,7 @@ from selfmotion.costs import Cost, JointVelocity
 from selfmotion.motion import NullMotion, PolynomialNullMotion
 from selfmotion.path import Path, PathSamples
 from selfmotion.realtime import law
+from selfmotion.realtime.arguments import as_asked, as_begun, as_measured, check_kinds
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.horizon import Horizon, in_null_space
 from selfmotion.realtime.limits import joint_limits, planned_limits, stoppable
@@ -98,6 +99,7 @@ class Replanner:
         patience: float = 0.2,
         approach: Approach | None = None,
     ) -> None:
+        check_kinds(robot, null_motion, approach)
         self.robot, self.task = robot, Task.of(task)
         self.horizon = as_number(horizon, "horizon", above=0.0)
         self.cycle = as_number(cycle, "cycle", above=0.0)
@@ -106,14 +108,7 @@ class Replanner:
         self._settling = as_number(settling, "settling", above=0.0)
         latency = as_number(latency, "latency", least=0.0)
         as_number(reserve, "reserve", least=0.0, most=self.horizon)
-        if not robot.can_follow(self.task):
-            able = [other.value for other in Task if robot.can_follow(other)]
-            raise ProblemError(
-                f"{robot.name}: cannot move the tool in every row of task '{self.task.value}'; "
-                f"expected one of those that it can: {', '.join(able) or 'none'}"
-            )
-        for cost in costs:
-            cost.check(robot, self.task)
+        costs, constraints = as_asked(robot, self.task, costs, constraints)
         limits = joint_limits(robot, constraints)
         self.limits = limits
         self._inner = np.vstack([tightened(limits), np.zeros(robot.dof)])
@@ -201,7 +196,7 @@ class Replanner:
             `t` lies before the last step, or an obstacle is not known.
         """
         with one_blas_thread():
-            return self._step(float(t), q, qd, path, obstacles or {})
+            return self._step(as_number(t, "t"), q, qd, path, obstacles or {})
 
     def _step(
         self,
@@ -211,9 +206,10 @@ class Replanner:
         path: Path,
         obstacles: Mapping[str, pin.SE3],
     ) -> Segment:
-        q, qd = np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64)
+        dof = self.robot.dof
         if not self._begun:
-            self._begin(t, q, qd)
+            self._begin(t, as_begun(q, "q", dof), as_begun(qd, "qd", dof))
+        q, qd = as_measured(q, dof), as_measured(qd, dof)
         t, passed = self._go_on(t)
         reasons: list[str] = []
         if self._around is not None:
@@ -237,7 +233,6 @@ class Replanner:
         return self._segment(t, end, flag, reasons, follows, error)
 
     def _begin(self, t: float, q: Array, qd: Array) -> None:
-        q, qd = self.robot.configuration(q), self.robot.configuration(qd)
         c = stoppable(self.robot, self._inner, q, qd, self.cycle)
         self._states[:] = 0.0
         self._states[:, 0], self._states[0, 1] = c, qd

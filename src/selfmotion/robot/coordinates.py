@@ -1,6 +1,7 @@
 """Numbers that tell how an arm stands: a joint, the place of a link, the swivel of the elbow."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 # An elbow nearer than this share of the arm to the line from shoulder to wrist has no swivel, and a
 # reference nearer than this to the line gives it no zero.
 _STRAIGHT = 1e-9
+# Names that a message lists at most.
+_FEW = 12
 
 
 class Coordinate(Saved, ABC, family="coordinate"):
@@ -73,7 +76,7 @@ class JointCoordinate(Coordinate):
         if self.joint not in robot.joint_names:
             raise ProblemError(
                 f"{robot.name}: no joint '{self.joint}' for a coordinate"
-                f"{nearest(self.joint, robot.joint_names)}"
+                f"{nearest(self.joint, robot.joint_names) or _choice(robot.joint_names)}"
             )
         k = robot.joint_names.index(self.joint)
         return q[:, k], np.tile(np.eye(robot.dof)[k], (len(q), 1))
@@ -204,6 +207,13 @@ def _frame(robot: RobotModel, name: str) -> int:
     known = [frame.name for frame in robot.model.frames]
     if name not in known:
         raise ProblemError(
-            f"{robot.name}: no link or joint '{name}' for a coordinate{nearest(name, known)}"
+            f"{robot.name}: no link or joint '{name}' for a coordinate"
+            f"{nearest(name, known) or _choice(robot.urdf.links)}"
         )
     return known.index(name)
+
+
+def _choice(names: Sequence[str]) -> str:
+    """Return what is said where no name is near: which there are, but for a crowd of them."""
+    listed = ", ".join(repr(name) for name in names[:_FEW])
+    return f", expected one of: {listed}{', …' if len(names) > _FEW else ''}"

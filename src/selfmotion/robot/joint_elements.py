@@ -30,7 +30,7 @@ def check_joint_elements(root: ElementTree.Element, source: str) -> None:
     for count, joint in enumerate(root.findall("joint"), start=1):
         name = name_of(joint, count, source)
         if name in taken:
-            raise RobotError(f"{source}: joint name '{name}' is used more than once")
+            raise RobotError(f"{source}: joint name '{name}' is used more than once; rename one")
         if name == _WORLD:
             raise RobotError(
                 f"{source}: a joint is called '{_WORLD}', as Pinocchio calls the world; rename it"

@@ -47,7 +47,7 @@ def check_link_elements(root: ElementTree.Element, source: str) -> None:
     for count, link in enumerate(root.findall("link"), start=1):
         name = name_of(link, count, source)
         if name in taken:
-            raise RobotError(f"{source}: link name '{name}' is used more than once")
+            raise RobotError(f"{source}: link name '{name}' is used more than once; rename one")
         taken.add(name)
         _check_inertial(link, f"{source}: link '{name}'")
         for tag in ("collision", "visual"):

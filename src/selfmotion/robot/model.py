@@ -14,6 +14,7 @@ from selfmotion.basics import (
     InverseKinematicsError,
     RobotError,
     as_whole,
+    plain_numbers,
     random_numbers,
     shown,
 )
@@ -135,13 +136,12 @@ class RobotModel:
         RobotError
             The shape is not (n,), or a number is not finite; the joint is named.
         """
-        try:
-            array = np.array(q, dtype=np.float64)
-        except (TypeError, ValueError):
+        array = plain_numbers(q)
+        if array is None:
             raise RobotError(
                 f"configuration is {shown(q)}, expected {self.dof} numbers, one for each of "
                 f"{', '.join(self.joint_names)}"
-            ) from None
+            )
         if array.shape != (self.dof,):
             raise RobotError(
                 f"configuration has shape {array.shape}, expected ({self.dof},) "
@@ -150,7 +150,7 @@ class RobotModel:
         bad = np.flatnonzero(~np.isfinite(array))
         if bad.size:
             raise RobotError(f"joint '{self.joint_names[bad[0]]}' is {array[bad[0]]}, not finite")
-        return array
+        return np.array(array)
 
     @property
     def _kinematics(self) -> ToolKinematics:

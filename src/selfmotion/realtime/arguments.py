@@ -1,0 +1,67 @@
+"""What a replanner is given, checked before the first step."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    ProblemError,
+    RobotError,
+    as_numbers,
+    as_several,
+    plain_numbers,
+    shown,
+)
+from selfmotion.constraints import Constraint
+from selfmotion.costs import Cost
+from selfmotion.motion import NullMotion
+from selfmotion.realtime.reference import Approach
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
+
+
+def check_kinds(robot: Any, null_motion: Any, approach: Any) -> None:
+    """Refuse what is no arm, no null motion or no approach."""
+    for name, given, kind, example in (
+        ("robot", robot, RobotModel, "a RobotModel (load_robot)"),
+        ("null_motion", null_motion, NullMotion | None, "a NullMotion or None"),
+        ("approach", approach, Approach | None, "an Approach or None"),
+    ):
+        if not isinstance(given, kind):
+            raise ProblemError(f"{name} is {shown(given)}, expected {example}")
+
+
+def as_asked(
+    robot: RobotModel, task: Task, costs: Any, constraints: Any
+) -> tuple[Sequence[Cost], Sequence[Constraint]]:
+    """Return costs and constraints as tuples, of kinds that fit the arm and a task it can follow.
+
+    Raises
+    ------
+    ProblemError
+        They do not.
+    """
+    if not robot.can_follow(task):
+        able = [other.value for other in Task if robot.can_follow(other)]
+        raise ProblemError(
+            f"{robot.name}: cannot move the tool in every row of task '{task.value}'; "
+            f"expected one of those that it can: {', '.join(able) or 'none'}"
+        )
+    wanted = as_several(costs, "costs", Cost)  # type: ignore[type-abstract]
+    for cost in wanted:
+        cost.check(robot, task)
+    kept = as_several(constraints, "constraints", Constraint)  # type: ignore[type-abstract]
+    return wanted, kept
+
+
+def as_begun(values: Any, what: str, dof: int) -> Array:
+    """Return the state (n,) that the command begins with; RobotError where it is none."""
+    return as_numbers(values, what, f"{dof} finite numbers, one for each joint", (dof,), RobotError)
+
+
+def as_measured(values: Any, dof: int) -> Array:
+    """Return a measured state (n,) as it is, or NaN where it is no numbers at all."""
+    numbers = plain_numbers(values)
+    return np.full(dof, np.nan) if numbers is None else numbers
