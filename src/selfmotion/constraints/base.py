@@ -103,6 +103,10 @@ class Constraint(Saved, ABC, family="constraint"):
         """Return what it asks of a motion along the first part of the path; None for nothing."""
         return self
 
+    def on_last_part(self) -> "Constraint | None":
+        """Return what it asks of a motion along the last part of the path; None for nothing."""
+        return self
+
 
 class BoundConstraint(Protocol):
     """A condition on the motion of one arm."""

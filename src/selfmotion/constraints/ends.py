@@ -104,6 +104,10 @@ class _EndRate(Constraint):
         """See `Constraint.on_part`: a part begins as the whole, but ends elsewhere."""
         return self if self.at_start else None
 
+    def on_last_part(self) -> Constraint | None:
+        """See `Constraint.on_last_part`: it ends as the whole, but begins elsewhere."""
+        return None if self.at_start else self
+
 
 @dataclass(frozen=True, eq=False)
 class EndVelocity(_EndRate):
@@ -279,6 +283,9 @@ class ClosedPath(Constraint):
 
     def on_part(self) -> None:
         """See `Constraint.on_part`: a part of a loop is not closed."""
+
+    def on_last_part(self) -> None:
+        """See `Constraint.on_last_part`: a part of a loop is not closed."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 """The nouns of a joint motion over time: grid, trajectory, null motion."""
 
 from selfmotion.motion.grid import Grid
+from selfmotion.motion.joining import joined_motions, reversed_motion
 from selfmotion.motion.null_motion import (
     BSplineNullMotion,
     NullMotion,
@@ -25,6 +26,8 @@ __all__ = [
     "Trajectory",
     "TransportedFrame",
     "column_names",
+    "joined_motions",
     "resting_window",
+    "reversed_motion",
     "transport",
 ]

@@ -8,6 +8,7 @@ from selfmotion.path.placed import Placed
 from selfmotion.path.polyline import Polyline
 from selfmotion.path.ramped import Ramped
 from selfmotion.path.retimed import Retimed
+from selfmotion.path.section import Section, section_at_rest
 from selfmotion.path.shapes import Circle, Line
 from selfmotion.path.truncated import Truncated
 from selfmotion.path.twist import TwistPath
@@ -27,12 +28,14 @@ __all__ = [
     "Polyline",
     "Ramped",
     "Retimed",
+    "Section",
     "TimeLaw",
     "Truncated",
     "TwistPath",
     "Waypoints",
     "check_oriented",
     "path_pose",
+    "section_at_rest",
     "times_along",
     "with_leads",
 ]

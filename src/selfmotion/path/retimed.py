@@ -66,10 +66,13 @@ class Retimed(_Derived, kind="retimed"):
 
     def _passed(self, wanted: Array) -> Array:
         """Return when times of the original are passed, (K,), from 0 to the duration."""
+        return read_only([0.0, *self.when(wanted)[1:-1], self.duration])
+
+    def when(self, sigma: Array) -> Array:
+        """Return when times of the original (K,) are passed, (K,) [s]."""
         pace = self._pace
-        k = np.clip(np.searchsorted(pace.sigma, wanted) - 1, 0, len(pace.t) - 2)
-        passed = times_when(pace, wanted, pace.t[k], pace.t[k + 1])
-        return read_only([0.0, *passed[1:-1], self.duration])
+        k = np.clip(np.searchsorted(pace.sigma, sigma) - 1, 0, len(pace.t) - 2)
+        return times_when(pace, sigma, pace.t[k], pace.t[k + 1])
 
     @property
     def pace(self) -> Pace:

@@ -52,6 +52,8 @@ class Candidates:
         so from any start.
     warm_start : Plan, optional
         Tried first; where its motion will do, nothing else is.
+    guide : SequenceGuide, optional
+        Likewise a motion that a search over the whole path has found.
 
     Attributes
     ----------
@@ -73,8 +75,9 @@ class Candidates:
         progress: Progress,
         reach: Callable[[float], Reach],
         warm_start: Plan | None = None,
+        guide: SequenceGuide | None = None,
     ) -> None:
-        self._reach, self._warm_start = reach, warm_start
+        self._reach, self._warm_start, self._guide = reach, warm_start, guide
         self._problem, self._effort = problem, effort
         self._begin = partial(Session.begin, problem, effort)
         self._settings, self._progress = search, progress
@@ -119,6 +122,10 @@ class Candidates:
             )
         starts = start is None and (search.mode != "global" or not can_search)
         rng = np.random.default_rng(search.rng)
+        if self._guide is not None:
+            self._follow(self._guide)
+            if not self._fell_short:
+                return
         if self._warm_start is not None and start is None:
             self._try_again(self._warm_start)
             if not self._fell_short and not search.compare:
@@ -149,6 +156,15 @@ class Candidates:
             return
         session.adopt(plan)
         self._progress("warm start", 1, 1)
+        self._try(session)
+
+    def _follow(self, guide: SequenceGuide) -> None:
+        """Optimise from a motion that is known."""
+        try:
+            session = self._begin(guide.start, free=self._problem.given_start is None, guide=guide)
+        except BreakdownError as error:
+            self._failure = error
+            return
         self._try(session)
 
     @property

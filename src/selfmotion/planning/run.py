@@ -32,7 +32,7 @@ from selfmotion.planning.session import Session
 from selfmotion.planning.settings import Search
 from selfmotion.planning.warm_start import check_warm_start
 from selfmotion.plans import Gap, Plan, Problem, Report
-from selfmotion.search import SPACING, Reach, reachable
+from selfmotion.search import SPACING, Reach, SequenceGuide, reachable
 
 # After these no other way is tried.
 _ENDED = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
@@ -119,7 +119,7 @@ def plan(
         max_evaluations = _PATIENCE
     counts = TimedCounts(deadline=clock)
     effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, counts)
-    settings = (Tolerance.of(tolerance), clock.telling(progress), warm_start, clock)
+    settings = (Tolerance.of(tolerance), clock.telling(progress), warm_start, clock, None)
     try:
         with one_blas_thread():
             return _plan(problem, effort, search or Search(), settings)
@@ -132,12 +132,20 @@ def plan(
         ) from None
 
 
-def _plan(
-    problem: Problem,
-    effort: Effort,
-    search: Search,
-    settings: tuple[Tolerance, Progress, Plan | None, Deadline],
+def plan_along(
+    problem: Problem, guide: SequenceGuide, tolerance: Tolerance, progress: Progress
 ) -> Plan:
+    """Plan as `plan` does, but try a motion first that is known, near which there should be one."""
+    clock = Deadline(inf)
+    effort = Effort(QuasiNewton(), None, None, TimedCounts(deadline=clock))
+    with one_blas_thread():
+        return _plan(problem, effort, Search(), (tolerance, progress, None, clock, guide))
+
+
+_Settings = tuple[Tolerance, Progress, Plan | None, Deadline, SequenceGuide | None]
+
+
+def _plan(problem: Problem, effort: Effort, search: Search, settings: _Settings) -> Plan:
     found = _Run(problem, effort, search, *settings).plan()
     # Few motions take an arm into itself: the others need not wait for distances.
     if not _overlaps(found) or found.report.status in _ENDED:
@@ -153,7 +161,7 @@ def _plan(
         except SelfmotionError:
             return found
         except KeyboardInterrupt:
-            clock = settings[-1]
+            clock = settings[3]
             return _told(found, Status.DEADLINE if clock.passed else Status.INTERRUPTED)
         if rival.report.status in _ENDED:
             return _better(found, rival)
@@ -212,13 +220,16 @@ class _Run:
         progress: Progress,
         warm_start: Plan | None,
         deadline: Deadline,
+        guide: SequenceGuide | None,
     ) -> None:
         self._problem, self._effort, self._search = problem, effort, search
         self._tolerance, self._progress = tolerance, progress
         self._deadline = deadline
         self._began = time.perf_counter()
         self._reach = cache(self._reachable)
-        self._candidates = Candidates(problem, effort, search, progress, self._reach, warm_start)
+        self._candidates = Candidates(
+            problem, effort, search, progress, self._reach, warm_start, guide
+        )
 
     def plan(self) -> Plan:
         """Return the plan of the whole path, or of the largest part of it."""

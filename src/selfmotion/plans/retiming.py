@@ -30,7 +30,7 @@ _ROUNDING = 1e-9
 # keeps the plan's tolerance.
 _DENSITIES = (4, 8, 16)
 # Requirements that a slower pace may keep, by how much slower it is tried, and how often.
-_OF_PACE = {*LIMIT_NAMES[1:], "joint torque limits", "tool limits"}
+OF_PACE = {*LIMIT_NAMES[1:], "joint torque limits", "tool limits"}
 _FACTOR, _SLOWER = 1.15, 16
 
 
@@ -123,7 +123,7 @@ def _positive(robot: RobotModel, limit: npt.ArrayLike, name: str) -> Array:
 def _is_too_fast(plan: Plan) -> bool:
     """Return whether a plan breaks nothing but what a slower pace may keep."""
     broken = {item.requirement for item in plan.certificate.findings if not item.kept}
-    return bool(broken) and broken <= _OF_PACE and plan.certificate.on_path
+    return bool(broken) and broken <= OF_PACE and plan.certificate.on_path
 
 
 def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:

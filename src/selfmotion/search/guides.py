@@ -24,7 +24,7 @@ _FEWEST_OF_CURVES, _FEWEST, _MOST = 150, 60, 400
 # The path is looked at so often to see how far the tool moves.
 _LOOKS = 2000
 # What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
-_MARGIN = 2.5e-4
+MARGIN = 2.5e-4
 # The jagged chain of samples is smoothed by a spline with this many of them per interval.
 _SMOOTHING = 3
 
@@ -66,24 +66,33 @@ def guides(
         No chain of configurations follows the path; says where it ends and why.
     """
     robot, path, asked = problem.robot, problem.path, problem.envelope
-    is_curve = robot.redundancy(problem.task) == 1
-    t = search_times(path, _FEWEST_OF_CURVES if is_curve else _FEWEST)
+    t = waypoint_times(problem)
     step = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
     options: dict[str, Any] = {
         "lower": asked.lower,
         "upper": asked.upper,
         "largest_step": step,
-        "bodies": [(model, distance + _MARGIN) for model, distance in asked.bodies],
+        "bodies": [(model, distance + MARGIN) for model, distance in asked.bodies],
         "count": _COUNT,
         "rng": 0 if rng is None else rng,
         "progress": progress,
     }
-    if is_curve:
+    if has_curves(problem):
         sequences = best_sequences(robot, path, problem.task, t, **options)
     else:
         weights = _weights(problem)
         sequences = sampled_sequences(robot, path, problem.task, t, weights=weights, **options)
     return [SequenceGuide(sequence) for sequence in sequences]
+
+
+def has_curves(problem: Problem) -> bool:
+    """Whether the self-motions of a problem are curves."""
+    return problem.robot.redundancy(problem.task) == 1
+
+
+def waypoint_times(problem: Problem) -> Array:
+    """Return times (W,) [s] at which to search for a problem's configurations."""
+    return search_times(problem.path, _FEWEST_OF_CURVES if has_curves(problem) else _FEWEST)
 
 
 def search_times(path: Path, fewest: int) -> Array:

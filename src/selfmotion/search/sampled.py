@@ -1,6 +1,7 @@
 """The search for two and more degrees of redundancy: samples of smooth motions as nodes."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,6 +31,56 @@ _STRAYS, _STRAY = 2, 0.15
 _RINGS, _ROUNDS = (0.3, 0.1, 0.03, 0.01), 5
 # A round that shortens the chain by less than this share is the last one of its ring.
 _WORTHWHILE = 5e-3
+
+
+@dataclass(frozen=True, eq=False)
+class SampledLayers:
+    """Samples of smooth motions at the waypoints of a path.
+
+    Attributes
+    ----------
+    manifold : Manifold
+    x : (W, 12)
+        The tool at the waypoints.
+    bounds : Admissible
+    layers : list of (K, n)
+        Free samples, sorted by the first joint.
+    """
+
+    manifold: Manifold
+    x: Array
+    bounds: Admissible
+    layers: list[Array]
+
+    @classmethod
+    def of(
+        cls,
+        robot: RobotModel,
+        path: Path,
+        task: Task,
+        t: Array,
+        limits: tuple[Array, Array],
+        bodies: tuple[tuple[CollisionModel, float], ...],
+        largest_step: Array,
+        weights: Array,
+        rng: np.random.Generator | int,
+        progress: Progress,
+    ) -> "SampledLayers":
+        """Return those of a task that leaves any redundancy; see `sampled_sequences`."""
+        manifold = Manifold(robot, task, *limits)
+        bounds = Admissible(*limits, manifold.revolute, bodies)
+        x, generator = targets(path, t), np.random.default_rng(rng)
+        layers = _layers(manifold, bounds, x, largest_step, weights, generator, progress)
+        return cls(manifold, x, bounds, layers)
+
+    def why_blocked(self, i: int) -> str:
+        """Return why no chain reaches waypoint i."""
+        if not len(self.layers[i]):
+            return "no sample there is within the limits and free"
+        return (
+            f"none of {len(self.layers[i])} samples that are within the limits and free can be "
+            f"reached from those before within the step limits"
+        )
 
 
 def sampled_sequences(
@@ -83,19 +134,14 @@ def sampled_sequences(
     NoSequenceError
         No chain exists among the samples; tells the waypoint at which the last one ends.
     """
-    manifold = Manifold(robot, task, lower, upper)
-    bounds = Admissible(lower, upper, manifold.revolute, tuple(bodies))
-    x = targets(path, t)
-    generator = np.random.default_rng(rng)
-    layers = _layers(manifold, bounds, x, largest_step, weights, generator, progress)
-    turning = bounds.turning
+    nodes = SampledLayers.of(
+        robot, path, task, t, (lower, upper), tuple(bodies), largest_step, weights, rng, progress
+    )
+    bounds, layers, turning = nodes.bounds, nodes.layers, nodes.bounds.turning
     chains = shortest_chains(layers, largest_step, turning, weights)
     if chains.blocked is not None:
         time = float(t[chains.blocked])
-        reason = (
-            f"none of {len(layers[chains.blocked])} samples that are within the limits and free "
-            f"can be reached from those before within the step limits"
-        )
+        reason = nodes.why_blocked(chains.blocked)
         raise NoSequenceError(
             f"{robot.name}: no motion along the path passes t = {time:.6g} s: {reason}",
             time=time,
@@ -105,7 +151,7 @@ def sampled_sequences(
     rough = [connected(layers, chain, turning) for chain in found]
     for number, q in enumerate(rough):
         progress("search: shortening sequence", number + 1, len(rough))
-        rough[number] = _shortened(manifold, bounds, x, q, largest_step, weights)
+        rough[number] = _shortened(nodes.manifold, bounds, nodes.x, q, largest_step, weights)
     return ranked(t, rough, turning, weights)
 
 
@@ -139,6 +185,9 @@ def _layers(
         q = np.concatenate([q[arrived], smooth[i]])
         layers.append(_sorted(q[bounds.keep(q)]))
         cost, _ = extended(before, cost, layers[-1], largest_step[i - 1], turning, weights)
+        if not np.any(np.isfinite(cost)):
+            # What lies beyond is for chains that begin here.
+            cost = np.zeros(len(cost))
     return layers
 
 

@@ -47,6 +47,56 @@ class Sequence:
         object.__setattr__(self, "q", read_only(self.q))
 
 
+@dataclass(frozen=True, eq=False)
+class CurveLayers:
+    """The self-motion curves at the waypoints of a path, and their free samples.
+
+    Attributes
+    ----------
+    motion : SelfMotion
+    x : (W, 12)
+        The tool at the waypoints.
+    curves : list of CurveSet
+    bounds : Admissible
+    samples : list of (K, n)
+        Without turns.
+    """
+
+    motion: SelfMotion
+    x: Array
+    curves: list[CurveSet]
+    bounds: Admissible
+    samples: list[Array]
+
+    @classmethod
+    def of(
+        cls,
+        robot: RobotModel,
+        path: Path,
+        task: Task,
+        t: Array,
+        limits: tuple[Array, Array],
+        bodies: tuple[tuple[CollisionModel, float], ...],
+        rng: np.random.Generator | int,
+        progress: Progress,
+    ) -> "CurveLayers":
+        """Return those of a task that leaves redundancy 1; see `best_sequences`."""
+        motion = SelfMotion(robot, task, SPACING)
+        bounds = Admissible(*limits, motion.revolute, bodies)
+        x = targets(path, t)
+        seeds = list(spread(robot, _SEEDS, np.random.default_rng(rng)))
+        curves = curves_along(motion, x, seeds, _EVERY, progress)
+        samples = _free_samples(motion, x, curves, bounds, progress)
+        return cls(motion, x, curves, bounds, samples)
+
+    def why_blocked(
+        self, i: int, alive: Array, layer: Array, bounds: Admissible, steps: Array
+    ) -> str:
+        """Return why no chain reaches waypoint i, with what chains reach before it (A, n)."""
+        step = steps[max(i - 1, 0)]
+        return why_blocked(self.motion, self.x[i], self.curves[i], alive, layer, bounds, step)
+
+
 def best_sequences(
     robot: RobotModel,
     path: Path,
@@ -118,13 +168,9 @@ def best_sequences(
     ]
     _check(robot, task, limits, count)
     lower, upper, steps = limits
-    motion = SelfMotion(robot, task, SPACING)
-    bounds = Admissible(lower, upper, motion.revolute, tuple(bodies))
-    x = targets(path, times)
-    seeds = list(spread(robot, _SEEDS, np.random.default_rng(rng)))
-    curves = curves_along(motion, x, seeds, _EVERY, progress)
-    samples = _free_samples(motion, x, curves, bounds, progress)
-    rough, turning = _rough_motions(motion, x, curves, samples, bounds, steps, times, count)
+    layers = CurveLayers.of(robot, path, task, times, (lower, upper), tuple(bodies), rng, progress)
+    motion, x, bounds = layers.motion, layers.x, layers.bounds
+    rough, turning = _rough_motions(layers, steps, times, count)
     # All of them roughly, to see which are worth the rest.
     for stage, spacings, kept in (
         ("search: shortening sequence", ROUGHLY, len(rough)),
@@ -140,30 +186,24 @@ def best_sequences(
 
 
 def _rough_motions(
-    motion: SelfMotion,
-    x: Array,
-    curves: list[CurveSet],
-    samples: list[Array],
-    bounds: Admissible,
-    steps: Array,
-    times: Array,
-    count: int,
+    nodes: CurveLayers, steps: Array, times: Array, count: int
 ) -> tuple[list[Array], Mask]:
     """Return the shortest unlike motions (W, n) over samples, and whose turns did not count.
 
     Turns of joints with room for several are left out at first, and the motion put inside the
     limits as a whole; where it does not fit, it is looked for among all turns of these joints.
     """
+    bounds = nodes.bounds
     relaxed = bounds.without_turns()
     while True:
-        layers, turning = [relaxed.layer(q) for q in samples], relaxed.turning
+        layers, turning = [relaxed.layer(q) for q in nodes.samples], relaxed.turning
         chains = shortest_chains(layers, steps, turning)
         if chains.blocked is not None:
             i = chains.blocked
             alive = layers[i - 1][np.isfinite(chains.cost[i - 1])] if i else layers[0][:0]
-            reason = why_blocked(motion, x[i], curves[i], alive, layers[i], relaxed, steps[i - 1])
+            reason = nodes.why_blocked(i, alive, layers[i], relaxed, steps)
             raise NoSequenceError(
-                f"{motion.robot.name}: no motion along the path passes t = {times[i]:.6g} s: "
+                f"{nodes.motion.robot.name}: no motion along the path passes t = {times[i]:.6g} s: "
                 f"{reason}",
                 time=float(times[i]),
                 reason=reason,

@@ -1,0 +1,29 @@
+"""Motions one after the other, and backwards."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from selfmotion.motion.trajectory import Trajectory
+
+
+def joined_motions(motions: Sequence[Trajectory]) -> Trajectory:
+    """Return motions one after the other as one, from t = 0 on.
+
+    Each begins in the configuration in which the one before it ends, as fast, and accelerating as
+    much.
+    """
+    t, tables = [motions[0].t[:1] * 0.0], [[motions[0](motions[0].t[:1], k)] for k in range(3)]
+    for motion in motions:
+        t.append(t[-1][-1] + motion.t[1:] - motion.t[0])
+        for order, table in enumerate(tables):
+            table.append(motion(motion.t[1:], order))
+    q, qd, qdd = (np.concatenate(table) for table in tables)
+    return Trajectory(np.concatenate(t), q, qd, motions[0].joint_names, qdd)
+
+
+def reversed_motion(motion: Trajectory) -> Trajectory:
+    """Return a motion backwards in time, from t = 0 on."""
+    t = motion.t
+    q, qd, qdd = (motion(t, order)[::-1] for order in range(3))
+    return Trajectory(t[-1] - t[::-1], q, -qd, motion.joint_names, qdd)

@@ -1,0 +1,300 @@
+"""A path that no motion follows as a whole, in the fewest parts."""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    BreakdownError,
+    InverseKinematicsError,
+    NoSequenceError,
+    PlanError,
+    ProblemError,
+    Progress,
+    SelfmotionError,
+    as_number,
+    as_numbers,
+    random_numbers,
+    shown,
+    silent,
+)
+from selfmotion.certificate import Tolerance
+from selfmotion.constraints import ClosedPath, Constraint
+from selfmotion.path import Retimed, Section, section_at_rest
+from selfmotion.planning.moves import Mover, Retreat, between_parts
+from selfmotion.planning.run import plan, plan_along
+from selfmotion.planning.settings import Search
+from selfmotion.plans import Move, Parts, Plan, Problem, rest_orders
+from selfmotion.search import Piece, Pieces, Sequence, SequenceGuide, has_curves, turned_towards
+from selfmotion.task import Relaxation
+
+# Other cuts are tried where parts could not be planned, so often; they are so far away at least, as
+# a share of the path's waypoints.
+_ATTEMPTS, _ELSEWHERE = 4, 0.03
+# A guide has at least so many samples.
+_SAMPLES = 13
+# How smoothly a tool motion has to rest that needs no ramp; see `rest_orders`.
+_AT_REST = 2
+# A window shorter than this share of a part is none.
+_SHORTEST = 1e-2
+
+
+def plan_in_parts(
+    problem: Problem,
+    *,
+    retreat: float = 0.0,
+    axis: npt.ArrayLike = (0.0, 0.0, -1.0),
+    ramp: float = 0.5,
+    rng: np.random.Generator | int = 0,
+    tolerance: Tolerance | None = None,
+    progress: Progress = silent,
+) -> Parts:
+    """Plan a path in the fewest parts, with changes of configuration in between.
+
+    The global search looks for the fewest chains of configurations that together follow the path,
+    and among these for the shortest. Where one will do, or the samples of the search are too few to
+    tell, `plan` comes first, and its plan is the only part if it is verified. Else each chain
+    becomes a plan. At a cut the tool comes to rest
+    on the path and goes on from there in another configuration. The move to that is a joint motion
+    from rest to rest that keeps what the problem asks of all times, judged like a plan: straight,
+    or by a few stops where that meets something.
+
+    The number of parts is the least among the samples of the search; nothing proves that no
+    continuous motion slips between them.
+
+    Parameters
+    ----------
+    problem : Problem
+        Conditions on the start or the end hold for the first or the last part. For a `ClosedPath`
+        a last move leads back to the start. At cuts the arm rests, whatever `rest` says.
+    retreat : float
+        How far the tool leaves the path along `axis` before each move, and from how far it comes
+        back [m]; by default the move begins on the path.
+    axis : (3,)
+        Where to, in tool axes: by default back along the tool's z axis.
+    ramp : float
+        How long the tool takes to come to rest at a cut, and to be up to speed again [s].
+    rng : Generator or int
+        Shifts the seeds of the searches.
+    tolerance : Tolerance, optional
+        What a motion may miss the path by.
+    progress : callable, optional
+        As in `plan`.
+
+    Returns
+    -------
+    Parts
+        Also where a part could not be planned or a move not be found: `Parts.verdict` says so, and
+        `Parts.require` raises.
+
+    Raises
+    ------
+    NoSequenceError
+        No parts, however many, follow the path: some pose of it is out of reach, beyond limits or
+        blocked in every configuration, or its neighbours are beyond the step limits. Tells when
+        and why.
+    ProblemError
+        An argument is not what it should be, the problem is damped, or has no self-motion to
+        search.
+    """
+    retreats = _checked(problem, retreat, axis)
+    ramp = as_number(ramp, "ramp", above=0.0)
+    random_numbers(rng)
+    tolerance = Tolerance.of(tolerance)
+    # Samples of curves tell whether parts are needed; those of larger spaces may have missed a way.
+    knows = has_curves(problem)
+    if not knows:
+        whole = _whole(problem, rng, tolerance, progress)
+        if whole is not None:
+            return Parts(problem, (whole,))
+    pieces = Pieces.of(problem, rng, progress)
+    chains = pieces.fewest(set())
+    if knows and len(chains) == 1:
+        whole = _whole(problem, rng, tolerance, progress)
+        if whole is not None:
+            return Parts(problem, (whole,))
+    planner = _Planner(problem, pieces, retreats, ramp, rng, tolerance, progress)
+    return _best_of(planner, pieces, chains)
+
+
+def _best_of(planner: "_Planner", pieces: Pieces, chains: list[Piece]) -> Parts:
+    """Return the parts along chains, or along others where some of these fail."""
+    best: Parts | None = None
+    forbidden: set[int] = set()
+    for _ in range(_ATTEMPTS):
+        found, failed = planner.plan(chains)
+        if found is not None and (best is None or _standing(found) < _standing(best)):
+            best = found
+        if failed <= forbidden:
+            break
+        forbidden |= failed
+        try:
+            chains = pieces.fewest(forbidden)
+        except NoSequenceError:
+            break
+    if best is None:
+        raise planner.failure
+    return best
+
+
+def _checked(problem: Problem, retreat: float, axis: npt.ArrayLike) -> Retreat | None:
+    if not isinstance(problem, Problem):
+        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")
+    if problem.damping is not None:
+        raise ProblemError(
+            "damping= leads through what cannot be followed by leaving the path, parts by another "
+            "configuration; leave the damping out, or call plan"
+        )
+    if problem.robot.redundancy(problem.task) == 0:
+        raise ProblemError(
+            f"{problem.robot.name}: task '{problem.task.value}' leaves no self-motion to search "
+            f"for parts; choose one with fewer rows, or call plan"
+        )
+    length = as_number(retreat, "retreat", least=0.0)
+    direction = as_numbers(axis, "axis", "three finite numbers", (3,))
+    if not np.any(direction):
+        raise ProblemError("axis is zero, expected a direction in tool axes")
+    return Retreat(length, direction / np.linalg.norm(direction)) if length > 0.0 else None
+
+
+def _whole(
+    problem: Problem, rng: np.random.Generator | int, tolerance: Tolerance, progress: Progress
+) -> Plan | None:
+    """Return a verified plan of the whole path, None where none is found."""
+    search = Search(rng=rng) if problem.given_start is None else None
+    try:
+        found = plan(problem, search=search, tolerance=tolerance, progress=progress)
+    except (BreakdownError, InverseKinematicsError, NoSequenceError):
+        return None
+    return found if found.certificate.verified else None
+
+
+def _standing(parts: Parts) -> tuple[int, int, int]:
+    """Return how many parts and moves are missing or not verified, and how many parts there are."""
+    plans = sum(not part.certificate.verified for part in parts.plans)
+    moves = sum(not move.verified for move in parts.moves)
+    return plans, moves, len(parts.plans)
+
+
+class _Planner:
+    """Plans the parts along chains, and the moves between them.
+
+    Attributes
+    ----------
+    failure : SelfmotionError
+        Why a part had no complete motion, of the last one that had none.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        pieces: Pieces,
+        retreat: Retreat | None,
+        ramp: float,
+        rng: np.random.Generator | int,
+        tolerance: Tolerance,
+        progress: Progress,
+    ) -> None:
+        self._problem, self._pieces, self._ramp = problem, pieces, ramp
+        self._tolerance, self._progress = tolerance, progress
+        self._closed = any(isinstance(item, ClosedPath) for item in problem.constraints)
+        generator = np.random.default_rng(rng)
+        self._mover = Mover(between_parts(problem), retreat, generator, progress)
+        self.failure: SelfmotionError = PlanError("no part was planned")
+        self._turning = np.isinf(problem.robot.lower) & np.isinf(problem.robot.upper)
+
+    def plan(self, chains: list[Piece]) -> tuple[Parts | None, set[int]]:
+        """Return the parts, and the waypoints where a cut has led to one that fails.
+
+        None where one has no complete motion; `failure` then says why.
+        """
+        plans: list[Plan] = []
+        failed: set[int] = set()
+        for number, piece in enumerate(chains, 1):
+            self._progress("part", number, len(chains))
+            try:
+                plans.append(self._part(piece, plans[-1] if plans else None))
+            except (BreakdownError, InverseKinematicsError, NoSequenceError) as error:
+                self.failure = error
+                return None, failed | self._around(piece)
+            if not plans[-1].certificate.verified:
+                failed |= self._around(piece)
+        cuts = tuple(float(piece.t[-1]) for piece in chains[:-1])
+        endings = tuple(piece.ending for piece in chains[:-1])
+        moves = self._moves(plans)
+        return Parts(self._problem, tuple(plans), moves, cuts, endings), failed
+
+    def _moves(self, plans: list[Plan]) -> tuple[Move, ...]:
+        pairs = list(itertools.pairwise(plans))
+        if self._closed:
+            pairs.append((plans[-1], plans[0]))
+        if not all(plan.certificate.verified for plan in plans):
+            missing = Move(None, trouble="not looked for, since a part is not verified")
+            return tuple(missing for _ in pairs)
+        ends = [(one.trajectory.q[-1], other.trajectory.q[0]) for one, other in pairs]
+        return tuple(self._mover.move(*each) for each in ends)
+
+    def _around(self, piece: Piece) -> set[int]:
+        """Return the waypoints at which the parts to both sides of a piece's ends are not cut."""
+        last = len(self._pieces.t) - 1
+        width = max(1, round(_ELSEWHERE * last))
+        cuts = {piece.first, piece.last} - {0, last}
+        return {i for cut in cuts for i in range(cut - width, cut + width + 1)}
+
+    def _part(self, piece: Piece, before: Plan | None) -> Plan:
+        """Return the plan along a piece that follows another one's plan."""
+        problem = self._part_problem(piece)
+        t, q = piece.t, piece.q
+        if isinstance(problem.path, Retimed):
+            t = problem.path.when(t - t[0])
+        if before is not None:
+            q = turned_towards(q, before.trajectory.q[-1], self._turning)
+        if len(t) < _SAMPLES:
+            t, few = np.linspace(0.0, problem.path.duration, _SAMPLES), t
+            q = np.stack([np.interp(t, few, joint) for joint in q.T], axis=1)
+        guide = SequenceGuide(Sequence(t, q, 0.0))
+        return plan_along(problem, guide, self._tolerance, self._progress)
+
+    def _part_problem(self, piece: Piece) -> Problem:
+        """Return the problem of a piece: at rest where it is cut, with what is asked of it."""
+        whole, last = self._problem, len(self._pieces.t) - 1
+        cut = piece.first > 0 or self._closed, piece.last < last or self._closed
+        if not any(cut):
+            return whole
+        ends = float(piece.t[0]), float(piece.t[-1])
+        orders = rest_orders(Section(whole.path, *ends), whole.task)
+        ramped = cut[0] and orders[0] < _AT_REST, cut[1] and orders[1] < _AT_REST
+        path = section_at_rest(whole.path, *ends, self._ramp, ramped)
+        return replace(
+            whole,
+            path=path,
+            start=whole.start if piece.first == 0 else None,
+            constraints=list(_asked_of_part(whole, piece.first == 0, piece.last == last)),
+            relaxations=list(_relaxed(whole, path, ends)),
+            rest=True,
+        )
+
+
+def _asked_of_part(problem: Problem, is_first: bool, is_last: bool) -> Iterator[Constraint]:
+    for item in problem.constraints:
+        kept: Constraint | None = None if isinstance(item, ClosedPath) else item
+        if kept is not None and not is_last:
+            kept = kept.on_part()
+        if kept is not None and not is_first:
+            kept = kept.on_last_part()
+        if kept is not None:
+            yield kept
+
+
+def _relaxed(problem: Problem, path: Retimed, ends: tuple[float, float]) -> Iterator[Relaxation]:
+    """Return what is relaxed along a stretch of the path, windows by its own time."""
+    for item in problem.relaxations:
+        if item.during is None:
+            yield item
+            continue
+        window = path.when(np.clip(item.during, *ends) - ends[0])
+        if window[1] - window[0] > _SHORTEST * path.duration:
+            yield replace(item, during=(float(window[0]), float(window[1])))

@@ -1,0 +1,220 @@
+"""The fewest chains of nodes that together follow a path which no single one follows."""
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from selfmotion.basics import Array, NoSequenceError, Progress, silent
+from selfmotion.constraints import EndConfiguration
+from selfmotion.plans import Problem
+from selfmotion.search.chains import Mask, Rows, extended, shortest_chains, unturned
+from selfmotion.search.guides import MARGIN, has_curves, waypoint_times
+from selfmotion.search.nodes import Admissible
+from selfmotion.search.sampled import SampledLayers
+from selfmotion.search.sequences import CurveLayers, connected
+
+# What a change to another configuration counts: more than any motion in between.
+_BREAK = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A chain of configurations along a stretch of a path.
+
+    Attributes
+    ----------
+    first, last : int
+        Its waypoints.
+    t : (W,)
+        Times of the waypoints [s].
+    q : (W, n)
+        Configurations [rad or m].
+    ending : str
+        Why no chain from its first waypoint goes all the way; "" for the last piece.
+    """
+
+    first: int
+    last: int
+    t: Array
+    q: Array
+    ending: str
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Nodes along a path, over which the fewest chains are looked for; made by `Pieces.of`.
+
+    Attributes
+    ----------
+    t : (W,)
+        Times of the waypoints [s].
+    """
+
+    problem: Problem
+    t: Array
+    _nodes: CurveLayers | SampledLayers
+    _bounds: Admissible
+    _steps: Array
+    _samples: list[Array]
+
+    @classmethod
+    def of(
+        cls, problem: Problem, rng: np.random.Generator | int = 0, progress: Progress = silent
+    ) -> "Pieces":
+        """Return the nodes of a problem: samples of all self-motions, free and within limits.
+
+        Raises
+        ------
+        NoSequenceError
+            A pose of the path has no node at all; tells the time and why.
+        """
+        asked, t = problem.envelope, waypoint_times(problem)
+        steps = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
+        bodies = tuple((model, distance + MARGIN) for model, distance in asked.bodies)
+        limits, weights = (asked.lower, asked.upper), problem.robot.joint_weights
+        where = (problem.robot, problem.path, problem.task, t, limits, bodies)
+        if has_curves(problem):
+            curves = CurveLayers.of(*where, rng, progress)
+            found = cls(problem, t, curves, curves.bounds, steps, curves.samples)
+        else:
+            samples = SampledLayers.of(*where, steps, weights, rng, progress)
+            found = cls(problem, t, samples, samples.bounds, steps, samples.layers)
+        found._pin_ends()
+        found._check()
+        return found
+
+    def fewest(self, forbidden: set[int]) -> list[Piece]:
+        """Return the fewest chains that follow the path one after the other, the shortest such.
+
+        Each begins in the pose in which the one before it ends, in another configuration; the ways
+        to these count as well.
+
+        Parameters
+        ----------
+        forbidden : set of int
+            Waypoints at which no chain may end before the last one.
+
+        Raises
+        ------
+        NoSequenceError
+            No chains, however many, follow the path; tells the time and why.
+        """
+        bounds = self._bounds
+        # Joints with room for several turns turn without end at first: see `best_sequences`.
+        relaxed = bounds.without_turns()
+        while True:
+            layers = [relaxed.layer(q) for q in self._samples]
+            turning = relaxed.turning
+            chains = self._chains(layers, relaxed, forbidden)
+            motions = [
+                bounds.turned_inside(connected(layers[first : first + len(chain)], chain, turning))
+                for first, chain in chains
+            ]
+            beyond = np.any([bounds.beyond(q) for q in motions], axis=0)
+            if not np.any(beyond):
+                break
+            relaxed = replace(
+                relaxed,
+                lower=np.where(beyond, bounds.lower, relaxed.lower),
+                upper=np.where(beyond, bounds.upper, relaxed.upper),
+            )
+        return [
+            Piece(
+                first,
+                first + len(q) - 1,
+                self.t[first : first + len(q)],
+                q,
+                self._ending(first, layers, relaxed) if q is not motions[-1] else "",
+            )
+            for (first, _), q in zip(chains, motions, strict=True)
+        ]
+
+    def _pin_ends(self) -> None:
+        """Let nothing but a given start, and a given end, be a node there."""
+        start, samples = self.problem.given_start, self._samples
+        if start is not None:
+            samples[0] = start[None]
+        for item in self.problem.constraints:
+            if isinstance(item, EndConfiguration):
+                samples[-1] = self.problem.robot.configuration(item.q)[None]
+        for i in (0, -1):
+            if len(samples[i]) == 1 and not self._bounds.keep(samples[i])[0]:
+                samples[i] = samples[i][:0]
+
+    def _check(self) -> None:
+        for i, samples in enumerate(self._samples):
+            if len(samples) == 0:
+                self._refuse(i, self._why(i, samples, samples, self._bounds.without_turns()))
+
+    def _chains(
+        self, layers: list[Array], bounds: Admissible, forbidden: set[int]
+    ) -> list[tuple[int, list[int]]]:
+        """Return the first waypoint of each chain, and its nodes, first to last."""
+        weights, turning = self.problem.robot.joint_weights, bounds.turning
+        anywhere = np.full(len(turning), np.inf)
+        cost = np.zeros(len(layers[0]))
+        parents: list[Rows] = [np.arange(len(cost))]
+        # From which node of its own waypoint a node is changed to; itself where it is not.
+        changes: list[Rows] = [np.arange(len(cost))]
+        for i, (before, after) in enumerate(itertools.pairwise(layers), 1):
+            cost, parent = extended(before, cost, after, self._steps[i - 1], turning, weights)
+            if not np.any(np.isfinite(cost)):
+                self._refuse(i, self._why(i, before, after, bounds))
+            parents.append(parent)
+            change = np.arange(len(cost))
+            if i < len(layers) - 1 and i not in forbidden:
+                changed, source = extended(after, cost, after, anywhere, turning, weights)
+                better = changed + _BREAK < cost
+                change = np.where(better, source, change)
+                cost = np.where(better, changed + _BREAK, cost)
+            changes.append(change)
+        return _traced_back(parents, changes, int(np.argmin(cost)))
+
+    def _ending(self, first: int, layers: list[Array], relaxed: Admissible) -> str:
+        """Return why no chain from a waypoint on follows the rest of the path."""
+        weights = self.problem.robot.joint_weights
+        chains = shortest_chains(layers[first:], self._steps[first:], relaxed.turning, weights)
+        if chains.blocked is None:
+            return "what goes on from there among the samples did not keep all constraints"
+        i = first + chains.blocked
+        alive = layers[i - 1][np.isfinite(chains.cost[chains.blocked - 1])]
+        reason = self._why(i, alive, layers[i], relaxed)
+        return f"no motion from t = {self.t[first]:.6g} s passes t = {self.t[i]:.6g} s: {reason}"
+
+    def _why(self, i: int, alive: Array, layer: Array, bounds: Admissible) -> str:
+        if isinstance(self._nodes, CurveLayers):
+            return self._nodes.why_blocked(i, alive, layer, bounds, self._steps)
+        return self._nodes.why_blocked(i)
+
+    def _refuse(self, waypoint: int, reason: str) -> None:
+        time = float(self.t[waypoint])
+        raise NoSequenceError(
+            f"{self.problem.robot.name}: no motion along the path, in however many parts, passes "
+            f"t = {time:.6g} s: {reason}",
+            time=time,
+            reason=reason,
+        )
+
+
+def _traced_back(
+    parents: list[Rows], changes: list[Rows], node: int
+) -> list[tuple[int, list[int]]]:
+    """Return the chains that end in a node of the last waypoint; see `Pieces`."""
+    chains: list[tuple[int, list[int]]] = []
+    chain: list[int] = []
+    for i in range(len(parents) - 1, 0, -1):
+        chain.append(node)
+        source = int(changes[i][node])
+        if source != node:
+            chains.append((i, chain[::-1]))
+            node, chain = source, [source]
+        node = int(parents[i][node])
+    chains.append((0, [*chain, node][::-1]))
+    return chains[::-1]
+
+
+def turned_towards(q: Array, before: Array, turning: Mask) -> Array:
+    """Return a motion (W, n), joints that turn without end by the turns that lead it nearest."""
+    step = q[0] - before
+    return np.asarray(q + (unturned(step, turning) - step))

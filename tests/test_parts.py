@@ -1,0 +1,292 @@
+"""Paths in the fewest parts: how many, where, why, and moves in between that keep everything."""
+
+import itertools
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+import selfmotion.testing
+from conftest import robot_named
+from oracle import Judge
+from own_kinematics import Arm
+from scenes import Followed, arm
+from selfmotion.basics import Array, NoSequenceError, ProblemError
+from selfmotion.motion import joined_motions, reversed_motion
+from selfmotion.path import section_at_rest
+from selfmotion.planning.moves import Mover, between_parts
+
+# The planar arm keeps about this shape, and its first joint turns by so much at most.
+SHAPE, LEAST, MOST = (0.8, 0.5), (0.5, 0.1), (1.1, 0.9)
+TURN = 6.4
+SPEED, ACCELERATION, JERK = 3.0, 10.0, 1e3
+# Of what one sample hands over to the next: positions, velocities and accelerations at rest.
+RESTING = 1e-6
+
+
+def wound(angle: float, *more: sm.Constraint, start: Array | None = None) -> sm.Problem:
+    """Return the problem of the planar arm on a circle about its base, of any angle [rad].
+
+    With the arm in one shape, its first joint draws all that it turns by: so TURN of the path can
+    be followed at once, and the next TURN again from a whole turn further back.
+    """
+    robot = robot_named("planar_3r")
+    lower, upper = np.array([-0.5 * TURN, *LEAST]), np.array([0.5 * TURN, *MOST])
+    first = robot.pose(np.array([-0.5 * TURN, *SHAPE])).translation
+    angles = np.linspace(0.0, angle, int(10 * angle) + 2)
+    turned = np.stack([pin.exp3(np.array([0.0, 0.0, a])) @ first for a in angles])
+    constraints = [
+        sm.JointPositionLimits(lower, upper),
+        sm.JointVelocityLimits(SPEED),
+        sm.JointAccelerationLimits(ACCELERATION),
+        sm.JointJerkLimits(JERK),
+        *more,
+    ]
+    path = sm.Waypoints(2.0 * angles, turned)
+    return sm.Problem(robot, path, "planar", start, constraints=constraints)
+
+
+def fewest(angle: float) -> int:
+    """Return how many parts a wound path needs at least.
+
+    The tool's direction is q1 + ψ(q2, q3): one part follows no more of it than q1 and ψ turn by.
+    """
+    robot = robot_named("planar_3r")
+    radius = float(np.linalg.norm(robot.pose(np.array([0.0, *SHAPE])).translation))
+    shapes = itertools.product(*(np.linspace(*ends, 200) for ends in zip(LEAST, MOST, strict=True)))
+    tips = [robot.pose(np.array([0.0, *shape])).translation for shape in shapes]
+    near = [np.arctan2(p[1], p[0]) for p in tips if abs(np.linalg.norm(p) - radius) < 0.02]
+    return int(np.ceil(angle / (TURN + float(np.ptp(near)))))
+
+
+def faults(parts: sm.Parts) -> list[str]:
+    """Return what is wrong with parts and moves as one motion, from its samples and poses alone."""
+    whole, problem, found = parts.trajectory, parts.problem, []
+    t = np.linspace(0.0, whole.duration, 5000)
+    for order, limit in ((1, SPEED), (2, ACCELERATION)):
+        if np.abs(whole(t, order)).max() > limit * (1.0 + 1e-9):
+            found.append(f"limit of order {order}")
+    lower, upper = problem.envelope.lower, problem.envelope.upper
+    if np.any(whole(t) < lower - 1e-9) or np.any(whole(t) > upper + 1e-9):
+        found.append("position limits")
+    stops = [0.0, *parts.cuts, problem.path.duration]
+    for plan, ends in zip(parts.plans, itertools.pairwise(stops), strict=True):
+        q = plan.trajectory.q
+        for configuration, time in zip((q[0], q[-1]), ends, strict=True):
+            miss = problem.task.miss(problem.path.pose(time), problem.robot.pose(configuration))
+            if max(miss) > 1e-6:
+                found.append(f"a part is not at its end of the path at t = {time:.3f} s")
+    for move, (before, after) in zip(parts.moves, itertools.pairwise(parts.plans), strict=True):
+        ends = move.trajectory.q[[0, -1]] - [before.trajectory.q[-1], after.trajectory.q[0]]
+        if np.abs(ends).max() > 0.0:
+            found.append("a move does not lead from part to part")
+        for motion in (before.trajectory, after.trajectory, move.trajectory):
+            at = [motion.t[-1], motion.t[0]] if motion is not move.trajectory else motion.t[[0, -1]]
+            cut = at[:1] if motion is before.trajectory else at[1:]
+            if np.abs(motion(np.array(cut), 1)).max() > RESTING:
+                found.append("it does not rest at a cut")
+    return found
+
+
+def test_a_path_that_needs_two_changes_is_found_with_two() -> None:
+    angle = 2.9 * TURN
+    assert fewest(angle) == 3
+    parts = sm.plan_in_parts(wound(angle)).require()
+    assert len(parts.plans) == 3
+    assert all(plan.certificate.verified for plan in parts.plans)
+    assert len(parts.moves) == len(parts.cuts) == 2
+    assert not faults(parts)
+    for cut, ending in zip(parts.cuts, parts.endings, strict=True):
+        assert 0.0 < cut < parts.problem.path.duration
+        assert "joint1" in ending
+    # Each begins where the motion of all of them says so.
+    for plan, begins in zip(parts.plans, parts.begins, strict=True):
+        np.testing.assert_allclose(parts.trajectory(begins), plan.trajectory.q[0], atol=1e-12)
+    broken = sm.Parts(parts.problem, parts.plans[:2], parts.moves[:1], parts.cuts[:1])
+    assert "a part is not at its end of the path at t = " in "".join(faults(broken))
+    swapped = sm.Parts(parts.problem, parts.plans, parts.moves[::-1], parts.cuts)
+    assert "a move does not lead from part to part" in faults(swapped)
+
+
+def test_one_change_where_one_is_needed_and_none_where_none_is() -> None:
+    for angle in (0.85 * TURN, 1.9 * TURN):
+        parts = sm.plan_in_parts(wound(angle)).require()
+        assert len(parts.plans) == fewest(angle) == len(parts.moves) + 1
+    whole = sm.plan_in_parts(wound(0.85 * TURN))
+    assert (whole.moves, whole.cuts, whole.endings) == ((), (), ())
+    assert whole.begins == (0.0,)
+    # One part is the plan itself.
+    assert whole.plans[0].problem.path is whole.problem.path
+
+
+def test_what_is_asked_of_the_ends_is_asked_of_the_first_and_the_last_part() -> None:
+    start = np.array([-0.4 * TURN, *SHAPE])
+    end = np.array([-0.5 * TURN + 1.9 * TURN - 2.0 * np.pi, *SHAPE])
+    problem = wound(1.9 * TURN, sm.EndConfiguration(end))
+    reached = problem.robot.inverse_kinematics(problem.path.pose(0.0), "planar", start)
+    pinned = sm.Problem(
+        problem.robot, problem.path, "planar", reached, constraints=problem.constraints
+    )
+    parts = sm.plan_in_parts(pinned).require()
+    np.testing.assert_allclose(parts.plans[0].trajectory.q[0], reached, atol=1e-12)
+    np.testing.assert_allclose(parts.plans[-1].trajectory.q[-1], end, atol=1e-6)
+
+
+def test_a_closed_path_in_parts_is_closed_by_a_last_move() -> None:
+    problem = wound(4.0 * np.pi, sm.ClosedPath())
+    parts = sm.plan_in_parts(problem).require()
+    assert len(parts.moves) == len(parts.plans) == fewest(4.0 * np.pi)
+    whole = parts.trajectory
+    np.testing.assert_allclose(whole.q[-1], whole.q[0], atol=1e-12)
+    assert max(np.abs(whole.qd[[0, -1]]).max(), 0.0) < RESTING
+
+
+def test_moves_go_round_what_is_in_the_way(tmp_path) -> None:
+    robot = arm(tmp_path, np.random.default_rng(3), 7, "box")
+    rng = np.random.default_rng(5)
+    first, last = rng.uniform(-1.2, 1.2, (2, 7))
+    kinematics = Arm(robot)
+    _, middle = kinematics.place(kinematics.tool, 0.5 * (first + last)[None])
+    ball = sm.Sphere("ball", middle[0], 0.08)
+    clearance = sm.Clearance([ball], 2e-3)
+    path = sm.Line(robot.pose(first), robot.pose(first) * pin.SE3(np.eye(3), np.full(3, 0.01)), 2.0)
+    limits = [sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits(20.0)]
+    problem = sm.Problem(robot, path, "pose", constraints=[*limits, clearance])
+    mover = Mover(between_parts(problem), None, np.random.default_rng(0), lambda *_: None)
+
+    def refuted(motion: sm.Trajectory) -> tuple[str, ...]:
+        followed = Followed(kinematics, motion, motion.duration)
+        bodies = [([ball], clearance.model(robot).pairs, 2e-3)]
+        acceleration = {2: (np.full(7, -20.0), np.full(7, 20.0))}
+        judge = Judge(robot, followed, limits=acceleration, bodies=bodies, per_interval=300)
+        return judge.judge(motion).refutes
+
+    move = mover.move(first, last)
+    assert move.verified
+    assert move.trajectory is not None
+    np.testing.assert_array_equal(move.trajectory.q[[0, -1]], [first, last])
+    assert not refuted(move.trajectory)
+    still = np.zeros((2, 7))
+    duration = move.trajectory.duration
+    straight = sm.Trajectory([0.0, duration], [first, last], still, robot.joint_names, still)
+    assert any(fault.startswith("apart") for fault in refuted(straight))
+    # Into the ball there is no way, and that is said.
+    missing = mover.move(first, 0.5 * (first + last))
+    assert not missing.verified
+    assert missing.trajectory is None
+    assert "no way was found" in missing.trouble
+
+
+def screw(angle: float, *more: sm.Constraint) -> sm.Problem:
+    """Return the problem of a Panda that turns its tool on the spot, joint 7 by 6.8 rad at most.
+
+    The others turn by 0.2 rad at most, so that one part turns the tool by 6.8 + 6 · 0.2 rad at
+    most.
+    """
+    panda = robot_named("panda")
+    home = np.array(sm.NAMED_ARMS["panda"].home)
+    lower, upper = home - 0.1, home + 0.1
+    lower[6], upper[6] = -3.4, 3.4
+    pose = panda.pose(np.array([*home[:6], -3.4]))
+    turns = np.linspace(0.0, angle, int(2.0 * angle))
+    poses = [pose * pin.SE3(pin.exp3(np.array([0.0, 0.0, a])), np.zeros(3)) for a in turns]
+    constraints = [
+        sm.JointPositionLimits(lower, upper, replace=True),
+        sm.JointVelocityLimits(),
+        sm.JointAccelerationLimits(),
+        *more,
+    ]
+    path = sm.Waypoints.from_poses(1.5 * turns, poses)
+    return sm.Problem(panda, path, "pose", constraints=constraints)
+
+
+def test_the_tool_leaves_the_work_before_a_move_and_comes_back_after_it() -> None:
+    parts = sm.plan_in_parts(screw(10.0), retreat=0.02).require()
+    assert len(parts.plans) == 2
+    (move,) = parts.moves
+    assert move.trajectory is not None
+    tool = [
+        parts.problem.robot.pose(q)
+        for q in move.trajectory(np.linspace(0, move.trajectory.duration, 400))
+    ]
+    cut = parts.problem.path.pose(parts.cuts[0])
+    away = np.array([cut.actInv(pose.translation) for pose in tool])
+    farthest = int(np.argmin(away[:, 2]))
+    assert away[:, 2].min() < -0.015
+    # Along the axis until it is 20 mm away.
+    leaving = away[: int(np.argmax(away[:, 2] < -0.0195))]
+    assert np.abs(leaving[:, :2]).max() < 1e-5
+    assert 0 < farthest < len(away) - 1
+    assert np.abs(away[[0, -1]]).max() < 1e-5
+
+
+def test_what_no_part_follows_is_refused_with_time_and_reason() -> None:
+    problem = wound(1.9 * TURN)
+    robot = problem.robot
+    far = np.linspace(4.0, 6.0, 9)
+    out = sm.Waypoints(np.linspace(0.0, 4.0, 9), np.stack([far, 0 * far, 0 * far], axis=1))
+    with pytest.raises(NoSequenceError, match="in however many parts, passes t = ") as error:
+        sm.plan_in_parts(sm.Problem(robot, out, "planar"))
+    assert 1.5 < error.value.time < 2.5
+    # A single pose in the middle that limits forbid.
+    gap = wound(2.0, sm.JointPositionLimits([-0.5 * TURN, -7, -7], [-0.5 * TURN + 0.7, 7, 7]))
+    with pytest.raises(NoSequenceError, match="joint limits"):
+        sm.plan_in_parts(gap)
+
+
+def test_what_parts_cannot_be_is_refused() -> None:
+    problem = wound(2.0)
+    robot, path = problem.robot, problem.path
+    damped = sm.Problem(robot, path, "planar", damping=sm.Damping())
+    with pytest.raises(ProblemError, match="leave the damping out"):
+        sm.plan_in_parts(damped)
+    ur5 = robot_named("ur5")
+    pose = ur5.pose(ur5.dexterous_configuration("pose"))
+    line = sm.Line(pose, pose * pin.SE3(np.eye(3), np.full(3, 0.02)), 2.0)
+    relaxed = sm.Problem(ur5, line, "pose", relaxations=[sm.Relaxation("rz", 0.2)])
+    with pytest.raises(ProblemError, match="leaves no self-motion to search"):
+        sm.plan_in_parts(relaxed)
+    for options, words in (
+        ({"retreat": -1.0}, "retreat"),
+        ({"axis": (0, 0, 0)}, "axis is zero"),
+        ({"ramp": 0.0}, "ramp"),
+        ({"rng": "x"}, "rng"),
+    ):
+        with pytest.raises(ProblemError, match=words):
+            sm.plan_in_parts(problem, **options)
+    with pytest.raises(ProblemError, match="expected a Problem"):
+        sm.plan_in_parts(path)  # type: ignore[arg-type]
+
+
+def test_a_section_is_the_path_between_two_times_and_rests_where_asked() -> None:
+    path = wound(3.0).path
+    section = sm.Section(path, 1.0, 4.0)
+    t = np.linspace(0.0, section.duration, 50)
+    np.testing.assert_array_equal(section.samples(t).twist, path.samples(1.0 + t).twist)
+    with pytest.raises(sm.PathError, match="two times in order"):
+        sm.Section(path, 3.0, 2.0)
+    for ramped in itertools.product((False, True), repeat=2):
+        slower = section_at_rest(path, 1.0, 4.0, 0.5, ramped)
+        sm.testing.check_path(slower)
+        assert slower.duration == pytest.approx(3.0 + 0.225 * sum(ramped))
+        speeds = [np.abs(slower.twist(time)).max() for time in (0.0, slower.duration)]
+        assert [speed < 1e-12 for speed in speeds] == list(ramped)
+        middle = 0.5 * slower.duration
+        when = slower.when(slower.pace(np.array([middle])))
+        assert when[0] == pytest.approx(middle)
+
+
+def test_motions_are_joined_and_reversed_exactly() -> None:
+    rng = np.random.default_rng(0)
+    q = rng.normal(size=(3, 2))
+    still = np.zeros((2, 2))
+    one, other = (
+        sm.Trajectory([0.0, 1.5], q[k : k + 2], still, ("a", "b"), still) for k in range(2)
+    )
+    whole = joined_motions([one, other])
+    t = np.linspace(0.0, 1.5, 30)
+    for order in range(3):
+        np.testing.assert_allclose(whole(t + 1.5, order), other(t, order), atol=1e-12)
+        back = reversed_motion(other)(1.5 - t, order)
+        np.testing.assert_allclose((-1.0) ** order * back, other(t, order), atol=1e-12)
