@@ -13,7 +13,7 @@ import selfmotion as sm
 from selfmotion.basics.arrays import Array
 from selfmotion.basics.errors import NoSequenceError, ProblemError
 from selfmotion.search import SelfMotion, Sequence, best_sequences, targets
-from selfmotion.search.chains import diverse_chains, shortest_chains
+from selfmotion.search.chains import best_chains, diverse_chains
 from selfmotion.search.guides import search_times
 from selfmotion.search.nodes import Admissible
 
@@ -211,7 +211,7 @@ def random_layers(seed: int) -> list[Array]:
 @pytest.mark.parametrize("seed", range(12))
 def test_shortest_chain_is_that_of_brute_force(seed: int) -> None:
     layers, step = random_layers(seed), np.array([0.6, 0.5, 0.7])
-    chains = shortest_chains(layers, step, np.zeros(3, dtype=bool))
+    chains = best_chains(layers, step, np.zeros(3, dtype=bool))
     best = brute_force(layers, step)
     assert chains.cost[-1].min() == pytest.approx(best)
     if np.isfinite(best):
@@ -226,8 +226,8 @@ def test_shortest_chain_is_that_of_brute_force(seed: int) -> None:
 def test_angles_of_turning_joints_count_modulo_turns() -> None:
     layers = [np.array([[3.1, 0.0]]), np.array([[-3.1, 0.0]])]
     step = np.array([0.2, 0.2])
-    assert shortest_chains(layers, step, np.array([False, False])).blocked == 1
-    turned = shortest_chains(layers, step, np.array([True, False]))
+    assert best_chains(layers, step, np.array([False, False])).blocked == 1
+    turned = best_chains(layers, step, np.array([True, False]))
     assert turned.cost[-1][0] == pytest.approx(2 * np.pi - 6.2)
 
 

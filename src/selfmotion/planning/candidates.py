@@ -29,8 +29,8 @@ from selfmotion.search import Reach, SequenceGuide, guides, start_candidates
 _SECOND_EFFORT = 4
 # Evaluations of the cost with which each sequence is optimised at first; only the best goes on.
 _FIRST = 16
-# Sequences are not worth refining when longer by this factor than one that keeps all constraints.
-_LONGER = 1.25
+# Sequences are not worth refining when dearer by this factor than one that keeps all constraints.
+_DEARER = 1.25
 
 
 class _CutShortError(Exception):
@@ -232,14 +232,15 @@ class Candidates:
                 self._try(begun[0], chosen=chosen)
 
     def _hopeless(self, guide: SequenceGuide, session: Session, best: Session) -> bool:
-        """Whether a sequence is much longer than the shortest, and costs more than what there is.
+        """Whether a sequence is much dearer than the best, and costs more than what there is.
 
         Optimising gains some percent on a sequence.
         """
         if best.violations:
             return False
-        longer = guide.sequence.length > _LONGER * self.sequences[0].sequence.length
-        return longer and session.merit() > best.score()[1]
+        least = self.sequences[0].sequence.cost
+        dearer = guide.sequence.cost > least + (_DEARER - 1.0) * abs(least)
+        return dearer and session.merit() > best.score()[1]
 
     def _try(
         self, session: Session, *, chosen: bool = True, evaluations: int | None = None

@@ -352,7 +352,7 @@ class _Run:
         candidates, motion = self._candidates, finished.motion
         if not candidates.sequences:
             return None
-        shortest = candidates.sequences[0].sequence
+        shortest = min((each.sequence for each in candidates.sequences), key=lambda s: s.length)
         rival = candidates.rival
         if rival is not None and rival is candidates.best and not rival.violations:
             rival_cost = motion.cost

@@ -1,16 +1,12 @@
-"""Dynamic programming over the waypoints: the shortest chains of nodes, and others unlike them."""
+"""Dynamic programming over the waypoints: the best chains of nodes, and others unlike them."""
 
 import itertools
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from selfmotion.basics import Array
-from selfmotion.search import kernels
-
-Mask = npt.NDArray[np.bool_]
-Rows = npt.NDArray[np.intp]
+from selfmotion.search.measures import Length, Mask, Measure, Rows
 
 # Chains are unlike when some joint differs by this [rad or m] at this share of the waypoints.
 _UNLIKE, _LONG = 0.3, 0.1
@@ -24,12 +20,12 @@ _STATIONS = 7
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """Shortest chains to every node, or from every node when made backwards.
+    """The cheapest chains to every node, or from every node when made backwards.
 
     Attributes
     ----------
     cost : tuple of (N_i,)
-        Least Σ|Δq| from the first waypoint; inf where no chain arrives.
+        The least from the first waypoint; inf where no chain arrives.
     parent : tuple of (N_i,)
         The node before on that chain, -1 where there is none.
     """
@@ -53,10 +49,10 @@ class Chains:
         return chain[::-1]
 
 
-def shortest_chains(
-    layers: list[Array], largest_step: Array, turning: Mask, weights: Array | None = None
+def best_chains(
+    layers: list[Array], largest_step: Array, turning: Mask, measure: Measure | None = None
 ) -> Chains:
-    """Return the shortest chains from the first layer on (Bellman's recursion, exact).
+    """Return the cheapest chains from the first layer on (Bellman's recursion, exact).
 
     Parameters
     ----------
@@ -66,28 +62,18 @@ def shortest_chains(
         No joint may move more between waypoints.
     turning : (n,)
         Joints that count modulo turns.
-    weights : (n,), optional
-        Of the joints in the length; 1 by default.
+    measure : Measure, optional
+        By default the length, all joints alike.
     """
-    weights = np.ones(len(turning)) if weights is None else weights
+    measure = Length(np.ones(len(turning))) if measure is None else measure
     cost = [np.zeros(len(layers[0]))]
     parent = [np.full(len(layers[0]), -1, dtype=np.intp)]
     steps = np.broadcast_to(largest_step, (len(layers) - 1, len(turning)))
-    for (before, after), step in zip(itertools.pairwise(layers), steps, strict=True):
-        reach, source = extended(before, cost[-1], after, step, turning, weights)
+    for k, (before, after) in enumerate(itertools.pairwise(layers)):
+        reach, source = measure.extended(k, before, cost[-1], after, steps[k], turning)
         cost.append(reach)
         parent.append(source)
     return Chains(tuple(cost), tuple(parent))
-
-
-def extended(
-    before: Array, cost: Array, after: Array, step: Array, turning: Mask, weights: Array
-) -> tuple[Array, Rows]:
-    """Return the least cost at `after` (M, n), (M,), and the node of `before` it comes from."""
-    reach, source = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
-    longest = np.ascontiguousarray(step)
-    kernels.extend(before, cost, after, longest, turning, weights, reach, source)
-    return reach, source
 
 
 def diverse_chains(
@@ -96,16 +82,17 @@ def diverse_chains(
     largest_step: Array,
     turning: Mask,
     count: int,
-    weights: Array | None = None,
+    measure: Measure | None = None,
 ) -> list[list[int]]:
-    """Return up to `count` chains of nodes: the shortest one, then the shortest unlike the others.
+    """Return up to `count` chains of nodes: the cheapest one, then the cheapest unlike the others.
 
-    Each is the shortest chain through some node of a few waypoints spread over the motion. Mirror
+    Each is the cheapest chain through some node of a few waypoints spread over the motion. Mirror
     images, whose joints move by the same amounts (a wrist turned over), come only where there are
     too few others.
     """
     backwards = largest_step if largest_step.ndim == 1 else largest_step[::-1]
-    reverse = shortest_chains(layers[::-1], backwards, turning, weights)
+    back = None if measure is None else measure.backwards()
+    reverse = best_chains(layers[::-1], backwards, turning, back)
     stations = np.unique(np.linspace(0, len(layers) - 1, _STATIONS).round().astype(int))
     through = [
         (float(forward.cost[i][k] + reverse.cost[-1 - i][k]), int(i), k)

@@ -11,6 +11,7 @@ from selfmotion.kernels import angle_kind
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.search import kernels
+from selfmotion.search.manifold import Manifold
 from selfmotion.task import Task
 
 # Newton's method from a sample of the neighbouring waypoint, and from anywhere.
@@ -123,6 +124,8 @@ class SelfMotion:
         self._rows = task.rows
         self._kind = angle_kind(task.rows, task.tool_axes)
         self._tool = robot.tool_kinematics()
+        everywhere = np.full(robot.dof, np.inf)
+        self._manifold = Manifold(robot, task, -everywhere, everywhere)
         # Any direction that is not a row of the Jacobian gives the tangent by projection.
         self._direction = np.random.default_rng(0).normal(size=robot.dof)
 
@@ -158,6 +161,15 @@ class SelfMotion:
                 return q
         return None
 
+    def project_all(
+        self, q: Array, target: Array, *, far: bool = False
+    ) -> tuple[Array, npt.NDArray[np.bool_]]:
+        """Return what Newton's method reaches from configurations (K, n), and where it does, (K,).
+
+        As `project`, for many at once; `target` is (12,), or (K, 12).
+        """
+        return self._manifold.project(q, target, far=far)
+
     def tangent(self, q: Array, target: Array) -> Array | None:
         """Return a unit null vector of J at q, a solution; None where q is singular."""
         jacobian = self._tool.at(q)
@@ -189,9 +201,10 @@ class SelfMotion:
     ) -> bool:
         """Add to `found` the curves it lacks; return whether there was one."""
         before = len(found.curves)
-        for seed in seeds:
-            q = self.project(seed, target, far=far)
-            if q is None or found.locate(q) is not None:
+        given = np.array(list(seeds)).reshape(-1, self.robot.dof)
+        projected, arrived = self.project_all(given, target, far=far)
+        for q in projected[arrived]:
+            if found.locate(q) is not None:
                 continue
             curve = self.trace(q, target)
             if curve is not None:

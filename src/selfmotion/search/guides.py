@@ -10,10 +10,11 @@ from selfmotion.basics import Array, Progress
 from selfmotion.costs import PathLength
 from selfmotion.path import Path
 from selfmotion.plans import Problem
+from selfmotion.search.measures import measure_of
 from selfmotion.search.sampled import sampled_sequences
 from selfmotion.search.sequences import Sequence, best_sequences
 
-# Sequences refined; the shortest among the samples is not always that of the best motion.
+# Sequences refined; the best among the samples is not always that of the best motion.
 _COUNT = 3
 # From one of the search's times to the next the tool moves by so much [m, rad], whatever the path's
 # own waypoints: more times would take longer, and what comes of them is smoothed anyway.
@@ -58,7 +59,7 @@ class SequenceGuide:
 def guides(
     problem: Problem, rng: np.random.Generator | int | None, progress: Progress
 ) -> list[SequenceGuide]:
-    """Return guides from the best sequences over the self-motions, shortest first.
+    """Return guides from the best sequences over the self-motions, by the problem's own costs.
 
     Raises
     ------
@@ -74,6 +75,7 @@ def guides(
         "largest_step": step,
         "bodies": [(model, distance + MARGIN) for model, distance in asked.bodies],
         "count": _COUNT,
+        "measure": measure_of(robot, problem.task, problem.costs, t, _weights(problem)),
         "rng": 0 if rng is None else rng,
         "progress": progress,
     }

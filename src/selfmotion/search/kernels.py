@@ -247,6 +247,52 @@ def extend(
 
 
 @kernel
+def near_pairs(
+    before: Array, after: Array, largest_step: Array, turning: Mask
+) -> tuple[Rows, Rows]:
+    """Return the pairs of nodes (P,), (P,) from `before` (N, n) to `after` (M, n) that are near.
+
+    No joint may move by more than `largest_step`; otherwise as `extend`.
+    """
+    n, many = after.shape[1], before.shape[0]
+    room = 4 * (many + after.shape[0])
+    first, second = np.empty(room, dtype=np.intp), np.empty(room, dtype=np.intp)
+    count = 0
+    for j in range(after.shape[0]):
+        begin = 0
+        if not turning[0]:
+            begin = int(np.searchsorted(before[:, 0], after[j, 0] - largest_step[0]))
+        for i in range(begin, many):
+            if not turning[0] and before[i, 0] > after[j, 0] + largest_step[0]:
+                break
+            near = True
+            for k in range(n):
+                if abs(wrapped(after[j, k] - before[i, k], turning[k])) > largest_step[k]:
+                    near = False
+                    break
+            if near:
+                if count == room:
+                    room *= 2
+                    longer = np.empty((2, room), dtype=np.intp)
+                    longer[0, :count], longer[1, :count] = first, second
+                    first, second = longer[0], longer[1]
+                first[count], second[count] = i, j
+                count += 1
+    return first[:count].copy(), second[:count].copy()
+
+
+@kernel
+def cheapest(
+    first: Rows, second: Rows, price: Array, cost: Array, reach: Array, parent: Rows
+) -> None:
+    """Lower `reach` (M,) to the least cost over steps with prices (P,), and set `parent`."""
+    for k in range(len(first)):
+        total = cost[first[k]] + price[k]
+        if total < reach[second[k]]:
+            reach[second[k]], parent[second[k]] = total, first[k]
+
+
+@kernel
 def project_all(
     q: Array,
     targets: Array,

@@ -132,7 +132,7 @@ def place_nodes(
     motion: SelfMotion,
     target: Array,
     curves: CurveSet,
-    carried: Sequence[Array],
+    carried: Array,
     bounds: Admissible,
     spacing: float,
 ) -> Array:
@@ -147,7 +147,7 @@ def place_nodes(
     motion : SelfMotion
     target : (12,)
     curves : CurveSet
-    carried : sequence of (n,)
+    carried : (C, n)
         Configurations on the curves.
     bounds : Admissible
     spacing : float
@@ -185,12 +185,8 @@ class _CurveSampler:
         arcs = np.concatenate([[arc for arc, _ in kept], gaps])
         q = np.vstack([*[q for _, q in kept], self.curve.at(gaps)])
         near = np.all(self.bounds.excess(q) < _SURELY_OUTSIDE, axis=1)
-        for i in np.flatnonzero(near[len(kept) :]) + len(kept):
-            solution = self.motion.project(q[i], self.target)
-            if solution is None:
-                near[i] = False
-            else:
-                q[i] = solution
+        fresh = np.flatnonzero(near[len(kept) :]) + len(kept)
+        q[fresh], near[fresh] = self.motion.project_all(q[fresh], self.target)
         free = near.copy()
         free[near] = self.bounds.free(q[near])
         order = np.argsort(arcs, kind="stable")

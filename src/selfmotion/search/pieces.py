@@ -8,8 +8,9 @@ import numpy as np
 from selfmotion.basics import Array, NoSequenceError, Progress, silent
 from selfmotion.constraints import EndConfiguration
 from selfmotion.plans import Problem
-from selfmotion.search.chains import Mask, Rows, extended, shortest_chains, unturned
+from selfmotion.search.chains import best_chains, unturned
 from selfmotion.search.guides import MARGIN, has_curves, waypoint_times
+from selfmotion.search.measures import Length, Mask, Rows
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sampled import SampledLayers
 from selfmotion.search.sequences import CurveLayers, connected
@@ -151,20 +152,20 @@ class Pieces:
         self, layers: list[Array], bounds: Admissible, forbidden: set[int]
     ) -> list[tuple[int, list[int]]]:
         """Return the first waypoint of each chain, and its nodes, first to last."""
-        weights, turning = self.problem.robot.joint_weights, bounds.turning
+        length, turning = Length(self.problem.robot.joint_weights), bounds.turning
         anywhere = np.full(len(turning), np.inf)
         cost = np.zeros(len(layers[0]))
         parents: list[Rows] = [np.arange(len(cost))]
         # From which node of its own waypoint a node is changed to; itself where it is not.
         changes: list[Rows] = [np.arange(len(cost))]
         for i, (before, after) in enumerate(itertools.pairwise(layers), 1):
-            cost, parent = extended(before, cost, after, self._steps[i - 1], turning, weights)
+            cost, parent = length.extended(i - 1, before, cost, after, self._steps[i - 1], turning)
             if not np.any(np.isfinite(cost)):
                 self._refuse(i, self._why(i, before, after, bounds))
             parents.append(parent)
             change = np.arange(len(cost))
             if i < len(layers) - 1 and i not in forbidden:
-                changed, source = extended(after, cost, after, anywhere, turning, weights)
+                changed, source = length.extended(i, after, cost, after, anywhere, turning)
                 better = changed + _BREAK < cost
                 change = np.where(better, source, change)
                 cost = np.where(better, changed + _BREAK, cost)
@@ -173,8 +174,7 @@ class Pieces:
 
     def _ending(self, first: int, layers: list[Array], relaxed: Admissible) -> str:
         """Return why no chain from a waypoint on follows the rest of the path."""
-        weights = self.problem.robot.joint_weights
-        chains = shortest_chains(layers[first:], self._steps[first:], relaxed.turning, weights)
+        chains = best_chains(layers[first:], self._steps[first:], relaxed.turning)
         if chains.blocked is None:
             return "what goes on from there among the samples did not keep all constraints"
         i = first + chains.blocked

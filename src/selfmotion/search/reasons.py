@@ -39,8 +39,8 @@ def why_blocked(
     if len(nodes) == 0:
         samples = np.vstack([curve.q for curve in curves.curves])
         return f"of all configurations there, {_refusals(samples, bounds, motion)}"
-    continued = [q for q in (motion.project(q, target) for q in alive) if q is not None]
-    ending = np.array(continued).reshape(-1, motion.robot.dof)
+    continued, arrived = motion.project_all(alive, target)
+    ending = continued[arrived]
     ending = ending[~bounds.free(ending)]
     step = _step(alive, nodes, bounds, largest_step, motion)
     if not len(ending):

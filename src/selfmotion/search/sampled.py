@@ -9,9 +9,10 @@ from selfmotion.basics import Array, NoSequenceError, Progress, silent
 from selfmotion.collision import CollisionModel
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
-from selfmotion.search.chains import diverse_chains, extended, shortest_chains
+from selfmotion.search.chains import best_chains, diverse_chains
 from selfmotion.search.curves import targets
 from selfmotion.search.manifold import Manifold
+from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sequences import Sequence, connected, ranked
 from selfmotion.search.starts import spread
@@ -95,15 +96,16 @@ def sampled_sequences(
     bodies: Iterable[tuple[CollisionModel, float]] = (),
     weights: Array,
     count: int,
+    measure: Measure | None = None,
     rng: np.random.Generator | int = 0,
     progress: Progress = silent,
 ) -> list[Sequence]:
-    """Return short joint sequences along a path that are unlike each other, for any redundancy.
+    """Return good joint sequences along a path that are unlike each other, for any redundancy.
 
     Self-motions of two and more dimensions are too large to be sampled evenly at every waypoint.
     The nodes are those of many smooth motions instead, which begin all over the self-motions of
     some waypoints and follow the path both ways, with different constant null motions; dynamic
-    programming changes from one to another where that is shorter, or where one ends or meets
+    programming changes from one to another where that is cheaper, or where one ends or meets
     something. Then samples around the best chains take their place, nearer and nearer.
 
     Parameters
@@ -121,13 +123,15 @@ def sampled_sequences(
         Of the joints in a sequence's length.
     count : int
         How many sequences at most.
+    measure : Measure, optional
+        What they are chosen by; by default their length.
     rng : Generator or int
     progress : Progress
 
     Returns
     -------
     list of Sequence
-        Shortest first, at least one.
+        The best first, at least one.
 
     Raises
     ------
@@ -138,7 +142,8 @@ def sampled_sequences(
         robot, path, task, t, (lower, upper), tuple(bodies), largest_step, weights, rng, progress
     )
     bounds, layers, turning = nodes.bounds, nodes.layers, nodes.bounds.turning
-    chains = shortest_chains(layers, largest_step, turning, weights)
+    length = Length(weights)
+    chains = best_chains(layers, largest_step, turning, length)
     if chains.blocked is not None:
         time = float(t[chains.blocked])
         reason = nodes.why_blocked(chains.blocked)
@@ -147,12 +152,17 @@ def sampled_sequences(
             time=time,
             reason=reason,
         )
-    found = diverse_chains(layers, chains, largest_step, turning, count, weights)
+    found = diverse_chains(layers, chains, largest_step, turning, count, length)
+    if measure is not None:
+        measure = measure.at_pace_of(connected(layers, found[0], turning))
+        chains = best_chains(layers, largest_step, turning, measure)
+        found = diverse_chains(layers, chains, largest_step, turning, count, measure)
+    measure = measure or length
     rough = [connected(layers, chain, turning) for chain in found]
     for number, q in enumerate(rough):
         progress("search: shortening sequence", number + 1, len(rough))
-        rough[number] = _shortened(nodes.manifold, bounds, nodes.x, q, largest_step, weights)
-    return ranked(t, rough, turning, weights)
+        rough[number] = _shortened(nodes.manifold, bounds, nodes.x, q, largest_step, measure)
+    return ranked(t, rough, turning, weights, measure)
 
 
 def _layers(
@@ -184,7 +194,9 @@ def _layers(
         q, arrived = manifold.project(guesses, x[i])
         q = np.concatenate([q[arrived], smooth[i]])
         layers.append(_sorted(q[bounds.keep(q)]))
-        cost, _ = extended(before, cost, layers[-1], largest_step[i - 1], turning, weights)
+        cost, _ = Length(weights).extended(
+            i - 1, before, cost, layers[-1], largest_step[i - 1], turning
+        )
         if not np.any(np.isfinite(cost)):
             # What lies beyond is for chains that begin here.
             cost = np.zeros(len(cost))
@@ -250,19 +262,19 @@ def _shortened(
     x: Array,
     q: Array,
     largest_step: Array,
-    weights: Array,
+    measure: Measure,
 ) -> Array:
-    """Return a shorter chain near q (W, n): never longer."""
+    """Return a better chain near q (W, n), never a worse one."""
     fixed = np.zeros(q.shape[1], dtype=bool)
-    length = _length(q, weights)
+    cost = measure.of(q)
     for ring in _RINGS:
         for _ in range(_ROUNDS):
             layers = _around(manifold, bounds, x, q, ring)
-            chains = shortest_chains(layers, largest_step, fixed, weights)
-            before, length = length, float(chains.cost[-1].min())
+            chains = best_chains(layers, largest_step, fixed, measure)
+            before, cost = cost, float(chains.cost[-1].min())
             chain = chains.back(len(q) - 1, int(np.argmin(chains.cost[-1])))
             q = connected(layers, chain, fixed)
-            if length > (1.0 - _WORTHWHILE) * before:
+            if cost > before - _WORTHWHILE * abs(before):
                 break
     return q
 
@@ -288,7 +300,3 @@ def _around(manifold: Manifold, bounds: Admissible, x: Array, q: Array, ring: fl
         for here, near, free in zip(q, found, kept, strict=True)
     ]
     return [_sorted(layer) for layer in layers]
-
-
-def _length(q: Array, weights: Array) -> float:
-    return float((np.abs(np.diff(q, axis=0)) * weights).sum())

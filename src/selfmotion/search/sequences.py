@@ -10,8 +10,9 @@ from selfmotion.basics import Array, NoSequenceError, ProblemError, Progress, re
 from selfmotion.collision import CollisionModel
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
-from selfmotion.search.chains import Mask, diverse_chains, shortest_chains, unlike, unturned
+from selfmotion.search.chains import best_chains, diverse_chains, unlike, unturned
 from selfmotion.search.curves import CurveSet, SelfMotion, curves_along, targets
+from selfmotion.search.measures import Length, Mask, Measure
 from selfmotion.search.nodes import Admissible, place_nodes
 from selfmotion.search.reasons import why_blocked
 from selfmotion.search.starts import spread
@@ -36,11 +37,14 @@ class Sequence:
         Configurations [rad or m], each with the tool on the path.
     length : float
         Σ w|Δq| over waypoints and joints, w being the joints' weights (`RobotModel.joint_weights`).
+    cost : float
+        What it was chosen by; see `Measure`.
     """
 
     t: Array
     q: Array
     length: float
+    cost: float = np.nan
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "t", read_only(self.t))
@@ -108,19 +112,20 @@ def best_sequences(
     largest_step: npt.ArrayLike,
     bodies: Iterable[tuple[CollisionModel, float]] = (),
     count: int = 3,
+    measure: Measure | None = None,
     rng: np.random.Generator | int = 0,
     progress: Progress = silent,
 ) -> list[Sequence]:
-    """Return the shortest joint sequences along a path that are unlike each other.
+    """Return the best joint sequences along a path that are unlike each other.
 
     At every waypoint all self-motion curves are sampled by numerical continuation, from inverse
     kinematics at many seeds and from the curves of the neighbouring waypoints. The samples inside
     the limits and free of collision are the nodes of a graph; dynamic programming finds the chain
-    of least Σ|Δq| with every step within `largest_step`: the global optimum over samples about
-    0.1 rad apart. Each is then moved along the curves, locally and with finer samples, to where
-    it is shorter; it stays a few per cent longer than the continuous problem's optimum.
-    Hence several chains, unlike each other by 0.3 rad in some joint at a
-    tenth of the waypoints: refine them all and keep the best.
+    of least Σ w|Δq|, or of the least of another measure, with every step within `largest_step`:
+    the global optimum over samples about 0.1 rad apart. Each is then moved along the curves,
+    locally and with finer samples, to where it is better; it stays a few per cent above the
+    continuous problem's optimum. Hence several chains, unlike each other by 0.3 rad in some joint
+    at a tenth of the waypoints: refine them all and keep the best.
 
     Parameters
     ----------
@@ -138,6 +143,8 @@ def best_sequences(
         Bodies to keep apart at the waypoints, and the distance [m].
     count : int
         How many sequences at most.
+    measure : Measure, optional
+        What they are chosen by; by default their length.
     rng : Generator or int
         Shifts the seeds of the inverse kinematics; the same one gives the same sequences.
     progress : Progress
@@ -146,7 +153,7 @@ def best_sequences(
     Returns
     -------
     list of Sequence
-        Shortest first, at least one.
+        The best first, at least one.
 
     Raises
     ------
@@ -170,7 +177,7 @@ def best_sequences(
     lower, upper, steps = limits
     layers = CurveLayers.of(robot, path, task, times, (lower, upper), tuple(bodies), rng, progress)
     motion, x, bounds = layers.motion, layers.x, layers.bounds
-    rough, turning = _rough_motions(layers, steps, times, count)
+    rough, turning, measure = _rough_motions(layers, steps, times, count, measure)
     # All of them roughly, to see which are worth the rest.
     for stage, spacings, kept in (
         ("search: shortening sequence", ROUGHLY, len(rough)),
@@ -179,25 +186,27 @@ def best_sequences(
         del rough[kept:]
         for number, q in enumerate(rough):
             progress(stage, number + 1, len(rough))
-            rough[number] = tighten(motion, x, q, bounds, steps, spacings)
-        best = ranked(times, rough, turning)
+            rough[number] = tighten(motion, x, q, bounds, steps, measure, spacings)
+        best = ranked(times, rough, turning, robot.joint_weights, measure)
         rough = [np.array(sequence.q) for sequence in best]
     return best
 
 
 def _rough_motions(
-    nodes: CurveLayers, steps: Array, times: Array, count: int
-) -> tuple[list[Array], Mask]:
-    """Return the shortest unlike motions (W, n) over samples, and whose turns did not count.
+    nodes: CurveLayers, steps: Array, times: Array, count: int, asked: Measure | None
+) -> tuple[list[Array], Mask, Measure]:
+    """Return the best unlike motions (W, n) over samples, whose turns did not count, and by what.
 
     Turns of joints with room for several are left out at first, and the motion put inside the
     limits as a whole; where it does not fit, it is looked for among all turns of these joints.
     """
-    bounds = nodes.bounds
+    bounds, length = nodes.bounds, Length(nodes.motion.robot.joint_weights)
+    if isinstance(asked, Length):
+        length = asked
     relaxed = bounds.without_turns()
     while True:
         layers, turning = [relaxed.layer(q) for q in nodes.samples], relaxed.turning
-        chains = shortest_chains(layers, steps, turning)
+        chains = best_chains(layers, steps, turning, length)
         if chains.blocked is not None:
             i = chains.blocked
             alive = layers[i - 1][np.isfinite(chains.cost[i - 1])] if i else layers[0][:0]
@@ -208,12 +217,17 @@ def _rough_motions(
                 time=float(times[i]),
                 reason=reason,
             )
+        measure: Measure = length
+        if asked is not None and asked is not length:
+            shortest = chains.back(len(layers) - 1, int(np.argmin(chains.cost[-1])))
+            measure = asked.at_pace_of(connected(layers, shortest, turning))
+            chains = best_chains(layers, steps, turning, measure)
         # Unlike chains may become the same one when they are tightened.
-        found = diverse_chains(layers, chains, steps, turning, 2 * count)
+        found = diverse_chains(layers, chains, steps, turning, 2 * count, measure)
         rough = [bounds.turned_inside(connected(layers, q, turning)) for q in found]
         beyond = bounds.beyond(rough[0])
         if not np.any(beyond):
-            return [q for q in rough if not np.any(bounds.beyond(q))], turning
+            return [q for q in rough if not np.any(bounds.beyond(q))], turning, measure
         relaxed = replace(
             relaxed,
             lower=np.where(beyond, bounds.lower, relaxed.lower),
@@ -222,15 +236,13 @@ def _rough_motions(
 
 
 def ranked(
-    times: Array, motions: list[Array], turning: Mask, weights: Array | None = None
+    times: Array, motions: list[Array], turning: Mask, weights: Array, measure: Measure
 ) -> list[Sequence]:
-    """Return the sequences, shortest first, without those that became like a shorter one."""
-    weights = np.ones(len(turning)) if weights is None else weights
-    sequences = [
-        Sequence(times, q, float((np.abs(np.diff(q, axis=0)) * weights).sum())) for q in motions
-    ]
+    """Return the sequences, the best first, without those that became like a better one."""
+    length = Length(weights)
+    sequences = [Sequence(times, q, length.of(q), measure.of(q)) for q in motions]
     kept: list[Sequence] = []
-    for sequence in sorted(sequences, key=lambda sequence: sequence.length):
+    for sequence in sorted(sequences, key=lambda sequence: sequence.cost):
         if all(unlike(sequence.q, other.q, turning) for other in kept):
             kept.append(sequence)
     return kept
@@ -244,8 +256,8 @@ def _free_samples(
     before = np.empty((0, motion.robot.dof))
     for number, (target, here) in enumerate(zip(x, curves, strict=True), 1):
         progress("search: what is free at waypoint", number, len(x))
-        carried = [q for q in (motion.project(s, target) for s in before) if q is not None]
-        before = place_nodes(motion, target, here, carried, bounds, SPACING)
+        carried, arrived = motion.project_all(before, target)
+        before = place_nodes(motion, target, here, carried[arrived], bounds, SPACING)
         found.append(before)
     return found
 

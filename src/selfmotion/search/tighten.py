@@ -1,10 +1,13 @@
-"""A chain of samples moved along its self-motion curves to where it is shorter."""
+"""A chain of samples moved along its self-motion curves to where it is better."""
+
+from collections.abc import Iterator
 
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.search.chains import shortest_chains
+from selfmotion.search.chains import best_chains
 from selfmotion.search.curves import SelfMotion
+from selfmotion.search.measures import Measure
 from selfmotion.search.nodes import Admissible
 
 # Distances of neighbouring samples [rad or m], each a third of the last, from half of that of the
@@ -13,7 +16,7 @@ from selfmotion.search.nodes import Admissible
 ROUGHLY, FINELY = (0.03, 0.01), (0.003, 0.001)
 # So many samples to each side are looked at in one round.
 _SIDE, _ROUNDS = 6, 40
-# A round that shortens the chain by less than this share is the last one of its spacing.
+# A round that improves the chain by less than this share is the last one of its spacing.
 _WORTHWHILE = 2e-4
 
 
@@ -23,13 +26,14 @@ def tighten(
     q: Array,
     bounds: Admissible,
     largest_step: Array,
+    measure: Measure,
     spacings: tuple[float, ...] = ROUGHLY + FINELY,
 ) -> Array:
-    """Return a shorter chain of configurations near q (W, n).
+    """Return a cheaper chain of configurations near q (W, n).
 
     Samples as coarse as those of the global search cannot follow small drifts along the curves.
     Dynamic programming over a few finer samples to both sides of each configuration, repeated
-    about the outcome until that gains no more, then with finer ones. Never longer than q.
+    about the outcome until that gains no more, then with finer ones. Never dearer than q.
 
     Parameters
     ----------
@@ -40,40 +44,59 @@ def tighten(
         On the path, within `bounds` and `largest_step`, angles without jumps.
     bounds : Admissible
     largest_step : (n,) or (W - 1, n)
+    measure : Measure
     spacings : tuple of float
         Of the samples [rad or m], one after the other.
     """
     fixed = np.zeros(q.shape[1], dtype=bool)
-    length = float(np.abs(np.diff(q, axis=0)).sum())
+    cost = measure.of(q)
     for spacing in spacings:
+        tangents = (motion.tangent(here, target) for target, here in zip(x, q, strict=True))
         strips = [
-            _Strip(motion, target, here, bounds, spacing) for target, here in zip(x, q, strict=True)
+            _Strip(here, tangent, bounds, spacing)
+            for here, tangent in zip(q, tangents, strict=True)
         ]
         for _ in range(_ROUNDS):
+            _grow(motion, x, strips)
             layers = [strip.layer() for strip in strips]
-            chains = shortest_chains(layers, largest_step, fixed)
+            chains = best_chains(layers, largest_step, fixed, measure)
             chain = chains.back(len(q) - 1, int(np.argmin(chains.cost[-1])))
-            before, length = length, float(chains.cost[-1].min())
+            before, cost = cost, float(chains.cost[-1].min())
             for strip, node in zip(strips, chain, strict=True):
                 strip.choose(node)
-            if length > (1.0 - _WORTHWHILE) * before:
+            if cost > before - _WORTHWHILE * abs(before):
                 break
         q = np.array([strip.chosen for strip in strips])
     return q
 
 
+def _grow(motion: SelfMotion, x: Array, strips: list["_Strip"]) -> None:
+    """Make the samples that the strips need for their next layers, all waypoints at once."""
+    while True:
+        wanted = [
+            (waypoint, index, guess)
+            for waypoint, strip in enumerate(strips)
+            for index, guess in strip.wanted()
+        ]
+        if not wanted:
+            return
+        guesses = np.array([guess for *_, guess in wanted])
+        found, arrived = motion.project_all(guesses, x[[waypoint for waypoint, *_ in wanted]])
+        for (waypoint, index, guess), q, is_there in zip(wanted, found, arrived, strict=True):
+            strips[waypoint].note(index, guess, q if is_there else None)
+
+
 class _Strip:
     """Samples of one waypoint's curve about a configuration, made when asked for and kept."""
 
-    def __init__(
-        self, motion: SelfMotion, target: Array, q: Array, bounds: Admissible, spacing: float
-    ) -> None:
-        self._motion, self._target, self._bounds = motion, target, bounds
-        self._spacing = spacing
+    def __init__(self, q: Array, tangent: Array | None, bounds: Admissible, spacing: float) -> None:
+        self._bounds, self._spacing = bounds, spacing
         # By the number of spacings from the first configuration; None beyond the curve's end.
         self._samples: dict[int, Array | None] = {0: q}
         self._free = {0: True}
-        self._tangent = motion.tangent(q, target)
+        self._tangent = tangent
+        # How far they go to each side so far.
+        self._reach = {-1: 0, 1: 0}
         self._centre = 0
         self._indices = [0]
 
@@ -88,37 +111,35 @@ class _Strip:
         """Make a node of the last layer the centre of the next one."""
         self._centre = self._indices[node]
 
+    def wanted(self) -> Iterator[tuple[int, Array]]:
+        """Yield the index of the next sample to each side that is needed, and about where it is."""
+        for toward, far in self._reach.items():
+            last = self._samples[toward * far]
+            if last is None or self._tangent is None or far >= _SIDE + toward * self._centre:
+                continue
+            if far == 0:
+                yield toward, last + toward * self._spacing * self._tangent
+            else:
+                earlier = self._samples[toward * (far - 1)]
+                assert earlier is not None, "the last one was made from it"
+                yield toward * (far + 1), 2.0 * last - earlier
+
+    def note(self, index: int, guess: Array, q: Array | None) -> None:
+        """Keep a sample, None where there is none."""
+        # Far corrections lead to another part of the curve, or another curve.
+        if q is not None and np.linalg.norm(q - guess) > 0.5 * self._spacing:
+            q = None
+        self._samples[index] = q
+        self._reach[1 if index > 0 else -1] = abs(index)
+        self._free[index] = q is not None and self._bounds.keeps(q)
+
     def layer(self) -> Array:
         """Return the free samples about the centre, (K, n), sorted by the first joint."""
         nodes = []
         for index in range(self._centre - _SIDE, self._centre + _SIDE + 1):
-            q = self._sample(index)
+            q = self._samples.get(index)
             if q is not None and self._free[index]:
                 nodes.append((q[0], index, q))
         nodes.sort(key=lambda node: node[:2])
         self._indices = [index for _, index, _ in nodes]
         return np.array([q for _, _, q in nodes])
-
-    def _sample(self, index: int) -> Array | None:
-        if index not in self._samples:
-            toward = 1 if index > 0 else -1
-            # The neighbour comes first; it exists, for layers grow outwards from the centre.
-            previous = self._sample(index - toward)
-            self._samples[index] = q = self._next(index, toward, previous)
-            self._free[index] = q is not None and self._bounds.keeps(q)
-        return self._samples[index]
-
-    def _next(self, index: int, toward: int, previous: Array | None) -> Array | None:
-        if previous is None or self._tangent is None:
-            return None
-        if index == toward:
-            guess = previous + toward * self._spacing * self._tangent
-        else:
-            earlier = self._samples[index - 2 * toward]
-            assert earlier is not None, "its neighbour was made from it"
-            guess = 2.0 * previous - earlier
-        q = self._motion.project(guess, self._target)
-        # Far corrections lead to another part of the curve, or another curve.
-        if q is None or np.linalg.norm(q - guess) > 0.5 * self._spacing:
-            return None
-        return q

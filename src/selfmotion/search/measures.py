@@ -1,0 +1,298 @@
+"""What a chain of configurations costs: its length, or what the problem minimises."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array
+from selfmotion.costs import Cost, PathLength, Samples
+from selfmotion.motion import Sampling
+from selfmotion.robot import RobotModel
+from selfmotion.search import kernels
+from selfmotion.task import Task
+
+Mask = npt.NDArray[np.bool_]
+Rows = npt.NDArray[np.intp]
+
+# Steps faster than this many times the mean speed of the shortest chain are changes from sample to
+# sample, which the finished motion spreads over more time.
+_FAST = 2.0
+
+
+class Measure(ABC):
+    """Adds up along chains of configurations, from one waypoint to the next."""
+
+    @abstractmethod
+    def extended(
+        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Mask
+    ) -> tuple[Array, Rows]:
+        """Return the least cost at the nodes of waypoint k + 1, and the nodes that it comes from.
+
+        Parameters
+        ----------
+        k : int
+            The waypoint before.
+        before, cost : (N, n), (N,)
+            Its nodes, sorted by the first joint, and what chains to them cost.
+        after : (M, n)
+        step : (n,)
+            No joint may move more.
+        turning : (n,)
+            Joints that count modulo turns.
+
+        Returns
+        -------
+        (M,), (M,)
+            inf and -1 where no step is short enough.
+        """
+
+    @abstractmethod
+    def of(self, q: Array) -> float:
+        """Return what a motion (W, n) costs."""
+
+    @abstractmethod
+    def backwards(self) -> "Measure":
+        """Return that of the same path from its end to its start."""
+
+    def at_pace_of(self, q: Array) -> "Measure":
+        """Return that for motions about as fast as the shortest one, (W, n)."""
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class Length(Measure):
+    """Σ w|Δq|.
+
+    Attributes
+    ----------
+    weights : (n,)
+        w of the joints.
+    """
+
+    weights: Array
+
+    def extended(
+        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Mask
+    ) -> tuple[Array, Rows]:
+        """See `Measure.extended`."""
+        reach, source = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
+        longest = np.ascontiguousarray(step)
+        kernels.extend(before, cost, after, longest, turning, self.weights, reach, source)
+        return reach, source
+
+    def of(self, q: Array) -> float:
+        """See `Measure.of`."""
+        return float((np.abs(np.diff(q, axis=0)) * self.weights).sum())
+
+    def backwards(self) -> Self:
+        """See `Measure.backwards`."""
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class RunningCost(Measure):
+    """∫ G dt of a problem's costs, as far as chains of samples tell it.
+
+    A step from q to q + Δq within Δt costs ½Δt (G(0, q) + G(0, q + Δq)) for being where it is, and
+    τ (G(Δq/τ, q + ½Δq) - G(0, q + ½Δq)) for moving, with τ = max(Δt, |Δq| / v). v is twice the mean
+    speed of the shortest chain: samples are as far apart as many intervals of a slow drift along
+    the self-motion, which no change from one sample to the next can follow, so that such a change
+    counts as if it were spread over the time it takes. Costs of accelerations and jerks are left
+    out.
+
+    Attributes
+    ----------
+    robot, task
+    t : (W,)
+        Times of the waypoints [s].
+    placed : tuple of Cost
+        Those of q alone.
+    moving : tuple of Cost
+        The others.
+    weights : (n,)
+        Of the joints in |Δq|.
+    speed : float
+        v [rad/s].
+    """
+
+    robot: RobotModel
+    task: Task
+    t: Array
+    placed: tuple[Cost, ...]
+    moving: tuple[Cost, ...]
+    weights: Array
+    speed: float = np.inf
+    _places: dict[int, "_Places"] = field(default_factory=dict, repr=False)
+    _steps: dict[tuple[int, int], "_Steps"] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def by(cls, robot: RobotModel, task: Task, costs: Sequence[Cost], t: Array) -> "RunningCost":
+        """Return that of costs over waypoints at times t (W,)."""
+        lower, upper = robot.finite_limits()
+        # Several times, since costs may take differences over them.
+        q = lower + (upper - lower) * np.random.default_rng(0).uniform(0.3, 0.7, (8, robot.dof))
+        sampling = Sampling.trapezoidal(np.linspace(t[0], t[-1], len(q)))
+        probe = Samples.along(robot, task, sampling, q, 0.1 * q)
+        placed: list[Cost] = []
+        moving: list[Cost] = []
+        for cost in costs:
+            partials = cost.gradient(probe)
+            if partials.qdd is not None or partials.qddd is not None:
+                continue
+            (placed if partials.qd is None else moving).append(cost)
+        return cls(robot, task, t, tuple(placed), tuple(moving), robot.joint_weights)
+
+    def extended(
+        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Mask
+    ) -> tuple[Array, Rows]:
+        """See `Measure.extended`."""
+        steps = self.steps(k, before, after, step, turning)
+        return _cheapest(steps.first, steps.second, steps.price, cost, len(after))
+
+    def steps(self, k: int, before: Array, after: Array, step: Array, turning: Mask) -> "_Steps":
+        """Return the steps that are short enough from waypoint k to the next; see `extended`."""
+        known = self._steps.get((id(before), id(after)))
+        if known is None or known.before is not before or known.after is not after:
+            longest = np.ascontiguousarray(step)
+            first, second = kernels.near_pairs(before, after, longest, turning)
+            price = self._prices(k, before, after, first, second, turning)
+            known = _Steps(before, after, first, second, price)
+            _note(self._steps, (id(before), id(after)), known, _MANY * len(self.t))
+        return known
+
+    def of(self, q: Array) -> float:
+        """See `Measure.of`."""
+        fixed, one = np.zeros(q.shape[1], dtype=bool), np.zeros(1, dtype=np.intp)
+        steps = (
+            self._prices(k, q[k : k + 1], q[k + 1 : k + 2], one, one, fixed)[0]
+            for k in range(len(q) - 1)
+        )
+        return float(sum(steps))
+
+    def backwards(self) -> "Backwards":
+        """See `Measure.backwards`."""
+        return Backwards(self)
+
+    def at_pace_of(self, q: Array) -> "RunningCost":
+        """See `Measure.at_pace_of`."""
+        moved = np.linalg.norm(self.weights * np.diff(q, axis=0), axis=1).sum()
+        mean = float(moved) / (self.t[-1] - self.t[0])
+        return replace(self, speed=_FAST * mean if mean > 0.0 else np.inf, _steps={})
+
+    def _prices(
+        self, k: int, before: Array, after: Array, first: Rows, second: Rows, turning: Mask
+    ) -> Array:
+        """Return what the steps between pairs of nodes cost, (P,)."""
+        span = float(self.t[k + 1] - self.t[k])
+        here, there = self._at(k, before), self._at(k + 1, after)
+        price = 0.5 * span * (here.cost[first] + there.cost[second])
+        if not self.moving or not len(first):
+            return price
+        difference = after[second] - before[first]
+        turn = 2.0 * np.pi
+        difference -= np.where(turning, turn * np.round(difference / turn), 0.0)
+        moved = np.linalg.norm(self.weights * difference, axis=1)
+        lasting = np.maximum(span, moved / self.speed)
+        sampling = Sampling.trapezoidal(np.full(len(first), self.t[k] + 0.5 * span))
+        samples = replace(
+            here.samples,
+            sampling=sampling,
+            q=before[first] + 0.5 * difference,
+            qd=difference / lasting[:, None],
+            # The kinematics hardly change on the way.
+            **{name: getattr(here.samples, name)[first] for name in _KINEMATICS},
+        )
+        still = replace(samples, qd=np.zeros_like(difference))
+        moving = sum(cost.value(samples) - cost.value(still) for cost in self.moving)
+        resting = sum(cost.value(still) for cost in self.moving)
+        return np.asarray(price + lasting * moving + span * resting)
+
+    def _at(self, k: int, q: Array) -> "_Places":
+        known = self._places.get(id(q))
+        if known is None or known.q is not q:
+            sampling = Sampling.trapezoidal(np.full(len(q), self.t[k]))
+            samples = Samples.along(self.robot, self.task, sampling, q, np.zeros_like(q))
+            cost = sum((cost.value(samples) for cost in self.placed), np.zeros(len(q)))
+            known = _Places(q, samples, cost)
+            _note(self._places, id(q), known, _MANY * len(self.t))
+        return known
+
+
+# Layers are known by what they are, and kept, so that nothing else gets their number.
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """A layer (N, n), its samples at rest, and what the costs of q alone are there, (N,)."""
+
+    q: Array
+    samples: Samples
+    cost: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    """Two layers, the pairs of near nodes (P,), (P,), and what steps between them cost, (P,)."""
+
+    before: Array
+    after: Array
+    first: Rows
+    second: Rows
+    price: Array
+
+
+def _note(known: dict[Any, Any], key: Any, value: Any, most: int) -> None:
+    if len(known) >= most:
+        known.clear()
+    known[key] = value
+
+
+def _cheapest(
+    first: Rows, second: Rows, price: Array, cost: Array, count: int
+) -> tuple[Array, Rows]:
+    reach, source = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
+    kernels.cheapest(first, second, price, cost, reach, source)
+    return reach, source
+
+
+@dataclass(frozen=True, eq=False)
+class Backwards(Measure):
+    """A running cost of chains from the last waypoint to the first."""
+
+    measure: RunningCost
+
+    def extended(
+        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Mask
+    ) -> tuple[Array, Rows]:
+        """See `Measure.extended`."""
+        last = len(self.measure.t) - 2
+        steps = self.measure.steps(last - k, after, before, step, turning)
+        return _cheapest(steps.second, steps.first, steps.price, cost, len(after))
+
+    def of(self, q: Array) -> float:
+        """See `Measure.of`."""
+        return self.measure.of(q[::-1])
+
+    def backwards(self) -> RunningCost:
+        """See `Measure.backwards`."""
+        return self.measure
+
+
+_KINEMATICS = ("jacobian", "rotation", "translation", "error", "task_jacobian")
+# Layers whose kinematics are kept, per waypoint.
+_MANY = 3
+
+
+def measure_of(
+    robot: RobotModel, task: Task, costs: Sequence[Cost], t: Array, weights: Array
+) -> Measure:
+    """Return what chains over waypoints at times t (W,) are measured by.
+
+    The costs, or the length with `weights` (n,) where it is all that they ask for.
+    """
+    own = RunningCost.by(robot, task, costs, t)
+    if all(isinstance(cost, PathLength) for cost in costs) or not (own.placed or own.moving):
+        return Length(weights)
+    return own
