@@ -13,7 +13,11 @@ from selfmotion.motion import Sampling
 from selfmotion.search.chains import best_chains
 from selfmotion.search.measures import Length, RunningCost, measure_of
 
-COSTS = (sm.JointVelocity(2.0), sm.InverseManipulability(1e-3), sm.KineticEnergy(robot_named("panda")))
+COSTS = (
+    sm.JointVelocity(2.0),
+    sm.InverseManipulability(1e-3),
+    sm.KineticEnergy(robot_named("panda")),
+)
 FIXED = np.zeros(7, dtype=bool)
 
 

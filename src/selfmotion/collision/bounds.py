@@ -51,7 +51,8 @@ class BoundingBoxes:
         pairs : (P, 2)
             Indices of bodies.
         limit : float
-            Where the spheres around the boxes are this far apart, their distance is enough [m].
+            Where the spheres around the boxes, or faces of these, are this far apart, that is
+            enough [m].
         """
         # Here, because importing numba takes longer than everything else in the package.
         from selfmotion.collision import kernels

@@ -256,7 +256,25 @@ class CollisionModel:
         """
         if q.shape != (self.robot.dof,) or not math.isfinite(q.dot(q)):
             self.robot.configuration(q)
-        bounds = self.hulls.lower_bounds(q[None], margin)[0]
+        return self._meets(q, self.hulls.lower_bounds(q[None], margin)[0], margin)
+
+    def colliding(self, q_samples: Array, margin: float = 0.0) -> npt.NDArray[np.bool_]:
+        """Return at which of many configurations (K, n) `collides` holds, (K,).
+
+        Raises
+        ------
+        RobotError
+            The shape is not (K, n), or a number is not finite.
+        """
+        q = self.samples(q_samples)
+        bounds = self.hulls.lower_bounds(q, margin)
+        found = np.zeros(len(q), dtype=bool)
+        for row in np.flatnonzero((bounds < margin).any(axis=1)).tolist():
+            found[row] = self._meets(q[row], bounds[row], margin)
+        return found
+
+    def _meets(self, q: Array, bounds: Array, margin: float) -> bool:
+        """Whether a pair is closer than the margin at q (n,), with lower bounds (P,) known."""
         near = np.flatnonzero(bounds < margin)
         if not near.size:
             return False

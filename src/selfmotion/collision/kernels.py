@@ -15,12 +15,12 @@ _PARALLEL = 1e-6
 
 
 @kernel
-def separation(a: Array, b: Array, t: Array, g: Array, h: Array) -> float:
+def separation(a: Array, b: Array, t: Array, g: Array, h: Array, limit: float) -> float:
     """Return the signed distance of two boxes along the best of 15 axes.
 
     These are the normals of all faces, and what is normal to an edge of each (S. Gottschalk, M.
     Lin, D. Manocha, "OBBTree", SIGGRAPH 1996). Of boxes that overlap it is minus the depth, of
-    others at most the distance.
+    others at most the distance. Where the faces separate them by `limit`, that is enough.
 
     Parameters
     ----------
@@ -31,7 +31,8 @@ def separation(a: Array, b: Array, t: Array, g: Array, h: Array) -> float:
     g, h : (3,)
         Half lengths of the first and of the second.
     """
-    c, u, v = np.empty((3, 3)), np.empty(3), np.empty(3)
+    c, uv = np.empty((3, 3)), np.empty((2, 3))
+    u, v = uv[0], uv[1]
     for i in range(3):
         u[i] = a[0, i] * t[0] + a[1, i] * t[1] + a[2, i] * t[2]
         v[i] = b[0, i] * t[0] + b[1, i] * t[1] + b[2, i] * t[2]
@@ -43,6 +44,8 @@ def separation(a: Array, b: Array, t: Array, g: Array, h: Array) -> float:
         best = max(best, abs(u[i]) - g[i] - reach)
         reach = abs(c[0, i]) * g[0] + abs(c[1, i]) * g[1] + abs(c[2, i]) * g[2]
         best = max(best, abs(v[i]) - h[i] - reach)
+    if best >= limit:
+        return best
     for i in range(3):
         k, m = (i + 1) % 3, (i + 2) % 3
         for j in range(3):
@@ -86,7 +89,7 @@ def lower_bounds(
                 t[a] = place[j, a] - place[i, a]
             gap = math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) - radii[i] - radii[j]
             if gap < limit:
-                gap = max(gap, separation(turned[i], turned[j], t, halves[i], halves[j]))
+                gap = max(gap, separation(turned[i], turned[j], t, halves[i], halves[j], limit))
             bounds[k, pair] = gap
     return bounds
 

@@ -95,25 +95,21 @@ class Admissible:
         """Whether each of q (K, n) is inside the limits at some turn, and clear of collisions."""
         first = self.representative(q)
         free = np.asarray(np.all((first <= self.upper) & (first >= self.lower), axis=-1))
-        for i in np.flatnonzero(free) if self.bodies else ():
-            free[i] = self._clear(first[i])
+        free[free] = self._clear(first[free])
         return free
 
     def keep(self, q: Array) -> npt.NDArray[np.bool_]:
         """Whether each of q (K, n) is inside the limits as it is, and clear of collisions."""
         kept = np.asarray(np.all((q <= self.upper) & (q >= self.lower), axis=1))
-        for i in np.flatnonzero(kept) if self.bodies else ():
-            kept[i] = self._clear(q[i])
+        kept[kept] = self._clear(q[kept])
         return kept
 
-    def keeps(self, q: Array) -> bool:
-        """Whether q (n,) itself, at its own turn, is inside the limits and clear of collisions."""
-        if np.any(q > self.upper) or np.any(q < self.lower):
-            return False
-        return self._clear(q)
-
-    def _clear(self, q: Array) -> bool:
-        return not any(model.collides(q, distance) for model, distance in self.bodies)
+    def _clear(self, q: Array) -> npt.NDArray[np.bool_]:
+        """Whether bodies keep their distances at each of q (K, n)."""
+        clear = np.ones(len(q), dtype=bool)
+        for model, distance in self.bodies:
+            clear[clear] = ~model.colliding(q[clear], distance)
+        return clear
 
     def all_turns(self, q: Array) -> Array:
         """Return q (K, n), inside the limits, at every turn that is inside them, (K', n)."""

@@ -52,12 +52,9 @@ def tighten(
     cost = measure.of(q)
     for spacing in spacings:
         tangents = (motion.tangent(here, target) for target, here in zip(x, q, strict=True))
-        strips = [
-            _Strip(here, tangent, bounds, spacing)
-            for here, tangent in zip(q, tangents, strict=True)
-        ]
+        strips = [_Strip(here, tangent, spacing) for here, tangent in zip(q, tangents, strict=True)]
         for _ in range(_ROUNDS):
-            _grow(motion, x, strips)
+            _grow(motion, x, strips, bounds, spacing)
             layers = [strip.layer() for strip in strips]
             chains = best_chains(layers, largest_step, fixed, measure)
             chain = chains.back(len(q) - 1, int(np.argmin(chains.cost[-1])))
@@ -70,7 +67,9 @@ def tighten(
     return q
 
 
-def _grow(motion: SelfMotion, x: Array, strips: list["_Strip"]) -> None:
+def _grow(
+    motion: SelfMotion, x: Array, strips: list["_Strip"], bounds: Admissible, spacing: float
+) -> None:
     """Make the samples that the strips need for their next layers, all waypoints at once."""
     while True:
         wanted = [
@@ -82,15 +81,21 @@ def _grow(motion: SelfMotion, x: Array, strips: list["_Strip"]) -> None:
             return
         guesses = np.array([guess for *_, guess in wanted])
         found, arrived = motion.project_all(guesses, x[[waypoint for waypoint, *_ in wanted]])
-        for (waypoint, index, guess), q, is_there in zip(wanted, found, arrived, strict=True):
-            strips[waypoint].note(index, guess, q if is_there else None)
+        # Far corrections lead to another part of the curve, or another curve.
+        arrived &= np.linalg.norm(found - guesses, axis=1) <= 0.5 * spacing
+        free = arrived.copy()
+        free[arrived] = bounds.keep(found[arrived])
+        for (waypoint, index, _), q, is_there, is_free in zip(
+            wanted, found, arrived, free, strict=True
+        ):
+            strips[waypoint].note(index, q if is_there else None, is_free=bool(is_free))
 
 
 class _Strip:
     """Samples of one waypoint's curve about a configuration, made when asked for and kept."""
 
-    def __init__(self, q: Array, tangent: Array | None, bounds: Admissible, spacing: float) -> None:
-        self._bounds, self._spacing = bounds, spacing
+    def __init__(self, q: Array, tangent: Array | None, spacing: float) -> None:
+        self._spacing = spacing
         # By the number of spacings from the first configuration; None beyond the curve's end.
         self._samples: dict[int, Array | None] = {0: q}
         self._free = {0: True}
@@ -124,14 +129,11 @@ class _Strip:
                 assert earlier is not None, "the last one was made from it"
                 yield toward * (far + 1), 2.0 * last - earlier
 
-    def note(self, index: int, guess: Array, q: Array | None) -> None:
+    def note(self, index: int, q: Array | None, *, is_free: bool) -> None:
         """Keep a sample, None where there is none."""
-        # Far corrections lead to another part of the curve, or another curve.
-        if q is not None and np.linalg.norm(q - guess) > 0.5 * self._spacing:
-            q = None
         self._samples[index] = q
         self._reach[1 if index > 0 else -1] = abs(index)
-        self._free[index] = q is not None and self._bounds.keeps(q)
+        self._free[index] = is_free
 
     def layer(self) -> Array:
         """Return the free samples about the centre, (K, n), sorted by the first joint."""
