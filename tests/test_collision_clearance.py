@@ -142,6 +142,7 @@ def test_few_clear_configurations_are_refused() -> None:
     model = ClearanceModel(exact)
     q = samples(model.robot, 400)
     free = np.array([not exact.collides(row) for row in q])
+    np.testing.assert_array_equal(exact.colliding(q), ~free)
     refused = model.clearances(q).values.min(axis=1) <= 0
     assert (refused & free).sum() < 0.1 * free.sum()
 

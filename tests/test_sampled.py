@@ -135,3 +135,10 @@ def test_metres_are_not_added_to_radians_unasked() -> None:
     with pytest.raises(sm.ProblemError, match=r"joint_weights are .* expected 8 numbers"):
         sm.Problem(robot, path, costs=[sm.PathLength(joint_weights=[1.0, 2.0])])
     sm.Problem(robot, path, costs=[sm.PathLength(joint_weights=weights)])
+    # The usual cost says what it counts a metre as.
+    (usual,) = sm.Problem(robot, path).costs
+    np.testing.assert_allclose(usual.weight, weights**2)
+    assert usual.name == f"joint velocity (1 m as {weights[slides][0]:.3g} rad)"
+    panda = robot_named("panda")
+    (plain,) = sm.Problem(panda, line_of(panda, "pose")).costs
+    assert (plain.name, float(plain.weight)) == ("joint velocity", 1.0)

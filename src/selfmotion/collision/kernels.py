@@ -15,7 +15,9 @@ _PARALLEL = 1e-6
 
 
 @kernel
-def separation(a: Array, b: Array, t: Array, g: Array, h: Array, limit: float) -> float:
+def separation(
+    a: Array, b: Array, t: Array, g: Array, h: Array, limit: float, work: Array
+) -> float:
     """Return the signed distance of two boxes along the best of 15 axes.
 
     These are the normals of all faces, and what is normal to an edge of each (S. Gottschalk, M.
@@ -30,9 +32,10 @@ def separation(a: Array, b: Array, t: Array, g: Array, h: Array, limit: float) -
         From the middle of the first to that of the second.
     g, h : (3,)
         Half lengths of the first and of the second.
+    work : (5, 3)
+        Room to work in.
     """
-    c, uv = np.empty((3, 3)), np.empty((2, 3))
-    u, v = uv[0], uv[1]
+    c, u, v = work[:3], work[3], work[4]
     for i in range(3):
         u[i] = a[0, i] * t[0] + a[1, i] * t[1] + a[2, i] * t[2]
         v[i] = b[0, i] * t[0] + b[1, i] * t[1] + b[2, i] * t[2]
@@ -77,7 +80,7 @@ def lower_bounds(
     bounds = np.empty((len(q), len(pairs)))
     r, p = np.empty((q.shape[1] + 1, 3, 3)), np.empty((q.shape[1] + 1, 3))
     turned, place = np.empty((len(joints), 3, 3)), np.empty((len(joints), 3))
-    radii, t = np.sqrt((halves * halves).sum(axis=1)), np.empty(3)
+    radii, t, work = np.sqrt((halves * halves).sum(axis=1)), np.empty(3), np.empty((5, 3))
     for k in range(len(q)):
         placements(q[k], rotations, positions, axes, is_revolute, r, p)
         for i in range(len(joints)):
@@ -89,7 +92,9 @@ def lower_bounds(
                 t[a] = place[j, a] - place[i, a]
             gap = math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) - radii[i] - radii[j]
             if gap < limit:
-                gap = max(gap, separation(turned[i], turned[j], t, halves[i], halves[j], limit))
+                gap = max(
+                    gap, separation(turned[i], turned[j], t, halves[i], halves[j], limit, work)
+                )
             bounds[k, pair] = gap
     return bounds
 

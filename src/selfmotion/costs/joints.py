@@ -90,6 +90,20 @@ class JointVelocity(_Derivative):
     name: str = "joint velocity"
     _order: ClassVar[int] = 1
 
+    @classmethod
+    def usual(cls, robot: RobotModel) -> "JointVelocity":
+        """Return that of an arm where none is given: W = 1, but for metres among radians.
+
+        A joint that moves in metres counts by `RobotModel.joint_weights`, whose squares are W; the
+        name of the cost says so.
+        """
+        slides = [robot.is_prismatic(name) for name in robot.joint_names]
+        if all(slides) or not any(slides):
+            return cls()
+        weights = robot.joint_weights
+        metre = float(weights[slides.index(True)])
+        return cls(weights**2, f"joint velocity (1 m as {metre:.3g} rad)")
+
 
 @dataclass(frozen=True, eq=False)
 class JointAcceleration(_Derivative):

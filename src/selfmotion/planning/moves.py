@@ -160,7 +160,7 @@ def between_parts(problem: Problem) -> Problem:
     return replace(
         problem,
         start=None,
-        costs=(JointVelocity(),),
+        costs=(JointVelocity.usual(problem.robot),),
         constraints=kept,
         relaxations=(),
         rest=True,

@@ -353,13 +353,13 @@ class _Run:
         if not candidates.sequences:
             return None
         shortest = min((each.sequence for each in candidates.sequences), key=lambda s: s.length)
-        rival = candidates.rival
+        rival, weights = candidates.rival, self._problem.robot.joint_weights
         if rival is not None and rival is candidates.best and not rival.violations:
             rival_cost = motion.cost
         return Gap(
             cost=motion.cost,
             best_cost=rival_cost,
-            length=float(np.abs(np.diff(motion.trajectory(shortest.t), axis=0)).sum()),
+            length=float((weights * np.abs(np.diff(motion.trajectory(shortest.t), axis=0))).sum()),
             best_length=shortest.length,
             spacing=SPACING,
             sequences=len(candidates.sequences),

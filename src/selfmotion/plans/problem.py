@@ -42,8 +42,10 @@ from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 # Links must not overlap; one object, so that its bodies are made once for each arm.
 NO_OVERLAP = Clearance(distance=0.0)
 # Defaults of a problem; values, meant to be shared.
-_REFINED, _SPEED = RefinedNullMotion(), (JointVelocity(),)
+_REFINED = RefinedNullMotion()
 _KEPT = (JointPositionLimits(), JointVelocityLimits(), JointAccelerationLimits(), JointJerkLimits())
+# Stands for the usual cost of whatever arm it is.
+_USUAL: tuple[Cost, ...] = (JointVelocity(),)
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
 # A null motion that was found by a search fades in this share of the duration.
@@ -79,7 +81,7 @@ class Problem:
         The parameterisation of the self-motion. By default the paper's cubic to begin with, and
         a spline where more freedom pays.
     costs : sequence of Cost
-        Their integrals are added up. By default ∫ ½ q̇ᵀq̇ dt.
+        Their integrals are added up. By default ∫ ½ q̇ᵀq̇ dt; see `JointVelocity.usual`.
     constraints : sequence of Constraint
         What the motion must keep, each judged by the certificate. By default the URDF's limits of
         joint position and velocity, and those of acceleration and jerk that the arm's maker
@@ -121,7 +123,7 @@ class Problem:
     task: _TaskField = _TaskField()  # a descriptor, meant to be shared
     start: npt.ArrayLike | str | None = None
     null_motion: NullMotion = _REFINED
-    costs: Sequence[Cost] = _SPEED
+    costs: Sequence[Cost] = _USUAL
     constraints: Sequence[Constraint] = _KEPT
     relaxations: Sequence[Relaxation] = ()
     damping: Damping | None = None
@@ -134,6 +136,8 @@ class Problem:
                 raise ProblemError(
                     f"{name} is {shown(getattr(self, name))}, expected a {_EXAMPLES[name]}"
                 )
+        if self.costs is _USUAL:
+            object.__setattr__(self, "costs", (JointVelocity.usual(self.robot),))
         for name, each in _SEQUENCES.items():
             object.__setattr__(self, name, as_several(getattr(self, name), name, each))
         check_oriented(self.path, self.task)
@@ -226,14 +230,12 @@ class Problem:
 
     def null_functions(self, t: Array, motion: NullMotion) -> Array:
         """Return φ of a null motion at times `t` (S,), at rest where the arm has to be, (S, K)."""
-        duration = self.path.duration
-        window = resting_window(t, duration, self.rest_orders)
-        return motion.functions(t, duration) * window[:, None]
+        window = resting_window(t, self.path.duration, self.rest_orders)
+        return motion.functions(t, self.path.duration) * window[:, None]
 
     def brought_to_rest(self, t: Array, epsilon: Array) -> Array:
         """Return a null motion (S, n) that fades to nothing where the arm has to be at rest."""
-        start, end = self.rests
-        s = t / self.path.duration
+        (start, end), s = self.rests, t / self.path.duration
         fade = _fade(s) if start else np.ones(len(t))
         return epsilon * (fade * (_fade(1.0 - s) if end else 1.0))[:, None]
 

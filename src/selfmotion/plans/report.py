@@ -24,7 +24,7 @@ class Gap:
         F of the best motion refined from the sequences that the search found; None where none
         keeps the constraints.
     length : float
-        Σ|Δq| of the plan over waypoints and joints [rad or m].
+        Σ w|Δq| of the plan over waypoints and joints [rad], w being `RobotModel.joint_weights`.
     best_length : float
         That of the shortest sequence of configurations within the same limits, clearance and
         steps.
