@@ -86,6 +86,8 @@ class Objective:
         self._deviation = deviation
         self._costs = tuple(costs)
         self._at: Array | None = None
+        # ∂q/∂x and ∂q̇/∂x there, once they were asked for.
+        self._tangents: tuple[Array, Array] | None = None
         self._terms: dict[str, float] = {}
         first = rollout.path.samples(0.0)
         self._first = pin.SE3(first.rotation[0], first.translation[0])
@@ -315,7 +317,7 @@ class Objective:
             return
         self.counts.evaluated()
         # An interruption on the way must not leave half a motion as that of x.
-        self._at = None
+        self._at = self._tangents = None
         self._terms = {cost.name: np.inf for cost in self._costs}
         before = self.rollout.jacobian_evaluations
         try:
@@ -364,6 +366,11 @@ class Objective:
 
     def _sensitivities(self, x: Array) -> tuple[Array, Array]:
         """Return ∂q/∂[z | x | c] and ∂q̇/∂[z | x | c] at the stages, (S, n, size)."""
+        if self._tangents is None:
+            self._tangents = self._differentiated(x)
+        return self._tangents
+
+    def _differentiated(self, x: Array) -> tuple[Array, Array]:
         by_coefficients = self.null_motion.matrix()
         first = self.start.size
         last = first + self.null_motion.size
