@@ -100,6 +100,7 @@ def test_refinements_that_make_no_sense(options: dict, message: str) -> None:
 
 def test_few_coefficients_where_the_redundancy_is_large() -> None:
     assert [finest(rows).intervals for rows in (0, 1, 3, 4, 9, 40)] == [64, 64, 64, 32, 16, 8]
-    assert sm.RefinedNullMotion().finer(64, 1) == sm.BSplineNullMotion(16)
+    assert sm.RefinedNullMotion().finer(64, 1) == sm.BSplineNullMotion(64)
+    assert sm.RefinedNullMotion().finer(64, 1, rests=True) == sm.BSplineNullMotion(16)
     most = sm.RefinedNullMotion(most=64)
     assert [most.finer(64, rows).intervals for rows in (1, 2, 4, 20)] == [64, 32, 16, 8]

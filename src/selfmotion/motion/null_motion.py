@@ -34,10 +34,11 @@ class NullMotion(Saved, ABC, family="null motion"):
     space: str = "null"
     gain: ClassVar[float] = np.inf
 
-    def finer(self, intervals: int, rows: int) -> "NullMotion":
+    def finer(self, intervals: int, rows: int, rests: bool = False) -> "NullMotion":
         """Return what to go on with where so many `intervals` pay: by default the same.
 
-        `rows` is r, or n where `space` is "joint".
+        `rows` is r, or n where `space` is "joint"; `rests` says whether the arm begins or ends at
+        rest.
         """
         return self
 
@@ -151,19 +152,22 @@ class RefinedNullMotion(NullMotion):
     ----------
     gain : float
         Share of the cost that may be left to save, as far as `Report.remaining` tells.
-    most : int
+    most : int, optional
         Largest number of the spline's intervals: 8, 16, 32 or 64; fewer where the redundancy is
         so large that they would have more than 110 coefficients. The more there are, the faster
-        an arm starts and stops where it rests, if its cost does not weigh accelerations.
+        an arm starts and stops where it rests, if its cost does not weigh accelerations: by
+        default 16 there, and 64 where it does not rest.
     """
 
     gain: float = 1e-3  # type: ignore[misc]  # fixed for other kinds
-    most: int = 16
+    most: int | None = None
 
     def __post_init__(self) -> None:
         as_number(self.gain, "null motion: gain", above=0.0)
-        if self.most not in (_FEWEST, 16, 32, 64):
-            raise ProblemError(f"null motion: most is {shown(self.most)}, expected 8, 16, 32 or 64")
+        if self.most not in (None, _FEWEST, 16, 32, 64):
+            raise ProblemError(
+                f"null motion: most is {shown(self.most)}, expected 8, 16, 32, 64 or None"
+            )
 
     @property
     def fewest_steps(self) -> int:
@@ -178,9 +182,9 @@ class RefinedNullMotion(NullMotion):
         """See `NullMotion.detours`: splines of more and more intervals."""
         return tuple(dict.fromkeys(self.finer(count, rows) for count in (_FEWEST, 2 * _FEWEST)))
 
-    def finer(self, intervals: int, rows: int) -> "BSplineNullMotion":
+    def finer(self, intervals: int, rows: int, rests: bool = False) -> "BSplineNullMotion":
         """See `NullMotion.finer`: a spline that can be any cubic, of not too many coefficients."""
-        fewer = min(intervals, self.most)
+        fewer = min(intervals, self.most or (16 if rests else 64))
         while fewer > _FEWEST and rows * (fewer + 3) > _MOST_COEFFICIENTS:
             fewer //= 2
         return BSplineNullMotion(fewer)

@@ -264,7 +264,8 @@ class Session:
             if self.remaining <= enough:
                 return
             rows = self._objective.null_motion.rows
-            finer = wanted.finer(left.intervals(0.5 * enough), rows)
+            rests = any(self._still.problem.rests)
+            finer = wanted.finer(left.intervals(0.5 * enough), rows, rests)
             if finer in (wanted, self.null_motion):
                 return
             self._change(finer)
