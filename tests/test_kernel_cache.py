@@ -3,9 +3,12 @@
 import errno
 import importlib.util
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
+import numba
 import pytest
+from numba.core import caching
 
 SOURCE = """
 from selfmotion.basics.jit import kernel
@@ -50,3 +53,24 @@ def test_a_full_disk_ends_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(module.twice._cache._cache_file, "save", full)
     assert module.twice(1.5) == 3.0
+
+
+def test_where_nothing_can_be_written_each_process_compiles(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither beside the code nor in the home folder."""
+
+    def read_only(*_: object, **__: object) -> None:
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(caching.tempfile, "TemporaryFile", read_only)
+    assert loaded(tmp_path).twice(1.5) == 3.0
+    assert [file.name for file in tmp_path.rglob("*") if file.suffix in (".nbi", ".nbc")] == []
+
+
+def test_kernels_run_as_written_for_a_debugger(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", True)
+    assert isinstance(loaded(tmp_path).twice, FunctionType)
+    assert loaded(tmp_path).twice(1.5) == 3.0
