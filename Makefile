@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-certificate fuzz-generated fuzz-realtime fuzz-files acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-certificate fuzz-generated fuzz-realtime fuzz-files arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -83,6 +83,16 @@ fuzz-realtime: $(READY)  ## 1,000 scenarios of pushes, late steps, jumps and fau
 
 fuzz-files: $(READY)  ## 20,000 spoiled files of all kinds: read, or refused in one line
 	$(BIN)/python benchmarks/fuzz_files.py
+
+arms: $(READY)  ## docs/chains.md: a line with every chain of example-robot-data, or why not
+	$(BIN)/python benchmarks/arms.py
+
+mutants: $(READY)  ## faults put into the parts that all else stands on, and how many tests catch
+	$(BIN)/pip install --quiet --constraint constraints.txt -e '.[mutants]'
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/mutants.py
+
+memory: $(READY)  ## 10,000 plans in one process, and its memory
+	$(BIN)/python benchmarks/memory.py
 
 acceptance: $(READY)  ## 200 random plans, driven at 1 kHz by what the makers publish of their arms
 	$(BIN)/python benchmarks/acceptance.py

@@ -82,7 +82,7 @@ PARTS = (
         (
             "test_rollout.py",
             "test_laws.py -k 'planar_3r or breakdown'",
-            "test_damping.py -k 'planar_3r or overreach'",
+            "test_damping.py -k planar_3r",
         ),
     ),
     Part(
@@ -111,10 +111,8 @@ PARTS = (
         ("certificate/*.py",),
         (
             "test_certificate_parts.py",
-            "test_verdicts.py",
-            "test_tool_limits.py",
-            "test_clearance_proof.py",
-            "test_certificate.py -k 'between or seams'",
+            "test_verdicts.py -k 'not threads'",
+            "test_clearance_proof.py -k 'not default'",
         ),
     ),
 )
@@ -251,6 +249,7 @@ def main(
 ) -> None:
     """Mutate, test, and tell what survives."""
     console = Console(soft_wrap=True, markup=False, highlight=False)
+    stages = Console(stderr=True, highlight=False)
     parts, reasons = [x for x in PARTS if not part or x.name in part], equivalent()
     table = Table("part", "mutants", "sample", "caught", "survived", "equivalent", "score")
     totals = Counter[str]()
@@ -273,6 +272,7 @@ def main(
                     continue
                 is_caught = any(fails(one, x, mutant, patience[x], log) for x in one.tests)
                 ends["caught" if is_caught else "survived"] += 1
+                stages.print(f"{one.name}: {ends.total()} of {len(sample)}", end="\r")
                 if not is_caught:
                     console.print(f"{mutant.file}:{mutant.line} {mutant.operator}")
                     console.print(f"    - {mutant.before}\n    + {mutant.after}")

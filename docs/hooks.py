@@ -13,8 +13,14 @@ import shown
 from mathml import MathMl
 
 DOCS = Path(__file__).parent
-# Made by `make errors` and `pictures.py`, and read on their own as well.
-BESIDE = ("arms.md", "errors.md", "replay.png", *(f"arms/{f.name}" for f in DOCS.glob("arms/*")))
+# Made by `make arms`, `make errors` and `pictures.py`, and read on their own as well.
+BESIDE = (
+    "arms.md",
+    "chains.md",
+    "errors.md",
+    "replay.png",
+    *(f"arms/{f.name}" for f in DOCS.glob("arms/*")),
+)
 GALLERY = ("weld_seam", "painting", "own_obstacle", "rail", "closed_loop", "ur5_pointing")
 
 

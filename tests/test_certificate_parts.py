@@ -253,7 +253,9 @@ def test_ends_are_judged_to_a_micrometre(miss: float) -> None:
         assert (found.amount, found.allowed) == (pytest.approx(abs(miss), rel=1e-6), 1e-6)
         assert f"{'ends' if time else 'starts'}" in found.text
     given = motion_of([q[0], q[0] + 1e-3], [q[0], q[0]])
-    assert "away from the start" in ClosedMotion(True).judge(given).text
+    told = ClosedMotion(True).judge(given).text
+    assert "away from the start" in told
+    assert "velocity" not in told
 
 
 def test_end_accelerations_are_judged_less_closely() -> None:
@@ -478,6 +480,8 @@ def test_a_verdict_names_each_fault_and_what_was_looked_at() -> None:
         assert words in bad.verdict
     for tolerance, kept in ((sm.Tolerance(6e-6, 1e-6), False), (sm.Tolerance(6e-6, 3e-6), True)):
         assert sm.certify(robot, beside, "pose", motion, tolerance).on_path is kept
+    exact = sm.Tolerance(bad.position_error.value, bad.rotation_error.value)
+    assert len(sm.certify(robot, beside, "pose", motion, exact).failures) == 1
     moved = motion.q + np.outer([0.0, 1.0], [0.0, 0.3, 0.0, -0.1, 0.0, 0.0, 0.0])
     gone = sm.Trajectory([0.0, 1.0], moved, np.zeros((2, 7)), robot.joint_names)
     assert sm.certify(robot, still, "pose", gone).closure == pytest.approx(0.3)

@@ -51,6 +51,13 @@ def test_what_rounding_hides_does_not_mislead(cost: float, slope: float, says: b
     assert not is_misleading(lambda x: cost, X, cost, STEP, 0.99 * least)
 
 
+def test_defaults_are_what_is_documented() -> None:
+    """They are part of the interface: a plan that was made with them can be made again."""
+    assert sm.QuasiNewton() == sm.QuasiNewton("fletcher", 1e-8, 200, sm.LineSearch(), 1e8)
+    assert sm.QuasiNewton().initial_metric == "gauss-newton"
+    assert SequentialQuadratic() == SequentialQuadratic(1e-7, 200)
+
+
 def test_the_line_search_has_fletchers_constants() -> None:
     assert sm.LineSearch() == sm.LineSearch(rho=0.01, sigma=0.9, tau1=9.0, tau2=0.1, tau3=0.5)
 
