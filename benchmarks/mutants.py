@@ -138,7 +138,7 @@ def sample_of(part: Part, count: int, seed: int) -> tuple[list[Mutant], int]:
         for name, occurrence in _places(file.read_text())
     ]
     chosen = random.Random(f"{part.name} {seed}").sample(places, min(count, len(places)))
-    return [_mutant(part, *place) for place in sorted(chosen)], len(places)
+    return [_mutant(part, *place) for place in chosen], len(places)
 
 
 def _places(text: str) -> Iterator[tuple[str, int]]:

@@ -167,6 +167,15 @@ def test_conditions_out_of_reach_are_brought_as_near_as_a_tenth_more_than_possib
     assert step.gain == pytest.approx(-0.5 * step.p @ step.p)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_is_out_of_reach_is_weighed_in_tolerances(sign: float) -> None:
+    """Least is 9, of 50: a tenth of the way between is left, which the strict condition takes."""
+    at = Residuals(np.array([0.5, -10.0 * sign]), np.array([0.01, 1.0]), np.array([False, True]))
+    step = best_step(np.zeros(2), np.eye(2), at, np.array([[-sign, 0.0], [1.0, 0.0]]), 1.0)
+    assert step.relaxed
+    assert step.worst == pytest.approx(9.0 + 0.1 * 41.0, abs=0.05)
+
+
 def test_an_inequality_out_of_reach_is_relaxed_alone() -> None:
     at, rows = residuals([10.0, -0.5]), np.array([[1.0, 0.0], [0.0, 1.0]])
     step = best_step(np.array([0.0, -10.0]), np.eye(2), at, rows, 1.0)
