@@ -151,6 +151,43 @@ def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:
     assert check(1.0).samples == 9
 
 
+def test_where_a_path_bends_sharply_a_short_interval_stays_undecided() -> None:
+    """Its error peaks at the tolerance in a corner that nothing announces: halved twelve times."""
+    robot = robot_named("planar_3r")
+    q = robot.dexterous_configuration("planar")
+    pose = robot.pose(q)
+
+    class Bent(sm.Path):
+        duration = 1.0
+
+        def evaluate(self, t: Array) -> sm.PathSamples:
+            swing = 1e-4 * (1.0 - np.abs(t - 1.0 / 3.0))
+            places = pose.translation + np.outer(swing, [0.0, 1.0, 0.0])
+            turns = np.tile(pose.rotation, (len(t), 1, 1))
+            return sm.PathSamples(t, places, turns, np.zeros((len(t), 6)))
+
+    trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 3)), robot.joint_names)
+    allowed = sm.Tolerance(1e-4 * (1.0 + 1e-9), 1.0)
+    found = bound_errors(robot, Bent(), sm.Task.PLANAR, trajectory, allowed, ())
+    ((start, end),) = found.undecided
+    assert start <= 1.0 / 3.0 <= end
+    assert end - start == pytest.approx(2.0**-12)
+    assert 1e-4 < found.position.value < 1.001e-4
+
+
+@pytest.mark.parametrize(("intervals", "each"), [(4096, 8), (4097, 4)])
+def test_of_many_intervals_fewer_points_are_looked_at(intervals: int, each: int) -> None:
+    robot = robot_named("planar_3r")
+    q = robot.dexterous_configuration("planar")
+    pose, t = robot.pose(q), np.linspace(0.0, 1.0, intervals + 1)
+    rest = np.zeros((len(t), 3))
+    trajectory = sm.Trajectory(t, np.tile(q, (len(t), 1)), rest, robot.joint_names)
+    path = sm.Dwell(pose, 1.0)
+    found = bound_errors(robot, path, sm.Task.PLANAR, trajectory, sm.Tolerance(), ())
+    assert found.samples == each * intervals + 1
+    assert found.position.value < 1e-12
+
+
 # --- limits of joints
 
 
@@ -334,6 +371,13 @@ def test_a_distance_that_is_grazed_is_undecided_and_said_to_be() -> None:
     assert not judged.kept
     assert "is not decided" in judged.text
     assert judged.time == pytest.approx(1.0 / 3.0, abs=1e-3)
+    found = closest_at_all_times(bodies, motion.trajectory, 0.1)  # type: ignore[arg-type]
+    assert found.open_until is not None
+    # Sixteen intervals, halved 26 times.
+    assert (found.open_until - found.time) * 16.0 * 2.0**26 == pytest.approx(1.0)
+    far = Bodies(lambda q: np.full(len(q), 50.0))
+    assert closest_at_all_times(far, motion.trajectory, 0.1).open_until is None  # type: ignore[arg-type]
+    assert far.asked == 17
 
 
 def test_nothing_to_be_near_to_is_far_enough() -> None:
@@ -383,6 +427,14 @@ def test_rates_are_seen_on_both_sides_of_a_sample() -> None:
         assert found.share == pytest.approx(6.0, rel=1e-3)
 
 
+def test_a_corner_is_cut_to_a_few_thousandths_of_an_interval() -> None:
+    """A peak just below 1 that no polynomial follows is over-estimated by what is left of it."""
+    motion = motion_of([[0.0] * 3, [0.0, 1.0, 0.0]], [[0.0, 1.0, 0.0]] * 2).trajectory
+    found = largest_share(motion, lambda q, *_: 1.0 - 1e-9 - np.abs(q[:, 1:2] - 1.0 / 3.0))
+    assert found is not None
+    assert found.share - 1.0 == pytest.approx(1.6e-7, rel=0.2)
+
+
 def test_what_is_not_a_number_is_no_share() -> None:
     motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0]], np.zeros((2, 3))).trajectory
     found = largest_share(motion, lambda q, qd, qdd: np.where(q > 0.99, np.nan, 0.1))
@@ -396,6 +448,7 @@ def test_joints_that_go_too_far_are_not_looked_at() -> None:
     found = too_far("it", far)
     assert (found.kept, found.subject) == (False, far.robot.joint_names[1])
     assert "travels 1e+06 rad" in found.text
+    assert (found.time, found.amount, found.allowed) == (far.trajectory.t[0], np.inf, 1.0)
 
 
 def test_a_band_is_half_its_width_from_its_middle() -> None:
