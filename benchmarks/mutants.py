@@ -252,7 +252,7 @@ def main(
     stages = Console(stderr=True, highlight=False)
     parts, reasons = [x for x in PARTS if not part or x.name in part], equivalent()
     table = Table("part", "mutants", "sample", "caught", "survived", "equivalent", "score")
-    totals = Counter[str]()
+    totals, endless = Counter[str](), 0
     _warm()
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log"
@@ -270,16 +270,18 @@ def main(
                 if reason is not None:
                     ends["equivalent"] += 1
                     continue
-                is_caught = any(fails(one, x, mutant, patience[x], log) for x in one.tests)
-                ends["caught" if is_caught else "survived"] += 1
+                reasons_to_fail = (fails(one, x, mutant, patience[x], log) for x in one.tests)
+                why = next(filter(None, reasons_to_fail), "")
+                ends["caught" if why else "survived"] += 1
+                endless += why == "no end"
                 stages.print(f"{one.name}: {ends.total()} of {len(sample)}", end="\r")
-                if not is_caught:
+                if not why:
                     console.print(f"{mutant.file}:{mutant.line} {mutant.operator}")
                     console.print(f"    - {mutant.before}\n    + {mutant.after}")
             table.add_row(*_row(one.name, of_all, ends))
             totals += ends + Counter(all=of_all)
     table.add_row(*_row("all", totals.pop("all"), totals))
-    console.print(f"seed {seed}", table, sep="\n")
+    console.print(f"seed {seed}; {endless} of those caught found no end in time", table, sep="\n")
 
 
 def _row(name: str, of_all: int, ends: Counter[str]) -> list[str]:
