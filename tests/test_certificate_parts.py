@@ -14,7 +14,7 @@ from selfmotion.basics.arrays import Array
 from selfmotion.certificate import AtRest, ClosedMotion, EndState, JointLimits
 from selfmotion.certificate.apart import KeepsApart, closest_at_all_times
 from selfmotion.certificate.band import CoordinateBand
-from selfmotion.certificate.check import _because, _damped_stretches
+from selfmotion.certificate.check import _because, _damped_stretches, _undecided
 from selfmotion.certificate.deviation import _turns, deviation_from, deviation_size, excess
 from selfmotion.certificate.interpolation import stencil
 from selfmotion.certificate.path_error import bound_errors
@@ -507,6 +507,18 @@ def test_where_damping_acts_is_told_stretch_by_stretch() -> None:
         last = damped[0] if time < 3.0 else damped[1]
         assert _because(time, damped) == f", {words} damping was active, {last}"
     assert _because(2.0, damped[1:]) == ""
+
+
+def test_what_is_undecided_is_counted() -> None:
+    assert _undecided(()) == ()
+    for count, words in (
+        (1, "decided:"),
+        (2, "and on 1 other interval:"),
+        (3, "2 other intervals:"),
+    ):
+        (text,) = _undecided(((0.25, 0.5),) * count)
+        assert "from t = 0.25 to 0.5 s is not decided" in text
+        assert words in text
 
 
 def test_a_verdict_names_each_fault_and_what_was_looked_at() -> None:

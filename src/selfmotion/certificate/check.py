@@ -158,7 +158,8 @@ def _undecided(intervals: tuple[tuple[float, float], ...]) -> tuple[str, ...]:
     if not intervals:
         return ()
     first, last = intervals[0]
-    others = f", and on {len(intervals) - 1} other intervals" if len(intervals) > 1 else ""
+    more = len(intervals) - 1
+    others = f", and on {more} other interval{'s' if more > 1 else ''}" if more else ""
     return (
         f"whether the tool is on the path from t = {first:.6g} to {last:.6g} s is not "
         f"decided{others}: the path or the motion is not smooth there",
