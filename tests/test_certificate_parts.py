@@ -271,7 +271,7 @@ def test_ends_are_judged_to_a_micrometre(miss: float) -> None:
     rest = np.zeros((2, 3))
     q = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])
     motion, kept = motion_of(q, rest), abs(miss) <= 1e-6
-    off = np.array([0.0, miss, 0.0])
+    off, far = np.array([0.0, miss, 0.0]), 9.0 * np.ones(3)
     cases: list[tuple[sm.Requirement, sm.FinishedMotion, float]] = [
         (EndState(0, q[1] + off), motion, 1.0),
         (EndState(0, q[0] + off, at_start=True), motion, 0.0),
@@ -280,8 +280,8 @@ def test_ends_are_judged_to_a_micrometre(miss: float) -> None:
         (AtRest(True, True), motion_of(q, [off, 0.0 * off]), 0.0),
         (AtRest(False, True), motion_of(q, [9.0 * np.ones(3), off]), 1.0),
         (AtRest(True, False), motion_of(q, [off, 9.0 * np.ones(3)]), 0.0),
-        (ClosedMotion(False), motion_of([q[0], q[0] + off], [off, 9.0 * np.ones(3)]), 1.0),
-        (ClosedMotion(True), motion_of([q[0], q[0]], [q[0], q[0] + off]), 1.0),
+        (ClosedMotion(False), motion_of([q[0], q[1], q[0] + off], [off, off, far]), 2.0),
+        (ClosedMotion(True), motion_of([q[0], q[1], q[0]], [q[0], off, q[0] + off]), 2.0),
     ]
     for requirement, given, time in cases:
         found = requirement.judge(given)
@@ -368,7 +368,8 @@ def test_a_distance_that_is_grazed_is_undecided_and_said_to_be() -> None:
     bodies = Bodies(lambda q: 0.1 + np.minimum(np.abs(q[:, 0] - 1.0), 0.3), lever=2.0)
     judged = KeepsApart(bodies, 0.1).judge(motion)  # type: ignore[arg-type]
     assert not judged.kept
-    assert "is not decided" in judged.text
+    assert "whether first0 - second0 keep 100.00 mm from t = 0.333333 to 0.333333 s" in judged.text
+    assert "is not decided: they come to 100.0000 mm" in judged.text
     assert judged.time == pytest.approx(1.0 / 3.0, abs=1e-3)
     found = closest_at_all_times(bodies, motion.trajectory, 0.1)  # type: ignore[arg-type]
     assert found.open_until is not None
