@@ -1,5 +1,6 @@
 """Paths in the fewest parts: how many, where, why, and moves in between that keep everything."""
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -16,6 +17,7 @@ from selfmotion.basics import Array, NoSequenceError, ProblemError
 from selfmotion.motion import joined_motions, reversed_motion
 from selfmotion.path import section_at_rest
 from selfmotion.planning.moves import Mover, between_parts
+from selfmotion.planning.parts import relaxed_along
 
 # The planar arm keeps about this shape, and its first joint turns by so much at most.
 SHAPE, LEAST, MOST = (0.8, 0.5), (0.5, 0.1), (1.1, 0.9)
@@ -109,11 +111,9 @@ def test_a_path_that_needs_two_changes_is_found_with_two() -> None:
     assert "a move does not lead from part to part" in faults(swapped)
 
 
-def test_one_change_where_one_is_needed_and_none_where_none_is() -> None:
-    for angle in (0.85 * TURN, 1.9 * TURN):
-        parts = sm.plan_in_parts(wound(angle)).require()
-        assert len(parts.plans) == fewest(angle) == len(parts.moves) + 1
-    whole = sm.plan_in_parts(wound(0.85 * TURN))
+def test_a_path_that_needs_no_change_is_one_plan() -> None:
+    whole = sm.plan_in_parts(wound(0.5 * TURN)).require()
+    assert len(whole.plans) == fewest(0.5 * TURN) == 1
     assert (whole.moves, whole.cuts, whole.endings) == ((), (), ())
     assert whole.begins == (0.0,)
     # One part is the plan itself.
@@ -129,6 +129,8 @@ def test_what_is_asked_of_the_ends_is_asked_of_the_first_and_the_last_part() -> 
         problem.robot, problem.path, "planar", reached, constraints=problem.constraints
     )
     parts = sm.plan_in_parts(pinned).require()
+    assert len(parts.plans) == fewest(1.9 * TURN) == 2
+    assert not faults(parts)
     np.testing.assert_allclose(parts.plans[0].trajectory.q[0], reached, atol=1e-12)
     np.testing.assert_allclose(parts.plans[-1].trajectory.q[-1], end, atol=1e-6)
 
@@ -233,6 +235,34 @@ def test_what_no_part_follows_is_refused_with_time_and_reason() -> None:
     gap = wound(2.0, sm.JointPositionLimits([-0.5 * TURN, -7, -7], [-0.5 * TURN + 0.7, 7, 7]))
     with pytest.raises(NoSequenceError, match="joint limits"):
         sm.plan_in_parts(gap)
+
+
+def test_a_given_start_that_may_not_be_is_named() -> None:
+    problem = wound(1.9 * TURN)
+    elsewhere = problem.robot.inverse_kinematics(
+        problem.path.pose(0.0), "planar", np.array([2.9, -1.0, -1.0])
+    )
+    beyond = dataclasses.replace(problem, start=elsewhere)
+    with pytest.raises(NoSequenceError, match=r"t = 0 s: the given start has joint 'joint\d' at "):
+        sm.plan_in_parts(beyond)
+
+
+def test_what_is_relaxed_for_a_while_is_so_in_each_part() -> None:
+    problem = wound(1.9 * TURN)
+    relaxed = [sm.Relaxation("x", 1e-2, during=(11.0, 15.0)), sm.Relaxation("y", 1e-2)]
+    problem = dataclasses.replace(problem, relaxations=relaxed)
+    windows = []
+    for ends, ramped in (((0.0, 12.0), (False, True)), ((12.0, 20.0), (True, False))):
+        path = section_at_rest(problem.path, *ends, 0.5, ramped)
+        during, always = relaxed_along(problem, path, ends)
+        assert always == relaxed[1]
+        windows.append(during.during)
+        if ends[0] == 0.0:
+            assert windows[0] == (11.0, path.duration)
+    # Half a ramp later than without one.
+    assert windows[1] == (0.0, pytest.approx(3.0 + 0.225))
+    late = section_at_rest(problem.path, 16.0, 20.0, 0.5, (True, False))
+    assert list(relaxed_along(problem, late, (16.0, 20.0))) == relaxed[1:]
 
 
 def test_what_parts_cannot_be_is_refused() -> None:

@@ -273,7 +273,7 @@ class _Planner:
             path=path,
             start=whole.start if piece.first == 0 else None,
             constraints=list(_asked_of_part(whole, piece.first == 0, piece.last == last)),
-            relaxations=list(_relaxed(whole, path, ends)),
+            relaxations=list(relaxed_along(whole, path, ends)),
             rest=True,
         )
 
@@ -289,12 +289,17 @@ def _asked_of_part(problem: Problem, is_first: bool, is_last: bool) -> Iterator[
             yield kept
 
 
-def _relaxed(problem: Problem, path: Retimed, ends: tuple[float, float]) -> Iterator[Relaxation]:
+def relaxed_along(
+    problem: Problem, path: Retimed, ends: tuple[float, float]
+) -> Iterator[Relaxation]:
     """Return what is relaxed along a stretch of the path, windows by its own time."""
     for item in problem.relaxations:
         if item.during is None:
             yield item
             continue
-        window = path.when(np.clip(item.during, *ends) - ends[0])
-        if window[1] - window[0] > _SHORTEST * path.duration:
-            yield replace(item, during=(float(window[0]), float(window[1])))
+        first, last = path.when(np.clip(item.during, *ends) - ends[0]).tolist()
+        # A ramp hardly moves at its end: when it gets there is known to some digits only.
+        first = 0.0 if item.during[0] <= ends[0] else first
+        last = path.duration if item.during[1] >= ends[1] else last
+        if last - first > _SHORTEST * path.duration:
+            yield replace(item, during=(first, last))

@@ -139,9 +139,18 @@ class Pieces:
         for item in self.problem.constraints:
             if isinstance(item, EndConfiguration):
                 samples[-1] = self.problem.robot.configuration(item.q)[None]
-        for i in (0, -1):
-            if len(samples[i]) == 1 and not self._bounds.keep(samples[i])[0]:
-                samples[i] = samples[i][:0]
+                self._keep_given(-1, "end configuration asked for")
+        if start is not None:
+            self._keep_given(0, "given start")
+
+    def _keep_given(self, i: int, name: str) -> None:
+        q = self._samples[i]
+        if np.any(self._bounds.beyond(q)):
+            k = int(np.argmax(self._bounds.beyond(q)))
+            joint = self.problem.robot.joint_names[k]
+            self._refuse(i, f"the {name} has joint '{joint}' at {q[0, k]:.4g}, outside its limits")
+        if not self._bounds.keep(q)[0]:
+            self._refuse(i, f"the {name} is in collision, or nearer than asked for")
 
     def _check(self) -> None:
         for i, samples in enumerate(self._samples):
