@@ -62,9 +62,10 @@ class Score:
     Attributes
     ----------
     first_seconds : float
-        When the first motion was known that keeps the criteria; NaN where there was none.
+        When the first motion was known that keeps the criteria, processor time; NaN where there was
+        none.
     seconds : float
-        Until the plan was returned.
+        Until the plan was returned, likewise.
     """
 
     name: str
@@ -174,12 +175,12 @@ class _Clock:
     """Notes when the first motion was optimised: when the search turns to what follows."""
 
     def __init__(self) -> None:
-        self.began, self.first = time.perf_counter(), float("nan")
+        self.began, self.first = time.process_time(), float("nan")
         self._refining = False
 
     @property
     def elapsed(self) -> float:
-        return time.perf_counter() - self.began
+        return time.process_time() - self.began
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         if self._refining and np.isnan(self.first):
