@@ -157,7 +157,7 @@ def setting_rows() -> list[Row]:
             "RefinedNullMotion",
             sm.RefinedNullMotion,
             gain=POSITIVE,
-            most={"7": 7, "'8'": "8", "None": None, "128": 128},
+            most={"7": 7, "'8'": "8", "0": 0, "128": 128},
         ),
         *bad_values_of(
             "Relaxations",
