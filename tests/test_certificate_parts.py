@@ -16,8 +16,9 @@ from selfmotion.certificate.apart import KeepsApart, closest_at_all_times
 from selfmotion.certificate.band import CoordinateBand
 from selfmotion.certificate.check import _because, _damped_stretches, _undecided
 from selfmotion.certificate.deviation import _turns, deviation_from, deviation_size, excess
+from selfmotion.certificate.findings import Extreme
 from selfmotion.certificate.interpolation import stencil
-from selfmotion.certificate.path_error import bound_errors
+from selfmotion.certificate.path_error import _larger, bound_errors
 from selfmotion.certificate.shares import largest_share, too_far
 from selfmotion.certificate.tool import ToolMotion
 from selfmotion.collision import Closest
@@ -242,6 +243,32 @@ def test_a_jump_of_acceleration_breaks_any_limit_of_jerk() -> None:
     assert found.amount == pytest.approx(12.0 / (1e-6 * 1e3))
     assert "jumps by 12" in found.text
     assert JointLimits(3, -1e8 * wide, 1e8 * wide).judge(motion).kept
+    # A jump just beyond what a limited jerk does in an instant, and just within.
+    for share in (1.01, 0.99):
+        narrow = np.full(3, 12.0 / (1e-6 * share))
+        found = JointLimits(3, -narrow, narrow).judge(motion)
+        assert found.kept is (share < 1.0)
+
+
+@pytest.mark.parametrize(("order", "power"), [(2, 0.5), (3, 1.0 / 3.0)])
+def test_slow_rates_say_how_much_shorter_it_could_take(order: int, power: float) -> None:
+    motion = motion_of([[0.0] * 3, [0.0, -1.0, 0.0]], np.zeros((2, 3)))
+    limit = np.full(3, {2: 6.0, 3: 12.0}[order] / 0.25)
+    found = JointLimits(order, -limit, limit).judge(motion)
+    assert f"give it {0.25**power:.5g} times the duration" in found.text
+
+
+def test_of_equal_errors_the_first_is_told() -> None:
+    first = _larger(Extreme(0.0, 0.0, "it"), np.array([1.0, 2.0, 2.0]), np.array([0.1, 0.2, 0.3]))
+    assert first == Extreme(2.0, 0.2, "it")
+    assert _larger(first, np.array([2.0]), np.array([0.7])) == first
+    assert _larger(first, np.zeros(0), np.zeros(0)) == first
+    assert np.isnan(_larger(first, np.array([3.0, np.nan]), np.array([0.7, 0.8])).value)
+
+
+def test_where_nothing_is_used_the_first_column_is_told_at_the_start() -> None:
+    motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0]], np.zeros((2, 3)), [2.0, 3.0]).trajectory
+    assert largest_share(motion, lambda q, *_: 0.0 * q) == (0.0, 2.0, 0)
 
 
 @pytest.mark.parametrize(
