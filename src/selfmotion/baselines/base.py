@@ -13,7 +13,7 @@ from selfmotion.certificate import Certificate, Tolerance
 from selfmotion.costs import Samples
 from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
-from selfmotion.plans import Plan, Problem, Report
+from selfmotion.plans import Plan, Problem, Report, check_problem
 
 # Samples of a motion to begin with; doubled until the quintics between them hold the tolerance.
 _FEWEST_STEPS, _MOST_DOUBLINGS = 64, 6
@@ -75,8 +75,7 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
         Without coefficients. `initial_trajectory` and `initial_cost` are those of the
         pseudo-inverse, as for every plan.
     """
-    if not isinstance(problem, Problem):
-        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")
+    check_problem(problem)
     if isinstance(method, type) or not callable(getattr(method, "solve", None)):
         raise ProblemError(f"method is {shown(method)}, expected one such as PseudoInverse()")
     tolerance = Tolerance.of(tolerance)

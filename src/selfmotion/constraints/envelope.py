@@ -7,6 +7,7 @@ import numpy as np
 from selfmotion.basics import Array, read_only
 from selfmotion.certificate import JointLimits
 from selfmotion.collision import CollisionModel
+from selfmotion.robot import RobotModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +59,10 @@ class Envelope:
             read_only(np.minimum(self.jerk, other.jerk)),
             (*self.bodies, *other.bodies),
         )
+
+    def arm(self, robot: RobotModel) -> RobotModel:
+        """Return the arm with these position limits instead of its own."""
+        return replace(robot, lower=self.lower, upper=self.upper)
 
     @property
     def limited(self) -> bool:

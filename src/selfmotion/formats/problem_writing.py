@@ -4,13 +4,13 @@ import dataclasses
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
-from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path, shown
+from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path
 from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost
 from selfmotion.formats.documents import write_document
 from selfmotion.motion import NullMotion
 from selfmotion.path import Path
-from selfmotion.plans import NO_OVERLAP, Problem
+from selfmotion.plans import NO_OVERLAP, Problem, check_problem
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot, mounting_of
 
 if TYPE_CHECKING:
@@ -27,8 +27,7 @@ def write_problem(problem: Problem, file: str | FilePath) -> None:
     FileFormatError
         The file cannot be written.
     """
-    if not isinstance(problem, Problem):
-        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")
+    check_problem(problem)
     write_document(as_path(file), problem_table(problem))
 
 

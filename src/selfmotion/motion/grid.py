@@ -43,6 +43,10 @@ class Grid:
         nodes[0::2], nodes[1::2] = self.nodes, middles
         return Grid(read_only(nodes))
 
+    def with_steps(self, fewest: int) -> "Grid":
+        """Return the grid halved until it has so many steps."""
+        return self if self.steps >= fewest else self.halved().with_steps(fewest)
+
     @property
     def steps(self) -> int:
         """Number N of steps."""

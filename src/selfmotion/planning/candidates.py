@@ -1,7 +1,6 @@
 """The best motion of a problem: from its start, from many starts, from global sequences."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import NoReturn
 
@@ -180,8 +179,7 @@ class Candidates:
 
     def _try_candidates(self, starts: int, finalists: int, rng: np.random.Generator) -> None:
         problem = self._problem
-        asked = problem.envelope
-        arm = replace(problem.robot, lower=asked.lower, upper=asked.upper)
+        arm = problem.envelope.arm(problem.robot)
         candidates = start_candidates(arm, problem.path, problem.task, starts, rng)
         if len(candidates) > finalists:
             candidates = self._best_of(candidates, finalists) or candidates

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, PlanError, ProblemError, Progress, per_joint, shown, silent
+from selfmotion.basics import Array, PlanError, ProblemError, Progress, per_joint, silent
 from selfmotion.constraints import (
     Constraint,
     JointAccelerationLimits,
@@ -16,7 +16,7 @@ from selfmotion.constraints import (
 from selfmotion.costs import LimitUse
 from selfmotion.path import Path, Retimed
 from selfmotion.planning.run import plan
-from selfmotion.plans import Plan, Problem, retime
+from selfmotion.plans import Plan, Problem, check_problem, retime
 
 # What limits the pace rather than the way.
 _OF_PACE = (JointVelocityLimits, JointAccelerationLimits, JointJerkLimits)
@@ -86,8 +86,7 @@ def fastest(
     PlanError
         No motion that was found keeps all limits at any pace; says the last verdict.
     """
-    if not isinstance(problem, Problem):
-        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")
+    check_problem(problem)
     v, a = _limits(problem, acceleration, velocity)
     geometric = tuple(item for item in problem.constraints if not isinstance(item, _OF_PACE))
     free = replace(problem, constraints=geometric, costs=(LimitUse(v, a, _POWER),))

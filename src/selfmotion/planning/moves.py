@@ -96,7 +96,7 @@ class Mover:
 
     def _between(self, first: Array, last: Array) -> Move:
         robot, asked = self._problem.robot, self._asked
-        arm = replace(robot, lower=asked.lower, upper=asked.upper)
+        arm = asked.arm(robot)
         ways = Roadmap(
             first, last, arm.finite_limits(), robot.joint_weights, self._is_free, self._rng
         )

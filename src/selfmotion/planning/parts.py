@@ -18,7 +18,6 @@ from selfmotion.basics import (
     as_number,
     as_numbers,
     random_numbers,
-    shown,
     silent,
 )
 from selfmotion.certificate import Tolerance
@@ -27,7 +26,7 @@ from selfmotion.path import Retimed, Section, section_at_rest
 from selfmotion.planning.moves import Mover, Retreat, between_parts
 from selfmotion.planning.run import plan, plan_along
 from selfmotion.planning.settings import Search
-from selfmotion.plans import Move, Parts, Plan, Problem, rest_orders
+from selfmotion.plans import Move, Parts, Plan, Problem, check_problem, rest_orders
 from selfmotion.search import Piece, Pieces, Sequence, SequenceGuide, has_curves, turned_towards
 from selfmotion.task import Relaxation
 
@@ -141,8 +140,7 @@ def _best_of(planner: "_Planner", pieces: Pieces, chains: list[Piece]) -> Parts:
 
 
 def _checked(problem: Problem, retreat: float, axis: npt.ArrayLike) -> Retreat | None:
-    if not isinstance(problem, Problem):
-        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")
+    check_problem(problem)
     if problem.damping is not None:
         raise ProblemError(
             "damping= leads through what cannot be followed by leaving the path, parts by another "

@@ -4,6 +4,7 @@ import time
 from dataclasses import replace
 from functools import cache
 from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from selfmotion.planning.largest_part import Part, largest_part
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import Search
 from selfmotion.planning.warm_start import check_warm_start
-from selfmotion.plans import Gap, Plan, Problem, Report
+from selfmotion.plans import Gap, Plan, Problem, Report, check_problem
 from selfmotion.search import SPACING, Reach, SequenceGuide, reachable
 
 # After these no other way is tried.
@@ -119,7 +120,7 @@ def plan(
         max_evaluations = _PATIENCE
     counts = TimedCounts(deadline=clock)
     effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, counts)
-    settings = (Tolerance.of(tolerance), clock.telling(progress), warm_start, clock, None)
+    settings = _Settings(Tolerance.of(tolerance), clock.telling(progress), warm_start, clock)
     try:
         with one_blas_thread():
             return _plan(problem, effort, search or Search(), settings)
@@ -138,15 +139,23 @@ def plan_along(
     """Plan as `plan` does, but try a motion first that is known, near which there should be one."""
     clock = Deadline(inf)
     effort = Effort(QuasiNewton(), None, None, TimedCounts(deadline=clock))
+    settings = _Settings(tolerance, progress, None, clock, guide)
     with one_blas_thread():
-        return _plan(problem, effort, Search(), (tolerance, progress, None, clock, guide))
+        return _plan(problem, effort, Search(), settings)
 
 
-_Settings = tuple[Tolerance, Progress, Plan | None, Deadline, SequenceGuide | None]
+class _Settings(NamedTuple):
+    """What all attempts at one plan have in common."""
+
+    tolerance: Tolerance
+    progress: Progress
+    warm_start: Plan | None
+    deadline: Deadline
+    guide: SequenceGuide | None = None
 
 
 def _plan(problem: Problem, effort: Effort, search: Search, settings: _Settings) -> Plan:
-    found = _Run(problem, effort, search, *settings).plan()
+    found = _Run(problem, effort, search, settings).plan()
     # Few motions take an arm into itself: the others need not wait for distances.
     if not _overlaps(found) or found.report.status in _ENDED:
         return found
@@ -157,12 +166,12 @@ def _plan(problem: Problem, effort: Effort, search: Search, settings: _Settings)
         efforts += [(effort, whole), (replace(effort, apart=True), whole)]
     for another, how in efforts:
         try:
-            rival = _Run(problem, another, how, *settings).plan()
+            rival = _Run(problem, another, how, settings).plan()
         except SelfmotionError:
             return found
         except KeyboardInterrupt:
-            clock = settings[3]
-            return _told(found, Status.DEADLINE if clock.passed else Status.INTERRUPTED)
+            passed = settings.deadline.passed
+            return _told(found, Status.DEADLINE if passed else Status.INTERRUPTED)
         if rival.report.status in _ENDED:
             return _better(found, rival)
         found = rival
@@ -195,8 +204,7 @@ def _overlaps(plan: Plan) -> bool:
 
 
 def _check(problem: Problem, search: Search | None, max_evaluations: int | None) -> None:
-    if not isinstance(problem, Problem):
-        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")
+    check_problem(problem)
     if search is not None and not isinstance(search, Search):
         raise ProblemError(f"search is {shown(search)}, expected Search(mode=…, starts=…, …)")
     if search is not None and problem.given_start is not None and not search.compare:
@@ -216,19 +224,21 @@ class _Run:
         problem: Problem,
         effort: Effort,
         search: Search,
-        tolerance: Tolerance,
-        progress: Progress,
-        warm_start: Plan | None,
-        deadline: Deadline,
-        guide: SequenceGuide | None,
+        settings: _Settings,
     ) -> None:
         self._problem, self._effort, self._search = problem, effort, search
-        self._tolerance, self._progress = tolerance, progress
-        self._deadline = deadline
+        self._tolerance, self._progress = settings.tolerance, settings.progress
+        self._deadline = settings.deadline
         self._began = time.perf_counter()
         self._reach = cache(self._reachable)
         self._candidates = Candidates(
-            problem, effort, search, progress, self._reach, warm_start, guide
+            problem,
+            effort,
+            search,
+            settings.progress,
+            self._reach,
+            settings.warm_start,
+            settings.guide,
         )
 
     def plan(self) -> Plan:

@@ -178,8 +178,7 @@ class Session:
         motion = self.null_motion
         if plan.report.null_motion is not None and plan.problem.null_motion == motion:
             motion = plan.report.null_motion
-        while grid.steps < max(motion.fewest_steps, plan.report.steps):
-            grid = grid.halved()
+        grid = grid.with_steps(max(motion.fewest_steps, plan.report.steps))
         objective = self._on(grid, motion)
         t = grid.stage_times
         x = coefficients_of(plan, problem, t, objective.null_motion)
@@ -216,9 +215,7 @@ class Session:
         """
         wanted = self._still.problem.null_motion
         for motion in wanted.detours(self._objective.null_motion.rows):
-            grid = self._still.grid
-            while grid.steps < motion.fewest_steps:
-                grid = grid.halved()
+            grid = self._still.grid.with_steps(motion.fewest_steps)
             session = Session(self._effort, self._still, self._on(grid, motion), free=self._free)
             session.null_motion, session._before = motion, self._before
             session.history = self.history

@@ -3,7 +3,7 @@
 from selfmotion.plans.paper_problem import sample_problem
 from selfmotion.plans.parts import Move, Parts
 from selfmotion.plans.plan import Plan, Views, load_plan
-from selfmotion.plans.problem import NO_OVERLAP, Problem
+from selfmotion.plans.problem import NO_OVERLAP, Problem, check_problem
 from selfmotion.plans.report import Binding, Gap, Report
 from selfmotion.plans.rest import rest_orders
 from selfmotion.plans.retiming import OF_PACE, retime, slowdown
@@ -20,6 +20,7 @@ __all__ = [
     "Problem",
     "Report",
     "Views",
+    "check_problem",
     "load_plan",
     "problem_from_dict",
     "problem_to_dict",

@@ -1,6 +1,7 @@
 """A plan in several parts, with changes of configuration in between."""
 
 from dataclasses import dataclass
+from itertools import accumulate
 
 from selfmotion.basics import PlanError
 from selfmotion.certificate import Finding
@@ -113,13 +114,9 @@ class Parts:
         PlanError
             A move was not found.
         """
-        times: list[float] = []
-        now = 0.0
-        for number, motion in enumerate(self._motions):
-            if number % 2 == 0 and len(times) < len(self.plans):
-                times.append(now)
-            now += motion.duration
-        return tuple(times)
+        durations = [motion.duration for motion in self._motions]
+        # Motions are parts and moves by turns.
+        return tuple(accumulate(durations[:-1], initial=0.0))[::2]
 
     @property
     def _motions(self) -> list[Trajectory]:

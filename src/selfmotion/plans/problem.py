@@ -367,3 +367,9 @@ def _fade(s: Array) -> Array:
     """Return a function of s (S,) that rises smoothly from 0 to 1 and stays there."""
     u = np.minimum(s / _FADE, 1.0)
     return np.asarray(u * u * (3.0 - 2.0 * u))
+
+
+def check_problem(problem: object) -> None:
+    """Raise ProblemError where something else was given for a problem."""
+    if not isinstance(problem, Problem):
+        raise ProblemError(f"problem is {shown(problem)}, expected a Problem(robot, path, …)")

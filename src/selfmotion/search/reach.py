@@ -1,6 +1,6 @@
 """How far along a path the arm can reach at all, pose by pose."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -45,7 +45,7 @@ def reachable(problem: Problem, suspect: float, starts: int, rng: np.random.Gene
     go on: a pose that nothing leads to is out of reach, as far as can be told. Poses all along the
     path, and more about the time `suspect` [s], where a motion had trouble.
     """
-    robot, path, task = _within_limits(problem), problem.path, problem.task
+    robot, path, task = problem.asked_envelope.arm(problem.robot), problem.path, problem.task
     given = problem.given_start
     first = start_candidates(robot, path, task, starts, rng) if given is None else [given]
     about = np.clip(suspect / path.duration + _ABOUT, 0.0, 1.0)
@@ -81,12 +81,6 @@ def _edge(
         else:
             beyond = middle
     return known, last
-
-
-def _within_limits(problem: Problem) -> RobotModel:
-    """Return the arm with the position limits that the motion was asked to keep."""
-    asked = problem.asked_envelope
-    return replace(problem.robot, lower=asked.lower, upper=asked.upper)
 
 
 def _solutions(
