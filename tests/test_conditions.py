@@ -67,12 +67,17 @@ def test_conditions_stand_one_after_another(grid: Grid, samples: Samples) -> Non
     np.testing.assert_array_equal(at.tolerance, [*[1e-3] * count, *[0.5] * 3])
     np.testing.assert_array_equal(at.equality, [*[False] * count, *[True] * 3])
     motion = NodeTangents(np.zeros((len(grid.nodes), 7, 4)), np.zeros((1, 7, 4)), grid.sampling)
-    np.testing.assert_array_equal(both.rows(samples, motion), np.outer(at.h, [1.0, 2.0, 3.0, 4.0]))
+    rows, expected = both.rows(samples, motion), np.outer(at.h, [1.0, 2.0, 3.0, 4.0])
+    every = np.arange(len(at.h))
+    np.testing.assert_array_equal(rows.picked(every), expected)
+    np.testing.assert_array_equal(rows.picked(every[::-2]), expected[::-2])
+    np.testing.assert_array_equal(rows.along(np.array([1.0, 0.0, 0.0, -1.0])), -3.0 * at.h)
     assert both.has_equalities
     assert not Conditions([first], grid).has_equalities
     none = Conditions([], grid)
     assert none.residuals(samples).h.shape == (0,)
-    assert none.rows(samples, motion).shape == (0, 4)
+    assert none.rows(samples, motion).picked(every[:0]).shape == (0, 4)
+    assert none.rows(samples, motion).along(np.ones(4)).shape == (0,)
     assert none.penalty(samples) == 0.0
     assert both.on(grid.halved()).constraints == (first, second)
 

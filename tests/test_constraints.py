@@ -17,6 +17,7 @@ from selfmotion.engine import Objective, StillMotion
 from selfmotion.engine.start import FreeStart
 from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import PolynomialNullMotion
+from selfmotion.optimise import pulled_back
 
 Circle = Callable[..., sm.Problem]
 
@@ -64,7 +65,7 @@ def test_rows_equal_central_differences(constraint: str, name: str, task: str) -
     x = 0.02 * np.random.default_rng(1).normal(size=objective.size)
     assert objective.conditions(x).worst > 1.0
     weights = np.random.default_rng(2).normal(size=len(objective.conditions(x).h))
-    exact = weights @ objective.condition_rows(x)
+    exact = pulled_back(objective.condition_rows(x), weights)
     differences = central_difference(lambda x: float(weights @ objective.conditions(x).h), x, 1e-6)
     assert np.abs(exact - differences).max() <= GRADIENT * np.abs(differences).max()
 
@@ -88,6 +89,26 @@ def test_tangents_equal_central_differences(constraint: str) -> None:
         np.testing.assert_allclose(exact[..., i], differences, atol=1e-6 * scale)
 
 
+@pytest.mark.parametrize("constraint", CONSTRAINTS)
+def test_rows_on_demand_are_those_of_all_tangents(constraint: str) -> None:
+    """Some, along a direction, and after other motions were looked at."""
+    made = CONSTRAINTS[constraint](robot_named("panda"))
+    objective = objective_with(made, "panda", "pose")
+    rng = np.random.default_rng(4)
+    x = 0.02 * rng.normal(size=objective.size)
+    tangents, samples = objective.node_tangents(x), objective.samples(x)
+    bound = objective.constraints.constraints[0]
+    expected = bound.tangents(samples, tangents).reshape(-1, objective.size)
+    rows = objective.condition_rows(x)
+    objective.conditions(x + 0.1)
+    direction, which = rng.normal(size=objective.size), rng.integers(0, len(expected), 40)
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(rows.picked(which), expected[which], atol=1e-12 * scale)
+    np.testing.assert_allclose(
+        rows.along(direction), expected @ direction, atol=1e-11 * scale * len(direction)
+    )
+
+
 def test_clearance_rows_equal_central_differences() -> None:
     robot = robot_named("panda")
     pose = robot.pose(start_of(robot, "pose"))
@@ -100,7 +121,7 @@ def test_clearance_rows_equal_central_differences() -> None:
     def value(x: Array) -> float:
         return float(np.sum(np.maximum(objective.conditions(x).h, 0.0) ** 2))
 
-    exact = 2.0 * excess @ objective.condition_rows(x)
+    exact = 2.0 * pulled_back(objective.condition_rows(x), excess)
     differences = central_difference(value, x, 1e-7)
     # Closest points jump on flat faces; away from jumps the agreement is that of the differences.
     assert np.abs(exact - differences).max() <= 1e-4 * np.abs(differences).max()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 import selfmotion as sm
 from selfmotion.basics.arrays import Array
@@ -11,6 +12,7 @@ from selfmotion.optimise.derivative import is_misleading
 from selfmotion.optimise.penalty import IGNORED, ExactPenalty, Point
 from selfmotion.optimise.quadratic import minimize_quadratic
 from selfmotion.optimise.restoration import restored
+from selfmotion.optimise.rows import DenseRows, ScaledRows, pulled_back
 from selfmotion.optimise.step import AIM, Step, best_step
 from selfmotion.optimise.update import renewed
 from test_sqp import Constrained
@@ -160,7 +162,7 @@ def test_conditions_out_of_reach_are_brought_as_near_as_a_tenth_more_than_possib
 ) -> None:
     """An equality on either side: of 10, a region of 1 takes out 1; nine tenths of it are taken."""
     at, rows = residuals([sign * 10.0], equalities=1), np.array([[1.0, 0.0]])
-    step = best_step(np.zeros(2), np.eye(2), at, rows, 1.0)
+    step = best_step(np.zeros(2), np.eye(2), at, DenseRows(rows), 1.0)
     assert step.relaxed
     assert step.worst == pytest.approx(9.1, abs=0.01)
     np.testing.assert_allclose(step.p, [-sign * 0.9, 0.0], atol=0.01)
@@ -171,14 +173,15 @@ def test_conditions_out_of_reach_are_brought_as_near_as_a_tenth_more_than_possib
 def test_what_is_out_of_reach_is_weighed_in_tolerances(sign: float) -> None:
     """Least is 9, of 50: a tenth of the way between is left, which the strict condition takes."""
     at = Residuals(np.array([0.5, -10.0 * sign]), np.array([0.01, 1.0]), np.array([False, True]))
-    step = best_step(np.zeros(2), np.eye(2), at, np.array([[-sign, 0.0], [1.0, 0.0]]), 1.0)
+    rows = np.array([[-sign, 0.0], [1.0, 0.0]])
+    step = best_step(np.zeros(2), np.eye(2), at, DenseRows(rows), 1.0)
     assert step.relaxed
     assert step.worst == pytest.approx(9.0 + 0.1 * 41.0, abs=0.05)
 
 
 def test_an_inequality_out_of_reach_is_relaxed_alone() -> None:
     at, rows = residuals([10.0, -0.5]), np.array([[1.0, 0.0], [0.0, 1.0]])
-    step = best_step(np.array([0.0, -10.0]), np.eye(2), at, rows, 1.0)
+    step = best_step(np.array([0.0, -10.0]), np.eye(2), at, DenseRows(rows), 1.0)
     assert step.relaxed
     assert step.worst == pytest.approx(9.1, abs=0.01)
     # The other one may use what the first one has to be given.
@@ -191,12 +194,12 @@ def test_equalities_that_repeat_each_other_do_not_contradict(sign: float) -> Non
     rows = np.array([[1.0, 0.0], [1.0, 0.0]])
     for apart, relaxed in ((1.8e-3, False), (2.2e-3, True)):
         at = residuals([sign * 0.3, sign * (0.3 + apart)], equalities=2)
-        assert best_step(np.zeros(2), np.eye(2), at, rows, 5.0).relaxed is relaxed
+        assert best_step(np.zeros(2), np.eye(2), at, DenseRows(rows), 5.0).relaxed is relaxed
 
 
 def test_inequalities_are_met_within_the_share_that_is_aimed_at() -> None:
     at, rows = residuals([-1.0, -50.0], 0.1), np.array([[1.0, 0.0], [0.0, 1.0]])
-    step = best_step(np.array([-3.0, -4.0]), np.eye(2), at, rows, 20.0)
+    step = best_step(np.array([-3.0, -4.0]), np.eye(2), at, DenseRows(rows), 20.0)
     np.testing.assert_allclose(step.p, [1.0 + AIM * 0.1, 4.0])
     np.testing.assert_allclose(step.multipliers, [3.0 - step.p[0], 0.0], atol=1e-9)
     assert step.gain == pytest.approx(3.0 * step.p[0] + 16.0 - 0.5 * (step.p[0] ** 2 + 16.0))
@@ -205,8 +208,9 @@ def test_inequalities_are_met_within_the_share_that_is_aimed_at() -> None:
 
 
 def test_a_step_of_nothing_tells_what_is_violated() -> None:
+    none = DenseRows(np.zeros((2, 0)))
     for h, relaxed in (([0.5, -3.0], False), ([1.5, -3.0], True)):
-        step = best_step(np.zeros(0), np.zeros((0, 0)), residuals(h), np.zeros((2, 0)), 1.0)
+        step = best_step(np.zeros(0), np.zeros((0, 0)), residuals(h), none, 1.0)
         assert step.worst == max(h)
         assert step.relaxed is relaxed
         assert (step.gain, len(step.p), step.multipliers.tolist()) == (0.0, 0, [0.0, 0.0])
@@ -334,3 +338,51 @@ def test_the_multiplier_and_the_estimate_are_those_of_the_unscaled_problem() -> 
     assert found.multipliers[0] == pytest.approx(100.0, rel=1e-4)
     np.testing.assert_allclose(found.inverse_hessian, np.linalg.inv(g), rtol=1e-3, atol=1e-6)
     assert function.evaluations <= 4
+
+
+@pytest.mark.parametrize("region", [0.3, 3.0])
+@pytest.mark.parametrize("seed", range(20))
+def test_steps_are_those_of_all_conditions(seed: int, region: float) -> None:
+    """Though programmes are solved with those alone that some step would violate."""
+    rng = np.random.default_rng(seed)
+    rows, h = rng.normal(size=(300, 5)), -rng.uniform(0.0, 2.0, 300)
+    at = residuals(list(h), 1e-3)
+    gradient = 3.0 * rng.normal(size=5)
+    step = best_step(gradient, np.eye(5), at, DenseRows(rows), region)
+    reach, upper = np.full(5, region), -h + AIM * 1e-3
+    everything = minimize_quadratic(np.eye(5), gradient, rows, np.full(300, -np.inf), upper, reach)
+    assert everything is not None
+    assert not step.relaxed
+    # A condition may be left out that is violated by a thousandth of its tolerance.
+    np.testing.assert_allclose(step.p, everything[0], atol=1e-5)
+    np.testing.assert_allclose(step.multipliers, everything[1], atol=1e-4)
+    assert step.worst == pytest.approx(np.max((h + rows @ step.p) / 1e-3), rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_violations_that_are_left_are_those_of_all_conditions(seed: int) -> None:
+    """Of half-spaces that share no point: the least violation, by linear programming."""
+    rng = np.random.default_rng(seed)
+    rows, h = rng.normal(size=(200, 3)), rng.uniform(-1.0, 1.0, 200)
+    at = residuals(list(h), 1e-2)
+    step = best_step(np.zeros(3), np.eye(3), at, DenseRows(rows), 2.0)
+    answer = linprog(
+        [0.0, 0.0, 0.0, 1.0],
+        A_ub=np.column_stack([rows, np.full(200, -1e-2)]),
+        b_ub=-h,
+        bounds=[(-2.0, 2.0)] * 3 + [(None, None)],
+    )
+    least, before = answer.fun, at.worst
+    assert step.relaxed
+    assert step.worst <= least + 0.1 * (before - least) + 0.02 * before
+    assert step.worst >= least * (1.0 - 1e-6)
+
+
+def test_rows_of_other_variables_are_those_by_the_chain_rule() -> None:
+    rng = np.random.default_rng(0)
+    table, scale = rng.normal(size=(6, 4)), rng.normal(size=(4, 3))
+    rows = ScaledRows(DenseRows(table), scale)
+    p, weights = rng.normal(size=3), np.array([0.0, 2.0, 0.0, -1.0, 0.0, 0.5])
+    np.testing.assert_allclose(rows.along(p), table @ scale @ p, rtol=1e-12)
+    np.testing.assert_allclose(rows.picked(np.array([4, 1])), (table @ scale)[[4, 1]], rtol=1e-12)
+    np.testing.assert_allclose(pulled_back(rows, weights), weights @ table @ scale, rtol=1e-12)

@@ -11,6 +11,7 @@ from selfmotion.basics import Array
 from selfmotion.optimise import Residuals, SequentialQuadratic, Status
 from selfmotion.optimise.quadratic import minimize_quadratic
 from selfmotion.optimise.restoration import _Penalised, restored, scanned
+from selfmotion.optimise.rows import DenseRows, pulled_back
 from selfmotion.optimise.step import AIM, best_step
 
 # Conditions of these functions may be violated by so much.
@@ -56,8 +57,8 @@ class Constrained:
         equality = np.arange(len(h)) >= len(h) - self._equalities
         return Residuals(h, np.full(len(h), self._tolerance), equality)
 
-    def condition_rows(self, x: Array) -> Array:
-        return self._rows(x)
+    def condition_rows(self, x: Array) -> DenseRows:
+        return DenseRows(self._rows(x))
 
 
 def quadratic_programme(seed: int, equalities: int = 1) -> tuple[Constrained, Array]:
@@ -95,7 +96,7 @@ def quadratic_programme(seed: int, equalities: int = 1) -> tuple[Constrained, Ar
 def kkt(function: Constrained, found: sm.Minimum) -> tuple[float, Array, Residuals]:
     """Return |∇F + Σ λ ∇h| relative to |∇F|, λ and the residuals."""
     rows, gradient = function.condition_rows(found.x), function.gradient(found.x)
-    residual = np.abs(gradient + found.multipliers @ rows).max()
+    residual = np.abs(gradient + pulled_back(rows, found.multipliers)).max()
     return residual / np.abs(gradient).max(), found.multipliers, function.conditions(found.x)
 
 
@@ -176,7 +177,7 @@ def test_contradictions_are_relaxed_in_proportion_to_tolerances(
     """x ≤ -1 and x ≥ 1: the least violation is in the middle, or nearer to the stricter one."""
     at = Residuals(np.array([1.0, 1.0]), np.array([share, 1.0]) * 1e-3, np.zeros(2, bool))
     rows = np.array([[1.0, 0.0], [-1.0, 0.0]])
-    step = best_step(np.zeros(2), np.eye(2), at, rows, 10.0)
+    step = best_step(np.zeros(2), np.eye(2), at, DenseRows(rows), 10.0)
     assert step.relaxed
     least = 2.0 / (1e-3 * (1.0 + share))
     # A tenth of what the relaxation takes out is left to the cost.

@@ -1,6 +1,6 @@
 """What every part of the package stands on: errors, arrays, progress, files, compilation."""
 
-from selfmotion.basics.arrays import Array, per_joint, plain_numbers, read_only, shown
+from selfmotion.basics.arrays import Array, Ints, per_joint, plain_numbers, read_only, shown
 from selfmotion.basics.errors import (
     BreakdownError,
     CollisionError,
@@ -46,6 +46,7 @@ __all__ = [
     "BreakdownError",
     "CollisionError",
     "FileFormatError",
+    "Ints",
     "InverseKinematicsError",
     "NoSequenceError",
     "PathError",

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from selfmotion.basics.errors import ProblemError
 
 Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.intp]
 
 _short = reprlib.Repr()
 _short.maxother = _short.maxstring = 60

@@ -47,6 +47,17 @@ class Clearances:
         changes[self.rows, self.columns] = terms[:, 0]
         return changes
 
+    def slopes_at(self, samples: Ints, pairs: Ints) -> Array:
+        """Return ∂d/∂q of some pairs at some samples (k,), (k, n)."""
+        width = self.values.shape[1]
+        listed = self.rows * width + self.columns
+        wanted = samples * width + pairs
+        at = np.minimum(np.searchsorted(listed, wanted), max(len(listed) - 1, 0))
+        near = listed[at] == wanted if len(listed) else np.zeros(len(wanted), dtype=bool)
+        slopes = np.zeros((len(wanted), self.slopes.shape[1]))
+        slopes[near] = self.slopes[at[near]]
+        return slopes
+
     def jacobian(self) -> Array:
         """Return ∂d/∂q, (K, P, n); most of it is zero, see `slopes`."""
         jacobian = np.zeros((*self.values.shape, self.slopes.shape[1]))

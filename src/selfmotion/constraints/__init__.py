@@ -4,8 +4,10 @@ from selfmotion.constraints.band import Band
 from selfmotion.constraints.base import (
     BoundConstraint,
     Constraint,
+    Linearised,
     NodeTangents,
     easing_of,
+    linearised,
 )
 from selfmotion.constraints.clearance import Clearance
 from selfmotion.constraints.ends import (
@@ -41,9 +43,11 @@ __all__ = [
     "JointPositionLimits",
     "JointTorqueLimits",
     "JointVelocityLimits",
+    "Linearised",
     "NodeTangents",
     "StartAcceleration",
     "StartVelocity",
     "ToolLimits",
     "easing_of",
+    "linearised",
 ]

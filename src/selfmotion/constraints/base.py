@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Protocol
 
-from selfmotion.basics import Array, Saved
+import numpy as np
+
+from selfmotion.basics import Array, Ints, Saved
 from selfmotion.certificate import Requirement
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
@@ -35,14 +37,34 @@ class NodeTangents:
     qd: Array
     sampling: Sampling
 
+    @property
+    def size(self) -> int:
+        """The number d of variables."""
+        return int(self.q.shape[2])
+
+    def along(self, p: Array) -> "NodeTangents":
+        """Return the tangents by one variable, the length along p (d,)."""
+        return NodeTangents((self.q @ p)[:, :, None], (self.qd @ p)[:, :, None], self.sampling)
+
+    def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
+        """Return the tangents of some of the joints at some of the nodes (k,), (k, d)."""
+        if order < 2:
+            return (self.q, self.qd)[order][nodes, joints]
+        rows = np.empty((len(nodes), self.size))
+        operator = self.sampling.node_differentiation(order - 1)
+        for joint in np.unique(joints):
+            own = joints == joint
+            rows[own] = operator[nodes[own]] @ self.qd[:, joint]
+        return rows
+
     def of_order(self, order: int) -> Array:
         """Return the tangents of q (0), q̇ (1), q̈ (2) or the jerk (3), (N + 1, n, d)."""
         return (self.q, self.qd)[order] if order < 2 else self._faster[order - 2]
 
     @cached_property
     def _faster(self) -> tuple[Array, Array]:
-        flat, here = self.qd.reshape(len(self.qd), -1), self.sampling.nodes
-        operators = (self.sampling.differentiation(order)[here] for order in (1, 2))
+        flat = self.qd.reshape(len(self.qd), -1)
+        operators = (self.sampling.node_differentiation(order) for order in (1, 2))
         first, second = ((operator @ flat).reshape(self.qd.shape) for operator in operators)
         return first, second
 
@@ -131,6 +153,60 @@ class BoundConstraint(Protocol):
 
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """Return what is wrong where h[row, column] is too large, with names and numbers."""
+
+
+class Linear(Protocol):
+    """How conditions change with the motion of the nodes, at one motion."""
+
+    def tangents_of(self, motion: NodeTangents) -> Array:
+        """Return what `BoundConstraint.tangents` does."""
+
+    def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
+        """Return its entries for some rows and columns of h, (k,) each: (k, d)."""
+
+
+class Linearised:
+    """The derivatives of a constraint's conditions at one motion, all of h in one row.
+
+    Parameters
+    ----------
+    shape : (int, int)
+        That of h.
+    known : Linear or (rows × columns, d)
+    """
+
+    def __init__(self, shape: tuple[int, int], known: Linear | Array) -> None:
+        self._shape, self._known = shape, known
+
+    @property
+    def count(self) -> int:
+        """Number C of conditions."""
+        return self._shape[0] * self._shape[1]
+
+    def along(self, p: Array, motion: NodeTangents) -> Array:
+        """Return the derivatives (C,) along p (d,), of which `motion` are the tangents."""
+        known = self._known
+        return known @ p if isinstance(known, np.ndarray) else known.tangents_of(motion).ravel()
+
+    def picked(self, motion: NodeTangents, which: Ints) -> Array:
+        """Return the rows (k, d) of some conditions (k,)."""
+        known = self._known
+        if isinstance(known, np.ndarray):
+            return known[which]
+        return known.picked(motion, *np.divmod(which, self._shape[1]))
+
+
+def linearised(bound: BoundConstraint, samples: Samples, motion: NodeTangents) -> Linearised:
+    """Return the derivatives of a constraint's conditions at a motion.
+
+    Those that its own ``linear(samples)`` computes as far as they are asked for, where it has one:
+    a `Linear`, with the shape of h. By default all `tangents`.
+    """
+    own = getattr(bound, "linear", None)
+    if own is not None:
+        return Linearised(*own(samples))
+    tangents = bound.tangents(samples, motion)
+    return Linearised(tangents.shape[:2], tangents.reshape(-1, motion.size))
 
 
 def easing_of(bound: BoundConstraint, column: int) -> tuple[float, str]:

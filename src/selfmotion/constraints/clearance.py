@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, as_number, shown
+from selfmotion.basics import Array, Ints, ProblemError, as_number, shown
 from selfmotion.certificate import KeepsApart
 from selfmotion.collision import (
     ClearanceModel,
@@ -172,7 +172,12 @@ class BoundClearance:
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
-        return self._clearances(samples).along(-motion.q / _METRE)
+        return _Pull(self._clearances(samples)).tangents_of(motion)
+
+    def linear(self, samples: Samples) -> tuple[tuple[int, int], "_Pull"]:
+        """See `linearised`."""
+        now = self._clearances(samples)
+        return (len(now.values), now.values.shape[1]), _Pull(now)
 
     def _clearances(self, samples: Samples) -> Clearances:
         """Return the distances at the nodes; those of the last motion are kept."""
@@ -194,6 +199,22 @@ class BoundClearance:
             f"'{first}' and '{second}' are {value * 1e3:.2f} mm apart at t = "
             f"{samples.sampling.node_times[row]:.3f} s, wanted {self.distance * 1e3:.2f} mm"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Pull:
+    """How clearances change with the motion."""
+
+    clearances: Clearances
+
+    def tangents_of(self, motion: NodeTangents) -> Array:
+        """See `Linear.tangents_of`."""
+        return self.clearances.along(-motion.q / _METRE)
+
+    def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
+        """See `Linear.picked`."""
+        slopes = self.clearances.slopes_at(rows, columns)
+        return np.asarray(np.einsum("kn,knd->kd", slopes, motion.q[rows])) / -_METRE
 
 
 # So far beyond the distance asked for, clearances begin to level off [m]: well outside of where

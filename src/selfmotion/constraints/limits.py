@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, as_flag, as_number, per_joint, read_only
+from selfmotion.basics import Array, Ints, ProblemError, as_flag, as_number, per_joint, read_only
 from selfmotion.certificate import LIMIT_NAMES, JointLimits
 from selfmotion.constraints.base import (
     Constraint,
@@ -287,8 +287,22 @@ class BoundLimits:
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
+        return self.tangents_of(motion)
+
+    def linear(self, samples: Samples) -> tuple[tuple[int, int], "BoundLimits"]:
+        """See `linearised`."""
+        return (len(samples.nodes), 2 * len(self.joints)), self
+
+    def tangents_of(self, motion: NodeTangents) -> Array:
+        """See `Linear.tangents_of`."""
         above = motion.of_order(self.order)[:, self.joints] / self.scale[:, None]
         return np.concatenate([above, -above], axis=1)
+
+    def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
+        """See `Linear.picked`."""
+        joints = columns % len(self.joints)
+        signed = np.where(columns < len(self.joints), 1.0, -1.0) / self.scale[joints]
+        return motion.picked(self.order, rows, self.joints[joints]) * signed[:, None]
 
     def easing(self, column: int) -> tuple[float, str]:
         """See `easing_of`: 2 % of a rate, on both sides; 0.01 rad or m of a position."""

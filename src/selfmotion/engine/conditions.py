@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array
-from selfmotion.constraints import BoundConstraint, NodeTangents, easing_of
+from selfmotion.basics import Array, Ints
+from selfmotion.constraints import BoundConstraint, Linearised, NodeTangents, easing_of, linearised
 from selfmotion.costs import Samples
 from selfmotion.motion import Grid
-from selfmotion.optimise import Residuals
+from selfmotion.optimise import Residuals, Rows
 from selfmotion.plans import Binding
 
 # A constraint whose violation, squared and integrated, is above this counts as much as ten times
@@ -30,6 +30,8 @@ class Conditions:
         self.constraints = tuple(constraints)
         steps = np.diff(grid.nodes)
         self._shares = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+        # Tolerances of all conditions, and which are equalities: the same for every motion.
+        self._kinds: tuple[Array, npt.NDArray[np.bool_]] | None = None
 
     def on(self, grid: Grid) -> "Conditions":
         """Return the same on another grid."""
@@ -38,19 +40,18 @@ class Conditions:
     def residuals(self, samples: Samples) -> Residuals:
         """Return h of all conditions, with their tolerances."""
         tables = [item.residual(samples).ravel() for item in self.constraints]
-        pairs = list(zip(self.constraints, tables, strict=True))
-        none = np.zeros(0)
-        return Residuals(
-            np.concatenate([none, *tables]),
-            np.concatenate([none, *(np.full(len(h), item.tolerance) for item, h in pairs)]),
-            np.concatenate([none, *(np.full(len(h), item.equality) for item, h in pairs)]) > 0.0,
-        )
+        if self._kinds is None:
+            counts = [len(table) for table in tables]
+            self._kinds = (
+                np.repeat(np.array([item.tolerance for item in self.constraints]), counts),
+                np.repeat(np.array([item.equality for item in self.constraints], bool), counts),
+            )
+        return Residuals(np.concatenate([np.zeros(0), *tables]), *self._kinds)
 
-    def rows(self, samples: Samples, motion: NodeTangents) -> Array:
-        """Return the derivatives of all conditions, (C, d)."""
-        size = motion.q.shape[2]
-        rows = [item.tangents(samples, motion).reshape(-1, size) for item in self.constraints]
-        return np.vstack([np.zeros((0, size)), *rows])
+    def rows(self, samples: Samples, motion: NodeTangents) -> Rows:
+        """Return the derivatives of all conditions."""
+        parts = [linearised(item, samples, motion) for item in self.constraints]
+        return _Stacked(parts, motion)
 
     @property
     def has_equalities(self) -> bool:
@@ -102,6 +103,29 @@ class Conditions:
                 text = item.describe(samples, int(row), int(column))
                 messages.append(f"{item.name}: {text}")
         return tuple(messages)
+
+
+class _Stacked:
+    """The rows of several constraints, one below the other."""
+
+    def __init__(self, parts: Sequence[Linearised], motion: NodeTangents) -> None:
+        self._parts, self._motion = parts, motion
+        self._ends = np.cumsum([part.count for part in parts], dtype=np.intp)
+
+    def along(self, p: Array) -> Array:
+        """See `Rows.along`."""
+        motion = self._motion.along(p)
+        return np.concatenate([np.zeros(0), *(part.along(p, motion) for part in self._parts)])
+
+    def picked(self, which: Ints) -> Array:
+        """See `Rows.picked`."""
+        rows = np.zeros((len(which), self._motion.size))
+        owner = np.searchsorted(self._ends, which, side="right")
+        for number in np.unique(owner):
+            own, part = owner == number, self._parts[number]
+            first = self._ends[number] - part.count
+            rows[own] = part.picked(self._motion, which[own] - first)
+        return rows
 
 
 def _spans(binds: npt.NDArray[np.bool_], times: Array) -> tuple[tuple[float, float], ...]:

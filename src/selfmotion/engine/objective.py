@@ -16,7 +16,7 @@ from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart, Start
 from selfmotion.engine.still import StillMotion
 from selfmotion.motion import Grid, NullMotion, NullMotionTable, Trajectory
-from selfmotion.optimise import Residuals
+from selfmotion.optimise import Residuals, Rows
 from selfmotion.path import PathSamples
 from selfmotion.plans import Problem
 
@@ -248,8 +248,8 @@ class Objective:
         """Return h at x, which inequalities ask to be ≤ 0 and equalities to be 0."""
         return self.constraints.residuals(self.samples(x))
 
-    def condition_rows(self, x: Array) -> Array:
-        """Return ∂h/∂x at x, (C, size)."""
+    def condition_rows(self, x: Array) -> Rows:
+        """Return ∂h/∂x of all conditions at x; it stays what it is when others are looked at."""
         tangents = self.node_tangents(x)
         return self.constraints.rows(self.samples(x), tangents)
 

@@ -12,7 +12,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.engine.objective import Objective
 from selfmotion.motion import BSplineNullMotion
-from selfmotion.optimise import Residuals, best_step
+from selfmotion.optimise import DenseRows, Residuals, ScaledRows, best_step
 
 # Intervals of the finest spline, and of coarser ones that it contains; coefficients beyond which
 # matrices would take longer than the rest of a plan.
@@ -48,7 +48,8 @@ class Remaining:
         self._gradient, self._metric = fine.gradient(x), fine.metric(x)
         none = Residuals(np.zeros(0), np.zeros(0), np.zeros(0, dtype=bool))
         self._at = fine.conditions(x) if bound else none
-        self._rows = fine.condition_rows(x) if bound else np.zeros((0, fine.size))
+        none_of_it = DenseRows(np.zeros((0, fine.size)))
+        self._rows = fine.condition_rows(x) if bound else none_of_it
 
     @cached_property
     def most(self) -> float:
@@ -69,7 +70,7 @@ class Remaining:
         reach = _REACH * float(np.linalg.norm(slope))
         if reach == 0.0:
             return 0.0
-        step = best_step(slope, bend, self._at, self._rows @ scale, reach)
+        step = best_step(slope, bend, self._at, ScaledRows(self._rows, scale), reach)
         return 0.0 if step.relaxed else max(step.gain, 0.0)
 
     def intervals(self, left: float) -> int:

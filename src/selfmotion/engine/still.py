@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -129,7 +130,11 @@ class StillMotion:
             return None
         if problem.robot.redundancy(problem.task) == 0:
             return np.zeros((len(t), problem.robot.dof, 0))
-        return TransportedFrame(self.grid.nodes, self.jacobians)(t)
+        return self._transported(t)
+
+    @cached_property
+    def _transported(self) -> TransportedFrame:
+        return TransportedFrame(self.grid.nodes, self.jacobians)
 
 
 def rough_still_motion(

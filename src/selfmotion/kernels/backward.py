@@ -225,15 +225,18 @@ def sensitivities(
                 space.by_epsilon,
                 space.by_target,
             )
-            for x in range(d):
-                slope = 0.0
-                for k in range(n):
-                    slope += space.by_epsilon[k] * epsilon_matrix[s, k, x]
-                    slope += space.by_q[k] * q_matrix[s, k, x]
-                if target_matrix is not None:
-                    for k in range(12):
-                        slope += space.by_target[k] * target_matrix[s, k, x]
-                qd_matrix[s, j, x] = slope
+            # Along x inside: neighbours in memory, several at once.
+            slope = qd_matrix[s, j]
+            slope[:] = 0.0
+            for k in range(n):
+                for x in range(d):
+                    slope[x] += space.by_epsilon[k] * epsilon_matrix[s, k, x]
+                for x in range(d):
+                    slope[x] += space.by_q[k] * q_matrix[s, k, x]
+            if target_matrix is not None:
+                for k in range(12):
+                    for x in range(d):
+                        slope[x] += space.by_target[k] * target_matrix[s, k, x]
         if s + 1 < count:
             step_matrix(q_matrix, qd_matrix, s, at.step[0])
 

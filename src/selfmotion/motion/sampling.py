@@ -61,6 +61,16 @@ class Sampling:
             self._operators[order] = _differentiation(self.node_times, self.t, order)
         return self._operators[order]
 
+    def node_differentiation(self, order: int) -> Any:
+        """Return the rows of `differentiation` for the nodes, sparse (N + 1, N + 1)."""
+        if order not in self._at_nodes:
+            self._at_nodes[order] = self.differentiation(order)[self.nodes]
+        return self._at_nodes[order]
+
+    @cached_property
+    def _at_nodes(self) -> dict[int, Any]:
+        return {}
+
     @cached_property
     def _operators(self) -> dict[int, Any]:
         return {}

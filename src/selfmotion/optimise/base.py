@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, read_only
+from selfmotion.optimise.rows import Rows
 
 
 class Function(Protocol):
@@ -64,8 +65,8 @@ class ConstrainedFunction(Function, Protocol):
     def conditions(self, x: Array) -> Residuals:
         """Return h(x), where F is finite."""
 
-    def condition_rows(self, x: Array) -> Array:
-        """Return ∂h/∂x, (C, size)."""
+    def condition_rows(self, x: Array) -> Rows:
+        """Return ∂h/∂x of C conditions."""
 
 
 class Status(Enum):

@@ -4,6 +4,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.optimise.base import Callback, ConstrainedFunction, Iteration, Residuals, Status
+from selfmotion.optimise.rows import pulled_back
 
 # The violation at the start weighs this many times the cost there.
 _WEIGHT = 10.0
@@ -41,15 +42,15 @@ class _Penalised:
         at = self._function.conditions(x)
         pull = self._weight * _excess(at) / at.tolerance
         rows = self._function.condition_rows(x)
-        return np.asarray(self._function.gradient(x) + pull @ rows)
+        return np.asarray(self._function.gradient(x) + pulled_back(rows, pull))
 
     def slope(self, x: Array, direction: Array) -> float:
         return float(self.gradient(x) @ direction)
 
     def metric(self, x: Array) -> Array:
         at = self._function.conditions(x)
-        violated = _excess(at) != 0.0
-        rows = self._function.condition_rows(x)[violated] / at.tolerance[violated, None]
+        violated = np.flatnonzero(_excess(at))
+        rows = self._function.condition_rows(x).picked(violated) / at.tolerance[violated, None]
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(self._function.metric(x) + self._weight * rows.T @ rows)
 

@@ -1,6 +1,6 @@
 """Sequential quadratic programming: the quasi-Newton method where conditions bind."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,13 +10,13 @@ from selfmotion.optimise.base import (
     ConstrainedFunction,
     Iteration,
     Minimum,
-    Residuals,
     Status,
     inverse_metric,
 )
 from selfmotion.optimise.derivative import is_misleading
 from selfmotion.optimise.penalty import IGNORED, ExactPenalty, Point
 from selfmotion.optimise.restoration import restored, scanned
+from selfmotion.optimise.rows import DenseRows, Rows, ScaledRows, pulled_back
 from selfmotion.optimise.step import Step, best_step
 from selfmotion.optimise.update import damped, renewed
 
@@ -127,7 +127,8 @@ class _Run:
         if here is None:
             raise ProblemError("optimiser: the cost or a condition at the start is not finite")
         self._here = self._best = self._begun = here
-        self._gradient, self._rows = np.zeros(len(x0)), np.zeros((len(here.at.h), len(x0)))
+        self._gradient = np.zeros(len(x0))
+        self._rows: Rows = DenseRows(np.zeros((len(here.at.h), len(x0))))
         self._multipliers = np.zeros(len(here.at.h))
         self._begin(np.eye(len(x0)))
 
@@ -287,7 +288,7 @@ class _Run:
         if there is None or ratio >= _POOR or not curved or spent or step.relaxed:
             return step.p, there, ratio
         # Second-order correction: the conditions as they are there, linear from there on.
-        shifted = Residuals(there.at.h - self._rows @ step.p, there.at.tolerance, there.at.equality)
+        shifted = replace(there.at, h=there.at.h - self._rows.along(step.p))
         p = best_step(self._gradient, hessian, shifted, self._rows, self._region).p
         corrected = self._reach(p)
         better = self._penalty.share(self._here, corrected, step)
@@ -299,14 +300,14 @@ class _Run:
         """Go there; return how H was renewed."""
         if there is None:
             raise RuntimeError("a step is taken only to where F is finite")
-        before = self._gradient + self._rows.T @ step.multipliers
+        before = self._gradient + pulled_back(self._rows, step.multipliers)
         self._go(there)
         self._derive()
         if step.relaxed:
             self._relaxed.append(there.at.worst)
         else:
             self._relaxed.clear()
-        y = self._gradient + self._rows.T @ step.multipliers - before
+        y = self._gradient + pulled_back(self._rows, step.multipliers) - before
         self._h, update = renewed(self._h, p, damped(y, p, hessian), "fletcher")
         if there.kept and self._is_far():
             self._model_anew()
@@ -337,11 +338,12 @@ class _Run:
     def _derive(self) -> None:
         x = self._here.x
         gradient, rows = self._function.gradient(x), self._function.condition_rows(x)
-        if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(rows))):
+        # What is not finite in a row is not so along any direction with parts of all variables.
+        if not np.all(np.isfinite(np.append(gradient, rows.along(np.ones(len(x)))))):
             raise ProblemError(
                 "optimiser: the cost and the conditions are finite, but a derivative is not"
             )
-        self._gradient, self._rows = self._scale.T @ gradient, rows @ self._scale
+        self._gradient, self._rows = self._scale.T @ gradient, ScaledRows(rows, self._scale)
 
     def _go(self, there: Point) -> None:
         self._here = there

@@ -37,7 +37,7 @@ def closed(objective: Objective, x: Array, inverse_hessian: Array) -> Array:
             break
         # A motion that hardly holds together has derivatives beyond all numbers.
         with np.errstate(over="ignore", invalid="ignore"):
-            rows = objective.condition_rows(x)[at.equality]
+            rows = objective.condition_rows(x).picked(np.flatnonzero(at.equality))
         if not np.all(np.isfinite(rows)):
             break
         spread = inverse_hessian @ rows.T

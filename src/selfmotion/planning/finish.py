@@ -43,7 +43,7 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
         try:
             progress("checking", 1, 1)
             finished = _check(problem, session, tolerance, part.ending)
-            rough = _rough(finished, session)
+            rough = _rough(problem, finished, session)
             roughs += rough
             # Where no evaluations are left, finer grids change nothing.
             spent = session.status is Status.MAX_EVALUATIONS or roughs > _ROUGH
@@ -69,10 +69,11 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
     return finished or _check(problem, session, tolerance, part.ending)
 
 
-def _rough(finished: Finished, session: Session) -> bool:
-    """Whether limits that are kept at the nodes are exceeded between them."""
+def _rough(problem: Problem, finished: Finished, session: Session) -> bool:
+    """Whether limits that were asked for and are kept at the nodes are exceeded between them."""
+    asked = {item.name for item in problem.requirements if item.name in LIMIT_NAMES}
     findings = finished.certificate.findings
-    beyond = any(not item.kept and item.requirement in LIMIT_NAMES for item in findings)
+    beyond = any(not item.kept and item.requirement in asked for item in findings)
     return beyond and finished.certificate.on_path and not session.violations
 
 

@@ -310,11 +310,9 @@ class _Run:
         """Go on to finer grids, also with what the best one is compared with; return its cost."""
         try:
             self._progress("finer grid", 1, 1)
-            best.refine_until_settled()
-            best.enrich()
+            best.settle()
             if rival is not None and rival is not best and not best.cut_short:
-                rival.refine_until_settled()
-                rival.enrich()
+                rival.settle()
                 if rival.cut_short:
                     best.end(rival.status)
                 violated, cost = rival.score()

@@ -24,8 +24,11 @@ from selfmotion.planning.effort import Effort
 from selfmotion.planning.warm_start import coefficients_of
 from selfmotion.plans import Binding, Plan, Problem
 
-# Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands.
-_COST_AGREEMENT = 1e-4
+# Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands; and at
+# which it tells what null motion is wanted.
+_COST_AGREEMENT, _ROUGH_AGREEMENT = 1e-4, 1e-2
+# While a null motion is chosen, this share of the steps that it should have will do.
+_THINNER = 2
 # A cost that rises this much on two grids in turn has no limit.
 _RISE, _RISES = 1.5, 2
 # What would save less than this share of the cost does not bind.
@@ -227,56 +230,78 @@ class Session:
                 session.minimize()
             yield session
 
-    def refine_until_settled(self) -> None:
-        """Optimise on halved grids until the cost agrees."""
-        rises = 0
+    def settle(self) -> None:
+        """Optimise until finer grids and more freedom of the null motion save nothing.
+
+        What freedom is wanted is found on a coarse grid, where it costs little.
+        """
+        error = self._refine_until(_ROUGH_AGREEMENT)
+        coarse = self._cost()
+        enriched = self._enriched()
+        if enriched or error > _COST_AGREEMENT:
+            self._refine_until(_COST_AGREEMENT)
+        if enriched or abs(self._cost() - coarse) > _ROUGH_AGREEMENT * abs(coarse):
+            while self._enriched():
+                self._refine_until(_COST_AGREEMENT)
+
+    def _refine_until(self, agreement: float) -> float:
+        """Optimise on halved grids until the cost agrees with that of the one before.
+
+        Return how well it does, as a share of the cost; 0 where no finer grid would help.
+        """
+        rises, error = 0, 0.0
         for _ in range(MOST_HALVINGS):
             if self.status in (*_CUT_SHORT, *_ADRIFT):
-                return
+                return 0.0
             unmet, before = self.score()
             self.refine()
             after = self._cost()
-            error = abs(after - before)
+            error = abs(after - before) / max(abs(before), np.finfo(float).tiny)
             # A cost that grows and grows, and what two grids in turn could not meet: the path runs
             # past the edge of the workspace between their nodes, or limits are too tight.
             rises = rises + 1 if after > _RISE * abs(before) else 0
             if rises == _RISES:
-                return
+                return 0.0
             self.minimize()
-            if error <= _COST_AGREEMENT * abs(before) or (unmet and self.violations):
-                return
+            if unmet and self.violations:
+                return 0.0
+            if error <= agreement:
+                break
+        return error
 
     def refine(self) -> None:
         """Go on with half the step length."""
         self._objective = self._on(self._objective.grid.halved())
         self._close()
 
-    def enrich(self) -> None:
-        """Give the null motion more freedom as long as that pays, and say what is left."""
+    def _enriched(self) -> bool:
+        """Give the null motion more freedom if that pays, and know what is left; return whether."""
+        if self.violations or self.status in (*_CUT_SHORT, *_ADRIFT):
+            return False
         wanted = self._still.problem.null_motion
-        while not (self.violations or self.status in (*_CUT_SHORT, *_ADRIFT)):
-            left = self._left()
-            self.remaining = left.most
-            enough = wanted.gain * abs(self._cost())
-            if self.remaining <= enough:
-                return
-            rows = self._objective.null_motion.rows
-            rests = any(self._still.problem.rests)
-            finer = wanted.finer(left.intervals(0.5 * enough), rows, rests)
-            if finer in (wanted, self.null_motion):
-                return
-            self._change(finer)
-            self.minimize()
-            self.refine_until_settled()
+        left = self._left()
+        self.remaining = left.most
+        enough = wanted.gain * abs(self._cost())
+        if self.remaining <= enough:
+            return False
+        rows = self._objective.null_motion.rows
+        rests = any(self._still.problem.rests)
+        finer = wanted.finer(left.intervals(0.5 * enough), rows, rests)
+        if finer in (wanted, self.null_motion):
+            return False
+        self._change(finer)
+        self.minimize()
+        return True
 
     def _left(self) -> Remaining:
         """Return what is left to save around the present motion."""
-        objective = self._objective
-        z, x, c = objective.parts(self._x)
-        around = objective.null_motion.epsilon(x)
         problem = self._still.problem
         spline = finest(problem.robot.redundancy(problem.task))
-        fine = self._on(objective.grid, spline, around)
+        grid = self._objective.grid.with_steps(spline.fewest_steps // _THINNER)
+        objective = self._on(grid)
+        z, x, c = objective.parts(self._x)
+        around = objective.null_motion.epsilon(x)
+        fine = self._on(grid, spline, around)
         none = np.zeros(fine.null_motion.size)
         return Remaining(fine, np.concatenate([z, none, c]), bound=self._bound)
 
@@ -284,11 +309,12 @@ class Session:
         """Go on with another null motion that can be what the present one is."""
         before = self._objective
         z, x, c = before.parts(self._x)
-        t, duration = before.grid.stage_times, self._still.problem.path.duration
+        grid = before.grid.with_steps(motion.fewest_steps // _THINNER)
+        t, duration = grid.stage_times, self._still.problem.path.duration
         own, new = (kind.functions(t, duration) for kind in (self.null_motion, motion))
         same = np.linalg.lstsq(new, own)[0]
         rows = x.reshape(before.null_motion.rows, -1) @ same.T
-        moved = np.concatenate([z, rows.ravel(), c]), self._on(before.grid, motion)
+        moved = np.concatenate([z, rows.ravel(), c]), self._on(grid, motion)
         # At once: an interruption finds what belongs together.
         self._x, self._objective, self.null_motion, self._minimum = *moved, motion, None
 
