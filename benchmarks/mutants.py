@@ -104,13 +104,17 @@ PARTS = (
     Part(
         "optimiser",
         ("optimise/*.py",),
-        ("test_optimiser_parts.py", "test_quasi_newton.py", "test_sqp.py"),
+        (
+            *("test_optimiser_parts.py", "test_known_problems.py"),
+            *("test_quasi_newton.py", "test_sqp.py"),
+        ),
     ),
     Part(
         "certificate",
         ("certificate/*.py",),
         (
             "test_certificate_parts.py",
+            "test_torques.py -k 'judged or whole_turns'",
             "test_verdicts.py -k 'not threads'",
             "test_clearance_proof.py -k 'not default'",
         ),

@@ -12,13 +12,13 @@ import selfmotion as sm
 from conftest import PANDA_HOME, robot_named
 from selfmotion.basics.arrays import Array
 from selfmotion.certificate import AtRest, ClosedMotion, EndState, JointLimits
-from selfmotion.certificate.apart import KeepsApart, closest_at_all_times
+from selfmotion.certificate.apart import Approach, KeepsApart, _nearer, closest_at_all_times
 from selfmotion.certificate.band import CoordinateBand
 from selfmotion.certificate.check import _because, _damped_stretches, _undecided
 from selfmotion.certificate.deviation import _turns, deviation_from, deviation_size, excess
 from selfmotion.certificate.findings import Extreme
 from selfmotion.certificate.interpolation import stencil
-from selfmotion.certificate.path_error import _larger, bound_errors
+from selfmotion.certificate.path_error import _TRAVEL, _edges, _larger, bound_errors
 from selfmotion.certificate.shares import largest_share, too_far
 from selfmotion.certificate.tool import ToolMotion
 from selfmotion.collision import Closest
@@ -152,6 +152,20 @@ def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:
     assert check(1.0).samples == 9
 
 
+@pytest.mark.parametrize("row", range(6))
+def test_errors_of_every_row_count(row: int) -> None:
+    """A tool at rest, and a path that is a constant bit beside it, or turned."""
+    robot, size = robot_named("panda"), 1e-4
+    q = robot.dexterous_configuration("pose")
+    beside = robot.pose(q) * pin.exp6(pin.Motion(size * np.eye(6)[row]))
+    path = sm.Waypoints.from_poses([0.0, 1.0], [beside, beside])
+    trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
+    found = bound_errors(robot, path, sm.Task.POSE, trajectory, sm.Tolerance(1.0, 1.0), ())
+    expected = [size, 0.0] if row < 3 else [0.0, size]
+    errors = [found.position.value, found.rotation.value]
+    np.testing.assert_allclose(errors, expected, atol=1e-3 * size)
+
+
 def test_where_a_path_bends_sharply_a_short_interval_stays_undecided() -> None:
     """Its error peaks at the tolerance in a corner that nothing announces: halved twelve times."""
     robot = robot_named("planar_3r")
@@ -174,6 +188,36 @@ def test_where_a_path_bends_sharply_a_short_interval_stays_undecided() -> None:
     assert start <= 1.0 / 3.0 <= end
     assert end - start == pytest.approx(2.0**-12)
     assert 1e-4 < found.position.value < 1.001e-4
+
+
+@pytest.mark.parametrize("turn", [0.1, 7.0, -60.0])
+def test_intervals_are_cut_where_a_joint_goes_far(turn: float) -> None:
+    robot = robot_named("planar_3r")
+    q = np.zeros((3, 3))
+    q[1:, 2] = turn
+    trajectory = sm.Trajectory([0.0, 0.5, 1.0], q, np.zeros((3, 3)), robot.joint_names)
+    pose = robot.pose(q[0])
+    edges = _edges(sm.Waypoints.from_poses([0.0, 1.0], [pose, pose]), trajectory, ())
+    fine = np.linspace(0.0, 1.0, 20001)
+    way = np.append(0.0, np.cumsum(np.abs(np.diff(trajectory(fine)[:, 2]))))
+    travel = np.diff(np.interp(edges, fine, way))
+    # The way is spread evenly over the pieces of an interval, as its mean speed is not.
+    assert travel.max() <= 2.0 * _TRAVEL
+    assert {0.0, 0.5, 1.0} <= set(edges)
+    assert np.all(np.diff(edges) > 0.0)
+    # Where nothing moves nothing is cut.
+    assert np.count_nonzero(edges > 0.5) == 1
+
+
+def test_a_distance_that_is_only_a_bound_is_no_approach() -> None:
+    model: Any = SimpleNamespace(pairs=(("a", "b"), ("c", "d")))
+    before = Approach(Closest(1.0, "a", "b"), 0.2)
+    t, values = np.array([0.3, 0.4]), np.array([[0.9, 0.5], [0.5, 0.7]])
+    for bound in (0.5, 0.4):
+        assert _nearer(before, model, t, values, np.full((2, 2), bound)) is before
+    found = _nearer(before, model, t, values, np.array([[1.0, 0.5], [0.5, 1.0]]))
+    assert (found.closest.value, found.time) == (0.7, 0.4)
+    assert (found.closest.first, found.closest.second) == ("c", "d")
 
 
 @pytest.mark.parametrize(("intervals", "each"), [(4096, 8), (4097, 4)])

@@ -308,6 +308,95 @@ def test_a_restoration_ends_near_the_conditions_and_tells_f_alone(equalities: in
         assert step.cost == pytest.approx(function.value(step.x))
 
 
+def test_restorations_are_the_same_in_other_variables() -> None:
+    """Steps are damped in the metric of F: x = S y changes where they are written, not where to."""
+    g = np.diag([1.0, 30.0, 0.1])
+    scale = np.array([[2.0, 0.3, 0.0], [0.0, 0.05, 0.1], [0.5, 0.0, 9.0]])
+
+    def problem(s: Array) -> Constrained:
+        function = Constrained(
+            lambda y: 0.5 * float(s @ y @ g @ s @ y) + 1.0,
+            lambda y: s.T @ g @ s @ y,
+            lambda y: np.array([9.0 - (s @ y) @ (s @ y), 2.0 - np.sum(np.sin(s @ y))]),
+            lambda y: np.array([-2.0 * s @ y, -np.cos(s @ y)]) @ s,
+        )
+        function.metric = lambda y: s.T @ g @ s  # type: ignore[method-assign]
+        return function
+
+    start, none = np.array([0.3, -0.1, 0.2]), np.eye(3)
+    x, _ = restored(problem(none), start, 1.0, np.inf, lambda step: None)
+    y, _ = restored(problem(scale), np.linalg.solve(scale, start), 1.0, np.inf, lambda step: None)
+    assert np.linalg.norm(x - start) > 1.0
+    np.testing.assert_allclose(scale @ y, x, rtol=1e-5)
+
+
+@pytest.mark.parametrize("spoiled", ["gradient", "metric"])
+def test_a_restoration_goes_nowhere_without_derivatives(spoiled: str) -> None:
+    function, start = bowl(), np.array([-1.0, 2.0])
+    whole = getattr(function, spoiled)
+    setattr(function, spoiled, lambda x: np.full_like(whole(x), np.nan))
+    with np.errstate(invalid="ignore"):
+        x, status = restored(function, start, 1.0, np.inf, lambda step: None)
+    assert status is None
+    np.testing.assert_array_equal(x, start)
+
+
+def hopeless() -> tuple[Constrained, list[Array]]:
+    """Return ½ xᵀGx + 1 where 1 ≤ 0 is asked for, and where it is looked at."""
+    seen: list[Array] = []
+    basis = np.linalg.qr(np.random.default_rng(3).normal(size=(5, 5)))[0]
+    g = (basis * [0.5, 20.0, 0.05, 4.0, 60.0]) @ basis.T
+
+    def value(x: Array) -> float:
+        seen.append(x.copy())
+        return 0.5 * float(x @ g @ x) + 1.0
+
+    function = Constrained(value, lambda x: g @ x, lambda x: np.ones(1), lambda x: np.zeros((1, 5)))
+    function.metric = lambda x: g  # type: ignore[method-assign]
+    return function, seen
+
+
+def test_steps_of_a_scan_lead_along_the_flattest_directions() -> None:
+    """Both ways, by one, two and three times what would double a quadratic cost."""
+    function, seen = hopeless()
+    start = np.array([0.1, 0.2, -0.1, 0.3, 0.1])
+    f = function.value(start)
+    values, vectors = np.linalg.eigh(function.metric(start))
+    found = SequentialQuadratic().minimize(function, start)
+    assert found.status is Status.INFEASIBLE
+    expected = [
+        start + k * np.sqrt(2.0 * f / values[axis]) * vectors[:, axis]
+        for axis in range(3)
+        for k in (1, -1, 2, -2, 3, -3)
+    ]
+    far = np.linalg.norm(seen - start, axis=1) > 0.5
+    points = np.array(seen)[far]
+    for point in expected:
+        assert np.abs(points - point).max(axis=1).min() < 1e-6 * np.linalg.norm(point)
+    steep = vectors[:, 3:]
+    assert np.abs((points - start) @ steep).max() < 1.0
+
+
+@pytest.mark.parametrize(("kept", "weights"), [(1.0, [1.0, 10.0]), (0.5, [1.0, 10.0, 100.0])])
+def test_restorations_go_on_as_long_as_they_help(
+    kept: float, weights: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ten times as stiff each time, and not after one that left the violation where it was."""
+    asked: list[float] = []
+    function, _ = hopeless()
+    share = np.ones(1)
+    function._h = lambda x: share.copy()
+
+    def restoring(function, x, weight, limit, note):
+        asked.append(weight)
+        share[0] *= kept
+        return x + 1e-3, None
+
+    monkeypatch.setattr("selfmotion.optimise.sqp.restored", restoring)
+    SequentialQuadratic().minimize(function, np.full(5, 0.1))
+    assert asked == weights
+
+
 @pytest.mark.parametrize("limit", [1, 2])
 def test_a_restoration_ends_with_the_evaluations(limit: int) -> None:
     function = bowl()

@@ -131,12 +131,12 @@ class Rollout:
             for _ in range(_POLISHING_STEPS):
                 if self._advance(self._node_table, node.q, 1.0) is not None:
                     break
-                node.q[0] += node.qd[0]
-                if np.abs(node.qd[0]).max() < _POLISHED:
+                node.q[:] += node.qd
+                if np.abs(node.qd).max() < _POLISHED:
                     break
-            node.target_twist[0], node.epsilon[0] = run.target_twist[stage], run.epsilon[stage]
+            node.target_twist[:], node.epsilon[:] = run.target_twist[stage], run.epsilon[stage]
             if self._advance(self._node_table, node.q, 0.0) is None:
-                q[i], qd[i] = node.q[0], node.qd[0]
+                q[i], qd[i] = node.q, node.qd
         self.jacobian_evaluations += len(here)
         return self.grid.nodes, q, qd
 
