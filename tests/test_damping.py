@@ -208,10 +208,13 @@ def test_a_damped_plan_is_exact_before_and_smooth_throughout(overreach: sm.Plan)
     early = np.linspace(0.0, stretch.start - 0.01, 400)
     misses = [overreach.task.miss(path.pose(t), robot.pose(motion(t)))[0] for t in early]
     assert max(misses) < 1e-6
-    # Where q jumped, the speed between two samples would not be near those at them.
+    # Where q jumped, the speed between two samples would not be near those at them: of a smooth
+    # motion it differs by a quarter of what it does over twice the time.
     middle = motion(0.5 * (motion.t[1:] + motion.t[:-1]), order=1)
     bends = np.abs(middle - 0.5 * (motion.qd[1:] + motion.qd[:-1])).max()
-    assert bends < 1e-3 * np.abs(motion.qd).max()
+    wider = np.abs(motion.qd[1:-1] - 0.5 * (motion.qd[2:] + motion.qd[:-2])).max()
+    assert bends < 0.35 * wider
+    assert wider < 0.01 * np.abs(motion.qd).max()
 
 
 def test_a_damped_plan_survives_the_disk(overreach: sm.Plan, tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Progress
-from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
+from selfmotion.certificate import Certificate, KeepsApart, Tolerance
 from selfmotion.engine import MOST_HALVINGS, Evaluation
 from selfmotion.motion import Trajectory
 from selfmotion.optimise import Status
@@ -70,8 +70,11 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
 
 
 def _rough(problem: Problem, finished: Finished, session: Session) -> bool:
-    """Whether limits that were asked for and are kept at the nodes are exceeded between them."""
-    asked = {item.name for item in problem.requirements if item.name in LIMIT_NAMES}
+    """Whether what was asked for and is kept at the nodes is not so between them.
+
+    Distances aside: while optimising, bodies are their hulls.
+    """
+    asked = {item.name for item in problem.requirements if not isinstance(item, KeepsApart)}
     findings = finished.certificate.findings
     beyond = any(not item.kept and item.requirement in asked for item in findings)
     return beyond and finished.certificate.on_path and not session.violations
