@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Progress
-from selfmotion.certificate import Certificate, KeepsApart, Tolerance
+from selfmotion.certificate import LIMIT_NAMES, Certificate, KeepsApart, Tolerance
 from selfmotion.engine import MOST_HALVINGS, Evaluation
 from selfmotion.motion import Trajectory
 from selfmotion.optimise import Status
@@ -74,10 +74,16 @@ def _rough(problem: Problem, finished: Finished, session: Session) -> bool:
 
     Distances aside: while optimising, bodies are their hulls.
     """
+    if session.violations or not finished.certificate.on_path:
+        return False
     asked = {item.name for item in problem.requirements if not isinstance(item, KeepsApart)}
-    findings = finished.certificate.findings
-    beyond = any(not item.kept and item.requirement in asked for item in findings)
-    return beyond and finished.certificate.on_path and not session.violations
+    nodes = finished.motion.trajectory.t
+    # Rates are judged on both sides of a node; anything else that is wrong there stays so.
+    return any(
+        item.requirement in LIMIT_NAMES or item.time not in nodes
+        for item in finished.certificate.findings
+        if not item.kept and item.requirement in asked
+    )
 
 
 def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tolerance) -> bool:
