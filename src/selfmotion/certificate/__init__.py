@@ -6,6 +6,7 @@ from selfmotion.certificate.check import certify
 from selfmotion.certificate.ends import QUANTITIES, AtRest, ClosedMotion, EndState
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import LIMIT_NAMES, JointLimits, arm_limits
+from selfmotion.certificate.path_error import errors_between
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.certificate.tool import TOOL_RATES, ToolMotion, tool_sizes
 from selfmotion.certificate.torques import JointTorques
@@ -32,5 +33,6 @@ __all__ = [
     "ToolMotion",
     "arm_limits",
     "certify",
+    "errors_between",
     "tool_sizes",
 ]

@@ -105,6 +105,20 @@ def bound_errors(
     return PathCheck(extremes[0], extremes[1], extremes[2:], gaps, samples + 1)
 
 
+def errors_between(
+    robot: RobotModel,
+    path: Path,
+    task: Task,
+    trajectory: Trajectory,
+    relaxations: Sequence[Relaxation],
+) -> Array:
+    """Return the errors in the middle between samples, (N, 2) [m, rad]: for planners, no proof."""
+    t = 0.5 * (trajectory.t[:-1] + trajectory.t[1:])
+    in_tool_axes = any(item.in_tool_axes for item in relaxations)
+    miss = deviation_from(robot, path, task, t, trajectory(t), in_tool_axes)
+    return np.asarray(_quantities(miss[:, None], t[:, None], path.duration, relaxations)[:, 0, :2])
+
+
 def _check_times(path: Path, trajectory: Trajectory) -> None:
     """Refuse a motion that begins before or after its path: a part of one would not be judged."""
     first = float(trajectory.t[0])

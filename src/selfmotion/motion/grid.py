@@ -36,12 +36,11 @@ class Grid:
         ]
         return cls(read_only(np.append(np.concatenate(pieces), knots[-1])))
 
-    def halved(self) -> "Grid":
-        """Return the grid with every step cut in two."""
+    def halved(self, where: npt.NDArray[np.bool_] | None = None) -> "Grid":
+        """Return the grid with every step cut in two, or those `where` (N,) says so."""
         middles = 0.5 * (self.nodes[:-1] + self.nodes[1:])
-        nodes = np.empty(2 * len(self.nodes) - 1)
-        nodes[0::2], nodes[1::2] = self.nodes, middles
-        return Grid(read_only(nodes))
+        cut = middles if where is None else middles[where]
+        return Grid(read_only(np.sort(np.concatenate([self.nodes, cut]))))
 
     def with_steps(self, fewest: int) -> "Grid":
         """Return the grid halved until it has so many steps."""

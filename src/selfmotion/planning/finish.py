@@ -13,6 +13,9 @@ from selfmotion.planning.largest_part import Part
 from selfmotion.planning.session import Session
 from selfmotion.plans import Problem
 
+# Between its nodes a motion may be off the path by this share of the tolerance where that is looked
+# at, in the middle; and by this share of what it was before steps were halved.
+_RESOLVED, _FALLS = 0.5, 0.7
 # Limits that are exceeded between the nodes on more grids than this are so on any.
 _ROUGH = 3
 
@@ -69,6 +72,22 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
     return finished or _check(problem, session, tolerance, part.ending)
 
 
+def _resolved(problem: Problem, session: Session, tolerance: Tolerance) -> Evaluation:
+    """Return the motion, steps halved between whose nodes the tool was off the path."""
+    allowed, before = np.array([tolerance.position, tolerance.rotation]), np.inf
+    motion = session.motion()
+    for _ in range(MOST_HALVINGS):
+        errors = problem.errors_between(motion.trajectory) / allowed
+        worst = float(errors.max())
+        # Written so that NaN is no progress. Damping's error is not that of the steps.
+        if motion.damped or worst <= _RESOLVED or not worst < _FALLS * before:
+            break
+        before = worst
+        session.refine((errors > _RESOLVED).any(axis=1))
+        motion = session.motion()
+    return motion
+
+
 def _rough(problem: Problem, finished: Finished, session: Session) -> bool:
     """Whether what was asked for and is kept at the nodes is not so between them.
 
@@ -96,6 +115,6 @@ def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tol
 
 
 def _check(problem: Problem, session: Session, tolerance: Tolerance, ending: str) -> Finished:
-    motion = session.motion()
+    motion = _resolved(problem, session, tolerance)
     certificate = problem.certify(motion.trajectory, tolerance, ending)
     return Finished(motion, session.still_motion(), certificate)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+import numpy.typing as npt
 
 from selfmotion.basics import Array
 from selfmotion.engine import (
@@ -224,8 +225,6 @@ class Session:
             session.history = self.history
             session.minimize()
             if wanted.gain == np.inf and not (session.violations or session.cut_short):
-                while session._objective.grid.steps < wanted.fewest_steps:
-                    session.refine()
                 session._change(wanted)
                 session.minimize()
             yield session
@@ -269,9 +268,9 @@ class Session:
                 break
         return error
 
-    def refine(self) -> None:
-        """Go on with half the step length."""
-        self._objective = self._on(self._objective.grid.halved())
+    def refine(self, where: npt.NDArray[np.bool_] | None = None) -> None:
+        """Go on with half the step length, everywhere or for some of the steps (N,)."""
+        self._objective = self._on(self._objective.grid.halved(where))
         self._close()
 
     def _enriched(self) -> bool:

@@ -18,7 +18,15 @@ from selfmotion.basics import (
     read_only,
     shown,
 )
-from selfmotion.certificate import AtRest, Certificate, Requirement, Tolerance, arm_limits, certify
+from selfmotion.certificate import (
+    AtRest,
+    Certificate,
+    Requirement,
+    Tolerance,
+    arm_limits,
+    certify,
+    errors_between,
+)
 from selfmotion.constraints import (
     BoundConstraint,
     Clearance,
@@ -291,6 +299,10 @@ class Problem:
             damping=self.damping_law,
             ending=ending,
         )
+
+    def errors_between(self, trajectory: Trajectory) -> Array:
+        """Return the errors of a motion in the middle between samples, (N, 2) [m, rad]."""
+        return errors_between(self.robot, self.path, self.task, trajectory, self.relaxations)
 
     @cached_property
     def knots(self) -> Array:

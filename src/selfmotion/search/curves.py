@@ -213,30 +213,11 @@ class SelfMotion:
 
     def _walk(self, start: Array, tangent: Array, target: Array) -> tuple[Array, bool]:
         """Return the samples (K, n) from `start` on, and whether they lead back to it."""
-        jacobian_at, trace, rows, kind = self._tool.at, kernels.trace, self._rows, self._kind
-        rotation, translation = self._tool.rotation, self._tool.translation
-        revolute = self.revolute
-        samples = np.empty((_MOST_SAMPLES, self.robot.dof))
-        samples[0] = start
-        tangents = np.array([tangent, tangent, tangent])
-        state = np.array([self.spacing, 0.0, 1.0, self.spacing])
-        q, code = start + self.spacing * tangent, kernels.GOING
-        while code == kernels.GOING:
-            jacobian = jacobian_at(q)
-            code = trace(
-                q,
-                jacobian,
-                rotation,
-                translation,
-                target,
-                rows,
-                kind,
-                revolute,
-                samples,
-                tangents,
-                state,
-            )
-        return samples[: int(state[2])].copy(), code == kernels.CLOSED
+        samples, on = np.empty((_MOST_SAMPLES, self.robot.dof)), self._manifold
+        count, closed = kernels.walk(
+            start, tangent, target, *on.chain, *on.rows, self.spacing, samples
+        )
+        return samples[:count].copy(), closed
 
 
 def targets(path: Path, t: Array) -> Array:

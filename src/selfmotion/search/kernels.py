@@ -19,7 +19,7 @@ from selfmotion.robot import compose, placements
 
 Mask = npt.NDArray[np.bool_]
 
-# What `trace` says of a curve.
+# What is known of a curve on the way.
 GOING, CLOSED, ENDED = 0, 1, 2
 
 # A Newton correction of this size [rad or m] leaves an error of its square.
@@ -92,7 +92,56 @@ def correct(
 
 
 @kernel
-def trace(
+def walk(
+    start: Array,
+    tangent: Array,
+    target: Array,
+    rotations: Array,
+    positions: Array,
+    axes: Array,
+    is_revolute: Mask,
+    tool_rotation: Array,
+    tool_position: Array,
+    rows: Rows,
+    angle_kind: int,
+    spacing: float,
+    samples: Array,
+) -> tuple[int, bool]:
+    """Follow a self-motion curve from `start` (n,) along `tangent`.
+
+    Sets `samples` (K, n); returns how many there are, and whether they lead back to the start. The
+    chain is that of `project_all`.
+    """
+    n = len(start)
+    r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    rotation, position, jacobian = np.empty((3, 3)), np.empty(3), np.zeros((6, n))
+    tangents, q = np.empty((3, n)), np.empty(n)
+    for k in range(n):
+        samples[0, k], q[k] = start[k], start[k] + spacing * tangent[k]
+        tangents[:, k] = tangent[k]
+    state, code = np.array([spacing, 0.0, 1.0, spacing]), GOING
+    while code == GOING:
+        placements(q, rotations, positions, axes, is_revolute, r, p)
+        compose(r[n], p[n], tool_rotation, tool_position, rotation, position)
+        _jacobian(r, p, axes, is_revolute, position, jacobian)
+        code = _advance(
+            q,
+            jacobian,
+            rotation,
+            position,
+            target,
+            rows,
+            angle_kind,
+            is_revolute,
+            samples,
+            tangents,
+            state,
+        )
+    return int(state[2]), code == CLOSED
+
+
+@kernel
+def _advance(
     q: Array,
     frame_jacobian: Array,
     rotation: Array,
@@ -279,6 +328,35 @@ def near_pairs(
                 first[count], second[count] = i, j
                 count += 1
     return first[:count].copy(), second[:count].copy()
+
+
+@kernel
+def spread_out(q: Array, apart: Array, most: int) -> Rows:
+    """Return the rows of q (K, n) to keep, at most so many: the earlier ones of near ones.
+
+    First those farther from all kept ones in some coordinate than apart[0], then apart[1], ….
+    """
+    n, many = q.shape[1], len(q)
+    kept, count = np.empty(min(most, many), dtype=np.intp), 0
+    taken = np.zeros(many, dtype=np.bool_)
+    for distance in apart:
+        for k in range(many):
+            if taken[k] or count == len(kept):
+                continue
+            alone = True
+            for other in range(count):
+                far = False
+                for i in range(n):
+                    if abs(q[k, i] - q[kept[other], i]) > distance:
+                        far = True
+                        break
+                if not far:
+                    alone = False
+                    break
+            if alone:
+                taken[k], kept[count] = True, k
+                count += 1
+    return kept[:count]
 
 
 @kernel

@@ -30,6 +30,10 @@ class Manifold:
     Attributes
     ----------
     revolute : (n,)
+    chain : tuple
+        What compiled kinematics need: `RobotModel.joint_places` and the tool's place.
+    rows : tuple
+        The task's rows, and how they measure angles.
 
     Raises
     ------
@@ -43,8 +47,8 @@ class Manifold:
         places = robot.joint_places()
         self.revolute: npt.NDArray[np.bool_] = places[3]
         tool = robot.model.frames[robot.tool_id].placement
-        self._chain = (*places, np.array(tool.rotation), np.array(tool.translation))
-        self._rows = (task.rows, angle_kind(task.rows, task.tool_axes))
+        self.chain = (*places, np.array(tool.rotation), np.array(tool.translation))
+        self.rows = (task.rows, angle_kind(task.rows, task.tool_axes))
         self._check()
 
     def project(
@@ -64,7 +68,7 @@ class Manifold:
         wanted = np.ascontiguousarray(np.broadcast_to(target, (len(q), 12)))
         steps = _FAR_STEPS if far else _NEAR_STEPS
         kernels.project_all(
-            found, wanted, *self._chain, *self._rows, *self._limits, _LONGEST, steps, arrived
+            found, wanted, *self.chain, *self.rows, *self._limits, _LONGEST, steps, arrived
         )
         return found, arrived
 
@@ -75,7 +79,7 @@ class Manifold:
     def _check(self) -> None:
         lower, upper = self.robot.finite_limits()
         for q in np.random.default_rng(0).uniform(lower, upper, (3, self.robot.dof)):
-            rotation, position = kernels.tool_place(q, *self._chain)
+            rotation, position = kernels.tool_place(q, *self.chain)
             pose = self.robot.pose(q)
             miss = max(
                 np.abs(rotation - pose.rotation).max(), np.abs(position - pose.translation).max()

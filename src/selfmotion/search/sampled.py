@@ -9,6 +9,7 @@ from selfmotion.basics import Array, NoSequenceError, Progress, silent
 from selfmotion.collision import CollisionModel
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
+from selfmotion.search import kernels
 from selfmotion.search.chains import best_chains, diverse_chains
 from selfmotion.search.curves import targets
 from selfmotion.search.manifold import Manifold
@@ -227,18 +228,8 @@ def _smooth_motions(
 
 def _spread_out(q: Array, cost: Array, count: int) -> Array:
     """Return up to `count` of q (K, n), far from each other first, the cheaper of near ones."""
-    left, kept = q[np.argsort(cost, kind="stable")], np.empty((0, q.shape[1]))
-    for apart in _APART:
-        chosen = np.zeros(len(left), dtype=bool)
-        far = np.ones(len(left), dtype=bool)
-        for other in kept:
-            far &= np.abs(left - other).max(axis=1) > apart
-        for k in range(len(left)):
-            if far[k] and len(kept) + chosen.sum() < count:
-                chosen[k] = True
-                far &= np.abs(left - left[k]).max(axis=1) > apart
-        kept, left = np.concatenate([kept, left[chosen]]), left[~chosen]
-    return kept
+    ranked = np.ascontiguousarray(q[np.argsort(cost, kind="stable")])
+    return np.asarray(ranked[kernels.spread_out(ranked, np.array(_APART), count)])
 
 
 def _sorted(q: Array) -> Array:
