@@ -138,7 +138,7 @@ def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:
         assert 1e-4 - 1e-9 <= found.position.value <= 1.03e-4
         assert found.position.time == pytest.approx(0.8, abs=0.05)
         assert found.position.name == "tool"
-        assert (found.rotation.value, found.undecided) == (0.0, ())
+        assert (found.rotation.value, found.rotation.time, found.undecided) == (0.0, 0.0, ())
     settled = check(1.001e-4)
     assert settled.position.value <= 1.001e-4
     within = check(5.05e-5, sm.Relaxation("y", 5e-5, during=(0.5, 1.0)))
@@ -207,6 +207,15 @@ def test_intervals_are_cut_where_a_joint_goes_far(turn: float) -> None:
     assert np.all(np.diff(edges) > 0.0)
     # Where nothing moves nothing is cut.
     assert np.count_nonzero(edges > 0.5) == 1
+
+
+def test_what_turns_wildly_is_not_cut_at_all() -> None:
+    robot = robot_named("planar_3r")
+    q = np.array([[0.0] * 3, [0.0, 0.0, 1e4], [0.0, 0.0, 1e4]])
+    trajectory = sm.Trajectory([0.0, 0.5, 1.0], q, np.zeros((3, 3)), robot.joint_names)
+    pose = robot.pose(q[0])
+    edges = _edges(sm.Waypoints.from_poses([0.0, 1.0], [pose, pose]), trajectory, ())
+    np.testing.assert_array_equal(edges, [0.0, 0.5, 1.0])
 
 
 def test_a_distance_that_is_only_a_bound_is_no_approach() -> None:
@@ -466,6 +475,10 @@ def test_a_start_that_is_too_near_is_told(value: float, words: str) -> None:
     bodies = Bodies(lambda q: np.full(len(q), value))
     assert words in KeepsApart(bodies, 0.1).judge(motion).text  # type: ignore[arg-type]
     assert words not in KeepsApart(bodies, -1.0).judge(motion).text  # type: ignore[arg-type]
+    # Of the start it is said, not of what comes later.
+    later = motion_of([[0.0] * 3, [1.0] * 3], np.zeros((2, 3)))
+    nearer = Bodies(lambda q: np.where(q[:, 0] > 0.5, value, 1.0))
+    assert "the start" not in KeepsApart(nearer, 0.1).judge(later).text  # type: ignore[arg-type]
 
 
 # --- shares of limits

@@ -1,5 +1,8 @@
 """Laws of the optimiser's parts: each by itself, on numbers that can be followed by hand."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -11,7 +14,7 @@ from selfmotion.optimise.base import inverse_metric
 from selfmotion.optimise.derivative import is_misleading
 from selfmotion.optimise.penalty import IGNORED, ExactPenalty, Point
 from selfmotion.optimise.quadratic import minimize_quadratic
-from selfmotion.optimise.restoration import restored
+from selfmotion.optimise.restoration import _fall, restored
 from selfmotion.optimise.rows import DenseRows, ScaledRows, pulled_back
 from selfmotion.optimise.step import AIM, Step, best_step
 from selfmotion.optimise.update import renewed
@@ -78,6 +81,26 @@ def test_bracketing_goes_tau1_times_as_far_while_the_slope_stays(tau1: float) ->
     assert found == (1e3, -1e3)
     advances = np.diff([0.0, *tried])[:-1]
     np.testing.assert_allclose(advances[1:] / advances[:-1], tau1)
+
+
+def test_bracketing_goes_at_least_as_far_again() -> None:
+    """However near the minimum is: of a parabola that is least at 1.1, the second trial is at 2."""
+    tried: list[float] = []
+
+    def value(a: float) -> float:
+        tried.append(a)
+        return (a - 1.1) ** 2
+
+    sm.LineSearch(sigma=0.011).search(
+        value,
+        lambda a: 2.0 * (a - 1.1),
+        1.21,
+        -2.2,
+        first=1.0,
+        longest=1e3,
+        more=lambda: len(tried) < 2,
+    )
+    np.testing.assert_allclose(tried, [1.0, 2.0])
 
 
 @pytest.mark.parametrize(("tau2", "tau3"), [(0.1, 0.5), (0.2, 0.3)])
@@ -328,6 +351,62 @@ def test_restorations_are_the_same_in_other_variables() -> None:
     y, _ = restored(problem(scale), np.linalg.solve(scale, start), 1.0, np.inf, lambda step: None)
     assert np.linalg.norm(x - start) > 1.0
     np.testing.assert_allclose(scale @ y, x, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "factor"), [(0.9, 0.2), (0.76, 0.2), (0.74, 1.0), (0.26, 1.0), (0.24, 5.0)]
+)
+def test_damping_follows_how_well_a_fall_was_foreseen(ratio: float, factor: float) -> None:
+    """K. Madsen and others: less where the model holds, more where it hardly does."""
+    metric, gradient = np.diag([2.0, 1.0]), np.array([1.0, -3.0])
+    p = -np.linalg.solve(metric + 0.01 * np.eye(2), gradient)
+    foreseen = -float(gradient @ p + 0.5 * p @ metric @ p)
+    asked: list[Array] = []
+
+    def value(x: Array) -> float:
+        asked.append(x)
+        return 7.0 - ratio * foreseen
+
+    stub: Any = SimpleNamespace(
+        gradient=lambda x: gradient, metric=lambda x: metric, value=value, evaluations=0
+    )
+    x, there, damping = _fall(stub, np.ones(2), 7.0, np.eye(2), 0.01, 10)
+    np.testing.assert_allclose(x, 1.0 + p)
+    assert there == value(x)
+    assert damping == pytest.approx(0.01 * factor)
+    assert len(asked) == 2
+
+
+def test_damping_grows_until_a_step_falls() -> None:
+    """And not beyond what leads nowhere."""
+    metric, gradient = np.eye(1), np.ones(1)
+    asked: list[float] = []
+
+    def value(x: Array) -> float:
+        asked.append(float(x[0]))
+        return 1.0 if abs(x[0]) > bound else 0.9
+
+    stub: Any = SimpleNamespace(
+        gradient=lambda x: gradient, metric=lambda x: metric, value=value, evaluations=0
+    )
+    bound = 0.1
+    found = _fall(stub, np.zeros(1), 1.0, np.eye(1), 1.0, 10)
+    assert found is not None
+    np.testing.assert_allclose(asked, [-1.0 / (1.0 + 5.0**k) for k in range(3)])
+    bound = -1.0
+    assert _fall(stub, np.zeros(1), 1.0, np.eye(1), 1.0, 10) is None
+
+
+def test_a_first_step_without_a_cost_is_short() -> None:
+    """Where F = 0 nothing says how far to go: a thousandth of the scale, doubled.
+
+    Nine tenths of what that takes out of the violation is taken.
+    """
+    function = Constrained(
+        lambda x: 0.5 * float(x @ x), lambda x: x, lambda x: 1.0 - x, lambda x: -np.eye(2)
+    )
+    history = SequentialQuadratic().minimize(function, np.zeros(2)).history
+    assert np.abs(history[1].x).max() == pytest.approx(0.9 * 2e-3)
 
 
 @pytest.mark.parametrize("spoiled", ["gradient", "metric"])

@@ -147,11 +147,11 @@ def _fall(
     The step -(M + λ M_0)⁻¹ g, with λ raised until it leads down.
     """
     gradient, metric = penalised.gradient(x), penalised.metric(x)
-    if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(metric))):
-        return None
     while penalised.evaluations < most and damping < _STIFFEST:
-        p = -np.linalg.solve(metric + damping * ground, gradient)
-        expected = -float(gradient @ p + 0.5 * p @ metric @ p)
+        with np.errstate(over="ignore", invalid="ignore"):
+            p = -np.linalg.solve(metric + damping * ground, gradient)
+            expected = -float(gradient @ p + 0.5 * p @ metric @ p)
+        # Written so that NaN leads nowhere.
         if not expected > 0.0:
             return None
         there = penalised.value(x + p)

@@ -121,7 +121,7 @@ class _Model:
             both, shares = np.vstack([above, below]), h / self._some.tolerance
             upper = -np.append(shares, -shares[equality])
             none = np.full(len(upper), -np.inf)
-            found = minimize_quadratic(hessian, np.zeros(size + 1), both, none, upper, reach)
+            found = minimize_quadratic(hessian, np.zeros_like(reach), both, none, upper, reach)
             if found is None:
                 return scale
             least = float(found[0][-1]) * scale
