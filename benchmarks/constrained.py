@@ -3,8 +3,8 @@
 60 problems made at random for each seed. Each is planned, and compared with what another revision
 made of it: `--store` writes a revision's results, `--against` compares with them. Limits are taken
 from another motion, which is then forgotten, so that they bind at x = 0 and can be kept. Times are
-those of the processor. The problems are those of one thread (OMP_NUM_THREADS=1): with more, the
-last digits of eigenvectors differ, and with them the random motions.
+those of the processor. Last digits decide which random motions these are: so the problems that
+results are stored of are stored, too (`--keep`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import json
 import subprocess
 import time
 import warnings
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,8 +27,10 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.engine import Objective, StillMotion, settled_still_motion
 from selfmotion.optimise import inverse_metric
+from selfmotion.plans import problem_from_dict, problem_to_dict
 
 DATA = Path(__file__).parent / "data"
+PROBLEMS = DATA / "constrained_problems.json"
 ARMS = (
     ("panda", "pose"),
     ("panda", "position"),
@@ -51,16 +54,33 @@ CALMER = 0.95
 
 
 def problem(seed: int, number: int) -> tuple[str, sm.Problem]:
-    """Return the name of a problem, and the problem."""
-    rng = np.random.default_rng([seed, number])
-    arm, task = ARMS[number % len(ARMS)]
-    kind = KINDS[number % len(KINDS)]
+    """Return the name of a problem, and the problem: as it is stored, or made anew."""
+    (arm, task), kind = ARMS[number % len(ARMS)], KINDS[number % len(KINDS)]
     if arm == "planar_3r" and kind == "clearance":
         kind = "velocity"
     if arm == "ur5" and kind not in ("closed", "at rest"):
         # Pointing leaves it only the turn of its last joint.
         task = "position"
     robot = sm.load_robot(arm)
+    stored = _stored().get(str(seed))
+    if stored is None:
+        made = _made(robot, task, kind, seed, number)
+    else:
+        named = {"named": arm}
+        values = {**stored[number], "robot": named}
+        made = problem_from_dict(values, {json.dumps(named): robot})
+    start = "" if made.given_start is not None else ", free start"
+    return f"{number:02d} {arm} {task}, {kind}{start}", made
+
+
+@cache
+def _stored() -> dict[str, list[dict[str, Any]]]:
+    found: dict[str, list[dict[str, Any]]] = json.loads(PROBLEMS.read_text())
+    return found
+
+
+def _made(robot: sm.RobotModel, task: str, kind: str, seed: int, number: int) -> sm.Problem:
+    rng = np.random.default_rng([seed, number])
     for _ in range(STARTS):
         free = _without(robot, task, kind, rng)
         try:
@@ -73,7 +93,7 @@ def problem(seed: int, number: int) -> tuple[str, sm.Problem]:
     else:
         raise RuntimeError(f"problem {number} of seed {seed}: no constraints that bind were found")
     start = None if number % FREE == FREE - 1 else free.given_start
-    made = sm.Problem(
+    return sm.Problem(
         robot,
         free.path,
         task,
@@ -83,7 +103,6 @@ def problem(seed: int, number: int) -> tuple[str, sm.Problem]:
         constraints=constraints,
         rest=False,
     )
-    return f"{number:02d} {arm} {task}, {kind}{', free start' if start is None else ''}", made
 
 
 def _without(robot: sm.RobotModel, task: str, kind: str, rng: np.random.Generator) -> sm.Problem:
@@ -252,9 +271,15 @@ def main(
     store: Annotated[Path | None, typer.Option(help="Write the results to a file.")] = None,
     against: Annotated[Path, typer.Option(help="Compare with these results.")] = DATA
     / "constrained_reference.json",
+    keep: Annotated[bool, typer.Option(help="Store the problems of a seed, and end.")] = False,
 ) -> None:
     """Plan all problems; print them side by side with another revision's results."""
     warnings.simplefilter("ignore")
+    if keep:
+        made = [problem_to_dict(problem(seed, number)[1]) for number in range(COUNT)]
+        kept = [{key: each[key] for key in each if key != "robot"} for each in made]
+        PROBLEMS.write_text(json.dumps({**_stored(), str(seed): kept}, separators=(",", ":")))
+        return
     sm.plan(sm.sample_problem())
     numbers = only or list(range(COUNT))
     results = []

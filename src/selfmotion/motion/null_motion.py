@@ -276,12 +276,13 @@ class TransportedFrame:
 def transport(jacobians: Array) -> Array:
     """Return orthonormal null-space bases of `jacobians` (N, m, n) along a motion, (N, n, r)."""
     null = null_space(jacobians)
-    bases = np.empty_like(null)
-    bases[0] = null[0]
-    for k in range(1, len(jacobians)):
-        u, _, v = np.linalg.svd(null[k].T @ bases[k - 1])
-        bases[k] = null[k] @ (u @ v)
-    return bases
+    # The polar factor of A R is that of A times R, for an orthogonal R: so all at once.
+    u, _, v = np.linalg.svd(null[1:].transpose(0, 2, 1) @ null[:-1])
+    turns = np.empty((len(null), null.shape[2], null.shape[2]))
+    turns[0] = np.eye(null.shape[2])
+    for k, turn in enumerate(u @ v, start=1):
+        turns[k] = turn @ turns[k - 1]
+    return np.asarray(null @ turns)
 
 
 def _check_degree(degree: int) -> None:

@@ -20,12 +20,12 @@ from selfmotion.plans import Problem
 # Steps of the rough motions.
 _STEPS = 12
 # Heats: so many starts at most, optimised with so many evaluations of the cost more.
-_HEATS = ((16, 4), (8, 8))
+_HEATS = ((16, 8), (6, 8))
 # Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
 # rule; rough optima this near are the same.
 _NEAR, _SAME = 0.6, 0.1
 # A rough optimum that costs more than this many times the best is not worth the rest.
-_HOPELESS = 1.3
+_HOPELESS = 2.0
 
 
 class Heats:

@@ -39,7 +39,7 @@ class Search:
     """
 
     starts: int = 48
-    finalists: int = 4
+    finalists: int = 3
     mode: str = "auto"
     compare: bool = False
     rng: np.random.Generator | int = 0
