@@ -11,7 +11,7 @@ import pytest
 import selfmotion as sm
 from conftest import PANDA_HOME, robot_named
 from selfmotion.basics.arrays import Array
-from selfmotion.certificate import AtRest, ClosedMotion, EndState, JointLimits
+from selfmotion.certificate import AtRest, ClosedMotion, EndState, JointLimits, JointTorques
 from selfmotion.certificate.apart import Approach, KeepsApart, _nearer, closest_at_all_times
 from selfmotion.certificate.band import CoordinateBand
 from selfmotion.certificate.check import _because, _damped_stretches, _undecided
@@ -374,6 +374,14 @@ def test_ends_are_judged_to_a_micrometre(miss: float) -> None:
     assert told == f"joint '{given.robot.joint_names[0]}' ends 1.00e-03 away from the start"
 
 
+@pytest.mark.parametrize(
+    ("order", "words"), [(0, "away from where it should"), (1, "off the one asked for")]
+)
+def test_ends_are_told_in_words_of_their_own(order: int, words: str) -> None:
+    motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
+    assert words in EndState(order, np.ones(3)).judge(motion).text
+
+
 def test_end_accelerations_are_judged_less_closely() -> None:
     motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0]], np.zeros((2, 3)))
     for miss, kept in ((0.9e-4, True), (1.1e-4, False)):
@@ -458,6 +466,22 @@ def test_a_distance_that_is_grazed_is_undecided_and_said_to_be() -> None:
     far = Bodies(lambda q: np.full(len(q), 50.0))
     assert closest_at_all_times(far, motion.trajectory, 0.1).open_until is None  # type: ignore[arg-type]
     assert far.asked == 17
+
+
+def test_how_near_bodies_come_is_told_in_millimetres() -> None:
+    motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
+    text = KeepsApart(Bodies(lambda q: np.full(len(q), 0.05)), 0.1).judge(motion).text  # type: ignore[arg-type]
+    assert text.startswith("first0 - second0 are 50.00 mm apart at t = 0.000 s (wanted: 100.00 mm)")
+
+
+def test_a_joint_that_needs_nothing_may_have_no_limit() -> None:
+    """0 of infinity is no number."""
+    dynamics: Any = SimpleNamespace(torques=lambda q, qd, qdd: 0.0 * q)
+    motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
+    found = JointTorques(dynamics, np.full(3, np.inf)).judge(motion)
+    assert found.kept
+    assert "needs 0 Nm or N" in found.text
+    assert "nan" not in found.text
 
 
 def test_nothing_to_be_near_to_is_far_enough() -> None:

@@ -59,6 +59,7 @@ def test_what_rounding_hides_does_not_mislead(cost: float, slope: float, says: b
 def test_defaults_are_what_is_documented() -> None:
     """They are part of the interface: a plan that was made with them can be made again."""
     assert sm.QuasiNewton() == sm.QuasiNewton("fletcher", 1e-8, 200, sm.LineSearch(), 1e8)
+    assert sm.QuasiNewton(unbounded=0.5).unbounded == 0.5
     assert sm.QuasiNewton().initial_metric == "gauss-newton"
     assert SequentialQuadratic() == SequentialQuadratic(1e-7, 200)
 
@@ -101,6 +102,20 @@ def test_bracketing_goes_at_least_as_far_again() -> None:
         more=lambda: len(tried) < 2,
     )
     np.testing.assert_allclose(tried, [1.0, 2.0])
+
+
+def test_a_trial_that_falls_no_further_ends_the_bracket() -> None:
+    """Equal to the one before, and still falling: the minimum is in between."""
+    tried: list[float] = []
+
+    def value(a: float) -> float:
+        tried.append(a)
+        return {0: -1.0, 1: -1.0}.get(len(tried) - 1, -2.0)
+
+    sm.LineSearch(sigma=0.01, tau1=2.0).search(
+        value, lambda a: -0.5, 0.0, -1.0, first=1.0, longest=1e3, more=lambda: len(tried) < 3
+    )
+    assert 1.0 < tried[2] < tried[1]
 
 
 @pytest.mark.parametrize(("tau2", "tau3"), [(0.1, 0.5), (0.2, 0.3)])
@@ -431,8 +446,48 @@ def hopeless() -> tuple[Constrained, list[Array]]:
         return 0.5 * float(x @ g @ x) + 1.0
 
     function = Constrained(value, lambda x: g @ x, lambda x: np.ones(1), lambda x: np.zeros((1, 5)))
-    function.metric = lambda x: g  # type: ignore[method-assign]
+    # Elsewhere the first direction is the steepest.
+    other = (basis * [900.0, 20.0, 0.05, 4.0, 60.0]) @ basis.T
+    function.metric = lambda x: g if np.abs(x).max() < 0.5 else other  # type: ignore[method-assign]
     return function, seen
+
+
+def test_an_interruption_of_a_restoration_keeps_where_it_was() -> None:
+    function, start, asked, interrupted = bowl(), np.array([-1.0, 2.0]), 0, 8
+    whole = function._value
+
+    def value(x: Array) -> float:
+        nonlocal asked
+        asked += 1
+        if asked > interrupted:
+            raise KeyboardInterrupt
+        return whole(x)
+
+    function._value = value
+    function._h = lambda x: np.array([1.0 - x[0] + 1e-3 * np.sin(50.0 * x[1])])
+    function._rows = lambda x: np.array([[-1.0, 0.05 * np.cos(50.0 * x[1])]])
+    x, status = restored(function, start, 1.0, np.inf, lambda step: None)
+    assert status is Status.INTERRUPTED
+    assert np.all(np.isfinite(x))
+    assert x[0] > start[0]
+
+
+def test_far_conditions_are_never_asked_for() -> None:
+    """Of a thousand, those that a step violates; the others only along it."""
+    asked: set[int] = set()
+    rng = np.random.default_rng(0)
+    table, h = rng.normal(size=(1000, 3)), np.full(1000, -50.0)
+    h[::100] = -0.01
+
+    class Watched(DenseRows):
+        def picked(self, which: Any) -> Array:
+            asked.update(which.tolist())
+            return super().picked(which)
+
+    step = best_step(np.ones(3), np.eye(3), residuals(list(h), 1e-3), Watched(table), 10.0)
+    assert not step.relaxed
+    assert asked
+    assert asked <= set(range(0, 1000, 100))
 
 
 def test_steps_of_a_scan_lead_along_the_flattest_directions() -> None:
@@ -462,18 +517,21 @@ def test_restorations_go_on_as_long_as_they_help(
 ) -> None:
     """Ten times as stiff each time, and not after one that left the violation where it was."""
     asked: list[float] = []
-    function, _ = hopeless()
-    share = np.ones(1)
+    function, seen = hopeless()
+    share, before = np.ones(1), []
     function._h = lambda x: share.copy()
 
     def restoring(function, x, weight, limit, note):
         asked.append(weight)
+        before.append(len(seen))
         share[0] *= kept
         return x + 1e-3, None
 
     monkeypatch.setattr("selfmotion.optimise.sqp.restored", restoring)
     SequentialQuadratic().minimize(function, np.full(5, 0.1))
     assert asked == weights
+    # Five steps that take nothing out of the violation are enough, each tried once.
+    assert before[0] <= 8
 
 
 @pytest.mark.parametrize("limit", [1, 2])
