@@ -199,10 +199,10 @@ class Linearised:
 def linearised(bound: BoundConstraint, samples: Samples, motion: NodeTangents) -> Linearised:
     """Return the derivatives of a constraint's conditions at a motion.
 
-    Those that its own ``linear(samples)`` computes as far as they are asked for, where it has one:
-    a `Linear`, with the shape of h. By default all `tangents`.
+    What its own ``linearised_at(samples)`` returns, where it has one: the shape of h, and a
+    `Linear` that computes as much as it is asked for. By default all `tangents`.
     """
-    own = getattr(bound, "linear", None)
+    own = getattr(bound, "linearised_at", None)
     if own is not None:
         return Linearised(*own(samples))
     tangents = bound.tangents(samples, motion)

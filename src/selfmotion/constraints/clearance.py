@@ -174,7 +174,7 @@ class BoundClearance:
         """See `BoundConstraint.tangents`."""
         return _Pull(self._clearances(samples)).tangents_of(motion)
 
-    def linear(self, samples: Samples) -> tuple[tuple[int, int], "_Pull"]:
+    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], "_Pull"]:
         """See `linearised`."""
         now = self._clearances(samples)
         return (len(now.values), now.values.shape[1]), _Pull(now)

@@ -289,7 +289,7 @@ class BoundLimits:
         """See `BoundConstraint.tangents`."""
         return self.tangents_of(motion)
 
-    def linear(self, samples: Samples) -> tuple[tuple[int, int], "BoundLimits"]:
+    def linearised_at(self, samples: Samples) -> tuple[tuple[int, int], "BoundLimits"]:
         """See `linearised`."""
         return (len(samples.nodes), 2 * len(self.joints)), self
 
