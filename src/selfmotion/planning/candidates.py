@@ -15,6 +15,7 @@ from selfmotion.basics import (
     Progress,
     SelfmotionError,
 )
+from selfmotion.motion import Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.heats import Heats
@@ -181,19 +182,27 @@ class Candidates:
         problem = self._problem
         arm = problem.envelope.arm(problem.robot)
         candidates = start_candidates(arm, problem.path, problem.task, starts, rng)
-        if len(candidates) > finalists:
-            candidates = self._best_of(candidates, finalists) or candidates
-        self._waiting = sessions = self._sessions(candidates)
+        rough = self._best_of(candidates, finalists) if len(candidates) > finalists else []
+        self._waiting = sessions = self._resumed(rough) if rough else self._sessions(candidates)
         for number, session in enumerate(sessions, 1):
             self._progress("optimising start", number, len(sessions))
             self._try(session)
         self._waiting = ()
 
-    def _best_of(self, candidates: list[Array], finalists: int) -> list[Array]:
-        """Return the starts of the best rough motions; none where these all break down."""
+    def _best_of(self, candidates: list[Array], finalists: int) -> list[Trajectory]:
+        """Return the best rough motions; none where these all break down."""
         self._heats = Heats(self._problem, self._effort, self._progress)
         self._heats.run(candidates, finalists)
         return self._heats.ranked
+
+    def _resumed(self, rough: Sequence[Trajectory]) -> list[Session]:
+        """Return sessions that begin at rough motions, the best first."""
+        sessions = []
+        for motion in rough:
+            for session in self._sessions([motion.q[0]]):
+                session.resume(motion)
+                sessions.append(session)
+        return sorted(sessions, key=Session.merit)
 
     def _sessions(self, starts: Sequence[Array]) -> list[Session]:
         sessions = []
@@ -265,7 +274,7 @@ class Candidates:
     def _interrupted(self) -> None:
         """Make the best that is known the outcome; raise KeyboardInterrupt where nothing is."""
         if self.best is None and not self._waiting and self._heats is not None:
-            self._waiting = self._sessions(self._heats.ranked[:1])
+            self._waiting = self._resumed(self._heats.ranked[:1])
         for session in self._waiting if self.best is None else ():
             session.end(Status.INTERRUPTED)
             self._consider(session)

@@ -89,13 +89,14 @@ def _resolved(problem: Problem, session: Session, tolerance: Tolerance) -> Evalu
 
 
 def _rough(problem: Problem, finished: Finished, session: Session) -> bool:
-    """Whether what was asked for and is kept at the nodes is not so between them.
-
-    Distances aside: while optimising, bodies are their hulls.
-    """
+    """Whether what was asked for and is kept at the nodes is not so between them."""
     if session.violations or not finished.certificate.on_path:
         return False
-    asked = {item.name for item in problem.requirements if not isinstance(item, KeepsApart)}
+    # Where only the default asks it, the arm was not kept apart from itself at the nodes either.
+    unasked = problem.own_collision is not None
+    asked = {
+        item.name for item in problem.requirements if not (unasked and isinstance(item, KeepsApart))
+    }
     nodes = finished.motion.trajectory.t
     # Rates are judged on both sides of a node; anything else that is wrong there stays so.
     return any(

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, Progress
-from selfmotion.motion import Grid
+from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.session import Session
@@ -47,9 +47,9 @@ class Heats:
         self._merits: list[tuple[float, Session]] = []
 
     @property
-    def ranked(self) -> list[Array]:
-        """Where the motions begin that were found so far, the best first; each (n,)."""
-        return [session.nodes[0] for _, session in self._merits]
+    def ranked(self) -> list[Trajectory]:
+        """The motions that were found so far, the best first."""
+        return [session.motion().trajectory for _, session in self._merits]
 
     def run(self, starts: Sequence[Array], finalists: int) -> None:
         """Leave the best `finalists` of the starts (n,), or fewer where they became the same."""

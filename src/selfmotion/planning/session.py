@@ -18,7 +18,7 @@ from selfmotion.engine import (
     rough_still_motion,
     settled_still_motion,
 )
-from selfmotion.motion import Grid, NullMotion
+from selfmotion.motion import Grid, NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Minimum, SequentialQuadratic, Status
 from selfmotion.planning.closing import closed
 from selfmotion.planning.effort import Effort
@@ -178,14 +178,22 @@ class Session:
 
     def adopt(self, plan: Plan) -> None:
         """Begin at a plan's null motion instead of x = 0, unless that would be worse."""
-        problem, grid, still = self._still.problem, self._objective.grid, self.merit()
         motion = self.null_motion
         if plan.report.null_motion is not None and plan.problem.null_motion == motion:
             motion = plan.report.null_motion
-        grid = grid.with_steps(max(motion.fewest_steps, plan.report.steps))
-        objective = self._on(grid, motion)
-        t = grid.stage_times
-        x = coefficients_of(plan, problem, t, objective.null_motion)
+        grid = self._objective.grid.with_steps(max(motion.fewest_steps, plan.report.steps))
+        pace = plan.path.duration / self._still.problem.path.duration
+        self._begin_along(plan.trajectory, pace, self._on(grid, motion), motion)
+
+    def resume(self, trajectory: Trajectory) -> None:
+        """Begin at the null motion of a motion along this path, unless that would be worse."""
+        self._begin_along(trajectory, 1.0, self._objective, self.null_motion)
+
+    def _begin_along(
+        self, trajectory: Trajectory, pace: float, objective: Objective, motion: NullMotion
+    ) -> None:
+        problem, t, still = self._still.problem, objective.grid.stage_times, self.merit()
+        x = coefficients_of(trajectory, pace, problem, t, objective.null_motion)
         z, _, c = objective.parts(np.zeros(objective.size))
         before = self._x, self._objective, self.null_motion
         self._x, self._objective = np.concatenate([z, x, c]), objective
@@ -264,6 +272,8 @@ class Session:
             self.minimize()
             if unmet and self.violations:
                 return 0.0
+            # The optimum agrees, too: a motion that a coarse grid praises may be none on this one.
+            error = max(error, abs(self._cost() - before) / max(abs(before), np.finfo(float).tiny))
             if error <= agreement:
                 break
         return error

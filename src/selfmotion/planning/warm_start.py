@@ -3,7 +3,7 @@
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError, shown
-from selfmotion.motion import NullMotionTable
+from selfmotion.motion import NullMotionTable, Trajectory
 from selfmotion.plans import Plan, Problem
 from selfmotion.robot import null_basis
 
@@ -32,27 +32,29 @@ def start_of(plan: Plan, problem: Problem) -> Array:
     return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task, seed)
 
 
-def coefficients_of(plan: Plan, problem: Problem, t: Array, table: NullMotionTable) -> Array:
-    """Return the coefficients x whose null motion is nearest to a plan's, (size,).
+def coefficients_of(
+    trajectory: Trajectory, pace: float, problem: Problem, t: Array, table: NullMotionTable
+) -> Array:
+    """Return the coefficients x whose null motion is nearest to that of another motion, (size,).
 
     By least squares over the times. Of a null motion only Nᵀε acts, with N (n, r) a basis of the
-    null space of the task: it is fitted to Nᵀq̇, with N and q̇ those of the plan at the same share
-    of its path.
+    null space of the task: it is fitted to Nᵀq̇, with N and q̇ those of the other motion at the same
+    share of its path.
 
     Parameters
     ----------
-    plan : Plan
+    trajectory : Trajectory
+    pace : float
+        The duration of its path over that of the problem's.
     problem : Problem
-        The other one.
     t : (S,)
         Times on its path [s].
     table : NullMotionTable
         Its null motion at these times.
     """
-    pace = plan.path.duration / problem.path.duration
     # A plan of a part of its path ends earlier.
-    theirs = np.minimum(t * pace, plan.trajectory.t[-1])
-    q, qd = plan.trajectory(theirs), pace * plan.trajectory(theirs, 1)
+    theirs = np.minimum(t * pace, trajectory.t[-1])
+    q, qd = trajectory(theirs), pace * trajectory(theirs, 1)
     null = np.array([null_basis(problem.robot, problem.task, each).T for each in q])
     acting = null @ table.matrix()
     wanted = np.einsum("srn,sn->sr", null, qd)
