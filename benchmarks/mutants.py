@@ -116,6 +116,7 @@ PARTS = (
         ("certificate/*.py",),
         (
             "test_certificate_parts.py",
+            "test_steps.py -k errors_between",
             "test_torques.py -k 'judged or whole_turns'",
             "test_verdicts.py -k 'not threads'",
             "test_clearance_proof.py -k 'not default'",

@@ -190,11 +190,12 @@ def test_where_a_path_bends_sharply_a_short_interval_stays_undecided() -> None:
     assert 1e-4 < found.position.value < 1.001e-4
 
 
+@pytest.mark.parametrize("moving", [0, 1])
 @pytest.mark.parametrize("turn", [0.1, 7.0, -60.0])
-def test_intervals_are_cut_where_a_joint_goes_far(turn: float) -> None:
+def test_intervals_are_cut_where_a_joint_goes_far(turn: float, moving: int) -> None:
     robot = robot_named("planar_3r")
     q = np.zeros((3, 3))
-    q[1:, 2] = turn
+    q[1 + moving :, 2] = turn
     trajectory = sm.Trajectory([0.0, 0.5, 1.0], q, np.zeros((3, 3)), robot.joint_names)
     pose = robot.pose(q[0])
     edges = _edges(sm.Waypoints.from_poses([0.0, 1.0], [pose, pose]), trajectory, ())
@@ -206,7 +207,8 @@ def test_intervals_are_cut_where_a_joint_goes_far(turn: float) -> None:
     assert {0.0, 0.5, 1.0} <= set(edges)
     assert np.all(np.diff(edges) > 0.0)
     # Where nothing moves nothing is cut.
-    assert np.count_nonzero(edges > 0.5) == 1
+    still = edges > 0.5 if moving == 0 else edges < 0.5
+    assert np.count_nonzero(still) == 1
 
 
 def test_what_turns_wildly_is_not_cut_at_all() -> None:
@@ -472,6 +474,23 @@ def test_how_near_bodies_come_is_told_in_millimetres() -> None:
     motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
     text = KeepsApart(Bodies(lambda q: np.full(len(q), 0.05)), 0.1).judge(motion).text  # type: ignore[arg-type]
     assert text.startswith("first0 - second0 are 50.00 mm apart at t = 0.000 s (wanted: 100.00 mm)")
+
+
+def test_links_that_overlap_as_they_are_made_are_told_with_how_often() -> None:
+    motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
+    bodies = Bodies(lambda q: np.full(len(q), -0.05))
+    bodies.overlapping = (SimpleNamespace(first="first0", second="second0", share=0.3),)
+    text = KeepsApart(bodies, 0.1).judge(motion).text  # type: ignore[arg-type]
+    assert "overlap in 30 % of all configurations" in text
+
+
+def test_a_finished_motion_is_looked_at_from_its_start_to_its_end() -> None:
+    motion = motion_of(np.zeros((3, 3)), np.zeros((3, 3)))
+    times = motion.trajectory.t
+    assert motion.t[0] == times[0]
+    assert motion.t[-1] == times[-1]
+    assert set(times) <= set(motion.t)
+    assert np.all(np.diff(motion.t) > 0.0)
 
 
 def test_a_joint_that_needs_nothing_may_have_no_limit() -> None:

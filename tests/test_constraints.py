@@ -100,7 +100,12 @@ def test_rows_on_demand_are_those_of_all_tangents(constraint: str) -> None:
     bound = objective.constraints.constraints[0]
     expected = bound.tangents(samples, tangents).reshape(-1, objective.size)
     rows = objective.condition_rows(x)
+    # All of one motion is computed once.
+    count = objective.evaluations
+    objective.value(x), objective.conditions(x), objective.gradient(x), objective.metric(x)
+    assert objective.evaluations == count
     objective.conditions(x + 0.1)
+    assert objective.evaluations == count + 1
     direction, which = rng.normal(size=objective.size), rng.integers(0, len(expected), 40)
     scale = np.abs(expected).max()
     np.testing.assert_allclose(rows.picked(which), expected[which], atol=1e-12 * scale)

@@ -344,6 +344,8 @@ def test_a_restoration_ends_near_the_conditions_and_tells_f_alone(equalities: in
     assert x[1] == pytest.approx(0.0, abs=0.02)
     for step in told:
         assert step.cost == pytest.approx(function.value(step.x))
+    # It ends where nothing is left to gain, not when it must.
+    assert function.evaluations < 30
 
 
 def test_restorations_are_the_same_in_other_variables() -> None:
@@ -600,7 +602,7 @@ def test_violations_that_are_left_are_those_of_all_conditions(seed: int) -> None
     )
     least, before = answer.fun, at.worst
     assert step.relaxed
-    assert step.worst <= least + 0.1 * (before - least) + 0.02 * before
+    assert step.worst <= least + 0.1 * (before - least) + 0.002 * before
     assert step.worst >= least * (1.0 - 1e-6)
 
 
