@@ -80,7 +80,8 @@ def _resolved(problem: Problem, session: Session, tolerance: Tolerance) -> Evalu
         errors = problem.errors_between(motion.trajectory) / allowed
         worst = float(errors.max())
         # Written so that NaN is no progress. Damping's error is not that of the steps.
-        if motion.damped or worst <= _RESOLVED or not worst < _FALLS * before:
+        stuck = not worst < _FALLS * before or len(errors) > session.most_steps
+        if motion.damped or worst <= _RESOLVED or stuck:
             break
         before = worst
         session.refine((errors > _RESOLVED).any(axis=1))

@@ -151,6 +151,11 @@ class Session:
         return self._objective.parts(self._x)[1].copy()
 
     @property
+    def most_steps(self) -> int:
+        """Steps beyond which a grid is not refined any more."""
+        return int(self._still.grid.steps * 2**MOST_HALVINGS)
+
+    @property
     def nodes(self) -> Array:
         """The motion as it is now, at the nodes of the grid, (N + 1, n)."""
         samples = self._objective.samples(self._x)
