@@ -371,12 +371,10 @@ class Objective:
         return self._tangents
 
     def _differentiated(self, x: Array) -> tuple[Array, Array]:
-        by_coefficients = self.null_motion.matrix()
         first = self.start.size
         last = first + self.null_motion.size
-        stages, n, _ = by_coefficients.shape
-        epsilon_matrix = np.zeros((stages, n, self.size))
-        epsilon_matrix[:, :, first:last] = by_coefficients
+        epsilon_matrix = self.null_motion.matrix(first, self.size - last)
+        stages, n, _ = epsilon_matrix.shape
         start_matrix = np.zeros((n, self.size))
         start_matrix[:, :first], by_pose = self.start.tangent()
         if not self._deviation.size:

@@ -241,11 +241,14 @@ class NullMotionTable:
             inner = np.einsum("snr,sn->sr", self.frame, inner)
         return np.asarray((inner.T @ self.functions).ravel())
 
-    def matrix(self) -> Array:
-        """Return ∂ε/∂x at the stages, (S, n, size)."""
+    def matrix(self, before: int = 0, after: int = 0) -> Array:
+        """Return ∂ε/∂x at the stages, (S, n, size), between as many columns of zeros."""
         frame = np.eye(self.rows)[None] if self.frame is None else self.frame
-        full = frame[:, :, :, None] * self.functions[:, None, None, :]
-        return np.asarray(full.reshape(len(self.functions), full.shape[1], self.size))
+        stages, n = len(self.functions), frame.shape[1]
+        full = np.zeros((stages, n, before + self.size + after))
+        own = full[:, :, before : before + self.size].reshape(stages, n, self.rows, -1)
+        np.multiply(frame[:, :, :, None], self.functions[:, None, None, :], out=own)
+        return full
 
 
 class TransportedFrame:

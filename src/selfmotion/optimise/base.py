@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -48,12 +49,12 @@ class Residuals:
     tolerance: Array
     equality: npt.NDArray[np.bool_]
 
-    @property
+    @cached_property
     def excess(self) -> Array:
         """How far each is violated, in multiples of its tolerance; ≤ 0 where it is kept, (C,)."""
         return np.asarray(np.where(self.equality, np.abs(self.h), self.h) / self.tolerance)
 
-    @property
+    @cached_property
     def worst(self) -> float:
         """The largest violation in multiples of its tolerance; kept where ≤ 1."""
         return float(np.max(self.excess, initial=0.0))
