@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+import selfmotion as sm
 from conftest import robot_named, short_line, start_of
 from selfmotion.basics.arrays import Array
 from selfmotion.constraints import NodeTangents
 from selfmotion.costs import Samples
+from selfmotion.engine import Objective, StillMotion
 from selfmotion.engine.conditions import Conditions
 from selfmotion.engine.rollout import Rollout
 from selfmotion.motion.grid import Grid
@@ -141,3 +143,27 @@ def test_the_worst_place_is_told_of_what_is_not_kept(
     broken = Given("broken", np.array([[0.0, np.nan]]), equality)
     told = Conditions([kept, beyond, broken], grid).violated(samples)
     assert told == ("beyond: row 0, column 0", "broken: row 0, column 1")
+
+
+def test_a_free_start_is_a_variable_and_a_guide_stands_for_no_null_motion() -> None:
+    robot = robot_named("panda")
+    start = start_of(robot, "pose")
+    problem = sm.Problem(robot, short_line(robot, start), Task.POSE, start, rest=False)
+    steps = Grid.aligned(problem.knots, 12)
+    still = StillMotion.on(problem, start, steps)
+    given, free = (Objective.of(problem, still, free=free) for free in (False, True))
+    assert free.size == given.size + 1
+    zero = np.zeros(given.size)
+    np.testing.assert_array_equal(given.samples(zero).q[steps.node_stages], still.q)
+
+    def guide(t: Array) -> Array:
+        return np.tile(0.3 * np.eye(7)[0], (len(t), 1))
+
+    guided = StillMotion.on(problem, start, steps, guide)
+    assert np.abs(guided.q[-1] - still.q[-1]).max() > 1e-3
+    along = Objective.of(problem, guided)
+    np.testing.assert_array_equal(along.samples(zero).q[steps.node_stages], guided.q)
+    # What is given in its place counts instead.
+    around = np.zeros((len(steps.stage_times), 7))
+    back = Objective.of(problem, guided, around=around)
+    np.testing.assert_array_equal(back.samples(zero).q[steps.node_stages], still.q)
