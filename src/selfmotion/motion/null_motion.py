@@ -244,9 +244,9 @@ class NullMotionTable:
     def matrix(self, before: int = 0, after: int = 0) -> Array:
         """Return ∂ε/∂x at the stages, (S, n, size), between as many columns of zeros."""
         frame = np.eye(self.rows)[None] if self.frame is None else self.frame
-        stages, n = len(self.functions), frame.shape[1]
+        (stages, count), n = self.functions.shape, frame.shape[1]
         full = np.zeros((stages, n, before + self.size + after))
-        own = full[:, :, before : before + self.size].reshape(stages, n, self.rows, -1)
+        own = full[:, :, before : before + self.size].reshape(stages, n, self.rows, count)
         np.multiply(frame[:, :, :, None], self.functions[:, None, None, :], out=own)
         return full
 
