@@ -16,8 +16,9 @@ from selfmotion.plans import Problem
 # Between its nodes a motion may be off the path by this share of the tolerance where that is looked
 # at, in the middle; and by this share of what it was before steps were halved.
 _RESOLVED, _FALLS = 0.5, 0.7
-# Limits that are exceeded between the nodes on more grids than this are so on any.
-_ROUGH = 3
+# Limits that are exceeded between the nodes on more grids than this are so on any; and nothing is
+# optimised again on grids with more than so many times the steps.
+_ROUGH, _FINER = 3, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +42,7 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
     finished: Finished | None = None
     coarse: Trajectory | None = None
     misses: list[float] = []
-    roughs = 0
+    roughs, first = 0, session.steps
     for _ in range(MOST_HALVINGS):
         try:
             progress("checking", 1, 1)
@@ -50,6 +51,7 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
             roughs += rough
             # Where no evaluations are left, finer grids change nothing.
             spent = session.status is Status.MAX_EVALUATIONS or roughs > _ROUGH
+            spent = spent or session.steps > _FINER * first
             if finished.certificate.on_path and (spent or not rough):
                 break
             trajectory = finished.motion.trajectory

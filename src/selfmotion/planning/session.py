@@ -151,6 +151,11 @@ class Session:
         return self._objective.parts(self._x)[1].copy()
 
     @property
+    def steps(self) -> int:
+        """Steps of the present grid."""
+        return self._objective.grid.steps
+
+    @property
     def most_steps(self) -> int:
         """Steps beyond which a grid is not refined any more."""
         return int(self._still.grid.steps * 2**MOST_HALVINGS)
