@@ -32,9 +32,10 @@ def main() -> int:
     start = robot.inverse_kinematics(path.pose(0.0), seed=[0, -0.5, 0, -2, 0, 1.6, 0.8])
     given = OUT / "given.json"
     given.write_text(json.dumps({"start": start.tolist(), "urdf": robot.urdf.source}))
+    default = ours(robot, path, start, sm.RefinedNullMotion(), "default")
     coarse = ours(robot, path, start, sm.BSplineNullMotion(24), "24 intervals, cubic")
     fine = ours(robot, path, start, sm.BSplineNullMotion(120, degree=1), "120 intervals, linear")
-    rows = [coarse, fine]
+    rows = [default, coarse, fine]
     for program, packages in PEERS.items():
         python = environment(program.split("_")[0], packages)
         command = [str(python), str(HERE / program), str(given)]
