@@ -437,6 +437,16 @@ def test_a_restoration_goes_nowhere_without_derivatives(spoiled: str) -> None:
     np.testing.assert_array_equal(x, start)
 
 
+def test_a_restoration_ends_where_derivatives_are_beyond_all_numbers() -> None:
+    """LAPACK calls such a matrix singular."""
+    function, start = bowl(), np.array([-1.0, 2.0])
+    function.metric = lambda x: np.zeros((2, 2))  # type: ignore[method-assign]
+    function._rows = lambda x: np.array([[0.0, 0.0]])
+    x, status = restored(function, start, 1.0, np.inf, lambda step: None)
+    assert status is None
+    np.testing.assert_array_equal(x, start)
+
+
 def hopeless() -> tuple[Constrained, list[Array]]:
     """Return ½ xᵀGx + 1 where 1 ≤ 0 is asked for, and where it is looked at."""
     seen: list[Array] = []

@@ -149,7 +149,11 @@ def _fall(
     gradient, metric = penalised.gradient(x), penalised.metric(x)
     while penalised.evaluations < most and damping < _STIFFEST:
         with np.errstate(over="ignore", invalid="ignore"):
-            p = -np.linalg.solve(metric + damping * ground, gradient)
+            try:
+                p = -np.linalg.solve(metric + damping * ground, gradient)
+            except np.linalg.LinAlgError:
+                # Next to singular poses derivatives are near the largest numbers.
+                return None
             expected = -float(gradient @ p + 0.5 * p @ metric @ p)
         # Written so that NaN leads nowhere.
         if not expected > 0.0:

@@ -267,7 +267,7 @@ class Session:
         Return how well it does, as a share of the cost; 0 where no finer grid would help.
         """
         rises, error = 0, 0.0
-        for _ in range(MOST_HALVINGS):
+        while self.steps < self.most_steps:
             if self.status in (*_CUT_SHORT, *_ADRIFT):
                 return 0.0
             unmet, before = self.score()
