@@ -360,7 +360,7 @@ def test_restorations_are_the_same_in_other_variables() -> None:
             lambda y: np.array([9.0 - (s @ y) @ (s @ y), 2.0 - np.sum(np.sin(s @ y))]),
             lambda y: np.array([-2.0 * s @ y, -np.cos(s @ y)]) @ s,
         )
-        function.metric = lambda y: s.T @ g @ s  # type: ignore[method-assign]
+        function._metric = lambda y: s.T @ g @ s
         return function
 
     start, none = np.array([0.3, -0.1, 0.2]), np.eye(3)
@@ -440,7 +440,7 @@ def test_a_restoration_goes_nowhere_without_derivatives(spoiled: str) -> None:
 def test_a_restoration_ends_where_derivatives_are_beyond_all_numbers() -> None:
     """LAPACK calls such a matrix singular."""
     function, start = bowl(), np.array([-1.0, 2.0])
-    function.metric = lambda x: np.zeros((2, 2))  # type: ignore[method-assign]
+    function._metric = lambda x: np.zeros((2, 2))
     function._rows = lambda x: np.array([[0.0, 0.0]])
     x, status = restored(function, start, 1.0, np.inf, lambda step: None)
     assert status is None
@@ -460,7 +460,7 @@ def hopeless() -> tuple[Constrained, list[Array]]:
     function = Constrained(value, lambda x: g @ x, lambda x: np.ones(1), lambda x: np.zeros((1, 5)))
     # Elsewhere the first direction is the steepest.
     other = (basis * [900.0, 20.0, 0.05, 4.0, 60.0]) @ basis.T
-    function.metric = lambda x: g if np.abs(x).max() < 0.5 else other  # type: ignore[method-assign]
+    function._metric = lambda x: g if np.abs(x).max() < 0.5 else other
     return function, seen
 
 
@@ -569,7 +569,7 @@ def test_the_multiplier_and_the_estimate_are_those_of_the_unscaled_problem() -> 
         lambda x: np.array([[1.0, 0.0]]),
         1,
     )
-    function.metric = lambda x: g  # type: ignore[method-assign]
+    function._metric = lambda x: g
     found = SequentialQuadratic(tolerance=1e-12).minimize(function, np.array([0.3, -3.0]))
     assert found.status is Status.CONVERGED
     np.testing.assert_allclose(found.x, [0.0, 2.0], atol=1e-5)

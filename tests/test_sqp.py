@@ -31,7 +31,9 @@ class Constrained:
         rows: Callable[[Array], Array],
         equalities: int = 0,
         tolerance: float = TOLERANCE,
+        metric: Callable[[Array], Array] = lambda x: np.eye(len(x)),
     ) -> None:
+        self._metric = metric
         self._value, self._gradient, self._h, self._rows = value, gradient, h, rows
         self._equalities, self._tolerance = equalities, tolerance
         self.evaluations = 0
@@ -50,7 +52,7 @@ class Constrained:
         return float(self._gradient(x) @ direction)
 
     def metric(self, x: Array) -> Array:
-        return np.eye(len(x))
+        return self._metric(x)
 
     def conditions(self, x: Array) -> Residuals:
         h = self._h(x)
@@ -329,7 +331,7 @@ def test_far_from_where_it_was_made_the_matrix_is_made_anew(
         lambda x: np.array([x[0] - 2.0]),
         lambda x: np.eye(1, len(x)),
     )
-    function.metric = lambda x: slopes(x).T @ slopes(x)  # type: ignore[method-assign]
+    function._metric = lambda x: slopes(x).T @ slopes(x)
     counts = []
     for never in (False, True):
         if never:
@@ -354,7 +356,7 @@ def test_the_penalty_of_a_restoration_has_its_own_gradient_and_metric() -> None:
         equalities=3,
         tolerance=0.1,
     )
-    function.metric = lambda x: np.zeros((3, 3))  # type: ignore[method-assign]
+    function._metric = lambda x: np.zeros((3, 3))
     penalised = _Penalised(function, 2.0)
     gradients = [
         (penalised.gradient(x + e) - penalised.gradient(x - e)) / 2e-6 for e in 1e-6 * np.eye(3)

@@ -128,7 +128,7 @@ class _Run:
             raise ProblemError("optimiser: the cost or a condition at the start is not finite")
         self._here = self._best = self._begun = here
         self._gradient = np.zeros(len(x0))
-        self._rows: Rows = DenseRows(np.zeros((len(here.at.h), len(x0))))
+        self._rows: Rows = DenseRows(np.zeros((0, len(x0))))
         self._multipliers = np.zeros(len(here.at.h))
         self._begin(np.eye(len(x0)))
 

@@ -50,8 +50,8 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
             rough = _rough(problem, finished, session)
             roughs += rough
             # Where no evaluations are left, finer grids change nothing.
-            spent = session.status is Status.MAX_EVALUATIONS or roughs > _ROUGH
-            spent = spent or session.steps > _FINER * first
+            out = session.status is Status.MAX_EVALUATIONS
+            spent = out or roughs > _ROUGH or session.steps > _FINER * first
             if finished.certificate.on_path and (spent or not rough):
                 break
             trajectory = finished.motion.trajectory

@@ -273,7 +273,7 @@ class Session:
             unmet, before = self.score()
             self.refine()
             after = self._cost()
-            error = abs(after - before) / max(abs(before), np.finfo(float).tiny)
+            error = _relative_change(before, after)
             # A cost that grows and grows, and what two grids in turn could not meet: the path runs
             # past the edge of the workspace between their nodes, or limits are too tight.
             rises = rises + 1 if after > _RISE * abs(before) else 0
@@ -283,7 +283,7 @@ class Session:
             if unmet and self.violations:
                 return 0.0
             # The optimum agrees, too: a motion that a coarse grid praises may be none on this one.
-            error = max(error, abs(self._cost() - before) / max(abs(before), np.finfo(float).tiny))
+            error = max(error, _relative_change(before, self._cost()))
             if error <= agreement:
                 break
         return error
@@ -317,7 +317,8 @@ class Session:
         problem = self._still.problem
         spline = finest(problem.robot.redundancy(problem.task))
         grid = self._objective.grid.with_steps(spline.fewest_steps // _THINNER)
-        objective = self._on(grid)
+        same = grid is self._objective.grid
+        objective = self._objective if same else self._on(grid)
         z, x, c = objective.parts(self._x)
         around = objective.null_motion.epsilon(x)
         fine = self._on(grid, spline, around)
@@ -430,3 +431,8 @@ class Session:
     def _close(self) -> None:
         if self._objective.constraints.has_equalities and self._minimum is not None:
             self._x = closed(self._objective, self._x, self._minimum.inverse_hessian)
+
+
+def _relative_change(before: float, after: float) -> float:
+    """Return the change of a cost as a share of what it was."""
+    return abs(after - before) / max(abs(before), np.finfo(float).tiny)

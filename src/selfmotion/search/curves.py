@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, Progress, read_only, silent
-from selfmotion.kernels import angle_kind
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.search import kernels
@@ -121,8 +120,6 @@ class SelfMotion:
     def __init__(self, robot: RobotModel, task: Task, spacing: float) -> None:
         self.robot, self.spacing = robot, spacing
         self.revolute = np.array([not robot.is_prismatic(name) for name in robot.joint_names])
-        self._rows = task.rows
-        self._kind = angle_kind(task.rows, task.tool_axes)
         self._tool = robot.tool_kinematics()
         everywhere = np.full(robot.dof, np.inf)
         self._manifold = Manifold(robot, task, -everywhere, everywhere)
@@ -150,8 +147,7 @@ class SelfMotion:
                 tool.rotation,
                 tool.translation,
                 target,
-                self._rows,
-                self._kind,
+                *self._manifold.rows,
                 unused,
                 _LONGEST,
             )
@@ -175,7 +171,7 @@ class SelfMotion:
         jacobian = self._tool.at(q)
         tangent, place = self._direction.copy(), (self._tool.rotation, self._tool.translation)
         length = kernels.correct(
-            q.copy(), jacobian, *place, target, self._rows, self._kind, tangent, _LONGEST
+            q.copy(), jacobian, *place, target, *self._manifold.rows, tangent, _LONGEST
         )
         return tangent if length >= 0.0 and np.all(np.isfinite(tangent)) else None
 
@@ -215,7 +211,7 @@ class SelfMotion:
         """Return the samples (K, n) from `start` on, and whether they lead back to it."""
         samples, on = np.empty((_MOST_SAMPLES, self.robot.dof)), self._manifold
         count, closed = kernels.walk(
-            start, tangent, target, *on.chain, *on.rows, self.spacing, samples
+            start, tangent, target, on.chain, *on.rows, self.spacing, samples
         )
         return samples[:count].copy(), closed
 

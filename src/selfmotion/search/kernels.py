@@ -18,6 +18,8 @@ from selfmotion.kernels import (
 from selfmotion.robot import compose, placements
 
 Mask = npt.NDArray[np.bool_]
+Chain = tuple[Array, Array, Array, Mask, Array, Array]
+"""That of `RobotModel.joint_places`, and the tool's place in the frame of the last joint."""
 
 # What is known of a curve on the way.
 GOING, CLOSED, ENDED = 0, 1, 2
@@ -96,12 +98,7 @@ def walk(
     start: Array,
     tangent: Array,
     target: Array,
-    rotations: Array,
-    positions: Array,
-    axes: Array,
-    is_revolute: Mask,
-    tool_rotation: Array,
-    tool_position: Array,
+    chain: Chain,
     rows: Rows,
     angle_kind: int,
     spacing: float,
@@ -109,8 +106,7 @@ def walk(
 ) -> tuple[int, bool]:
     """Follow a self-motion curve from `start` (n,) along `tangent`.
 
-    Sets `samples` (K, n); returns how many there are, and whether they lead back to the start. The
-    chain is that of `project_all`.
+    Sets `samples` (K, n); returns how many there are, and whether they lead back to the start.
     """
     n = len(start)
     r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
@@ -121,9 +117,7 @@ def walk(
         tangents[:, k] = tangent[k]
     state, code = np.array([spacing, 0.0, 1.0, spacing]), GOING
     while code == GOING:
-        placements(q, rotations, positions, axes, is_revolute, r, p)
-        compose(r[n], p[n], tool_rotation, tool_position, rotation, position)
-        _jacobian(r, p, axes, is_revolute, position, jacobian)
+        _place(q, chain, r, p, rotation, position, jacobian)
         code = _advance(
             q,
             jacobian,
@@ -132,7 +126,7 @@ def walk(
             target,
             rows,
             angle_kind,
-            is_revolute,
+            chain[3],
             samples,
             tangents,
             state,
@@ -374,12 +368,7 @@ def cheapest(
 def project_all(
     q: Array,
     targets: Array,
-    rotations: Array,
-    positions: Array,
-    axes: Array,
-    is_revolute: Mask,
-    tool_rotation: Array,
-    tool_position: Array,
+    chain: Chain,
     rows: Rows,
     angle_kind: int,
     lower: Array,
@@ -391,8 +380,7 @@ def project_all(
     """Put each of q (K, n) onto its target (K, 12) by Newton's method, in place.
 
     A joint that would leave its limits stays at the limit, and the others do the rest. `arrived`
-    (K,) says of which that was possible within so many steps. The chain is that of
-    `RobotModel.joint_places`, the tool's place that in the frame of the last joint.
+    (K,) says of which that was possible within so many steps.
     """
     n = q.shape[1]
     r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
@@ -411,9 +399,7 @@ def project_all(
             if inside and length < CONVERGED:
                 arrived[k] = True
                 break
-            placements(q[k], rotations, positions, axes, is_revolute, r, p)
-            compose(r[n], p[n], tool_rotation, tool_position, rotation, position)
-            _jacobian(r, p, axes, is_revolute, position, jacobian)
+            _place(q[k], chain, r, p, rotation, position, jacobian)
             for j in range(n):
                 unused[j] = 1.0
                 if held[j]:
@@ -424,6 +410,18 @@ def project_all(
             # Singular, or not a number.
             if not length >= 0.0:
                 break
+
+
+@kernel
+def _place(
+    q: Array, chain: Chain, r: Array, p: Array, rotation: Array, position: Array, jacobian: Array
+) -> None:
+    """Set the joints' places, the tool's, and its Jacobian (6, n) at q (n,)."""
+    rotations, positions, axes, is_revolute, tool_rotation, tool_position = chain
+    n = len(q)
+    placements(q, rotations, positions, axes, is_revolute, r, p)
+    compose(r[n], p[n], tool_rotation, tool_position, rotation, position)
+    _jacobian(r, p, axes, is_revolute, position, jacobian)
 
 
 @kernel
@@ -449,19 +447,10 @@ def _jacobian(
 
 
 @kernel
-def tool_place(
-    q: Array,
-    rotations: Array,
-    positions: Array,
-    axes: Array,
-    is_revolute: Mask,
-    tool_rotation: Array,
-    tool_position: Array,
-) -> tuple[Array, Array]:
-    """Return the tool's rotation (3, 3) and position (3,) at q (n,); the chain as for others."""
+def tool_place(q: Array, chain: Chain) -> tuple[Array, Array]:
+    """Return the tool's rotation (3, 3) and position (3,) at q (n,)."""
     n = len(q)
     r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
     rotation, position = np.empty((3, 3)), np.empty(3)
-    placements(q, rotations, positions, axes, is_revolute, r, p)
-    compose(r[n], p[n], tool_rotation, tool_position, rotation, position)
+    _place(q, chain, r, p, rotation, position, np.empty((6, n)))
     return rotation, position

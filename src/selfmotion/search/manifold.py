@@ -68,7 +68,7 @@ class Manifold:
         wanted = np.ascontiguousarray(np.broadcast_to(target, (len(q), 12)))
         steps = _FAR_STEPS if far else _NEAR_STEPS
         kernels.project_all(
-            found, wanted, *self.chain, *self.rows, *self._limits, _LONGEST, steps, arrived
+            found, wanted, self.chain, *self.rows, *self._limits, _LONGEST, steps, arrived
         )
         return found, arrived
 
@@ -79,7 +79,7 @@ class Manifold:
     def _check(self) -> None:
         lower, upper = self.robot.finite_limits()
         for q in np.random.default_rng(0).uniform(lower, upper, (3, self.robot.dof)):
-            rotation, position = kernels.tool_place(q, *self.chain)
+            rotation, position = kernels.tool_place(q, self.chain)
             pose = self.robot.pose(q)
             miss = max(
                 np.abs(rotation - pose.rotation).max(), np.abs(position - pose.translation).max()
