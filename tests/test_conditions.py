@@ -1,13 +1,14 @@
 """What the engine makes of constraints: one list of numbers, prices, words, and a penalty."""
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import selfmotion as sm
 from conftest import robot_named, short_line, start_of
-from selfmotion.basics.arrays import Array
+from selfmotion.basics import Array, ProblemError
 from selfmotion.constraints import NodeTangents
 from selfmotion.costs import Samples
 from selfmotion.engine import Objective, StillMotion
@@ -15,6 +16,7 @@ from selfmotion.engine.conditions import Conditions
 from selfmotion.engine.rollout import Rollout
 from selfmotion.motion.grid import Grid
 from selfmotion.task import Task
+from selfmotion.testing import check_constraint
 
 DURATION = 1.5
 
@@ -167,3 +169,47 @@ def test_a_free_start_is_a_variable_and_a_guide_stands_for_no_null_motion() -> N
     around = np.zeros((len(steps.stage_times), 7))
     back = Objective.of(problem, guided, around=around)
     np.testing.assert_array_equal(back.samples(zero).q[steps.node_stages], still.q)
+
+
+@pytest.mark.parametrize(
+    ("tangents", "message"),
+    [
+        (lambda h, d: np.zeros((*h.shape, d - 1)), r"tangents\(\) has shape .* \(4,\) appended"),
+        (lambda h, d: np.zeros(h.shape), r"tangents\(\) has shape \(13, 2\)"),
+        (lambda h, d: np.zeros((h.shape[0] - 1, h.shape[1], d)), "of 24 conditions, expected 26"),
+    ],
+)
+def test_derivatives_of_another_shape_are_refused_by_name(
+    tangents, message: str, grid: Grid, samples: Samples
+) -> None:
+    class Misshapen(Given):
+        def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
+            return tangents(self.h, motion.size)
+
+    both = Conditions([Misshapen("mine", table(grid))], grid)
+    both.residuals(samples)
+    motion = NodeTangents(np.zeros((13, 7, 4)), np.zeros((13, 7, 4)), grid.sampling)
+    with pytest.raises(ProblemError, match=f"constraint 'mine': .*{message}"):
+        both.rows(samples, motion)
+
+
+@pytest.mark.parametrize("wrong", ["picked", "tangents_of"])
+def test_a_constraint_that_is_wrong_on_demand_does_not_pass(wrong: str) -> None:
+    """Its tangents are right, but not what programmes are solved with."""
+
+    class Mine(sm.JointVelocityLimits):
+        def bind(self, robot, task, start, end):
+            own = super().bind(robot, task, start, end)
+            known = SimpleNamespace(picked=own.picked, tangents_of=own.tangents_of)
+            right = getattr(own, wrong)
+            setattr(known, wrong, lambda *given: -right(*given))
+            asked = ("name", "equality", "tolerance", "residual", "tangents", "describe")
+            bound = SimpleNamespace(**{name: getattr(own, name) for name in asked})
+            bound.linearised_at = lambda samples: (own.linearised_at(samples)[0], known)
+            return bound
+
+    robot = robot_named("panda")
+    start = start_of(robot, "pose")
+    problem = sm.Problem(robot, short_line(robot, start), Task.POSE, start, rest=False)
+    with pytest.raises(AssertionError, match=r"linearised_at\(\) is .* off what tangents\(\) says"):
+        check_constraint(Mine(0.02), problem)

@@ -155,11 +155,31 @@ def check_constraint(constraint: Constraint, problem: Problem) -> None:
     def weighed(x: Array) -> float:
         return float(np.sum(weights * bound.residual(objective.samples(x))))
 
-    tangents = objective.node_tangents(x)
-    exact = np.tensordot(weights, bound.tangents(objective.samples(x), tangents), weights.ndim)
+    tangents = bound.tangents(objective.samples(x), objective.node_tangents(x))
+    shape = (*weights.shape, objective.size)
+    told = f"constraint '{bound.name}': tangents() has shape {np.shape(tangents)}, expected {shape}"
+    _require(np.shape(tangents) == shape, told)
+    exact = np.tensordot(weights, tangents, weights.ndim)
     _gradient(weighed, lambda _: exact, x, f"constraint '{bound.name}'")
+    _known_on_demand(objective, bound.name, tangents.reshape(-1, objective.size), x)
     _judges_alike(objective, bound, requirement, robot, rng)
     _saved(constraint, Constraint)
+
+
+def _known_on_demand(objective: Objective, name: str, table: Array, x: Array) -> None:
+    """Require that derivatives computed as far as they are asked for are those of the table."""
+    objective.conditions(x)
+    rows = objective.condition_rows(x)
+    ones, scale = np.ones(objective.size), max(1.0, float(np.abs(table).max(initial=0.0)))
+    for found, expected in (
+        (rows.picked(np.arange(len(table))), table),
+        (rows.along(ones), table @ ones),
+    ):
+        off = float(np.abs(found - expected).max(initial=0.0))
+        _require(
+            off <= GRADIENT * scale,
+            f"constraint '{name}': linearised_at() is {off:.2e} off what tangents() says",
+        )
 
 
 def check_optimizer(optimizer: Optimizer) -> None:

@@ -12,7 +12,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints, Saved
+from selfmotion.basics import Array, Ints, ProblemError, Saved
 from selfmotion.certificate import Requirement
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
@@ -200,12 +200,18 @@ def linearised(bound: BoundConstraint, samples: Samples, motion: NodeTangents) -
     """Return the derivatives of a constraint's conditions at a motion.
 
     What its own ``linearised_at(samples)`` returns, where it has one: the shape of h, and a
-    `Linear` that computes as much as it is asked for. By default all `tangents`.
+    `Linear` that computes as much as it is asked for. By default all `tangents`; ProblemError where
+    these are not of the shape that they should have.
     """
     own = getattr(bound, "linearised_at", None)
-    if own is not None:
+    if callable(own):
         return Linearised(*own(samples))
     tangents = bound.tangents(samples, motion)
+    if np.ndim(tangents) != 3 or tangents.shape[2] != motion.size:
+        raise ProblemError(
+            f"constraint '{bound.name}': tangents() has shape {np.shape(tangents)}, expected that "
+            f"of the residual with ({motion.size},) appended"
+        )
     return Linearised(tangents.shape[:2], tangents.reshape(-1, motion.size))
 
 

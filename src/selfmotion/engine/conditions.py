@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, Ints
+from selfmotion.basics import Array, Ints, ProblemError
 from selfmotion.constraints import BoundConstraint, Linearised, NodeTangents, easing_of, linearised
 from selfmotion.costs import Samples
 from selfmotion.motion import Grid
@@ -32,6 +32,8 @@ class Conditions:
         self._shares = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
         # Tolerances of all conditions, and which are equalities: the same for every motion.
         self._kinds: tuple[Array, npt.NDArray[np.bool_]] | None = None
+        # How many each constraint has, once they were looked at.
+        self._counts: list[int] = []
 
     def on(self, grid: Grid) -> "Conditions":
         """Return the same on another grid."""
@@ -41,16 +43,24 @@ class Conditions:
         """Return h of all conditions, with their tolerances."""
         tables = [item.residual(samples).ravel() for item in self.constraints]
         if self._kinds is None:
-            counts = [len(table) for table in tables]
+            self._counts = [len(table) for table in tables]
+            tolerances = np.array([item.tolerance for item in self.constraints])
+            equalities = np.array([item.equality for item in self.constraints], bool)
             self._kinds = (
-                np.repeat(np.array([item.tolerance for item in self.constraints]), counts),
-                np.repeat(np.array([item.equality for item in self.constraints], bool), counts),
+                np.repeat(tolerances, self._counts),
+                np.repeat(equalities, self._counts),
             )
         return Residuals(np.concatenate([np.zeros(0), *tables]), *self._kinds)
 
     def rows(self, samples: Samples, motion: NodeTangents) -> Rows:
         """Return the derivatives of all conditions."""
         parts = [linearised(item, samples, motion) for item in self.constraints]
+        for item, part, count in zip(self.constraints, parts, self._counts, strict=False):
+            if part.count != count:
+                raise ProblemError(
+                    f"constraint '{item.name}': there are derivatives of {part.count} conditions, "
+                    f"expected {count}, as many as its residual has"
+                )
         return _Stacked(parts, motion)
 
     @property
