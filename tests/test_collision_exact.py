@@ -295,6 +295,23 @@ def test_distances_of_all_pairs_are_exact_where_they_are_asked_for(panda: RobotM
     assert np.all(near[~close] >= 0.05 - GJK)
 
 
+def test_hulls_will_do_where_exact_distances_are_not_asked_for(panda: RobotModel) -> None:
+    model = CollisionModel(panda, BOXES)
+    q = samples(panda, 30)
+    every, near = model.distances(q), model.distances(q, 0.2, 0.05)
+    hulls, bounds = np.empty_like(every), model.hulls.lower_bounds(q)
+    for row, here in enumerate(q):
+        model.hulls.place(here)
+        hulls[row] = [model.hulls.distance(k, bound) for k, bound in enumerate(bounds[row])]
+    looked_at = every < 0.2 - GJK
+    exact = looked_at & (hulls < 0.05 - GJK)
+    assert exact.any()
+    np.testing.assert_allclose(near[exact], every[exact], atol=GJK)
+    rough = looked_at & (hulls > 0.05 + GJK) & (hulls < 0.2 - GJK)
+    assert np.any(every[rough] - hulls[rough] > 10.0 * GJK)
+    np.testing.assert_allclose(near[rough], hulls[rough], atol=GJK)
+
+
 def test_what_touches_is_named_with_the_line_that_leaves_it_out(
     panda: RobotModel, tmp_path: Path
 ) -> None:

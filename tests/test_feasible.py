@@ -1,6 +1,7 @@
 """Paths that the arm cannot follow to the end: the largest part, where it ends, and why."""
 
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
@@ -223,3 +224,34 @@ def test_an_excursion_between_the_poses_looked_at_is_found(planar: sm.RobotModel
     check_part(plan, edge)
     assert plan.trajectory.t[-1] > (1.0 - EDGE) * edge
     assert "the pose is out of reach" in plan.certificate.verdict
+
+
+@pytest.mark.parametrize("given", [True, False], ids=["given start", "free start"])
+def test_poses_that_limits_put_out_of_reach_end_the_search(
+    planar: sm.RobotModel, given: bool
+) -> None:
+    """An arm that may not fold: where its tool is nearest to the base is known in closed form."""
+    most, start = 1.2, np.array([-0.75, 0.9, 0.6])
+    first = planar.pose(start)
+    last = first.copy()
+    last.translation = 0.25 * first.translation
+    line = sm.Line(first, last, 3.0)
+    limits = sm.JointPositionLimits(np.full(3, -most), np.full(3, most))
+    stages: list[str] = []
+    plan = sm.plan(
+        sm.Problem(planar, line, "planar", start if given else None, constraints=[limits]),
+        progress=lambda stage, number, of: stages.append(stage),
+    )
+    lengths = [np.linalg.norm(place.translation) for place in planar.model.jointPlacements][2:]
+    lengths.append(np.linalg.norm(planar.model.frames[planar.tool_id].placement.translation))
+    folded = sum(length * np.exp(1j * most * k) for k, length in enumerate(lengths))
+    times = np.linspace(0.0, 3.0, 300_001)
+    beyond = np.linalg.norm(line.samples(times).translation, axis=1) < abs(folded)
+    edge = float(times[np.argmax(beyond)])
+    check_part(plan, edge)
+    assert plan.trajectory.t[-1] > (1.0 - LIMITED) * edge
+    told = re.search(r"from t = ([\d.]+) s on the pose is out of reach", plan.certificate.verdict)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(edge, rel=EDGE)
+    assert "at its limit: joint 'joint2', 'joint3'" in plan.certificate.verdict
+    assert not any(stage.startswith("search") for stage in stages)

@@ -20,6 +20,8 @@ from selfmotion.motion import Trajectory
 _FIRST, _DEPTH = 16, 26
 # More intervals than this at once are not looked at: what is left is undecided.
 _MOST = 200_000
+# Hulls will do where some halvings more settle a pair with them; meshes are slow.
+_HULLS_DO = 0.05
 # The distance that is reported is the smallest one to this share, or to this [m].
 _SHARE, _SLACK = 0.02, 1e-4
 
@@ -151,7 +153,7 @@ def closest_at_all_times(
     budget = np.diff(way(edges), axis=0) @ levers.T
     goal = _goal(best, distance)
     need = np.maximum(np.pad(budget, ((0, 1), (0, 0))), np.pad(budget, ((1, 0), (0, 0))))
-    values = model.distances(trajectory(edges), goal + need)
+    values = model.distances(trajectory(edges), goal + need, goal + _HULLS_DO * need)
     first, last = values[:-1], values[1:]
     for _ in range(_DEPTH):
         # Written so that NaN settles nothing.
@@ -165,13 +167,15 @@ def closest_at_all_times(
         middle = 0.5 * (begin + end)
         intervals = np.stack([begin, middle, middle, end], axis=1).reshape(-1, 2)
         budget = (way(intervals[:, 1]) - way(intervals[:, 0])) @ levers.T
-        need = goal + np.maximum(budget[0::2], budget[1::2])
-        inner = model.distances(trajectory(middle), np.where(settled, -np.inf, need))
+        need = np.maximum(budget[0::2], budget[1::2])
+        exact_below = goal + _HULLS_DO * need
+        asked = np.where(settled, -np.inf, goal + need)
+        inner = model.distances(trajectory(middle), asked, exact_below)
         # Pairs that are settled need no number any more.
         ends = [np.where(settled, np.inf, side) for side in (first[rows], inner, last[rows])]
         first = np.stack(ends[:2], axis=1).reshape(len(intervals), -1)
         last = np.stack(ends[1:], axis=1).reshape(len(intervals), -1)
-        approach = _nearer(approach, model, middle, ends[1], need)
+        approach = _nearer(approach, model, middle, ends[1], exact_below)
         goal = _goal(approach.closest, distance)
     row = rows[int(np.argmin(first[rows].min(axis=1)))] if len(rows) <= _MOST else 0
     return _undecided(model, approach, intervals, first, distance, int(row))

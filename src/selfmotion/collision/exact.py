@@ -216,6 +216,7 @@ class CollisionModel:
         self,
         q_samples: npt.ArrayLike,
         within: float | Array = math.inf,
+        exact_below: float | Array = math.inf,
     ) -> Array:
         """Return the distance of every pair at samples (K, n), (K, P) [m], as `pairs` names them.
 
@@ -225,6 +226,9 @@ class CollisionModel:
         within : float or (K, P)
             Pairs that are farther apart than this need no exact number [m]: theirs is a lower
             bound of the distance that is not below `within`. -inf where none is needed.
+        exact_below : float or (K, P)
+            For pairs that are farther apart than this, the distance of their hulls will do, a lower
+            bound that is not below this [m]: it takes a twentieth of the time.
 
         Raises
         ------
@@ -233,13 +237,14 @@ class CollisionModel:
         """
         q = self.samples(q_samples)
         asked = np.broadcast_to(np.asarray(within, dtype=np.float64), (len(q), len(self.pairs)))
+        exact = np.minimum(asked, exact_below)
         values = self.hulls.lower_bounds(q, float(asked.max(initial=-math.inf)))
         for row in range(len(q)):
             near = np.flatnonzero(values[row] < asked[row]).tolist()
             places = self.hulls.place(q[row]) if near else None
             for pair in near:
                 hulls = self.hulls.distance(pair, values[row, pair])
-                far = hulls >= asked[row, pair]
+                far = hulls >= exact[row, pair]
                 values[row, pair] = hulls if far else self._meshes.refine(places, pair, hulls)
         return values
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, kernel
+from selfmotion.basics import Array, inlined, kernel
 from selfmotion.robot import Flags, compose, placements
 
 Ints = npt.NDArray[np.int64]
@@ -14,7 +14,7 @@ Vector = tuple[float, float, float]
 _PARALLEL = 1e-6
 
 
-@kernel
+@inlined
 def separation(
     a: Array, b: Array, t: Array, g: Array, h: Array, limit: float, work: Array
 ) -> float:
@@ -80,7 +80,10 @@ def lower_bounds(
     bounds = np.empty((len(q), len(pairs)))
     r, p = np.empty((q.shape[1] + 1, 3, 3)), np.empty((q.shape[1] + 1, 3))
     turned, place = np.empty((len(joints), 3, 3)), np.empty((len(joints), 3))
-    radii, t, work = np.sqrt((halves * halves).sum(axis=1)), np.empty(3), np.empty((5, 3))
+    radii, t, work = np.empty(len(joints)), np.empty(3), np.empty((5, 3))
+    for i in range(len(joints)):
+        h = halves[i]
+        radii[i] = math.sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2])
     for k in range(len(q)):
         placements(q[k], rotations, positions, axes, is_revolute, r, p)
         for i in range(len(joints)):
@@ -99,12 +102,12 @@ def lower_bounds(
     return bounds
 
 
-@kernel
+@inlined
 def _from(corner: Array, point: Array) -> Vector:
     return (corner[0] - point[0], corner[1] - point[1], corner[2] - point[2])
 
 
-@kernel
+@inlined
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 

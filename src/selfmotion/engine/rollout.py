@@ -11,8 +11,8 @@ from selfmotion.path import Path, PathSamples
 from selfmotion.robot import RobotModel
 from selfmotion.task import DampingLaw, Task, feedback_rate
 
-# A Newton correction this small [rad or m] is rounding; quadratic convergence needs few steps.
-_POLISHED, _POLISHING_STEPS = 1e-13, 4
+# After a Newton correction this small [rad or m] rounding is left: convergence is quadratic.
+_POLISHED, _POLISHING_STEPS = 1e-8, 4
 
 
 class Rollout:

@@ -5,6 +5,7 @@ from typing import Protocol
 import numpy as np
 import pinocchio as pin
 
+from selfmotion import kernels
 from selfmotion.basics import Array
 from selfmotion.robot import RobotModel, null_basis
 from selfmotion.task import Task
@@ -62,9 +63,12 @@ class FreeStart:
     """
 
     def __init__(self, robot: RobotModel, task: Task, reference: Array) -> None:
-        self._robot, self._task, self._reference = robot, task, reference
+        self._task, self._reference = task, reference
         self._null = null_basis(robot, task, reference)
         self._at = reference
+        self._tool = robot.tool_kinematics()
+        self._rows = task.rows, kernels.angle_kind(task.rows, task.tool_axes)
+        self._chart = np.ascontiguousarray(self._null), np.array(reference, dtype=np.float64)
 
     @property
     def size(self) -> int:
@@ -73,33 +77,33 @@ class FreeStart:
 
     def configuration(self, z: Array, pose: pin.SE3) -> Array | None:
         """See `Start.configuration`."""
-        q = self._reference + self._null @ z
+        q, tool = self._reference + self._null @ z, self._tool
+        target = np.array(pose.rotation), np.array(pose.translation)
         for _ in range(_STEPS):
-            if not np.all(np.isfinite(q)):
+            wrong = kernels.approach_start(
+                q,
+                tool.at(q),
+                tool.rotation,
+                tool.translation,
+                *target,
+                *self._rows,
+                *self._chart,
+                z,
+            )
+            # NaN arrives nowhere.
+            if not wrong >= 0.0:
                 return None
-            actual = self._robot.pose(q)
-            twist = self._task.twist_error(pose, actual)
-            error = self._task.select(twist[:, None], actual.rotation)[:, 0]
-            rest = z - self._null.T @ (q - self._reference)
-            arrived = max(np.abs(error).max(), np.abs(rest).max(initial=0.0)) < _ARRIVED
-            try:
-                q = q + np.linalg.solve(self._system(q), np.concatenate([error, rest]))
-            except np.linalg.LinAlgError:
-                return None
-            if arrived:
+            if wrong < _ARRIVED:
                 self._at = q
                 return q
         return None
 
     def tangent(self) -> tuple[Array, Array]:
         """See `Start.tangent`: [J; N0ᵀ]⁻¹ [0; I] and [J; N0ᵀ]⁻¹ [S; 0]."""
-        m = self._task.dimension
-        rows = self._task.select(np.eye(6), self._robot.pose(self._at).rotation)
-        right = np.zeros((m + self.size, self.size + 6))
-        right[m:, : self.size] = np.eye(self.size)
-        right[:m, self.size :] = rows
-        both = np.linalg.solve(self._system(self._at), right)
-        return np.asarray(both[:, : self.size]), np.asarray(both[:, self.size :])
-
-    def _system(self, q: Array) -> Array:
-        return np.vstack([self._robot.task_jacobian(q, self._task), self._null.T])
+        m, r = self._task.dimension, self.size
+        jacobian = self._task.select(self._tool.at(self._at), self._tool.rotation)
+        right = np.zeros((m + r, r + 6))
+        right[m:, :r] = np.eye(r)
+        right[:m, r:] = self._task.select(np.eye(6), self._tool.rotation)
+        both = np.linalg.solve(np.vstack([jacobian, self._null.T]), right)
+        return np.asarray(both[:, :r]), np.asarray(both[:, r:])

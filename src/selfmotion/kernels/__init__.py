@@ -7,9 +7,9 @@ y = A⁻¹(u - Jε), and eq. 4 in the form that needs one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 
-Python calls `advance`, `pullback`, `sensitivities` and `contract_task`. Each is made of small
-kernels, which LLVM inlines, and is compiled for what it is given: who has no damping, or a path
-that does not move, does not wait for theirs.
+Python calls `advance`, `approach_start`, `pullback`, `sensitivities` and `contract_task`. Each is
+made of small kernels, which LLVM inlines, and is compiled for what it is given: who has no damping,
+or a path that does not move, does not wait for theirs.
 """
 
 from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
@@ -17,6 +17,7 @@ from selfmotion.kernels.backward import pullback, sensitivities, space_size
 from selfmotion.kernels.contraction import contract_task
 from selfmotion.kernels.damping import Law
 from selfmotion.kernels.forward import advance
+from selfmotion.kernels.start import approach_start
 from selfmotion.kernels.table import Stage, columns, part, parts
 from selfmotion.kernels.tool import POINTING, Rows, angle_kind, pose_error, select, task_rows
 
@@ -27,6 +28,7 @@ __all__ = [
     "Stage",
     "advance",
     "angle_kind",
+    "approach_start",
     "cholesky",
     "columns",
     "contract_task",

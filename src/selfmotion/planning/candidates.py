@@ -173,10 +173,10 @@ class Candidates:
 
     def _is_out_of_reach(self) -> bool:
         """Whether no start led anywhere because the path leaves the workspace."""
+        if self.best is not None:
+            return bool(self.best.violations) and bool(self._reach(0.0).reason)
         failure = self._failure
-        if self.best is not None or not isinstance(failure, BreakdownError):
-            return False
-        return bool(self._reach(failure.time).reason)
+        return isinstance(failure, BreakdownError) and bool(self._reach(failure.time).reason)
 
     def _try_candidates(self, starts: int, finalists: int, rng: np.random.Generator) -> None:
         problem = self._problem
@@ -187,6 +187,9 @@ class Candidates:
         for number, session in enumerate(sessions, 1):
             self._progress("optimising start", number, len(sessions))
             self._try(session)
+            # What nothing can reach, no other start will.
+            if self._is_out_of_reach():
+                break
         self._waiting = ()
 
     def _best_of(self, candidates: list[Array], finalists: int) -> list[Trajectory]:

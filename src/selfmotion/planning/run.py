@@ -2,7 +2,6 @@
 
 import time
 from dataclasses import replace
-from functools import cache
 from math import inf
 from typing import NamedTuple
 
@@ -230,7 +229,7 @@ class _Run:
         self._tolerance, self._progress = settings.tolerance, settings.progress
         self._deadline = settings.deadline
         self._began = time.perf_counter()
-        self._reach = cache(self._reachable)
+        self._known_reach: dict[float, Reach] = {}
         self._candidates = Candidates(
             problem,
             effort,
@@ -245,7 +244,11 @@ class _Run:
         """Return the plan of the whole path, or of the largest part of it."""
         candidates = self._candidates
         try:
-            best = self._met(candidates.run())
+            best = candidates.run()
+            shorter = self._shorter(best)
+            if shorter is not None:
+                return shorter
+            best = self._met(best)
         except (BreakdownError, NoSequenceError) as error:
             # Chains of configurations end at obstacles and step limits as well: these stay errors.
             blocked = isinstance(error, NoSequenceError) and not self._reach(error.time).reason
@@ -279,6 +282,20 @@ class _Run:
                 break
         return best
 
+    def _shorter(self, best: Session) -> Plan | None:
+        """Return the plan of the largest part where violations are because poses are out of reach.
+
+        None where there are no such: no other motion on finer grids would be better then.
+        """
+        ended = best.status in (*_ENDED, Status.MAX_EVALUATIONS)
+        if not best.violations or ended or self._problem.damping is not None:
+            return None
+        try:
+            return self._part() if self._reach().reason else None
+        except KeyboardInterrupt:
+            best.end(Status.INTERRUPTED)
+            return None
+
     def _stands(self, best: Session, finished: Finished) -> bool:
         """Whether a part of the path is no better answer than this motion along all of it."""
         check = finished.certificate
@@ -287,12 +304,22 @@ class _Run:
         # With damping the motion goes on where the path cannot be followed: so it was asked for.
         return (check.on_path and not out_of_limits) or no_more or self._problem.damping is not None
 
-    def _reachable(self, suspect: float) -> Reach:
-        self._progress("reach", 1, 1)
-        rng = np.random.default_rng(self._search.rng)
-        return reachable(self._problem, suspect, self._search.starts, rng)
+    def _reach(self, suspect: float = 0.0) -> Reach:
+        """Return how far single poses are in reach, after a closer look at a time [s].
 
-    def _part(self, suspect: float) -> Plan | None:
+        That is left out where something is known to be beyond.
+        """
+        for known in self._known_reach.values():
+            if known.reason:
+                return known
+        if suspect not in self._known_reach:
+            self._progress("reach", 1, 1)
+            rng = np.random.default_rng(self._search.rng)
+            found = reachable(self._problem, self._search.starts, rng, suspect)
+            self._known_reach[suspect] = found
+        return self._known_reach[suspect]
+
+    def _part(self, suspect: float = 0.0) -> Plan | None:
         """Return the plan of the largest part, looking closely at a time [s]; None for none."""
         effort = self._effort
         if effort.max_evaluations is None:

@@ -16,8 +16,8 @@ class Search:
     Parameters
     ----------
     starts : int
-        For redundancy 1, starts along all self-motions of the first pose; else seeds of the inverse
-        kinematics.
+        So many at most: for redundancy 1 along all self-motions of the first pose, else what
+        Newton's method finds from twice as many seeds.
     finalists : int
         How many starts are optimised to the end: those of the best motions among rough ones, which
         are optimised a little (`Heats`). As many as `starts` leave the rough ones out.

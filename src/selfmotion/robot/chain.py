@@ -5,12 +5,12 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, kernel
+from selfmotion.basics import Array, inlined
 
 Flags = npt.NDArray[np.bool_]
 
 
-@kernel
+@inlined
 def turned(axis: Array, angle: float, rotation: Array) -> None:
     """Write the rotation by an angle about a unit vector (Rodrigues' formula)."""
     s, c = math.sin(angle), math.cos(angle)
@@ -27,7 +27,7 @@ def turned(axis: Array, angle: float, rotation: Array) -> None:
     rotation[2, 1] += x * s
 
 
-@kernel
+@inlined
 def compose(first: Array, at: Array, second: Array, there: Array, r: Array, p: Array) -> None:
     """Write the product of two placements."""
     for a in range(3):
@@ -37,7 +37,7 @@ def compose(first: Array, at: Array, second: Array, there: Array, r: Array, p: A
             r[a, b] = x * second[0, b] + y * second[1, b] + z * second[2, b]
 
 
-@kernel
+@inlined
 def placements(
     q: Array,
     rotations: Array,
@@ -52,13 +52,19 @@ def placements(
     Row 0 is the world. Each joint has a place in the frame of the one before, (n, 3, 3) and (n, 3),
     and an axis in its own, (n, 3).
     """
-    r[0], p[0] = np.eye(3), 0.0
-    turn, middle, shift = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    identity, none = np.eye(3), np.zeros(3)
+    # Loops: numba takes seconds for what NumPy checks of shapes.
+    turn, middle, shift, slide = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    for a in range(3):
+        p[0, a] = 0.0
+        for b in range(3):
+            r[0, a, b] = 1.0 if a == b else 0.0
     for j in range(len(q)):
         compose(r[j], p[j], rotations[j], positions[j], middle, shift)
         if is_revolute[j]:
             turned(axes[j], q[j], turn)
-            compose(middle, shift, turn, none, r[j + 1], p[j + 1])
-        else:
-            compose(middle, shift, identity, q[j] * axes[j], r[j + 1], p[j + 1])
+        for a in range(3):
+            slide[a] = 0.0 if is_revolute[j] else q[j] * axes[j, a]
+            for b in range(3):
+                if not is_revolute[j]:
+                    turn[a, b] = 1.0 if a == b else 0.0
+        compose(middle, shift, turn, slide, r[j + 1], p[j + 1])

@@ -13,8 +13,6 @@ from selfmotion.search import kernels
 from selfmotion.search.manifold import Manifold
 from selfmotion.task import Task
 
-# Newton's method from a sample of the neighbouring waypoint, and from anywhere.
-_NEAR_STEPS, _FAR_STEPS = 8, 40
 # Longest single correction [rad or m]: a far start wanders where J is nearly singular.
 _LONGEST = 0.5
 # A configuration this near [rad or m] to a curve's polyline is on the curve.
@@ -137,25 +135,8 @@ class SelfMotion:
         far : bool
             Whether q is any configuration instead of one near the solution.
         """
-        q, unused = q.copy(), self._direction.copy()
-        tool = self._tool
-        for _ in range(_FAR_STEPS if far else _NEAR_STEPS):
-            jacobian = tool.at(q)
-            length = kernels.correct(
-                q,
-                jacobian,
-                tool.rotation,
-                tool.translation,
-                target,
-                *self._manifold.rows,
-                unused,
-                _LONGEST,
-            )
-            if length < 0.0:
-                return None
-            if length < kernels.CONVERGED:
-                return q
-        return None
+        found, arrived = self._manifold.project(q[None], target, far=far)
+        return np.array(found[0]) if arrived[0] else None
 
     def project_all(
         self, q: Array, target: Array, *, far: bool = False
@@ -168,8 +149,10 @@ class SelfMotion:
 
     def tangent(self, q: Array, target: Array) -> Array | None:
         """Return a unit null vector of J at q, a solution; None where q is singular."""
-        jacobian = self._tool.at(q)
-        tangent, place = self._direction.copy(), (self._tool.rotation, self._tool.translation)
+        tangent, tool = self._direction.copy(), self._tool
+        # In the order of what compiled kinematics make: so `correct` is compiled only once.
+        jacobian, rotation = (np.ascontiguousarray(a) for a in (tool.at(q), tool.rotation))
+        place = rotation, tool.translation
         length = kernels.correct(
             q.copy(), jacobian, *place, target, *self._manifold.rows, tangent, _LONGEST
         )

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, kernel
+from selfmotion.basics import Array, inlined, kernel
 from selfmotion.kernels import (
     POINTING,
     Rows,
@@ -114,7 +114,8 @@ def walk(
     tangents, q = np.empty((3, n)), np.empty(n)
     for k in range(n):
         samples[0, k], q[k] = start[k], start[k] + spacing * tangent[k]
-        tangents[:, k] = tangent[k]
+        for i in range(3):
+            tangents[i, k] = tangent[k]
     state, code = np.array([spacing, 0.0, 1.0, spacing]), GOING
     while code == GOING:
         _place(q, chain, r, p, rotation, position, jacobian)
@@ -134,7 +135,7 @@ def walk(
     return int(state[2]), code == CLOSED
 
 
-@kernel
+@inlined
 def _advance(
     q: Array,
     frame_jacobian: Array,
@@ -170,27 +171,30 @@ def _advance(
     # NaN fails these comparisons, too.
     sound = 0.0 <= length <= CONVERGED and cosine > _ALIGNED
     if sound and 0.3 * state[0] < moved < 1.2 * state[0]:
-        samples[count] = q
+        for k in range(n):
+            samples[count, k] = q[k]
         state[2] = count + 1
         if count >= 3 and _passes_start(samples, count, revolute, tangents):
             return CLOSED
         if count + 1 == samples.shape[0]:
             return ENDED
-        tangents[0] = tangents[1]
+        for k in range(n):
+            tangents[0, k] = tangents[1, k]
         state[0] = min(state[3], 1.5 * state[0])
         last = samples[count]
     else:
         state[0] *= 0.5
         if state[0] < _SMALLEST_STEP * state[3]:
             return ENDED
-        tangents[1] = tangents[0]
+        for k in range(n):
+            tangents[1, k] = tangents[0, k]
     state[1] = 0
     for k in range(n):
         q[k] = last[k] + state[0] * tangents[0, k]
     return GOING
 
 
-@kernel
+@inlined
 def _passes_start(samples: Array, count: int, revolute: Mask, tangents: Array) -> bool:
     """Whether the last segment passes the start, modulo turns; then it is made to end there."""
     n = samples.shape[1]
@@ -388,7 +392,9 @@ def project_all(
     jacobian, unused = np.zeros((6, n)), np.empty(n)
     held = np.zeros(n, dtype=np.bool_)
     for k in range(len(q)):
-        arrived[k], held[:] = False, False
+        arrived[k] = False
+        for j in range(n):
+            held[j] = False
         length = np.inf
         for _ in range(steps):
             inside = True
@@ -403,7 +409,8 @@ def project_all(
             for j in range(n):
                 unused[j] = 1.0
                 if held[j]:
-                    jacobian[:, j] = 0.0
+                    for i in range(6):
+                        jacobian[i, j] = 0.0
             length = correct(
                 q[k], jacobian, rotation, position, targets[k], rows, angle_kind, unused, longest
             )
@@ -412,7 +419,7 @@ def project_all(
                 break
 
 
-@kernel
+@inlined
 def _place(
     q: Array, chain: Chain, r: Array, p: Array, rotation: Array, position: Array, jacobian: Array
 ) -> None:
@@ -424,7 +431,7 @@ def _place(
     _jacobian(r, p, axes, is_revolute, position, jacobian)
 
 
-@kernel
+@inlined
 def _jacobian(
     r: Array, p: Array, axes: Array, is_revolute: Mask, tool: Array, jacobian: Array
 ) -> None:
@@ -440,17 +447,8 @@ def _jacobian(
             jacobian[0, j] = axis[1] * z - axis[2] * y
             jacobian[1, j] = axis[2] * x - axis[0] * z
             jacobian[2, j] = axis[0] * y - axis[1] * x
-            jacobian[3:, j] = axis
+            for a in range(3):
+                jacobian[3 + a, j] = axis[a]
         else:
-            jacobian[:3, j] = axis
-            jacobian[3:, j] = 0.0
-
-
-@kernel
-def tool_place(q: Array, chain: Chain) -> tuple[Array, Array]:
-    """Return the tool's rotation (3, 3) and position (3,) at q (n,)."""
-    n = len(q)
-    r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
-    rotation, position = np.empty((3, 3)), np.empty(3)
-    _place(q, chain, r, p, rotation, position, np.empty((6, n)))
-    return rotation, position
+            for a in range(3):
+                jacobian[a, j], jacobian[3 + a, j] = axis[a], 0.0

@@ -43,7 +43,8 @@ class Manifold:
 
     def __init__(self, robot: RobotModel, task: Task, lower: Array, upper: Array) -> None:
         self.robot, self.task = robot, task
-        self._limits = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+        # Copies: kernels are compiled anew for what may not be written to.
+        self._limits = np.array(lower), np.array(upper)
         places = robot.joint_places()
         self.revolute: npt.NDArray[np.bool_] = places[3]
         tool = robot.model.frames[robot.tool_id].placement
@@ -65,7 +66,7 @@ class Manifold:
             Whether q is any configuration instead of one near the solution.
         """
         found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
-        wanted = np.ascontiguousarray(np.broadcast_to(target, (len(q), 12)))
+        wanted = np.array(np.broadcast_to(target, (len(q), 12)), order="C")
         steps = _FAR_STEPS if far else _NEAR_STEPS
         kernels.project_all(
             found, wanted, self.chain, *self.rows, *self._limits, _LONGEST, steps, arrived
@@ -77,14 +78,14 @@ class Manifold:
         return transport(np.array([self.robot.task_jacobian(here, self.task) for here in q]))
 
     def _check(self) -> None:
+        """Compare with Pinocchio: where it puts the tool, nothing is left to correct."""
         lower, upper = self.robot.finite_limits()
         for q in np.random.default_rng(0).uniform(lower, upper, (3, self.robot.dof)):
-            rotation, position = kernels.tool_place(q, self.chain)
             pose = self.robot.pose(q)
-            miss = max(
-                np.abs(rotation - pose.rotation).max(), np.abs(position - pose.translation).max()
-            )
-            if not miss < _AGREE:
+            target = np.concatenate([pose.translation, pose.rotation.ravel()])
+            found, arrived = self.project(q[None], target)
+            miss = max(self.task.miss(pose, self.robot.pose(found[0])))
+            if arrived[0] and not miss < _AGREE:
                 raise RobotError(
                     f"{self.robot.name}: compiled kinematics put '{self.robot.tool}' {miss:.3g} "
                     f"off where Pinocchio does; this is an error of selfmotion's"

@@ -7,11 +7,16 @@ import numpy as np
 from selfmotion.basics import Array, InverseKinematicsError
 from selfmotion.plans import Problem
 from selfmotion.robot import RobotModel
-from selfmotion.search.starts import start_candidates
+from selfmotion.search.curves import targets
+from selfmotion.search.manifold import Manifold
+from selfmotion.search.starts import spread, start_candidates
 
 # Poses along the path that are looked at, branches of solutions that are followed from one to the
-# next, restarts where none of them goes on, and bisections of the time at which that happens.
-_POSES, _BRANCHES, _RESTARTS, _BISECTIONS = 64, 3, 12, 16
+# next, seeds where none of them goes on, and bisections of the time at which that happens.
+_POSES, _BRANCHES, _SEEDS, _BISECTIONS = 64, 12, 24, 16
+# Before a pose counts as out of reach, a slower method tries so often; how far poses are out of
+# reach is looked at for so many of them.
+_RESTARTS, _LOOKS = 12, 12
 # Poses about a time of trouble, in shares of the path's duration.
 _ABOUT = np.array([-1e-3, 0.0, 1e-3, 4e-3])
 # A singular value below this share of the dexterous configuration's counts as stretched or folded,
@@ -38,7 +43,9 @@ class Reach:
     reason: str
 
 
-def reachable(problem: Problem, suspect: float, starts: int, rng: np.random.Generator) -> Reach:
+def reachable(
+    problem: Problem, starts: int, rng: np.random.Generator, suspect: float = 0.0
+) -> Reach:
     """Return how far single poses of the path can be reached, within the joint limits.
 
     Inverse kinematics from the solutions of the pose before, and from elsewhere where these do not
@@ -50,56 +57,61 @@ def reachable(problem: Problem, suspect: float, starts: int, rng: np.random.Gene
     first = start_candidates(robot, path, task, starts, rng) if given is None else [given]
     about = np.clip(suspect / path.duration + _ABOUT, 0.0, 1.0)
     times = path.duration * np.union1d(np.linspace(0.0, 1.0, _POSES + 1), about)
-    known, last = first, 0.0
+    poses = _Poses(robot, problem, rng)
+    known, last = np.array(first), 0.0
     for t in times[1:]:
-        found = _solutions(robot, problem, t, known, rng)
-        if not found:
-            known, last = _edge(robot, problem, (last, t), known, rng)
+        found = poses.solutions(t, known)
+        if not len(found):
+            known, last = poses.edge((last, t), known)
             # From right before it, a pose that only seemed out of reach is found.
-            found = _solutions(robot, problem, t, known, rng)
-        if not found:
+            found = poses.sure_solutions(t, known)
+        if not len(found):
             beyond = times[times > last]
             return Reach(last, first, _out_of_reach(problem, robot, last, known[0], beyond))
         known, last = found, float(t)
     return Reach(path.duration, first, "")
 
 
-def _edge(
-    robot: RobotModel,
-    problem: Problem,
-    interval: tuple[float, float],
-    known: list[Array],
-    rng: np.random.Generator,
-) -> tuple[list[Array], float]:
-    """Return the last time of an interval that solutions go on to, and these."""
-    last, beyond = interval
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (last + beyond)
-        found = _solutions(robot, problem, middle, known, rng)
-        if found:
-            known, last = found, middle
-        else:
-            beyond = middle
-    return known, last
+class _Poses:
+    """Inverse kinematics of the poses along a path."""
 
+    def __init__(self, robot: RobotModel, problem: Problem, rng: np.random.Generator) -> None:
+        self._robot, self._path, self._task, self._rng = robot, problem.path, problem.task, rng
+        self._manifold = Manifold(robot, problem.task, robot.lower, robot.upper)
+        self._seeds = np.array(list(spread(robot, _SEEDS, rng)))
 
-def _solutions(
-    robot: RobotModel, problem: Problem, t: float, seeds: list[Array], rng: np.random.Generator
-) -> list[Array]:
-    """Return configurations for the pose at t from those of a pose nearby; [] where none is."""
-    pose = problem.path.pose(t)
-    found = []
-    for seed in seeds[:_BRANCHES]:
+    def solutions(self, t: float, known: Array) -> Array:
+        """Return configurations for the pose at t from those of a pose nearby, or any, (K, n)."""
+        target = targets(self._path, np.array([t]))[0]
+        found, arrived = self._manifold.project(known[:_BRANCHES], target)
+        if not arrived.any():
+            found, arrived = self._manifold.project(self._seeds, target, far=True)
+        return np.asarray(found[arrived])
+
+    def sure_solutions(self, t: float, known: Array) -> Array:
+        """Return configurations for the pose at t, also where Newton's method finds none."""
+        found = self.solutions(t, known)
+        if len(found):
+            return found
         try:
-            found.append(robot.inverse_kinematics(pose, problem.task, seed=seed, attempts=1))
+            q = self._robot.inverse_kinematics(
+                self._path.pose(t), self._task, seed=known[0], rng=self._rng, attempts=_RESTARTS
+            )
         except InverseKinematicsError:
-            continue
-    if found:
-        return found
-    try:
-        return [robot.inverse_kinematics(pose, problem.task, rng=rng, attempts=_RESTARTS)]
-    except InverseKinematicsError:
-        return []
+            return np.empty((0, self._robot.dof))
+        return q[None]
+
+    def edge(self, interval: tuple[float, float], known: Array) -> tuple[Array, float]:
+        """Return solutions at the last time of an interval that there are any, and this time."""
+        last, beyond = interval
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (last + beyond)
+            found = self.solutions(middle, known)
+            if len(found):
+                known, last = found, middle
+            else:
+                beyond = middle
+        return known, last
 
 
 def _out_of_reach(problem: Problem, robot: RobotModel, time: float, q: Array, beyond: Array) -> str:
@@ -108,7 +120,7 @@ def _out_of_reach(problem: Problem, robot: RobotModel, time: float, q: Array, be
     q (n,) is its configuration at `time`, the last one; `beyond` are later times.
     """
     misses = []
-    for t in beyond:
+    for t in beyond[np.unique(np.linspace(0, len(beyond) - 1, _LOOKS).round().astype(int))]:
         try:
             robot.inverse_kinematics(problem.path.pose(t), problem.task, seed=q, attempts=1)
         except InverseKinematicsError as error:

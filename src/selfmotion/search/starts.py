@@ -4,10 +4,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from selfmotion.basics import Array, InverseKinematicsError
+from selfmotion.basics import Array
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
 from selfmotion.search.curves import SelfMotion, targets
+from selfmotion.search.manifold import Manifold
 from selfmotion.search.nodes import Admissible
 from selfmotion.task import Task
 
@@ -16,6 +17,8 @@ _SAME = 0.3
 # Where all self-motions of the first pose can be traced: from so many seeds, in steps of this
 # [rad or m].
 _SEEDS, _SPACING = 60, 0.1
+# Where they cannot: so many seeds for each configuration that is asked for.
+_TRIES = 2
 
 
 def start_candidates(
@@ -25,14 +28,14 @@ def start_candidates(
 
     For one degree of redundancy they are spread evenly over all self-motion curves of the first
     pose, as far as these are within the limits, each joint by the whole turns that bring it nearest
-    to the middle of its range. For more, inverse kinematics from a low-discrepancy sequence over
-    the joint limits; solutions near an earlier one are dropped.
+    to the middle of its range. For more, Newton's method from a low-discrepancy sequence over the
+    joint limits; solutions near an earlier one are dropped.
 
     Parameters
     ----------
     robot, path, task
     count : int
-        How many at most; for more than one degree of redundancy, seeds to try.
+        How many at most.
     rng : Generator
         Shifts the sequence.
 
@@ -76,16 +79,14 @@ def _along_curves(
 def _scattered(
     robot: RobotModel, path: Path, task: Task, count: int, rng: np.random.Generator
 ) -> list[Array]:
-    """Return what inverse kinematics finds from `count` seeds, without what is near another."""
-    pose = path.pose(0.0)
+    """Return up to `count` configurations that Newton's method finds, none near another."""
+    manifold = Manifold(robot, task, robot.lower, robot.upper)
+    seeds = np.array(list(spread(robot, _TRIES * count, rng)))
+    q, arrived = manifold.project(seeds, targets(path, np.zeros(1))[0], far=True)
     found: list[Array] = []
-    for seed in spread(robot, count, rng):
-        try:
-            q = robot.inverse_kinematics(pose, task, seed=seed, attempts=1)
-        except InverseKinematicsError:
-            continue
-        if all(np.linalg.norm(q - other) > _SAME for other in found):
-            found.append(q)
+    for one in q[arrived]:
+        if len(found) < count and all(np.linalg.norm(one - other) > _SAME for other in found):
+            found.append(one)
     return found
 
 

@@ -1,0 +1,53 @@
+"""One step of Newton's method towards a start on the self-motion of the first pose."""
+
+import numpy as np
+
+from selfmotion.basics import Array, kernel
+from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
+from selfmotion.kernels.tool import POINTING, Rows, pose_error, select, task_rows
+
+
+@kernel
+def approach_start(
+    q: Array,
+    frame_jacobian: Array,
+    rotation: Array,
+    translation: Array,
+    target_rotation: Array,
+    target_translation: Array,
+    rows: Rows,
+    angle_kind: int,
+    null: Array,
+    reference: Array,
+    z: Array,
+) -> float:
+    """Add B⁻¹b to q (n,), with B = [J; N0ᵀ] and b = [e; z - N0ᵀ(q - q_ref)]; return max |b|.
+
+    B⁻¹ = Bᵀ(BBᵀ)⁻¹: errors of the product are taken out by the next step. -1 where B is singular,
+    NaN where q is not finite.
+    """
+    m, r, n = rows.shape[0], null.shape[1], q.shape[0]
+    error, b = np.zeros(6), np.empty(m + r)
+    system, factor = np.empty((m + r, n)), np.empty((m + r, m + r))
+    pointing = angle_kind == POINTING
+    pose_error(angle_kind, target_translation, target_rotation, translation, rotation, error)
+    select(rows, pointing, rotation, error, b)
+    task_rows(rows, pointing, rotation, frame_jacobian, system)
+    for i in range(r):
+        b[m + i] = z[i]
+        for k in range(n):
+            system[m + i, k] = null[k, i]
+            b[m + i] -= null[k, i] * (q[k] - reference[k])
+    largest = 0.0
+    for i in range(m + r):
+        # Written so that NaN stays.
+        if not abs(b[i]) <= largest:
+            largest = abs(b[i])
+    gram(system, factor)
+    if not cholesky(factor):
+        return -1.0 if largest < np.inf else np.nan
+    solve_cholesky(factor, b)
+    for k in range(n):
+        for i in range(m + r):
+            q[k] += system[i, k] * b[i]
+    return largest
