@@ -89,8 +89,7 @@ class Objective:
         # ∂q/∂x and ∂q̇/∂x there, once they were asked for.
         self._tangents: tuple[Array, Array] | None = None
         self._terms: dict[str, float] = {}
-        first = rollout.path.samples(0.0)
-        self._first = pin.SE3(first.rotation[0], first.translation[0])
+        self._first = rollout.first_pose
 
     @classmethod
     def of(
@@ -104,6 +103,7 @@ class Objective:
         counts: Counts | None = None,
         null_motion: NullMotion | None = None,
         around: Array | None = None,
+        rollout: Rollout | None = None,
     ) -> "Objective":
         """Return the objective of a problem around its motion at x = 0.
 
@@ -123,6 +123,8 @@ class Objective:
             By default that of the problem.
         around : (S, n), optional
             The null motion of x = 0; by default that of `still`.
+        rollout : Rollout, optional
+            One on this grid that nobody else uses any more; by default a new one.
         """
         robot, task, grid = problem.robot, problem.task, grid or still.grid
         t = grid.stage_times
@@ -138,7 +140,7 @@ class Objective:
         )
         start: Start = FreeStart(robot, task, still.start) if free else FixedStart(still.start)
         return cls(
-            Rollout(robot, problem.path, task, grid, damping=problem.damping_law),
+            rollout or Rollout(robot, problem.path, task, grid, damping=problem.damping_law),
             table,
             problem.all_costs,
             start,

@@ -54,6 +54,8 @@ class Rollout:
         self._rows, self._angle_kind = task.rows, kernels.angle_kind(task.rows, task.tool_axes)
         self._table, self._at = self._new_table(len(grid.stage_times))
         self._space = np.zeros(kernels.space_size(robot.dof, task.dimension))
+        # Of the last run, once they were asked for.
+        self._samples: Samples | None = None
         # What `polished` works on: one stage, at a node.
         self._node_table, self._node = self._new_table(1)
         self.aim(path.samples(grid.stage_times))
@@ -66,6 +68,7 @@ class Rollout:
 
     def aim(self, target: PathSamples) -> None:
         """Follow other poses and twists from now on, given at the stages (S)."""
+        self._samples = None
         self._at.target_translation[:] = target.translation
         self._at.target_rotation[:] = target.rotation
         self._at.target_twist[:] = target.twist
@@ -79,6 +82,7 @@ class Rollout:
             None when it arrived; otherwise the time [s] at which the task Jacobian lost rank or a
             number stopped being finite.
         """
+        self._samples = None
         self._at.epsilon[:] = epsilon
         self._at.q[0] = start
         failed = self._advance(self._table, self._at.q, self._gain)
@@ -184,6 +188,17 @@ class Rollout:
         return self._at.error
 
     @property
+    def first_pose(self) -> pin.SE3:
+        """The pose that it follows at the start."""
+        at = self._at
+        return pin.SE3(np.array(at.target_rotation[0]), np.array(at.target_translation[0]))
+
+    @property
+    def target(self) -> Array:
+        """Translations that it follows at the nodes [m], (N + 1, 3)."""
+        return self._at.target_translation[self.grid.node_stages]
+
+    @property
     def drift(self) -> Array:
         """Pose error of the last run at the nodes, (N + 1, 6) [m, rad].
 
@@ -198,17 +213,20 @@ class Rollout:
 
     def samples(self) -> Samples:
         """Return the last run at its stages, without copying: valid until the next run."""
-        return Samples(
-            sampling=self.grid.sampling,
-            q=self._at.q,
-            qd=self._at.qd,
-            jacobian=self._at.jacobian,
-            rotation=self._at.rotation,
-            translation=self._at.translation,
-            error=self._at.error,
-            task=self.task,
-            task_jacobian=self._at.task_jacobian,
-        )
+        if self._samples is None:
+            at = self._at
+            self._samples = Samples(
+                sampling=self.grid.sampling,
+                q=at.q,
+                qd=at.qd,
+                jacobian=at.jacobian,
+                rotation=at.rotation,
+                translation=at.translation,
+                error=at.error,
+                task=self.task,
+                task_jacobian=at.task_jacobian,
+            )
+        return self._samples
 
     def pullback(
         self, q_cotangent: Array, qd_cotangent: Array, error_cotangent: Array | None = None

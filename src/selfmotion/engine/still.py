@@ -51,6 +51,8 @@ class StillMotion:
         Whether the inverse was damped anywhere.
     jacobian_evaluations : int
         What it took.
+    rollout : Rollout
+        What integrated it: for one objective on the same grid.
     """
 
     problem: Problem
@@ -63,6 +65,7 @@ class StillMotion:
     broken: float | None
     damped: bool
     jacobian_evaluations: int
+    rollout: Rollout
 
     @classmethod
     def on(
@@ -77,8 +80,7 @@ class StillMotion:
         own = idle if guide is None else problem.brought_to_rest(t, guide(t))
         broken = rollout.run(configuration, own)
         samples, rows = rollout.samples(), problem.task.rows
-        target = problem.path.samples(grid.nodes).translation
-        extent = max(float(np.ptp(target, axis=0).max()), _SHORTEST)
+        extent = max(float(np.ptp(rollout.target, axis=0).max()), _SHORTEST)
         drift = rollout.drift[:, rows] / np.where(rows < 3, extent, 1.0)
         if broken is not None:
             drift = np.where((grid.nodes > broken)[:, None], np.nan, drift)
@@ -97,6 +99,7 @@ class StillMotion:
             broken,
             rollout.damped,
             rollout.jacobian_evaluations,
+            rollout,
         )
 
     @property
@@ -128,7 +131,7 @@ class StillMotion:
         problem = self.problem
         if space == "joint":
             return None
-        if problem.robot.redundancy(problem.task) == 0:
+        if problem.robot.dof == problem.task.dimension:
             return np.zeros((len(t), problem.robot.dof, 0))
         return self._transported(t)
 

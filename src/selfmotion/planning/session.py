@@ -120,7 +120,14 @@ class Session:
             still, jacobians = rough_still_motion(problem, configuration, grid)
         effort.counts.jacobians += jacobians
         bound = problem.bind_constraints(configuration, still.end, apart=effort.apart)
-        objective = Objective.of(problem, still, free=free, constraints=bound, counts=effort.counts)
+        objective = Objective.of(
+            problem,
+            still,
+            free=free,
+            constraints=bound,
+            counts=effort.counts,
+            rollout=still.rollout,
+        )
         return cls(effort, still, objective, free=free)
 
     @property

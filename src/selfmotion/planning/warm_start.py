@@ -5,7 +5,7 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError, shown
 from selfmotion.motion import NullMotionTable, Trajectory
 from selfmotion.plans import Plan, Problem
-from selfmotion.robot import null_basis
+from selfmotion.robot import null_space
 
 
 def check_warm_start(plan: object, problem: Problem) -> None:
@@ -55,7 +55,8 @@ def coefficients_of(
     # A plan of a part of its path ends earlier.
     theirs = np.minimum(t * pace, trajectory.t[-1])
     q, qd = trajectory(theirs), pace * trajectory(theirs, 1)
-    null = np.array([null_basis(problem.robot, problem.task, each).T for each in q])
+    jacobians = np.array([problem.robot.task_jacobian(each, problem.task) for each in q])
+    null = np.swapaxes(null_space(jacobians), 1, 2)
     acting = null @ table.matrix()
     wanted = np.einsum("srn,sn->sr", null, qd)
     return np.asarray(np.linalg.lstsq(acting.reshape(-1, table.size), wanted.ravel())[0])

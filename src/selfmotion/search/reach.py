@@ -16,7 +16,7 @@ from selfmotion.search.starts import spread, start_candidates
 _POSES, _BRANCHES, _SEEDS, _BISECTIONS = 64, 12, 24, 16
 # Before a pose counts as out of reach, a slower method tries so often; how far poses are out of
 # reach is looked at for so many of them.
-_RESTARTS, _LOOKS = 12, 12
+_RESTARTS, _LOOKS = 4, 12
 # Poses about a time of trouble, in shares of the path's duration.
 _ABOUT = np.array([-1e-3, 0.0, 1e-3, 4e-3])
 # A singular value below this share of the dexterous configuration's counts as stretched or folded,
