@@ -69,15 +69,25 @@ class Heats:
         for heat, (most, evaluations) in enumerate(_HEATS, 1):
             del self._merits[max(most, finalists) :]
             running = [session for _, session in self._merits]
+            optima: list[Array] = []
             for number, session in enumerate(running, 1):
                 self._progress(f"heat {heat}", number, len(running))
+                # What lies where another one has arrived would arrive there, too.
+                here, first = session.nodes, heat == 1
+                if first and any(self._apart(here, other) <= _NEAR for other in optima):
+                    self._forget(session)
+                    continue
                 session.minimize(evaluations)
                 if session.status is Status.INTERRUPTED:
                     raise KeyboardInterrupt
-                self._merits = [pair for pair in self._merits if pair[1] is not session]
+                optima.append(session.nodes)
+                self._forget(session)
                 self._note(session)
             self._drop()
         del self._merits[finalists:]
+
+    def _forget(self, session: Session) -> None:
+        self._merits = [pair for pair in self._merits if pair[1] is not session]
 
     def _note(self, session: Session) -> None:
         # Known from now on, whatever interrupts.
