@@ -50,6 +50,11 @@ class NullMotion(Saved, ABC, family="null motion"):
         return ()
 
     @property
+    def rough(self) -> "NullMotion":
+        """One of far fewer functions, near whose optimum its own is: by default the same."""
+        return self
+
+    @property
     @abstractmethod
     def fewest_steps(self) -> int:
         """Steps below which a grid does not resolve the functions."""
@@ -125,6 +130,12 @@ class BSplineNullMotion(NullMotion):
         _check_degree(self.degree)
         _check_space(self.space)
         as_whole(self.intervals, "null motion: intervals", 1, _MOST_INTERVALS)
+
+    @property
+    def rough(self) -> "BSplineNullMotion":
+        """See `NullMotion.rough`: of eight intervals, where it has twice as many or more."""
+        few = self.intervals < 2 * _FEWEST
+        return self if few else BSplineNullMotion(_FEWEST, max(self.degree, 3), self.space)
 
     def detours(self, rows: int) -> tuple[NullMotion, ...]:
         """See `NullMotion.detours`: one polynomial."""

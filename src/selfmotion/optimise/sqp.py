@@ -35,7 +35,7 @@ _FLATTEST = 1e-12
 _DOUBTFUL, _DOUBTS = 1e-4, 3
 # So many relaxed steps in turn have to take the violation to this share: conditions otherwise pull
 # in opposite directions here, and are to be restored on another way; so often at most.
-_PATIENCE, _PROGRESS, _RESTORATIONS = 4, 0.7, 3
+_PATIENCE, _PROGRESS = 4, 0.7
 # Trials of one step.
 _TRIALS = 40
 
@@ -62,10 +62,13 @@ class SequentialQuadratic:
         Converged when all conditions are kept and the decrease that the model predicts is below
         this times |F|.
     max_iterations : int
+    restorations : int
+        How often it may begin again elsewhere where conditions pull in opposite directions.
     """
 
     tolerance: float = 1e-7
     max_iterations: int = 200
+    restorations: int = 3
 
     def __post_init__(self) -> None:
         if not self.tolerance > 0.0:
@@ -146,7 +149,7 @@ class _Run:
 
     def until_done(self, inverse_hessian: Array | None) -> Status:
         status = self._descend(inverse_hessian)
-        for attempt in range(_RESTORATIONS):
+        for attempt in range(self._method.restorations):
             if status is not Status.INFEASIBLE:
                 return status
             before = self._best.at.worst

@@ -53,7 +53,7 @@ class Heats:
 
     def run(self, starts: Sequence[Array], finalists: int) -> None:
         """Leave the best `finalists` of the starts (n,), or fewer where they became the same."""
-        problem = self._problem
+        problem = replace(self._problem, null_motion=self._problem.null_motion.rough)
         steps = max(_STEPS, problem.null_motion.fewest_steps)
         # A path of many waypoints is crossed in strides: what is rough needs not stop at each.
         knots = problem.knots if len(problem.knots) <= steps else problem.knots[[0, -1]]

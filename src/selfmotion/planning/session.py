@@ -19,8 +19,9 @@ from selfmotion.engine import (
     settled_still_motion,
 )
 from selfmotion.motion import Grid, NullMotion, Trajectory
-from selfmotion.optimise import Iteration, Minimum, SequentialQuadratic, Status
+from selfmotion.optimise import Iteration, Minimum, Status
 from selfmotion.planning.closing import closed
+from selfmotion.planning.descent import Descent, breaks
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.warm_start import coefficients_of
 from selfmotion.plans import Binding, Plan, Problem
@@ -54,7 +55,6 @@ class Session:
 
     Attributes
     ----------
-    history : list of Iteration
     violations : tuple of str
         What is wrong for each constraint that the last minimisation could not meet.
     active : tuple of Binding
@@ -70,16 +70,14 @@ class Session:
     ) -> None:
         self._effort, self._still, self._free = effort, still, free
         self._objective = objective
-        self._before = effort.counts.evaluations
+        self._descent = Descent(effort, effort.counts.evaluations)
         self._minimum: Minimum | None = None
         self._ended: Status | None = None
-        # Whether conditions count: so far none was met on the way.
-        self._bound = False
         self._x = np.zeros(objective.size)
         self.null_motion: NullMotion = still.problem.null_motion
         self.remaining: float | None = None
         self._evaluations: int | None = None
-        self.history: list[Iteration] = []
+        self._tried: NullMotion | None = None
         self.violations: tuple[str, ...] = ()
         self.active: tuple[Binding, ...] = ()
 
@@ -134,6 +132,11 @@ class Session:
     def counts(self) -> Counts:
         """Work done by all sessions of the plan."""
         return self._effort.counts
+
+    @property
+    def history(self) -> list[Iteration]:
+        """All iterations so far."""
+        return self._descent.history
 
     @property
     def status(self) -> Status:
@@ -227,15 +230,84 @@ class Session:
             So many of the cost, for a rough optimum; by default what `Effort` allows.
         """
         self._evaluations = evaluations
-        if not np.isfinite(self._objective.value(self._x)):
-            self._objective.require_finite(self._x)
-        self._minimum = self._next_minimum()
-        self._x = np.array(self._minimum.x)
-        if self._minimum.status is Status.INTERRUPTED:
-            # For good, whatever is minimised later.
-            self.end(Status.INTERRUPTED)
+        objective, wanted = self._objective, self.null_motion
+        if not np.isfinite(objective.value(self._x)):
+            objective.require_finite(self._x)
+        if self._approached():
+            status = self.status
+            self._change(wanted)
+            if status in _CUT_SHORT:
+                self.end(status)
+        if self._ended is None:
+            self._descend()
         self._close()
         self.violations = self._objective.violations(self._x)
+
+    def _descend(self) -> None:
+        """Minimise from where the motion is; by a finer null motion where this one gets stuck."""
+        wanted, before = self._still.problem.null_motion, (self._x, self._objective)
+        # Where more freedom is taken anyway if it pays, it is a shorter way than restoration.
+        refines = wanted.gain < np.inf and self.null_motion == wanted
+        refines &= self._minimum is None and self._evaluations is None
+        self._take_minimum(restores=not refines)
+        if not refines or self.status is not Status.INFEASIBLE:
+            return
+        stuck = self._x, self._objective, self._minimum, wanted
+        self._x, self._objective = before
+        self._tried = wanted.detours(self._objective.null_motion.rows)[0]
+        self._change(self._tried)
+        self._take_minimum()
+        if not breaks(self._objective, self._x):
+            return
+        status = self.status
+        self._x, self._objective, self._minimum, self.null_motion = stuck
+        if status in _CUT_SHORT:
+            self.end(status)
+        else:
+            self._take_minimum()
+
+    def _approached(self) -> bool:
+        """Whether this is now the optimum of a rougher null motion, which leads to that wanted.
+
+        That is sought where conditions are violated at x = 0: with many coefficients, steps would
+        be small, and each would cost much.
+        """
+        wanted, objective = self.null_motion, self._objective
+        z, x, c = objective.parts(self._x)
+        first = self._minimum is None and self._evaluations is None and not x.any()
+        if wanted.rough == wanted or not first or not breaks(objective, self._x):
+            return False
+        before = self._x, objective
+        grid = Grid.aligned(self._still.problem.knots, wanted.rough.fewest_steps)
+        rough = self._on(grid, wanted.rough)
+        if not np.isfinite(rough.value(np.zeros(rough.size))):
+            return False
+        self._x = np.concatenate([z, np.zeros(rough.null_motion.size), c])
+        self._objective, self.null_motion = rough, wanted.rough
+        self._take_minimum()
+        if self.status is Status.INFEASIBLE:
+            self._x, self._objective, self.null_motion, self._minimum = *before, wanted, None
+            return False
+        return True
+
+    def _take_minimum(self, *, restores: bool = True) -> None:
+        """Go to the minimum from where the motion is, and know what binds there."""
+        objective, before = self._objective, self._minimum
+        minimum = self._descent.minimum(
+            objective,
+            self._x,
+            None if before is None else before.inverse_hessian,
+            evaluations=self._evaluations,
+            restores=restores,
+        )
+        self._minimum, self._x, self.active = minimum, np.array(minimum.x), ()
+        if minimum.status is Status.INTERRUPTED:
+            # For good, whatever is minimised later.
+            self.end(Status.INTERRUPTED)
+        if self._descent.bound and minimum.status is Status.CONVERGED:
+            least = _LEAST_SAVING * abs(minimum.cost)
+            samples = objective.samples(minimum.x)
+            self.active = objective.constraints.active(samples, minimum.multipliers, least)
 
     def detours(self) -> Iterator["Session"]:
         """Yield sessions around the same motion at x = 0 whose null motions may meet conditions.
@@ -244,10 +316,12 @@ class Session:
         """
         wanted = self._still.problem.null_motion
         for motion in wanted.detours(self._objective.null_motion.rows):
+            if motion == self._tried:
+                continue
             grid = self._still.grid.with_steps(motion.fewest_steps)
             session = Session(self._effort, self._still, self._on(grid, motion), free=self._free)
-            session.null_motion, session._before = motion, self._before
-            session.history = self.history
+            session.null_motion = motion
+            session._descent.before, session._descent.history = self._descent.before, self.history
             session.minimize()
             if wanted.gain == np.inf and not (session.violations or session.cut_short):
                 session._change(wanted)
@@ -330,7 +404,7 @@ class Session:
         around = objective.null_motion.epsilon(x)
         fine = self._on(grid, spline, around)
         none = np.zeros(fine.null_motion.size)
-        return Remaining(fine, np.concatenate([z, none, c]), bound=self._bound)
+        return Remaining(fine, np.concatenate([z, none, c]), bound=self._descent.bound)
 
     def _change(self, motion: NullMotion) -> None:
         """Go on with another null motion that can be what the present one is."""
@@ -362,78 +436,6 @@ class Session:
 
     def _cost(self) -> float:
         return sum(self._objective.terms(self._x).values())
-
-    def _next_minimum(self) -> Minimum:
-        """Minimise by the optimiser as long as conditions are kept; go on with them from there."""
-        effort, objective, before = self._effort, self._objective, self._minimum
-        if self._bound or self._breaks(self._x):
-            return self._bound_minimum(known=False)
-        kept: list[Iteration] = []
-        asked = False
-
-        def note(iteration: Iteration) -> bool:
-            nonlocal asked
-            if self._breaks(iteration.x):
-                return True
-            kept.append(iteration)
-            asked = effort.callback is not None and bool(effort.callback(iteration))
-            return asked
-
-        minimum = effort.optimizer.minimize(
-            objective,
-            self._x,
-            None if before is None else before.inverse_hessian,
-            max_evaluations=self._limit(),
-            callback=note,
-        )
-        self.history += kept
-        ended = asked or minimum.status in (Status.INTERRUPTED, Status.MAX_EVALUATIONS)
-        if ended or not self._breaks(minimum.x):
-            return minimum
-        # The last point that kept all: the one after it may be anywhere.
-        self._x = np.array(kept[-1].x) if kept else self._x
-        return self._bound_minimum(known=len(kept) > 0)
-
-    def _breaks(self, x: Array) -> bool:
-        """Whether a condition is violated; not where there is no motion."""
-        objective = self._objective
-        return np.isfinite(objective.value(x)) and not objective.conditions(x).worst <= 1.0
-
-    def _bound_minimum(self, *, known: bool) -> Minimum:
-        """Minimise where conditions count; `known` says that the start was told to the callback."""
-        effort, before = self._effort, self._minimum
-        first = known
-
-        def note(iteration: Iteration) -> bool:
-            nonlocal first
-            repeated, first = first, False
-            return not repeated and effort.callback is not None and bool(effort.callback(iteration))
-
-        self._bound = True
-        self.active = ()
-        minimum = SequentialQuadratic().minimize(
-            self._objective,
-            self._x,
-            None if before is None else before.inverse_hessian,
-            max_evaluations=self._limit(),
-            callback=note,
-        )
-        self.history += minimum.history[1 if known else 0 :]
-        if minimum.status is Status.CONVERGED:
-            objective, least = self._objective, _LEAST_SAVING * abs(minimum.cost)
-            samples = objective.samples(minimum.x)
-            self.active = objective.constraints.active(samples, minimum.multipliers, least)
-        return minimum
-
-    def _limit(self) -> int | None:
-        effort = self._effort
-        if self._evaluations is not None:
-            return effort.counts.evaluations + self._evaluations
-        if effort.max_evaluations is None:
-            return None
-        # At least one more, so that there is something to show.
-        used_up = self._before + effort.max_evaluations
-        return max(used_up, effort.counts.evaluations + 1)
 
     def _close(self) -> None:
         if self._objective.constraints.has_equalities and self._minimum is not None:
