@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import BPoly
 
 import selfmotion as sm
-from selfmotion.motion.polynomials import inner_roots
+from selfmotion.motion.polynomials import evaluated, inner_roots, may_vanish
 
 NAMES = ("a", "b", "c")
 
@@ -137,3 +137,17 @@ def test_accelerations_of_a_plan_are_those_of_its_velocities(panda, task: str) -
     t, h = np.linspace(0.1, 3.9, 77), 1e-5
     difference = (motion(t + h, 1) - motion(t - h, 1)) / (2 * h)
     np.testing.assert_allclose(motion(t, 2), difference, atol=1e-6)
+
+
+def test_polynomials_that_may_vanish_are_all_found() -> None:
+    rng = np.random.default_rng(0)
+    s = np.linspace(0.0, 1.0, 2001)
+    for degree in range(5):
+        coefficients = rng.normal(size=(degree + 1, 500))
+        values = np.stack([evaluated(coefficients, at) for at in s])
+        vanishes = (values.min(axis=0) <= 0.0) & (values.max(axis=0) >= 0.0)
+        found = may_vanish(coefficients)
+        assert found[vanishes].all()
+        # Far from zero nothing is looked for.
+        coefficients[0] += 100.0
+        assert not may_vanish(coefficients).any()

@@ -11,8 +11,8 @@ from selfmotion.path import Path, PathSamples
 from selfmotion.robot import RobotModel
 from selfmotion.task import DampingLaw, Task, feedback_rate
 
-# After a Newton correction this small [rad or m] rounding is left: convergence is quadratic.
-_POLISHED, _POLISHING_STEPS = 1e-8, 4
+# A tool this near to the path [m, rad] is on it; Newton's method needs few steps to that.
+_POLISHED, _POLISHING_STEPS = 1e-12, 4
 
 
 class Rollout:
@@ -116,9 +116,9 @@ class Rollout:
     def polished(self) -> tuple[Array, Array, Array]:
         """Return the nodes of the last run, put exactly onto the path; the run stays as it is.
 
-        Newton's method q ← q + J⁺e, from errors the size of the integration's; then eq. 4 once
-        more for q̇. A motion that was damped anywhere is returned as it is: it is off the path by
-        more than that, and its nodes do not come back to it one by one without a jump.
+        Newton's method q ← q + J⁺e, from errors the size of the integration's, with q̇ by eq. 4
+        there. A motion that was damped anywhere is returned as it is: it is off the path by more
+        than that, and its nodes do not come back to it one by one without a jump.
 
         Returns
         -------
@@ -128,19 +128,19 @@ class Rollout:
         q, qd = run.q[here], run.qd[here]
         if self.damped:
             return self.grid.nodes, q, qd
+        wrong = self.task.select_along(run.error[here, :, None], run.rotation[here])
+        nearer = q + _correction(run.task_jacobian[here], wrong)
         for i, stage in enumerate(here):
             self._node_table[0] = self._table[stage]
-            # J⁺e is eq. 4 for ẋ = 0, ε = 0 and K = 1.
-            node.target_twist[:] = node.epsilon[:] = 0.0
+            node.q[0] = nearer[i]
             for _ in range(_POLISHING_STEPS):
-                if self._advance(self._node_table, node.q, 1.0) is not None:
+                if self._advance(self._node_table, node.q, 0.0) is not None:
                     break
-                node.q[:] += node.qd
-                if np.abs(node.qd).max() < _POLISHED:
+                left = self.task.select(node.error[0, :, None], node.rotation[0])
+                q[i], qd[i] = node.q[0], node.qd[0]
+                if np.abs(left).max() < _POLISHED:
                     break
-            node.target_twist[:], node.epsilon[:] = run.target_twist[stage], run.epsilon[stage]
-            if self._advance(self._node_table, node.q, 0.0) is None:
-                q[i], qd[i] = node.q, node.qd
+                node.q[0] += _correction(node.task_jacobian[0], left)
         self.jacobian_evaluations += len(here)
         return self.grid.nodes, q, qd
 
@@ -271,3 +271,9 @@ class Rollout:
             target_gradient,
         )
         return epsilon_gradient, start_gradient, target_gradient
+
+
+def _correction(jacobians: Array, errors: Array) -> Array:
+    """Return J⁺e for Jacobians (…, m, n) and errors (…, m, 1), (…, n)."""
+    transposed = np.swapaxes(jacobians, -1, -2)
+    return np.asarray((transposed @ np.linalg.solve(jacobians @ transposed, errors))[..., 0])

@@ -44,6 +44,13 @@ def may_pass(coefficients: Array, least: Array, largest: Array) -> npt.NDArray[n
     return np.asarray((inner.max(axis=0) > largest) | (inner.min(axis=0) < least))
 
 
+def may_vanish(coefficients: Array) -> npt.NDArray[np.bool_]:
+    """Return which polynomials (m + 1, …) may be 0 somewhere inside: not those of one sign."""
+    inner = np.tensordot(_bernstein(len(coefficients) - 1), coefficients, 1)
+    hull = np.concatenate([coefficients[:1], inner, coefficients.sum(axis=0, keepdims=True)])
+    return np.asarray((hull.max(axis=0) >= 0.0) & (hull.min(axis=0) <= 0.0))
+
+
 def inner_roots(coefficients: Array) -> Array:
     """Return the real roots of M polynomials (m + 1, M) in 0 < s < 1, (m, M); 0 stands for none."""
     degree, count = len(coefficients) - 1, coefficients.shape[1]

@@ -18,7 +18,13 @@ from selfmotion.basics import (
     read_table,
     shown,
 )
-from selfmotion.motion.polynomials import differentiated, evaluated, inner_roots, may_pass
+from selfmotion.motion.polynomials import (
+    differentiated,
+    evaluated,
+    inner_roots,
+    may_pass,
+    may_vanish,
+)
 
 # What follows a joint's name in the header of the columns of its velocity and acceleration.
 _MANY = {"_velocity": "velocities", "_acceleration": "accelerations"}
@@ -261,8 +267,7 @@ class Trajectory:
         """Where in each interval joints turn round, sorted, (N - 1, m, n); 0 for nowhere."""
         pieces = self._pieces(1)
         turns = np.zeros((len(pieces) - 1, *pieces.shape[1:]))
-        zero = np.zeros(pieces.shape[2])
-        some, joints = np.nonzero(may_pass(pieces, zero, zero))
+        some, joints = np.nonzero(may_vanish(pieces))
         turns[:, some, joints] = inner_roots(pieces[:, some, joints])
         return np.sort(turns.transpose(1, 0, 2), axis=1)
 
