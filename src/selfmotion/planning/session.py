@@ -397,7 +397,8 @@ class Session:
         """Return what is left to save around the present motion."""
         problem = self._still.problem
         spline = finest(problem.robot.redundancy(problem.task))
-        grid = self._objective.grid.with_steps(spline.fewest_steps // _THINNER)
+        # More than a step for each interval makes no better estimate.
+        grid = self._objective.grid.with_steps(spline.intervals)
         same = grid is self._objective.grid
         objective = self._objective if same else self._on(grid)
         z, x, c = objective.parts(self._x)
