@@ -3,18 +3,24 @@
 import dataclasses
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 
 import selfmotion as sm
 from conftest import robot_named
 from selfmotion.basics import restore
 from selfmotion.basics.arrays import Array
+from selfmotion.certificate import Extreme
 from selfmotion.engine import Rollout, settled_still_motion
 from selfmotion.motion.grid import Grid
+from selfmotion.optimise import Status
 from selfmotion.path import Truncated
+from selfmotion.planning.run import _message
 from selfmotion.replay import write_replay
+from selfmotion.search import reachable
 
 # The end of a part that only the workspace limits, relative to the closed form.
 EDGE = 1e-3
@@ -255,3 +261,45 @@ def test_poses_that_limits_put_out_of_reach_end_the_search(
     assert float(told[1]) == pytest.approx(edge, rel=EDGE)
     assert "at its limit: joint 'joint2', 'joint3'" in plan.certificate.verdict
     assert not any(stage.startswith("search") for stage in stages)
+
+
+@pytest.mark.parametrize(
+    ("name", "task"),
+    [("panda", "pose"), ("panda", "position"), ("ur5", "pointing"), ("planar_3r", "planar")],
+)
+def test_what_a_motion_within_the_limits_draws_is_in_reach(name: str, task: str) -> None:
+    """Joint motions that hug their limits: no pose of theirs may count as out of reach."""
+    robot = robot_named(name)
+    lower, upper = robot.finite_limits()
+    t = np.linspace(0.0, 4.0, 81)
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        first = lower + (upper - lower) * rng.uniform(0.05, 0.95, robot.dof)
+        knots = first + np.cumsum(rng.uniform(-0.6, 0.6, (5, robot.dof)), axis=0)
+        rough = make_interp_spline(np.linspace(0.0, 4.0, 5), knots)(t)
+        inside = np.pad(np.clip(rough, lower + 1e-3, upper - 1e-3), ((4, 4), (0, 0)), mode="edge")
+        q = np.stack([np.convolve(joint, np.ones(9) / 9.0, "valid") for joint in inside.T], axis=1)
+        path = sm.Waypoints.from_poses(t, [robot.pose(x) for x in q])
+        for start in (None, q[0]):
+            problem = sm.Problem(robot, path, task, start, rest=False, collision=None)
+            assert reachable(problem, 48, np.random.default_rng(0)).reason == ""
+
+
+@pytest.mark.parametrize("on_path", [True, False])
+def test_next_to_a_singular_pose_no_gradient_is_blamed(on_path: bool) -> None:
+    session = SimpleNamespace(status=Status.GRADIENT, violations=(), cut_short=False)
+    certificate = SimpleNamespace(
+        on_path=on_path,
+        failures=() if on_path else ("the tool is off",),
+        verdict="not verified: the tool is off",
+        damped=(),
+        smallest_singular_value=Extreme(3e-7, 1.5, "tool"),
+    )
+    said = _message(
+        SimpleNamespace(session=session, ending=""),  # type: ignore[arg-type]
+        SimpleNamespace(certificate=certificate),  # type: ignore[arg-type]
+        [],
+    )
+    singular = "the motion passes a singular pose near t = 1.5 s (smallest singular value 3e-07)"
+    assert said.startswith(Status.GRADIENT.message if on_path else singular)
+    assert said.endswith("" if on_path else "but not verified: the tool is off")

@@ -405,7 +405,14 @@ def _message(part: Part, finished: Finished, notes: list[str]) -> str:
     """Return in words how the optimisation ended, and what came of it."""
     session, violations = part.session, part.session.violations
     certificate = finished.certificate
-    parts = [session.status.message] if session.cut_short or not violations else []
+    said = session.status.message
+    if session.status is Status.GRADIENT and not certificate.on_path:
+        least = certificate.smallest_singular_value
+        said = (
+            f"the motion passes a singular pose near t = {least.time:.4g} s (smallest singular "
+            f"value {least.value:.2g}), next to which its cost cannot be lowered"
+        )
+    parts = [said] if session.cut_short or not violations else []
     if violations:
         parts.append(f"not all constraints could be met: {'; '.join(violations)}")
     if certificate.failures and not (violations or part.ending):

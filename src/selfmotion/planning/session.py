@@ -29,6 +29,8 @@ from selfmotion.plans import Binding, Plan, Problem
 # Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands; and at
 # which it tells what null motion is wanted.
 _COST_AGREEMENT, _ROUGH_AGREEMENT = 1e-4, 1e-2
+# A grid on which the motion at x = 0 costs this much more or less will do for a rough null motion.
+_ALIKE = 0.05
 # While a null motion is chosen, this share of the steps that it should have will do.
 _THINNER = 2
 # A cost that rises this much on two grids in turn has no limit.
@@ -277,11 +279,14 @@ class Session:
         first = self._minimum is None and self._evaluations is None and not x.any()
         if wanted.rough == wanted or not first or not breaks(objective, self._x):
             return False
-        before = self._x, objective
+        before, cost = (self._x, objective), objective.value(self._x)
         grid = Grid.aligned(self._still.problem.knots, wanted.rough.fewest_steps)
         rough = self._on(grid, wanted.rough)
-        if not np.isfinite(rough.value(np.zeros(rough.size))):
-            return False
+        # Written so that NaN asks for more steps, too.
+        while not _relative_change(cost, rough.value(np.zeros(rough.size))) <= _ALIKE:
+            if rough.grid.steps >= objective.grid.steps:
+                return False
+            rough = self._on(rough.grid.halved(), wanted.rough)
         self._x = np.concatenate([z, np.zeros(rough.null_motion.size), c])
         self._objective, self.null_motion = rough, wanted.rough
         self._take_minimum()

@@ -17,6 +17,8 @@ _POSES, _BRANCHES, _SEEDS, _BISECTIONS = 64, 12, 24, 16
 # Before a pose counts as out of reach, a slower method tries so often; how far poses are out of
 # reach is looked at for so many of them.
 _RESTARTS, _LOOKS = 4, 12
+# Who gets so near [m + rad] counts as there.
+_NEARLY = 1e-5
 # Poses about a time of trouble, in shares of the path's duration.
 _ABOUT = np.array([-1e-3, 0.0, 1e-3, 4e-3])
 # A singular value below this share of the dexterous configuration's counts as stretched or folded,
@@ -97,8 +99,10 @@ class _Poses:
             q = self._robot.inverse_kinematics(
                 self._path.pose(t), self._task, seed=known[0], rng=self._rng, attempts=_RESTARTS
             )
-        except InverseKinematicsError:
-            return np.empty((0, self._robot.dof))
+        except InverseKinematicsError as error:
+            # Where the arm is all but stretched, the last digits are not worth the search.
+            nearly = error.position_miss + error.rotation_miss < _NEARLY
+            return known if nearly else np.empty((0, self._robot.dof))
         return q[None]
 
     def edge(self, interval: tuple[float, float], known: Array) -> tuple[Array, float]:
