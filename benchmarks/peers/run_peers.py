@@ -35,7 +35,8 @@ def main() -> int:
     default = ours(robot, path, start, sm.RefinedNullMotion(), "default")
     coarse = ours(robot, path, start, sm.BSplineNullMotion(24), "24 intervals, cubic")
     fine = ours(robot, path, start, sm.BSplineNullMotion(120, degree=1), "120 intervals, linear")
-    rows = [default, coarse, fine]
+    finest = ours(robot, path, start, sm.BSplineNullMotion(256), "256 intervals, cubic")
+    rows = [default, coarse, fine, finest]
     for program, packages in PEERS.items():
         python = environment(program.split("_")[0], packages)
         command = [str(python), str(HERE / program), str(given)]
