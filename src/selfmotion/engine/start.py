@@ -78,17 +78,13 @@ class FreeStart:
     def configuration(self, z: Array, pose: pin.SE3) -> Array | None:
         """See `Start.configuration`."""
         q, tool = self._reference + self._null @ z, self._tool
-        target = np.array(pose.rotation), np.array(pose.translation)
+        target = np.array(pose.rotation, order="C"), np.array(pose.translation)
         for _ in range(_STEPS):
+            # In one order, for which the rest of the package is compiled, too.
+            jacobian, rotation = (np.ascontiguousarray(a) for a in (tool.at(q), tool.rotation))
+            place = rotation, tool.translation
             wrong = kernels.approach_start(
-                q,
-                tool.at(q),
-                tool.rotation,
-                tool.translation,
-                *target,
-                *self._rows,
-                *self._chart,
-                z,
+                q, jacobian, *place, *target, *self._rows, *self._chart, z
             )
             # NaN arrives nowhere.
             if not wrong >= 0.0:
