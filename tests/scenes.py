@@ -209,8 +209,9 @@ def seams(number: int, robot: sm.RobotModel, start: Array) -> list[Scene]:
         plan = sm.plan(sm.Problem(robot, path, task, start), max_evaluations=3)
     except sm.SelfmotionError:
         return []
-    # Its bodies are meshes, of which the judge knows nothing.
-    judge = replace(Judge.of(plan), bodies=())
+    # Its bodies are meshes, of which the judge knows nothing; beyond the arm's limits of position
+    # and speed nothing is asked.
+    judge = replace(Judge.of(plan), bodies=(), limits={})
     found = [Scene(judge, plan.trajectory)]
     for spoil in (_thinned, _moved):
         motion = spoil(plan.trajectory, rng)

@@ -152,6 +152,38 @@ def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:
     assert check(1.0).samples == 9
 
 
+@pytest.mark.parametrize("angular", [False, True])
+def test_no_peak_between_the_points_looked_at_is_missed(angular: bool) -> None:
+    """A tool at rest, and a path beside it by a parabola whose top is anywhere."""
+    robot, most = robot_named("panda"), 1e-4
+    q = robot.dexterous_configuration("pose")
+    pose = robot.pose(q)
+    trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
+
+    class Arched(sm.Path):
+        duration = 1.0
+        knots = np.array([0.0, 1.0])
+
+        def __init__(self, top: float) -> None:
+            self.top = top
+
+        def evaluate(self, t: Array) -> sm.PathSamples:
+            sizes = most * (1.0 - (t - self.top) ** 2)
+            motions = np.outer(sizes, np.eye(6)[5 if angular else 1])
+            places = [pose * pin.exp6(pin.Motion(motion)) for motion in motions]
+            translation = np.array([place.translation for place in places])
+            rotation = np.array([place.rotation for place in places])
+            return sm.PathSamples(t, translation, rotation, np.zeros((len(t), 6)))
+
+    for top in np.random.default_rng(0).uniform(0.05, 0.95, 40):
+        for allowed in (1.0, most * (1.0 - 1e-5)):
+            given = sm.Tolerance(allowed, allowed)
+            path = Arched(float(top))
+            found = bound_errors(robot, path, sm.Task.POSE, trajectory, given, ())
+            value = (found.rotation if angular else found.position).value
+            assert most - ROUNDING <= value <= 1.01 * most
+
+
 @pytest.mark.parametrize("row", range(6))
 def test_errors_of_every_row_count(row: int) -> None:
     """A tool at rest, and a path that is a constant bit beside it, or turned."""

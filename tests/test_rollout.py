@@ -68,3 +68,16 @@ def test_polishing_leaves_the_run_as_it_is(panda: sm.RobotModel) -> None:
     assert not np.array_equal(q, before[rollout.grid.node_stages])
     np.testing.assert_array_equal(rollout.samples().q, before)
     np.testing.assert_array_equal(rollout.drift, drift)
+
+
+def test_what_broke_down_is_polished_as_far_as_it_goes(panda: sm.RobotModel) -> None:
+    """Beyond the breakdown there is nothing that could be put onto the path."""
+    start = start_of(panda, "pose")
+    path = short_line(panda, start)
+    rollout = Rollout(panda, path, sm.Task.POSE, Grid.aligned(path.knots, 8))
+    epsilon = np.zeros((33, 7))
+    epsilon[13] = np.inf
+    assert rollout.run(start, epsilon) is not None
+    t, q, _ = rollout.polished()
+    for when, here in zip(t[:3], q[:3], strict=True):
+        assert max(sm.Task.POSE.miss(path.pose(when), panda.pose(here))) < 1e-12

@@ -5,7 +5,8 @@ deviation of the tool from the path is smooth. On each such interval it is measu
 points; the polynomial through every other of them predicts the rest, and the largest miss r of
 these predictions bounds how far the polynomial through all points is off between them (its own
 error is smaller by the order of two further halvings). The bound is the largest value of that
-polynomial plus r. Intervals on which it does not decide are halved.
+polynomial at 33 points, plus what it may rise by between these, plus r. Intervals on which it does
+not decide are halved.
 """
 
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError
 from selfmotion.certificate.deviation import deviation_from, deviation_size, excess
 from selfmotion.certificate.findings import Extreme, Tolerance
-from selfmotion.certificate.interpolation import stencil
+from selfmotion.certificate.interpolation import SAG, stencil
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel
@@ -196,6 +197,9 @@ def _bounds(
     left = np.abs(miss[:, 1::2] - np.einsum("ab,ibk->iak", predict, miss[:, ::2]))
     rest = np.stack([_length(left[:, :, :3]), _length(left[:, :, 3:])], axis=2).max(axis=1)
     between = np.einsum("ab,ibk->iak", dense, miss)
+    bent = np.diff(between, 2, axis=1)
+    sag = np.stack([_length(bent[:, :, :3]), _length(bent[:, :, 3:])], axis=2).max(axis=1)
+    rest += SAG * sag
     times = starts + lengths * dense_shares
     values = _quantities(between, times, path.duration, relaxations)
     measured = _quantities(miss, t, path.duration, relaxations)[:, :, :2].max(axis=1)

@@ -14,7 +14,7 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.certificate.findings import Finding
-from selfmotion.certificate.interpolation import stencil
+from selfmotion.certificate.interpolation import SAG, stencil
 from selfmotion.certificate.requirement import FinishedMotion
 from selfmotion.motion import Trajectory
 
@@ -73,8 +73,7 @@ def _bounds(motion: Trajectory, intervals: Array, shares: Shares) -> tuple[Array
     used = shares(motion(t), motion(t, 1), motion(t, 2)).reshape(len(intervals), _POINTS, -1)
     missed = np.abs(used[:, 1::2] - np.einsum("ab,ibn->ian", predict, used[:, ::2]))
     inside = np.einsum("ab,ibn->ian", dense, used)
-    # The peak of a parabola is higher than the points beside it by at most this.
-    missed_peaks = 0.125 * np.abs(np.diff(inside, 2, axis=1)).max(axis=1)
+    missed_peaks = SAG * np.abs(np.diff(inside, 2, axis=1)).max(axis=1)
     size = np.abs(inside)
     times = starts + lengths * between[np.argmax(size, axis=1)]
     bounds = size.max(axis=1) + missed.max(axis=1) + missed_peaks

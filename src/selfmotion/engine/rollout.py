@@ -274,6 +274,11 @@ class Rollout:
 
 
 def _correction(jacobians: Array, errors: Array) -> Array:
-    """Return J⁺e for Jacobians (…, m, n) and errors (…, m, 1), (…, n)."""
+    """Return J⁺e for Jacobians (…, m, n) and errors (…, m, 1), (…, n); 0 where one is singular."""
     transposed = np.swapaxes(jacobians, -1, -2)
-    return np.asarray((transposed @ np.linalg.solve(jacobians @ transposed, errors))[..., 0])
+    try:
+        solved = np.linalg.solve(jacobians @ transposed, errors)
+    except np.linalg.LinAlgError:
+        # A motion that broke down has no Jacobians beyond that.
+        return np.zeros(transposed.shape[:-1])
+    return np.asarray((transposed @ solved)[..., 0])
