@@ -467,6 +467,28 @@ class Bodies:
         return self.worst(q[None])
 
 
+@pytest.mark.parametrize("most", [1, 4, 200_000])
+def test_what_is_not_looked_at_is_never_kept(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two bodies that meet for an instant, while another pair nearly does all the time."""
+    monkeypatch.setattr("selfmotion.certificate.apart._MOST", most)
+    motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
+    bodies = Bodies(
+        lambda q: np.full(len(q), 1e-7),
+        lambda q: np.minimum(np.abs(q[:, 0] - 1.234567), 0.3) - 1e-3,
+    )
+    found = closest_at_all_times(bodies, motion.trajectory, 0.0)  # type: ignore[arg-type]
+    assert found.open_until is not None or found.closest.value < 0.0
+
+
+@pytest.mark.parametrize("above", [-1e-10, -1e-17, 0.0, 1e-17, 1e-12])
+def test_bodies_that_come_exactly_as_near_as_they_may_are_told(above: float) -> None:
+    motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
+    bodies = Bodies(lambda q: 0.1 + np.abs(q[:, 0] - 1.234567))
+    found = closest_at_all_times(bodies, motion.trajectory, 0.1 + above)  # type: ignore[arg-type]
+    assert found.names == "first0 - second0"
+    assert found.closest.value == pytest.approx(0.1, abs=0.002)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_the_closest_approach_is_found_wherever_it_is(seed: int) -> None:
     """Dips as narrow as levers allow, at times that nothing looks at by itself."""

@@ -177,8 +177,7 @@ def closest_at_all_times(
         last = np.stack(ends[1:], axis=1).reshape(len(intervals), -1)
         approach = _nearer(approach, model, middle, ends[1], exact_below)
         goal = _goal(approach.closest, distance)
-    row = rows[int(np.argmin(first[rows].min(axis=1)))] if len(rows) <= _MOST else 0
-    return _undecided(model, approach, intervals, first, distance, int(row))
+    return _undecided(model, approach, intervals, first, 0.5 * (first + last - budget), distance)
 
 
 def _levers(model: CollisionModel, trajectory: Trajectory) -> Array:
@@ -207,13 +206,19 @@ def _undecided(
     approach: Approach,
     intervals: Array,
     first: Array,
+    bounds: Array,
     distance: float,
-    row: int,
 ) -> Approach:
-    """Return the approach that halving does not decide, unless it only concerns the report."""
-    pair = int(np.argmin(first[row]))
-    near = Closest(float(first[row, pair]), *model.pairs[pair])
-    if near.value > distance + _SLACK:
+    """Return the approach that halving does not decide, unless it only concerns the report.
+
+    Pairs (P) come no nearer than `bounds` (I, P) on intervals (I, 2) that they begin at distances
+    `first` (I, P).
+    """
+    # Written so that NaN is open.
+    if np.all(bounds >= distance) or approach.closest.value < distance:
         return approach
+    least = int(np.argmin(np.where(np.isnan(bounds), -np.inf, bounds)))
+    row, pair = np.unravel_index(least, bounds.shape)
+    near = Closest(float(first[row, pair]), *model.pairs[int(pair)])
     start, end = intervals[row]
     return Approach(near, float(start), float(end))

@@ -14,9 +14,9 @@ from selfmotion.search.starts import spread, start_candidates
 # Poses along the path that are looked at, branches of solutions that are followed from one to the
 # next, seeds where none of them goes on, and bisections of the time at which that happens.
 _POSES, _BRANCHES, _SEEDS, _BISECTIONS = 64, 12, 24, 16
-# Before a pose counts as out of reach, a slower method tries so often; how far poses are out of
-# reach is looked at for so many of them.
-_RESTARTS, _LOOKS = 4, 12
+# Before a pose counts as out of reach, so many seeds more are tried, and a slower method from some;
+# how far poses are out of reach is looked at for so many of them.
+_MORE, _RESTARTS, _LOOKS = 600, 12, 12
 # Who gets so near [m + rad] counts as there.
 _NEARLY = 1e-5
 # Poses about a time of trouble, in shares of the path's duration.
@@ -93,6 +93,11 @@ class _Poses:
     def sure_solutions(self, t: float, known: Array) -> Array:
         """Return configurations for the pose at t, also where Newton's method finds none."""
         found = self.solutions(t, known)
+        if not len(found):
+            target = targets(self._path, np.array([t]))[0]
+            seeds = np.array(list(spread(self._robot, _MORE, self._rng)))
+            found, arrived = self._manifold.project(seeds, target, far=True)
+            found = found[arrived]
         if len(found):
             return found
         try:
