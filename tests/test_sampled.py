@@ -34,6 +34,21 @@ def searched(robot: sm.RobotModel, path: sm.Path, **options: object) -> list[sm.
     return sampled_sequences(robot, path, sm.Task.POSITION, t, **(values | options))
 
 
+@pytest.mark.parametrize("off", [1e-8, 1e-4, 0.1, 10.0, np.nan])
+def test_compiled_kinematics_that_are_not_those_of_pinocchio_are_refused(
+    off: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = robot_named("panda")
+    rotations, positions, axes, turning = robot.joint_places()
+    wrong = positions.copy()
+    wrong[3, 0] += off
+    monkeypatch.setattr(
+        sm.RobotModel, "joint_places", lambda own: (rotations, wrong, axes, turning)
+    )
+    with pytest.raises(sm.RobotError, match="compiled kinematics put 'panda_hand_tcp'"):
+        Manifold(robot, sm.Task.POSITION, robot.lower, robot.upper)
+
+
 @pytest.mark.parametrize(("name", "task"), CASES)
 def test_projection_is_onto_the_path_and_within_the_limits(name: str, task: str) -> None:
     robot, rows = robot_named(name), sm.Task.of(task)

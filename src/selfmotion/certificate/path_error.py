@@ -195,11 +195,8 @@ def _bounds(
     miss = deviation_from(robot, path, task, t.ravel(), q, in_tool_axes)
     miss = miss.reshape(len(intervals), count, 6)
     left = np.abs(miss[:, 1::2] - np.einsum("ab,ibk->iak", predict, miss[:, ::2]))
-    rest = np.stack([_length(left[:, :, :3]), _length(left[:, :, 3:])], axis=2).max(axis=1)
     between = np.einsum("ab,ibk->iak", dense, miss)
-    bent = np.diff(between, 2, axis=1)
-    sag = np.stack([_length(bent[:, :, :3]), _length(bent[:, :, 3:])], axis=2).max(axis=1)
-    rest += SAG * sag
+    rest = _largest(left) + SAG * _largest(np.diff(between, 2, axis=1))
     times = starts + lengths * dense_shares
     values = _quantities(between, times, path.duration, relaxations)
     measured = _quantities(miss, t, path.duration, relaxations)[:, :, :2].max(axis=1)
@@ -217,6 +214,12 @@ def _quantities(miss: Array, t: Array, duration: float, relaxations: Sequence[Re
     columns = [_length(beyond[:, :3]), _length(beyond[:, 3:])]
     columns += [deviation_size(item, duration, times, flat) for item in relaxations]
     return np.stack(columns, axis=1).reshape(*t.shape, -1)
+
+
+def _largest(parts: Array) -> Array:
+    """Return the largest lengths of translations and rotations (I, P, 6), (I, 2)."""
+    both = np.stack([_length(parts[:, :, :3]), _length(parts[:, :, 3:])], axis=2)
+    return np.asarray(both.max(axis=1))
 
 
 def _length(rows: Array) -> Array:

@@ -34,7 +34,7 @@ _FLATTEST = 1e-12
 # share of F for the first, which is asked so often.
 _DOUBTFUL, _DOUBTS = 1e-4, 3
 # So many relaxed steps in turn have to take the violation to this share: conditions otherwise pull
-# in opposite directions here, and are to be restored on another way; so often at most.
+# in opposite directions here, and are to be restored on another way.
 _PATIENCE, _PROGRESS = 4, 0.7
 # Trials of one step.
 _TRIALS = 40

@@ -19,18 +19,18 @@ class Descent:
     Parameters
     ----------
     effort : Effort
-    before : int
-        Evaluations of the cost before this start.
 
     Attributes
     ----------
+    before : int
+        Evaluations of the cost before this start.
     history : list of Iteration
     bound : bool
         Whether conditions count: until then none was met on the way.
     """
 
-    def __init__(self, effort: Effort, before: int) -> None:
-        self._effort, self.before = effort, before
+    def __init__(self, effort: Effort) -> None:
+        self._effort, self.before = effort, effort.counts.evaluations
         self.history: list[Iteration] = []
         self.bound = False
 

@@ -72,7 +72,7 @@ class Session:
     ) -> None:
         self._effort, self._still, self._free = effort, still, free
         self._objective = objective
-        self._descent = Descent(effort, effort.counts.evaluations)
+        self._descent = Descent(effort)
         self._minimum: Minimum | None = None
         self._ended: Status | None = None
         self._x = np.zeros(objective.size)

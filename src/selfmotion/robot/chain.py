@@ -60,11 +60,7 @@ def placements(
             r[0, a, b] = 1.0 if a == b else 0.0
     for j in range(len(q)):
         compose(r[j], p[j], rotations[j], positions[j], middle, shift)
-        if is_revolute[j]:
-            turned(axes[j], q[j], turn)
+        turned(axes[j], q[j] if is_revolute[j] else 0.0, turn)
         for a in range(3):
             slide[a] = 0.0 if is_revolute[j] else q[j] * axes[j, a]
-            for b in range(3):
-                if not is_revolute[j]:
-                    turn[a, b] = 1.0 if a == b else 0.0
         compose(middle, shift, turn, slide, r[j + 1], p[j + 1])

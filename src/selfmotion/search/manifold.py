@@ -79,13 +79,14 @@ class Manifold:
 
     def _check(self) -> None:
         """Compare with Pinocchio: where it puts the tool, nothing is left to correct."""
-        lower, upper = self.robot.finite_limits()
+        ends = zip(self._limits, self.robot.finite_limits(), strict=True)
+        lower, upper = (np.where(np.isfinite(own), own, finite) for own, finite in ends)
         for q in np.random.default_rng(0).uniform(lower, upper, (3, self.robot.dof)):
             pose = self.robot.pose(q)
             target = np.concatenate([pose.translation, pose.rotation.ravel()])
             found, arrived = self.project(q[None], target)
             miss = max(self.task.miss(pose, self.robot.pose(found[0])))
-            if arrived[0] and not miss < _AGREE:
+            if not (arrived[0] and miss < _AGREE):
                 raise RobotError(
                     f"{self.robot.name}: compiled kinematics put '{self.robot.tool}' {miss:.3g} "
                     f"off where Pinocchio does; this is an error of selfmotion's"

@@ -84,20 +84,15 @@ class _Poses:
 
     def solutions(self, t: float, known: Array) -> Array:
         """Return configurations for the pose at t from those of a pose nearby, or any, (K, n)."""
-        target = targets(self._path, np.array([t]))[0]
-        found, arrived = self._manifold.project(known[:_BRANCHES], target)
-        if not arrived.any():
-            found, arrived = self._manifold.project(self._seeds, target, far=True)
-        return np.asarray(found[arrived])
+        found = self._reached(t, known[:_BRANCHES])
+        return found if len(found) else self._reached(t, self._seeds, far=True)
 
     def sure_solutions(self, t: float, known: Array) -> Array:
         """Return configurations for the pose at t, also where Newton's method finds none."""
         found = self.solutions(t, known)
         if not len(found):
-            target = targets(self._path, np.array([t]))[0]
             seeds = np.array(list(spread(self._robot, _MORE, self._rng)))
-            found, arrived = self._manifold.project(seeds, target, far=True)
-            found = found[arrived]
+            found = self._reached(t, seeds, far=True)
         if len(found):
             return found
         try:
@@ -109,6 +104,12 @@ class _Poses:
             nearly = error.position_miss + error.rotation_miss < _NEARLY
             return known if nearly else np.empty((0, self._robot.dof))
         return q[None]
+
+    def _reached(self, t: float, seeds: Array, *, far: bool = False) -> Array:
+        """Return what Newton's method makes of seeds (K, n) for the pose at t, (K', n)."""
+        target = targets(self._path, np.array([t]))[0]
+        found, arrived = self._manifold.project(seeds, target, far=far)
+        return np.asarray(found[arrived])
 
     def edge(self, interval: tuple[float, float], known: Array) -> tuple[Array, float]:
         """Return solutions at the last time of an interval that there are any, and this time."""
