@@ -27,7 +27,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.engine import Objective, StillMotion, settled_still_motion
 from selfmotion.optimise import inverse_metric
-from selfmotion.plans import problem_from_dict, problem_to_dict
+from selfmotion.problem import problem_from_dict, problem_to_dict
 
 DATA = Path(__file__).parent / "data"
 PROBLEMS = DATA / "constrained_problems.json"

@@ -18,7 +18,7 @@ from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart
 from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
-from selfmotion.plans.relaxed_rows import check_relaxations
+from selfmotion.problem.relaxed_rows import check_relaxations
 from selfmotion.task.damping import DampingLaw
 
 # Exact gradients against central differences, relative to the largest entry.

@@ -9,7 +9,7 @@ import selfmotion as sm
 from conftest import PANDA_HOME, robot_named, short_line, start_of
 from selfmotion.certificate import AtRest
 from selfmotion.motion import resting_window
-from selfmotion.plans.rest import rest_orders
+from selfmotion.problem.rest import rest_orders
 
 # At rest by construction: what is left is the rounding of the path's own twist.
 REST = 1e-9

@@ -55,6 +55,7 @@ from selfmotion.collision import (
 )
 from selfmotion.constraints import (
     Band,
+    Binding,
     BoundConstraint,
     Clearance,
     ClosedPath,
@@ -143,19 +144,8 @@ from selfmotion.planning import (
     plan,
     plan_in_parts,
 )
-from selfmotion.plans import (
-    Binding,
-    Gap,
-    Move,
-    Parts,
-    Plan,
-    Problem,
-    Report,
-    load_plan,
-    retime,
-    sample_problem,
-    slowdown,
-)
+from selfmotion.problem import Problem, sample_problem
+from selfmotion.result import Gap, Move, Parts, Plan, Report, load_plan, retime, slowdown
 from selfmotion.robot import (
     NAMED_ARMS,
     Coordinate,

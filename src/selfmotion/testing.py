@@ -24,7 +24,7 @@ from selfmotion.engine import Objective, StillMotion
 from selfmotion.motion import Grid, NullMotion, PolynomialNullMotion
 from selfmotion.optimise import Iteration, Minimum, Optimizer
 from selfmotion.path import Line, Path
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel, load_robot
 from selfmotion.task import Task
 

@@ -13,7 +13,8 @@ from selfmotion.certificate import Certificate, Tolerance
 from selfmotion.costs import Samples
 from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
-from selfmotion.plans import Plan, Problem, Report, check_problem
+from selfmotion.problem import Problem, check_problem
+from selfmotion.result import Plan, Report
 
 # Samples of a motion to begin with; doubled until the quintics between them hold the tolerance.
 _FEWEST_STEPS, _MOST_DOUBLINGS = 64, 6

@@ -9,7 +9,7 @@ from selfmotion.baselines.integration import PoseFeedback
 from selfmotion.baselines.local import MANIPULABILITY, pose_gradient
 from selfmotion.basics import Array, BreakdownError
 from selfmotion.costs import Cost
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 from selfmotion.robot import null_space
 
 # The attraction to the stationary pose, times the duration.

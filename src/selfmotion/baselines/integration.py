@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 from selfmotion.task import feedback_rate
 
 if TYPE_CHECKING:

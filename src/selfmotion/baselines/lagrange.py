@@ -11,7 +11,8 @@ from selfmotion.basics import Array, ProblemError
 from selfmotion.costs import Cost, JointVelocity, Samples, weight_matrix
 from selfmotion.motion import Sampling
 from selfmotion.optimise import Status
-from selfmotion.plans import Plan, Problem
+from selfmotion.problem import Problem
+from selfmotion.result import Plan
 from selfmotion.robot import null_space
 
 # The pose feedback removes what collocation lets in at the rate K e; K times the duration.

@@ -9,7 +9,7 @@ from selfmotion.baselines.integration import PoseFeedback
 from selfmotion.basics import Array, BreakdownError, ProblemError, as_number
 from selfmotion.costs import Cost, Manipulability, Samples
 from selfmotion.motion import Grid, Sampling
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 
 # Steps of the quadrature that compares gains, and cost evaluations of the search for the best.
 _STEPS, _TRIALS = 64, 16

@@ -13,7 +13,7 @@ from typing import Any
 
 from selfmotion.basics import FileFormatError, write_atomically
 from selfmotion.formats import write_text
-from selfmotion.plans import Plan, load_plan
+from selfmotion.result import Plan, load_plan
 
 
 @dataclass(frozen=True)

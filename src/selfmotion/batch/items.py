@@ -11,7 +11,7 @@ from typing import Any
 from selfmotion.basics import ProblemError, SelfmotionError
 from selfmotion.costs import FunctionCost
 from selfmotion.formats import Job, grid_documents, job_of, read_document
-from selfmotion.plans import Problem, problem_to_dict
+from selfmotion.problem import Problem, problem_to_dict
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from selfmotion.batch.folder import Folder, Row
 from selfmotion.batch.items import Item, problem_items
 from selfmotion.batch.worker import begin_process, plan_task
 from selfmotion.formats import Job
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 
 # Each worker has this many problems at hand, so that none waits for the next one.
 _AT_HAND = 2

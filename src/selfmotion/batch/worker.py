@@ -12,7 +12,7 @@ from typing import Any
 
 from selfmotion.basics import SelfmotionError
 from selfmotion.planning import plan
-from selfmotion.plans import problem_from_dict
+from selfmotion.problem import problem_from_dict
 
 # Arms and bodies of problems planned before; forgotten when there are many.
 _known: dict[str, Any] = {}

@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from selfmotion.certificate import LIMIT_NAMES, Certificate
-from selfmotion.plans import Gap, Plan, Report
+from selfmotion.result import Gap, Plan, Report
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 

@@ -9,6 +9,7 @@ from selfmotion.constraints.base import (
     easing_of,
     linearised,
 )
+from selfmotion.constraints.binding import Binding
 from selfmotion.constraints.clearance import Clearance
 from selfmotion.constraints.ends import (
     ClosedPath,
@@ -30,6 +31,7 @@ from selfmotion.constraints.torque import JointTorqueLimits
 
 __all__ = [
     "Band",
+    "Binding",
     "BoundConstraint",
     "Clearance",
     "ClosedPath",

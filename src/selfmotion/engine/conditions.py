@@ -6,11 +6,17 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, Ints, ProblemError
-from selfmotion.constraints import BoundConstraint, Linearised, NodeTangents, easing_of, linearised
+from selfmotion.constraints import (
+    Binding,
+    BoundConstraint,
+    Linearised,
+    NodeTangents,
+    easing_of,
+    linearised,
+)
 from selfmotion.costs import Samples
 from selfmotion.motion import Grid
 from selfmotion.optimise import Residuals, Rows
-from selfmotion.plans import Binding
 
 # A constraint whose violation, squared and integrated, is above this counts as much as ten times
 # the cost.

@@ -18,7 +18,7 @@ from selfmotion.engine.still import StillMotion
 from selfmotion.motion import Grid, NullMotion, NullMotionTable, Trajectory
 from selfmotion.optimise import Residuals, Rows
 from selfmotion.path import PathSamples
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError
 from selfmotion.engine.rollout import Rollout
 from selfmotion.motion import Grid, TransportedFrame
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 
 Guide = Callable[[Array], Array]
 """t (S,) → a null motion (S, n) that stands for x = 0."""

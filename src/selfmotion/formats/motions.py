@@ -23,7 +23,7 @@ from selfmotion.formats.mujoco import keyframes
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.formats.urscript import script
 from selfmotion.motion import Trajectory, column_names
-from selfmotion.plans import Plan
+from selfmotion.result import Plan
 from selfmotion.robot import RobotModel
 
 

@@ -31,7 +31,8 @@ from selfmotion.motion import NullMotion
 from selfmotion.optimise import LineSearch, Optimizer, QuasiNewton
 from selfmotion.path import Circle, Feed, Line, Path, Placed, Ramped
 from selfmotion.planning import Search, plan
-from selfmotion.plans import Plan, Problem
+from selfmotion.problem import Problem
+from selfmotion.result import Plan
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.task import Damping, Relaxation, Task
 

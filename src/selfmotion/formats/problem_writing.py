@@ -10,7 +10,7 @@ from selfmotion.costs import Cost
 from selfmotion.formats.documents import write_document
 from selfmotion.motion import NullMotion
 from selfmotion.path import Path
-from selfmotion.plans import NO_OVERLAP, Problem, check_problem
+from selfmotion.problem import NO_OVERLAP, Problem, check_problem
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot, mounting_of
 
 if TYPE_CHECKING:

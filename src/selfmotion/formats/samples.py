@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError
 from selfmotion.motion import Trajectory
-from selfmotion.plans import Plan
+from selfmotion.result import Plan
 from selfmotion.task import Task
 
 # Messages count whole nanoseconds.

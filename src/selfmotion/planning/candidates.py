@@ -22,7 +22,8 @@ from selfmotion.planning.heats import Heats
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import Search
 from selfmotion.planning.warm_start import start_of
-from selfmotion.plans import Plan, Problem
+from selfmotion.problem import Problem
+from selfmotion.result import Plan
 from selfmotion.search import Reach, SequenceGuide, guides, start_candidates
 
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.

@@ -16,7 +16,8 @@ from selfmotion.constraints import (
 from selfmotion.costs import LimitUse
 from selfmotion.path import Path, Retimed
 from selfmotion.planning.run import plan
-from selfmotion.plans import Plan, Problem, check_problem, retime
+from selfmotion.problem import Problem, check_problem
+from selfmotion.result import Plan, retime
 
 # What limits the pace rather than the way.
 _OF_PACE = (JointVelocityLimits, JointAccelerationLimits, JointJerkLimits)

@@ -11,7 +11,7 @@ from selfmotion.motion import Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.largest_part import Part
 from selfmotion.planning.session import Session
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 
 # Between its nodes a motion may be off the path by this share of the tolerance where that is looked
 # at, in the middle; and by this share of what it was before steps were halved.

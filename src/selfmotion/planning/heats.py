@@ -15,7 +15,7 @@ from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.session import Session
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 
 # Steps of the rough motions.
 _STEPS = 12

@@ -11,7 +11,7 @@ from selfmotion.optimise import Status
 from selfmotion.path import Truncated
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.session import Session
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 from selfmotion.robot import null_basis
 from selfmotion.search import Reach
 

@@ -13,7 +13,8 @@ from selfmotion.motion import Trajectory, joined_motions, reversed_motion
 from selfmotion.path import Line
 from selfmotion.planning.roadmap import Roadmap
 from selfmotion.planning.run import plan
-from selfmotion.plans import OF_PACE, Move, Problem
+from selfmotion.problem import Problem
+from selfmotion.result import OF_PACE, Move
 
 # Largest velocity, acceleration and jerk of 10τ³ - 15τ⁴ + 6τ⁵ for 0 ≤ τ ≤ 1.
 _SPEED, _ACCELERATION, _JERK = 1.875, 10.0 / np.sqrt(3.0), 60.0

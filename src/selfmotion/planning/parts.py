@@ -26,7 +26,8 @@ from selfmotion.path import Retimed, Section, section_at_rest
 from selfmotion.planning.moves import Mover, Retreat, between_parts
 from selfmotion.planning.run import plan, plan_along
 from selfmotion.planning.settings import Search
-from selfmotion.plans import Move, Parts, Plan, Problem, check_problem, rest_orders
+from selfmotion.problem import Problem, check_problem, rest_orders
+from selfmotion.result import Move, Parts, Plan
 from selfmotion.search import Piece, Pieces, Sequence, SequenceGuide, has_curves, turned_towards
 from selfmotion.task import Relaxation
 

@@ -31,7 +31,8 @@ from selfmotion.planning.largest_part import Part, largest_part
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import Search
 from selfmotion.planning.warm_start import check_warm_start
-from selfmotion.plans import Gap, Plan, Problem, Report, check_problem
+from selfmotion.problem import Problem, check_problem
+from selfmotion.result import Gap, Plan, Report
 from selfmotion.search import SPACING, Reach, SequenceGuide, reachable
 
 # After these no other way is tried.

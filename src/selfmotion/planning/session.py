@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array
+from selfmotion.constraints import Binding
 from selfmotion.engine import (
     MOST_HALVINGS,
     Counts,
@@ -24,7 +25,8 @@ from selfmotion.planning.closing import closed
 from selfmotion.planning.descent import Descent, breaks
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.warm_start import coefficients_of
-from selfmotion.plans import Binding, Plan, Problem
+from selfmotion.problem import Problem
+from selfmotion.result import Plan
 
 # Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands; and at
 # which it tells what null motion is wanted.

@@ -4,7 +4,8 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError, shown
 from selfmotion.motion import NullMotionTable, Trajectory
-from selfmotion.plans import Plan, Problem
+from selfmotion.problem import Problem
+from selfmotion.result import Plan
 from selfmotion.robot import null_space
 
 

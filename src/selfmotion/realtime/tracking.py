@@ -16,11 +16,12 @@ from selfmotion.costs import Cost, JointVelocity, Samples
 from selfmotion.motion import Sampling, Trajectory
 from selfmotion.optimise import Status
 from selfmotion.path import Path, Waypoints
-from selfmotion.plans import Plan, Problem, Report
+from selfmotion.problem import Problem
 from selfmotion.realtime.loop import State, follow
 from selfmotion.realtime.replanner import Replanner
 from selfmotion.realtime.segment import Segment
 from selfmotion.realtime.simulation import SimulatedArm
+from selfmotion.result import Plan, Report
 
 # What counts as on the path for an arm that is measured [m, rad].
 _BACK = 1e-3, 1e-2

@@ -12,8 +12,8 @@ from typing import IO, Any
 import numpy as np
 
 from selfmotion.basics import RenderError, as_path, write_atomically
-from selfmotion.plans import Plan
 from selfmotion.replay.page import replay_html
+from selfmotion.result import Plan
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # Draw on the processor: the same picture on every machine, and no display needed.

@@ -4,12 +4,12 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array
-from selfmotion.plans import Plan
 from selfmotion.replay import links, scene, shapes
 from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
 from selfmotion.replay.facts import describe, table
 from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames
 from selfmotion.replay.payload import Json, Payload
+from selfmotion.result import Plan
 
 # What can be shown and hidden: with its key, and whether it is shown at first.
 _LAYERS = [

@@ -3,7 +3,7 @@
 from typing import Any
 
 from selfmotion.certificate import Extreme
-from selfmotion.plans import Plan, Report
+from selfmotion.result import Plan, Report
 
 # A number and a remark, shown smaller after it.
 Cell = tuple[str, str]

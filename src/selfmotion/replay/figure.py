@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from selfmotion.basics import Array, RenderError
-from selfmotion.plans import Plan
 from selfmotion.replay.motion import Curves, curves
+from selfmotion.result import Plan
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

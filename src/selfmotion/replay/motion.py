@@ -9,7 +9,7 @@ from scipy.ndimage import maximum_filter1d
 
 from selfmotion.basics import Array
 from selfmotion.motion import Trajectory
-from selfmotion.plans import Plan
+from selfmotion.result import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 

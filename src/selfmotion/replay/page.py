@@ -15,10 +15,10 @@ from typing import IO, Any
 import numpy.typing as npt
 
 from selfmotion.basics import ProblemError, as_path, write_atomically
-from selfmotion.plans import Plan
 from selfmotion.replay.content import page_content
 from selfmotion.replay.facts import describe
 from selfmotion.replay.payload import Payload
+from selfmotion.result import Plan
 
 _TRIADS = 7
 _VIEWER = "meshcat/viewer/dist/main.min.js"

@@ -9,7 +9,7 @@ import pinocchio as pin
 from selfmotion.basics import Array, Progress
 from selfmotion.costs import PathLength
 from selfmotion.path import Path
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 from selfmotion.search.measures import measure_of
 from selfmotion.search.sampled import sampled_sequences
 from selfmotion.search.sequences import Sequence, best_sequences

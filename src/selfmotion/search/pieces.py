@@ -7,7 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array, NoSequenceError, Progress, silent
 from selfmotion.constraints import EndConfiguration
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 from selfmotion.search.chains import best_chains, unturned
 from selfmotion.search.guides import MARGIN, has_curves, waypoint_times
 from selfmotion.search.measures import Length, Mask, Rows

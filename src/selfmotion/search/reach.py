@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, InverseKinematicsError
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
 from selfmotion.search.curves import targets
 from selfmotion.search.manifold import Manifold

@@ -18,7 +18,8 @@ from selfmotion.costs import InverseManipulability, JointVelocity
 from selfmotion.motion import PolynomialNullMotion
 from selfmotion.path import Circle
 from selfmotion.planning import plan
-from selfmotion.plans import Plan, Problem, sample_problem
+from selfmotion.problem import Problem, sample_problem
+from selfmotion.result import Plan
 from selfmotion.robot import NAMED_ARMS, load_robot
 from selfmotion.study.context import Context
 from selfmotion.study.results import Claim, Section, Table, Verdict

@@ -12,7 +12,8 @@ from selfmotion.costs import Cost, InverseManipulability, JointVelocity
 from selfmotion.motion import PolynomialNullMotion
 from selfmotion.optimise import Minimum
 from selfmotion.planning import plan
-from selfmotion.plans import Plan, Problem, sample_problem
+from selfmotion.problem import Problem, sample_problem
+from selfmotion.result import Plan
 from selfmotion.study.engine import Scale, bind, optimum
 from selfmotion.study.published import (
     PublishedFunction,

@@ -9,7 +9,7 @@ from selfmotion.basics import Array
 from selfmotion.engine import Objective, StillMotion
 from selfmotion.motion import Grid
 from selfmotion.optimise import LineSearch, Minimum, QuasiNewton, inverse_metric
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 
 
 @dataclass(frozen=True)

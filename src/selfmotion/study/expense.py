@@ -9,7 +9,7 @@ import numpy as np
 from selfmotion.baselines import LagrangianOptimum, plan_by
 from selfmotion.path import Line
 from selfmotion.planning import plan
-from selfmotion.plans import Problem, sample_problem
+from selfmotion.problem import Problem, sample_problem
 from selfmotion.robot import load_robot
 from selfmotion.study.context import Context, PublishedRun, run_published
 from selfmotion.study.published import (

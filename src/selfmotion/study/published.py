@@ -8,7 +8,7 @@ from selfmotion.basics import Array
 from selfmotion.costs import Samples
 from selfmotion.motion import NullMotionTable, PolynomialNullMotion, Sampling
 from selfmotion.optimise import LineSearch, QuasiNewton
-from selfmotion.plans import Problem
+from selfmotion.problem import Problem
 
 # Relative tolerance of MATLAB's ode23 where none is given; its absolute one is a thousandth.
 ODE23_TOLERANCE = 1e-3

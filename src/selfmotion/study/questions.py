@@ -15,7 +15,8 @@ from selfmotion.basics import Array, BreakdownError
 from selfmotion.motion import PolynomialNullMotion
 from selfmotion.path import Line
 from selfmotion.planning import plan
-from selfmotion.plans import Plan, Problem, sample_problem
+from selfmotion.problem import Problem, sample_problem
+from selfmotion.result import Plan
 from selfmotion.robot import load_robot
 from selfmotion.study.context import FINE, Context, finely
 from selfmotion.study.engine import bind, optimum

@@ -10,7 +10,7 @@ from selfmotion.constraints import Constraint
 from selfmotion.costs import cost_from_dict
 from selfmotion.motion import NullMotion
 from selfmotion.path import Path
-from selfmotion.plans.problem import NO_OVERLAP, Problem
+from selfmotion.problem.problem import NO_OVERLAP, Problem
 from selfmotion.robot import rebuild_robot
 from selfmotion.task import Damping, Relaxation
 

@@ -40,10 +40,10 @@ from selfmotion.constraints import (
 from selfmotion.costs import Cost, JointVelocity, OffPath
 from selfmotion.motion import NullMotion, RefinedNullMotion, Trajectory, resting_window
 from selfmotion.path import Path, check_oriented
-from selfmotion.plans.path_scale import check_pace, check_units
-from selfmotion.plans.redundancy import check_redundancy
-from selfmotion.plans.relaxed_rows import check_relaxations
-from selfmotion.plans.rest import rest_orders
+from selfmotion.problem.path_scale import check_pace, check_units
+from selfmotion.problem.redundancy import check_redundancy
+from selfmotion.problem.relaxed_rows import check_relaxations
+from selfmotion.problem.rest import rest_orders
 from selfmotion.robot import RobotModel
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 

@@ -18,7 +18,7 @@ from selfmotion.constraints import (
 )
 from selfmotion.motion import Trajectory
 from selfmotion.path import Pace, Retimed, times_along
-from selfmotion.plans.plan import Plan
+from selfmotion.result.plan import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Relaxation
 

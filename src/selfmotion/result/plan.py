@@ -20,9 +20,9 @@ from selfmotion.certificate import Certificate, Requirement, Tolerance
 from selfmotion.collision import Obstacle
 from selfmotion.motion import Trajectory, column_names
 from selfmotion.path import Path
-from selfmotion.plans.archive import Archive
-from selfmotion.plans.problem import Problem
-from selfmotion.plans.report import Report
+from selfmotion.problem.problem import Problem
+from selfmotion.result.archive import Archive
+from selfmotion.result.report import Report
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 

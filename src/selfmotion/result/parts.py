@@ -6,8 +6,8 @@ from itertools import accumulate
 from selfmotion.basics import PlanError
 from selfmotion.certificate import Finding
 from selfmotion.motion import Trajectory, joined_motions
-from selfmotion.plans.plan import Plan
-from selfmotion.plans.problem import Problem
+from selfmotion.problem.problem import Problem
+from selfmotion.result.plan import Plan
 
 
 @dataclass(frozen=True, eq=False)

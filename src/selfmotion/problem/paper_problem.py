@@ -5,7 +5,7 @@ import numpy as np
 from selfmotion.costs import InverseManipulability, JointVelocity
 from selfmotion.motion import NullMotion, PolynomialNullMotion
 from selfmotion.path import TwistPath
-from selfmotion.plans.problem import Problem
+from selfmotion.problem.problem import Problem
 from selfmotion.robot import load_robot
 from selfmotion.task import Task
 

@@ -18,11 +18,12 @@ from selfmotion.basics import (
     write_archive,
 )
 from selfmotion.certificate import Certificate, DampedStretch, Extreme, Finding, Tolerance
+from selfmotion.constraints import Binding
 from selfmotion.motion import NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Status
-from selfmotion.plans.problem import Problem
-from selfmotion.plans.report import Binding, Gap, Report
-from selfmotion.plans.saved_problem import problem_from_dict, problem_to_dict
+from selfmotion.problem.problem import Problem
+from selfmotion.problem.saved_problem import problem_from_dict, problem_to_dict
+from selfmotion.result.report import Gap, Report
 
 # Raised with every change that older versions cannot read.
 FORMAT = 3

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from selfmotion.constraints import Binding
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import Iteration, Status
 
@@ -52,28 +53,6 @@ class Gap:
     def length_excess(self) -> float:
         """The plan's joint path above the shortest one, as a share."""
         return self.length / self.best_length - 1.0
-
-
-@dataclass(frozen=True)
-class Binding:
-    """A constraint that keeps the plan from a lower cost, with its price.
-
-    Attributes
-    ----------
-    constraint : str
-        Its name.
-    easing : str
-        What asking for a little less would be, in words, with the joint or the pair.
-    saving : float
-        What that would take off F, to first order: the multipliers' sum times the amount.
-    spans : tuple of (float, float)
-        First and last time [s] of each stretch on which it binds.
-    """
-
-    constraint: str
-    easing: str
-    saving: float
-    spans: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, eq=False)
