@@ -19,7 +19,7 @@ from selfmotion.costs.manipulability import (
     SmallestSingularValue,
 )
 from selfmotion.costs.off_path import OffPath
-from selfmotion.costs.samples import Samples
+from selfmotion.costs.samples import Samples, TipSamples
 from selfmotion.costs.towards import Towards
 
 __all__ = [
@@ -43,6 +43,7 @@ __all__ = [
     "Posture",
     "Samples",
     "SmallestSingularValue",
+    "TipSamples",
     "Towards",
     "cost_from_dict",
     "weight_matrix",

@@ -1,9 +1,10 @@
 """What numba compiles: the small dense algebra around Pinocchio's Jacobians.
 
-Notation, per stage: J6 (6, n) the tool's Jacobian [v; ω] in world axes, S the selection of the
-task's rows, J = S J6 (m, n), ε the null motion, u = S(ẋ_d + K e) the commanded rows with pose
-error e, A = JJᵀ + λ²I = LLᵀ (λ = 0 except near singular poses, where damping is asked for),
-y = A⁻¹(u - Jε), and eq. 4 in the form that needs one solve:
+Notation, per stage: J6 (6, n) a tip's Jacobian [v; ω] in the axes of its chain's base, S the
+selection of its task's rows, J = S J6 (m, n) the rows of all tips, one below the other, ε the null
+motion, u = S(ẋ_d + K e) the commanded rows with pose errors e, A = JJᵀ + λ²I = LLᵀ (λ = 0 except
+near singular poses, where damping is asked for), y = A⁻¹(u - Jε), and eq. 4 in the form that needs
+one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 
@@ -16,30 +17,44 @@ from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
 from selfmotion.kernels.backward import pullback, sensitivities, space_size
 from selfmotion.kernels.contraction import contract_task
 from selfmotion.kernels.damping import Law
-from selfmotion.kernels.forward import advance
+from selfmotion.kernels.forward import advance, at_tip
 from selfmotion.kernels.start import approach_start
-from selfmotion.kernels.table import Stage, columns, part, parts
-from selfmotion.kernels.tool import POINTING, Rows, angle_kind, pose_error, select, task_rows
+from selfmotion.kernels.table import Stage, Tip, columns, part, parts, tip_of
+from selfmotion.kernels.tool import (
+    KIND,
+    Layout,
+    Rows,
+    layout_of,
+    pose_error,
+    rows_of,
+    select,
+    task_rows,
+)
 
 __all__ = [
-    "POINTING",
+    "KIND",
     "Law",
+    "Layout",
     "Rows",
     "Stage",
+    "Tip",
     "advance",
-    "angle_kind",
     "approach_start",
+    "at_tip",
     "cholesky",
     "columns",
     "contract_task",
     "gram",
+    "layout_of",
     "part",
     "parts",
     "pose_error",
     "pullback",
+    "rows_of",
     "select",
     "sensitivities",
     "solve_cholesky",
     "space_size",
     "task_rows",
+    "tip_of",
 ]

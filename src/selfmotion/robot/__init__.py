@@ -1,6 +1,6 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
-from selfmotion.robot.chain import Chain, ChainArrays, Kinematics, null_space
+from selfmotion.robot.chain import Chain, ChainArrays, Kinematics, march, null_space
 from selfmotion.robot.coordinates import Coordinate, FrameCoordinate, JointCoordinate, SwivelAngle
 from selfmotion.robot.dynamics import Dynamics
 from selfmotion.robot.loading import NAMED_ARMS, load_robot, rebuild_robot
@@ -28,6 +28,7 @@ __all__ = [
     "UrdfJoint",
     "compose",
     "load_robot",
+    "march",
     "mounting_of",
     "null_space",
     "placements",
