@@ -22,7 +22,7 @@ def test_joints(benchmark: Any, joints: int) -> None:
 def test_steps(benchmark: Any, steps: int) -> None:
     objective = objective_on(chain(7), steps)
     benchmark.extra_info["steps"] = steps
-    benchmark.extra_info["bytes"] = objective.rollout.table_bytes
+    benchmark.extra_info["bytes"] = objective.rollout._table.nbytes
     benchmark(Measured(objective, gradient=True))
 
 

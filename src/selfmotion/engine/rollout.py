@@ -178,11 +178,6 @@ class Rollout:
         return by_q, by_qd
 
     @property
-    def table_bytes(self) -> int:
-        """Memory that the tables take."""
-        return int(self._table.nbytes)
-
-    @property
     def error(self) -> Array:
         """Pose error e of the last run at the stages, (S, 6) [m, rad], without copying."""
         return self._at.error

@@ -12,34 +12,31 @@ made of small kernels, which LLVM inlines, and is compiled for what it is given:
 or a path that does not move, does not wait for theirs.
 """
 
-from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
-from selfmotion.kernels.backward import pullback, sensitivities, space_size
-from selfmotion.kernels.contraction import contract_task
-from selfmotion.kernels.damping import Law
-from selfmotion.kernels.forward import advance
-from selfmotion.kernels.start import approach_start
-from selfmotion.kernels.table import Stage, columns, part, parts
-from selfmotion.kernels.tool import POINTING, Rows, angle_kind, pose_error, select, task_rows
-
-__all__ = [
-    "POINTING",
-    "Law",
-    "Rows",
-    "Stage",
-    "advance",
-    "angle_kind",
-    "approach_start",
-    "cholesky",
-    "columns",
-    "contract_task",
-    "gram",
-    "part",
-    "parts",
-    "pose_error",
-    "pullback",
-    "select",
-    "sensitivities",
-    "solve_cholesky",
-    "space_size",
-    "task_rows",
-]
+from selfmotion.kernels.algebra import (
+    cholesky as cholesky,
+    gram as gram,
+    solve_cholesky as solve_cholesky,
+)
+from selfmotion.kernels.backward import (
+    pullback as pullback,
+    sensitivities as sensitivities,
+    space_size as space_size,
+)
+from selfmotion.kernels.contraction import contract_task as contract_task
+from selfmotion.kernels.damping import Law as Law
+from selfmotion.kernels.forward import advance as advance
+from selfmotion.kernels.start import approach_start as approach_start
+from selfmotion.kernels.table import (
+    Stage as Stage,
+    columns as columns,
+    part as part,
+    parts as parts,
+)
+from selfmotion.kernels.tool import (
+    POINTING as POINTING,
+    Rows as Rows,
+    angle_kind as angle_kind,
+    pose_error as pose_error,
+    select as select,
+    task_rows as task_rows,
+)

@@ -1,35 +1,21 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
-from selfmotion.robot.chain import Flags, compose, placements
-from selfmotion.robot.coordinates import Coordinate, FrameCoordinate, JointCoordinate, SwivelAngle
-from selfmotion.robot.dynamics import Dynamics
-from selfmotion.robot.kinematics import ToolKinematics
-from selfmotion.robot.loading import NAMED_ARMS, load_robot, rebuild_robot
-from selfmotion.robot.model import RobotModel
-from selfmotion.robot.mounting import Mounting, mounting_of
-from selfmotion.robot.null_space import null_basis, null_space
-from selfmotion.robot.tool_rates import ToolRates
-from selfmotion.robot.urdf import Urdf, UrdfJoint
-
-__all__ = [
-    "NAMED_ARMS",
-    "Coordinate",
-    "Dynamics",
-    "Flags",
-    "FrameCoordinate",
-    "JointCoordinate",
-    "Mounting",
-    "RobotModel",
-    "SwivelAngle",
-    "ToolKinematics",
-    "ToolRates",
-    "Urdf",
-    "UrdfJoint",
-    "compose",
-    "load_robot",
-    "mounting_of",
-    "null_basis",
-    "null_space",
-    "placements",
-    "rebuild_robot",
-]
+from selfmotion.robot.chain import Flags as Flags, compose as compose, placements as placements
+from selfmotion.robot.coordinates import (
+    Coordinate as Coordinate,
+    FrameCoordinate as FrameCoordinate,
+    JointCoordinate as JointCoordinate,
+    SwivelAngle as SwivelAngle,
+)
+from selfmotion.robot.dynamics import Dynamics as Dynamics
+from selfmotion.robot.kinematics import ToolKinematics as ToolKinematics
+from selfmotion.robot.loading import (
+    NAMED_ARMS as NAMED_ARMS,
+    load_robot as load_robot,
+    rebuild_robot as rebuild_robot,
+)
+from selfmotion.robot.model import RobotModel as RobotModel
+from selfmotion.robot.mounting import Mounting as Mounting, mounting_of as mounting_of
+from selfmotion.robot.null_space import null_basis as null_basis, null_space as null_space
+from selfmotion.robot.tool_rates import ToolRates as ToolRates
+from selfmotion.robot.urdf import Urdf as Urdf, UrdfJoint as UrdfJoint
