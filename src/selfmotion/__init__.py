@@ -91,6 +91,7 @@ from selfmotion.costs import (
     SmallestSingularValue as SmallestSingularValue,
     Towards as Towards,
 )
+from selfmotion.follow import Follow as Follow, Follows as Follows
 from selfmotion.formats import (
     Job as Job,
     read_job as read_job,

@@ -34,7 +34,7 @@ def deviation_from(
 
 def smallest_singular_values(robot: RobotModel, task: Task, q: Array) -> Array:
     """Return the smallest singular value of the task Jacobian at q (K, n), (K,)."""
-    model, data, tool = robot.model, robot.model.createData(), robot.tool_id
+    model, data, tool = robot.model, robot.model.createData(), robot.chain.tip
     jacobian, rotation = np.empty((len(q), 6, robot.dof)), np.empty((len(q), 3, 3))
     for k, configuration in enumerate(q):
         pin.computeJointJacobians(model, data, configuration)
@@ -49,7 +49,7 @@ def _poses(robot: RobotModel, q: Array) -> tuple[Array, Array]:
 
     By calls of its own: what checks a motion must not share a fault with what made it.
     """
-    model, data, tool = robot.model, robot.model.createData(), robot.tool_id
+    model, data, tool = robot.model, robot.model.createData(), robot.chain.tip
     rotation, translation = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
     pose = data.oMf[tool]
     seen_rotation, seen_translation = pose.rotation, pose.translation

@@ -1,6 +1,11 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
-from selfmotion.robot.chain import Flags as Flags, compose as compose, placements as placements
+from selfmotion.robot.chain import (
+    Chain as Chain,
+    ChainArrays as ChainArrays,
+    Kinematics as Kinematics,
+    null_space as null_space,
+)
 from selfmotion.robot.coordinates import (
     Coordinate as Coordinate,
     FrameCoordinate as FrameCoordinate,
@@ -8,7 +13,6 @@ from selfmotion.robot.coordinates import (
     SwivelAngle as SwivelAngle,
 )
 from selfmotion.robot.dynamics import Dynamics as Dynamics
-from selfmotion.robot.kinematics import ToolKinematics as ToolKinematics
 from selfmotion.robot.loading import (
     NAMED_ARMS as NAMED_ARMS,
     load_robot as load_robot,
@@ -16,6 +20,6 @@ from selfmotion.robot.loading import (
 )
 from selfmotion.robot.model import RobotModel as RobotModel
 from selfmotion.robot.mounting import Mounting as Mounting, mounting_of as mounting_of
-from selfmotion.robot.null_space import null_basis as null_basis, null_space as null_space
+from selfmotion.robot.placements import Flags as Flags, compose as compose, placements as placements
 from selfmotion.robot.tool_rates import ToolRates as ToolRates
 from selfmotion.robot.urdf import Urdf as Urdf, UrdfJoint as UrdfJoint
