@@ -128,11 +128,11 @@ from selfmotion.path import (
     PathSamples as PathSamples,
     Placed as Placed,
     Polyline as Polyline,
-    Ramped as Ramped,
     Retimed as Retimed,
     Section as Section,
     TwistPath as TwistPath,
     Waypoints as Waypoints,
+    section_at_rest as section_at_rest,
     with_leads as with_leads,
 )
 from selfmotion.planning import (

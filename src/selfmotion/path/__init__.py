@@ -13,10 +13,8 @@ from selfmotion.path.joined import Dwell as Dwell, Joined as Joined, with_leads 
 from selfmotion.path.pace import Pace as Pace, times_along as times_along
 from selfmotion.path.placed import Placed as Placed
 from selfmotion.path.polyline import Polyline as Polyline
-from selfmotion.path.ramped import Ramped as Ramped
 from selfmotion.path.retimed import Retimed as Retimed
 from selfmotion.path.section import Section as Section, section_at_rest as section_at_rest
 from selfmotion.path.shapes import Circle as Circle, Line as Line
-from selfmotion.path.truncated import Truncated as Truncated
 from selfmotion.path.twist import TwistPath as TwistPath
 from selfmotion.path.waypoints import Waypoints as Waypoints
