@@ -13,48 +13,38 @@ made of small kernels, which LLVM inlines, and is compiled for what it is given:
 or a path that does not move, does not wait for theirs.
 """
 
-from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
-from selfmotion.kernels.backward import pullback, sensitivities, space_size
-from selfmotion.kernels.contraction import contract_task
-from selfmotion.kernels.damping import Law
-from selfmotion.kernels.forward import advance, at_tip
-from selfmotion.kernels.start import approach_start
-from selfmotion.kernels.table import Stage, Tip, columns, part, parts, tip_of
-from selfmotion.kernels.tool import (
-    KIND,
-    Layout,
-    Rows,
-    layout_of,
-    pose_error,
-    rows_of,
-    select,
-    task_rows,
+from selfmotion.kernels.algebra import (
+    cholesky as cholesky,
+    gram as gram,
+    solve_cholesky as solve_cholesky,
 )
-
-__all__ = [
-    "KIND",
-    "Law",
-    "Layout",
-    "Rows",
-    "Stage",
-    "Tip",
-    "advance",
-    "approach_start",
-    "at_tip",
-    "cholesky",
-    "columns",
-    "contract_task",
-    "gram",
-    "layout_of",
-    "part",
-    "parts",
-    "pose_error",
-    "pullback",
-    "rows_of",
-    "select",
-    "sensitivities",
-    "solve_cholesky",
-    "space_size",
-    "task_rows",
-    "tip_of",
-]
+from selfmotion.kernels.backward import (
+    pullback as pullback,
+    sensitivities as sensitivities,
+    space_size as space_size,
+)
+from selfmotion.kernels.contraction import contract_task as contract_task
+from selfmotion.kernels.damping import Law as Law
+from selfmotion.kernels.forward import (
+    advance as advance,
+    at_tip as at_tip,
+)
+from selfmotion.kernels.start import approach_start as approach_start
+from selfmotion.kernels.table import (
+    Stage as Stage,
+    Tip as Tip,
+    columns as columns,
+    part as part,
+    parts as parts,
+    tip_of as tip_of,
+)
+from selfmotion.kernels.tool import (
+    KIND as KIND,
+    Layout as Layout,
+    Rows as Rows,
+    layout_of as layout_of,
+    pose_error as pose_error,
+    rows_of as rows_of,
+    select as select,
+    task_rows as task_rows,
+)
