@@ -6,7 +6,10 @@ from selfmotion.costs.base import (
     Partials as Partials,
     weight_matrix as weight_matrix,
 )
-from selfmotion.costs.dynamics import GravityTorque as GravityTorque, KineticEnergy as KineticEnergy
+from selfmotion.costs.dynamics import (
+    GravityTorque as GravityTorque,
+    KineticEnergy as KineticEnergy,
+)
 from selfmotion.costs.function import (
     FunctionCost as FunctionCost,
     LostCost as LostCost,
@@ -28,5 +31,8 @@ from selfmotion.costs.manipulability import (
     SmallestSingularValue as SmallestSingularValue,
 )
 from selfmotion.costs.off_path import OffPath as OffPath
-from selfmotion.costs.samples import Samples as Samples
+from selfmotion.costs.samples import (
+    Samples as Samples,
+    TipSamples as TipSamples,
+)
 from selfmotion.costs.towards import Towards as Towards

@@ -1,9 +1,10 @@
 """What numba compiles: the small dense algebra around Pinocchio's Jacobians.
 
-Notation, per stage: J6 (6, n) the tool's Jacobian [v; ω] in world axes, S the selection of the
-task's rows, J = S J6 (m, n), ε the null motion, u = S(ẋ_d + K e) the commanded rows with pose
-error e, A = JJᵀ + λ²I = LLᵀ (λ = 0 except near singular poses, where damping is asked for),
-y = A⁻¹(u - Jε), and eq. 4 in the form that needs one solve:
+Notation, per stage: J6 (6, n) a tip's Jacobian [v; ω] in the axes of its chain's base, S the
+selection of its task's rows, J = S J6 (m, n) the rows of all tips, one below the other, ε the null
+motion, u = S(ẋ_d + K e) the commanded rows with pose errors e, A = JJᵀ + λ²I = LLᵀ (λ = 0 except
+near singular poses, where damping is asked for), y = A⁻¹(u - Jε), and eq. 4 in the form that needs
+one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 
@@ -24,19 +25,26 @@ from selfmotion.kernels.backward import (
 )
 from selfmotion.kernels.contraction import contract_task as contract_task
 from selfmotion.kernels.damping import Law as Law
-from selfmotion.kernels.forward import advance as advance
+from selfmotion.kernels.forward import (
+    advance as advance,
+    at_tip as at_tip,
+)
 from selfmotion.kernels.start import approach_start as approach_start
 from selfmotion.kernels.table import (
     Stage as Stage,
+    Tip as Tip,
     columns as columns,
     part as part,
     parts as parts,
+    tip_of as tip_of,
 )
 from selfmotion.kernels.tool import (
-    POINTING as POINTING,
+    KIND as KIND,
+    Layout as Layout,
     Rows as Rows,
-    angle_kind as angle_kind,
+    layout_of as layout_of,
     pose_error as pose_error,
+    rows_of as rows_of,
     select as select,
     task_rows as task_rows,
 )

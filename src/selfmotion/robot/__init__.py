@@ -4,6 +4,7 @@ from selfmotion.robot.chain import (
     Chain as Chain,
     ChainArrays as ChainArrays,
     Kinematics as Kinematics,
+    march as march,
     null_space as null_space,
 )
 from selfmotion.robot.coordinates import (
@@ -19,7 +20,17 @@ from selfmotion.robot.loading import (
     rebuild_robot as rebuild_robot,
 )
 from selfmotion.robot.model import RobotModel as RobotModel
-from selfmotion.robot.mounting import Mounting as Mounting, mounting_of as mounting_of
-from selfmotion.robot.placements import Flags as Flags, compose as compose, placements as placements
+from selfmotion.robot.mounting import (
+    Mounting as Mounting,
+    mounting_of as mounting_of,
+)
+from selfmotion.robot.placements import (
+    Flags as Flags,
+    compose as compose,
+    placements as placements,
+)
 from selfmotion.robot.tool_rates import ToolRates as ToolRates
-from selfmotion.robot.urdf import Urdf as Urdf, UrdfJoint as UrdfJoint
+from selfmotion.robot.urdf import (
+    Urdf as Urdf,
+    UrdfJoint as UrdfJoint,
+)
