@@ -1,5 +1,6 @@
 """What every part of the package stands on: errors, arrays, progress, files, compilation."""
 
+from selfmotion.basics import series
 from selfmotion.basics.arrays import Array, Ints, per_joint, plain_numbers, read_only, shown
 from selfmotion.basics.errors import (
     BreakdownError,
@@ -80,6 +81,7 @@ __all__ = [
     "read_rows",
     "read_table",
     "restore",
+    "series",
     "shown",
     "silent",
     "write_archive",

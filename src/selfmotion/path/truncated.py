@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, PathError, read_only
-from selfmotion.path.base import Path, PathSamples, _Derived
+from selfmotion.path.base import Path, PathSamples, PathSeries, _Derived, path_series
 
 # The knots crowd towards the end by halves, down to about this share of the duration.
 _GRADES = 14
@@ -54,6 +54,10 @@ class Truncated(_Derived, kind="truncated"):
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
         return self._path.samples(t)
+
+    def series(self, middle: Array, half: Array) -> PathSeries | None:
+        """See `Path.series`."""
+        return path_series(self._path, middle, half)
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""

@@ -1,6 +1,7 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
 from selfmotion.robot.chain import Flags, compose, placements
+from selfmotion.robot.chain_series import ChainSeries
 from selfmotion.robot.coordinates import Coordinate, FrameCoordinate, JointCoordinate, SwivelAngle
 from selfmotion.robot.dynamics import Dynamics
 from selfmotion.robot.kinematics import ToolKinematics
@@ -13,6 +14,7 @@ from selfmotion.robot.urdf import Urdf, UrdfJoint
 
 __all__ = [
     "NAMED_ARMS",
+    "ChainSeries",
     "Coordinate",
     "Dynamics",
     "Flags",
