@@ -48,7 +48,7 @@ docs: $(READY)  ## the site, into out/site
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --config-file docs/mkdocs.yml
 
 errors: $(READY)  ## docs/errors.md: every bad input of the tests, and what the user sees
-	$(BIN)/python tests/bad_inputs.py
+	PYTHONPATH=tests $(BIN)/python -m support.bad_inputs
 
 study: $(READY)  ## the paper re-run, as a report in out/study
 	$(BIN)/selfmotion study --out out/study

@@ -19,7 +19,7 @@ import selfmotion as sm
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from acceptance import LIMITS, commanded, shares
+from support.acceptance import LIMITS, commanded, shares
 
 
 def main() -> int:

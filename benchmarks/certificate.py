@@ -22,8 +22,8 @@ from rich.console import Console
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import selfmotion as sm
-from scenes import Scene, among_plates, near_limits, seams
 from selfmotion.certificate.deviation import deviation_from, smallest_singular_values
+from support.scenes import Scene, among_plates, near_limits, seams
 
 REPEATS = 9
 ARMS = ("panda", "xarm7", "kinova")

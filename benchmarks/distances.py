@@ -20,7 +20,7 @@ from rich.progress import track
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from independent_distances import Trial, free_body
+from support.independent_distances import Trial, free_body
 
 
 def main(

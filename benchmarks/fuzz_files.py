@@ -29,8 +29,8 @@ from rich.console import Console
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import selfmotion as sm
-from generated import Hang, alarm
-from mutations import good_files, mutated
+from support.generated import Hang, alarm
+from support.mutations import good_files, mutated
 
 SECONDS, MEGABYTES = 2, 500
 # What no signal of the process's own ends, ends after so many seconds on the clock.

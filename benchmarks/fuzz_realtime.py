@@ -12,9 +12,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-import realtime_scenarios as scenarios
 import selfmotion as sm
 from selfmotion.realtime import Replanner
+from support import realtime_scenarios as scenarios
 
 TASKS = ("pose", "position", "pointing")
 FAR = {"horizon": 8.0, "null_motion": sm.BSplineNullMotion(6), "steps": 24}

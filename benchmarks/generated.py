@@ -20,8 +20,8 @@ from rich.console import Console
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from generated import End, end_of
-from strategies import Generated, problems
+from support.generated import End, end_of
+from support.strategies import Generated, problems
 
 
 def drawn(count: int, seed: int) -> list[Generated]:

@@ -80,9 +80,9 @@ PARTS = (
         "rollout",
         ("engine/rollout.py",),
         (
-            "test_rollout.py",
-            "test_laws.py -k 'planar_3r or breakdown'",
-            "test_damping.py -k planar_3r",
+            "engine/test_rollout.py -k 'planar_3r or breakdown or broke or polish'",
+            "motion/test_null_motion.py -k planar_3r",
+            "task/test_damping.py -k planar_3r",
         ),
         # Compiled code would read beyond arrays unseen.
         compiled=False,
@@ -90,36 +90,35 @@ PARTS = (
     Part(
         "kernels",
         ("kernels/*.py",),
-        ("test_kernels.py", "test_rollout.py", "test_laws.py -k 'planar_3r and not cost'"),
+        (
+            "kernels",
+            "engine/test_rollout.py -k 'planar_3r or breakdown or broke or polish'",
+            "engine/test_objective.py -k 'planar_3r and sensitivities'",
+        ),
         compiled=False,
     ),
     Part(
         "objective",
         ("engine/objective.py", "engine/conditions.py"),
         (
-            "test_conditions.py",
-            "test_constraints.py -k 'metric or equality or finite or rows'",
-            "test_relaxation.py -k 'metric or (equal_central and (several or window))'",
-            "test_laws.py -k 'gradient_equals and (planar_3r or panda-pose)'",
+            "engine/test_conditions.py",
+            "constraints/test_base.py -k 'equality or finite or rows'",
+            "engine/test_deviation.py -k 'metric or (equal_central and (several or window))'",
+            "engine/test_objective.py -k 'metric or gradient_equals and (planar_3r or panda-pose)'",
         ),
     ),
     Part(
         "optimiser",
         ("optimise/*.py",),
-        (
-            *("test_optimiser_parts.py", "test_known_problems.py"),
-            *("test_quasi_newton.py", "test_sqp.py"),
-        ),
+        ("optimise",),
     ),
     Part(
         "certificate",
         ("certificate/*.py",),
         (
-            "test_certificate_parts.py",
-            "test_steps.py -k errors_between",
-            "test_torques.py -k 'judged or whole_turns'",
-            "test_verdicts.py -k 'not threads'",
-            "test_clearance_proof.py -k 'not default'",
+            "certificate -k 'not default'",
+            "constraints/test_torque.py -k 'judged or whole_turns'",
+            "whole/test_verdicts.py -k 'not threads'",
         ),
     ),
 )
@@ -302,9 +301,15 @@ def _warm() -> None:
     """Import what others made once for all processes, and ours in each anew."""
     os.chdir(TESTS.parent)
     sys.path.insert(0, str(TESTS))
-    for name in ("conftest", "scipy.optimize", "scipy.interpolate", "daqp", "selfmotion.testing"):
+    for name in (
+        "support.arms",
+        "scipy.optimize",
+        "scipy.interpolate",
+        "daqp",
+        "selfmotion.testing",
+    ):
         importlib.import_module(name)
-    for name in [x for x in sys.modules if x.split(".")[0] in ("selfmotion", "conftest")]:
+    for name in [x for x in sys.modules if x.split(".")[0] in ("selfmotion", "support")]:
         del sys.modules[name]
 
 

@@ -21,7 +21,7 @@ from selfmotion.basics import Array
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from own_kinematics import Arm
+from support.own_kinematics import Arm
 
 
 @dataclass(frozen=True)

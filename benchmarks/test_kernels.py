@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from engine import Measured, objective_on, pinocchio_loop
 from problems import circle
+
+from engine import Measured, objective_on, pinocchio_loop
 
 
 @pytest.fixture(scope="module")

@@ -138,13 +138,13 @@ def check_constraint(constraint: Constraint, problem: Problem) -> None:
     robot = problem.robot
     # Conditions on the velocity at the ends have to be broken here.
     problem = replace(problem, rest=False)
-    constraint.check(robot, problem.path, problem.task)
+    constraint.check(problem.follows)
     start = problem.given_start
     if start is None:
         start = robot.inverse_kinematics(problem.path.pose(0.0), problem.task)
     grid = Grid.aligned(problem.knots, _STEPS * max(1, problem.null_motion.fewest_steps // 4))
     still = StillMotion.on(problem, start, grid)
-    bound = constraint.bind(robot, problem.task, still.start, still.end)
+    bound = constraint.bind(problem.follows, still.start, still.end)
     objective = Objective.of(problem, still, free=True, constraints=[bound])
     requirement = constraint.requirement(robot)
     _require(isinstance(requirement, Requirement), f"requirement() returned {requirement!r}")

@@ -124,7 +124,7 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
 def costs(problem: Problem, motion: Motion, grid: Grid) -> dict[str, float]:
     """Return what each cost of the problem contributes to F along a motion."""
     q, qd = motion.at(grid.stage_times)
-    samples = Samples.along(problem.robot, problem.task, grid.sampling, q, qd)
+    samples = Samples.along(problem.follows, grid.sampling, q, qd)
     return {cost.name: float(samples.weights @ cost.value(samples)) for cost in problem.costs}
 
 

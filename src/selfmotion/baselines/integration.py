@@ -59,7 +59,7 @@ class PoseFeedback:
     def __call__(self, t: float, q: Array) -> Here:
         """Return the kinematics at time `t` [s] and configuration `q` (n,)."""
         task = self._task
-        full, rotation, translation = self._robot.kinematics(q)
+        full, rotation, translation = self._robot.chain.at(q)
         target = self._path.samples(t)
         angular = np.zeros(3)
         if np.any(task.rows >= 3):

@@ -91,7 +91,7 @@ class LagrangianOptimum:
 
     def _end_conditions(self, problem: Problem, flow: "_Flow") -> Callable[[Array, Array], Array]:
         start, n = start_of(problem), flow.n
-        rows = problem.robot.task_jacobian(start, problem.task)
+        rows = problem.follows.jacobian(start)
         null = null_space(rows).T
 
         def conditions(first: Array, last: Array) -> Array:
@@ -141,7 +141,7 @@ class _Flow:
         self.jacobian_evaluations += len(t)
         problem = self._problem
         moments = Sampling.trapezoidal(t)
-        return Samples.along(problem.robot, problem.task, moments, q, np.zeros_like(q))
+        return Samples.along(problem.follows, moments, q, np.zeros_like(q))
 
     def _hamilton(self, samples: Samples, p: Array) -> tuple[Array, Array]:
         """Return q̇ and ṗ, (K, n) each."""
@@ -194,7 +194,7 @@ def _velocity_weight(problem: Problem) -> Array:
     weight = np.zeros((n, n))
     q = start_of(problem)[None]
     moment = Sampling.trapezoidal(t)
-    at_rest = Samples.along(problem.robot, problem.task, moment, q, np.zeros((1, n)))
+    at_rest = Samples.along(problem.follows, moment, q, np.zeros((1, n)))
     for cost in problem.costs:
         if isinstance(cost, JointVelocity):
             weight += weight_matrix(np.asarray(cost.weight), n)

@@ -166,7 +166,7 @@ def pose_gradient(problem: Problem, criterion: Cost, t: float, q: Array) -> Arra
     """Return ∂h/∂q (n,) of a cost of the pose at one configuration."""
     moment = Sampling.trapezoidal(np.array([t]))
     rest = np.zeros((1, len(q)))
-    samples = Samples.along(problem.robot, problem.task, moment, q[None], rest)
+    samples = Samples.along(problem.follows, moment, q[None], rest)
     partials = criterion.gradient(samples)
     if partials.q is None:
         raise ProblemError(f"cost '{criterion.name}' does not depend on the pose")

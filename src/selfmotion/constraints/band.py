@@ -10,8 +10,8 @@ from selfmotion.basics import Array, ProblemError, as_number, restore, shown
 from selfmotion.certificate import CoordinateBand
 from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
 from selfmotion.costs import Samples
+from selfmotion.follow import Follows
 from selfmotion.robot import Coordinate, RobotModel, SwivelAngle
-from selfmotion.task import Task
 
 # Centre of the swivel angle from upwards, about the direction from shoulder to wrist [rad].
 _SIDES = {"up": 0.0, "left": -0.5 * np.pi, "right": 0.5 * np.pi, "down": np.pi}
@@ -68,8 +68,9 @@ class Band(Constraint):
             )
         return cls(SwivelAngle(**names), _SIDES[side], half)
 
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundBand":
+    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundBand":
         """See `Constraint.bind`."""
+        robot = follows.robot
         self.coordinate(robot, start[None])
         return BoundBand(robot, self.coordinate, float(self.center), float(self.half), self.margin)
 

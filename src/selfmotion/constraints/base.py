@@ -16,10 +16,9 @@ from selfmotion.basics import Array, Ints, ProblemError, Saved
 from selfmotion.certificate import Requirement
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
+from selfmotion.follow import Follows
 from selfmotion.motion import Sampling
-from selfmotion.path import Path
 from selfmotion.robot import RobotModel
-from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +92,7 @@ class Constraint(Saved, ABC, family="constraint"):
     sets_acceleration: ClassVar[tuple[bool, bool]] = (False, False)
 
     @abstractmethod
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundConstraint":
+    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundConstraint":
         """Return the conditions on the motion of an arm; ProblemError where it misfits.
 
         `start` and `end` (n,) are those of the motion that the optimisation begins with.
@@ -107,10 +106,10 @@ class Constraint(Saved, ABC, family="constraint"):
         """Return whether it asks anything of an arm: not where it keeps limits nobody knows."""
         return True
 
-    def check(self, robot: RobotModel, path: Path, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """Raise ProblemError where it does not fit an arm, a path or a task."""
 
-    def check_start(self, robot: RobotModel, path: Path, task: Task, start: Array | None) -> None:
+    def check_start(self, follows: Follows, start: Array | None) -> None:
         """Raise ProblemError where it does not fit the start, (n,) or None for a free one."""
 
     def envelope(self, robot: RobotModel) -> Envelope:

@@ -22,8 +22,8 @@ from selfmotion.collision import (
 from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
+from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
-from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +87,9 @@ class Clearance(Constraint):
         """
         return self._models(robot).exact
 
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundClearance":
+    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundClearance":
         """See `Constraint.bind`."""
+        robot = follows.robot
         return BoundClearance(self._models(robot).smooth, self.distance)
 
     def requirement(self, robot: RobotModel) -> KeepsApart:

@@ -19,9 +19,9 @@ from selfmotion.basics import Array, ProblemError, as_flag, as_numbers, per_join
 from selfmotion.certificate import QUANTITIES, ClosedMotion, EndState
 from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
 from selfmotion.costs import Samples
-from selfmotion.path import STILL, Path
-from selfmotion.robot import RobotModel, null_basis
-from selfmotion.task import Task
+from selfmotion.follow import Follows
+from selfmotion.path import STILL
+from selfmotion.robot import RobotModel
 
 # The optimiser need only come near [rad, rad/s]: Newton's method then closes the rest.
 _NEAR = 1e-4
@@ -45,26 +45,27 @@ class EndConfiguration(Constraint):
 
     q: npt.ArrayLike
 
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
+    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundEnd":
         """See `Constraint.bind`."""
-        target = read_only(robot.configuration(self.q))
-        null = null_basis(robot, task, target)
-        return BoundEnd("end configuration", (0,), target, null)
+        target = read_only(follows.robot.configuration(self.q))
+        return BoundEnd("end configuration", (0,), target, follows.null_basis(target))
 
     def requirement(self, robot: RobotModel) -> EndState:
         """See `Constraint.requirement`."""
         return EndState(0, read_only(robot.configuration(self.q)))
 
-    def check(self, robot: RobotModel, path: Path, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Constraint.check`: it has to put the tool on the end of the path."""
-        actual = robot.pose(robot.configuration(self.q))
-        position, rotation = task.miss(path.pose(path.duration), actual)
-        if max(position, rotation) > _NEAR_END:
-            raise ProblemError(
-                f"{robot.name}: the end configuration puts '{robot.tool}' {position:.3g} m and "
-                f"{rotation:.3g} rad off the end of the path; take "
-                f"robot.inverse_kinematics(path.pose(path.duration), task, seed=q)"
-            )
+        robot = follows.robot
+        q = robot.configuration(self.q)
+        for item in follows.items:
+            position, rotation = item.miss(item.path.pose(item.path.duration), q)
+            if max(position, rotation) > _NEAR_END:
+                raise ProblemError(
+                    f"{robot.name}: the end configuration puts '{robot.tool}' {position:.3g} m and "
+                    f"{rotation:.3g} rad off the end of the path; take "
+                    f"robot.inverse_kinematics(path.pose(path.duration), task, seed=q)"
+                )
 
     def on_part(self) -> None:
         """See `Constraint.on_part`: the part ends elsewhere."""
@@ -85,11 +86,11 @@ class _EndRate(Constraint):
     def _name(self) -> str:
         return f"{'start' if self.at_start else 'end'} {QUANTITIES[self.order]}"
 
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
+    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundEnd":
         """See `Constraint.bind`."""
-        null = null_basis(robot, task, start if self.at_start else end)
+        null = follows.null_basis(start if self.at_start else end)
         row = 0 if self.at_start else -1
-        return BoundEnd(self._name, (self.order,), self.target(robot), null, row)
+        return BoundEnd(self._name, (self.order,), self.target(follows.robot), null, row)
 
     def requirement(self, robot: RobotModel) -> EndState:
         """See `Constraint.requirement`."""
@@ -133,13 +134,11 @@ class EndVelocity(_EndRate):
         """See `_EndRate.asked`."""
         return self.qd
 
-    def check(self, robot: RobotModel, path: Path, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Constraint.check`: a motion ends at rest only where its path does."""
-        if np.any(self.target(robot)):
+        if np.any(self.target(follows.robot)):
             return
-        rotation = path.pose(path.duration).rotation
-        twist = task.select(path.twist(path.duration)[:, None], rotation)
-        speed = float(np.abs(twist).max())
+        speed = float(np.abs(follows.twist(follows.duration)).max())
         if speed > STILL:
             raise ProblemError(
                 f"the motion cannot end at rest: the path ends at {speed:.3g} m/s or rad/s; give "
@@ -172,18 +171,19 @@ class StartVelocity(_EndRate):
         """See `_EndRate.asked`."""
         return self.qd
 
-    def check_start(self, robot: RobotModel, path: Path, task: Task, start: Array | None) -> None:
+    def check_start(self, follows: Follows, start: Array | None) -> None:
         """See `Constraint.check_start`: the tool has to begin as the path does."""
+        robot = follows.robot
         if start is None:
             raise ProblemError("a start velocity needs a given start (start=)")
-        asked = robot.task_jacobian(start, task) @ self.target(robot)
-        twist = task.select(path.twist(0.0)[:, None], robot.pose(start).rotation)[:, 0]
+        asked = follows.jacobian(start) @ self.target(robot)
+        twist = follows.twist(0.0)
         row = int(np.argmax(np.abs(asked - twist)))
         if abs(asked[row] - twist[row]) > _NEAR_END:
             begins = round(float(twist[row]), 9) + 0.0
             raise ProblemError(
                 f"the start velocity moves '{robot.tool}' at {asked[row]:.6g} m/s or rad/s in row "
-                f"'{task.row_names[row]}', but the path begins at {begins:g}; give "
+                f"'{follows.row_names[row]}', but the path begins at {begins:g}; give "
                 f"the path that speed, or the arm another one"
             )
 
@@ -213,7 +213,7 @@ class StartAcceleration(_EndRate):
         """See `_EndRate.asked`."""
         return self.qdd
 
-    def check_start(self, robot: RobotModel, path: Path, task: Task, start: Array | None) -> None:
+    def check_start(self, follows: Follows, start: Array | None) -> None:
         """See `Constraint.check_start`: of a free start no acceleration is known."""
         if start is None:
             raise ProblemError("a start acceleration needs a given start (start=)")
@@ -259,23 +259,25 @@ class ClosedPath(Constraint):
     def __post_init__(self) -> None:
         as_flag(self.velocity, "closed path: velocity")
 
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundEnd":
+    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundEnd":
         """See `Constraint.bind`."""
         orders = (0, 1) if self.velocity else (0,)
-        return BoundEnd("closed path", orders, None, null_basis(robot, task, start))
+        return BoundEnd("closed path", orders, None, follows.null_basis(start))
 
     def requirement(self, robot: RobotModel) -> ClosedMotion:
         """See `Constraint.requirement`."""
         return ClosedMotion(self.velocity)
 
-    def check(self, robot: RobotModel, path: Path, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Constraint.check`: the tool's path has to be closed as well."""
-        position, rotation = task.miss(path.pose(0.0), path.pose(path.duration))
-        if max(position, rotation) > _SAME_POSE:
-            raise ProblemError(
-                f"a closed joint path needs a closed tool path, but the tool ends {position:.3g} m "
-                f"and {rotation:.3g} rad from where it began"
-            )
+        for item in follows.items:
+            path = item.path
+            position, rotation = item.task.miss(path.pose(0.0), path.pose(path.duration))
+            if max(position, rotation) > _SAME_POSE:
+                raise ProblemError(
+                    f"a closed joint path needs a closed tool path, but the tool ends "
+                    f"{position:.3g} m and {rotation:.3g} rad from where it began"
+                )
 
     def at_rest(self) -> "ClosedPath":
         """See `Constraint.at_rest`: both velocities are 0."""

@@ -16,8 +16,8 @@ from selfmotion.constraints.base import (
 )
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
+from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
-from selfmotion.task import Task
 
 _QUANTITIES = ("position", "speed", "acceleration", "jerk")
 # Joints with limits turn less than this [rad].
@@ -47,8 +47,9 @@ class JointPositionLimits(Constraint):
         _check_margin(self.margin)
         as_flag(self.replace, f"{type(self).__name__}: replace")
 
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
+    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
+        robot = follows.robot
         return BoundLimits.of(robot, LIMIT_NAMES[0], 0, self.limits(robot), self.margin)
 
     def requirement(self, robot: RobotModel) -> JointLimits:
@@ -94,8 +95,9 @@ class _RateLimits(Constraint):
     def of(self, robot: RobotModel) -> Array:
         """Return the limits for an arm, (n,) [rad or m, per s^order]."""
 
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundLimits":
+    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
+        robot = follows.robot
         name = LIMIT_NAMES[self.order]
         return BoundLimits.symmetric(robot, name, self.order, self.of(robot), self.margin)
 

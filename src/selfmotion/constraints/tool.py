@@ -9,8 +9,8 @@ from selfmotion.basics import Array, ProblemError, as_number
 from selfmotion.certificate import TOOL_RATES, ToolMotion, tool_sizes
 from selfmotion.constraints.base import Constraint, NodeTangents, motion_at_nodes
 from selfmotion.costs import Samples
+from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel, ToolRates
-from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +60,9 @@ class ToolLimits(Constraint):
         """Speed, turn rate, acceleration and turn acceleration, (4,); inf where there is none."""
         return np.array(self._given, dtype=np.float64)
 
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundToolLimits":
+    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundToolLimits":
         """See `Constraint.bind`."""
+        robot = follows.robot
         return BoundToolLimits(ToolRates(robot), robot.tool, self.limit, self.margin)
 
     def requirement(self, robot: RobotModel) -> ToolMotion:

@@ -9,8 +9,8 @@ from selfmotion.basics import Array, ProblemError, per_joint
 from selfmotion.certificate import JointTorques
 from selfmotion.constraints.base import Constraint, NodeTangents, motion_at_nodes
 from selfmotion.costs import Samples
+from selfmotion.follow import Follows
 from selfmotion.robot import Dynamics, RobotModel
-from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +37,9 @@ class JointTorqueLimits(Constraint):
     inertia: npt.ArrayLike | None = None
     margin: float = 1e-2
 
-    def bind(self, robot: RobotModel, task: Task, start: Array, end: Array) -> "BoundTorques":
+    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundTorques":
         """See `Constraint.bind`."""
+        robot = follows.robot
         if not self.margin > 0.0:
             raise ProblemError(
                 f"{robot.name}: joint torque limits: margin is {self.margin}, expected > 0"

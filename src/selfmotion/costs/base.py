@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, Saved, as_number, as_numbers, shown
 from selfmotion.costs.samples import Samples
-from selfmotion.robot import RobotModel
-from selfmotion.task import Task
+from selfmotion.follow import Follows
 
 # In place of an order of derivative: the pose error e, in the rows of the task.
 ERROR = -1
@@ -63,7 +62,7 @@ class Cost(Saved, ABC, family="cost"):
         """
         return {}
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """Raise ProblemError where the cost does not fit an arm and a task; nothing by default."""
 
 

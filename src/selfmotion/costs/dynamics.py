@@ -18,8 +18,8 @@ from selfmotion.costs.base import (
     weighted,
 )
 from selfmotion.costs.samples import Samples
+from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
-from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +79,9 @@ class KineticEnergy(Cost):
         mass = np.triu(pin.crba(self._model, self._model.createData(), 0.5 * (lower + upper)))
         return {1: self.mu * (mass + np.triu(mass, 1).T)}
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
+        robot = follows.robot
         check_mu(self.mu, self.name)
         _check_robot(self.robot, robot, self.name)
 
@@ -125,8 +126,9 @@ class GravityTorque(Cost):
             by_q[s] = weighted(np.asarray(self.weight), torque[None])[0] @ derivative
         return Partials(q=by_q)
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
+        robot = follows.robot
         check_weight(np.asarray(self.weight), robot.dof, self.name)
         _check_robot(self.robot, robot, self.name)
 

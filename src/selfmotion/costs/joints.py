@@ -28,8 +28,8 @@ from selfmotion.costs.base import (
     weighted,
 )
 from selfmotion.costs.samples import Samples
+from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
-from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +46,9 @@ class _Quadratic(Cost):
     def _w(self) -> Array:
         return np.asarray(self.weight)
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
-        check_weight(self._w, robot.dof, self.name)
+        check_weight(self._w, follows.robot.dof, self.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,9 +166,10 @@ class Posture(_Quadratic):
         """See `Cost.curvature`."""
         return {0: weight_matrix(self._w, dof)}
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
-        super().check(robot, task)
+        robot = follows.robot
+        super().check(follows)
         posture = np.asarray(self.posture)
         if posture.shape != (robot.dof,) or not np.all(np.isfinite(posture)):
             raise ProblemError(
@@ -221,8 +222,9 @@ class JointLimitDistance(Cost):
         relative = self._relative(samples) ** (self.power - 1)
         return Partials(q=self.mu * self.power * relative * self._scale[1])
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
+        robot = follows.robot
         check_mu(self.mu, self.name)
         if np.asarray(self.lower).shape != (robot.dof,):
             raise ProblemError(
@@ -276,8 +278,9 @@ class PathLength(Cost):
         """See `Cost.gradient`: w_i q̇_i / √(q̇_i² + δ²)."""
         return Partials(qd=self._w * samples.qd / np.hypot(samples.qd, self.smoothing))
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
+        robot = follows.robot
         check_name(self.name)
         as_number(self.smoothing, f"cost '{self.name}': smoothing", above=0.0)
         weights = self._w

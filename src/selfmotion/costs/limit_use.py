@@ -8,8 +8,7 @@ import numpy.typing as npt
 from selfmotion.basics import Array, ProblemError, as_number, per_joint
 from selfmotion.costs.base import Cost, Partials, check_name
 from selfmotion.costs.samples import Samples
-from selfmotion.robot import RobotModel
-from selfmotion.task import Task
+from selfmotion.follow import Follows
 
 # Where nothing moves, G is this: it keeps the root smooth.
 _LEAST = 1e-3
@@ -62,8 +61,9 @@ class LimitUse(Cost):
         v, a = self._limits(dof)
         return {1: np.diag((self.power - 1.0) / v**2), 2: np.diag(0.5 * self.power / a**2)}
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`: the limits have to be the arm's."""
+        robot = follows.robot
         self._limits(robot.dof)
         if not np.isfinite(np.concatenate(self._limits(robot.dof))).any():
             raise ProblemError(f"cost '{self.name}': no joint has a limit of which to use a share")

@@ -8,8 +8,7 @@ import numpy.typing as npt
 from selfmotion.basics import Array, ProblemError, as_numbers, as_whole, read_only, shown
 from selfmotion.costs.base import Cost, Partials, check_mu
 from selfmotion.costs.samples import Samples
-from selfmotion.robot import RobotModel
-from selfmotion.task import Task
+from selfmotion.follow import Follows
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class InverseManipulability(Cost):
         """See `Cost.gradient`: ∂G = -G ∂log det(JJᵀ)."""
         return Partials(q=-self.value(samples)[:, None] * samples.log_determinant_gradient)
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
         check_mu(self.mu, self.name)
 
@@ -65,7 +64,7 @@ class Manipulability(Cost):
         """See `Cost.gradient`: ∂w = ½ w ∂log det(JJᵀ)."""
         return Partials(q=0.5 * self.value(samples)[:, None] * samples.log_determinant_gradient)
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
         check_mu(self.mu, self.name)
 
@@ -107,14 +106,14 @@ class DirectionalManipulability(Cost):
         back = np.einsum("sm,smn->sn", a, samples.task_jacobian)
         return Partials(q=samples.contract(-2.0 * self.mu * a[:, :, None] * back[:, None, :]))
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
         check_mu(self.mu, self.name)
-        rows = task.dimension
+        rows = follows.dimension
         if len(np.asarray(self.direction)) != rows:
             raise ProblemError(
                 f"cost '{self.name}': direction has {len(np.asarray(self.direction))} entries, "
-                f"expected one per row of task '{task.value}' ({rows})"
+                f"expected one per prescribed row ({rows}: {', '.join(follows.row_names)})"
             )
 
     def _solved(self, samples: Samples) -> Array:
@@ -156,7 +155,7 @@ class SmallestSingularValue(Cost):
         weights = -scale[:, None, None] * (inverse @ samples.task_jacobian)
         return Partials(q=samples.contract(weights))
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
         check_mu(self.mu, self.name)
         as_whole(self.power, f"cost '{self.name}': power", 1, 100)

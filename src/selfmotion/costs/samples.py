@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from selfmotion import kernels
 from selfmotion.basics import Array
+from selfmotion.follow import Follows
 from selfmotion.motion import Sampling
-from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
 _ARRAYS = ("q", "qd", "jacobian", "rotation", "translation", "error", "task_jacobian")
@@ -57,14 +57,10 @@ class Samples:
             object.__setattr__(self, name, view)
 
     @classmethod
-    def along(
-        cls, robot: RobotModel, task: Task, sampling: Sampling, q: Array, qd: Array
-    ) -> "Samples":
+    def along(cls, follows: Follows, sampling: Sampling, q: Array, qd: Array) -> "Samples":
         """Return the samples of a motion on its path, q and q̇ (S, n) each."""
-        jacobian = np.empty((len(q), 6, robot.dof))
-        rotation, translation = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
-        for k, configuration in enumerate(q):
-            jacobian[k], rotation[k], translation[k] = robot.kinematics(configuration)
+        jacobian, rotation, translation = follows.only.chain.along(q)
+        task = follows.task
         rows = task.select_along(jacobian, rotation)
         error = np.zeros((len(q), 6))
         return cls(sampling, q, qd, jacobian, rotation, translation, error, task, rows)

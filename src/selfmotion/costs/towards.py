@@ -9,8 +9,8 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError, as_number, restore, shown
 from selfmotion.costs.base import Cost, Partials, check_name
 from selfmotion.costs.samples import Samples
+from selfmotion.follow import Follows
 from selfmotion.robot import Coordinate, RobotModel
-from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +68,9 @@ class Towards(Cost):
         _, by_q = self.coordinate(self.robot, 0.5 * (lower + upper)[None])
         return {0: self.weight * np.outer(by_q[0], by_q[0])}
 
-    def check(self, robot: RobotModel, task: Task) -> None:
+    def check(self, follows: Follows) -> None:
         """See `Cost.check`: the arm has to be the same."""
+        robot = follows.robot
         if robot.joint_names != self.robot.joint_names:
             raise ProblemError(
                 f"cost '{self.name}': is made for {self.robot.name}, not {robot.name}"

@@ -126,7 +126,7 @@ class Objective:
         rollout : Rollout, optional
             One on this grid that nobody else uses any more; by default a new one.
         """
-        robot, task, grid = problem.robot, problem.task, grid or still.grid
+        follows, grid = problem.follows, grid or still.grid
         t = grid.stage_times
         motion = null_motion or problem.null_motion
         frame = still.frame(t, motion.space)
@@ -135,12 +135,12 @@ class Objective:
         table = NullMotionTable(
             problem.null_functions(t, motion),
             frame,
-            robot.dof if frame is None else frame.shape[2],
+            problem.robot.dof if frame is None else frame.shape[2],
             around,
         )
-        start: Start = FreeStart(robot, task, still.start) if free else FixedStart(still.start)
+        start: Start = FreeStart(follows, still.start) if free else FixedStart(still.start)
         return cls(
-            rollout or Rollout(robot, problem.path, task, grid, damping=problem.damping_law),
+            rollout or Rollout(follows, grid, damping=problem.damping_law),
             table,
             problem.all_costs,
             start,

@@ -6,10 +6,10 @@ import pinocchio as pin
 from selfmotion import kernels
 from selfmotion.basics import Array
 from selfmotion.costs import Samples
+from selfmotion.follow import Follows
 from selfmotion.motion import Grid
-from selfmotion.path import Path, PathSamples
-from selfmotion.robot import RobotModel
-from selfmotion.task import DampingLaw, Task, feedback_rate
+from selfmotion.path import PathSamples
+from selfmotion.task import DampingLaw, feedback_rate
 
 # A tool this near to the path [m, rad] is on it; Newton's method needs few steps to that.
 _POLISHED, _POLISHING_STEPS = 1e-12, 4
@@ -28,32 +28,23 @@ class Rollout:
 
     Parameters
     ----------
-    robot : RobotModel
-    path : Path
-    task : Task
+    follows : Follows
     grid : Grid
     damping : DampingLaw, optional
         Without it, a singular pose ends the motion.
     """
 
-    def __init__(
-        self,
-        robot: RobotModel,
-        path: Path,
-        task: Task,
-        grid: Grid,
-        *,
-        damping: DampingLaw | None = None,
-    ) -> None:
-        self.robot, self.path, self.task, self.grid = robot, path, task, grid
+    def __init__(self, follows: Follows, grid: Grid, *, damping: DampingLaw | None = None) -> None:
+        path, task = follows.path, follows.task
+        self.follows, self.robot, self.task, self.grid = follows, follows.robot, task, grid
         self.damping = damping
         self.jacobian_evaluations = 0
-        self._data = robot.model.createData()
+        self._kinematics = follows.only.chain.kinematics()
         self._law = None if damping is None else (damping.threshold, damping.strength)
         self._gain = feedback_rate(path.duration)
         self._rows, self._angle_kind = task.rows, kernels.angle_kind(task.rows, task.tool_axes)
         self._table, self._at = self._new_table(len(grid.stage_times))
-        self._space = np.zeros(kernels.space_size(robot.dof, task.dimension))
+        self._space = np.zeros(kernels.space_size(self.robot.dof, task.dimension))
         # Of the last run, once they were asked for.
         self._samples: Samples | None = None
         # What `polished` works on: one stage, at a node.
@@ -97,21 +88,9 @@ class Rollout:
 
         `q` (S, n) is the table's own: each stage writes that of the next.
         """
-        model, data, tool = self.robot.model, self._data, self.robot.tool_id
-        jacobians, place = pin.computeJointJacobians, pin.updateFramePlacement
-        advance, rows, angle_kind, law = kernels.advance, self._rows, self._angle_kind, self._law
-        # Views of Pinocchio's own memory: each of the two calls refreshes its own. All joints are
-        # on the way to the tool, so that its Jacobian is that of all joints.
-        jacobian, pose = data.J, data.oMf[tool]
-        rotation, translation = pose.rotation, pose.translation
-        for stage, configuration in enumerate(q):
-            jacobians(model, data, configuration)
-            place(model, data, tool)
-            if not advance(
-                stage, jacobian, rotation, translation, table, rows, angle_kind, gain, law
-            ):
-                return stage
-        return None
+        return self._kinematics.march(
+            q, kernels.advance, table, self._rows, self._angle_kind, gain, self._law
+        )
 
     def polished(self) -> tuple[Array, Array, Array]:
         """Return the nodes of the last run, put exactly onto the path; the run stays as it is.

@@ -7,8 +7,7 @@ import pinocchio as pin
 
 from selfmotion import kernels
 from selfmotion.basics import Array
-from selfmotion.robot import RobotModel, null_basis
-from selfmotion.task import Task
+from selfmotion.follow import Follows
 
 # Newton's method onto the start of the path is quadratic: few steps, and the one after an error of
 # this is exact. Far moves fail and say so.
@@ -57,16 +56,17 @@ class FreeStart:
 
     Parameters
     ----------
-    robot, task
+    follows : Follows
     reference : (n,)
         q_ref, on the path's first pose; z = 0.
     """
 
-    def __init__(self, robot: RobotModel, task: Task, reference: Array) -> None:
+    def __init__(self, follows: Follows, reference: Array) -> None:
+        task = follows.task
         self._task, self._reference = task, reference
-        self._null = null_basis(robot, task, reference)
+        self._null = follows.null_basis(reference)
         self._at = reference
-        self._tool = robot.tool_kinematics()
+        self._tool = follows.only.chain.kinematics()
         self._rows = task.rows, kernels.angle_kind(task.rows, task.tool_axes)
         self._chart = np.ascontiguousarray(self._null), np.array(reference, dtype=np.float64)
 

@@ -72,9 +72,7 @@ class StillMotion:
         cls, problem: Problem, configuration: Array, grid: Grid, guide: Guide | None = None
     ) -> "StillMotion":
         """Integrate from a start configuration (n,) on one grid."""
-        rollout = Rollout(
-            problem.robot, problem.path, problem.task, grid, damping=problem.damping_law
-        )
+        rollout = Rollout(problem.follows, grid, damping=problem.damping_law)
         t = grid.stage_times
         idle = np.zeros((len(t), problem.robot.dof))
         own = idle if guide is None else problem.brought_to_rest(t, guide(t))

@@ -1,6 +1,6 @@
 """Tool motion over time: what the tool frame is to do, as pose and twist at any time."""
 
-from selfmotion.path.base import STILL, Path, PathSamples, TimeLaw, check_oriented, path_pose
+from selfmotion.path.base import STILL, Path, PathSamples, PathSeries, TimeLaw, check_oriented, path_pose, path_series
 from selfmotion.path.feed import Feed
 from selfmotion.path.joined import Dwell, Joined, with_leads
 from selfmotion.path.pace import Pace, times_along
@@ -24,6 +24,7 @@ __all__ = [
     "Pace",
     "Path",
     "PathSamples",
+    "PathSeries",
     "Placed",
     "Polyline",
     "Ramped",
@@ -35,6 +36,7 @@ __all__ = [
     "Waypoints",
     "check_oriented",
     "path_pose",
+    "path_series",
     "section_at_rest",
     "times_along",
     "with_leads",

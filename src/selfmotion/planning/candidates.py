@@ -114,7 +114,7 @@ class Candidates:
     def _search(self) -> None:
         problem, search = self._problem, self._settings
         start = problem.given_start
-        redundancy = problem.robot.redundancy(problem.task)
+        redundancy = problem.follows.redundancy
         can_search = redundancy > 0
         if search.compare and redundancy != 1:
             raise ProblemError(
@@ -182,7 +182,7 @@ class Candidates:
     def _try_candidates(self, starts: int, finalists: int, rng: np.random.Generator) -> None:
         problem = self._problem
         arm = problem.envelope.arm(problem.robot)
-        candidates = start_candidates(arm, problem.path, problem.task, starts, rng)
+        candidates = start_candidates(problem.follows.for_robot(arm), starts, rng)
         rough = self._best_of(candidates, finalists) if len(candidates) > finalists else []
         self._waiting = sessions = self._resumed(rough) if rough else self._sessions(candidates)
         for number, session in enumerate(sessions, 1):

@@ -12,7 +12,6 @@ from selfmotion.path import Truncated
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.session import Session
 from selfmotion.problem import Problem
-from selfmotion.robot import null_basis
 from selfmotion.search import Reach
 
 _Candidate = tuple[Array, Guide | None]
@@ -230,7 +229,7 @@ class _Push:
 
 def _pushes(problem: Problem, start: Array) -> list[Guide]:
     """Return null motions to either side: x = 0 may keep to a plane that has no way on."""
-    basis = null_basis(problem.robot, problem.task, start) / problem.path.duration
+    basis = problem.follows.null_basis(start) / problem.path.duration
     angles = [sign * angle for angle in _PUSHES for sign in (1.0, -1.0)]
     return [_Push(angle * direction) for direction in basis.T for angle in angles]
 

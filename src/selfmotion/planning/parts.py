@@ -147,7 +147,7 @@ def _checked(problem: Problem, retreat: float, axis: npt.ArrayLike) -> Retreat |
             "damping= leads through what cannot be followed by leaving the path, parts by another "
             "configuration; leave the damping out, or call plan"
         )
-    if problem.robot.redundancy(problem.task) == 0:
+    if problem.follows.redundancy == 0:
         raise ProblemError(
             f"{problem.robot.name}: task '{problem.task.value}' leaves no self-motion to search "
             f"for parts; choose one with fewer rows, or call plan"

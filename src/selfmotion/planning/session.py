@@ -403,7 +403,7 @@ class Session:
     def _left(self) -> Remaining:
         """Return what is left to save around the present motion."""
         problem = self._still.problem
-        spline = finest(problem.robot.redundancy(problem.task))
+        spline = finest(problem.follows.redundancy)
         # More than a step for each interval makes no better estimate.
         grid = self._objective.grid.with_steps(spline.intervals)
         same = grid is self._objective.grid

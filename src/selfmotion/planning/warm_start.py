@@ -56,7 +56,7 @@ def coefficients_of(
     # A plan of a part of its path ends earlier.
     theirs = np.minimum(t * pace, trajectory.t[-1])
     q, qd = trajectory(theirs), pace * trajectory(theirs, 1)
-    jacobians = np.array([problem.robot.task_jacobian(each, problem.task) for each in q])
+    jacobians = np.array([problem.follows.jacobian(each) for each in q])
     null = np.swapaxes(null_space(jacobians), 1, 2)
     acting = null @ table.matrix()
     wanted = np.einsum("srn,sn->sr", null, qd)

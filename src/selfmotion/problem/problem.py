@@ -38,6 +38,7 @@ from selfmotion.constraints import (
     JointVelocityLimits,
 )
 from selfmotion.costs import Cost, JointVelocity, OffPath
+from selfmotion.follow import Follows
 from selfmotion.motion import NullMotion, RefinedNullMotion, Trajectory, resting_window
 from selfmotion.path import Path, check_oriented
 from selfmotion.problem.path_scale import check_pace, check_units
@@ -155,7 +156,7 @@ class Problem:
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
             object.__setattr__(self, "start", None)
         object.__setattr__(self, "rest", as_flag(self.rest, "rest"))
-        check_redundancy(self.robot, self.task, bool(self.relaxations))
+        check_redundancy(self.follows, bool(self.relaxations))
         check_units(self.robot, self.path)
         check_pace(self.robot, self.path)
         self._check_costs()
@@ -165,10 +166,15 @@ class Problem:
             object.__setattr__(self, "start", start)
             self._check_start(start)
         for item in self.constraints:
-            item.check_start(self.robot, self.path, self.task, self.given_start)
+            item.check_start(self.follows, self.given_start)
 
     def __repr__(self) -> str:
         return f"Problem({self.robot.name}, {self.path!r}, task '{self.task.value}')"
+
+    @cached_property
+    def follows(self) -> Follows:
+        """What the arm follows: the one thing that planners are told."""
+        return Follows.of(self.robot, self.path, self.task)
 
     @property
     def given_start(self) -> Array | None:
@@ -214,7 +220,7 @@ class Problem:
         asked = list(self.all_constraints if apart else self._asking)
         if all(self.rests):
             asked = [item.at_rest() for item in asked]
-        return tuple(item.bind(self.robot, self.task, start, end) for item in asked)
+        return tuple(item.bind(self.follows, start, end) for item in asked)
 
     @cached_property
     def rest_orders(self) -> tuple[int, int]:
@@ -329,11 +335,11 @@ class Problem:
         if twice:
             raise ProblemError(f"two costs are called '{twice[0]}'; give one another name=")
         for cost in self.costs:
-            cost.check(self.robot, self.task)
+            cost.check(self.follows)
 
     def _check_constraints(self) -> None:
         for item in self.constraints:
-            item.check(self.robot, self.path, self.task)
+            item.check(self.follows)
         # Now, not when the motion is finished: without a requirement nothing judges it.
         for item, found in zip(self.all_constraints, self._asked, strict=True):
             if not isinstance(found, Requirement):

@@ -1,11 +1,12 @@
 """Whether an arm can follow a task, and what self-motion that leaves."""
 
 from selfmotion.basics import ProblemError, RedundancyError
+from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
 
-def check_redundancy(robot: RobotModel, task: Task, is_relaxed: bool) -> None:
+def check_redundancy(follows: Follows, is_relaxed: bool) -> None:
     """Refuse a task that the arm cannot follow, or that leaves no self-motion and no row relaxed.
 
     Raises
@@ -15,6 +16,7 @@ def check_redundancy(robot: RobotModel, task: Task, is_relaxed: bool) -> None:
     RedundancyError
         There are as many rows as joints.
     """
+    robot, task = follows.robot, follows.task
     if not robot.can_follow(task):
         others = _redundant_tasks(robot)
         choice = (
@@ -27,7 +29,7 @@ def check_redundancy(robot: RobotModel, task: Task, is_relaxed: bool) -> None:
             f"({', '.join(task.row_names)}), but the arm cannot move '{robot.tool}' freely in "
             f"all of them; {choice}"
         )
-    if robot.redundancy(task) == 0 and not is_relaxed:
+    if follows.redundancy == 0 and not is_relaxed:
         others = _redundant_tasks(robot)
         choice = f"choose a task with fewer rows ({', '.join(others)}), " if others else ""
         raise RedundancyError(

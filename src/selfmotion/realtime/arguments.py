@@ -16,6 +16,7 @@ from selfmotion.basics import (
 )
 from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost
+from selfmotion.follow import Follows
 from selfmotion.motion import NullMotion
 from selfmotion.realtime.reference import Approach
 from selfmotion.robot import RobotModel
@@ -34,7 +35,7 @@ def check_kinds(robot: Any, null_motion: Any, approach: Any) -> None:
 
 
 def as_asked(
-    robot: RobotModel, task: Task, costs: Any, constraints: Any
+    follows: Follows, costs: Any, constraints: Any
 ) -> tuple[Sequence[Cost], Sequence[Constraint]]:
     """Return costs and constraints as tuples, of kinds that fit the arm and a task it can follow.
 
@@ -43,6 +44,7 @@ def as_asked(
     ProblemError
         They do not.
     """
+    robot, task = follows.robot, follows.task
     if not robot.can_follow(task):
         able = [other.value for other in Task if robot.can_follow(other)]
         raise ProblemError(
@@ -51,7 +53,7 @@ def as_asked(
         )
     wanted = as_several(costs, "costs", Cost)  # type: ignore[type-abstract]
     for cost in wanted:
-        cost.check(robot, task)
+        cost.check(follows)
     kept = as_several(constraints, "constraints", Constraint)  # type: ignore[type-abstract]
     return wanted, kept
 

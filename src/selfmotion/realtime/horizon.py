@@ -13,13 +13,13 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError
 from selfmotion.costs import Cost, Samples
 from selfmotion.engine import Rollout
+from selfmotion.follow import Follows
 from selfmotion.motion import Grid, NullMotion
-from selfmotion.path import Dwell, PathSamples
+from selfmotion.path import PathSamples
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.law import transport_frame
 from selfmotion.realtime.programme import best_step
-from selfmotion.robot import RobotModel, null_space
-from selfmotion.task import Task
+from selfmotion.robot import null_space
 
 # Added to the Gauss-Newton matrix, relative to its trace: directions that do not act stay put.
 _REGULAR = 1e-8
@@ -44,8 +44,8 @@ class Horizon:
 
     Parameters
     ----------
-    robot : RobotModel
-    task : Task
+    follows : Follows
+        Its path is another one at each step.
     costs : sequence of Cost
     limits : (4, n)
         Lower, upper, speed, acceleration: what is aimed at.
@@ -68,8 +68,7 @@ class Horizon:
 
     def __init__(
         self,
-        robot: RobotModel,
-        task: Task,
+        follows: Follows,
         costs: Sequence[Cost],
         limits: Array,
         null_motion: NullMotion,
@@ -78,10 +77,9 @@ class Horizon:
         surroundings: Surroundings | None = None,
     ) -> None:
         self.grid = Grid(_graded(duration, steps))
-        self.rollout = Rollout(
-            robot, Dwell(robot.pose(robot.dexterous_configuration()), duration), task, self.grid
-        )
-        self.redundancy = robot.redundancy(task)
+        robot = follows.robot
+        self.rollout = Rollout(follows, self.grid)
+        self.redundancy = follows.redundancy
         self._costs, self._duration = tuple(costs), duration
         self._null_motion, self._around = null_motion, surroundings
         t = self.grid.stage_times

@@ -6,10 +6,9 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, as_number
+from selfmotion.follow import Follows
 from selfmotion.path import Path, PathSamples
 from selfmotion.realtime import law
-from selfmotion.robot import RobotModel
-from selfmotion.task import Task
 
 # An offset of the tool is known every so many seconds.
 _OFFSET_STEP = 2e-3
@@ -50,8 +49,7 @@ class Reference:
 
     Parameters
     ----------
-    robot : RobotModel
-    task : Task
+    follows : Follows
     approach : Approach
     times : (M,)
         From now on [s].
@@ -64,13 +62,14 @@ class Reference:
         Task Jacobian where the arm is.
     """
 
-    def __init__(self, robot: RobotModel, task: Task, approach: Approach, times: Array) -> None:
+    def __init__(self, follows: Follows, approach: Approach, times: Array) -> None:
+        task = follows.task
         self._task, self._times = task, times
-        self._kinematics = robot.tool_kinematics()
+        self._kinematics = follows.only.chain.kinematics()
         self._approach = approach.numbers
         self._offsets = np.zeros((int(np.ceil(times.max() / _OFFSET_STEP)) + 2, 12))
         self.table = np.zeros((len(times), law.REFERENCE))
-        self.jacobian = np.zeros((task.dimension, robot.dof))
+        self.jacobian = np.zeros((task.dimension, follows.robot.dof))
         # What the task does not prescribe is left where it is; of an axis all three rows turn.
         self._free = np.full(6, not task.tool_axes)
         self._free[task.rows] = False

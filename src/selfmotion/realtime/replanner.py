@@ -10,8 +10,9 @@ from selfmotion import kernels
 from selfmotion.basics import Array, ProblemError, as_number, as_whole, one_blas_thread
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost, JointVelocity
+from selfmotion.follow import Follows
 from selfmotion.motion import NullMotion, PolynomialNullMotion
-from selfmotion.path import Path, PathSamples
+from selfmotion.path import Dwell, Path, PathSamples
 from selfmotion.realtime import law
 from selfmotion.realtime.arguments import as_asked, as_begun, as_measured, check_kinds
 from selfmotion.realtime.clear import Surroundings
@@ -108,7 +109,9 @@ class Replanner:
         self._settling = as_number(settling, "settling", above=0.0)
         latency = as_number(latency, "latency", least=0.0)
         as_number(reserve, "reserve", least=0.0, most=self.horizon)
-        costs, constraints = as_asked(robot, self.task, costs, constraints)
+        somewhere = Dwell(robot.pose(robot.dexterous_configuration()), self.horizon)
+        follows = Follows.of(robot, somewhere, self.task)
+        costs, constraints = as_asked(follows, costs, constraints)
         limits = joint_limits(robot, constraints)
         self.limits = limits
         self._inner = np.vstack([tightened(limits), np.zeros(robot.dof)])
@@ -117,8 +120,7 @@ class Replanner:
         clearances = [item for item in constraints if isinstance(item, Clearance)]
         self._around = Surroundings(robot, clearances[0]) if clearances else None
         self._horizon = Horizon(
-            robot,
-            self.task,
+            follows,
             costs,
             planned_limits(limits),
             null_motion,
@@ -126,12 +128,12 @@ class Replanner:
             steps,
             self._around,
         )
-        self._data = robot.model.createData()
+        self._kinematics = follows.only.chain.kinematics()
         self._rows = self.task.rows
         self._kind = kernels.angle_kind(self._rows, self.task.tool_axes)
         self._delay = round(latency / self.cycle)
         self._prepare(round(self.period / self.cycle) + round(reserve / self.cycle))
-        self._reference = Reference(robot, self.task, approach or Approach(), self._times)
+        self._reference = Reference(follows, approach or Approach(), self._times)
         self._begun = False
 
     def _prepare(self, cycles: int) -> None:
@@ -359,21 +361,21 @@ class Replanner:
 
     def _follow(self) -> bool:
         """Command the cycles one after the other; return whether the tool moves as asked."""
-        model, data, tool = self.robot.model, self._data, self.robot.tool_id
-        jacobians, locate = pin.computeJointJacobians, pin.updateFramePlacement
-        command, states, table, limits = law.command, self._states, self._table, self._inner
-        rows, kind, h, n = self._rows, self._kind, self.cycle, self.robot.dof
-        pose = data.oMf[tool]
-        jacobian, rotation, translation = data.J, pose.rotation, pose.translation
+        states, table, limits = self._states, self._table, self._inner
+        h, n = self.cycle, self.robot.dof
         table[0, :n] = states[0, 0] + 0.5 * h * states[0, 1] + limits[4]
-        places = table[:, :n]
+        places = table[: self._cycles, :n]
         follows = True
-        for cycle in range(self._cycles):
-            jacobians(model, data, places[cycle])
-            locate(model, data, tool)
-            follows &= command(
+
+        def step(cycle: int, jacobian: Array, rotation: Array, translation: Array) -> bool:
+            nonlocal follows
+            follows &= law.command(
                 cycle, jacobian, rotation, translation, table, states, limits, rows, kind, _GAIN, h
             )
+            return True
+
+        rows, kind = self._rows, self._kind
+        self._kinematics.march(places, step)
         return follows
 
     def _segment(

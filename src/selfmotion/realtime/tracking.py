@@ -92,7 +92,7 @@ class Record:
         problem = Problem(robot, path, task, costs=tuple(costs), constraints=tuple(constraints))
         rates = np.gradient(self.q, self.t, axis=0)
         motion = Trajectory(self.t, self.q, rates, robot.joint_names)
-        samples = Samples.along(robot, task, Sampling.trapezoidal(self.t), self.q, rates)
+        samples = Samples.along(problem.follows, Sampling.trapezoidal(self.t), self.q, rates)
         terms = {cost.name: float(samples.weights @ cost.value(samples)) for cost in costs}
         steps = len(self.t)
         report = Report(

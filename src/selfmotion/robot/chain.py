@@ -1,66 +1,276 @@
-"""Where joints are, compiled: for many configurations at once, of which Python would ask singly."""
+"""A chain of a tree: from a base frame to a tip frame, the one place that places the tip.
 
-import math
+In Pinocchio's world Jacobian of all joints, column j is the twist [v0, ω] of all that joint j
+moves, v0 at the world's origin. Relative to a base frame that joints move as well,
+
+    J_j = s_j Rᵀ [v0_j + ω_j × p; ω_j],
+
+with R the base frame's orientation, p the tip's position, and s_j = 1 where joint j moves the tip,
+-1 where it moves the base; joints that move both or none drop out.
+"""
+
+import threading
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
+import pinocchio as pin
 
-from selfmotion.basics import Array, inlined
+from selfmotion.basics import Array, Ints
+from selfmotion.robot.placements import Flags
 
-Flags = npt.NDArray[np.bool_]
-
-
-@inlined
-def turned(axis: Array, angle: float, rotation: Array) -> None:
-    """Write the rotation by an angle about a unit vector (Rodrigues' formula)."""
-    s, c = math.sin(angle), math.cos(angle)
-    x, y, z, rest = axis[0], axis[1], axis[2], 1.0 - c
-    for a in range(3):
-        for b in range(3):
-            rotation[a, b] = axis[a] * axis[b] * rest
-        rotation[a, a] += c
-    rotation[0, 1] -= z * s
-    rotation[1, 0] += z * s
-    rotation[0, 2] += y * s
-    rotation[2, 0] -= y * s
-    rotation[1, 2] -= x * s
-    rotation[2, 1] += x * s
+# The frame that does not move.
+WORLD = 0
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
-@inlined
-def compose(first: Array, at: Array, second: Array, there: Array, r: Array, p: Array) -> None:
-    """Write the product of two placements."""
-    for a in range(3):
-        x, y, z = first[a, 0], first[a, 1], first[a, 2]
-        p[a] = at[a] + x * there[0] + y * there[1] + z * there[2]
-        for b in range(3):
-            r[a, b] = x * second[0, b] + y * second[1, b] + z * second[2, b]
+class ChainArrays(NamedTuple):
+    """What compiled kinematics need of a chain of c joints, from base to tip.
 
-
-@inlined
-def placements(
-    q: Array,
-    rotations: Array,
-    positions: Array,
-    axes: Array,
-    is_revolute: Flags,
-    r: Array,
-    p: Array,
-) -> None:
-    """Write where q (n,) places the joints of a chain: (n + 1, 3, 3) and (n + 1, 3).
-
-    Row 0 is the world. Each joint has a place in the frame of the one before, (n, 3, 3) and (n, 3),
-    and an axis in its own, (n, 3).
+    Attributes
+    ----------
+    rotations, positions : (c, 3, 3), (c, 3)
+        Of each joint at q = 0 in the frame of the one before, the first in the base frame [m].
+    axes : (c, 3)
+        In the joints' own frames; turned round where a joint is passed from its far side.
+    is_revolute : (c,)
+    tip_rotation, tip_position : (3, 3), (3,)
+        Of the tip in the frame of the last joint [m].
     """
-    # Loops: numba takes seconds for what NumPy checks of shapes.
-    turn, middle, shift, slide = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
-    for a in range(3):
-        p[0, a] = 0.0
-        for b in range(3):
-            r[0, a, b] = 1.0 if a == b else 0.0
-    for j in range(len(q)):
-        compose(r[j], p[j], rotations[j], positions[j], middle, shift)
-        turned(axes[j], q[j] if is_revolute[j] else 0.0, turn)
-        for a in range(3):
-            slide[a] = 0.0 if is_revolute[j] else q[j] * axes[j, a]
-        compose(middle, shift, turn, slide, r[j + 1], p[j + 1])
+
+    rotations: Array
+    positions: Array
+    axes: Array
+    is_revolute: Flags
+    tip_rotation: Array
+    tip_position: Array
+
+
+class Kinematics:
+    """Asks Pinocchio for a chain's Jacobian and pose, with data of its own.
+
+    The one class with these calls: another library would be one class like it. Two of them may be
+    used by two threads at once; one may not.
+
+    Parameters
+    ----------
+    chain : Chain
+
+    Attributes
+    ----------
+    rotation, translation : (3, 3), (3,)
+        The tip's pose in the base frame at the last configuration: views of memory that each call
+        of `at` refreshes.
+    """
+
+    __slots__ = ("_base", "_chain", "_data", "_tip", "jacobian", "rotation", "translation")
+
+    def __init__(self, chain: "Chain") -> None:
+        self._chain, self._data = chain, chain.model.createData()
+        tip, base = self._data.oMf[chain.tip], self._data.oMf[chain.base]
+        self._tip, self._base = (tip.rotation, tip.translation), (base.rotation, base.translation)
+        if chain.is_rooted:
+            # Views of Pinocchio's own memory.
+            self.jacobian: Array = self._data.J
+            self.rotation, self.translation = self._tip
+        else:
+            self.jacobian = np.zeros((6, chain.dof), order="F")
+            self.rotation, self.translation = np.zeros((3, 3), order="F"), np.zeros(3)
+
+    def refresh(self, q: Array) -> None:
+        """Set the tip's pose at q (n,), and `jacobian` (6, n), [v, ω] at the base's origin."""
+        chain = self._chain
+        pin.computeJointJacobians(chain.model, self._data, q)
+        pin.updateFramePlacement(chain.model, self._data, chain.tip)
+        if not chain.is_rooted:
+            pin.updateFramePlacement(chain.model, self._data, chain.base)
+            self._rebase()
+
+    def march(self, q: Array, step: Callable[..., bool], *arguments: Any) -> int | None:
+        """Refresh at each of q (S, n) and call ``step(s, jacobian, rotation, translation, …)``.
+
+        Each step may set the next row of q. Returns the first s at which it returned False.
+        """
+        jacobian, rotation, translation = self.jacobian, self.rotation, self.translation
+        chain, data = self._chain, self._data
+        if not chain.is_rooted:
+            for s, configuration in enumerate(q):
+                self.refresh(configuration)
+                if not step(s, jacobian, rotation, translation, *arguments):
+                    return s
+            return None
+        # Written out: this loop is where the engine spends its time.
+        model, tip = chain.model, chain.tip
+        jacobians, place = pin.computeJointJacobians, pin.updateFramePlacement
+        for s, configuration in enumerate(q):
+            jacobians(model, data, configuration)
+            place(model, data, tip)
+            if not step(s, jacobian, rotation, translation, *arguments):
+                return s
+        return None
+
+    def at(self, q: Array) -> Array:
+        """Return the Jacobian at q (n,), (6, n): rows [v, ω] of the tip in the base's axes."""
+        self.refresh(q)
+        chain = self._chain
+        if chain.is_rooted:
+            jacobian: Array = pin.getFrameJacobian(chain.model, self._data, chain.tip, _AXES)
+            # Of a single joint it comes as a vector.
+            return jacobian.reshape(6, -1)
+        jacobian = self.jacobian.copy()
+        jacobian[:3] += np.cross(jacobian[3:].T, self.translation).T
+        return jacobian
+
+    def place(self, q: Array) -> pin.SE3:
+        """Return the tip's pose at q (n,), a copy; cheaper than with its Jacobian."""
+        chain = self._chain
+        pin.forwardKinematics(chain.model, self._data, q)
+        tip = pin.updateFramePlacement(chain.model, self._data, chain.tip)
+        if chain.is_rooted:
+            return pin.SE3(tip)
+        base = pin.updateFramePlacement(chain.model, self._data, chain.base)
+        return base.actInv(tip)
+
+    def _rebase(self) -> None:
+        """Set what is asked of the base frame from what is known of the world."""
+        turn, place = self._base
+        world: Array = self._data.J
+        signs = self._chain.signs
+        moving = world[:3] + np.cross(world[3:].T, place).T
+        self.jacobian[:3] = signs * (turn.T @ moving)
+        self.jacobian[3:] = signs * (turn.T @ world[3:])
+        self.rotation[:] = turn.T @ self._tip[0]
+        self.translation[:] = turn.T @ (self._tip[1] - place)
+
+
+class Chain:
+    """The joints between a base frame and a tip frame of a tree.
+
+    Poses and Jacobians are those of the tip in the base frame, in its axes. A value: threads may
+    share it.
+
+    Parameters
+    ----------
+    model : pinocchio.Model
+        The tree, one coordinate for each joint.
+    tip, base : int
+        Frames of the model.
+    """
+
+    def __init__(self, model: Any, tip: int, base: int = WORLD) -> None:
+        self.model, self.tip, self.base = model, tip, base
+        self._per_thread = threading.local()
+
+    def __getstate__(self) -> tuple[Any, int, int]:
+        return self.model, self.tip, self.base
+
+    def __setstate__(self, state: tuple[Any, int, int]) -> None:
+        # What belongs to a thread does not travel to another process.
+        self.__init__(*state)  # type: ignore[misc]
+
+    @property
+    def dof(self) -> int:
+        """Number n of the tree's joints: the length of configurations."""
+        return int(self.model.nv)
+
+    @property
+    def is_rooted(self) -> bool:
+        """Whether the base is the world, and all joints are on the way to the tip."""
+        return self.base == WORLD and len(self.joints) == self.dof
+
+    def kinematics(self) -> Kinematics:
+        """Return the chain's kinematics with data of their own, for whoever asks often."""
+        return Kinematics(self)
+
+    @property
+    def own(self) -> Kinematics:
+        """The kinematics of this thread alone."""
+        found: Kinematics | None = getattr(self._per_thread, "kinematics", None)
+        if found is None:
+            found = self._per_thread.kinematics = self.kinematics()
+        return found
+
+    def place(self, q: Array) -> pin.SE3:
+        """Return the tip's pose at q (n,), which is not checked."""
+        return self.own.place(q)
+
+    def at(self, q: Array) -> tuple[Array, Array, Array]:
+        """Return Jacobian (6, n), rotation (3, 3) and translation (3,) at q (n,), unchecked."""
+        own = self.own
+        return own.at(q), np.array(own.rotation), np.array(own.translation)
+
+    def along(self, q: Array) -> tuple[Array, Array, Array]:
+        """Return the same at many configurations (K, n): (K, 6, n), (K, 3, 3) and (K, 3)."""
+        jacobians = np.empty((len(q), 6, self.dof))
+        rotations, translations = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
+        own = self.own
+        for k, configuration in enumerate(q):
+            jacobians[k] = own.at(configuration)
+            rotations[k], translations[k] = own.rotation, own.translation
+        return jacobians, rotations, translations
+
+    @cached_property
+    def joints(self) -> Ints:
+        """Coordinates of the chain's joints, from base to tip, (c,)."""
+        return np.array([joint - 1 for joint, _ in self._passed], dtype=np.int64)
+
+    @cached_property
+    def signs(self) -> Array:
+        """1 for joints that move the tip, -1 for those that move the base, 0 for both or none."""
+        signs = np.zeros(self.dof)
+        for joint, sign in self._passed:
+            signs[joint - 1] = sign
+        return signs
+
+    @cached_property
+    def _passed(self) -> list[tuple[int, int]]:
+        """Joints from base to tip, -1 where one is passed from its far side."""
+        frames, supports = self.model.frames, self.model.supports
+        up, down = (list(supports[frames[frame].parentJoint]) for frame in (self.base, self.tip))
+        both = sum(1 for a, b in zip(up, down, strict=False) if a == b) - 1
+        return [(joint, -1) for joint in up[:both:-1]] + [(joint, 1) for joint in down[both + 1 :]]
+
+    @cached_property
+    def arrays(self) -> ChainArrays:
+        """What compiled kinematics need."""
+        model, frames = self.model, self.model.frames
+        place = frames[self.base].placement.inverse()
+        rotations, positions, axes, kinds = [], [], [], []
+        for joint, sign in self._passed:
+            if sign > 0:
+                place = place * model.jointPlacements[joint]
+            twist = _motion(model, joint)
+            is_revolute = bool(np.any(twist.angular))
+            rotations.append(np.array(place.rotation))
+            positions.append(np.array(place.translation))
+            axes.append(sign * np.array(twist.angular if is_revolute else twist.linear))
+            kinds.append(is_revolute)
+            place = pin.SE3.Identity() if sign > 0 else model.jointPlacements[joint].inverse()
+        place = place * frames[self.tip].placement
+        return ChainArrays(
+            np.array(rotations).reshape(-1, 3, 3),
+            np.array(positions).reshape(-1, 3),
+            np.array(axes).reshape(-1, 3),
+            np.array(kinds, dtype=np.bool_),
+            np.array(place.rotation),
+            np.array(place.translation),
+        )
+
+
+def _motion(model: Any, joint: int) -> pin.Motion:
+    """Return the twist of a joint at unit speed, in its own frame."""
+    data = model.createData()
+    # Columns [v, ω] at the world's origin; of one joint Pinocchio returns a vector.
+    columns = pin.computeJointJacobians(model, data, pin.neutral(model)).reshape(6, -1)
+    return data.oMi[joint].actInv(pin.Motion(columns[:, joint - 1]))
+
+
+def null_space(jacobians: Array) -> Array:
+    """Return orthonormal null-space bases of matrices (…, m, n) of rank m ≤ n, (…, n, n - m).
+
+    The last right singular vectors; their signs and order are arbitrary.
+    """
+    rows = jacobians.shape[-2]
+    _, _, right = np.linalg.svd(jacobians)
+    return np.asarray(np.swapaxes(right[..., rows:, :], -1, -2))

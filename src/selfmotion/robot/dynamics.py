@@ -55,7 +55,7 @@ class Dynamics:
             raise ProblemError(
                 f"payload: inertia {turning.tolist()} is not symmetric with moments ≥ 0"
             )
-        tool = model.frames[robot.tool_id]
+        tool = model.frames[robot.chain.tip]
         held = pin.Inertia(float(payload), where, turning)
         model.appendBodyToJoint(tool.parentJoint, held, tool.placement)
         self._model, self._data = model, model.createData()

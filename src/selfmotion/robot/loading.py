@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion.basics import RobotError, as_number, nearest, read_only, shown
+from selfmotion.robot.chain import Chain
 from selfmotion.robot.expansion import expand
 from selfmotion.robot.full_model import full_model, name_links
 from selfmotion.robot.held import locked_configuration
@@ -198,8 +199,7 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
         upper=read_only(np.where(continuous, np.inf, model.upperPositionLimit)),
         velocity_limit=read_only(np.where(velocity > 0, velocity, np.inf)),
         locked=locked,
-        model=model,
-        tool_id=model.getFrameId(tool, pin.FrameType.BODY),
+        chain=Chain(model, model.getFrameId(tool, pin.FrameType.BODY)),
         urdf=urdf,
         effort_limit=read_only(np.where(effort > 0.0, effort, np.inf)),
         acceleration_limit=read_only(np.full(len(names), np.inf)),

@@ -1,6 +1,5 @@
 """The arm as a chain with one coordinate per joint, on Pinocchio's model of it."""
 
-import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -18,9 +17,9 @@ from selfmotion.basics import (
     random_numbers,
     shown,
 )
+from selfmotion.robot.chain import Chain
 from selfmotion.robot.full_model import full_model, link_geometry
 from selfmotion.robot.held import locked_configuration
-from selfmotion.robot.kinematics import ToolKinematics
 from selfmotion.robot.mesh_files import bad_meshes, without_meshes
 from selfmotion.robot.urdf import Urdf
 from selfmotion.task import Task, as_pose
@@ -47,10 +46,8 @@ class RobotModel:
         Speed limits [rad/s or m/s]; inf where the URDF gives none.
     locked : dict
         Joint name → coordinate at which it is held.
-    model : pinocchio.Model
-        The chain, nq = nv = n. Not to be modified.
-    tool_id : int
-        Index of the tool frame in `model`.
+    chain : Chain
+        From the root frame to the tool, on Pinocchio's model of all joints, nq = nv = n.
     urdf : Urdf
         What it was made from.
     touching : tuple of (str, str)
@@ -69,25 +66,21 @@ class RobotModel:
     upper: Array
     velocity_limit: Array
     locked: Mapping[str, float]
-    model: Any = field(repr=False)
-    tool_id: int = field(repr=False)
+    chain: Chain = field(repr=False)
     urdf: Urdf = field(repr=False)
     effort_limit: Array
     acceleration_limit: Array
     jerk_limit: Array
     touching: tuple[tuple[str, str], ...] = ()
-    _per_thread: threading.local = field(default_factory=threading.local, init=False, repr=False)
 
     def __repr__(self) -> str:
         """Return one line: name, tool and joints."""
         return f"RobotModel({self.name}, tool '{self.tool}', joints {', '.join(self.joint_names)})"
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {key: value for key, value in self.__dict__.items() if key != "_per_thread"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        # What belongs to a thread does not travel to another process.
-        self.__dict__.update(state, _per_thread=threading.local())
+    @property
+    def model(self) -> Any:
+        """The ``pinocchio.Model`` of its joints. Not to be modified."""
+        return self.chain.model
 
     @property
     def dof(self) -> int:
@@ -101,16 +94,14 @@ class RobotModel:
     @property
     def reach(self) -> float:
         """How far from its root the tool can be at most [m]: an upper bound, link by link."""
-        links = sum(
-            float(np.linalg.norm(place.translation)) for place in self.model.jointPlacements
-        )
-        tool = self.model.frames[self.tool_id].placement.translation
+        arrays = self.chain.arrays
+        links = np.vstack([arrays.positions, arrays.tip_position])
         slides = [
             float(max(abs(low), abs(high)))
             for name, low, high in zip(self.joint_names, self.lower, self.upper, strict=True)
             if self.is_prismatic(name)
         ]
-        return links + float(np.linalg.norm(tool)) + sum(slides)
+        return float(np.linalg.norm(links, axis=1).sum()) + sum(slides)
 
     @property
     def joint_weights(self) -> Array:
@@ -120,9 +111,9 @@ class RobotModel:
         by a metre at the arm's mean lever: the mean over revolute joints of the lengths of all
         links beyond [rad/m].
         """
-        links = [float(np.linalg.norm(place.translation)) for place in self.model.jointPlacements]
-        tool = float(np.linalg.norm(self.model.frames[self.tool_id].placement.translation))
-        beyond = np.cumsum([*links[2:], tool][::-1])[::-1]
+        arrays = self.chain.arrays
+        links = np.linalg.norm([*arrays.positions[1:], arrays.tip_position], axis=1)
+        beyond = np.cumsum(links[::-1])[::-1]
         slides = np.array([self.is_prismatic(name) for name in self.joint_names])
         levers = beyond[~slides]
         mean = float(levers.mean()) if levers.size and levers.max() > 0.0 else 1.0
@@ -152,73 +143,26 @@ class RobotModel:
             raise RobotError(f"joint '{self.joint_names[bad[0]]}' is {array[bad[0]]}, not finite")
         return np.array(array)
 
-    @property
-    def _kinematics(self) -> ToolKinematics:
-        """That of this thread alone: a robot may be shared by threads."""
-        own: ToolKinematics | None = getattr(self._per_thread, "kinematics", None)
-        if own is None:
-            own = self._per_thread.kinematics = self.tool_kinematics()
-        return own
-
-    def tool_kinematics(self) -> ToolKinematics:
-        """Return the kinematics of the tool with data of their own, for whoever asks often."""
-        return ToolKinematics(self.model, self.tool_id)
-
-    def joint_places(self) -> tuple[Array, Array, Array, npt.NDArray[np.bool_]]:
-        """Return what `selfmotion.robot.placements` places joints by.
-
-        Returns
-        -------
-        rotations, positions : (n, 3, 3), (n, 3)
-            Of each joint at q = 0 in the frame of the one before [m].
-        axes : (n, 3)
-            In the joints' own frames.
-        is_revolute : (n,)
-        """
-        model = self.model
-        data = model.createData()
-        # Columns [v, ω] at the world's origin; of one joint Pinocchio returns a vector.
-        columns = pin.computeJointJacobians(model, data, np.zeros(self.dof)).reshape(6, -1).T
-        twists = [data.oMi[j + 1].actInv(pin.Motion(columns[j])) for j in range(self.dof)]
-        is_revolute = np.array([bool(np.any(twist.angular)) for twist in twists])
-        axes = [t.angular if r else t.linear for t, r in zip(twists, is_revolute, strict=True)]
-        places = list(model.jointPlacements)[1:]
-        return (
-            np.array([place.rotation for place in places]).reshape(-1, 3, 3),
-            np.array([place.translation for place in places]).reshape(-1, 3),
-            np.array(axes).reshape(-1, 3),
-            is_revolute,
-        )
-
     def pose(self, q: npt.ArrayLike) -> pin.SE3:
         """Return the tool's pose at `q`."""
-        return self._kinematics.place(self.configuration(q))
+        return self.chain.place(self.configuration(q))
 
     def jacobian(self, q: npt.ArrayLike) -> Array:
         """Return the tool's Jacobian at `q`, (6, n): rows [v, ω] in world axes.
 
         v is the velocity of the tool frame's origin (Pinocchio's LOCAL_WORLD_ALIGNED).
         """
-        return self._kinematics.at(self.configuration(q))
-
-    def kinematics(self, q: Array) -> tuple[Array, Array, Array]:
-        """Return the Jacobian (6, n), rotation (3, 3) and translation (3,) of the tool at `q`.
-
-        One pass for all three, and no check of `q`: for callers that ask thousands of times.
-        """
-        here = self._kinematics
-        return here.at(q), here.rotation.copy(), here.translation.copy()
+        return self.chain.at(self.configuration(q))[0]
 
     def task_jacobian(self, q: npt.ArrayLike, task: Task | str) -> Array:
         """Return the prescribed rows of the Jacobian at `q`, (m, n)."""
-        here = self._kinematics
-        jacobian = here.at(self.configuration(q))
-        return Task.of(task).select(jacobian, here.rotation)
+        jacobian, rotation, _ = self.chain.at(self.configuration(q))
+        return Task.of(task).select(jacobian, rotation)
 
     def redundancy(self, task: Task | str) -> int:
         """Return n - rank J of the task at generic configurations (0: no self-motion)."""
         task = Task.of(task)
-        jacobians = [self.task_jacobian(q, task) for q in self._generic_configurations()]
+        jacobians = [self.task_jacobian(q, task) for q in self.generic_configurations()]
         return self.dof - int(max(np.linalg.matrix_rank(jacobians, tol=_RANK_TOLERANCE)))
 
     def can_follow(self, task: Task | str) -> bool:
@@ -229,12 +173,13 @@ class RobotModel:
         """
         task = Task.of(task)
         if task is Task.PLANAR_POSE:
-            jacobians = np.array([self.jacobian(q) for q in self._generic_configurations()])
+            jacobians = np.array([self.jacobian(q) for q in self.generic_configurations()])
             if np.abs(jacobians[:, 2:5]).max() > _RANK_TOLERANCE:
                 return False
         return self.dof - self.redundancy(task) == task.dimension
 
-    def _generic_configurations(self) -> Array:
+    def generic_configurations(self) -> Array:
+        """Return a few configurations within the limits, at none of which anything is special."""
         lower, upper = self.finite_limits()
         return np.random.default_rng(0).uniform(lower, upper, (5, self.dof))
 

@@ -22,7 +22,7 @@ class ToolRates:
     """
 
     def __init__(self, robot: RobotModel) -> None:
-        self._model, self._frame = robot.model, robot.tool_id
+        self._model, self._frame = robot.model, robot.chain.tip
         self._data = robot.model.createData()
 
     def __call__(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:

@@ -7,11 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, Progress, read_only, silent
+from selfmotion.follow import Follows
 from selfmotion.path import Path
-from selfmotion.robot import RobotModel
 from selfmotion.search import kernels
 from selfmotion.search.manifold import Manifold
-from selfmotion.task import Task
 
 # Longest single correction [rad or m]: a far start wanders where J is nearly singular.
 _LONGEST = 0.5
@@ -108,19 +107,19 @@ class SelfMotion:
 
     Parameters
     ----------
-    robot : RobotModel
-    task : Task
+    follows : Follows
         Leaves redundancy 1.
     spacing : float
         Largest distance of neighbouring samples [rad or m].
     """
 
-    def __init__(self, robot: RobotModel, task: Task, spacing: float) -> None:
+    def __init__(self, follows: Follows, spacing: float) -> None:
+        robot = follows.robot
         self.robot, self.spacing = robot, spacing
         self.revolute = np.array([not robot.is_prismatic(name) for name in robot.joint_names])
-        self._tool = robot.tool_kinematics()
+        self._tool = follows.only.chain.kinematics()
         everywhere = np.full(robot.dof, np.inf)
-        self._manifold = Manifold(robot, task, -everywhere, everywhere)
+        self._manifold = Manifold(follows, -everywhere, everywhere)
         # Any direction that is not a row of the Jacobian gives the tangent by projection.
         self._direction = np.random.default_rng(0).normal(size=robot.dof)
 

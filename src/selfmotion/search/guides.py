@@ -66,7 +66,7 @@ def guides(
     NoSequenceError
         No chain of configurations follows the path; says where it ends and why.
     """
-    robot, path, asked = problem.robot, problem.path, problem.envelope
+    follows, asked = problem.follows, problem.envelope
     t = waypoint_times(problem)
     step = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
     options: dict[str, Any] = {
@@ -75,21 +75,21 @@ def guides(
         "largest_step": step,
         "bodies": [(model, distance + MARGIN) for model, distance in asked.bodies],
         "count": _COUNT,
-        "measure": measure_of(robot, problem.task, problem.costs, t, _weights(problem)),
+        "measure": measure_of(problem.follows, problem.costs, t, _weights(problem)),
         "rng": 0 if rng is None else rng,
         "progress": progress,
     }
     if has_curves(problem):
-        sequences = best_sequences(robot, path, problem.task, t, **options)
+        sequences = best_sequences(follows, t, **options)
     else:
         weights = _weights(problem)
-        sequences = sampled_sequences(robot, path, problem.task, t, weights=weights, **options)
+        sequences = sampled_sequences(follows, t, weights=weights, **options)
     return [SequenceGuide(sequence) for sequence in sequences]
 
 
 def has_curves(problem: Problem) -> bool:
     """Whether the self-motions of a problem are curves."""
-    return problem.robot.redundancy(problem.task) == 1
+    return problem.follows.redundancy == 1
 
 
 def waypoint_times(problem: Problem) -> Array:

@@ -15,11 +15,9 @@ from selfmotion.kernels import (
     solve_cholesky,
     task_rows,
 )
-from selfmotion.robot import compose, placements
+from selfmotion.robot import ChainArrays, compose, placements
 
 Mask = npt.NDArray[np.bool_]
-Chain = tuple[Array, Array, Array, Mask, Array, Array]
-"""That of `RobotModel.joint_places`, and the tool's place in the frame of the last joint."""
 
 # What is known of a curve on the way.
 GOING, CLOSED, ENDED = 0, 1, 2
@@ -98,7 +96,7 @@ def walk(
     start: Array,
     tangent: Array,
     target: Array,
-    chain: Chain,
+    chain: ChainArrays,
     rows: Rows,
     angle_kind: int,
     spacing: float,
@@ -127,7 +125,7 @@ def walk(
             target,
             rows,
             angle_kind,
-            chain[3],
+            chain.is_revolute,
             samples,
             tangents,
             state,
@@ -372,7 +370,7 @@ def cheapest(
 def project_all(
     q: Array,
     targets: Array,
-    chain: Chain,
+    chain: ChainArrays,
     rows: Rows,
     angle_kind: int,
     lower: Array,
@@ -421,7 +419,13 @@ def project_all(
 
 @inlined
 def _place(
-    q: Array, chain: Chain, r: Array, p: Array, rotation: Array, position: Array, jacobian: Array
+    q: Array,
+    chain: ChainArrays,
+    r: Array,
+    p: Array,
+    rotation: Array,
+    position: Array,
+    jacobian: Array,
 ) -> None:
     """Set the joints' places, the tool's, and its Jacobian (6, n) at q (n,)."""
     rotations, positions, axes, is_revolute, tool_rotation, tool_position = chain

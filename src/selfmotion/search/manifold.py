@@ -4,11 +4,10 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, RobotError
+from selfmotion.follow import Follows
 from selfmotion.kernels import angle_kind
 from selfmotion.motion import transport
-from selfmotion.robot import RobotModel
 from selfmotion.search import kernels
-from selfmotion.task import Task
 
 _NEAR_STEPS, _FAR_STEPS = 10, 60
 # Longest single correction [rad or m].
@@ -22,16 +21,15 @@ class Manifold:
 
     Parameters
     ----------
-    robot : RobotModel
-    task : Task
+    follows : Follows
     lower, upper : (n,)
         Joint limits [rad or m], ±inf where there is none. Joints stop there while others go on.
 
     Attributes
     ----------
     revolute : (n,)
-    chain : tuple
-        What compiled kinematics need: `RobotModel.joint_places` and the tool's place.
+    chain : ChainArrays
+        What compiled kinematics need: `Chain.arrays`.
     rows : tuple
         The task's rows, and how they measure angles.
 
@@ -41,15 +39,13 @@ class Manifold:
         The compiled kinematics are not those of Pinocchio.
     """
 
-    def __init__(self, robot: RobotModel, task: Task, lower: Array, upper: Array) -> None:
-        self.robot, self.task = robot, task
+    def __init__(self, follows: Follows, lower: Array, upper: Array) -> None:
+        self.follows, self.robot, self.task = follows, follows.robot, follows.task
         # Copies: kernels are compiled anew for what may not be written to.
         self._limits = np.array(lower), np.array(upper)
-        places = robot.joint_places()
-        self.revolute: npt.NDArray[np.bool_] = places[3]
-        tool = robot.model.frames[robot.tool_id].placement
-        self.chain = (*places, np.array(tool.rotation), np.array(tool.translation))
-        self.rows = (task.rows, angle_kind(task.rows, task.tool_axes))
+        self.chain = follows.only.chain.arrays
+        self.revolute: npt.NDArray[np.bool_] = self.chain.is_revolute
+        self.rows = (self.task.rows, angle_kind(self.task.rows, self.task.tool_axes))
         self._check()
 
     def project(
@@ -75,7 +71,7 @@ class Manifold:
 
     def carried_bases(self, q: Array) -> Array:
         """Return null-space bases along a motion (W, n), (W, n, r), each turned to the last one."""
-        return transport(np.array([self.robot.task_jacobian(here, self.task) for here in q]))
+        return transport(np.array([self.follows.jacobian(here) for here in q]))
 
     def _check(self) -> None:
         """Compare with Pinocchio: where it puts the tool, nothing is left to correct."""

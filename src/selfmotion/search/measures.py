@@ -10,10 +10,9 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array
 from selfmotion.costs import Cost, PathLength, Samples
+from selfmotion.follow import Follows
 from selfmotion.motion import Sampling
-from selfmotion.robot import RobotModel
 from selfmotion.search import kernels
-from selfmotion.task import Task
 
 Mask = npt.NDArray[np.bool_]
 Rows = npt.NDArray[np.intp]
@@ -106,7 +105,7 @@ class RunningCost(Measure):
 
     Attributes
     ----------
-    robot, task
+    follows : Follows
     t : (W,)
         Times of the waypoints [s].
     placed : tuple of Cost
@@ -119,8 +118,7 @@ class RunningCost(Measure):
         v [rad/s].
     """
 
-    robot: RobotModel
-    task: Task
+    follows: Follows
     t: Array
     placed: tuple[Cost, ...]
     moving: tuple[Cost, ...]
@@ -130,13 +128,14 @@ class RunningCost(Measure):
     _steps: dict[tuple[int, int], "_Steps"] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def by(cls, robot: RobotModel, task: Task, costs: Sequence[Cost], t: Array) -> "RunningCost":
+    def by(cls, follows: Follows, costs: Sequence[Cost], t: Array) -> "RunningCost":
         """Return that of costs over waypoints at times t (W,)."""
+        robot = follows.robot
         lower, upper = robot.finite_limits()
         # Several times, since costs may take differences over them.
         q = lower + (upper - lower) * np.random.default_rng(0).uniform(0.3, 0.7, (8, robot.dof))
         sampling = Sampling.trapezoidal(np.linspace(t[0], t[-1], len(q)))
-        probe = Samples.along(robot, task, sampling, q, 0.1 * q)
+        probe = Samples.along(follows, sampling, q, 0.1 * q)
         placed: list[Cost] = []
         moving: list[Cost] = []
         for cost in costs:
@@ -144,7 +143,7 @@ class RunningCost(Measure):
             if partials.qdd is not None or partials.qddd is not None:
                 continue
             (placed if partials.qd is None else moving).append(cost)
-        return cls(robot, task, t, tuple(placed), tuple(moving), robot.joint_weights)
+        return cls(follows, t, tuple(placed), tuple(moving), robot.joint_weights)
 
     def extended(
         self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Mask
@@ -215,7 +214,7 @@ class RunningCost(Measure):
         known = self._places.get(id(q))
         if known is None or known.q is not q:
             sampling = Sampling.trapezoidal(np.full(len(q), self.t[k]))
-            samples = Samples.along(self.robot, self.task, sampling, q, np.zeros_like(q))
+            samples = Samples.along(self.follows, sampling, q, np.zeros_like(q))
             cost = sum((cost.value(samples) for cost in self.placed), np.zeros(len(q)))
             known = _Places(q, samples, cost)
             _note(self._places, id(q), known, _MANY * len(self.t))
@@ -285,14 +284,12 @@ _KINEMATICS = ("jacobian", "rotation", "translation", "error", "task_jacobian")
 _MANY = 3
 
 
-def measure_of(
-    robot: RobotModel, task: Task, costs: Sequence[Cost], t: Array, weights: Array
-) -> Measure:
+def measure_of(follows: Follows, costs: Sequence[Cost], t: Array, weights: Array) -> Measure:
     """Return what chains over waypoints at times t (W,) are measured by.
 
     The costs, or the length with `weights` (n,) where it is all that they ask for.
     """
-    own = RunningCost.by(robot, task, costs, t)
+    own = RunningCost.by(follows, costs, t)
     if all(isinstance(cost, PathLength) for cost in costs) or not (own.placed or own.moving):
         return Length(weights)
     return own

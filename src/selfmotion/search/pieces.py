@@ -74,7 +74,7 @@ class Pieces:
         steps = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
         bodies = tuple((model, distance + MARGIN) for model, distance in asked.bodies)
         limits, weights = (asked.lower, asked.upper), problem.robot.joint_weights
-        where = (problem.robot, problem.path, problem.task, t, limits, bodies)
+        where = (problem.follows, t, limits, bodies)
         if has_curves(problem):
             curves = CurveLayers.of(*where, rng, progress)
             found = cls(problem, t, curves, curves.bounds, steps, curves.samples)

@@ -54,9 +54,13 @@ def reachable(
     go on: a pose that nothing leads to is out of reach, as far as can be told. Poses all along the
     path, and more about the time `suspect` [s], where a motion had trouble.
     """
-    robot, path, task = problem.asked_envelope.arm(problem.robot), problem.path, problem.task
+    robot, path = problem.asked_envelope.arm(problem.robot), problem.path
     given = problem.given_start
-    first = start_candidates(robot, path, task, starts, rng) if given is None else [given]
+    first = (
+        start_candidates(problem.follows.for_robot(robot), starts, rng)
+        if given is None
+        else [given]
+    )
     about = np.clip(suspect / path.duration + _ABOUT, 0.0, 1.0)
     times = path.duration * np.union1d(np.linspace(0.0, 1.0, _POSES + 1), about)
     poses = _Poses(robot, problem, rng)
@@ -79,7 +83,7 @@ class _Poses:
 
     def __init__(self, robot: RobotModel, problem: Problem, rng: np.random.Generator) -> None:
         self._robot, self._path, self._task, self._rng = robot, problem.path, problem.task, rng
-        self._manifold = Manifold(robot, problem.task, robot.lower, robot.upper)
+        self._manifold = Manifold(problem.follows.for_robot(robot), robot.lower, robot.upper)
         self._seeds = np.array(list(spread(robot, _SEEDS, rng)))
 
     def solutions(self, t: float, known: Array) -> Array:

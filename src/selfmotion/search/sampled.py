@@ -7,8 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array, NoSequenceError, Progress, silent
 from selfmotion.collision import CollisionModel
-from selfmotion.path import Path
-from selfmotion.robot import RobotModel
+from selfmotion.follow import Follows
 from selfmotion.search import kernels
 from selfmotion.search.chains import best_chains, diverse_chains
 from selfmotion.search.curves import targets
@@ -17,7 +16,6 @@ from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sequences import Sequence, connected, ranked
 from selfmotion.search.starts import spread
-from selfmotion.task import Task
 
 # Motions begin at so many times, evenly, from so many configurations each: of those that inverse
 # kinematics finds from so many seeds.
@@ -57,9 +55,7 @@ class SampledLayers:
     @classmethod
     def of(
         cls,
-        robot: RobotModel,
-        path: Path,
-        task: Task,
+        follows: Follows,
         t: Array,
         limits: tuple[Array, Array],
         bodies: tuple[tuple[CollisionModel, float], ...],
@@ -69,9 +65,9 @@ class SampledLayers:
         progress: Progress,
     ) -> "SampledLayers":
         """Return those of a task that leaves any redundancy; see `sampled_sequences`."""
-        manifold = Manifold(robot, task, *limits)
+        manifold = Manifold(follows, *limits)
         bounds = Admissible(*limits, manifold.revolute, bodies)
-        x, generator = targets(path, t), np.random.default_rng(rng)
+        x, generator = targets(follows.path, t), np.random.default_rng(rng)
         layers = _layers(manifold, bounds, x, largest_step, weights, generator, progress)
         return cls(manifold, x, bounds, layers)
 
@@ -86,9 +82,7 @@ class SampledLayers:
 
 
 def sampled_sequences(
-    robot: RobotModel,
-    path: Path,
-    task: Task,
+    follows: Follows,
     t: Array,
     *,
     lower: Array,
@@ -111,7 +105,7 @@ def sampled_sequences(
 
     Parameters
     ----------
-    robot, path, task
+    follows : Follows
     t : (W,)
         Times of the waypoints [s].
     lower, upper : (n,)
@@ -140,7 +134,7 @@ def sampled_sequences(
         No chain exists among the samples; tells the waypoint at which the last one ends.
     """
     nodes = SampledLayers.of(
-        robot, path, task, t, (lower, upper), tuple(bodies), largest_step, weights, rng, progress
+        follows, t, (lower, upper), tuple(bodies), largest_step, weights, rng, progress
     )
     bounds, layers, turning = nodes.bounds, nodes.layers, nodes.bounds.turning
     length = Length(weights)
@@ -149,7 +143,7 @@ def sampled_sequences(
         time = float(t[chains.blocked])
         reason = nodes.why_blocked(chains.blocked)
         raise NoSequenceError(
-            f"{robot.name}: no motion along the path passes t = {time:.6g} s: {reason}",
+            f"{follows.robot.name}: no motion along the path passes t = {time:.6g} s: {reason}",
             time=time,
             reason=reason,
         )

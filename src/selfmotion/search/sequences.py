@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, NoSequenceError, ProblemError, Progress, read_only, silent
 from selfmotion.collision import CollisionModel
-from selfmotion.path import Path
+from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
 from selfmotion.search.chains import best_chains, diverse_chains, unlike, unturned
 from selfmotion.search.curves import CurveSet, SelfMotion, curves_along, targets
@@ -17,7 +17,6 @@ from selfmotion.search.nodes import Admissible, place_nodes
 from selfmotion.search.reasons import why_blocked
 from selfmotion.search.starts import spread
 from selfmotion.search.tighten import FINELY, ROUGHLY, tighten
-from selfmotion.task import Task
 
 # Largest distance of samples along a curve [rad or m], configuration norm.
 SPACING = 0.1
@@ -75,9 +74,7 @@ class CurveLayers:
     @classmethod
     def of(
         cls,
-        robot: RobotModel,
-        path: Path,
-        task: Task,
+        follows: Follows,
         t: Array,
         limits: tuple[Array, Array],
         bodies: tuple[tuple[CollisionModel, float], ...],
@@ -85,10 +82,10 @@ class CurveLayers:
         progress: Progress,
     ) -> "CurveLayers":
         """Return those of a task that leaves redundancy 1; see `best_sequences`."""
-        motion = SelfMotion(robot, task, SPACING)
+        motion = SelfMotion(follows, SPACING)
         bounds = Admissible(*limits, motion.revolute, bodies)
-        x = targets(path, t)
-        seeds = list(spread(robot, _SEEDS, np.random.default_rng(rng)))
+        x = targets(follows.path, t)
+        seeds = list(spread(follows.robot, _SEEDS, np.random.default_rng(rng)))
         curves = curves_along(motion, x, seeds, _EVERY, progress)
         samples = _free_samples(motion, x, curves, bounds, progress)
         return cls(motion, x, curves, bounds, samples)
@@ -102,9 +99,7 @@ class CurveLayers:
 
 
 def best_sequences(
-    robot: RobotModel,
-    path: Path,
-    task: Task | str,
+    follows: Follows,
     t: npt.ArrayLike,
     *,
     lower: npt.ArrayLike,
@@ -129,9 +124,7 @@ def best_sequences(
 
     Parameters
     ----------
-    robot : RobotModel
-    path : Path
-    task : Task or str
+    follows : Follows
         Must leave redundancy 1.
     t : (W,)
         Times of the waypoints [s], increasing, within the path.
@@ -164,7 +157,7 @@ def best_sequences(
     NoSequenceError
         No chain exists among the samples; tells the waypoint at which the last one ends, and why.
     """
-    task, times = Task.of(task), _times(t)
+    robot, times = follows.robot, _times(t)
     limits = [
         _joint_values(robot, values, name, shape)
         for values, name, shape in (
@@ -173,9 +166,9 @@ def best_sequences(
             (largest_step, "largest_step", (len(times) - 1, robot.dof)),
         )
     ]
-    _check(robot, task, limits, count)
+    _check(follows, limits, count)
     lower, upper, steps = limits
-    layers = CurveLayers.of(robot, path, task, times, (lower, upper), tuple(bodies), rng, progress)
+    layers = CurveLayers.of(follows, times, (lower, upper), tuple(bodies), rng, progress)
     motion, x, bounds = layers.motion, layers.x, layers.bounds
     rough, turning, measure = _rough_motions(layers, steps, times, count, measure)
     # All of them roughly, to see which are worth the rest.
@@ -287,12 +280,12 @@ def _joint_values(
     return np.ascontiguousarray(np.broadcast_to(array, shape))
 
 
-def _check(robot: RobotModel, task: Task, limits: list[Array], count: int) -> None:
-    redundancy = robot.redundancy(task)
+def _check(follows: Follows, limits: list[Array], count: int) -> None:
+    robot, redundancy = follows.robot, follows.redundancy
     if redundancy != 1:
         raise ProblemError(
-            f"{robot.name} has redundancy {redundancy} for task '{task.value}'; the search over "
-            f"self-motion curves needs 1, use multiple starts instead"
+            f"{robot.name} has redundancy {redundancy} for task '{follows.task.value}'; the search "
+            f"over self-motion curves needs 1, use multiple starts instead"
         )
     if np.any(limits[0] > limits[1]):
         k = int(np.flatnonzero(limits[0] > limits[1])[0])

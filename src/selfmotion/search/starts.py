@@ -5,12 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.path import Path
+from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
 from selfmotion.search.curves import SelfMotion, targets
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.nodes import Admissible
-from selfmotion.task import Task
 
 # Solutions nearer than this [rad or m, Euclidean] lead to the same plan once the start may move.
 _SAME = 0.3
@@ -21,9 +20,7 @@ _SEEDS, _SPACING = 60, 0.1
 _TRIES = 2
 
 
-def start_candidates(
-    robot: RobotModel, path: Path, task: Task, count: int, rng: np.random.Generator
-) -> list[Array]:
+def start_candidates(follows: Follows, count: int, rng: np.random.Generator) -> list[Array]:
     """Return distinct configurations that put the tool on the start of the path.
 
     For one degree of redundancy they are spread evenly over all self-motion curves of the first
@@ -33,7 +30,7 @@ def start_candidates(
 
     Parameters
     ----------
-    robot, path, task
+    follows : Follows
     count : int
         How many at most.
     rng : Generator
@@ -50,23 +47,21 @@ def start_candidates(
         No seed led to the pose.
     """
     found: list[Array] = []
-    if robot.redundancy(task) == 1:
-        found = _along_curves(robot, path, task, count, rng)
+    if follows.redundancy == 1:
+        found = _along_curves(follows, count, rng)
     if not found:
-        found = _scattered(robot, path, task, count, rng)
+        found = _scattered(follows, count, rng)
     if not found:
         # Many more attempts, and an error that names the miss.
-        found = [robot.inverse_kinematics(path.pose(0.0), task, rng=rng)]
+        found = [follows.robot.inverse_kinematics(follows.path.pose(0.0), follows.task, rng=rng)]
     return found
 
 
-def _along_curves(
-    robot: RobotModel, path: Path, task: Task, count: int, rng: np.random.Generator
-) -> list[Array]:
+def _along_curves(follows: Follows, count: int, rng: np.random.Generator) -> list[Array]:
     """Return up to `count` configurations within the limits, evenly over all curves."""
-    motion = SelfMotion(robot, task, _SPACING)
+    robot, motion = follows.robot, SelfMotion(follows, _SPACING)
     bounds = Admissible(robot.lower, robot.upper, motion.revolute, ())
-    curves = motion.curves(targets(path, np.zeros(1))[0], spread(robot, _SEEDS, rng)).curves
+    curves = motion.curves(targets(follows.path, np.zeros(1))[0], spread(robot, _SEEDS, rng)).curves
     # The last sample of a closed curve is its first one.
     samples = [curve.q[: len(curve.q) - curve.closed] for curve in curves]
     inside = [q[bounds.free(q)] for q in samples]
@@ -76,13 +71,12 @@ def _along_curves(
     return [bounds.turned_inside(q[None])[0] for q in bounds.representative(every)]
 
 
-def _scattered(
-    robot: RobotModel, path: Path, task: Task, count: int, rng: np.random.Generator
-) -> list[Array]:
+def _scattered(follows: Follows, count: int, rng: np.random.Generator) -> list[Array]:
     """Return up to `count` configurations that Newton's method finds, none near another."""
-    manifold = Manifold(robot, task, robot.lower, robot.upper)
+    robot = follows.robot
+    manifold = Manifold(follows, robot.lower, robot.upper)
     seeds = np.array(list(spread(robot, _TRIES * count, rng)))
-    q, arrived = manifold.project(seeds, targets(path, np.zeros(1))[0], far=True)
+    q, arrived = manifold.project(seeds, targets(follows.path, np.zeros(1))[0], far=True)
     found: list[Array] = []
     for one in q[arrived]:
         if len(found) < count and all(np.linalg.norm(one - other) > _SAME for other in found):

@@ -85,7 +85,7 @@ class PublishedFunction:
         qd = np.array([self._rate(t, row, x) for t, row in zip(solution.t, q, strict=True)])
         # Straight lines between the solver's points.
         points = Sampling.trapezoidal(solution.t)
-        return Samples.along(problem.robot, problem.task, points, q, qd)
+        return Samples.along(problem.follows, points, q, qd)
 
     def gradient(self, x: Array) -> Array:
         """Return ∇F(x) by forward differences, n(p + 1) + 1 evaluations (eq. 13)."""
@@ -109,7 +109,7 @@ class PublishedFunction:
         problem = self._problem
         functions = problem.null_motion.functions(np.array([t]), problem.path.duration)
         epsilon = NullMotionTable(functions, None, problem.robot.dof).epsilon(x)[0]
-        jacobian, rotation, _ = problem.robot.kinematics(q)
+        jacobian, rotation, _ = problem.robot.chain.at(q)
         rows = problem.task.select(jacobian, rotation)
         command = problem.task.select(problem.path.twist(t)[:, None], rotation)[:, 0]
         y = np.linalg.solve(rows @ rows.T, command - rows @ epsilon)

@@ -1,0 +1,6 @@
+"""What the arm follows: chains, their paths, and the rows of them that are prescribed."""
+
+from selfmotion.follow.follow import Follow
+from selfmotion.follow.follows import Follows
+
+__all__ = ["Follow", "Follows"]

@@ -1,0 +1,109 @@
+"""All that an arm follows at once: rows of several tips, stacked."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError
+from selfmotion.follow.follow import Follow
+from selfmotion.path import Path
+from selfmotion.robot import RobotModel, null_space
+from selfmotion.task import Task
+
+
+@dataclass(frozen=True, eq=False)
+class Follows:
+    """What an arm follows: the one thing that planners, costs and constraints are told.
+
+    Attributes
+    ----------
+    robot : RobotModel
+    items : tuple of Follow
+        Each a tip on its path; their rows are stacked in this order. They last equally long.
+    """
+
+    robot: RobotModel
+    items: tuple[Follow, ...]
+
+    @classmethod
+    def of(cls, robot: RobotModel, path: Path, task: Task | str) -> Self:
+        """Return that an arm's tool follows a path."""
+        return cls(robot, (Follow(robot.chain, path, Task.of(task)),))
+
+    @property
+    def dimension(self) -> int:
+        """Number m of prescribed rows."""
+        return sum(item.task.dimension for item in self.items)
+
+    @property
+    def duration(self) -> float:
+        """How long the motion lasts [s]."""
+        return self.items[0].path.duration
+
+    @property
+    def only(self) -> Follow:
+        """The one tip that is followed.
+
+        Raises
+        ------
+        ProblemError
+            There are several.
+        """
+        if len(self.items) > 1:
+            raise ProblemError(
+                f"{self.robot.name}: {len(self.items)} frames follow paths of their own, which is "
+                f"not supported here, only one"
+            )
+        return self.items[0]
+
+    @property
+    def path(self) -> Path:
+        """The path of the one tip."""
+        return self.only.path
+
+    @property
+    def task(self) -> Task:
+        """The rows of the one tip."""
+        return self.only.task
+
+    @cached_property
+    def redundancy(self) -> int:
+        """Number n - m of directions of self-motion at generic configurations."""
+        jacobians = [self.jacobian(q) for q in self.robot.generic_configurations()]
+        return self.robot.dof - max(map(_rank, jacobians))
+
+    @cached_property
+    def linear(self) -> Array:
+        """1 for rows in metres, 0 for those in radians, (m,)."""
+        return np.concatenate([item.task.rows < 3 for item in self.items]).astype(np.float64)
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Names of the rows, (m)."""
+        return tuple(name for item in self.items for name in item.task.row_names)
+
+    def twist(self, t: float) -> Array:
+        """Return the prescribed rows of the paths' twists at t [s], (m,) [m/s, rad/s]."""
+        return np.concatenate([item.twist(t) for item in self.items])
+
+    def jacobian(self, q: Array) -> Array:
+        """Return the prescribed rows of all Jacobians at q (n,), (m, n); q is not checked."""
+        return np.concatenate([item.jacobian(q) for item in self.items])
+
+    def null_basis(self, q: Array) -> Array:
+        """Return an orthonormal basis of the self-motion's directions at q (n,), (n, r)."""
+        return null_space(self.jacobian(q))
+
+    def along(self, path: Path) -> "Follows":
+        """Return that the one tip follows another path."""
+        return replace(self, items=(replace(self.only, path=path),))
+
+    def for_robot(self, robot: RobotModel) -> "Follows":
+        """Return the same for an arm of the same joints with other limits."""
+        return replace(self, robot=robot)
+
+
+def _rank(jacobian: Array) -> int:
+    return int(np.linalg.matrix_rank(jacobian, tol=1e-6))

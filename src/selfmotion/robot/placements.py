@@ -1,0 +1,66 @@
+"""Where joints are, compiled: for many configurations at once, of which Python would ask singly."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, inlined
+
+Flags = npt.NDArray[np.bool_]
+
+
+@inlined
+def turned(axis: Array, angle: float, rotation: Array) -> None:
+    """Write the rotation by an angle about a unit vector (Rodrigues' formula)."""
+    s, c = math.sin(angle), math.cos(angle)
+    x, y, z, rest = axis[0], axis[1], axis[2], 1.0 - c
+    for a in range(3):
+        for b in range(3):
+            rotation[a, b] = axis[a] * axis[b] * rest
+        rotation[a, a] += c
+    rotation[0, 1] -= z * s
+    rotation[1, 0] += z * s
+    rotation[0, 2] += y * s
+    rotation[2, 0] -= y * s
+    rotation[1, 2] -= x * s
+    rotation[2, 1] += x * s
+
+
+@inlined
+def compose(first: Array, at: Array, second: Array, there: Array, r: Array, p: Array) -> None:
+    """Write the product of two placements."""
+    for a in range(3):
+        x, y, z = first[a, 0], first[a, 1], first[a, 2]
+        p[a] = at[a] + x * there[0] + y * there[1] + z * there[2]
+        for b in range(3):
+            r[a, b] = x * second[0, b] + y * second[1, b] + z * second[2, b]
+
+
+@inlined
+def placements(
+    q: Array,
+    rotations: Array,
+    positions: Array,
+    axes: Array,
+    is_revolute: Flags,
+    r: Array,
+    p: Array,
+) -> None:
+    """Write where q (n,) places the joints of a chain: (n + 1, 3, 3) and (n + 1, 3).
+
+    Row 0 is the world. Each joint has a place in the frame of the one before, (n, 3, 3) and (n, 3),
+    and an axis in its own, (n, 3).
+    """
+    # Loops: numba takes seconds for what NumPy checks of shapes.
+    turn, middle, shift, slide = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    for a in range(3):
+        p[0, a] = 0.0
+        for b in range(3):
+            r[0, a, b] = 1.0 if a == b else 0.0
+    for j in range(len(q)):
+        compose(r[j], p[j], rotations[j], positions[j], middle, shift)
+        turned(axes[j], q[j] if is_revolute[j] else 0.0, turn)
+        for a in range(3):
+            slide[a] = 0.0 if is_revolute[j] else q[j] * axes[j, a]
+        compose(middle, shift, turn, slide, r[j + 1], p[j + 1])

@@ -1,0 +1,33 @@
+"""Files are written whole or not at all."""
+
+from pathlib import Path
+
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import files
+
+
+@pytest.fixture(scope="module")
+def plan() -> sm.Plan:
+    return sm.plan(sm.sample_problem())
+
+
+def test_failed_writes_leave_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    file = tmp_path / "plan.npz"
+    file.write_text("old")
+
+    def fail(stream: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        files.write_atomically(file, fail)
+    assert [path.name for path in tmp_path.iterdir()] == ["plan.npz"]
+    assert file.read_text() == "old"
+
+
+def test_a_folder_in_the_way_is_named(plan: sm.Plan, tmp_path: Path) -> None:
+    (tmp_path / "plan.npz").mkdir()
+    with pytest.raises(sm.FileFormatError, match=r"plan\.npz: cannot be written"):
+        plan.save(tmp_path / "plan.npz")
+    assert [path.name for path in tmp_path.iterdir()] == ["plan.npz"]

@@ -1,0 +1,304 @@
+"""Many plans: the same whoever makes them; what is killed is lost once and done once."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import nullcontext
+from multiprocessing import active_children
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.batch import BatchProgress, Item, grid_items, plan_items, run, worker
+from support.arms import PANDA_HOME, robot_named
+from support.places import TESTS
+from support.shell import complaint, invoke
+
+GRID = """
+task = "planar"
+start = [0.1, 0.9, 0.9]
+robot = { name = "planar_3r" }
+path = { kind = "line", by = [-0.5, 0, 0], duration = 2 }
+[[costs]]
+kind = "JointVelocity"
+[[costs]]
+kind = "InverseManipulability"
+mu = 0
+[grid]
+"path.duration" = [3, 4, 5]
+"costs.1.mu" = [0, 1]
+"""
+
+
+@pytest.fixture
+def grid(tmp_path: Path) -> Path:
+    (tmp_path / "cell.toml").write_text(GRID)
+    return tmp_path / "cell.toml"
+
+
+class InPlace(Executor):
+    """Runs each call at once: what every executor does, without its costs."""
+
+    def __init__(self, breaks_at: int | None = None) -> None:
+        self.calls, self._breaks_at = 0, breaks_at
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        self.calls += 1
+        future: Future[Any] = Future()
+        if self.calls == self._breaks_at:
+            future.set_exception(BrokenProcessPool("a worker is gone"))
+        else:
+            future.set_result(fn(*args, **options))
+        return future
+
+
+def motions(batch: sm.Batch) -> list[sm.Trajectory]:
+    return [row.plan().trajectory for row in batch.rows]
+
+
+def same(one: sm.Batch, other: sm.Batch) -> None:
+    assert [row.name for row in one.rows] == [row.name for row in other.rows]
+    for a, b in zip(motions(one), motions(other), strict=True):
+        np.testing.assert_array_equal(a.t, b.t)
+        np.testing.assert_array_equal(a.q, b.q)
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> sm.Batch:
+    folder = tmp_path_factory.mktemp("reference")
+    (folder / "cell.toml").write_text(GRID)
+    return plan_items(grid_items(folder / "cell.toml"), InPlace(), out=folder / "out")
+
+
+def test_a_batch_plans_what_python_plans(reference: sm.Batch) -> None:
+    assert [row.settings["path.duration"] for row in reference.rows] == [3, 3, 4, 4, 5, 5]
+    assert all(row.verified and not row.error for row in reference.rows)
+    for row in reference.rows[:2]:
+        plan = row.plan()
+        np.testing.assert_array_equal(sm.plan(plan.problem).trajectory.q, plan.trajectory.q)
+    best = reference.best
+    assert best is not None
+    assert best.cost == min(row.cost for row in reference.rows)
+
+
+def test_two_processes_and_threads_give_the_same(
+    reference: sm.Batch, grid: Path, tmp_path: Path
+) -> None:
+    seen: list[BatchProgress] = []
+    two = plan_items(grid_items(grid), out=tmp_path / "two", workers=2, progress=seen.append)
+    same(two, reference)
+    assert [item.done for item in seen] == [1, 2, 3, 4, 5, 6]
+    assert seen[-1].seconds_left == 0.0
+    assert all(item.rate > 0.0 and item.total == 6 for item in seen)
+    with ThreadPoolExecutor(2) as threads:
+        same(plan_items(grid_items(grid), threads, out=tmp_path / "threads"), reference)
+
+
+def test_a_dask_cluster_gives_the_same(reference: sm.Batch, grid: Path, tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, host="127.0.0.1",
+        dashboard_address=None, silence_logs=50, local_directory=str(tmp_path / "dask"),
+    )  # fmt: skip
+    with cluster:
+        code, text = invoke(
+            "batch", grid, "--dask", cluster.scheduler_address, "--out", tmp_path / "out",
+            "--replays", "0", "--json",
+        )  # fmt: skip
+        with distributed.Client(cluster) as client:
+            pids, done = list(client.run(os.getpid).values()), list[int]()
+
+            def kill_one(found: BatchProgress) -> None:
+                done.append(found.done)
+                if found.done == 2:
+                    os.kill(pids[0], signal.SIGKILL)
+
+            lost = plan_items(
+                grid_items(grid), client.get_executor(), out=tmp_path / "lost", progress=kill_one
+            )
+    assert code == 0
+    assert len(json.loads(text)["rows"]) == 6
+    assert done == [1, 2, 3, 4, 5, 6]
+    same(lost, reference)
+    again = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
+    assert again.resumed == 6
+    same(again, reference)
+
+
+def test_a_run_that_was_killed_goes_on(reference: sm.Batch, grid: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    script = TESTS / "support" / "batch_killed.py"
+    with subprocess.Popen(
+        [sys.executable, script, grid, out, "1"], stdout=subprocess.PIPE, text=True
+    ) as killed:
+        assert killed.stdout is not None
+        while killed.stdout.readline().strip() != "2":
+            pass
+        killed.send_signal(signal.SIGKILL)
+    before = {file: file.stat().st_mtime_ns for file in (out / "plans").glob("*.npz")}
+    assert 2 <= len(before) < 6
+    executor = InPlace()
+    result = plan_items(grid_items(grid), executor, out=out)
+    assert result.resumed + executor.calls == 6
+    assert result.resumed >= 2
+    rows = {row.file: row for row in result.rows[: result.resumed]}
+    assert all(file.stat().st_mtime_ns == before[file] for file in rows)
+    assert not [file for file in out.rglob(".*")], "temporary files of the run that was killed"
+    same(result, reference)
+
+
+def test_a_worker_that_is_killed_loses_nothing(
+    reference: sm.Batch, grid: Path, tmp_path: Path
+) -> None:
+    killed: list[int] = []
+
+    done: list[int] = []
+
+    def progress(found: BatchProgress) -> None:
+        done.append(found.done)
+        if found.done == 2:
+            killed.append(active_children()[0].pid or 0)
+            os.kill(killed[0], signal.SIGKILL)
+
+    result = plan_items(grid_items(grid), out=tmp_path / "out", workers=1, progress=progress)
+    assert killed
+    assert done == [1, 2, 3, 4, 5, 6]
+    same(result, reference)
+
+
+class Deadly(InPlace):
+    """Processes of which one problem kills each that it comes to."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
+        if args[0]["problem"]["path"]["duration"] != 4.0:
+            return super().submit(fn, *args, **options)
+        future: Future[Any] = Future()
+        future.set_exception(BrokenProcessPool("a worker is gone"))
+        return future
+
+
+def test_a_problem_that_kills_its_worker_is_found_out(
+    grid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "_pool", lambda workers: nullcontext(Deadly()))
+    grid.write_text(GRID.replace("[0, 1]", "[0]"))
+    batch = plan_items(grid_items(grid), out=tmp_path / "out", workers=1)
+    assert [row.verified for row in batch.rows] == [True, False, True]
+    assert batch.rows[1].error.startswith("its process died twice")
+
+
+def test_an_executor_that_breaks_leaves_what_was_done(grid: Path, tmp_path: Path) -> None:
+    with pytest.raises(sm.PlanError, match=r"broke after 5 of 6 problems; .*: run again to go on"):
+        plan_items(grid_items(grid), InPlace(breaks_at=4), out=tmp_path)
+    assert plan_items(grid_items(grid), InPlace(), out=tmp_path).resumed == 5
+
+
+def test_whoever_stops_a_batch_keeps_what_is_done(grid: Path, tmp_path: Path) -> None:
+    def stop(found: BatchProgress) -> None:
+        if found.done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        plan_items(grid_items(grid), InPlace(), out=tmp_path, progress=stop)
+    assert plan_items(grid_items(grid), InPlace(), out=tmp_path).resumed == 2
+
+
+def test_a_problem_that_changed_is_planned_anew(grid: Path, tmp_path: Path) -> None:
+    plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
+    grid.write_text(GRID.replace("[3, 4, 5]", "[3, 4.5, 5]"))
+    executor = InPlace()
+    assert plan_items(grid_items(grid), executor, out=tmp_path / "out").resumed == 4
+    assert executor.calls == 2
+    # So is one whose file is gone, or whose row was cut short.
+    (tmp_path / "out" / "plans" / "cell-0.npz").unlink()
+    (tmp_path / "out" / "rows" / "cell-1.json").write_text("{")
+    assert plan_items(grid_items(grid), InPlace(), out=tmp_path / "out").resumed == 4
+
+
+def test_bad_problems_do_not_stop_the_rest(tmp_path: Path) -> None:
+    panda = robot_named("panda")
+    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.05, 3.0)
+    good = sm.Problem(panda, circle, start=PANDA_HOME)
+    far = panda.pose(PANDA_HOME)
+    far.translation = far.translation + 5.0
+    problems = [
+        good,
+        sm.Job(sm.Problem(panda, sm.Circle.around(far, 0.05, 3.0)), sm.Search(starts=4)),
+        sm.Problem(panda, circle, costs=[sm.FunctionCost(lambda qd, q, t: q[:, 0] ** 2)]),
+    ]
+    batch = sm.plan_many(problems, InPlace(), out=tmp_path)
+    assert [bool(row.error) for row in batch.rows] == [False, True, True]
+    assert "is a function, which cannot be sent" in batch.rows[2].error
+    with pytest.raises(sm.FileFormatError, match="has no plan"):
+        batch.rows[1].plan()
+    with pytest.raises(sm.ProblemError, match=r"problems\[0\] is 3"):
+        sm.plan_many([3], out=tmp_path)  # type: ignore[list-item]
+
+
+def test_a_fault_of_ones_own_code_is_said_and_tried_again(
+    grid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = worker.plan
+
+    def faulty(problem: sm.Problem, **options: Any) -> sm.Plan:
+        if problem.path.duration == 4.0:
+            raise ZeroDivisionError("own code")
+        return real(problem, **options)
+
+    monkeypatch.setattr(worker, "plan", faulty)
+    batch = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
+    assert [row.error for row in batch.rows if row.error] == ["ZeroDivisionError: own code"] * 2
+    monkeypatch.setattr(worker, "plan", real)
+    again = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
+    assert again.resumed == 4
+    assert all(not row.error for row in again.rows)
+
+
+def test_tables_are_ranked_and_linked(grid: Path, tmp_path: Path) -> None:
+    text = GRID.replace('"costs.1.mu" = [0, 1]', '"costs.1.mu" = [0, -1]')
+    grid.write_text(text)
+    out = tmp_path / "out"
+    result = plan_items(grid_items(grid), InPlace(), out=out, replays=1)
+    rows = list(csv.DictReader((out / "table.csv").read_text().splitlines()))
+    assert [int(row["rank"]) for row in rows] == [1, 2, 3, 4, 5, 6]
+    costs = [float(row["cost"]) for row in rows[:3]]
+    assert costs == sorted(costs)
+    assert all(row["verified"] == "no plan" and "mu is -1" in row["verdict"] for row in rows[3:])
+    assert rows[0]["name"] == (result.best and result.best.name)
+    page = (out / "index.html").read_text()
+    for row in rows[:3]:
+        assert f'href="{row["plan"]}"' in page
+        assert (out / row["plan"]).is_file()
+    assert [bool(row["replay"]) for row in rows] == [True, False, False, False, False, False]
+    assert (out / rows[0]["replay"]).stat().st_size > 100_000
+    # Replays that are there stay linked.
+    plan_items(grid_items(grid), InPlace(), out=out)
+    assert rows[0]["replay"] in (out / "index.html").read_text()
+
+
+def test_the_shell_says_what_went_wrong(grid: Path, tmp_path: Path) -> None:
+    assert "no scheduler answers" in complaint("batch", grid, "--dask", "no address at all")
+    grid.write_text(GRID.replace("[0, 1]", "1"))
+    assert "grid.costs.1.mu: is 1, expected a list of values" in complaint("batch", grid)
+    grid.write_text(GRID)
+    (tmp_path / "b").mkdir()
+    other = tmp_path / "b" / "cell.toml"
+    other.write_text(GRID)
+    assert "two problem files are called 'cell-0'" in complaint("batch", grid, other)
+
+
+def test_names_sort_as_they_are_numbered(grid: Path) -> None:
+    grid.write_text(GRID.replace("[0, 1]", "[0, 1, 2, 3]"))
+    names = [item.name for item in grid_items(grid)]
+    assert names == sorted(names)
+    assert len({item.key for item in grid_items(grid)}) == len(names) == 12
+    assert all(isinstance(item, Item) for item in grid_items(grid))

@@ -1,0 +1,180 @@
+"""Verdicts: each fault is named, broken plans are refused, and another computation agrees."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.certificate.check import _because, _damped_stretches, _undecided
+from selfmotion.task import DampingLaw
+from support.arms import PANDA_HOME, robot_named
+from support.motions import motion_of
+
+
+def test_a_finished_motion_is_looked_at_from_its_start_to_its_end() -> None:
+    motion = motion_of(np.zeros((3, 3)), np.zeros((3, 3)))
+    times = motion.trajectory.t
+    assert motion.t[0] == times[0]
+    assert motion.t[-1] == times[-1]
+    assert set(times) <= set(motion.t)
+    assert np.all(np.diff(motion.t) > 0.0)
+
+
+def test_where_damping_acts_is_told_stretch_by_stretch() -> None:
+    law, t = DampingLaw(0.2, 0.1), np.arange(8.0)
+    singular = np.array([0.1, 0.3, 0.3, 0.15, 0.05, 0.2, 0.3, 0.1])
+    damped = _damped_stretches(law, t, singular)
+    assert [(x.start, x.end, x.singular_value) for x in damped] == [
+        (0.0, 0.0, 0.1),
+        (3.0, 4.0, 0.05),
+        (7.0, 7.0, 0.1),
+    ]
+    np.testing.assert_allclose([x.factor for x in damped], law.factor(np.array([0.1, 0.05, 0.1])))
+    assert _damped_stretches(law, t, np.full(8, 0.2)) == ()
+    for time, words in (
+        (0.0, "where"),
+        (1.0, "after"),
+        (3.0, "where"),
+        (4.0, "where"),
+        (5.0, "after"),
+    ):
+        last = damped[0] if time < 3.0 else damped[1]
+        assert _because(time, damped) == f", {words} damping was active, {last}"
+    assert _because(2.0, damped[1:]) == ""
+
+
+def test_what_is_undecided_is_counted() -> None:
+    assert _undecided(()) == ()
+    for count, words in (
+        (1, "decided:"),
+        (2, "and on 1 other interval:"),
+        (3, "2 other intervals:"),
+    ):
+        (text,) = _undecided(((0.25, 0.5),) * count)
+        assert "from t = 0.25 to 0.5 s is not decided" in text
+        assert words in text
+
+
+def test_a_verdict_names_each_fault_and_what_was_looked_at() -> None:
+    """Off the path in place and angle, too short, with limits: and nothing of that when kept."""
+    robot = robot_named("panda")
+    pose = robot.pose(PANDA_HOME)
+    still = sm.Waypoints.from_poses([0.0, 1.0], [pose, pose])
+    motion = sm.Trajectory([0.0, 1.0], [PANDA_HOME] * 2, np.zeros((2, 7)), robot.joint_names)
+    good = sm.certify(robot, still, "pose", motion)
+    assert good.verified
+    assert good.on_path
+    assert good.closure == 0.0
+    assert "verified at all times (path, joint limits, speeds)" in good.verdict
+    assert good.not_checked == ("accelerations", "self-collision")
+    aside = pose.copy()
+    aside.translation = pose.translation + np.array([0.0, 3e-6, 4e-6])
+    aside.rotation = pose.rotation @ pin.exp3(np.array([0.0, 0.0, 2e-6]))
+    beside = sm.Waypoints.from_poses([0.0, 2.0], [aside, aside])
+    bad = sm.certify(robot, beside, "pose", motion)
+    assert bad.position_error.value == pytest.approx(5e-6, rel=1e-3)
+    assert bad.rotation_error.value == pytest.approx(2e-6, rel=1e-3)
+    assert len(bad.failures) == 3
+    for words in ("5.00e-06 m off", "2.00e-06 rad off", "lasts 1 s, the path 2 s"):
+        assert words in bad.verdict
+    for tolerance, kept in ((sm.Tolerance(6e-6, 1e-6), False), (sm.Tolerance(6e-6, 3e-6), True)):
+        assert sm.certify(robot, beside, "pose", motion, tolerance).on_path is kept
+    exact = sm.Tolerance(bad.position_error.value, bad.rotation_error.value)
+    assert len(sm.certify(robot, beside, "pose", motion, exact).failures) == 1
+    moved = motion.q + np.outer([0.0, 1.0], [0.0, 0.3, 0.0, -0.1, 0.0, 0.0, 0.0])
+    gone = sm.Trajectory([0.0, 1.0], moved, np.zeros((2, 7)), robot.joint_names)
+    assert sm.certify(robot, still, "pose", gone).closure == pytest.approx(0.3)
+    ended = sm.certify(robot, still, "pose", motion, ending="it stops here")
+    assert ended.failures == ("it stops here",)
+
+
+# Of a few additions of numbers of order 1.
+ROUNDING = 1e-12
+
+
+Circle = Callable[..., sm.Problem]
+
+
+@pytest.fixture(scope="module")
+def sample() -> sm.Plan:
+    return sm.plan(sm.sample_problem())
+
+
+def test_certificate_equals_an_independent_recomputation(
+    case: tuple[sm.RobotModel, sm.Task, Array, sm.Path],
+) -> None:
+    robot, task, start, path = case
+    plan = sm.plan(sm.Problem(robot, path, task, start))
+    certificate = plan.certificate
+    t = np.concatenate(
+        [
+            np.linspace(a, b, 5, endpoint=False)
+            for a, b in zip(plan.trajectory.t[:-1], plan.trajectory.t[1:], strict=True)
+        ]
+        + [plan.trajectory.t[-1:]]
+    )
+    misses, singular, margins, ratios = [], [], [], []
+    for time in t:
+        q, qd = plan.trajectory(time), plan.trajectory(time, order=1)
+        misses.append(task.miss(path.pose(time), robot.pose(q)))
+        jacobian = robot.task_jacobian(q, task)
+        singular.append(np.sqrt(np.linalg.eigvalsh(jacobian @ jacobian.T)[0]))
+        margins.append(min((q - robot.lower).min(), (robot.upper - q).min()))
+        ratios.append((np.abs(qd) / robot.velocity_limit).max())
+    position, rotation = np.max(misses, axis=0)
+    # Errors are bounds at all times: never milder than what is found here, and near it.
+    assert position - ROUNDING <= certificate.position_error.value <= 1.5 * position + ROUNDING
+    assert rotation - 1e-9 <= certificate.rotation_error.value <= 1.5 * rotation + 1e-9
+    assert certificate.smallest_singular_value.value == pytest.approx(min(singular), rel=1e-6)
+    # Limits are judged between these times as well: never milder than here, and hardly stricter.
+    assert min(margins) - 1e-5 <= certificate.limit_margin.value <= min(margins) + ROUNDING
+    assert max(ratios) - ROUNDING <= certificate.velocity_ratio.value <= max(ratios) * (1 + 1e-3)
+    assert certificate.samples >= 8 * (len(plan.trajectory.t) - 1)
+    assert certificate.position_error.value <= 1e-6
+    assert certificate.rotation_error.value <= 1e-6
+
+
+def broken(plan: sm.Plan, **changes: Array) -> sm.Certificate:
+    trajectory = dataclasses.replace(plan.trajectory, **changes)
+    return sm.certify(plan.robot, plan.path, plan.task, trajectory)
+
+
+def test_broken_plans_are_refused(panda_circle: Circle) -> None:
+    plan = sm.plan(panda_circle())
+    motion = plan.trajectory
+    assert broken(plan).verified
+
+    q = motion.q.copy()
+    q[60, 2] += 1e-4
+    certificate = broken(plan, q=q)
+    assert not certificate.verified
+    assert "off the path" in certificate.verdict
+    assert certificate.position_error.time == pytest.approx(motion.t[60], abs=0.1)
+
+    qd = motion.qd.copy()
+    qd[60, 2] += 0.1
+    assert not broken(plan, qd=qd).verified
+
+    assert "lasts" in broken(plan, t=motion.t * 0.9).verdict
+
+    shifted = motion.q.copy()
+    shifted[:, 6] += 3.0
+    assert "joint 'panda_joint7' is" in broken(plan, q=shifted).verdict
+
+
+def test_too_fast_plans_are_refused_with_the_factor(panda: sm.RobotModel) -> None:
+    start = panda.dexterous_configuration()
+    path = sm.Circle.around(panda.pose(start), 0.15, 0.8, normal=(1, 0, 0))
+    plan = sm.plan(sm.Problem(panda, path, start=start))
+    assert "times its limit" in plan.certificate.verdict
+    assert plan.certificate.position_error.value <= 1e-6
+    with pytest.raises(sm.PlanError, match="times the duration"):
+        plan.require()
+
+
+def test_verified_plans_pass_require(sample: sm.Plan) -> None:
+    assert sample.require() is sample

@@ -1,0 +1,123 @@
+"""Joint limits and rates: margins, shares, and what a pace would change."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.certificate import JointLimits, JointTorques
+from selfmotion.certificate.shares import largest_share
+from support.motions import motion_of
+
+ROUNDING = 1e-12
+
+
+def test_margins_are_those_of_the_nearest_side() -> None:
+    """A cubic from 0 to 0 with speeds ± 4 reaches 1 in the middle."""
+    motion = motion_of([[0.0, 0.2, 0.0]] * 2, [[4.0, 0.0, -4.0], [-4.0, 0.0, 4.0]])
+    infinite = np.full(3, np.inf)
+    for lower, upper, joint, amount, time in (
+        (-infinite, np.array([1.5, 1.0, np.inf]), 0, 0.5, 0.5),
+        (-infinite, np.array([0.75, 1.0, np.inf]), 0, -0.25, 0.5),
+        (np.array([-np.inf, -np.inf, -0.9]), infinite, 2, -0.1, 0.5),
+        (np.array([-0.3, -0.05, -9.0]), np.array([9.0, 0.3, 9.0]), 1, 0.1, 0.0),
+    ):
+        found = JointLimits(0, lower, upper).judge(motion)
+        assert found.subject == motion.robot.joint_names[joint]
+        assert (found.amount, found.allowed) == (pytest.approx(amount), 0.0)
+        assert found.kept is (amount >= 0.0)
+        assert found.time == pytest.approx(time)
+        assert f"is {-amount:.3g} beyond its limit" in found.text
+    kept = JointLimits(0, np.array([0.0, 0.0, -1.0]), np.array([1.0, 1.0, 0.0])).judge(motion)
+    assert (kept.kept, kept.amount) == (True, pytest.approx(0.0, abs=ROUNDING))
+
+
+@pytest.mark.parametrize(("order", "longer"), [(1, 2.0), (2, 2.0**0.5), (3, 2.0 ** (1.0 / 3.0))])
+def test_shares_of_rates_say_how_much_longer_it_takes(order: int, longer: float) -> None:
+    """From rest to rest by 1 in 1 s: 1.5 of speed, 6 of acceleration, 12 of jerk at most."""
+    most = {1: 1.5, 2: 6.0, 3: 12.0}[order]
+    motion = motion_of([[0.0] * 3, [0.0, -1.0, 0.0]], np.zeros((2, 3)))
+    limit = np.array([1e-3, 0.5 * most, np.inf])
+    limits = JointLimits(order, -limit, limit)
+    found = limits.judge(motion)
+    assert (found.subject, found.allowed, found.kept) == (motion.robot.joint_names[1], 1.0, False)
+    assert found.amount == pytest.approx(2.0)
+    assert f"{found.amount:.5g} times its limit" in found.text
+    assert f"give it {longer:.5g} times the duration" in found.text
+    known = ("speeds", "accelerations", "jerks")[order - 1]
+    assert limits.covers == ((known,) if order == 1 else ())
+    exact = JointLimits(order, np.full(3, -most), np.full(3, most))
+    assert exact.covers == (known,)
+    assert exact.judge(motion).amount == pytest.approx(1.0)
+    one_sided = JointLimits(order, np.full(3, -0.5 * most), np.full(3, 9.0 * most)).judge(motion)
+    # The jerk of such a motion has one sign.
+    assert one_sided.amount == pytest.approx(2.0 if order < 3 else 1.0 / 9.0)
+
+
+def test_a_jump_of_acceleration_breaks_any_limit_of_jerk() -> None:
+    """Two cubics from rest to rest: from -6 to 6 at the middle sample."""
+    motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], np.zeros((3, 3)))
+    wide = np.full(3, 1e3)
+    found = JointLimits(3, -wide, wide).judge(motion)
+    assert (found.kept, found.subject, found.time) == (False, motion.robot.joint_names[0], 1.0)
+    assert found.amount == pytest.approx(12.0 / (1e-6 * 1e3))
+    assert "jumps by 12" in found.text
+    assert JointLimits(3, -1e8 * wide, 1e8 * wide).judge(motion).kept
+    # A jump just beyond what a limited jerk does in an instant, and just within.
+    for share in (1.01, 0.99):
+        narrow = np.full(3, 12.0 / (1e-6 * share))
+        found = JointLimits(3, -narrow, narrow).judge(motion)
+        assert found.kept is (share < 1.0)
+
+
+@pytest.mark.parametrize(("order", "power"), [(2, 0.5), (3, 1.0 / 3.0)])
+def test_slow_rates_say_how_much_shorter_it_could_take(order: int, power: float) -> None:
+    motion = motion_of([[0.0] * 3, [0.0, -1.0, 0.0]], np.zeros((2, 3)))
+    limit = np.full(3, {2: 6.0, 3: 12.0}[order] / 0.25)
+    found = JointLimits(order, -limit, limit).judge(motion)
+    assert f"give it {0.25**power:.5g} times the duration" in found.text
+
+
+def test_where_nothing_is_used_the_first_column_is_told_at_the_start() -> None:
+    motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0]], np.zeros((2, 3)), [2.0, 3.0]).trajectory
+    assert largest_share(motion, lambda q, *_: 0.0 * q) == (0.0, 2.0, 0)
+
+
+@pytest.mark.parametrize(
+    ("order", "lower", "upper"),
+    [
+        (4, -1.0, 1.0),
+        (0, 1.0, -1.0),
+        (0, np.nan, 1.0),
+        (1, 0.0, 1.0),
+        (1, -1.0, 0.0),
+        (2, 0.5, 1.0),
+    ],
+)
+def test_limits_that_cannot_be_kept_are_refused(order: int, lower: float, upper: float) -> None:
+    with pytest.raises(sm.ProblemError, match="expected"):
+        JointLimits(order, np.full(3, lower), np.full(3, upper))
+    assert JointLimits(0, np.zeros(3), np.zeros(3)).order == 0
+    with pytest.raises(sm.ProblemError, match="expected"):
+        JointLimits(0, np.zeros(3), np.ones(2))
+
+
+def test_a_joint_that_needs_nothing_may_have_no_limit() -> None:
+    """0 of infinity is no number."""
+    dynamics: Any = SimpleNamespace(torques=lambda q, qd, qdd: 0.0 * q)
+    motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
+    found = JointTorques(dynamics, np.full(3, np.inf)).judge(motion)
+    assert found.kept
+    assert "needs 0 Nm or N" in found.text
+    assert "nan" not in found.text
+
+
+def test_rates_are_seen_on_both_sides_of_a_sample() -> None:
+    """Accelerations jump there: from -6 to 6."""
+    motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], np.zeros((3, 3))).trajectory
+    for sign in (1.0, -1.0):
+        found = largest_share(motion, lambda q, qd, qdd, sign=sign: np.maximum(sign * qdd, 0.0))
+        assert found is not None
+        assert found.share == pytest.approx(6.0, rel=1e-3)

@@ -1,0 +1,187 @@
+"""The path error at all times: no peak is missed, and hardly more is claimed."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.certificate.findings import Extreme
+from selfmotion.certificate.path_error import _TRAVEL, _edges, _larger, bound_errors
+from support.arms import robot_named
+
+ROUNDING = 1e-12
+
+
+def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:
+    """A tool at rest, and a path that swings beside it between the trajectory's two samples."""
+    robot = robot_named("planar_3r")
+    q = robot.dexterous_configuration("planar")
+    pose = robot.pose(q)
+
+    class Swinging(sm.Path):
+        """Sideways by a tenth of a millimetre, most at 0.8 s."""
+
+        duration = 1.0
+        knots = np.array([0.0, 1.0])
+
+        def evaluate(self, t: Array) -> sm.PathSamples:
+            swing = 1e-4 * np.exp(-((t - 0.8) ** 2) / 0.02)
+            twist = np.outer(-swing * 100.0 * (t - 0.8), np.eye(6)[1])
+            places = pose.translation + np.outer(swing, [0.0, 1.0, 0.0])
+            return sm.PathSamples(t, places, np.tile(pose.rotation, (len(t), 1, 1)), twist)
+
+    trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 3)), robot.joint_names)
+
+    def check(tolerance: float, *relaxed: sm.Relaxation) -> Any:
+        given = sm.Tolerance(tolerance, 1e-6)
+        return bound_errors(robot, Swinging(), sm.Task.PLANAR, trajectory, given, relaxed)
+
+    for tolerance in (1.001e-4, 1e-4 / 1.001):
+        found = check(tolerance)
+        assert 1e-4 - 1e-9 <= found.position.value <= 1.03e-4
+        assert found.position.time == pytest.approx(0.8, abs=0.05)
+        assert found.position.name == "tool"
+        assert (found.rotation.value, found.rotation.time, found.undecided) == (0.0, 0.0, ())
+    settled = check(1.001e-4)
+    assert settled.position.value <= 1.001e-4
+    within = check(5.05e-5, sm.Relaxation("y", 5e-5, during=(0.5, 1.0)))
+    assert 5e-5 - 1e-9 <= within.position.value <= 5.1e-5
+    assert within.deviations[0].value == pytest.approx(1e-4, rel=0.03)
+    assert (within.deviations[0].name, within.undecided) == ("(y)", ())
+    outside = check(1e-6, sm.Relaxation("y", 1e-3, during=(0.0, 0.5)))
+    # So far beyond the tolerance nothing has to be known more closely.
+    assert 1e-4 - 1e-9 <= outside.position.value <= 1.2e-4
+    # One pose less per interval than is looked at, and the last one.
+    assert check(1.0).samples == 9
+
+
+@pytest.mark.parametrize("angular", [False, True])
+def test_no_peak_between_the_points_looked_at_is_missed(angular: bool) -> None:
+    """A tool at rest, and a path beside it by a parabola whose top is anywhere."""
+    robot, most = robot_named("panda"), 1e-4
+    q = robot.dexterous_configuration("pose")
+    pose = robot.pose(q)
+    trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
+
+    class Arched(sm.Path):
+        duration = 1.0
+        knots = np.array([0.0, 1.0])
+
+        def __init__(self, top: float) -> None:
+            self.top = top
+
+        def evaluate(self, t: Array) -> sm.PathSamples:
+            sizes = most * (1.0 - (t - self.top) ** 2)
+            motions = np.outer(sizes, np.eye(6)[5 if angular else 1])
+            places = [pose * pin.exp6(pin.Motion(motion)) for motion in motions]
+            translation = np.array([place.translation for place in places])
+            rotation = np.array([place.rotation for place in places])
+            return sm.PathSamples(t, translation, rotation, np.zeros((len(t), 6)))
+
+    for top in np.random.default_rng(0).uniform(0.05, 0.95, 40):
+        for allowed in (1.0, most * (1.0 - 1e-5)):
+            given = sm.Tolerance(allowed, allowed)
+            path = Arched(float(top))
+            found = bound_errors(robot, path, sm.Task.POSE, trajectory, given, ())
+            value = (found.rotation if angular else found.position).value
+            assert most - ROUNDING <= value <= 1.01 * most
+
+
+@pytest.mark.parametrize("row", range(6))
+def test_errors_of_every_row_count(row: int) -> None:
+    """A tool at rest, and a path that is a constant bit beside it, or turned."""
+    robot, size = robot_named("panda"), 1e-4
+    q = robot.dexterous_configuration("pose")
+    beside = robot.pose(q) * pin.exp6(pin.Motion(size * np.eye(6)[row]))
+    path = sm.Waypoints.from_poses([0.0, 1.0], [beside, beside])
+    trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
+    found = bound_errors(robot, path, sm.Task.POSE, trajectory, sm.Tolerance(1.0, 1.0), ())
+    expected = [size, 0.0] if row < 3 else [0.0, size]
+    errors = [found.position.value, found.rotation.value]
+    np.testing.assert_allclose(errors, expected, atol=1e-3 * size)
+
+
+def test_where_a_path_bends_sharply_a_short_interval_stays_undecided() -> None:
+    """Its error peaks at the tolerance in a corner that nothing announces: halved twelve times."""
+    robot = robot_named("planar_3r")
+    q = robot.dexterous_configuration("planar")
+    pose = robot.pose(q)
+
+    class Bent(sm.Path):
+        duration = 1.0
+
+        def evaluate(self, t: Array) -> sm.PathSamples:
+            swing = 1e-4 * (1.0 - np.abs(t - 1.0 / 3.0))
+            places = pose.translation + np.outer(swing, [0.0, 1.0, 0.0])
+            turns = np.tile(pose.rotation, (len(t), 1, 1))
+            return sm.PathSamples(t, places, turns, np.zeros((len(t), 6)))
+
+    trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 3)), robot.joint_names)
+    allowed = sm.Tolerance(1e-4 * (1.0 + 1e-9), 1.0)
+    found = bound_errors(robot, Bent(), sm.Task.PLANAR, trajectory, allowed, ())
+    ((start, end),) = found.undecided
+    assert start <= 1.0 / 3.0 <= end
+    assert end - start == pytest.approx(2.0**-12)
+    assert 1e-4 < found.position.value < 1.001e-4
+
+
+@pytest.mark.parametrize("moving", [0, 1])
+@pytest.mark.parametrize("turn", [0.1, 7.0, -60.0])
+def test_intervals_are_cut_where_a_joint_goes_far(turn: float, moving: int) -> None:
+    robot = robot_named("planar_3r")
+    q = np.zeros((3, 3))
+    q[1 + moving :, 2] = turn
+    trajectory = sm.Trajectory([0.0, 0.5, 1.0], q, np.zeros((3, 3)), robot.joint_names)
+    pose = robot.pose(q[0])
+    edges = _edges(sm.Waypoints.from_poses([0.0, 1.0], [pose, pose]), trajectory, ())
+    fine = np.linspace(0.0, 1.0, 20001)
+    way = np.append(0.0, np.cumsum(np.abs(np.diff(trajectory(fine)[:, 2]))))
+    travel = np.diff(np.interp(edges, fine, way))
+    # The way is spread evenly over the pieces of an interval, as its mean speed is not.
+    assert travel.max() <= 2.0 * _TRAVEL
+    assert {0.0, 0.5, 1.0} <= set(edges)
+    assert np.all(np.diff(edges) > 0.0)
+    # Where nothing moves nothing is cut.
+    still = edges > 0.5 if moving == 0 else edges < 0.5
+    assert np.count_nonzero(still) == 1
+
+
+def test_what_turns_wildly_is_not_cut_at_all() -> None:
+    robot = robot_named("planar_3r")
+    q = np.array([[0.0] * 3, [0.0, 0.0, 1e4], [0.0, 0.0, 1e4]])
+    trajectory = sm.Trajectory([0.0, 0.5, 1.0], q, np.zeros((3, 3)), robot.joint_names)
+    pose = robot.pose(q[0])
+    edges = _edges(sm.Waypoints.from_poses([0.0, 1.0], [pose, pose]), trajectory, ())
+    np.testing.assert_array_equal(edges, [0.0, 0.5, 1.0])
+
+
+def test_of_equal_errors_the_first_is_told() -> None:
+    first = _larger(Extreme(0.0, 0.0, "it"), np.array([1.0, 2.0, 2.0]), np.array([0.1, 0.2, 0.3]))
+    assert first == Extreme(2.0, 0.2, "it")
+    assert _larger(first, np.array([2.0]), np.array([0.7])) == first
+    assert _larger(first, np.zeros(0), np.zeros(0)) == first
+    assert np.isnan(_larger(first, np.array([3.0, np.nan]), np.array([0.7, 0.8])).value)
+
+
+@pytest.mark.parametrize("row", range(6))
+def test_errors_between_samples_are_those_of_the_poses(row: int) -> None:
+    robot, offset = robot_named("panda"), 1e-3
+    q = robot.dexterous_configuration("pose")
+    pose = robot.pose(q)
+    beside = pose * pin.exp6(pin.Motion(offset * np.eye(6)[row]))
+    path = sm.Waypoints.from_poses([0.0, 1.0, 2.0], [pose, pose, beside])
+    problem = sm.Problem(robot, path, start=q)
+    still = sm.Trajectory([0.0, 0.5, 2.0], [q] * 3, np.zeros((3, 7)), robot.joint_names)
+    errors = problem.errors_between(still)
+    middles = [path.pose(0.25), path.pose(1.25)]
+    expected = [problem.task.miss(target, pose) for target in middles]
+    np.testing.assert_allclose(errors, expected, atol=1e-9)
+    # What a relaxation allows is no error.
+    name = ("x", "y", "z", "rx", "ry", "rz")[row]
+    band = sm.Relaxation(name, 2.0 * offset, axes="tool")
+    relaxed = dataclasses.replace(problem, relaxations=[band])
+    np.testing.assert_allclose(relaxed.errors_between(still), 0.0, atol=1e-5 * offset)

@@ -1,0 +1,152 @@
+"""The command line as a user types it."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from support.shell import invoke
+
+SELFMOTION = Path(sys.executable).with_name("selfmotion")
+
+
+def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"COLUMNS": "120"}
+    command = [SELFMOTION, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+
+
+def test_plan_check_and_replay(tmp_path: Path) -> None:
+    plan, csv, html = tmp_path / "plan.npz", tmp_path / "plan.csv", tmp_path / "a.html"
+    planned = run(
+        "plan", "planar_3r", "--circle", "0.5", "--normal", "z", "--task", "planar",
+        "--mu", "1", "--out", plan, "--out", csv, "--html", html,
+    )  # fmt: skip
+    assert planned.returncode == 0, planned.stderr
+    for word in ("joint velocity", "inverse manipulability", "total", "verified", "evaluations"):
+        assert word in planned.stdout
+    assert "\x1b" not in planned.stdout
+    assert sm.load_plan(plan).certificate.verified
+    assert len(csv.read_text().splitlines()) == len(sm.load_plan(plan).trajectory.t) + 1
+    assert html.stat().st_size > 100_000
+
+    checked = run("check", plan)
+    assert checked.returncode == 0
+    assert "verified at all times" in checked.stdout
+
+    again = tmp_path / "b.html"
+    assert run("replay", plan, "--html", again).returncode == 0
+    assert again.read_bytes() == html.read_bytes()
+
+
+def test_plan_through_waypoints(tmp_path: Path) -> None:
+    robot = sm.load_robot("panda")
+    start = robot.dexterous_configuration()
+    line = sm.Line(robot.pose(start), robot.pose(start + 0.05), 2.0)
+    rows = ["t,x,y,z,qw,qx,qy,qz"]
+    for t in np.linspace(0, 2, 9):
+        pose = line.pose(t)
+        x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
+        rows.append(",".join(map(repr, map(float, [t, *pose.translation, w, x, y, z]))))
+    file = tmp_path / "path.csv"
+    file.write_text("\n".join(rows) + "\n")
+    result = run("plan", "panda", "--path", file, "--task", "pose")
+    assert result.returncode in (0, 1), result.stderr
+    assert "position error" in result.stdout
+
+
+def test_unverified_plans_exit_with_1(tmp_path: Path) -> None:
+    plan = tmp_path / "plan.npz"
+    fast = run("plan", "panda", "--circle", "0.15", "--duration", "0.5", "--out", plan)
+    assert fast.returncode == 1
+    assert "not verified: joint" in fast.stdout
+    assert run("check", plan).returncode == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("plan", "nosuch", "--circle", "0.1"), "error: unknown robot 'nosuch'"),
+        (("plan", "ur5", "--circle", "0.1"), "error: ur5: 6 joints and task 'pose'"),
+        (("plan", "panda"), "error: give the tool motion by one of"),
+        (("plan", "panda", "--path", "no.csv"), "error: no.csv: cannot be read"),
+        (("plan", "panda", "--circle", "0.1", "--start", "1,2"), "shape (2,), expected (7,)"),
+        (("plan", "panda", "--circle", "0.1", "--start", "a"), "error: --start is 'a'"),
+        (("plan", "panda", "--line", "1,2"), "error: --line has 2 numbers, expected 3"),
+        (("plan", "panda", "--circle", "0.1", "--out", "a.txt"), "--out writes .npz"),
+        (("plan", "panda", "--circle", "0.1", "--mu", "-1"), "mu is -1.0"),
+        (("plan", "panda", "--circle", "0.1", "--max-evaluations", "0"), "max_evaluations is 0"),
+        (("check", "no.npz"), "error: no.npz: no such file"),
+        (("replay", "no.npz"), "error: no.npz: no such file"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_2(arguments: tuple[str, ...], message: str) -> None:
+    result = run(*arguments)
+    assert result.returncode == 2
+    assert message in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert "Traceback" not in result.stderr
+
+
+def test_robots_lists_every_arm() -> None:
+    result = run("robots")
+    assert result.returncode == 0
+    for name in sm.NAMED_ARMS:
+        assert name in result.stdout
+    assert "panda_hand_tcp" in result.stdout
+
+
+COMMANDS = (
+    "plan", "init", "schema", "check", "export", "compare", "replay", "batch", "robots", "demo",
+    "study",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_an_example(command: str) -> None:
+    code, text = invoke(command, "--help")
+    assert code == 0
+    assert f"Example: selfmotion {command}" in text
+
+
+def test_demo(tmp_path: Path) -> None:
+    result = run("demo", "--out", tmp_path / "out")
+    assert result.returncode == 0, result.stdout + result.stderr
+    names = {f"{name}.{kind}" for name in ("planar", "panda") for kind in ("npz", "csv", "html")}
+    assert {file.name for file in (tmp_path / "out").iterdir()} == names
+
+
+def test_a_path_that_leaves_the_workspace_exits_with_1(tmp_path: Path) -> None:
+    file, html = tmp_path / "plan.npz", tmp_path / "a.html"
+    line = ("plan", "planar_3r", "--line", "11,0,0", "--duration", "8", "--task", "planar")
+    planned = run(*line, "--out", file, "--html", html)
+    assert planned.returncode == 1, planned.stderr
+    checked = run("check", file)
+    assert checked.returncode == 1
+    for output in (planned.stdout, checked.stdout):
+        text = " ".join(output.split())
+        assert "not verified: the motion ends at t =" in text
+        assert "the pose is out of reach" in text
+    assert html.stat().st_size > 100_000
+
+    damped = run(*line, "--damped")
+    assert damped.returncode == 1, damped.stderr
+    text = " ".join(damped.stdout.split())
+    assert "path error" in text
+    assert "where damping was active" in text
+
+
+def test_a_log_names_the_stages_and_the_gap(tmp_path: Path) -> None:
+    planned = run(
+        "plan", "planar_3r", "--circle", "0.3", "--normal", "z", "--task", "planar", "--compare"
+    )
+    assert planned.returncode in (0, 1), planned.stderr
+    assert planned.stderr.splitlines()[-1] == "checking"
+    assert "refining sequence" in planned.stderr
+    assert "\x1b" not in planned.stderr
+    assert "% from its best motion" in planned.stdout

@@ -1,0 +1,133 @@
+"""The shell knows what Python knows: each option is the problem that it stands for."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from support.arms import PANDA_HOME
+from support.shell import complaint, invoke
+
+HOME = ",".join(map(str, PANDA_HOME.tolist()))
+
+
+SRDF = '<robot name="panda"><disable_collisions link1="panda_link5" link2="panda_link7"/></robot>'
+
+
+def planned(folder: Path, *options: str | Path) -> sm.Plan:
+    """Return the plan of a Panda on a circle, with further options."""
+    out = folder / "plan.npz"
+    code, text = invoke(
+        "plan", "panda", "--circle", "0.05", "--start", HOME, "--out", out, "--json", *options
+    )
+    assert code == 0, text
+    assert json.loads(text)["certificate"]["verified"]
+    return sm.load_plan(out)
+
+
+def kinds(plan: sm.Plan) -> list[dict[str, Any]]:
+    return [item.to_dict() for item in plan.problem.constraints]
+
+
+def test_limits_and_closed_paths(tmp_path: Path) -> None:
+    plan = planned(tmp_path, "--velocity", "2", "--acceleration", "9,9,9,9,9,9,8", "--closed")
+    asked = {item["kind"]: item for item in kinds(plan)}
+    assert set(asked) == {
+        "JointPositionLimits", "JointVelocityLimits", "JointAccelerationLimits", "JointJerkLimits",
+        "ClosedPath",
+    }  # fmt: skip
+    assert asked["JointVelocityLimits"]["limit"] == 2.0
+    assert asked["JointAccelerationLimits"]["limit"] == [9, 9, 9, 9, 9, 9, 8]
+
+
+def test_costs_by_name(tmp_path: Path) -> None:
+    plan = planned(
+        tmp_path, "--cost", "JointAcceleration=0.1", "--cost", "SmallestSingularValue=0.01",
+        "--cost", "KineticEnergy", "--degree", "2",
+    )  # fmt: skip
+    described = [cost.to_dict() for cost in plan.problem.costs]
+    assert [item["kind"] for item in described] == [
+        "JointAcceleration", "SmallestSingularValue", "KineticEnergy",
+    ]  # fmt: skip
+    assert (described[0]["weight"], described[1]["mu"]) == (0.1, 0.01)
+    assert plan.problem.null_motion == sm.PolynomialNullMotion(2)
+
+
+def test_obstacles_pairs_and_locks(tmp_path: Path) -> None:
+    (tmp_path / "arm.srdf").write_text(SRDF)
+    cell = tmp_path / "cell.toml"
+    cell.write_text(
+        "[[obstacles]]\nshape = 'box'\nname = 'post'\nposition = [0, -0.8, 0.5]\n"
+        "rpy_deg = [0, 0, 90]\nsize_mm = [100, 200, 1000]\n"
+    )
+    plan = planned(
+        tmp_path, "--obstacles", cell, "--clearance", "0.01", "--srdf", tmp_path / "arm.srdf",
+        "--lock", "panda_finger_joint1=0.03", "--tool", "panda_hand",
+    )  # fmt: skip
+    (clearance,) = (item for item in kinds(plan) if item["kind"] == "Clearance")
+    assert clearance["distance"] == 0.01
+    assert clearance["disabled"] == [["panda_link5", "panda_link7"]]
+    assert clearance["obstacles"][0]["size"] == pytest.approx([0.1, 0.2, 1.0])
+    np.testing.assert_allclose(clearance["obstacles"][0]["rotation"][1], [1, 0, 0], atol=1e-12)
+    assert plan.robot.locked["panda_finger_joint1"] == 0.03
+    assert plan.robot.tool == "panda_hand"
+    # The same as JSON; two bodies of one name are refused.
+    (tmp_path / "twice.json").write_text(json.dumps(clearance["obstacles"] * 2))
+    twice = complaint("plan", "panda", "--circle", "0.1", "--obstacles", tmp_path / "twice.json")
+    assert "box 'post': a link or another obstacle has this name too" in twice
+
+
+def test_self_collision_can_be_left_out(tmp_path: Path) -> None:
+    plan = planned(tmp_path, "--no-self-collision", "--damped")
+    assert plan.problem.collision is None
+    assert plan.problem.damping == sm.Damping()
+
+
+def test_a_plan_can_start_from_another(tmp_path: Path) -> None:
+    first = planned(tmp_path)
+    out = tmp_path / "next.npz"
+    code, _ = invoke(
+        "plan", "panda", "--line", "0,0.05,0", "--from", tmp_path / "plan.npz", "--out", out
+    )
+    assert code == 0
+    np.testing.assert_array_equal(sm.load_plan(out).trajectory.q[0], first.trajectory.q[0])
+
+
+def test_anything_of_a_problem_file_can_be_set(tmp_path: Path) -> None:
+    plan = planned(
+        tmp_path, "--set", 'robot.base={"position": [0, 0, 1]}', "--set", "path.duration=6",
+        "--set", "path.normal=[1,0,0]", "--set", "tolerance.position=1e-5",
+    )  # fmt: skip
+    assert plan.path.duration == 6.0
+    assert plan.path.pose(0.0).translation[2] > 1.0
+    assert plan.tolerance.position == 1e-5
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.html", "a.yaml", "a.json", "a.xml"])
+def test_a_plan_is_written_in_any_format(tmp_path: Path, name: str) -> None:
+    planned(tmp_path, "--out", tmp_path / name)
+    assert (tmp_path / name).stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--cost", "Speed"), "--cost is 'Speed', expected NAME or NAME=WEIGHT"),
+        (("--cost", "PathLength=1"), "--cost: PathLength has no weight"),
+        (("--cost", "JointVelocity=a"), "--cost is 'a', expected numbers"),
+        (("--frame", "0,0,0,0,0,0"), "--frame and --ramp are for --path"),
+        (("--feed", "0.1", "--duration", "2"), "give the pace by one of --feed and --duration"),
+        (("--lock", "a"), "--lock is 'a', expected NAME=VALUE"),
+        (("--lock", "a=1"), "lock names joint 'a'"),
+        (("--from", "no.npz"), "no.npz: no such file"),
+        (("--obstacles", "no.toml"), "no.toml: cannot be read"),
+        (("--velocity", "1,2"), "one for each of the 7 joints"),
+        (("--srdf", "no.srdf"), "no.srdf: SRDF cannot be read"),
+        (("--out", "a.txt"), "--out writes .npz (the plan)"),
+    ],
+)
+def test_what_is_wrong_is_one_line(options: tuple[str, str], said: str) -> None:
+    assert said in complaint("plan", "panda", "--circle", "0.1", *options)

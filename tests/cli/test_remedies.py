@@ -1,0 +1,60 @@
+"""What the shell says is in its own words: options, not arguments of Python."""
+
+from pathlib import Path
+
+import pytest
+
+import selfmotion as sm
+from support.shell import complaint, invoke
+
+TABLE = "x,y,z\n0.4,0,0.4\n0.5,0,0.4\n"
+
+
+TIMED = "t,x,y,z\n0,0.4,0,0.4\n1,0.5,0,0.4\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        (TABLE, "--feed 0.1", "(--task position)"),
+        (TABLE, "--task position", "give either --feed (m/s) or --duration (s)"),
+        (TIMED, "--task position --duration 3", "so that --duration has no effect; drop it"),
+        (TABLE, "--feed 0.1 --jump 0.01 --task position", "give a larger --jump"),
+        (TABLE, "--duration 1 --corners round --task position", "which needs --feed (m/s)"),
+    ],
+)
+def test_remedies_name_options(text: str, options: str, said: str, tmp_path: Path) -> None:
+    file = tmp_path / "path.csv"
+    file.write_text(text)
+    assert said in complaint("plan", "panda", "--path", file, *options.split())
+
+
+def test_remedies_for_arms_name_options(tmp_path: Path) -> None:
+    line = complaint("plan", "ur5", "--circle", "0.05", "--task", "pose")
+    assert "take another --task (position, pointing, planar), relax some" in line
+    urdf = tmp_path / "two.urdf"
+    parts = ['<link name="base"/>']
+    for name in "ab":
+        parts.append(f'<link name="{name}"/><joint name="j{name}" type="continuous">')
+        parts.append(f'<parent link="base"/><child link="{name}"/><axis xyz="0 0 1"/></joint>')
+    urdf.write_text(f'<robot name="two">{"".join(parts)}</robot>')
+    assert complaint("plan", urdf, "--circle", "0.1").endswith("name the tool frame with --tool")
+
+
+def test_problem_files_keep_their_own_words(tmp_path: Path) -> None:
+    sm.write_problem(sm.sample_problem(), tmp_path / "problem.toml")
+    text = (tmp_path / "problem.toml").read_text()
+    (tmp_path / "problem.toml").write_text(text.replace('task = "planar"', 'task = "pose"'))
+    line = complaint("plan", tmp_path / "problem.toml")
+    assert line.endswith("choose another task (planar)")
+    assert "--task" not in line
+
+
+def test_a_circle_of_a_planar_arm_lies_in_its_plane(tmp_path: Path) -> None:
+    file = tmp_path / "plan.npz"
+    code, _ = invoke("plan", "planar_3r", "--circle", "0.3", "--out", file, "--json")
+    assert code == 0
+    plan = sm.load_plan(file)
+    assert plan.problem.task is sm.Task.PLANAR
+    heights = [plan.path.pose(t).translation[2] for t in (0.0, 1.0, 2.0)]
+    assert max(heights) - min(heights) < 1e-12

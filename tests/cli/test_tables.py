@@ -1,0 +1,34 @@
+"""Tables fit narrow terminals and logs."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import selfmotion as sm
+
+SELFMOTION = Path(sys.executable).with_name("selfmotion")
+
+
+@pytest.mark.parametrize("columns", [60, None])
+def test_tables_fit_narrow_terminals_and_logs(tmp_path: Path, columns: int | None) -> None:
+    """No name is cut and no unit lost; a verdict is one line of a log, to be searched for."""
+    file = tmp_path / "plan.npz"
+    sm.plan(sm.sample_problem()).save(file)
+    environment = {key: value for key, value in os.environ.items() if key != "COLUMNS"}
+    environment |= {} if columns is None else {"COLUMNS": str(columns)}
+    verdict = sm.load_plan(file).certificate.verdict
+    for command in (["check", file], ["compare", file, file], ["robots"]):
+        printed = subprocess.run(
+            [SELFMOTION, *map(str, command)], capture_output=True, text=True, env=environment
+        )
+        assert printed.returncode == 0, printed.stderr
+        assert "…" not in printed.stdout
+        table = [line for line in printed.stdout.splitlines() if line != verdict]
+        assert max(map(len, table)) <= (columns or 120)
+        if command[0] == "check":
+            assert verdict in printed.stdout.splitlines()
+        if command[0] == "compare":
+            assert "joint path, rad or m" in printed.stdout

@@ -1,0 +1,105 @@
+"""Conditions on both ends: reached, closed, or refused."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.certificate import ClosedMotion, EndState
+from selfmotion.engine.start import FreeStart
+from support.arms import PANDA_HOME, short_line
+
+Circle = Callable[..., sm.Problem]
+
+
+LIMITS = (sm.JointPositionLimits(), sm.JointVelocityLimits())
+
+
+def certify_again(plan: sm.Plan, requirements: list[sm.Requirement]) -> sm.Certificate:
+    """Return a plan's certificate with other requirements."""
+    return sm.certify(plan.robot, plan.path, plan.task, plan.trajectory, requirements=requirements)
+
+
+def test_a_hundred_loops_of_a_closed_circle_do_not_drift(panda_circle: Circle) -> None:
+    open_loop = sm.plan(panda_circle())
+    plan = sm.plan(panda_circle(constraints=(*LIMITS, sm.ClosedPath())))
+    assert plan.certificate.verified
+    assert plan.certificate.closure <= 1e-9
+    assert plan.certificate.closure * 100 <= 1e-6
+    assert open_loop.certificate.closure > 0.01
+    ends = plan.trajectory.qd[[0, -1]]
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-6)
+    # What the pseudo-inverse alone does in one loop.
+    drift = open_loop.initial_trajectory.q[-1] - open_loop.initial_trajectory.q[0]
+    assert np.linalg.norm(drift) > 0.01
+    assert plan.report.cost < 1.1 * open_loop.report.cost
+
+
+def test_closed_paths_from_a_free_start(panda_circle: Circle) -> None:
+    problem = panda_circle(constraints=(*LIMITS, sm.ClosedPath()))
+    fixed = sm.plan(problem)
+    free = sm.plan(dataclasses.replace(problem, start=None))
+    assert free.certificate.verified
+    assert free.certificate.closure <= 1e-8
+    assert free.report.cost < fixed.report.cost
+
+
+def test_a_closed_joint_path_needs_a_closed_tool_path(panda: sm.RobotModel) -> None:
+    line = short_line(panda, PANDA_HOME)
+    with pytest.raises(sm.ProblemError, match="needs a closed tool path"):
+        sm.Problem(panda, line, start=PANDA_HOME, constraints=[sm.ClosedPath()])
+
+
+def test_end_configuration_is_reached(panda_circle: Circle) -> None:
+    """The start itself, and a configuration further along the self-motion."""
+    problem = panda_circle()
+    robot, task = problem.robot, sm.Task.POSE
+    manifold = FreeStart(robot, task, PANDA_HOME)
+    target = manifold.configuration(np.array([0.2]), problem.path.pose(0.0))
+    assert target is not None
+    constraints = (*LIMITS, sm.EndConfiguration(target))
+    plan = sm.plan(panda_circle(constraints=constraints))
+    assert plan.certificate.verified
+    np.testing.assert_allclose(plan.trajectory.q[-1], target, atol=1e-7)
+
+
+def test_an_end_velocity_is_reached_and_checked(panda_circle: Circle) -> None:
+    """Rest where the path rests; the velocity of a motion known to be possible where it moves."""
+    rest = sm.plan(panda_circle("pointing", constraints=(*LIMITS, sm.EndVelocity())))
+    assert rest.certificate.verified, rest.certificate.verdict
+    np.testing.assert_allclose(rest.trajectory.qd[-1], 0.0, atol=1e-6)
+    problem = panda_circle("pointing")
+    first = problem.path.pose(0.0)
+    path = sm.Circle.around(first, 0.15, 4.0, normal=(1.0, 0.0, 0.0), time_law="constant")
+    problem = dataclasses.replace(problem, path=path)
+    with pytest.raises(sm.ProblemError, match="cannot end at rest"):
+        dataclasses.replace(problem, constraints=[sm.EndVelocity()])
+    free = sm.plan(problem)
+    end, target = free.trajectory.q[-1], free.trajectory.qd[-1]
+    ends = (sm.EndConfiguration(end), sm.EndVelocity(target))
+    kept = sm.plan(dataclasses.replace(problem, constraints=(*LIMITS, *ends)))
+    assert kept.certificate.verified, kept.certificate.verdict
+    np.testing.assert_allclose(kept.trajectory.qd[-1], target, atol=1e-6)
+    for wrong in (EndState(1, target + 0.1), EndState(0, end + 0.1)):
+        check = certify_again(kept, [wrong])
+        assert "'panda_joint" in check.verdict
+        assert not check.verified
+
+
+def test_a_jump_in_velocity_is_refused_where_the_path_repeats(panda_circle: Circle) -> None:
+    plan = sm.plan(panda_circle(constraints=(*LIMITS, sm.ClosedPath(velocity=False)), rest=False))
+    assert plan.certificate.verified
+    check = certify_again(plan, [ClosedMotion(velocity=True)])
+    assert "off that of the start" in check.verdict
+
+
+def test_end_conditions_that_contradict_each_other_are_named(panda_circle: Circle) -> None:
+    robot, path = panda_circle().robot, panda_circle().path
+    manifold = FreeStart(robot, sm.Task.POSE, PANDA_HOME)
+    end = manifold.configuration(np.array([0.3]), path.pose(0.0))
+    assert end is not None
+    plan = sm.plan(panda_circle(constraints=[sm.ClosedPath(), sm.EndConfiguration(end)]))
+    assert not plan.certificate.verified
+    assert "not all constraints could be met" in plan.report.message

@@ -1,0 +1,98 @@
+"""Limits of the tool's speed and acceleration: exact, kept, judged and refused."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion import testing
+from selfmotion.certificate import FinishedMotion, ToolMotion
+from selfmotion.robot import ToolRates
+from support.arms import PANDA_HOME
+
+# Central differences of poses and of rates.
+DIFFERENCE = 1e-6
+
+
+def circle(robot: sm.RobotModel, **options) -> sm.Problem:
+    path = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 3.0)
+    return sm.Problem(robot, path, start=PANDA_HOME, **options)
+
+
+@pytest.fixture
+def free(panda: sm.RobotModel) -> sm.Plan:
+    return sm.plan(circle(panda, task="position"))
+
+
+def test_derivatives_equal_central_differences(panda: sm.RobotModel) -> None:
+    rates, rng, h = ToolRates(panda), np.random.default_rng(0), 1e-6
+    state = [rng.normal(size=(4, 7)) for _ in range(3)]
+    by_velocity, by_acceleration = rates.derivatives(*state)
+    for order in range(3):
+        for joint in range(7):
+            step = h * np.eye(7)[joint]
+            late, early = (
+                rates(*(part + sign * step * (k == order) for k, part in enumerate(state)))
+                for sign in (1, -1)
+            )
+            for exact, more, less in zip((by_velocity, by_acceleration), late, early, strict=True):
+                if order < len(exact):
+                    difference = (more - less) / (2 * h)
+                    np.testing.assert_allclose(
+                        exact[order][:, :, joint], difference, atol=DIFFERENCE
+                    )
+
+
+@pytest.mark.parametrize("task", ["pose", "position", "pointing"])
+def test_the_constraint_keeps_the_laws(panda: sm.RobotModel, task: str) -> None:
+    limits = sm.ToolLimits(0.3, 0.5, 1.0, 2.0)
+    testing.check_constraint(limits, circle(panda, task=task))
+
+
+def test_what_the_task_leaves_free_keeps_its_limit(
+    panda: sm.RobotModel, free: sm.Plan, tmp_path
+) -> None:
+    rates, t = ToolRates(panda), np.linspace(0.0, 3.0, 20_001)
+
+    def turn_rate(plan: sm.Plan) -> float:
+        motion = plan.trajectory
+        velocity, _ = rates(motion(t), motion(t, 1), motion(t, 2))
+        return float(np.linalg.norm(velocity[:, 3:], axis=1).max())
+
+    fastest = turn_rate(free)
+    found = ToolMotion(panda, np.array([np.inf, 2.0 * fastest, np.inf, np.inf])).judge(
+        FinishedMotion(panda, free.trajectory)
+    )
+    assert 0.5 <= found.amount <= 0.5 * (1.0 + 1e-4)
+    asked = sm.ToolLimits(turn_rate=0.5 * fastest)
+    plan = sm.plan(circle(panda, task="position", constraints=[sm.JointVelocityLimits(), asked]))
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert "tool turn rate" in plan.certificate.covers
+    assert turn_rate(plan) <= 0.5 * fastest
+    assert plan.report.cost > free.report.cost
+    plan.save(tmp_path / "plan.npz")
+    assert sm.load_plan(tmp_path / "plan.npz").certificate.verified
+
+
+def test_a_path_that_is_too_fast_is_refused_with_the_amount(panda: sm.RobotModel) -> None:
+    path = circle(panda).path
+    t = np.linspace(0.0, path.duration, 4001)
+    fastest = np.linalg.norm(path.samples(t).twist[:, :3], axis=1).max()
+    limits = sm.ToolLimits(speed=0.5 * fastest)
+    plan = sm.plan(circle(panda, constraints=[limits]), max_evaluations=20)
+    assert not plan.certificate.verified
+    assert "2 times its limit: give it 2 times the duration" in plan.certificate.verdict
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "none is given"),
+        ({"speed": 0.0}, "tool limits: speed is 0.0"),
+        ({"turn_rate": np.nan}, "tool limits: turn_rate is nan"),
+        ({"acceleration": [1.0]}, "tool limits: acceleration is"),
+        ({"speed": 1.0, "margin": 0.0}, "margin is 0.0"),
+    ],
+)
+def test_limits_that_make_no_sense(options: dict, message: str) -> None:
+    with pytest.raises(sm.ProblemError, match=message):
+        sm.ToolLimits(**options)

@@ -1,0 +1,97 @@
+"""The site is built, offline and without a warning; the examples run while it is built."""
+
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+import selfmotion as sm
+from selfmotion import realtime, replay, testing
+from support.places import ROOT
+
+EXAMPLES = sorted(file.stem for file in (ROOT / "examples").glob("*.py"))
+
+
+class Addresses(HTMLParser):
+    """Collects what a browser would fetch to show a page."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        if tag in ("script", "img", "iframe", "source"):
+            self.found += [given["src"]] if given.get("src") else []
+        if tag == "link" and given.get("rel") in ("stylesheet", "icon", "preload", "preconnect"):
+            self.found += [given["href"] or ""]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build it; an example that fails, a dead link or a missing docstring ends that."""
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet"]
+    built = subprocess.run(
+        [*command, "--config-file", str(ROOT / "docs/mkdocs.yml"), "--site-dir", str(folder)],
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert built.returncode == 0, built.stdout + built.stderr
+    return folder
+
+
+def test_nothing_is_fetched_but_the_site_itself(site: Path) -> None:
+    pages = [page for page in site.rglob("*.html") if "replays" not in page.parts]
+    assert len(pages) > 30
+    for page in pages:
+        parser = Addresses()
+        parser.feed(page.read_text())
+        assert parser.found
+        for address in parser.found:
+            if address.startswith("data:") or page.name == "404.html":
+                continue
+            assert "://" not in address, f"{page}: {address}"
+            assert (page.parent / address.split("?")[0]).exists(), f"{page}: {address}"
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_every_example_is_shown_with_its_output(site: Path, name: str) -> None:
+    text = (site / "examples.html").read_text()
+    part = re.split(r"<h[23]", text.split(f'<h3 id="{name}py"')[1])[0]
+    assert part.count('<span class="filename">') == 2
+    printed = part.split('<span class="filename">prints</span>')[1]
+    assert len(re.sub(r"<[^>]*>", "", printed).strip()) > 20
+
+
+def test_examples_are_short() -> None:
+    for name in EXAMPLES:
+        # The one's two classes, and the other's two ends of a wire, are the point.
+        if name not in ("own_constraint", "udp_bridge"):
+            assert len((ROOT / f"examples/{name}.py").read_text().splitlines()) <= 60, name
+
+
+def test_equations_are_drawn_by_the_browser(site: Path) -> None:
+    text = (site / "method.html").read_text()
+    assert text.count('<math display="block"') + text.count('display="block"') >= 10
+    assert "$" not in re.sub(r"<(script|style).*?</\1>", "", text, flags=re.DOTALL)
+
+
+def test_every_public_name_is_on_one_page_of_the_api(site: Path) -> None:
+    pages = "\n".join(page.read_text() for page in (ROOT / "docs/pages/api").glob("*.md"))
+    listed = re.findall(r"^::: (\S+)$", pages, re.MULTILINE)
+    wanted = [f"selfmotion.{name}" for name in sm.__all__]
+    wanted += [f"selfmotion.testing.{name}" for name in testing.__all__]
+    wanted += [f"selfmotion.replay.{name}" for name in replay.__all__]
+    own = set(realtime.__all__) - set(sm.__all__)
+    wanted += [f"selfmotion.realtime.{name}" for name in own]
+    assert sorted(listed) == sorted(wanted)
+    shown = "\n".join(page.read_text() for page in (site / "api").glob("*.html"))
+    for name in sm.__all__:
+        assert f'id="selfmotion.{name}"' in shown, name

@@ -1,0 +1,135 @@
+"""F, its gradient and its metric equal central differences."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.engine import Objective, StillMotion
+from selfmotion.engine.rollout import Rollout
+from selfmotion.engine.start import FixedStart
+from selfmotion.motion.grid import Grid
+from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
+from support.arms import (
+    PANDA_HOME,
+    Case,
+    central_difference,
+    objective_of,
+    robot_named,
+    short_line,
+    start_of,
+)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_the_metric_is_the_differenced_gauss_newton_matrix(
+    panda: sm.RobotModel, order: int
+) -> None:
+    """∫ (∂q^(k)/∂x)ᵀ W (∂q^(k)/∂x) dt, the derivatives by central differences of motions."""
+    cost = (sm.JointVelocity(), sm.JointAcceleration(), sm.JointJerk())[order - 1]
+    path = short_line(panda, PANDA_HOME)
+    motion = PolynomialNullMotion(3, "joint")
+    problem = sm.Problem(panda, path, "pose", PANDA_HOME, motion, costs=[cost], constraints=())
+    objective = Objective.of(
+        problem, StillMotion.on(problem, PANDA_HOME, Grid.aligned(path.knots, 12))
+    )
+    x = 0.05 * np.random.default_rng(0).normal(size=objective.size)
+    sampling = objective.grid.sampling
+
+    def derivative(x: Array) -> Array:
+        samples = objective.samples(x)
+        table = samples.qd if order == 1 else (samples.qdd if order == 2 else samples.qddd)
+        return table.copy()
+
+    step = 1e-5
+    tangent = np.stack(
+        [(derivative(x + e) - derivative(x - e)) / (2 * step) for e in step * np.eye(len(x))],
+        axis=2,
+    )
+    weight = cost.curvature(7)[order]
+    expected = np.einsum("s,sid,ij,sje->de", sampling.weights, tangent, weight, tangent)
+    metric = objective.metric(x)
+    np.testing.assert_allclose(metric, expected, atol=1e-6 * np.abs(expected).max())
+
+
+# Exact gradients against central differences of F, relative to the gradient's largest entry.
+GRADIENT = 1e-6
+
+
+def rollout_of(case: Case, steps: int = 12) -> Rollout:
+    robot, task, _, path = case
+    return Rollout(robot, path, task, Grid.aligned(path.knots, steps))
+
+
+COSTS = {
+    "velocity": lambda r, t: sm.JointVelocity(),
+    "weighted velocity": lambda r, t: sm.JointVelocity(np.arange(1.0, r.dof + 1.0)),
+    "full weight": lambda r, t: sm.JointVelocity(np.eye(r.dof) + 0.3),
+    "acceleration": lambda r, t: sm.JointAcceleration(),
+    "jerk": lambda r, t: sm.JointJerk(),
+    "posture": lambda r, t: sm.Posture(np.arange(1.0, r.dof + 1.0), posture=np.ones(r.dof)),
+    "joint limits": lambda r, t: sm.JointLimitDistance(r.lower, r.upper),
+    "path length": lambda r, t: sm.PathLength(),
+    "inverse manipulability": lambda r, t: sm.InverseManipulability(0.01),
+    "manipulability": lambda r, t: sm.Manipulability(0.7),
+    "directional": lambda r, t: sm.DirectionalManipulability(np.arange(1.0, t.dimension + 1)),
+    "smallest singular value": lambda r, t: sm.SmallestSingularValue(),
+    "kinetic energy": lambda r, t: sm.KineticEnergy(r),
+    "gravity torque": lambda r, t: sm.GravityTorque(r),
+    "function": lambda r, t: sm.FunctionCost(
+        lambda qd, q, t: np.sin(q).sum(axis=1) * (qd**2).sum(axis=1) + t * q[:, 0]
+    ),
+}
+
+
+@pytest.mark.parametrize("cost", COSTS)
+def test_gradient_equals_central_differences(case: Case, cost: str) -> None:
+    robot, task, start, path = case
+    rollout = rollout_of(case, 8)
+    functions = PolynomialNullMotion(2, "joint").functions(rollout.grid.stage_times, path.duration)
+    table = NullMotionTable(functions, None, robot.dof)
+    objective = objective_of(rollout, table, [COSTS[cost](robot, task)], FixedStart(start))
+    x = 0.1 * np.random.default_rng(7).normal(size=objective.size)
+    exact = objective.gradient(x)
+    differences = central_difference(objective.value, x, 1e-5)
+    # Where the self-motion leaves a cost unchanged (UR's last joint), rounding of F remains.
+    scale = max(np.abs(differences).max(), 1e-2 * abs(objective.value(x)))
+    assert np.abs(exact - differences).max() <= GRADIENT * scale
+
+
+def test_panda_gradient_to_seven_digits() -> None:
+    """50 steps, 6 rows; differences extrapolated so that their own error is far below."""
+    robot = robot_named("panda")
+    start = start_of(robot, "pose")
+    path = sm.Circle.around(robot.pose(start), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    rollout = Rollout(robot, path, sm.Task.POSE, Grid.aligned(path.knots, 50))
+    functions = PolynomialNullMotion(3, "joint").functions(rollout.grid.stage_times, 4.0)
+    table = NullMotionTable(functions, None, robot.dof)
+    costs = [sm.JointVelocity(), sm.InverseManipulability(0.01)]
+    objective = objective_of(rollout, table, costs, FixedStart(start))
+    x = 0.05 * np.random.default_rng(13).normal(size=objective.size)
+    exact = objective.gradient(x)
+    coarse = central_difference(objective.value, x, 2e-3)
+    fine = central_difference(objective.value, x, 1e-3)
+    differences = (4.0 * fine - coarse) / 3.0
+    assert np.abs(exact - differences).max() <= 1e-7 * np.abs(differences).max()
+
+
+def test_sensitivities_equal_central_differences(case: Case) -> None:
+    robot, _, start, path = case
+    rollout = rollout_of(case, 20)
+    functions = PolynomialNullMotion(1, "joint").functions(rollout.grid.stage_times, path.duration)
+    table = NullMotionTable(functions, None, robot.dof)
+    x = 0.1 * np.random.default_rng(9).normal(size=table.size)
+    assert rollout.run(start, table.epsilon(x)) is None
+    _, exact = rollout.sensitivities(table.matrix(), np.zeros((robot.dof, table.size)))
+    for i in range(table.size):
+        shift = np.zeros_like(x)
+        shift[i] = 1e-6
+        ends = []
+        for sign in (1.0, -1.0):
+            assert rollout.run(start, table.epsilon(x + sign * shift)) is None
+            ends.append(rollout.samples().qd.copy())
+        differences = (ends[0] - ends[1]) / 2e-6
+        scale = max(1.0, np.abs(differences).max())
+        np.testing.assert_allclose(exact[:, :, i], differences, atol=GRADIENT * scale)

@@ -1,0 +1,285 @@
+"""Motions out: each format is read by the definition that its users go by."""
+
+import ast
+import csv
+import json
+import re
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+import yaml
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from support.arms import PANDA_HOME, robot_named
+from support.shell import complaint, invoke
+
+# A setpoint's time is a whole nanosecond.
+NANO = 1e-9
+
+
+# MuJoCo's frames from the same URDF [m]; it keeps the text's own digits.
+PLACE = 1e-6
+
+
+@pytest.fixture(scope="module")
+def plan() -> sm.Plan:
+    panda = robot_named("panda")
+    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
+    return sm.plan(sm.Problem(panda, circle, start=PANDA_HOME))
+
+
+@pytest.fixture(scope="module")
+def ur_plan() -> sm.Plan:
+    ur5 = robot_named("ur5")
+    start = ur5.dexterous_configuration("pointing")
+    return sm.plan(
+        sm.Problem(ur5, sm.Circle.around(ur5.pose(start), 0.05, 1.01), "pointing", start)
+    )
+
+
+@pytest.fixture
+def saved(plan: sm.Plan, tmp_path: Path) -> Path:
+    plan.save(tmp_path / "plan.npz")
+    return tmp_path / "plan.npz"
+
+
+def load(text: str) -> Any:
+    """Return what YAML says; libyaml is ten times as fast as its Python twin."""
+    return yaml.load(text, Loader=yaml.CSafeLoader)
+
+
+Table = tuple[list[str], Array, Array, Array, Array]
+
+
+def read_csv(file: Path) -> Table:
+    rows = list(csv.reader(file.read_text().splitlines()))
+    names = [name for name in rows[0][1:] if not name.endswith(("_velocity", "_acceleration"))]
+    table = {name: [float(row[k]) for row in rows[1:]] for k, name in enumerate(rows[0])}
+    parts = (
+        np.array([table[name + suffix] for name in names]).T
+        for suffix in ("", "_velocity", "_acceleration")
+    )
+    return names, np.array(table["t"]), *parts  # type: ignore[return-value]
+
+
+def read_arrays(file: Path) -> Table:
+    found = json.loads(file.read_text()) if file.suffix == ".json" else np.load(file)
+    values = (np.array(found[name]) for name in ("t", "q", "qd", "qdd"))
+    return list(map(str, found["joint_names"])), *values  # type: ignore[return-value]
+
+
+def read_joint_trajectory(message: object) -> Table:
+    """By trajectory_msgs/msg/JointTrajectory and JointTrajectoryPoint, every field of them."""
+    assert isinstance(message, dict)
+    assert set(message) == {"header", "joint_names", "points"}
+    assert message["header"] == {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    points = message["points"]
+    fields = {"positions", "velocities", "accelerations", "effort", "time_from_start"}
+    assert all(set(point) == fields for point in points)
+    since = [point["time_from_start"] for point in points]
+    assert all(type(s["sec"]) is int and 0 <= s["nanosec"] < 10**9 for s in since)
+    t = np.array([s["sec"] + 1e-9 * s["nanosec"] for s in since])
+    parts = (np.array([p[k] for p in points]) for k in ("positions", "velocities", "accelerations"))
+    return message["joint_names"], t, *parts  # type: ignore[return-value]
+
+
+def read_ros(file: Path) -> Table:
+    return read_joint_trajectory(load(file.read_text()))
+
+
+def read_moveit(file: Path) -> Table:
+    """By moveit_msgs/msg/RobotTrajectory."""
+    message = load(file.read_text())
+    assert set(message) == {"joint_trajectory", "multi_dof_joint_trajectory"}
+    assert message["multi_dof_joint_trajectory"]["points"] == []
+    return read_joint_trajectory(message["joint_trajectory"])
+
+
+READERS = {
+    "csv": (".csv", read_csv),
+    "npz": (".npz", read_arrays),
+    "json": (".json", read_arrays),
+    "ros": (".yaml", read_ros),
+    "moveit": (".yaml", read_moveit),
+}
+
+
+@pytest.mark.parametrize("rate", [None, 77.0])
+@pytest.mark.parametrize("form", READERS)
+def test_what_is_written_is_the_motion(
+    plan: sm.Plan, tmp_path: Path, form: str, rate: float | None
+) -> None:
+    suffix, read = READERS[form]
+    file = tmp_path / f"motion{suffix}"
+    sm.write_motion(plan, file, rate=rate, form=form)
+    names, t, q, qd, qdd = read(file)
+    assert tuple(names) == plan.trajectory.joint_names
+    assert t[0] == 0.0
+    assert t[-1] == pytest.approx(3.0, abs=NANO)
+    if rate is not None:
+        np.testing.assert_allclose(t[:-1], np.arange(len(t) - 1) / rate, atol=NANO)
+        assert len(t) == int(3 * rate) + 1
+    # The samples of the motion are where its acceleration jumps; elsewhere all orders agree.
+    inside = np.abs(t[:, None] - plan.trajectory.t).min(axis=1) > 2 * NANO
+    for order, values in enumerate((q, qd, qdd)):
+        rows = inside if order == 2 else slice(None)
+        np.testing.assert_allclose(
+            values[rows], plan.trajectory(np.minimum(t, 3.0)[rows], order), atol=1e-6
+        )
+    # Read back, it is still the motion that was certified.
+    again = sm.read_motion(file)
+    assert plan.problem.certify(again, plan.tolerance).verified
+    np.testing.assert_array_equal(again.q, q)
+
+
+def test_a_broken_file_is_no_longer_verified(plan: sm.Plan, tmp_path: Path) -> None:
+    file = tmp_path / "motion.yaml"
+    sm.write_motion(plan, file)
+    message = load(file.read_text())
+    message["points"][20]["positions"][2] += 1e-3
+    file.write_text(yaml.dump(message))
+    assert not plan.problem.certify(sm.read_motion(file), plan.tolerance).verified
+    for change, said in (
+        (lambda m: m["points"][3].pop("velocities"), r"points\[3\]: 'velocities'"),
+        (lambda m: m["points"][3]["positions"].pop(), r"points\[3\]: 6 positions"),
+        (lambda m: m.pop("joint_names"), "has no joint_names and points"),
+    ):
+        broken = load(yaml.dump(message))
+        change(broken)
+        file.write_text(yaml.dump(broken))
+        with pytest.raises(sm.FileFormatError, match=said):
+            sm.read_motion(file)
+
+
+def simulated(robot: sm.RobotModel, keys: Path) -> mujoco.MjModel:
+    """Return MuJoCo's own model of the URDF, bodies without shapes, with the keyframes in it."""
+    root = ElementTree.fromstring(robot.urdf.text)
+    for link in root.findall("link"):
+        for part in (*link.findall("visual"), *link.findall("collision")):
+            link.remove(part)
+    extension = ElementTree.SubElement(root, "mujoco")
+    ElementTree.SubElement(
+        extension, "compiler", fusestatic="false", boundmass="1e-3", boundinertia="1e-6"
+    )
+    spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    spec.compile()
+    # As a user has it: by include. That file has six digits, though; so the keys go over as well.
+    included = keys.with_name("model.xml")
+    include = f'<include file="{keys.name}"/></mujoco>'
+    included.write_text(spec.to_xml().replace("</mujoco>", include))
+    for key in mujoco.MjSpec.from_file(str(keys)).keys:
+        spec.add_key(name=key.name, time=key.time, qpos=key.qpos, qvel=key.qvel)
+    model = spec.compile()
+    loaded = mujoco.MjModel.from_xml_path(str(included))
+    np.testing.assert_array_equal(loaded.key_qpos, model.key_qpos)
+    return model
+
+
+@pytest.mark.parametrize("name", ["panda", "planar_3r"])
+def test_mujoco_puts_the_tool_where_the_plan_says(plan: sm.Plan, tmp_path: Path, name: str) -> None:
+    shown = plan if name == "panda" else sm.plan(sm.sample_problem())
+    sm.write_motion(shown, tmp_path / "keys.xml", rate=20)
+    model = simulated(shown.robot, tmp_path / "keys.xml")
+    count = int(shown.trajectory.duration * 20) + 1
+    assert model.nkey == count
+    data = mujoco.MjData(model)
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, shown.robot.tool)
+    assert body > 0
+    for key in range(count):
+        mujoco.mj_resetDataKeyframe(model, data, key)
+        mujoco.mj_forward(model, data)
+        pose = shown.path.pose(min(data.time, shown.path.duration))
+        rows = 2 if name == "planar_3r" else 3
+        np.testing.assert_allclose(data.xpos[body][:rows], pose.translation[:rows], atol=PLACE)
+        if name == "panda":
+            np.testing.assert_allclose(data.xmat[body].reshape(3, 3), pose.rotation, atol=PLACE)
+        speeds = shown.trajectory(min(data.time, shown.trajectory.t[-1]), 1)
+        joints = [model.joint(joint).dofadr[0] for joint in shown.robot.joint_names]
+        np.testing.assert_allclose(data.qvel[joints], speeds, atol=1e-9)
+
+
+def test_urscript_streams_the_motion(ur_plan: sm.Plan, tmp_path: Path) -> None:
+    file = tmp_path / "motion.script"
+    sm.write_motion(ur_plan, file, rate=200)
+    lines = file.read_text().splitlines()
+    head = " ".join(line for line in lines if line.startswith("#"))
+    assert "200 Hz" in head
+    assert "lookahead_time = 0.1 s" in head
+    body = [line for line in lines if not line.startswith("#")]
+    assert (body[0], body[-1]) == ("def selfmotion():", "end")
+    calls = [re.fullmatch(r"  servoj\((\[.*?\]), t=(\S+), lookahead_time=0.1, gain=300\)", line)
+             for line in body[2:-2]]  # fmt: skip
+    q = np.array([ast.literal_eval(call[1]) for call in calls if call is not None])
+    assert len(q) == len(calls) == 203
+    assert {float(call[2]) for call in calls if call is not None} == {0.005}
+    times = np.minimum(np.arange(203) / 200, 1.01)
+    np.testing.assert_allclose(q, ur_plan.trajectory(times), atol=1e-6)
+    assert body[1] == f"  movej([{', '.join(map(repr, q[0].tolist()))}])"
+    assert body[-2] == "  stopj(2.0)"
+
+
+def test_what_a_format_cannot_say_is_refused(plan: sm.Plan, tmp_path: Path) -> None:
+    with pytest.raises(sm.ProblemError, match="URScript is for arms of 6 revolute joints"):
+        sm.write_motion(plan, tmp_path / "motion.script")
+    with pytest.raises(sm.FileFormatError, match=r"suffix '\.txt' is no format of motions: csv"):
+        sm.write_motion(plan, tmp_path / "motion.txt")
+    with pytest.raises(sm.FileFormatError, match="form 'vtk' is no format"):
+        sm.write_motion(plan, tmp_path / "motion.txt", form="vtk")
+    for rate in (0.0, -1.0, np.nan, 0.1):
+        with pytest.raises(sm.ProblemError, match="rate is"):
+            sm.write_motion(plan, tmp_path / "motion.csv", rate=rate)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_export_writes_and_checks(saved: Path, tmp_path: Path) -> None:
+    files = [tmp_path / name for name in ("a.csv", "a.npz", "a.json", "a.yaml", "a.xml")]
+    asked = [part for file in files for part in ("--out", file)]
+    code, text = invoke("export", saved, *asked, "--rate", "250")
+    assert code == 0
+    assert text.count("read back: verified at all times") == 4
+    assert all(file.is_file() for file in files)
+    code, text = invoke("export", saved, "--out", tmp_path / "b.yaml", "--format", "moveit")
+    assert code == 0
+    assert "joint_trajectory" in load((tmp_path / "b.yaml").read_text())
+    # Four setpoints a second do not hold a micrometre, and the check says so.
+    code, text = invoke("export", saved, "--out", tmp_path / "c.csv", "--rate", "4")
+    assert code == 1
+    assert "not verified" in text
+    assert "no format of motions" in complaint("export", saved, "--out", tmp_path / "a.txt")
+
+
+def test_plans_side_by_side(saved: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.npz"
+    sm.plan(sm.sample_problem()).save(other)
+    code, text = invoke("compare", saved, other)
+    assert code == 0
+    for word in ("joint velocity", "inverse manipulability", "total cost", "verified"):
+        assert word in text
+    code, text = invoke("compare", saved, other, "--json")
+    assert list(json.loads(text)) == [str(saved), str(other)]
+
+
+@pytest.mark.parametrize("rate", [None, 20.0, 100.0])
+def test_what_straight_lines_between_samples_cost(plan: sm.Plan, rate: float | None) -> None:
+    from selfmotion.formats import linear_miss
+    from selfmotion.formats.samples import MotionSamples
+
+    miss = linear_miss(plan, rate)
+    samples = MotionSamples.of(plan.trajectory, rate)
+    worst = 0.0
+    for t in np.linspace(0.0, plan.trajectory.duration, 1501):
+        line = np.array([np.interp(t, samples.t, column) for column in samples.q.T])
+        there = plan.robot.pose(plan.trajectory(t)).translation
+        worst = max(worst, float(np.linalg.norm(plan.robot.pose(line).translation - there)))
+    assert 0.9 * worst <= miss.position
+    assert miss.position <= 1.1 * worst
+    # At the rate that is named, lines stay within the plan's tolerance, and not at half of it.
+    assert linear_miss(plan, miss.rate).position <= 1.05 * plan.tolerance.position
+    slower = linear_miss(plan, 0.5 * miss.rate)
+    limits = (plan.tolerance.position, plan.tolerance.rotation)
+    assert max(np.divide(slower[:2], limits)) > 2.0

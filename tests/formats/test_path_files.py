@@ -1,0 +1,280 @@
+"""Tool motions from files: every way to write the same poses, and what is wrong with a row."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import yaml
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from support.arms import PANDA_HOME, robot_named
+from support.shell import complaint, invoke
+
+# Of poses that went through another way to write a rotation.
+ROUNDING = 1e-12
+
+
+T = np.array([0.0, 0.5, 1.2, 2.0])
+
+
+@pytest.fixture(scope="module")
+def poses() -> list[pin.SE3]:
+    panda = robot_named("panda")
+    line = sm.Line(panda.pose(PANDA_HOME), panda.pose(PANDA_HOME + 0.05), 2.0)
+    return [line.pose(t) for t in T]
+
+
+def quaternion(pose: pin.SE3) -> Array:
+    return np.roll(pin.Quaternion(pose.rotation).coeffs(), 1)
+
+
+def rows(poses: list[pin.SE3], orientation: str) -> Array:
+    makers = {
+        "quaternion": quaternion,
+        "vector": lambda pose: pin.log3(pose.rotation),
+        "rpy": lambda pose: pin.rpy.matrixToRpy(pose.rotation),
+        "normal": lambda pose: pose.rotation[:, 2],
+        "none": lambda pose: np.zeros(0),
+    }
+    return np.array([[*pose.translation, *makers[orientation](pose)] for pose in poses])
+
+
+def table(header: str, values: Array, mark: str = ",") -> str:
+    lines = [header.replace(",", mark)]
+    lines += [mark.join(repr(float(value)) for value in row) for row in values]
+    return "\n".join(lines) + "\n"
+
+
+def agree(path: sm.Path, poses: list[pin.SE3], rotation: bool = True) -> None:
+    for t, pose in zip(T, poses, strict=True):
+        found = path.pose(t)
+        np.testing.assert_allclose(found.translation, pose.translation, atol=ROUNDING)
+        if rotation:
+            np.testing.assert_allclose(found.rotation, pose.rotation, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+@pytest.mark.parametrize(
+    ("header", "orientation"),
+    [
+        ("x,y,z,qw,qx,qy,qz", "quaternion"),
+        ("x,y,z,rx,ry,rz", "vector"),
+        ("x,y,z,roll,pitch,yaw", "rpy"),
+    ],
+)
+def test_tables_of_all_kinds(
+    poses: list[pin.SE3], tmp_path: Path, header: str, orientation: str, mark: str
+) -> None:
+    values = np.column_stack([T, rows(poses, orientation)])
+    order = np.random.default_rng(0).permutation(values.shape[1])
+    names = np.array(["t", *header.split(",")])[order]
+    text = table(",".join(names), values[:, order], mark)
+    file = tmp_path / "seam.csv"
+    file.write_text("\ufeff# a seam\n" + text.replace("\n", "\n# a remark\n\n", 2), "utf-8")
+    agree(sm.read_path(file), poses)
+
+
+def test_units_are_said_by_the_columns(poses: list[pin.SE3], tmp_path: Path) -> None:
+    values = np.column_stack([T, rows(poses, "rpy") * ([1e3] * 3 + [180 / np.pi] * 3)])
+    file = tmp_path / "seam.csv"
+    file.write_text(table("t,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg", values))
+    agree(sm.read_path(file), poses)
+
+
+def test_a_normal_is_the_tool_axis(poses: list[pin.SE3], tmp_path: Path) -> None:
+    file = tmp_path / "seam.csv"
+    file.write_text(
+        table("t,x,y,z,nx,ny,nz", np.column_stack([T, rows(poses, "normal") * [1, 1, 1, 3, 3, 3]]))
+    )
+    path = sm.read_path(file)
+    agree(path, poses, rotation=False)
+    for t, pose in zip(T, poses, strict=True):
+        np.testing.assert_allclose(path.pose(t).rotation[:, 2], pose.rotation[:, 2], atol=ROUNDING)
+
+
+def test_arrays(poses: list[pin.SE3], tmp_path: Path) -> None:
+    file, values = tmp_path / "seam.npy", rows(poses, "quaternion")
+    np.save(file, np.column_stack([T, values]))
+    agree(sm.read_path(file), poses)
+    np.save(file, np.column_stack([T, values[:, :3]]))
+    agree(sm.read_path(file), poses, rotation=False)
+    for array in (values, np.array([pose.homogeneous for pose in poses])):
+        np.save(file, array)
+        path = sm.read_path(file, duration=2.0)
+        for t, pose in zip(path.waypoint_times, poses, strict=True):
+            np.testing.assert_allclose(path.pose(t).homogeneous, pose.homogeneous, atol=ROUNDING)
+
+
+def ros(poses: list[pin.SE3]) -> dict[str, object]:
+    """Return a nav_msgs/Path, as `ros2 topic echo` prints it."""
+    listed = []
+    for t, pose in zip(T + 1700.0, poses, strict=True):
+        w, x, y, z = map(float, quaternion(pose))
+        place = dict(zip("xyz", map(float, pose.translation), strict=True))
+        stamp = {"sec": int(t), "nanosec": round((t - int(t)) * 1e9)}
+        inner = {"position": place, "orientation": {"x": x, "y": y, "z": z, "w": w}}
+        listed.append({"header": {"stamp": stamp, "frame_id": "world"}, "pose": inner})
+    return {"header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": "world"}, "poses": listed}
+
+
+@pytest.mark.parametrize("suffix", [".yaml", ".json"])
+def test_what_ros_writes(poses: list[pin.SE3], tmp_path: Path, suffix: str) -> None:
+    message = ros(poses)
+    file = tmp_path / f"seam{suffix}"
+    dump = json.dumps if suffix == ".json" else lambda m: yaml.safe_dump(m) + "---\n"
+    file.write_text(dump(message))
+    agree(sm.read_path(file), poses)
+    # A PoseArray has no times.
+    listed = [item["pose"] for item in message["poses"]]  # type: ignore[attr-defined]
+    file.write_text(dump({"header": message["header"], "poses": listed}))
+    path = sm.read_path(file, feed=0.02)
+    t = np.linspace(0.0, path.duration, 400)
+    speeds = np.linalg.norm(path.samples(t).twist[:, :3], axis=1)
+    turning = np.linalg.norm(path.samples(t).twist[:, 3:], axis=1)
+    # In the middle at the feed, or at the turn rate.
+    share = np.maximum(speeds / 0.02, turning / 1.0)[100:300]
+    np.testing.assert_allclose(share, 1.0, rtol=1e-2)
+    assert max(speeds[0], speeds[-1]) <= 1e-9
+
+
+def test_a_frame_of_ones_own(poses: list[pin.SE3], tmp_path: Path) -> None:
+    frame = pin.SE3(pin.rpy.rpyToMatrix(np.array([0.1, 0.2, 0.3])), np.array([0.4, -0.1, 0.2]))
+    local = [frame.inverse() * pose for pose in poses]
+    file = tmp_path / "seam.csv"
+    file.write_text(table("t,x,y,z,qw,qx,qy,qz", np.column_stack([T, rows(local, "quaternion")])))
+    placed = sm.Placed(sm.read_path(file), frame)
+    agree(placed, poses)
+    # Its twist is the derivative of its pose, like that of every path.
+    from selfmotion.testing import check_path
+
+    check_path(placed)
+    out = tmp_path / "plan.npz"
+    code, text = invoke(
+        "plan", "panda", "--path", file, "--frame", "0.4,-0.1,0.2,0.1,0.2,0.3", "--out", out
+    )
+    assert code == 0, text
+    agree(sm.load_plan(out).path, poses)
+
+
+HEADER = "t,x,y,z,qw,qx,qy,qz"
+
+
+GOOD = ["0,.4,0,.5,1,0,0,0", "1,.4,.1,.5,1,0,0,0", "2,.4,.2,.5,1,0,0,0"]
+
+
+def csv(*lines: str, header: str = HEADER) -> str:
+    return "\n".join(["# a seam", header, *lines]) + "\n"
+
+
+def changed(line: str, k: int = 1) -> str:
+    """Return the good table with line k in place of another one; the header is line 2."""
+    return csv(*GOOD[:k], line, *GOOD[k + 1 :])
+
+
+RPY = "x,y,z,roll,pitch,yaw"
+
+
+FIRST = "0.4,0,0.5,0,0,0"
+
+
+_Q = "orientation: {x: 0, y: 0, z: 0, w: 1}"
+
+
+_P = "position: {x: 0.4, y: 0, z: 0.5}"
+
+
+# File name, its text, what is asked besides, and what is said.
+MALFORMED: list[tuple[str, str, str, str]] = [
+    ("a.csv", "", "", "is empty, expected a header line"),
+    ("a.csv", csv(), "", "has 0 poses, expected at least two"),
+    ("a.csv", csv(GOOD[0]), "", "has 1 poses, expected at least two"),
+    ("a.csv", changed("1,.4,.1,.5,1,0,0"), "", "line 4 has 7 values, expected 8"),
+    ("a.csv", changed("1,.4,.1,.5,1,0,0,0,0"), "", "line 4 has 9 values, expected 8"),
+    ("a.csv", changed("1,.4,a,.5,1,0,0,0"), "", "line 4: could not convert"),
+    ("a.csv", changed("1,.4,nan,.5,1,0,0,0"), "", "line 4: the position is not finite"),
+    ("a.csv", changed("1,.4,inf,.5,1,0,0,0"), "", "line 4: the position is not finite"),
+    ("a.csv", changed("1,.4,0,.5,nan,0,0,0"), "", "line 4: the quaternion is not finite"),
+    ("a.csv", changed("nan,.4,0,.5,1,0,0,0"), "", "line 4: the time is not finite"),
+    ("a.csv", changed("1,.4,.1,.5,0,0,0,0"), "", "line 4: the quaternion is zero"),
+    ("a.csv", changed("0,.4,.1,.5,1,0,0,0"), "", "line 4: time 0 s does not come after 0 s"),
+    ("a.csv", changed("-1,.4,.1,.5,1,0,0,0"), "", "line 4: time -1 s does not come after"),
+    ("a.csv", changed("1,.4,.1,.5,1,0,0,0", 2), "", "line 5: time 1 s does not come after 1 s"),
+    ("a.csv", changed("1,.4,.9,.5,1,0,0,0"), "", "line 4: the path jumps by 0.9 m from the pose"),
+    ("a.csv", changed("1,.4,.1,.5,1,0,0,0"), "--jump 0.05", "line 4: the path jumps by 0.1 m"),
+    ("a.csv", changed("1,.4,.1,.5,0,1,0,0"), "", "line 4: the path turns by 3.142 rad from"),
+    ("a.csv", changed("1,400,100,500,1,0,0,0"), "", "line 4: position 400 is taken for metres"),
+    ("a.csv", csv(*GOOD, header="t,x,y,z,qw,qx,qy,qx"), "", "line 2: column 'qx' appears twice"),
+    ("a.csv", csv(*GOOD, header="t,x,y,q,qw,qx,qy,qz"), "", "unknown column 'q', expected t"),
+    ("a.csv", csv(*GOOD, header="t,x,y,yaw,qw,qx,qy,qz"), "", "column 'z' is missing"),
+    ("a.csv", csv(*GOOD, header="t,x,y,z,qw,qx,qy,yaw"), "", "has columns qw,qx,qy,qz and roll"),
+    ("a.csv", csv("0,1,0,0,1", header="t,x,y,z,rx"), "", "column 'ry' is missing, expected rx"),
+    ("a.csv", csv(*GOOD, header="t,x,y,z,z_mm,qx,qy,qz"), "", "column 'z' appears twice, in two"),
+    ("a.csv", csv(*GOOD, header="t_mm,x,y,z,qw,qx,qy,qz"), "", "unknown column 't_mm'"),
+    ("a.csv", csv(FIRST, "0.4,0.1,0.5,90,0,0", header=RPY), "--feed 0.1",
+     "line 4: angle 90 is taken for radians; say roll_deg"),
+    ("a.csv", csv("0.4,0,0.5,180,0,0", FIRST, header="x,y,z,rx,ry,rz"), "--feed 0.1",
+     "line 3: angle 180 is taken for radians"),
+    ("a.csv", csv(FIRST, "0.4,0.1,0.5,0,0,0", header="x,y,z,nx,ny,nz"), "--feed 0.1",
+     "line 3: the normal is zero"),
+    ("a.csv", csv(FIRST, "0.4,0.1,0.5,0,0,0", header=RPY), "", "has no times; give either --feed"),
+    ("a.csv", csv(FIRST, "0.4,0.1,0.5,0,0,0", header=RPY), "--feed 0", "feed is 0"),
+    ("a.csv", csv(FIRST, "0.4,0.1,0.5,0,0,0", header=RPY), "--duration -1", "duration is -1"),
+    ("a.csv", csv(FIRST, "0.4,0.1,0.5,0,0,0", header=RPY), "--feed 1 --duration 1", "not both"),
+    ("a.csv", csv(FIRST, FIRST, header=RPY), "--feed 1", "line 4: the tool does not move from the"),
+    ("a.csv", csv(*GOOD), "--feed 0.1", "has times, so that --feed has no effect"),
+    ("a.csv", csv(*GOOD), "--frame 1,2", "--frame has 2 numbers, expected 6"),
+    ("a.csv", "t x y z\n0 0 0 0\n", "", "line 2: could not convert string to float"),
+    ("a.dxf", "", "", "has suffix '.dxf', expected one of .csv"),
+    ("a.npy", "no array", "", "cannot be read as a NumPy array"),
+    ("a.json", "{", "", "is not JSON"),
+    ("a.json", "[]", "", "holds a list, expected a table"),
+    ("a.json", "{}", "", "has no list of poses, expected a nav_msgs/Path"),
+    ("a.yaml", "poses: [", "", "is not YAML"),
+    ("a.yaml", "poses: []", "", "has no list of poses"),
+    ("a.yaml", "poses: [3]", "", "poses[0]: position.x is missing or no number"),
+    ("a.yaml", f"poses: [{{{_P}, {_Q}}}, {{{_P}}}]", "", "poses[1]: orientation.w is missing"),
+    ("a.yaml", f"poses: [{{{_P}, {_Q}}}, {{position: {{x: a, y: 0, z: 0}}, {_Q}}}]", "",
+     "poses[1]: position.x is missing or no number"),
+    ("a.yaml", f"poses: [{{header: {{stamp: {{sec: 1}}}}, pose: {{{_P}, {_Q}}}}}]", "",
+     "poses[0]: header.stamp is incomplete"),
+    ("a.yaml", f"poses: [{{{_P}, {_Q}}}, {{{_P}, orientation: {{x: 0, y: 0, z: 0, w: 0}}}}]",
+     "--feed 0.1", "poses[1]: the quaternion is zero"),
+    ("a.yaml", f"poses: [{{{_P}, {_Q}}}]", "--feed 0.1", "has 1 poses, expected at least two"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", MALFORMED, ids=lambda case: f"{case[0]}: {case[3][:40]}")
+def test_malformed_files_are_one_line_and_exit_2(
+    case: tuple[str, str, str, str], tmp_path: Path
+) -> None:
+    name, text, options, said = case
+    file = tmp_path / name
+    file.write_text(text)
+    line = complaint("plan", "panda", "--path", file, *options.split())
+    assert said in line
+    if "--frame" not in options:
+        assert line.startswith(f"error: {file}: ")
+
+
+@pytest.mark.parametrize("shape", [(3,), (2, 5), (2, 3, 3)])
+def test_arrays_of_other_shapes(shape: tuple[int, ...], tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.zeros(shape))
+    with pytest.raises(sm.FileFormatError, match=r"has shape .*, expected \(N, 4, 4\) poses"):
+        sm.read_path(tmp_path / "a.npy")
+    matrix = np.tile(np.eye(4), (3, 1, 1))
+    matrix[1, 0, 0] = -1.0
+    np.save(tmp_path / "a.npy", matrix)
+    with pytest.raises(
+        sm.FileFormatError, match="row 2: the pose: its rotation is not orthonormal"
+    ):
+        sm.read_path(tmp_path / "a.npy", duration=1.0)
+
+
+def test_long_ways_between_poses_are_read_where_they_are_meant(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(csv("0,.4,0,.5", "1,.4,.9,.5", header="t,x,y,z"))
+    with pytest.raises(sm.FileFormatError, match=r"jumps by 0\.9 m"):
+        sm.read_path(tmp_path / "a.csv")
+    assert sm.read_path(tmp_path / "a.csv", jump=1.0).duration == 1.0

@@ -1,0 +1,269 @@
+"""Problem files: what they say is what is planned, and they round-trip."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.formats import (
+    example_text,
+    grid_documents,
+    job_of,
+    json_schema,
+    read_document,
+    write_job,
+)
+from support.arms import PANDA_HOME, robot_named
+from support.cells import CELL, written
+from support.places import ROOT
+from support.shell import complaint, invoke
+
+# No pose is known to more digits after roll, pitch and yaw.
+ROUNDING = 1e-12
+
+
+def same_motion(one: sm.Plan, other: sm.Plan, tolerance: float = 0.0) -> None:
+    np.testing.assert_array_equal(one.trajectory.t, other.trajectory.t)
+    np.testing.assert_allclose(one.trajectory.q, other.trajectory.q, rtol=0, atol=tolerance)
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory: pytest.TempPathFactory) -> sm.Job:
+    return sm.read_job(written(tmp_path_factory.mktemp("cell"), CELL))
+
+
+def test_a_file_says_what_python_says(job: sm.Job) -> None:
+    panda = sm.load_robot("panda", lock={"panda_finger_joint1": 0.02})
+    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    turned = pin.SE3(pin.rpy.rpyToMatrix(np.array([0, 0, np.pi / 18])), np.array([0, -0.6, 0.6]))
+    problem = sm.Problem(
+        panda,
+        circle,
+        start=PANDA_HOME,
+        costs=[sm.JointVelocity(), sm.InverseManipulability(0.001)],
+        constraints=[
+            sm.JointPositionLimits(),
+            sm.Clearance([sm.Box("post", turned, [0.1, 0.1, 1.2])], 0.01),
+        ],
+        relaxations=[sm.Relaxation(("rx", "ry"), np.pi / 36)],
+    )
+    said = sm.plan(problem, max_evaluations=50, tolerance=sm.Tolerance(position=1e-5))
+    same_motion(job.plan(), said, ROUNDING)
+
+
+@pytest.mark.parametrize("name", ["again.toml", "again.json"])
+def test_written_problems_give_the_same_plan(job: sm.Job, tmp_path: Path, name: str) -> None:
+    write_job(job, tmp_path / name)
+    again = sm.read_job(tmp_path / name)
+    assert again.settings == job.settings
+    same_motion(again.plan(), job.plan())
+
+
+def test_problems_of_all_kinds_round_trip(tmp_path: Path) -> None:
+    panda, file = robot_named("panda"), tmp_path / "problem.toml"
+    base = pin.SE3(pin.exp3(np.array([0.1, 0.2, 0.3])), np.array([0.4, 0.5, 0.6]))
+    held = sm.load_robot("panda", base=base, tool_offset=pin.SE3(np.eye(3), np.array([0, 0, 0.1])))
+    start = held.dexterous_configuration()
+    line = sm.Line(held.pose(start), held.pose(start + 0.05), 2.0)
+    seam = sm.Waypoints([0, 1, 2], [line.pose(t).translation for t in (0.0, 1.0, 2.0)])
+    problems = [
+        sm.sample_problem(),
+        sm.Problem(held, line, start=start, collision=None),
+        sm.Problem(
+            panda,
+            sm.Placed(seam, base.inverse()),
+            "position",
+            null_motion=sm.BSplineNullMotion(6),
+            costs=[sm.GravityTorque(panda), sm.JointAcceleration([1, 2, 3, 4, 5, 6, 7])],
+            constraints=[
+                sm.JointAccelerationLimits(5.0),
+                sm.JointVelocityLimits(1.0, replace=True),
+            ],
+            relaxations=[sm.Relaxation("z", during=(0.5, 1.5))],
+            damping=sm.Damping(),
+            collision=sm.Clearance(disabled=[("panda_link0", "panda_link2")]),
+        ),
+    ]
+    for problem in problems:
+        sm.write_problem(problem, file)
+        read = sm.read_problem(file)
+        for t in (0.0, 0.3, 0.9):
+            np.testing.assert_array_equal(
+                read.path.pose(t).homogeneous, problem.path.pose(t).homogeneous
+            )
+        q = problem.robot.dexterous_configuration("planar") * 0.9
+        np.testing.assert_allclose(
+            read.robot.pose(q).homogeneous, problem.robot.pose(q).homogeneous, atol=ROUNDING
+        )
+        for name in ("costs", "constraints", "relaxations"):
+            one, other = getattr(read, name), getattr(problem, name)
+            assert [item.to_dict() for item in one] == [item.to_dict() for item in other]
+        assert read.null_motion == problem.null_motion
+        assert read.damping == problem.damping
+        assert (read.collision is None) == (problem.collision is None)
+        text = file.read_text()
+        sm.write_problem(read, file)
+        if problem.robot is not held:
+            assert file.read_text() == text
+
+
+def test_a_base_and_a_tool_offset_move_what_they_should(tmp_path: Path) -> None:
+    base = pin.SE3(pin.exp3(np.array([0.1, 0.2, 0.3])), np.array([0.4, 0.5, 0.6]))
+    offset = pin.SE3(pin.exp3(np.array([0.3, 0.2, 0.1])), np.array([0.0, 0.01, 0.1]))
+    plain = robot_named("panda")
+    placed = sm.load_robot("panda", base=base, tool_offset=offset)
+    wanted = base * plain.pose(PANDA_HOME) * offset
+    np.testing.assert_allclose(placed.pose(PANDA_HOME).homogeneous, wanted.homogeneous, atol=1e-12)
+    plan = sm.plan(
+        sm.Problem(placed, sm.Circle.around(wanted, 0.05, 3.0), start=PANDA_HOME)
+    ).require()
+    plan.save(tmp_path / "plan.npz")
+    assert sm.load_plan(tmp_path / "plan.npz").certificate.verified
+    assert not sm.load_plan(tmp_path / "plan.npz").certificate.notes
+
+
+XACRO = """<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="long" default="1"/><link name="root"/>
+<xacro:macro name="part" params="a b"><joint name="j_${b}" type="revolute">
+<parent link="${a}"/><child link="${b}"/><axis xyz="0 0 1"/><origin xyz="$(arg long) 0 0"/>
+<limit lower="-3" upper="3" velocity="1" effort="1"/></joint><link name="${b}"/></xacro:macro>
+<xacro:part a="root" b="one"/><xacro:part a="one" b="two"/><xacro:part a="two" b="three"/>
+<joint name="t" type="fixed"><parent link="three"/><child link="tool"/><origin xyz="1 0 0"/></joint>
+<link name="tool"/></robot>"""
+
+
+def test_xacro_files_are_expanded(tmp_path: Path) -> None:
+    written(tmp_path, XACRO, "arm.xacro")
+    cell = """
+    task = "planar"
+    start = [0.1, 0.5, 0.5]
+    robot = { file = "arm.xacro", arguments = { long = 2 } }
+    path = { kind = "line", by_mm = [-300, 0, 0], duration = 5 }
+    """
+    problem = sm.read_problem(written(tmp_path, cell))
+    assert problem.robot.pose(np.zeros(3)).translation[0] == pytest.approx(7.0)
+    assert not problem.robot.urdf.has_changed()
+    written(tmp_path, XACRO.replace("${a}", "${nosuch}"), "arm.xacro")
+    with pytest.raises(sm.SelfmotionError, match=r"arm\.xacro: cannot be expanded by xacro: .*nos"):
+        sm.read_problem(tmp_path / "cell.toml")
+
+
+def test_code_of_the_user_is_loaded_only_where_allowed(tmp_path: Path) -> None:
+    code = """
+    from dataclasses import dataclass
+    import numpy as np
+    import selfmotion as sm
+
+    def elbow(qd, q, t):
+        return 1.0 - np.cos(q[:, 3])
+
+    @dataclass(frozen=True)
+    class BendOfATest(sm.Cost):
+        mu: float = 1.0
+        name: str = "elbow class"
+        def value(self, samples):
+            return self.mu * (1.0 - np.cos(samples.q[:, 3]))
+        def gradient(self, samples):
+            by_q = np.zeros_like(samples.q)
+            by_q[:, 3] = self.mu * np.sin(samples.q[:, 3])
+            return sm.Partials(q=by_q)
+    """
+    written(tmp_path, "\n".join(line[4:] for line in code.splitlines()), "own_costs_of_a_test.py")
+    own = CELL.replace('"InverseManipulability"\nmu', '"own_costs_of_a_test:BendOfATest"\nmu')
+    own += '\n[[costs]]\nkind = "own_costs_of_a_test:elbow"\nname = "elbow function"\n'
+    file = written(tmp_path, own)
+    with pytest.raises(sm.FileFormatError, match=r"costs\[1\]\.kind.*--allow-code"):
+        sm.read_problem(file)
+    assert "own_costs_of_a_test" not in sys.modules
+    problem = sm.read_problem(file, allow_code=True)
+    assert [cost.name for cost in problem.costs] == [
+        "joint velocity", "elbow class", "elbow function",
+    ]  # fmt: skip
+    again = tmp_path / "again.toml"
+    with pytest.raises(sm.ProblemError, match="'elbow function' holds a function"):
+        sm.write_problem(problem, again)
+    sm.write_problem(replace(problem, costs=problem.costs[:2]), again)
+    assert sm.read_problem(again, allow_code=True).costs[1] == problem.costs[1]
+    # A misspelt key of an own class is found like one of ours.
+    wrong = written(tmp_path, own.replace("mu =", "mus ="))
+    with pytest.raises(
+        sm.FileFormatError, match=r"costs\[1\]\.mus: unknown key, did you mean 'mu'"
+    ):
+        sm.read_problem(wrong, allow_code=True)
+
+
+def test_poses_that_differ_in_the_last_digits_are_two(tmp_path: Path) -> None:
+    grid = CELL.replace("lock =", "base = { position = [0, 0, 0] }\nlock =")
+    grid += '[grid]\n"robot.base.position" = [[0, 0, 1e-9], [0, 0, 2e-9]]\n'
+    memory: dict[str, Any] = {}
+    documents = grid_documents(read_document(written(tmp_path, grid)))
+    heights = [
+        job_of(one, tmp_path / "a.toml", memory=memory)
+        .problem.robot.pose(PANDA_HOME)
+        .translation[2]
+        for one, _ in documents
+    ]
+    assert heights[1] - heights[0] == pytest.approx(1e-9, rel=1e-3)
+    assert len(memory) == 4
+
+
+def test_grids_are_all_combinations(tmp_path: Path) -> None:
+    grid = CELL + '[grid]\n"path.duration" = [3, 5]\n"costs.1.mu" = [0, 1, 2]\n'
+    found = grid_documents(read_document(written(tmp_path, grid)))
+    seen = [(one["path"]["duration"], one["costs"][1]["mu"]) for one, _ in found]
+    assert seen == [(3, 0), (3, 1), (3, 2), (5, 0), (5, 1), (5, 2)]
+    assert found[1][1] == {"path.duration": 3, "costs.1.mu": 1}
+    assert all("grid" not in one for one, _ in found)
+
+
+@pytest.mark.parametrize("name", ["panda", "planar_3r", "ur5"])
+def test_examples_run_as_they_are(name: str, tmp_path: Path) -> None:
+    file = tmp_path / "cell.toml"
+    assert invoke("init", name, "--out", file)[0] == 0
+    code, text = invoke("plan", file, "--json", "--out", tmp_path / "plan.npz")
+    assert code == 0
+    assert json.loads(text)["certificate"]["verified"]
+    assert sm.load_plan(tmp_path / "plan.npz").certificate.verified
+    assert "is there already" in complaint("init", name, "--out", file)
+    with pytest.raises(sm.RobotError, match="unknown robot 'none'"):
+        example_text("none", "cell.toml")
+
+
+def test_the_example_cell_runs() -> None:
+    cell = ROOT / "examples" / "cell.toml"
+    assert sm.read_job(cell).plan().certificate.verified
+
+
+def test_the_schema_accepts_what_is_read_and_refuses_what_is_not(tmp_path: Path) -> None:
+    schema = json_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    check = jsonschema.Draft202012Validator(schema)
+    good = read_document(written(tmp_path, CELL))
+    assert check.is_valid(good)
+    assert check.is_valid(read_document(written(tmp_path, example_text("panda", "cell.toml"))))
+    for key, value in (("task", "pse"), ("start", 3), ("paht", {}), ("robot", {"nam": "panda"})):
+        assert not check.is_valid({**good, key: value})
+    assert invoke("schema", "--out", tmp_path / "schema.json")[0] == 0
+    assert json.loads((tmp_path / "schema.json").read_text()) == schema
+
+
+def test_a_path_from_a_file_is_run_up_to_its_speed(tmp_path: Path) -> None:
+    (tmp_path / "seam.csv").write_text("x,y,z\n0.5,-0.1,0.4\n0.5,0.0,0.4\n0.5,0.1,0.4\n")
+    file = tmp_path / "cell.toml"
+    text = 'task = "position"\nrobot.name = "panda"\n[path]\nkind = "file"\nfile = "seam.csv"\n'
+    file.write_text(text + "duration = 4\n")
+    seam = sm.read_problem(file).path
+    file.write_text(text + "duration = 4\nramp = 0.5\n")
+    path = sm.read_problem(file).path
+    assert path.duration == pytest.approx(seam.duration + 0.5)
+    assert np.linalg.norm(seam.twist(0.0)[:3]) == pytest.approx(0.05)
+    assert not path.twist(0.0).any()
+    assert not path.twist(path.duration).any()
+    np.testing.assert_allclose(path.twist(1.0), seam.twist(0.75), atol=1e-12)

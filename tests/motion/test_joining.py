@@ -1,0 +1,22 @@
+"""Motions are joined and reversed exactly."""
+
+import numpy as np
+
+import selfmotion as sm
+import selfmotion.testing
+from selfmotion.motion import joined_motions, reversed_motion
+
+
+def test_motions_are_joined_and_reversed_exactly() -> None:
+    rng = np.random.default_rng(0)
+    q = rng.normal(size=(3, 2))
+    still = np.zeros((2, 2))
+    one, other = (
+        sm.Trajectory([0.0, 1.5], q[k : k + 2], still, ("a", "b"), still) for k in range(2)
+    )
+    whole = joined_motions([one, other])
+    t = np.linspace(0.0, 1.5, 30)
+    for order in range(3):
+        np.testing.assert_allclose(whole(t + 1.5, order), other(t, order), atol=1e-12)
+        back = reversed_motion(other)(1.5 - t, order)
+        np.testing.assert_allclose((-1.0) ** order * back, other(t, order), atol=1e-12)

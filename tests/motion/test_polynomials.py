@@ -1,0 +1,41 @@
+"""Roots of polynomials of all degrees."""
+
+import numpy as np
+
+from selfmotion.motion.polynomials import evaluated, inner_roots, may_vanish
+
+
+def test_roots_of_polynomials_of_all_degrees() -> None:
+    rng = np.random.default_rng(0)
+    for degree in range(1, 5):
+        roots = rng.uniform(0.05, 0.95, (degree, 200))
+        coefficients = np.stack([np.poly(roots[:, k])[::-1] for k in range(200)], axis=1)
+        # A leading coefficient of nothing is none.
+        found = inner_roots(np.vstack([coefficients, np.zeros((1, 200))]))
+        np.testing.assert_allclose(
+            np.sort(found[:degree], axis=0), np.sort(roots, axis=0), atol=1e-5
+        )
+        assert not found[degree:].any()
+
+
+def test_small_leading_coefficients_cost_no_digits() -> None:
+    # (s - 1/3) (s - 0.7) (1 + e s²): the companion matrix is then of size 1 / e.
+    for tiny in (1e-4, 1e-8, 1e-11):
+        low = np.array([0.7 / 3.0, -(0.7 + 1.0 / 3.0), 1.0])
+        coefficients = np.append(low, [0.0, 0.0]) + tiny * np.append([0.0, 0.0], low)
+        found = inner_roots(coefficients[:, None])[:, 0]
+        np.testing.assert_allclose(np.sort(found)[-2:], [1.0 / 3.0, 0.7], rtol=0, atol=1e-13)
+
+
+def test_polynomials_that_may_vanish_are_all_found() -> None:
+    rng = np.random.default_rng(0)
+    s = np.linspace(0.0, 1.0, 2001)
+    for degree in range(5):
+        coefficients = rng.normal(size=(degree + 1, 500))
+        values = np.stack([evaluated(coefficients, at) for at in s])
+        vanishes = (values.min(axis=0) <= 0.0) & (values.max(axis=0) >= 0.0)
+        found = may_vanish(coefficients)
+        assert found[vanishes].all()
+        # Far from zero nothing is looked for.
+        coefficients[0] += 100.0
+        assert not may_vanish(coefficients).any()

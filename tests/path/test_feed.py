@@ -1,0 +1,163 @@
+"""Constant feeds, rounded corners, leads and rests: the tool does what the process asks for."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.ndimage import binary_dilation
+from scipy.spatial.transform import Rotation
+
+import selfmotion as sm
+from selfmotion import testing
+from support.arms import PANDA_HOME
+from support.paths import polygon
+from support.shell import complaint
+
+# The tool rests where it is slower than this [m/s, rad/s].
+RESTS = 1e-9
+
+
+# A feed is kept where it is within this share.
+WITHIN = 0.01
+
+
+ACCELERATION, TURN_ACCELERATION, SMOOTHING = 2.0, 20.0, 0.04
+
+
+def geometric(seed: int) -> sm.Path:
+    """Return a path of one of five kinds whose own pace means nothing."""
+    points, turns = polygon(seed)
+    start = pin.SE3(pin.Quaternion(*turns[0]).matrix(), points[0])
+    match seed % 5:
+        case 0:
+            return sm.Polyline(points, turns)
+        case 1:
+            return sm.Polyline(points, tolerance=5e-3)
+        case 2:
+            return sm.Waypoints(np.arange(len(points)), points, turns)
+        case 3:
+            return sm.Circle.around(start, 0.05 + 0.01 * seed, 1.0, turn_tool=True)
+    return sm.Line(
+        start, start * pin.SE3(Rotation.from_rotvec([0, 0.3, 0]).as_matrix(), points[1]), 1
+    )
+
+
+def at_feed(seed: int) -> sm.Feed:
+    feed = (0.02, 0.05, 0.1)[seed % 3]
+    return sm.Feed(
+        geometric(seed),
+        feed,
+        acceleration=ACCELERATION,
+        turn_acceleration=TURN_ACCELERATION,
+        smoothing=SMOOTHING,
+    )
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_feed_is_kept_where_limits_allow_and_nowhere_passed(seed: int) -> None:
+    path = at_feed(seed)
+    t = np.linspace(0.0, path.duration, 20_001)
+    twist = path.samples(t).twist
+    speed, turning = (np.linalg.norm(part, axis=1) for part in (twist[:, :3], twist[:, 3:]))
+    share = np.maximum(speed / path.feed, turning / 1.0)
+    assert share.max() <= 1.0 + WITHIN
+    # Whatever is slower than the feed is so for a bend, or on the way to one or to an end.
+    change = np.gradient(twist, t, axis=0)
+    linear, angular = (np.linalg.norm(part, axis=1) for part in (change[:, :3], change[:, 3:]))
+    used = np.maximum(linear / ACCELERATION, angular / TURN_ACCELERATION)
+    assert used.max() <= 1.0
+    reach = int(2.0 * SMOOTHING / (t[1] - t[0]))
+    busy = binary_dilation(used > 0.02, iterations=reach)
+    assert np.all(busy | (share > 1.0 - WITHIN))
+    assert np.any(share > 1.0 - WITHIN)
+    testing.check_path(path)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_tool_rests_where_it_is_asked_to(seed: int) -> None:
+    path = at_feed(seed)
+    first = sm.Dwell(path.pose(0.0), 0.3)
+    last = path.pose(path.duration)
+    joined = first + path + sm.Dwell(last, 0.2) + sm.Line(last, path.pose(0.0), 2.0)
+    led = sm.with_leads(joined, 0.02, 0.5)
+    ends = [piece.duration for piece in led.pieces]
+    for time in (0.0, *np.minimum(np.cumsum(ends), led.duration)):
+        assert np.abs(led.twist(time)).max() <= RESTS
+    inside = led.samples(0.5 + np.linspace(0.0, 0.3, 20))
+    assert np.abs(inside.twist).max() <= RESTS
+    np.testing.assert_allclose(led.pose(0.0).homogeneous, led.pose(led.duration).homogeneous)
+    back = led.pose(0.5).actInv(led.pose(0.0))
+    np.testing.assert_allclose(back.translation, [0.0, 0.0, -0.02], atol=1e-12)
+
+
+def test_positions_alone_are_for_tasks_that_leave_orientations_free(panda: sm.RobotModel) -> None:
+    pose = panda.pose(PANDA_HOME)
+    points = pose.translation + np.array([[0.0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0]])
+    for path in (
+        sm.Feed(sm.Polyline(points), 0.05),
+        sm.Placed(sm.Waypoints([0, 1, 2], points), np.eye(4)),
+        sm.Ramped(sm.Waypoints([0, 1, 2], points)),
+    ):
+        with pytest.raises(sm.PathError, match="no orientations, which task 'pose' prescribes"):
+            sm.Problem(panda, path, start=PANDA_HOME)
+        sm.Problem(panda, path, "position", start=PANDA_HOME)
+    plan = sm.plan(sm.Problem(panda, sm.Feed(sm.Polyline(points), 0.05), "position"))
+    assert plan.certificate.verified, plan.certificate.verdict
+    with pytest.raises(sm.PathError, match="no orientations"):
+        sm.certify(panda, plan.path, "pose", plan.trajectory)
+
+
+def test_a_seam_at_a_feed_is_planned_and_verified(panda: sm.RobotModel) -> None:
+    pose = panda.pose(PANDA_HOME)
+    points = pose.translation + np.array(
+        [[0.0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0.0, 0.1, 0.05]]
+    )
+    turn = np.roll(pin.Quaternion(pose.rotation).coeffs(), 1)
+    path = sm.with_leads(sm.Feed(sm.Polyline(points, np.tile(turn, (4, 1))), 0.05), 0.03, 1.0)
+    start = panda.inverse_kinematics(path.pose(0.0), "pose", seed=PANDA_HOME)
+    plan = sm.plan(sm.Problem(panda, path, start=start))
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert "rest at both ends" in plan.certificate.covers
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: sm.Polyline([[0, 0, 0]]), "shape (1, 3), expected (N, 3) with N ≥ 2"),
+        (lambda: sm.Polyline([[0, 0, 0]] * 2), "poses[0] and poses[1] are the same"),
+        (lambda: sm.Polyline([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0]]), "quaternions have shape"),
+        (
+            lambda: sm.Polyline([[0, 0, 0], [1, 0, 0], [0, 0, 0]]),
+            "poses[1] the tool turns straight",
+        ),
+        (lambda: sm.Polyline([[0, 0, 0], [1, 0, 0]], tolerance=0.0), "tolerance is 0.0"),
+        (lambda: sm.Feed(sm.Polyline([[0, 0, 0], [1, 0, 0]]), 0.0), "feed is 0.0"),
+        (
+            lambda: sm.Feed(sm.Waypoints([0, 1, 2], np.eye(3), corners="stop"), 0.1),
+            "the path rests at",
+        ),
+        (lambda: sm.with_leads(sm.Polyline([[0, 0, 0], [1, 0, 0]]), 0.1, 1.0), "faster or slower"),
+        (lambda: sm.with_leads(sm.Dwell(np.eye(4), 1.0), 0.1, 1.0, axis=[0, 0, 0]), "axis is zero"),
+    ],
+)
+def test_what_cannot_be_fed(make, message: str) -> None:
+    with pytest.raises(sm.PathError) as refused:
+        make()
+    assert message in str(refused.value)
+
+
+def test_files_at_a_feed(tmp_path) -> None:
+    file = tmp_path / "seam.csv"
+    file.write_text("x,y,z\n0.4,0,0.3\n0.5,0,0.3\n0.5,0.1,0.3\n")
+    t = {}
+    for corners in ("blend", "stop", "round"):
+        path = sm.read_path(file, feed=0.05, corners=corners)
+        assert not path.oriented
+        assert np.abs(path.samples([0.0, path.duration]).twist).max() <= RESTS
+        inside = path.samples(np.linspace(0.2, 0.4, 5) * path.duration)
+        speeds = np.linalg.norm(inside.twist[:, :3], axis=1)
+        np.testing.assert_allclose(speeds, 0.05, rtol=WITHIN)
+        t[corners] = path.duration
+    assert t["round"] < t["stop"]
+    assert "corners are 'round', which needs --feed" in complaint(
+        "plan", "panda", "--path", file, "--duration", "4", "--corners", "round"
+    )

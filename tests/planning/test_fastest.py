@@ -1,0 +1,64 @@
+"""The fastest motion: never slower than x = 0 at its fastest, all limits kept, none left unused."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from support.arms import PANDA_HOME, robot_named
+
+# What the fastest motion uses of a limit somewhere at all times but where the jerk takes over, by
+# the number of samples.
+BUSY = 0.6
+
+
+@pytest.fixture(scope="module")
+def found() -> sm.Fastest:
+    panda = robot_named("panda")
+    start = panda.pose(PANDA_HOME)
+    end = pin.SE3(start.rotation, start.translation + np.array([-0.1, 0.25, 0.15]))
+    return sm.fastest(sm.Problem(panda, sm.Line(start, end, 2.0), start=PANDA_HOME))
+
+
+def test_it_is_faster_than_the_pseudo_inverse_and_keeps_all_limits(found: sm.Fastest) -> None:
+    assert found.plan.certificate.verified, found.plan.certificate.verdict
+    assert {"speeds", "accelerations", "jerks"} <= set(found.plan.certificate.covers)
+    assert found.duration <= found.pseudo_inverse
+    assert found.duration < 0.99 * found.pseudo_inverse
+    assert list(found.times) == sorted(found.times, reverse=True)
+    assert found.times[-1] == found.duration
+    assert np.abs(found.plan.trajectory.qd[[0, -1]]).max() <= 1e-9
+
+
+def test_limits_are_used(found: sm.Fastest) -> None:
+    robot, motion = found.plan.robot, found.plan.trajectory
+    t = np.linspace(0.0, found.duration, 2001)
+    used = np.maximum(
+        np.abs(motion(t, 1)) / robot.velocity_limit, np.abs(motion(t, 2)) / robot.acceleration_limit
+    ).max(axis=1)
+    assert used.max() <= 1.0
+    assert np.mean(used > 0.9) > BUSY
+
+
+def test_the_tool_follows_the_same_line(found: sm.Fastest) -> None:
+    robot, motion = found.plan.robot, found.plan.trajectory
+    places = np.array(
+        [robot.pose(q).translation for q in motion(np.linspace(0, found.duration, 99))]
+    )
+    line = places[-1] - places[0]
+    off = np.cross(places - places[0], line / np.linalg.norm(line))
+    assert np.abs(off).max() <= 1e-6
+
+
+def test_arms_and_paths_without_a_fastest_pace(panda: sm.RobotModel) -> None:
+    start = panda.pose(PANDA_HOME)
+    baxter = robot_named("baxter")
+    pose = baxter.dexterous_configuration()
+    path = sm.Circle.around(baxter.pose(pose), 0.05, 2.0)
+    with pytest.raises(sm.ProblemError, match=r"no limit of acceleration is known .* give accel"):
+        sm.fastest(sm.Problem(baxter, path, start=pose))
+    away = pin.SE3(start.rotation, start.translation + np.array([1.5, 0.0, 0.0]))
+    with pytest.raises(sm.PlanError, match="no motion keeps all limits at any pace"):
+        sm.fastest(sm.Problem(panda, sm.Line(start, away, 4.0), start=PANDA_HOME))
+    with pytest.raises(sm.ProblemError, match="problem is 1, expected a Problem"):
+        sm.fastest(1)

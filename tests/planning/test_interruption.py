@@ -1,0 +1,154 @@
+"""Ctrl-C, a callback that stops, and what is told on the way."""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.engine.rollout import Rollout
+
+# All stages of a plan from a free start, compared with the global search.
+STAGES = (
+    "start",
+    "heat 1",
+    "heat 2",
+    "optimising start",
+    "search: self-motions at waypoint",
+    "search: what is free at waypoint",
+    "search: shortening sequence",
+    "search: shortening finalist",
+    "refining sequence",
+    "finer grid",
+    "checking",
+)
+
+
+def level(x: float, y: float) -> pin.SE3:
+    return pin.SE3(np.eye(3), np.array([x, y, 0.0]))
+
+
+@pytest.fixture
+def problem(planar: sm.RobotModel) -> sm.Problem:
+    times = np.linspace(0.0, 2.0, 21)
+    line = sm.Line(level(2.0, 1.0), level(3.0, -0.5), 2.0)
+    path = sm.Waypoints.from_poses(times, [line.pose(float(t)) for t in times])
+    # Of path length there is more than one good sequence here.
+    return sm.Problem(planar, path, "planar", costs=[sm.PathLength()])
+
+
+SEARCH = sm.Search(starts=6, finalists=3, compare=True)
+
+
+GLOBAL = dataclasses.replace(SEARCH, mode="global")
+
+
+def plan(problem: sm.Problem, **options: object) -> sm.Plan:
+    options.setdefault("search", SEARCH)
+    return sm.plan(problem, **options)
+
+
+def interrupt_at(stage: str, number: int) -> Callable[[str, int, int], None]:
+    def progress(now: str, done: int, total: int) -> None:
+        if (now, done) == (stage, number):
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_each_stage_is_told_in_order(problem: sm.Problem) -> None:
+    told: list[tuple[str, int, int]] = []
+    plan(problem, progress=lambda *now: told.append(now))
+    assert tuple(dict.fromkeys(stage for stage, _, _ in told)) == STAGES
+    for stage in STAGES[:-2]:
+        numbers = [(done, total) for name, done, total in told if name == stage]
+        total = numbers[0][1]
+        assert numbers == [(k, total) for k in range(1, total + 1)]
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_an_interruption_at_any_stage_yields_the_best_so_far(
+    problem: sm.Problem, stage: str
+) -> None:
+    # The first start may be the only one that is worth optimising.
+    alone = ("heat 2", "optimising start", "finer grid", "checking")
+    number = 1 if stage in alone else 2
+    found = plan(problem, progress=interrupt_at(stage, number))
+    assert found.report.status is sm.Status.INTERRUPTED
+    assert "interrupted" in found.report.message
+    assert found.certificate.position_error.value < 1e-3
+
+
+def test_without_a_motion_an_interruption_is_one(problem: sm.Problem) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        plan(problem, progress=interrupt_at("start", 1))
+    for stage in STAGES[4:8]:
+        with pytest.raises(KeyboardInterrupt):
+            plan(problem, search=GLOBAL, progress=interrupt_at(stage, 1))
+
+
+def test_an_interruption_among_guides_keeps_the_first_one(problem: sm.Problem) -> None:
+    whole = plan(problem, search=GLOBAL)
+    assert whole.report.gap is not None
+    assert whole.report.gap.sequences > 1
+    found = plan(problem, search=GLOBAL, progress=interrupt_at("refining sequence", 2))
+    assert found.report.status is sm.Status.INTERRUPTED
+    assert found.certificate.verified
+
+
+def test_an_interruption_within_any_rollout(
+    problem: sm.Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls, at = [0], [0]
+    run = Rollout.run
+
+    def counted(self: Rollout, *arguments: Array) -> float | None:
+        calls[0] += 1
+        broken = run(self, *arguments)
+        if calls[0] == at[0]:
+            # As from the keyboard: after the work, before its outcome is noted.
+            raise KeyboardInterrupt
+        return broken
+
+    monkeypatch.setattr(Rollout, "run", counted)
+    plan(problem)
+    total = calls[0]
+    # The first is the motion at x = 0 of the first start.
+    for at[0] in (1, *np.unique(np.linspace(2, total, 25).astype(int))):
+        calls[0] = 0
+        if at[0] == 1:
+            with pytest.raises(KeyboardInterrupt):
+                plan(problem)
+            continue
+        found = plan(problem)
+        assert found.report.status is sm.Status.INTERRUPTED
+        assert np.isfinite(found.report.cost)
+        assert found.certificate.position_error.value < 1e-3
+
+
+def test_a_callback_stops_all_starts(problem: sm.Problem) -> None:
+    costs: list[float] = []
+
+    def stop(iteration: sm.Iteration) -> bool:
+        costs.append(iteration.cost)
+        # Each start's first iteration has step 0.
+        stop.begun += iteration.step == 0.0
+        return stop.begun == 2
+
+    stop.begun = 0
+    found = plan(problem, callback=stop)
+    assert found.report.status is sm.Status.STOPPED
+    assert stop.begun == 2
+    assert found.report.cost <= min(costs) * (1.0 + 1e-3)
+
+
+def test_an_interruption_of_a_given_start(problem: sm.Problem) -> None:
+    start = problem.robot.inverse_kinematics(problem.path.pose(0.0), "planar", rng=0)
+    given = dataclasses.replace(problem, start=start)
+    for stage in STAGES[4:]:
+        found = plan(given, progress=interrupt_at(stage, 1))
+        assert found.report.status is sm.Status.INTERRUPTED
+        np.testing.assert_allclose(found.trajectory.q[0], start, atol=1e-9)

@@ -1,0 +1,233 @@
+"""Paths that the arm cannot follow to the end: the largest part, where it ends, and why."""
+
+import dataclasses
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.engine import Rollout, settled_still_motion
+from selfmotion.motion.grid import Grid
+from selfmotion.replay import write_replay
+from support.arms import robot_named
+from support.paths import outward
+
+# The end of a part that only the workspace limits, relative to the closed form.
+EDGE = 1e-3
+
+
+# Where limits are kept with a margin, and the end is bisected, besides.
+LIMITED = 5e-3
+
+
+def time_at(line: sm.Line, distance: float) -> float:
+    """Return when a line straight away from the base is at a distance from it, in closed form."""
+    first, last = (np.linalg.norm(line.pose(t).translation) for t in (0.0, line.duration))
+    return float((distance - first) / (last - first) * line.duration)
+
+
+@pytest.fixture(scope="module")
+def overlong() -> sm.Plan:
+    planar = sm.load_robot("planar_3r")
+    return sm.plan(sm.Problem(planar, outward(planar, 1.5), "planar", [0.0, 0.5, 0.5]))
+
+
+def check_part(plan: sm.Plan, edge: float) -> None:
+    end = plan.trajectory.t[-1]
+    assert end < edge
+    certificate = plan.certificate
+    assert not certificate.verified
+    (failure,) = certificate.failures
+    assert f"the motion ends at t = {end:.6g} s of {plan.path.duration:.6g} s" in failure
+    assert failure in certificate.verdict
+    assert failure in plan.report.message
+    assert certificate.position_error.value <= 1e-6
+    assert certificate.rotation_error.value <= 1e-6
+    assert certificate.limit_margin.value >= 0.0
+    assert certificate.velocity_ratio.value <= 1.0
+    with pytest.raises(sm.PlanError, match="the motion ends at"):
+        plan.require()
+
+
+def test_a_line_that_leaves_the_workspace(overlong: sm.Plan) -> None:
+    """The arm is stretched at 5 m: the motion ends there, within the law, and never beyond."""
+    edge = time_at(outward(overlong.robot, 1.5), 5.0)
+    check_part(overlong, edge)
+    assert overlong.trajectory.t[-1] > (1.0 - EDGE) * edge
+    for words in ("the pose is out of reach", "stretched", "misses it by up to 1.99e+03 mm"):
+        assert words in overlong.certificate.verdict
+    np.testing.assert_array_equal(overlong.trajectory.q[0], [0.0, 0.5, 0.5])
+    assert overlong.report.cost < overlong.report.initial_cost
+
+
+def test_a_free_start_gets_as_far_and_cheaper(overlong: sm.Plan) -> None:
+    free = sm.plan(sm.Problem(overlong.robot, overlong.path, "planar"))
+    edge = time_at(outward(overlong.robot, 1.5), 5.0)
+    check_part(free, edge)
+    assert free.trajectory.t[-1] > (1.0 - EDGE) * edge
+    assert free.report.cost <= overlong.report.cost * (1.0 + 1e-3)
+
+
+def test_speed_limits_end_it_earlier_and_are_named(planar: sm.RobotModel) -> None:
+    """Towards the edge joint speeds grow without bound."""
+    line = outward(planar, 1.5, 1.0)
+    plan = sm.plan(sm.Problem(planar, line, "planar", [0.0, 0.5, 0.5]))
+    check_part(plan, time_at(line, 5.0))
+    assert plan.certificate.velocity_ratio.value > 0.9
+    for words in ("gets nearer to that: joint velocity limits", "the pose is out of reach"):
+        assert words in plan.certificate.verdict
+
+
+def test_joint_limits_bound_the_workspace(planar: sm.RobotModel) -> None:
+    """With an elbow bent by 0.5 at least, links of 2, 2 and 1 m reach 4 cos(0.25) + 1 m."""
+    line = outward(planar, 1.06)
+    limits = sm.JointPositionLimits([-6.0, 0.5, -6.0], [6.0, 3.0, 6.0])
+    problem = sm.Problem(
+        planar, line, "planar", [0.0, 0.5, 0.5], constraints=[limits, sm.JointVelocityLimits()]
+    )
+    start = planar.inverse_kinematics(line.pose(0.0), "planar", seed=[0.0, 0.8, 0.1])
+    plan = sm.plan(dataclasses.replace(problem, start=start))
+    edge = time_at(line, 4.0 * np.cos(0.25) + 1.0)
+    check_part(plan, edge)
+    assert plan.trajectory.t[-1] > (1.0 - LIMITED) * edge
+    assert "at its limit: joint 'joint2'" in plan.certificate.verdict
+
+
+@pytest.mark.parametrize(("task", "free"), [("position", False), ("pose", True)])
+def test_a_panda_beyond_its_reach(task: str, free: bool) -> None:
+    panda = robot_named("panda")
+    start = panda.dexterous_configuration(task)
+    end = panda.pose(start)
+    end.translation = 1.8 * end.translation
+    line = sm.Line(panda.pose(start), end, 4.0)
+    plan = sm.plan(sm.Problem(panda, line, task, None if free else start))
+    last = plan.trajectory.t[-1]
+    assert last > 0.8
+    check_part(plan, 4.0)
+    with pytest.raises(sm.InverseKinematicsError):
+        panda.inverse_kinematics(line.pose(1.2 * last), task)
+
+
+def test_limits_that_are_not_asked_for_cut_nothing_off(planar: sm.RobotModel) -> None:
+    """Beyond the URDF's limits the certificate says so, on the whole path."""
+    start = np.array([planar.lower[0] + 0.01, planar.lower[1] + 0.5, planar.lower[2] + 0.5])
+    pose = planar.pose(start)
+    problem = sm.Problem(planar, sm.Circle.around(pose, 1.0, 4.0), "planar", start, constraints=[])
+    plan = sm.plan(problem)
+    assert plan.certificate.limit_margin.value < 0.0
+    assert plan.trajectory.t[-1] == 4.0
+
+
+def test_parts_survive_the_disk_and_stay_parts(overlong: sm.Plan, tmp_path: Path) -> None:
+    file = tmp_path / "plan.npz"
+    overlong.save(file)
+    again = sm.load_plan(file)
+    assert again.certificate == overlong.certificate
+    assert again.check() == overlong.certificate
+    assert again.path.duration == 10.0
+    assert not sm.retime(again, 50.0).certificate.verified
+    assert write_replay(again, tmp_path / "replay.html").is_file()
+
+
+def test_another_null_motion_where_x_0_breaks_down(planar: sm.RobotModel) -> None:
+    """A start that x = 0 takes into the folded pose at 3 m, where the tool cannot go further out.
+
+    Found backwards: from beside that pose, inward. Other null motions pass it by.
+    """
+    beside = np.array([0.0, 1e-3, np.pi])
+    here = planar.pose(beside)
+    inner, outer = here.copy(), here.copy()
+    inner.translation, outer.translation = here.translation * 0.8, here.translation * 1.3
+    inward = sm.Line(here, inner, 1.0)
+    back = Rollout(planar, inward, sm.Task.PLANAR, Grid.aligned(inward.knots, 8000))
+    assert back.run(beside, np.zeros((32001, 3))) is None
+    start = planar.inverse_kinematics(inner, "planar", seed=back.samples().q[-1])
+    line = sm.Line(inner, outer, 4.0)
+    problem = sm.Problem(planar, line, "planar", start)
+    with pytest.raises(sm.BreakdownError):
+        settled_still_motion(problem, start)
+    plan = sm.plan(problem)
+    assert plan.certificate.verified
+    assert plan.trajectory.t[-1] == line.duration
+
+
+def test_without_a_part_the_errors_stay(planar: sm.RobotModel) -> None:
+    start = [0.0, 0.02, 0.02]
+    pose = planar.pose(start)
+    end = pose.copy()
+    end.translation = pose.translation * 1.5
+    with pytest.raises(sm.BreakdownError, match="singular pose near t ="):
+        sm.plan(sm.Problem(planar, sm.Line(pose, end, 1.0, time_law="constant"), "planar", start))
+    far = end.copy()
+    far.translation = pose.translation * 2.0
+    with pytest.raises(sm.InverseKinematicsError, match="move the pose into the workspace"):
+        sm.plan(sm.Problem(planar, sm.Line(end, far, 1.0), "planar"))
+
+
+def test_an_interruption_keeps_the_part_so_far(planar: sm.RobotModel) -> None:
+    def interrupt(step: sm.Iteration) -> None:
+        if step.evaluations >= 3:
+            raise KeyboardInterrupt
+
+    problem = sm.Problem(planar, outward(planar, 1.5), "planar", [0.0, 0.5, 0.5])
+    plan = sm.plan(problem, callback=interrupt)
+    assert plan.report.status is sm.Status.INTERRUPTED
+    assert "the motion ends at" in plan.certificate.verdict
+
+
+def test_conditions_on_the_end_do_not_bind_a_part(planar: sm.RobotModel) -> None:
+    constraints = [sm.JointPositionLimits(), sm.EndVelocity(0.1)]
+    line = outward(planar, 1.5)
+    problem = sm.Problem(planar, line, "planar", [0.0, 0.5, 0.5], constraints=constraints)
+    plan = sm.plan(problem)
+    assert plan.trajectory.t[-1] > (1.0 - EDGE) * time_at(line, 5.0)
+    assert "off the one asked for" in plan.certificate.verdict
+
+
+def test_an_excursion_between_the_poses_looked_at_is_found(planar: sm.RobotModel) -> None:
+    """A circle that is out of reach for a sixtieth of its time, by 2 mm."""
+    pose = np.eye(4)
+    pose[0, 3] = 4.002
+    centre, axis = np.array([4.502, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    circle = sm.Circle(pose, centre, axis, 4.0, turns=1.013)
+    start = planar.inverse_kinematics(circle.pose(0.0), "planar")
+    plan = sm.plan(sm.Problem(planar, circle, "planar", start))
+    times = np.linspace(0.0, 4.0, 400_001)
+    beyond = np.linalg.norm(circle.samples(times).translation, axis=1) > 5.0
+    edge = float(times[np.argmax(beyond)])
+    check_part(plan, edge)
+    assert plan.trajectory.t[-1] > (1.0 - EDGE) * edge
+    assert "the pose is out of reach" in plan.certificate.verdict
+
+
+@pytest.mark.parametrize("given", [True, False], ids=["given start", "free start"])
+def test_poses_that_limits_put_out_of_reach_end_the_search(
+    planar: sm.RobotModel, given: bool
+) -> None:
+    """An arm that may not fold: where its tool is nearest to the base is known in closed form."""
+    most, start = 1.2, np.array([-0.75, 0.9, 0.6])
+    first = planar.pose(start)
+    last = first.copy()
+    last.translation = 0.25 * first.translation
+    line = sm.Line(first, last, 3.0)
+    limits = sm.JointPositionLimits(np.full(3, -most), np.full(3, most))
+    stages: list[str] = []
+    plan = sm.plan(
+        sm.Problem(planar, line, "planar", start if given else None, constraints=[limits]),
+        progress=lambda stage, number, of: stages.append(stage),
+    )
+    lengths = [np.linalg.norm(place.translation) for place in planar.model.jointPlacements][2:]
+    lengths.append(np.linalg.norm(planar.model.frames[planar.tool_id].placement.translation))
+    folded = sum(length * np.exp(1j * most * k) for k, length in enumerate(lengths))
+    times = np.linspace(0.0, 3.0, 300_001)
+    beyond = np.linalg.norm(line.samples(times).translation, axis=1) < abs(folded)
+    edge = float(times[np.argmax(beyond)])
+    check_part(plan, edge)
+    assert plan.trajectory.t[-1] > (1.0 - LIMITED) * edge
+    told = re.search(r"from t = ([\d.]+) s on the pose is out of reach", plan.certificate.verdict)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(edge, rel=EDGE)
+    assert "at its limit: joint 'joint2', 'joint3'" in plan.certificate.verdict
+    assert not any(stage.startswith("search") for stage in stages)

@@ -1,0 +1,187 @@
+"""Plans: the paper's numbers, the accuracy promised, and what is said of what falls short."""
+
+import dataclasses
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yourdfpy
+
+import selfmotion as sm
+from selfmotion.certificate import Extreme
+from selfmotion.optimise import Status
+from selfmotion.planning.run import _message
+
+
+@pytest.mark.parametrize("on_path", [True, False])
+def test_next_to_a_singular_pose_no_gradient_is_blamed(on_path: bool) -> None:
+    session = SimpleNamespace(status=Status.GRADIENT, violations=(), cut_short=False)
+    certificate = SimpleNamespace(
+        on_path=on_path,
+        failures=() if on_path else ("the tool is off",),
+        verdict="not verified: the tool is off",
+        damped=(),
+        smallest_singular_value=Extreme(3e-7, 1.5, "tool"),
+    )
+    said = _message(
+        SimpleNamespace(session=session, ending=""),  # type: ignore[arg-type]
+        SimpleNamespace(certificate=certificate),  # type: ignore[arg-type]
+        [],
+    )
+    singular = "the motion passes a singular pose near t = 1.5 s (smallest singular value 3e-07)"
+    assert said.startswith(Status.GRADIENT.message if on_path else singular)
+    assert said.endswith("" if on_path else "but not verified: the tool is off")
+
+
+Circle = Callable[..., sm.Problem]
+
+
+@pytest.fixture(scope="module")
+def sample() -> sm.Plan:
+    return sm.plan(sm.sample_problem())
+
+
+def test_sample_problem_without_self_motion(sample: sm.Plan) -> None:
+    """Against an independent high-order integration (rtol 1e-10)."""
+    report = sample.report
+    assert report.initial_cost == pytest.approx(15.500547, abs=1e-4)
+    assert report.initial_terms["joint velocity"] == pytest.approx(15.415431, abs=1e-4)
+    assert report.initial_terms["inverse manipulability"] == pytest.approx(0.085116, abs=1e-5)
+    end = sample.initial_trajectory.q[-1]
+    np.testing.assert_allclose(end, [-1.582881, 4.814126, -0.269540], atol=2e-5)
+
+
+def test_sample_problem_optimum(sample: sm.Plan) -> None:
+    assert sample.report.cost == pytest.approx(10.5137, abs=1e-4)
+    first = next(i for i in sample.report.history if i.cost <= 10.5145)
+    assert first.evaluations <= 10
+    assert sample.report.evaluations <= 15
+    assert sample.report.status is sm.Status.CONVERGED
+    assert sample.certificate.verified
+
+
+def test_the_papers_twelve_coefficients() -> None:
+    motion = sm.PolynomialNullMotion(3, "joint", "monomial")
+    plan = sm.plan(sm.sample_problem(null_motion=motion))
+    assert plan.coefficients.shape == (12,)
+    assert plan.report.cost <= 10.4855
+    identity = sm.plan(
+        sm.sample_problem(null_motion=motion), optimizer=sm.QuasiNewton(initial_metric="identity")
+    )
+    assert identity.report.cost <= 10.4900
+    default = sm.plan(sm.sample_problem())
+    assert default.report.evaluations < 0.5 * identity.report.evaluations
+
+
+def test_higher_degree_is_never_worse() -> None:
+    costs = [
+        sm.plan(sm.sample_problem(null_motion=sm.PolynomialNullMotion(degree))).report.cost
+        for degree in (0, 1, 3, 7)
+    ]
+    assert np.all(np.diff(costs) < 1e-6)
+    assert costs[-1] == pytest.approx(10.4931, abs=2e-4)
+
+
+def test_there_and_back() -> None:
+    plan = sm.plan(sm.sample_problem(duration=2.0, null_motion=sm.PolynomialNullMotion(7)))
+    assert plan.certificate.verified
+    assert plan.report.cost < plan.report.initial_cost
+
+
+def test_without_the_velocity_term_joints_race(sample: sm.Plan) -> None:
+    """Why the paper adds the term: manipulability alone is bought with any joint speed."""
+    alone = dataclasses.replace(sm.sample_problem(), costs=[sm.Manipulability()])
+    plan = sm.plan(alone, max_evaluations=100)
+    assert np.abs(plan.trajectory.qd).max() > 2.0 * np.abs(sample.trajectory.qd).max()
+    assert plan.report.cost < plan.report.initial_cost
+
+
+@pytest.mark.parametrize("task", [None, "pose", "position", "pointing"])
+def test_evaluations_to_the_optimum(panda_circle: Circle, task: str | None) -> None:
+    """Within 1 % after at most 6 evaluations, within 1e-6 after at most 15, on one grid."""
+    problem = sm.sample_problem() if task is None else panda_circle(task)
+    tight = sm.QuasiNewton(tolerance=1e-13, line_search=sm.LineSearch(sigma=0.1))
+    best = _first_grid(sm.plan(problem, optimizer=tight))[-1].cost
+    history = _first_grid(sm.plan(problem))
+    near = next(i.evaluations for i in history if i.cost <= best * 1.01)
+    converged = next(i.evaluations for i in history if i.cost <= best * (1 + 1e-6))
+    assert near <= 6
+    assert converged <= 15
+
+
+def _first_grid(plan: sm.Plan) -> list[sm.Iteration]:
+    """Return the iterations up to the second grid's start (a record without a step)."""
+    history = plan.report.history
+    end = next((k for k in range(1, len(history)) if history[k].step == 0.0), len(history))
+    return list(history[:end])
+
+
+@pytest.mark.parametrize("task", ["pose", "position", "pointing"])
+def test_panda_circle_is_followed_to_a_micrometre(panda_circle: Circle, task: str) -> None:
+    """On a grid of its own, with yourdfpy's kinematics instead of Pinocchio's."""
+    plan = sm.plan(panda_circle(task))
+    assert plan.certificate.verified
+    assert plan.report.cost < plan.report.initial_cost
+    assert plan.report.evaluations <= 35
+    oracle = yourdfpy.URDF.load(plan.robot.urdf.source, load_meshes=False, build_scene_graph=True)
+    fingers = [0.0] * (len(oracle.actuated_joint_names) - 7)
+    for t in np.linspace(0, 4, 173):
+        oracle.update_cfg([*plan.trajectory(t), *fingers])
+        actual = oracle.get_transform(plan.robot.tool, oracle.base_link)
+        pose = plan.path.pose(float(t))
+        assert np.linalg.norm(actual[:3, 3] - pose.translation) < 1e-6
+        if task == "pose":
+            assert np.abs(actual[:3, :3] - pose.rotation).max() < 1e-6
+        elif task == "pointing":
+            assert np.abs(actual[:3, 2] - pose.rotation[:, 2]).max() < 1e-6
+
+
+@pytest.mark.parametrize("limit", [0, -5])
+def test_bad_limits_and_tolerances_are_refused(limit: int) -> None:
+    with pytest.raises(sm.ProblemError, match="max_evaluations"):
+        sm.plan(sm.sample_problem(), max_evaluations=limit)
+    with pytest.raises(sm.ProblemError, match="tolerance: position"):
+        sm.Tolerance(limit, 1.0)
+
+
+def test_breakdown_names_the_time(planar: sm.RobotModel) -> None:
+    """Nearly stretched: what is left of the path is not worth a plan."""
+    start = planar.inverse_kinematics(planar.pose([0.0, 0.05, 0.05]), "planar")
+    pose = planar.pose(start)
+    end = pose.copy()
+    end.translation = pose.translation * 1.5
+    line = sm.Line(pose, end, 1.0, time_law="constant")
+    with pytest.raises(sm.BreakdownError, match="singular pose near t =") as caught:
+        sm.plan(sm.Problem(planar, line, "planar", start))
+    assert 0.0 < caught.value.time < 0.01
+
+
+def test_interruption_returns_the_best_so_far() -> None:
+    def interrupt(step: sm.Iteration) -> None:
+        if step.evaluations >= 3:
+            raise KeyboardInterrupt
+
+    plan = sm.plan(sm.sample_problem(), callback=interrupt)
+    assert plan.report.status is sm.Status.INTERRUPTED
+    assert plan.report.cost < plan.report.initial_cost
+    assert plan.certificate.position_error.value < 1e-6
+
+
+def test_plans_repeat_bit_for_bit(sample: sm.Plan) -> None:
+    again = sm.plan(sm.sample_problem())
+    np.testing.assert_array_equal(again.trajectory.q, sample.trajectory.q)
+    np.testing.assert_array_equal(again.coefficients, sample.coefficients)
+
+
+def test_a_free_start_is_no_dearer_than_a_good_given_one() -> None:
+    """The dexterous start lies on one of the self-motions that a free start looks along."""
+    robot = sm.load_robot("panda")
+    start = robot.dexterous_configuration()
+    for task, normal in (("pose", (1.0, 0.0, 0.0)), ("position", (0.0, 0.0, 1.0))):
+        path = sm.Circle.around(robot.pose(start), 0.1, 4.0, normal=normal)
+        given = sm.plan(sm.Problem(robot, path, task, start=start))
+        free = sm.plan(sm.Problem(robot, path, task))
+        assert free.certificate.verified
+        # Rough optima that differ by less are not told apart.
+        assert free.report.cost <= 1.01 * given.report.cost

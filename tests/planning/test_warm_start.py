@@ -1,0 +1,106 @@
+"""Planning from a plan: nothing is lost, and what is not ours is refused."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from support.shell import invoke
+
+# Costs on a grid and on the halved one agree to this before a plan stands.
+AGREEMENT = 1e-4
+
+
+# x = 0, the plan's null motion, both on a finer grid, and what remains; nothing to search for.
+FEW = 5
+
+
+@pytest.fixture(scope="module")
+def problems() -> dict[str, sm.Problem]:
+    panda = sm.load_robot("panda")
+    start = panda.dexterous_configuration()
+    circle = sm.Circle.around(panda.pose(start), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    closed = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.ClosedPath())
+    return {
+        "paper": sm.sample_problem(),
+        "pose": sm.Problem(panda, circle, "pose", start),
+        "position": sm.Problem(panda, circle, "position", start),
+        "free start": sm.Problem(panda, circle, "position"),
+        "closed": sm.Problem(panda, circle, "pose", start, constraints=closed),
+    }
+
+
+@pytest.fixture(scope="module")
+def plans(problems: dict[str, sm.Problem]) -> dict[str, sm.Plan]:
+    return {name: sm.plan(problem) for name, problem in problems.items()}
+
+
+NAMES = ("paper", "pose", "position", "free start", "closed")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_plan_planned_anew_is_itself(name: str, plans: dict[str, sm.Plan]) -> None:
+    plan = plans[name]
+    again = sm.plan(plan.problem, warm_start=plan)
+    assert again.certificate.verified
+    assert again.report.iterations <= 1
+    assert again.report.cost == pytest.approx(plan.report.cost, rel=AGREEMENT)
+    assert again.report.evaluations < plan.report.evaluations
+    if name != "closed":  # which takes Newton steps to end as it began, on each grid
+        assert again.report.evaluations <= FEW
+    assert again.report.null_motion == plan.report.null_motion
+    miss = again.trajectory(plan.trajectory.t) - plan.trajectory.q
+    assert np.abs(miss).max() < 1e-3
+
+
+def test_the_paper_s_null_motion_begins_so_too() -> None:
+    cubic = sm.PolynomialNullMotion(space="joint", basis="monomial")
+    problem = replace(sm.sample_problem(), null_motion=cubic)
+    plan = sm.plan(problem)
+    again = sm.plan(problem, warm_start=plan)
+    assert again.report.iterations <= 3
+    assert again.report.cost == pytest.approx(plan.report.cost, rel=AGREEMENT)
+
+
+def test_a_slower_path_begins_at_the_same_shape(plans: dict[str, sm.Plan]) -> None:
+    plan = plans["pose"]
+    path = replace(plan.path, duration=2.0 * plan.path.duration)
+    problem = replace(plan.problem, path=path)
+    warm, cold = sm.plan(problem, warm_start=plan), sm.plan(problem)
+    # ∫ ½ q̇ᵀq̇ dt of the same curve in twice the time is half of it.
+    assert warm.report.history[0].cost == pytest.approx(0.5 * plan.report.cost, rel=1e-3)
+    assert warm.report.evaluations < cold.report.evaluations
+    assert warm.report.cost == pytest.approx(cold.report.cost, rel=1e-3)
+
+
+def test_x_0_is_begun_with_where_it_is_better(plans: dict[str, sm.Plan]) -> None:
+    plan = plans["position"]
+    backwards = replace(plan, trajectory=_mirrored(plan.trajectory))
+    again = sm.plan(plan.problem, warm_start=backwards)
+    assert again.report.history[0].cost <= plan.report.initial_cost * (1.0 + 1e-3)
+    assert again.report.cost == pytest.approx(plan.report.cost, rel=1e-3)
+
+
+def _mirrored(motion: sm.Trajectory) -> sm.Trajectory:
+    """Return a motion whose velocities all have the other sign and ten times the size."""
+    return replace(motion, qd=-10.0 * motion.qd)
+
+
+def test_what_is_no_plan_of_the_arm_is_refused(plans: dict[str, sm.Plan]) -> None:
+    plan = plans["pose"]
+    with pytest.raises(sm.ProblemError, match=r"warm_start is 'plan.npz', expected a Plan"):
+        sm.plan(plan.problem, warm_start="plan.npz")  # type: ignore[arg-type]
+    with pytest.raises(sm.ProblemError, match="its joints are joint1, joint2, joint3, expected"):
+        sm.plan(plan.problem, warm_start=plans["paper"])
+
+
+def test_a_problem_file_begins_from_a_plan(tmp_path: Path) -> None:
+    file, first, second = tmp_path / "panda.toml", tmp_path / "1.npz", tmp_path / "2.npz"
+    assert invoke("init", "panda", "--out", file)[0] == 0
+    assert invoke("plan", file, "--out", first)[0] == 0
+    assert invoke("plan", file, "--from", first, "--out", second)[0] == 0
+    cold, warm = sm.load_plan(first).report, sm.load_plan(second).report
+    assert warm.evaluations < cold.evaluations
+    assert warm.cost == pytest.approx(cold.cost, rel=AGREEMENT)

@@ -1,0 +1,161 @@
+"""Segments: no jumps, the tool on its path, and what happens when not."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.realtime import Flag, Replanner
+from support import realtime_scenarios as scenarios
+from support.arms import PANDA_HOME
+from support.loops import closed_loop
+
+# Segments meet in the same numbers, computed in the same way but for one shift of an index.
+SAME = 1e-12
+
+
+# What the tool is off its path without noise or lag: the middle rule's error over cycles of 1 ms.
+TRACKED = 1e-5
+
+
+# The loop.
+
+
+@pytest.mark.parametrize(
+    ("arm", "task", "horizon"),
+    [
+        ("panda", "pose", 2.0),
+        ("panda", "position", 2.0),
+        # Steps far ahead are longer than near ones.
+        ("panda", "position", 8.0),
+        ("xarm7", "pointing", 2.0),
+    ],
+)
+def test_segments_go_on_without_a_jump_and_the_tool_stays_on_its_path(
+    arm: str, task: str, horizon: float
+) -> None:
+    robot = sm.load_robot(arm)
+    start = robot.dexterous_configuration()
+    path = sm.Circle.around(robot.pose(start), 0.05, 4.0, normal=(1.0, 0.0, 0.0))
+    replanner = Replanner(robot, task, horizon=horizon)
+    segments, places = closed_loop(replanner, path, start, 1.5)
+    for one, other in pairwise(segments):
+        here = one.index(other.t[0])
+        for name in ("q", "qd", "qdd"):
+            before, after = getattr(one, name)[here], getattr(other, name)[0]
+            assert np.abs(before - after).max() <= SAME
+    assert all(item.flag is Flag.PLANNED and item.follows for item in segments)
+    for k, q in enumerate(places):
+        miss = sm.Task.of(task).miss(path.pose((k + 1) * replanner.period), robot.pose(q))
+        assert max(miss) < TRACKED
+
+
+def test_each_segment_ends_at_rest_and_keeps_all_limits(
+    panda: sm.RobotModel, slow_circle: sm.Circle
+) -> None:
+    replanner = Replanner(panda, "position")
+    for segment in closed_loop(replanner, slow_circle, PANDA_HOME, 1.5)[0][::20]:
+        assert np.all(segment.qd[-1] == 0.0)
+        assert np.all(segment.qdd[-1] == 0.0)
+        assert np.all(np.abs(segment.qdd) <= replanner.limits[3])
+        assert segment.t[-1] - segment.t[0] > replanner.period
+
+
+def test_the_same_inputs_give_the_same_segments(
+    panda: sm.RobotModel, slow_circle: sm.Circle
+) -> None:
+    runs = [closed_loop(Replanner(panda), slow_circle, PANDA_HOME, 0.3)[1] for _ in range(2)]
+    assert np.array_equal(*runs)
+
+
+def test_a_closed_loop_costs_little_more_than_planning_all_at_once(panda: sm.RobotModel) -> None:
+    # The paper's cost (eq. 12), on a path where the self-motion saves more than 5 %.
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 20.0, normal=(1.0, 0.0, 0.0))
+    costs = sm.JointVelocity(), sm.InverseManipulability(mu=0.02)
+    full = sm.plan(
+        sm.Problem(panda, path, "position", PANDA_HOME, costs=costs, collision=None)
+    ).report
+    assert full.cost < 0.95 * full.initial_cost
+    replanner = Replanner(panda, "position", costs)
+    segments, _ = closed_loop(replanner, path, PANDA_HOME, 20.0)
+    count = round(replanner.period / replanner.cycle)
+    q = np.concatenate([segment.q[:count] for segment in segments])
+    qd = np.concatenate([segment.qd[:count] for segment in segments])
+    sampling = sm.motion.Sampling.trapezoidal(replanner.cycle * np.arange(len(q)))
+    samples = sm.Samples.along(panda, sm.Task.POSITION, sampling, q, qd)
+    cost = sum(float(samples.weights @ item.value(samples)) for item in costs)
+    assert cost < 1.03 * full.cost
+    assert cost < full.initial_cost
+
+
+# What fails.
+
+
+def test_a_path_that_fails_is_kept_for_a_while_and_then_the_arm_stops(
+    panda: sm.RobotModel, slow_circle: sm.Circle
+) -> None:
+    replanner = Replanner(panda, patience=0.05)
+    segments, _ = closed_loop(replanner, slow_circle, PANDA_HOME, 0.5)
+    broken = scenarios.Broken(nan=False)
+    t, q = 0.5, segments[-1].q[10]
+    flags = []
+    for k in range(60):
+        segment = replanner.step(t + k * replanner.period, q, np.zeros(7), broken)
+        q = segment.q[segment.index(t + (k + 1) * replanner.period)]
+        flags.append(segment.flag)
+        assert "no camera" in segment.reasons[0]
+    assert flags[:4] == [Flag.PLANNED] * 4
+    assert flags[6:] == [Flag.STOPPING] * len(flags[6:])
+    assert np.all(segment.qd == 0.0)
+
+
+def test_without_a_plan_the_tool_is_tracked(
+    panda: sm.RobotModel, slow_circle: sm.Circle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replanner = Replanner(panda, "position")
+    monkeypatch.setattr(replanner._horizon, "improve", scenarios.no_plan(replanner))
+    segments, places = closed_loop(replanner, slow_circle, PANDA_HOME, 0.5)
+    assert {item.flag for item in segments} == {Flag.TRACKING}
+    miss = np.linalg.norm(panda.pose(places[-1]).translation - slow_circle.pose(0.5).translation)
+    assert miss < TRACKED
+
+
+def test_a_cost_that_is_not_finite_is_told_and_the_tool_is_tracked(
+    panda: sm.RobotModel, slow_circle: sm.Circle
+) -> None:
+    cost = sm.FunctionCost(lambda qd, q, t: np.full(len(t), np.nan))
+    segments, _ = closed_loop(Replanner(panda, "position", [cost]), slow_circle, PANDA_HOME, 0.1)
+    assert {item.flag for item in segments} == {Flag.TRACKING}
+    assert all("not finite" in reason for item in segments for reason in item.reasons)
+
+
+def test_a_late_step_goes_on_from_what_was_commanded_meanwhile(
+    panda: sm.RobotModel, slow_circle: sm.Circle
+) -> None:
+    replanner = Replanner(panda)
+    last = closed_loop(replanner, slow_circle, PANDA_HOME, 1.0)[0][-1]
+    # When the arm is coming to rest already.
+    k = len(last.t) - 4
+    segment = replanner.step(last.t[k], last.q[k], np.zeros(7), slow_circle)
+    assert np.abs(segment.q[0] - last.q[k]).max() <= SAME
+    assert np.array_equal(segment.qdd[0], last.qdd[k])
+    assert np.any(segment.qd[0] != 0.0)
+
+
+def test_an_arm_that_is_elsewhere_than_its_command_stops(
+    panda: sm.RobotModel, slow_circle: sm.Circle
+) -> None:
+    replanner = Replanner(panda)
+    closed_loop(replanner, slow_circle, PANDA_HOME, 0.2)
+    off = PANDA_HOME + 0.8 * np.eye(7)[0]
+    segment = replanner.step(0.2, off, np.zeros(7), slow_circle)
+    assert segment.flag is Flag.STOPPING
+    assert "panda_joint1" in segment.reasons[0]
+
+
+def test_time_does_not_go_back(panda: sm.RobotModel, slow_circle: sm.Circle) -> None:
+    replanner = Replanner(panda)
+    replanner.step(1.0, PANDA_HOME, np.zeros(7), slow_circle)
+    with pytest.raises(sm.ProblemError, match=r"t is 0\.5"):
+        replanner.step(0.5, PANDA_HOME, np.zeros(7), slow_circle)

@@ -1,0 +1,378 @@
+"""The page in a real browser: it moves as Pinocchio says, and its controls work."""
+
+import os
+import shutil
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from selfmotion.collision import CollisionModel
+from selfmotion.replay import notebook_html, write_replay
+from selfmotion.robot import NAMED_ARMS
+from support.replay_plans import arm_plan, planar_plan, shelf_plan
+
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+
+
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None and not os.environ.get("CI"), reason="needs a browser; CI has one"
+)
+
+
+SOFTWARE_GL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_GL)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("replays")
+    plans = {
+        "planar": planar_plan(),
+        "panda": arm_plan("panda"),
+        "ur5": arm_plan("ur5"),
+        "two": [planar_plan(), planar_plan(mu=30.0)],
+    }
+    return {name: write_replay(plan, folder / f"{name}.html") for name, plan in plans.items()}
+
+
+class Seen:
+    """What a page complained about, and what it asked for."""
+
+    def __init__(self, page):
+        self.complaints, self.requests = [], []
+        page.on(
+            "console",
+            lambda m: self.complaints.append(m.text) if m.type in ("error", "warning") else None,
+        )
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("request", lambda request: self.requests.append(request.url))
+
+
+@pytest.fixture
+def open_page(browser):
+    contexts = []
+
+    def open_file(file, **options):
+        options = {"viewport": {"width": 900, "height": 700}, "reduced_motion": "reduce", **options}
+        context = browser.new_context(**options)
+        contexts.append(context)
+        page = context.new_page()
+        page.seen = Seen(page)
+        page.goto(file.as_uri() if hasattr(file, "as_uri") else file)
+        page.wait_for_selector("html[data-replay=ready]", timeout=60_000)
+        return page
+
+    yield open_file
+    for context in contexts:
+        context.close()
+
+
+def assert_quiet(page):
+    # Chromium's remark on software rendering is about the machine, not about the page.
+    loud = [text for text in page.seen.complaints if "GPU stall" not in text]
+    assert loud == []
+    assert [url for url in page.seen.requests if url[:5] not in ("file:", "data:", "blob:")] == []
+
+
+POSES = """() => {
+  const found = {};
+  const inverse = viewer.scene.matrixWorld.clone().invert();
+  viewer.scene.updateMatrixWorld(true);
+  viewer.scene_tree.find(["selfmotion", "robot"]).object.children.forEach((node) => {
+    found[node.name] = inverse.clone().multiply(node.matrixWorld).toArray();
+  });
+  return found;
+}"""
+
+
+def page_poses(page):
+    return {name: np.reshape(m, (4, 4)).T for name, m in page.evaluate(POSES).items()}
+
+
+def largest_difference(poses, plan, time):
+    robot, data = plan.robot, plan.robot.model.createData()
+    pin.forwardKinematics(robot.model, data, plan.trajectory(time))
+    return max(
+        np.abs(poses[name] - data.oMi[k + 1].homogeneous).max()
+        for k, name in enumerate(robot.joint_names)
+    )
+
+
+@pytest.mark.parametrize("name", ["planar", "panda", "ur5"])
+def test_links_are_where_pinocchio_has_them(open_page, files, name):
+    page = open_page(files[name])
+    plan = planar_plan() if name == "planar" else arm_plan(name)
+    assert page.evaluate("viewer.animator.duration") == pytest.approx(plan.trajectory.duration)
+    for share in (0.0, 0.137, 0.5, 0.81, 1.0):
+        time = share * plan.trajectory.duration
+        page.evaluate("t => viewer.animator.seek(t)", time)
+        poses = page_poses(page)
+        assert largest_difference(poses, plan, time) < 1e-4
+        if 0 < share < 1:
+            assert largest_difference(poses, plan, 0.9 * time) > 1e-3
+    assert_quiet(page)
+
+
+def test_every_triangle_reaches_the_scene(open_page, files):
+    page = open_page(files["ur5"])
+    drawn = page.evaluate("""() => {
+      let count = 0;
+      viewer.scene_tree.find(["selfmotion", "robot"]).object.traverse((object) => {
+        if (object.isMesh) count += object.geometry.index.count / 3;
+      });
+      return count;
+    }""")
+    assert drawn == 95_694
+
+
+def test_pixels_change_with_time_and_come_back(open_page, files):
+    page = open_page(files["panda"], viewport={"width": 320, "height": 400})
+    shots = [
+        page.evaluate("t => { viewer.animator.seek(t); return viewer.capture_image(); }", t)
+        for t in (0.5, 2.0, 0.5)
+    ]
+    assert shots[0] != shots[1]
+    assert shots[0] == shots[2]
+    page.keyboard.press("g")
+    ghost = page.evaluate("() => { viewer.animator.seek(0.5); return viewer.capture_image(); }")
+    assert ghost != shots[0]
+
+
+def time_of(page):
+    return page.evaluate("viewer.animator.actions[0].time")
+
+
+def cursor_of(page):
+    return page.evaluate("""[...document.querySelectorAll(".plot .cursor")]
+      .map((line) => Number(line.getAttribute("x1")))""")
+
+
+def test_keys_slider_and_plots_keep_one_time(open_page, files):
+    page = open_page(files["planar"])
+    assert time_of(page) == 0.0
+    places = [cursor_of(page)]
+    for key, expected in (("ArrowRight", 0.02), ("Shift+ArrowRight", 0.22), ("ArrowLeft", 0.2)):
+        page.keyboard.press(key)
+        assert time_of(page) == pytest.approx(expected)
+        places.append(cursor_of(page))
+    assert all(a != b for a, b in pairwise(places))
+    page.keyboard.press("End")
+    assert time_of(page) == pytest.approx(2.0)
+    page.keyboard.press("Home")
+    assert time_of(page) == 0.0
+    page.locator("#time").fill("1.5")
+    assert time_of(page) == pytest.approx(1.5)
+    assert page.locator("#clock").inner_text() == "1.50 / 2.00 s"
+    box = page.locator(".plot svg").first.bounding_box()
+    page.mouse.click(box["x"] + 52 + 0.25 * (box["width"] - 62), box["y"] + 60)
+    assert time_of(page) == pytest.approx(0.5, abs=0.02)
+    page.evaluate("viewer.animator.seek(1.0); viewer.render()")
+    assert page.locator("#clock").inner_text() == "1.00 / 2.00 s"
+    assert_quiet(page)
+
+
+def test_play_and_pause(open_page, files):
+    page = open_page(files["planar"])
+    page.wait_for_timeout(200)
+    assert time_of(page) == 0.0, "it must not start by itself where motion is to be reduced"
+    page.locator("#speed").select_option("0.1")
+    page.locator("#play").click()
+    page.wait_for_timeout(600)
+    page.locator("#play").click()
+    stopped = time_of(page)
+    assert 0.0 < stopped < 0.5
+    page.wait_for_timeout(200)
+    assert time_of(page) == stopped
+    page.locator("#view").click()
+    page.keyboard.press(" ")
+    page.wait_for_timeout(400)
+    assert time_of(page) != stopped
+
+
+def test_it_starts_by_itself_otherwise(open_page, files):
+    page = open_page(files["planar"], reduced_motion="no-preference")
+    page.wait_for_timeout(500)
+    assert time_of(page) > 0.0
+    assert_quiet(page)
+
+
+def test_hover_shows_the_values_there(open_page, files):
+    page = open_page(files["planar"])
+    plan = planar_plan()
+    box = page.locator(".plot svg").first.bounding_box()
+    page.mouse.move(box["x"] + 52 + 0.5 * (box["width"] - 62), box["y"] + 60)
+    shown = [
+        float(text) for text in page.locator(".plot").first.locator("output").all_inner_texts()
+    ]
+    np.testing.assert_allclose(shown, plan.trajectory(1.0), atol=0.05)
+    assert time_of(page) == 0.0
+
+
+def test_a_joint_singled_out_shows_its_limits(open_page, files):
+    page = open_page(files["panda"])
+    plot = page.locator(".plot").first
+    before = plot.locator("svg text").all_text_contents()
+    plot.locator("button").nth(3).click()
+    assert plot.locator("button").nth(3).get_attribute("aria-pressed") == "true"
+    assert plot.locator("svg text").all_text_contents() != before
+    heights = plot.locator("svg .limit:not(.beyond)").evaluate_all(
+        "lines => lines.map((line) => Number(line.getAttribute('y1')))"
+    )
+    assert len(heights) == 2
+    assert all(10 <= height <= 168 for height in heights)
+
+
+def test_plans_share_a_page(open_page, files):
+    page = open_page(files["two"])
+    second = planar_plan(mu=30.0)
+    assert page.locator("#choice button").count() == 2
+    page.locator("#choice button").nth(1).click()
+    page.evaluate("viewer.animator.seek(1.3)")
+    assert largest_difference(page_poses(page), second, 1.3) < 1e-4
+    assert largest_difference(page_poses(page), planar_plan(), 1.3) > 1e-3
+    cost = f"{second.report.cost:.4g}"
+    assert cost in page.locator("#description").inner_text()
+    page.keyboard.press("1")
+    assert cost not in page.locator("#description").inner_text()
+    page.evaluate("viewer.animator.seek(1.3)")
+    assert largest_difference(page_poses(page), planar_plan(), 1.3) < 1e-4
+    assert page.locator("#numbers thead th").all_inner_texts() == ["Plan A", "Plan B"]
+    assert_quiet(page)
+
+
+LIT = """() => {
+  const names = [];
+  viewer.scene_tree.find(["selfmotion"]).object.traverse((object) => {
+    if (object.material?.emissive?.getHex()) names.push(object.uuid);
+  });
+  return names;
+}"""
+
+
+def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
+    plan = shelf_plan()
+    clearance = plan.problem.constraints[-1]
+    world = clearance.model(plan.robot)
+    page = open_page(write_replay([plan, arm_plan("panda")], tmp_path / "shelf.html"))
+    for time in (0.5, 2.0):
+        page.evaluate("t => replay.seek(t)", time)
+        expected = world.distance(plan.trajectory(time))
+        said = page.locator("#pair").inner_text()
+        assert said == (f"closest: {expected.first} and {expected.second}, {expected.value:.3f} m")
+        bodies = [name.replace("/", "_") for name in (expected.first, expected.second)]
+        lit = page.evaluate(LIT)
+        assert lit
+        assert all(any(f"/{body}/" in name for body in bodies) for name in lit)
+        assert all(any(f"/{body}/" in name for name in lit) for body in bodies)
+    drawn = page.evaluate("""viewer.scene_tree.find(["selfmotion", "plan0", "obstacles"]).object
+      .children.map((node) => node.name)""")
+    assert drawn == ["shelf", "ball", "post", "a_b", "part"]
+    assert page.locator(".plot figcaption", has_text="Clearance").count() == 1
+    page.keyboard.press("c")
+    assert page.evaluate(LIT) == []
+    assert not page.locator("#pair").is_visible()
+    page.keyboard.press("c")
+    page.keyboard.press("2")
+    links = set(CollisionModel(plan.robot).bodies)
+    first, second = (
+        page.locator("#pair").inner_text()[len("closest: ") :].split(",")[0].split(" and ")
+    )
+    assert {first, second} <= links, "the second plan knows of no obstacles"
+    assert not page.evaluate(
+        'viewer.scene_tree.find(["selfmotion", "plan0", "obstacles"]).object.visible'
+    )
+    assert_quiet(page)
+
+
+@pytest.mark.parametrize("name", sorted(NAMED_ARMS))
+def test_every_named_arm_is_drawn(open_page, tmp_path, name):
+    plan = planar_plan() if name == "planar_3r" else arm_plan(name)
+    small = {"width": 240, "height": 500}
+    page = open_page(write_replay(plan, tmp_path / "arm.html"), viewport=small)
+    page.evaluate("replay.seek(0.5 * replay.duration)")
+    time = 0.5 * plan.trajectory.duration
+    assert largest_difference(page_poses(page), plan, time) < 1e-4
+    # Without the arm the picture is another one.
+    shots = page.evaluate("""() => [true, false].map((visible) => {
+      replay.stage.show("/selfmotion/robot", visible);
+      return viewer.capture_image();
+    })""")
+    assert shots[0] != shots[1]
+    assert_quiet(page)
+
+
+def test_a_notebook_frame_works_in_its_sandbox(browser, tmp_path):
+    notebook = tmp_path / "notebook.html"
+    notebook.write_text(f"<!doctype html>{notebook_html(planar_plan())}", encoding="utf-8")
+    context = browser.new_context(reduced_motion="reduce")
+    page = context.new_page()
+    page.seen = Seen(page)
+    page.goto(notebook.as_uri())
+    frame = page.frame_locator("iframe")
+    frame.locator("html[data-replay=ready]").wait_for(timeout=60_000)
+    assert frame.locator("#notice").is_hidden()
+    assert_quiet(page)
+    context.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_telephone_shows_it_whole(open_page, files, scheme):
+    size = {"width": 390, "height": 780}
+    page = open_page(files["panda"], viewport=size, color_scheme=scheme)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    view = page.locator("#view canvas").bounding_box()
+    assert view["width"] > 350
+    for part in ("#play", "#time", "#legend", "#layers", "#verdict"):
+        box = page.locator(part).bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 390
+    text, ground = page.evaluate("""() => {
+      const style = getComputedStyle(document.body);
+      return [style.color, style.backgroundColor].map((c) => Number(c.match(/\\d+/)[0]));
+    }""")
+    assert (text > ground) == (scheme == "dark")
+
+
+def test_without_webgl_the_plots_remain(playwright_without_webgl, files):
+    page = playwright_without_webgl
+    page.goto(files["planar"].as_uri())
+    page.wait_for_selector("html[data-replay=ready]")
+    assert "No 3-D view" in page.locator("#notice").inner_text()
+    page.keyboard.press("End")
+    assert page.locator("#clock").inner_text() == "2.00 / 2.00 s"
+
+
+@pytest.fixture
+def playwright_without_webgl(browser):
+    context = browser.new_context(reduced_motion="reduce")
+    context.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    yield context.new_page()
+    context.close()
+
+
+def test_the_policy_stops_foreign_code(open_page, files, tmp_path):
+    """The checks above can fail: a page with an added script and image is found out."""
+    text = files["planar"].read_text(encoding="utf-8")
+    tampered = tmp_path / "tampered.html"
+    tampered.write_text(
+        text.replace(
+            "</main>",
+            '</main><script>window.foreign = 1</script><img src="http://localhost:9/a.png">',
+        ),
+        encoding="utf-8",
+    )
+    page = open_page(tampered)
+    assert page.evaluate("window.foreign") is None
+    with pytest.raises(AssertionError):
+        assert_quiet(page)

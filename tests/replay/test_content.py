@@ -1,0 +1,211 @@
+"""What goes into a page: meshes, key frames, curves, the payload."""
+
+import base64
+import gzip
+import json
+import struct
+
+import coal
+import collada
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics.errors import RobotError
+from selfmotion.replay import shapes
+from selfmotion.replay.links import bake
+from selfmotion.replay.meshes import make_mesh, read_meshes
+from selfmotion.replay.motion import curves, key_frames
+from selfmotion.replay.payload import Payload, face_codes, grid_codes
+from selfmotion.robot import NAMED_ARMS, load_robot
+from support.replay_plans import arm_plan, planar_plan
+
+CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+
+
+CUBE_FACES = np.array(
+    [
+        [[a, b, c], [a, c, d]]
+        for a, b, c, d in (
+            (0, 1, 3, 2),
+            (4, 6, 7, 5),
+            (0, 4, 5, 1),
+            (2, 3, 7, 6),
+            (0, 2, 6, 4),
+            (1, 5, 7, 3),
+        )
+    ]
+).reshape(-1, 3)
+
+
+def triangle_areas(vertices, faces):
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def test_a_cube_is_split_at_its_edges():
+    mesh = make_mesh(CUBE, CUBE_FACES)
+    assert len(mesh.faces) == 12
+    assert len(mesh.grid) == 24
+
+
+def test_a_smooth_surface_shares_its_vertices():
+    vertices, faces = shapes.tube(np.linspace([0, 0, 0], [1, 0, 0], 5), 0.1, sides=24)
+    soup = make_mesh(vertices[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3))
+    assert len(soup.grid) == len(vertices)
+
+
+def test_degenerate_triangles_are_kept():
+    faces = np.vstack([CUBE_FACES, [[0, 0, 1], [2, 2, 2]]])
+    assert len(make_mesh(CUBE, faces).faces) == len(faces)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMED_ARMS if name != "planar_3r"])
+def test_every_triangle_is_kept_where_the_file_has_it(name):
+    """Against coal, which reads the same files by assimp: box, area, and no triangle fewer."""
+    seen = set()
+    for item in load_robot(name).geometry(pin.GeometryType.VISUAL).geometryObjects:
+        if not isinstance(item.geometry, coal.BVHModelBase) or item.meshPath in seen:
+            continue
+        seen.add(item.meshPath)
+        parts = read_meshes(item.meshPath, item.name)
+        scale = np.asarray(item.meshScale).reshape(3)
+        vertices = np.concatenate([part.vertices for part in parts]) * scale
+        expected = np.array(item.geometry.vertices())
+        np.testing.assert_allclose(vertices.min(axis=0), expected.min(axis=0), atol=2e-5)
+        np.testing.assert_allclose(vertices.max(axis=0), expected.max(axis=0), atol=2e-5)
+        assert sum(len(part.faces) for part in parts) >= item.geometry.num_tris
+        for part in parts:
+            assert part.color is None or all(0.0 <= value <= 1.0 for value in part.color)
+
+
+@pytest.mark.filterwarnings("ignore:the matrix subclass:PendingDeprecationWarning")
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_each_triangle_is_where_the_collada_file_has_it(name):
+    """Count and area against pycollada; coal's own triangles of such files are mixed up."""
+    for item in load_robot(name).geometry(pin.GeometryType.VISUAL).geometryObjects:
+        file = collada.Collada(item.meshPath, ignore=[collada.common.DaeError])
+        parts = [
+            part.triangleset() if hasattr(part, "triangleset") else part
+            for geometry in file.scene.objects("geometry")
+            for part in geometry.primitives()
+            if not isinstance(part, collada.lineset.BoundLineSet)
+        ]
+        expected = np.concatenate([triangle_areas(p.vertex, p.vertex_index) for p in parts])
+        expected *= file.assetInfo.unitmeter**2
+        baked = [
+            triangle_areas(mesh.vertices, mesh.faces)
+            for mesh in read_meshes(item.meshPath, item.name)
+        ]
+        # Triangles without area may be left out: there is nothing to see of them.
+        assert np.sum(expected > 0) <= sum(map(len, baked)) <= len(expected)
+        assert sum(map(np.sum, baked)) == pytest.approx(expected.sum(), rel=1e-4)
+
+
+def test_an_unreadable_mesh_is_refused_by_name():
+    with pytest.raises(RobotError, match=r"hand_0.*/nowhere/hand\.dae"):
+        read_meshes("/nowhere/hand.dae", "visual 'hand_0'")
+
+
+def test_coal_stands_in_where_trimesh_fails():
+    item = load_robot("xarm7").geometry(pin.GeometryType.VISUAL).geometryObjects[0]
+    (expected,) = read_meshes(item.meshPath, item.name)
+    (part,) = read_meshes("/nowhere/base.stl", item.name, item.geometry, 0.5)
+    assert len(part.faces) == len(expected.faces)
+    np.testing.assert_allclose(np.ptp(part.vertices, axis=0), 2 * np.ptp(expected.vertices, axis=0))
+
+
+def test_mesh_files_used_twice_are_packed_once():
+    arm = bake(load_robot("panda"), Payload())
+    fingers = [v for v in arm.visuals if "finger" in v.name]
+    used = {v.geometry["mesh"] for v in fingers}
+    assert len(fingers) == 2 * len(used)
+
+
+def test_codes_can_be_undone():
+    rng = np.random.default_rng(1)
+    grid = rng.integers(0, 2**16, (50, 3)).astype(np.uint16)
+    np.testing.assert_array_equal(np.cumsum(grid_codes(grid), axis=1, dtype=np.uint16).T, grid)
+    faces = make_mesh(rng.random((30, 3)), rng.integers(0, 30, (40, 3))).faces
+    unused, restored = 0, []
+    for code in face_codes(faces):
+        restored.append(unused - code)
+        unused += code == 0
+    np.testing.assert_array_equal(restored, faces.ravel())
+
+
+def test_payload_layout():
+    payload = Payload()
+    content = {"a": payload.array([1.5, 2.5], "f8"), "b": payload.array([[1], [2], [3]], "u2")}
+    data = gzip.decompress(base64.b64decode(payload.pack(content)))
+    (length,) = struct.unpack_from("<I", data)
+    text = json.loads(data[4 : 4 + length])
+    assert text["a"] == {"$": 0}
+    start = -(-(4 + length) // 8) * 8
+    kind, offset, count = text["arrays"][1]
+    assert (kind, count) == ("Uint16Array", 3)
+    assert list(np.frombuffer(data, "<u2", count, start + offset)) == [1, 2, 3]
+
+
+@pytest.mark.parametrize("name", ["planar_3r", "panda"])
+def test_key_frames_interpolate_to_a_tenth_of_a_millimetre(name):
+    plan = planar_plan() if name == "planar_3r" else arm_plan(name)
+    frames = key_frames(plan.robot, plan.trajectory)
+    assert frames.t[0] == 0.0
+    assert frames.t[-1] == plan.trajectory.duration
+    assert np.all(np.diff(frames.t) > 0)
+    data = plan.robot.model.createData()
+    for t in np.random.default_rng(2).uniform(0, frames.t[-1], 200):
+        pin.forwardKinematics(plan.robot.model, data, plan.trajectory(t))
+        for joint in range(plan.robot.dof):
+            place = np.array(
+                [np.interp(t, frames.t, frames.position[:, joint, k]) for k in range(3)]
+            )
+            np.testing.assert_allclose(place, data.oMi[joint + 1].translation, atol=1e-4)
+
+
+def test_curves_know_a_path_that_is_missed():
+    plan = planar_plan()
+    good = curves(plan, plan.trajectory)
+    assert good.position_error.max() < 1e-5
+    np.testing.assert_allclose(good.q[0], plan.trajectory.q[0])
+    motion = plan.trajectory
+    late = sm.Trajectory(motion.t, motion.q, motion.qd, motion.joint_names)
+    late.q.setflags(write=True)
+    late.q[:, 0] += 0.01
+    missed = curves(plan, late)
+    reach = np.linalg.norm(missed.tool[:, :2], axis=1)
+    assert np.all(missed.position_error > 0.00999 * reach)
+    assert missed.position_error.max() == pytest.approx(0.01 * reach.max(), rel=1e-3)
+
+
+def test_manipulability_is_the_root_of_the_determinant():
+    plan = arm_plan("panda")
+    drawn = curves(plan, plan.trajectory, points=5)
+    for q, value in zip(drawn.q, drawn.manipulability, strict=True):
+        jacobian = plan.robot.jacobian(q)
+        assert value == pytest.approx(np.sqrt(np.linalg.det(jacobian @ jacobian.T)))
+
+
+def test_tube_keeps_its_radius():
+    angle = np.linspace(0, 4, 60)
+    line = np.stack([np.cos(angle), np.sin(angle), 0.2 * angle], axis=1)
+    vertices, faces = shapes.tube(line, 0.05, sides=8)
+    distance = np.linalg.norm(vertices.reshape(60, 8, 3) - line[:, None], axis=2)
+    np.testing.assert_allclose(distance, 0.05, atol=1e-12)
+    assert faces.max() == len(vertices) - 1
+
+
+def test_a_tube_follows_a_path_that_turns_back():
+    there = np.linspace([0.0, 0, 0], [1.0, 0, 0], 11)
+    vertices, _ = shapes.tube(np.vstack([there, there[-2::-1]]), 0.05)
+    assert np.all(np.isfinite(vertices))
+    np.testing.assert_allclose(np.linalg.norm(vertices[:, 1:], axis=1), 0.05, atol=1e-12)
+
+
+def test_colors_span_the_scale():
+    colors = shapes.colors_of(np.array([-1.0, 0.0, 1.0, 2.0]), 0.0, 1.0)
+    np.testing.assert_allclose(255 * colors[0], [0x44, 0x01, 0x54])
+    np.testing.assert_array_equal(colors[0], colors[1])
+    np.testing.assert_array_equal(colors[2], colors[3])

@@ -1,0 +1,166 @@
+"""Pictures by a headless browser, the matplotlib figure, and what is left behind: nothing."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from PIL import Image
+
+from selfmotion.basics.errors import RenderError
+from selfmotion.replay import browser, figure, render_gif, render_png
+from support.places import TESTS
+from support.replay_plans import arm_plan, planar_plan
+
+needs_browser = pytest.mark.skipif(
+    not any(map(shutil.which, browser._BROWSERS)) and not os.environ.get("CI"),
+    reason="needs a browser; CI has one",
+)
+
+
+def pixels(file):
+    with Image.open(file) as picture:
+        return np.asarray(picture.convert("RGB"))
+
+
+@needs_browser
+def test_a_picture_shows_the_time_asked_for(tmp_path):
+    plan = planar_plan()
+    files = [
+        render_png(plan, tmp_path / f"{k}.png", t=t, size=(320, 240))
+        for k, t in enumerate((0.3, 1.0))
+    ]
+    pictures = [pixels(file) for file in files]
+    assert pictures[0].shape == (240, 320, 3)
+    assert not np.array_equal(pictures[0], pictures[1])
+    assert sorted(tmp_path.iterdir()) == files
+
+
+@needs_browser
+def test_a_gif_lasts_as_long_as_the_motion(tmp_path):
+    file = render_gif(planar_plan(), tmp_path / "a.gif", size=(160, 120), frames_per_second=5)
+    with Image.open(file) as picture:
+        assert picture.n_frames == 11
+        assert picture.info["duration"] == 200
+
+
+@needs_browser
+def test_the_whole_page_is_taller_than_the_window(tmp_path):
+    file = render_png(planar_plan(), tmp_path / "a.png", t=0.0, size=(400, 300), whole_page=True)
+    with Image.open(file) as picture:
+        assert picture.height > 900
+
+
+def test_no_browser_is_said_clearly(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path))
+    with pytest.raises(RenderError, match="install Chromium"):
+        render_png(planar_plan(), tmp_path / "a.png", t=0.0)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_playwright_is_said_clearly(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
+    with pytest.raises(RenderError, match="pip install playwright"):
+        render_png(planar_plan(), tmp_path / "a.png", t=0.0)
+
+
+WRITE = """
+import sys, psutil
+from support.replay_plans import planar_plan
+from selfmotion.replay import write_replay
+write_replay(planar_plan(), sys.argv[1] + "/a.html")
+me = psutil.Process()
+assert me.children() == [] and me.net_connections() == [], "a process or port is left"
+assert not {"meshcat", "zmq", "matplotlib", "playwright", "IPython"} & set(sys.modules)
+"""
+
+
+RENDER = """
+import sys
+from support.replay_plans import planar_plan
+from selfmotion.replay import render_gif
+render_gif(planar_plan(), sys.argv[1] + "/a.gif", frames_per_second=100)
+"""
+
+
+ANSWERING = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+"""
+
+
+def start(script, folder, temporary):
+    environment = {**os.environ, "PYTHONPATH": str(TESTS), "TMPDIR": str(temporary)}
+    return subprocess.Popen(
+        # Workers of a parallel test run ignore Ctrl-C, and so would what they start.
+        [sys.executable, "-c", ANSWERING + script, str(folder)],
+        env=environment,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def wait_until(condition, seconds=30.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it does not happen"
+        time.sleep(0.05)
+
+
+def test_writing_leaves_no_process_port_or_heavy_import(tmp_path):
+    process = start(WRITE, tmp_path, tmp_path)
+    _, complaints = process.communicate(timeout=60)
+    assert process.returncode == 0, complaints
+    assert [file.name for file in tmp_path.iterdir()] == ["a.html"]
+
+
+@pytest.fixture
+def short_folder():
+    """Chromium's sockets need a path of fewer than 108 characters, which tmp_path's is not."""
+    with tempfile.TemporaryDirectory(prefix="replay") as folder:
+        yield Path(folder)
+
+
+@needs_browser
+def test_an_interrupted_picture_leaves_nothing(short_folder):
+    folder, temporary = short_folder / "out", short_folder / "tmp"
+    folder.mkdir()
+    temporary.mkdir()
+    process = start(RENDER, folder, temporary)
+    try:
+        started = psutil.Process(process.pid)
+        wait_until(lambda: len(started.children(recursive=True)) > 3)
+        offspring = started.children(recursive=True)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+        assert process.returncode != 0
+        assert psutil.wait_procs(offspring, timeout=10)[1] == []
+    finally:
+        process.kill()
+        process.communicate()
+    assert list(folder.iterdir()) == []
+    assert list(temporary.iterdir()) == []
+
+
+def test_the_figure_draws_what_was_planned():
+    plan = arm_plan("panda")
+    drawing = figure(plan)
+    positions, velocities, manipulability, errors = drawing.axes
+    curves = [line for line in positions.get_lines() if line.get_linestyle() == "-"]
+    limits = [line for line in positions.get_lines() if line.get_linestyle() == "--"]
+    assert [line.get_label() for line in curves] == list(plan.robot.joint_names)
+    assert len(limits) == 14
+    t = np.asarray(curves[2].get_xdata())
+    np.testing.assert_allclose(curves[2].get_ydata(), plan.trajectory(t)[:, 2])
+    assert len(velocities.get_lines()) == 21
+    assert len(manipulability.get_lines()) == 2
+    assert errors.get_yscale() == "log"
+    assert plan.certificate.verdict in drawing.get_suptitle()

@@ -1,0 +1,88 @@
+"""Plans come back from files without loss, or are refused by name."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import files
+
+
+@pytest.fixture(scope="module")
+def plan() -> sm.Plan:
+    return sm.plan(sm.sample_problem())
+
+
+def assert_same(one: sm.Certificate, other: sm.Certificate) -> None:
+    """Equal but for the last digits of when extremes are: roots depend on where arrays lie."""
+    for mine, its in zip(one.findings, other.findings, strict=True):
+        assert dataclasses.replace(mine, time=its.time, amount=its.amount) == its
+        assert (mine.time, mine.amount) == pytest.approx((its.time, its.amount), rel=1e-12)
+    assert dataclasses.replace(one, findings=other.findings) == other
+
+
+def test_saved_plans_come_back_without_loss(plan: sm.Plan, tmp_path: Path) -> None:
+    plan.save(tmp_path / "folder" / "plan.npz")
+    loaded = sm.load_plan(tmp_path / "folder" / "plan.npz")
+    for one, other in (
+        (plan.trajectory, loaded.trajectory),
+        (plan.initial_trajectory, loaded.initial_trajectory),
+    ):
+        for name in ("t", "q", "qd", "qdd"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        assert one.joint_names == other.joint_names
+    np.testing.assert_array_equal(plan.coefficients, loaded.coefficients)
+    assert_same(loaded.certificate, plan.certificate)
+    assert loaded.task is plan.task
+    for field in dataclasses.fields(plan.report):
+        if field.name != "history":
+            assert getattr(loaded.report, field.name) == getattr(plan.report, field.name)
+    for one, other in zip(plan.report.history, loaded.report.history, strict=True):
+        np.testing.assert_array_equal(one.x, other.x)
+        assert dataclasses.replace(one, x=other.x) != one or one.cost == other.cost
+    again = sm.certify(loaded.robot, loaded.path, loaded.task, loaded.trajectory)
+    assert_same(again, plan.certificate)
+
+
+def test_continuous_joints_and_locks_survive(tmp_path: Path) -> None:
+    for name, lock in (("kinova", {}), ("tiago", {"torso_lift_joint": 0.2})):
+        robot = sm.load_robot(name, lock=lock)
+        start = robot.dexterous_configuration("position")
+        path = sm.Circle.around(robot.pose(start), 0.03, 3.0)
+        plan = sm.plan(sm.Problem(robot, path, "position", start))
+        plan.save(tmp_path / "plan.npz")
+        loaded = sm.load_plan(tmp_path / "plan.npz").robot
+        assert loaded.joint_names == robot.joint_names
+        assert loaded.locked == robot.locked
+        np.testing.assert_array_equal(loaded.upper, robot.upper)
+        np.testing.assert_array_equal(loaded.pose(start).homogeneous, robot.pose(start).homogeneous)
+
+
+def test_csv_has_every_digit(plan: sm.Plan, tmp_path: Path) -> None:
+    plan.to_csv(tmp_path / "plan.csv")
+    lines = (tmp_path / "plan.csv").read_text().splitlines()
+    assert lines[0].split(",")[:3] == ["t", "joint1", "joint2"]
+    table = np.array([[float(value) for value in line.split(",")] for line in lines[1:]])
+    motion = plan.trajectory
+    np.testing.assert_array_equal(table[:, :7], np.column_stack([motion.t, motion.q, motion.qd]))
+    np.testing.assert_allclose(table[:, 7:], motion.qdd, rtol=1e-9, atol=1e-9)
+    again = sm.Trajectory.from_csv(tmp_path / "plan.csv")
+    t = np.linspace(motion.t[0], motion.t[-1], 300)
+    np.testing.assert_allclose(again(t), motion(t), rtol=0, atol=1e-13)
+
+
+def test_files_that_are_no_plans_are_named(plan: sm.Plan, tmp_path: Path) -> None:
+    with pytest.raises(sm.FileFormatError, match=r"none\.npz: no such file"):
+        sm.load_plan(tmp_path / "none.npz")
+    text = tmp_path / "text.npz"
+    text.write_text("not a plan")
+    with pytest.raises(sm.FileFormatError, match=r"text\.npz: is no plan"):
+        sm.load_plan(text)
+    np.savez(tmp_path / "other.npz", a=np.zeros(2))
+    with pytest.raises(sm.FileFormatError, match=r"other\.npz: is no plan"):
+        sm.load_plan(tmp_path / "other.npz")
+    files.write_archive(tmp_path / "empty.npz", {}, {})
+    with pytest.raises(sm.FileFormatError, match="has no format number"):
+        sm.load_plan(tmp_path / "empty.npz")

@@ -1,0 +1,39 @@
+"""The tool's rates are derivatives of its pose."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.robot import ToolRates
+from support.arms import PANDA_HOME
+
+
+def circle(robot: sm.RobotModel, **options) -> sm.Problem:
+    path = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 3.0)
+    return sm.Problem(robot, path, start=PANDA_HOME, **options)
+
+
+@pytest.fixture
+def free(panda: sm.RobotModel) -> sm.Plan:
+    return sm.plan(circle(panda, task="position"))
+
+
+def test_rates_are_derivatives_of_the_pose(panda: sm.RobotModel, free: sm.Plan) -> None:
+    motion, h = free.trajectory, 1e-5
+    t = np.linspace(0.1, 2.9, 23)
+    velocity, acceleration = ToolRates(panda)(motion(t), motion(t, 1), motion(t, 2))
+
+    def world_twist(at: float) -> np.ndarray:
+        step = 1e-5
+        early, late = (panda.pose(motion(at + d)) for d in (-step, step))
+        linear = (late.translation - early.translation) / (2 * step)
+        angular = pin.log3(late.rotation @ early.rotation.T) / (2 * step)
+        return np.concatenate([linear, angular])
+
+    for k, at in enumerate(t):
+        turn = panda.pose(motion(at)).rotation.T
+        twist, change = world_twist(at), (world_twist(at + h) - world_twist(at - h)) / (2 * h)
+        for part in (slice(0, 3), slice(3, 6)):
+            np.testing.assert_allclose(velocity[k, part], turn @ twist[part], atol=1e-8)
+            np.testing.assert_allclose(acceleration[k, part], turn @ change[part], atol=1e-4)

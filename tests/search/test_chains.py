@@ -1,0 +1,58 @@
+"""Chains, against brute force."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from selfmotion.basics import Array
+from selfmotion.search.chains import best_chains, diverse_chains
+from selfmotion.search.nodes import Admissible
+
+
+def brute_force(layers: list[Array], step: Array) -> float:
+    best = np.inf
+    for chain in itertools.product(*layers):
+        steps = np.abs(np.diff(np.array(chain), axis=0))
+        if np.all(steps <= step):
+            best = min(best, float(steps.sum()))
+    return best
+
+
+def random_layers(seed: int) -> list[Array]:
+    rng = np.random.default_rng(seed)
+    layers = [rng.uniform(0.0, 1.0, (rng.integers(3, 8), 3)) for _ in range(5)]
+    return [layer[np.argsort(layer[:, 0])] for layer in layers]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_shortest_chain_is_that_of_brute_force(seed: int) -> None:
+    layers, step = random_layers(seed), np.array([0.6, 0.5, 0.7])
+    chains = best_chains(layers, step, np.zeros(3, dtype=bool))
+    best = brute_force(layers, step)
+    assert chains.cost[-1].min() == pytest.approx(best)
+    if np.isfinite(best):
+        chain = diverse_chains(layers, chains, step, np.zeros(3, dtype=bool), 1)[0]
+        q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
+        assert np.abs(np.diff(q, axis=0)).sum() == pytest.approx(best)
+        # Without one of its nodes the answer is another one.
+        layers[2] = np.delete(layers[2], chain[2], axis=0)
+        assert brute_force(layers, step) > best
+
+
+def test_angles_of_turning_joints_count_modulo_turns() -> None:
+    layers = [np.array([[3.1, 0.0]]), np.array([[-3.1, 0.0]])]
+    step = np.array([0.2, 0.2])
+    assert best_chains(layers, step, np.array([False, False])).blocked == 1
+    turned = best_chains(layers, step, np.array([True, False]))
+    assert turned.cost[-1][0] == pytest.approx(2 * np.pi - 6.2)
+
+
+def test_bounds_count_every_turn() -> None:
+    bounds = Admissible(np.array([-7.0]), np.array([7.0]), np.array([True]), ())
+    assert sorted(bounds.all_turns(np.array([[0.5]]))[:, 0]) == pytest.approx(
+        [0.5 - 2 * np.pi, 0.5, 0.5 + 2 * np.pi]
+    )
+    narrow = Admissible(np.array([-1.0]), np.array([1.0]), np.array([True]), ())
+    assert list(narrow.free(np.array([[0.9], [1.1], [0.9 - 4 * np.pi]]))) == [True, False, True]
+    assert narrow.excess(np.array([[1.2], [-1.3], [0.3]]))[:, 0] == pytest.approx([0.2, 0.3, 0.0])

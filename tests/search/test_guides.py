@@ -1,0 +1,35 @@
+"""When the search looks at the path."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.search.guides import search_times
+
+
+def level(x: float, y: float) -> pin.SE3:
+    return pin.SE3(np.eye(3), np.array([x, y, 0.0]))
+
+
+@pytest.mark.parametrize("waypoints", [2, 3, 60, 199, 1000])
+def test_the_search_looks_at_neither_too_few_nor_too_many_times(waypoints: int) -> None:
+    rng = np.random.default_rng(waypoints)
+    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.0, waypoints - 1))])
+    poses = [level(2.0 + 0.5 * time / times[-1], 1.0) for time in times]
+    t = search_times(sm.Waypoints.from_poses(times, poses), 60)
+    assert (t[0], t[-1]) == (0.0, times[-1])
+    assert 60 <= len(t) <= 401
+    assert np.diff(t).min() > 0.0
+
+
+def test_the_search_looks_as_the_tool_moves_on() -> None:
+    """However the path is timed, and whether it moves or turns; at pauses hardly at all."""
+    poses = [level(2.0, 1.0), level(4.0, 1.0), level(4.0, 1.0), level(4.0, -1.0)]
+    path = sm.Waypoints.from_poses(np.array([0.0, 1.0, 5.0, 9.0]), poses)
+    t = search_times(path, 60)
+    tool = path.samples(t).translation
+    strides = np.linalg.norm(np.diff(tool, axis=0), axis=1)
+    # 0.02 m, by interpolation between 2,000 looks.
+    assert strides.max() < 0.022
+    assert np.sum((t > 1.0) & (t < 5.0)) < 0.1 * len(t)

@@ -1,0 +1,70 @@
+"""Newton's method onto self-motions: projection, limits, bases carried along."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.search import spread, targets
+from selfmotion.search.manifold import Manifold
+from support.arms import robot_named
+from support.paths import line_of
+
+CASES = (("panda", "position"), ("panda", "pointing"), ("tiago", "pose"), ("ur5", "pointing"))
+
+
+@pytest.mark.parametrize("off", [1e-8, 1e-4, 0.1, 10.0, np.nan])
+def test_compiled_kinematics_that_are_not_those_of_pinocchio_are_refused(
+    off: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = robot_named("panda")
+    rotations, positions, axes, turning = robot.joint_places()
+    wrong = positions.copy()
+    wrong[3, 0] += off
+    monkeypatch.setattr(
+        sm.RobotModel, "joint_places", lambda own: (rotations, wrong, axes, turning)
+    )
+    with pytest.raises(sm.RobotError, match="compiled kinematics put 'panda_hand_tcp'"):
+        Manifold(robot, sm.Task.POSITION, robot.lower, robot.upper)
+
+
+@pytest.mark.parametrize(("name", "task"), CASES)
+def test_projection_is_onto_the_path_and_within_the_limits(name: str, task: str) -> None:
+    robot, rows = robot_named(name), sm.Task.of(task)
+    path = line_of(robot, task)
+    manifold = Manifold(robot, rows, robot.lower, robot.upper)
+    seeds = np.array(list(spread(robot, 100, np.random.default_rng(0))))
+    q, arrived = manifold.project(seeds, targets(path, np.zeros(1))[0], far=True)
+    # Of an arm near its limits not every seed leads there.
+    assert arrived.sum() > 10
+    for here in q[arrived]:
+        # A correction of 1e-6 leaves an error of its square.
+        assert max(rows.miss(path.pose(0.0), robot.pose(here))) < 1e-9
+        assert np.all((here >= robot.lower) & (here <= robot.upper))
+
+
+def test_a_joint_at_its_limit_stays_there_while_others_go_on() -> None:
+    robot = robot_named("panda")
+    q = robot.dexterous_configuration("position")
+    upper = robot.upper.copy()
+    upper[3] = q[3]
+    manifold = Manifold(robot, sm.Task.POSITION, robot.lower, upper)
+    pose = robot.pose(q + 0.05)
+    target = np.concatenate([pose.translation, pose.rotation.ravel()])
+    beyond = q.copy()
+    beyond[3] += 0.1
+    (found,), arrived = manifold.project(beyond[None], target)
+    assert arrived.all()
+    assert found[3] <= upper[3]
+    assert max(sm.Task.POSITION.miss(pose, robot.pose(found))) < 1e-9
+
+
+def test_bases_are_carried_without_turning() -> None:
+    robot = robot_named("panda")
+    task = sm.Task.POSITION
+    q0 = robot.dexterous_configuration(task)
+    q = q0 + np.linspace(0.0, 0.5, 40)[:, None]
+    bases = Manifold(robot, task, robot.lower, robot.upper).carried_bases(q)
+    for here, basis in zip(q, bases, strict=True):
+        np.testing.assert_allclose(robot.task_jacobian(here, task) @ basis, 0.0, atol=1e-12)
+    # Between neighbours 0.03 rad apart, bases of the same planes turn about as much.
+    assert np.abs(np.diff(bases, axis=0)).max() < 0.1

@@ -1,0 +1,94 @@
+"""The global search for two and more degrees of redundancy: projection, chains, and refusals."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.basics.errors import NoSequenceError
+from selfmotion.search import targets
+from selfmotion.search.manifold import Manifold
+from selfmotion.search.sampled import sampled_sequences
+from support.arms import robot_named
+from support.paths import line_of
+
+STEP = 0.5
+
+
+def searched(robot: sm.RobotModel, path: sm.Path, **options: object) -> list[sm.search.Sequence]:
+    values = {
+        "lower": robot.lower,
+        "upper": robot.upper,
+        "largest_step": np.full((20, robot.dof), STEP),
+        "weights": robot.joint_weights,
+        "count": 2,
+    }
+    t = np.linspace(0.0, path.duration, 21)
+    return sampled_sequences(robot, path, sm.Task.POSITION, t, **(values | options))
+
+
+def test_sequences_follow_the_path_keep_all_and_are_as_long_as_they_say() -> None:
+    robot = robot_named("panda")
+    path = line_of(robot, "position")
+    post = sm.Sphere("post", path.pose(1.0).translation - [0.0, 0.25, 0.0], 0.05)
+    model = sm.CollisionModel(robot, [post])
+    found = searched(robot, path, bodies=[(model, 2e-3)])
+    lengths = [sequence.length for sequence in found]
+    assert lengths == sorted(lengths)
+    for sequence in found:
+        q: Array = sequence.q
+        for time, here in zip(sequence.t, q, strict=True):
+            assert max(sm.Task.POSITION.miss(path.pose(float(time)), robot.pose(here))) < 1e-9
+            assert model.distance(here).value >= 2e-3
+        assert np.all((q >= robot.lower) & (q <= robot.upper))
+        assert np.abs(np.diff(q, axis=0)).max() <= STEP
+        assert sequence.length == pytest.approx(np.abs(np.diff(q, axis=0)).sum())
+    again = searched(robot, path, bodies=[(model, 2e-3)])
+    assert all(np.array_equal(a.q, b.q) for a, b in zip(found, again, strict=True))
+
+
+def test_it_is_not_longer_than_following_from_the_same_start() -> None:
+    """Dynamic programming may always stay on the motion that it begins with."""
+    robot = robot_named("panda")
+    path = line_of(robot, "position")
+    best = searched(robot, path)[0]
+    manifold = Manifold(robot, sm.Task.POSITION, robot.lower, robot.upper)
+    q, length = best.q[:1], 0.0
+    for target in targets(path, best.t)[1:]:
+        following, arrived = manifold.project(q, target)
+        assert arrived.all()
+        length += float(np.abs(following - q).sum())
+        q = following
+    assert best.length <= length * (1 + 1e-9)
+
+
+def test_a_path_that_nothing_follows_says_when() -> None:
+    robot = robot_named("panda")
+    path = line_of(robot, "position", length=-3.0)
+    with pytest.raises(NoSequenceError, match="no motion along the path passes t = ") as error:
+        searched(robot, path)
+    assert 0.0 < error.value.time < 2.0
+
+
+def test_metres_are_not_added_to_radians_unasked() -> None:
+    robot = robot_named("tiago")
+    weights = robot.joint_weights
+    slides = np.array([robot.is_prismatic(name) for name in robot.joint_names])
+    assert slides.any()
+    np.testing.assert_array_equal(weights[~slides], 1.0)
+    # An arm's mean lever is some tenths of a metre.
+    assert np.all((weights[slides] > 1.0) & (weights[slides] < 10.0))
+    path = line_of(robot, "pose")
+    joint = robot.joint_names[int(np.argmax(slides))]
+    with pytest.raises(sm.ProblemError, match=f"'{joint}' moves in metres.*joint_weights"):
+        sm.Problem(robot, path, costs=[sm.PathLength()])
+    with pytest.raises(sm.ProblemError, match=r"joint_weights are .* expected 8 numbers"):
+        sm.Problem(robot, path, costs=[sm.PathLength(joint_weights=[1.0, 2.0])])
+    sm.Problem(robot, path, costs=[sm.PathLength(joint_weights=weights)])
+    # The usual cost says what it counts a metre as.
+    (usual,) = sm.Problem(robot, path).costs
+    np.testing.assert_allclose(usual.weight, weights**2)
+    assert usual.name == f"joint velocity (1 m as {weights[slides][0]:.3g} rad)"
+    panda = robot_named("panda")
+    (plain,) = sm.Problem(panda, line_of(panda, "pose")).costs
+    assert (plain.name, float(plain.weight)) == ("joint velocity", 1.0)

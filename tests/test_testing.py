@@ -1,0 +1,292 @@
+"""What users write themselves: judged like ours, saved and loaded, refused when something lacks."""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import selfmotion as sm
+from selfmotion import testing
+from selfmotion.basics import Array, restore
+from selfmotion.cli import app
+from selfmotion.motion import NullMotion
+from support.arms import PANDA_HOME
+
+LIMITS = (sm.JointPositionLimits(), sm.JointVelocityLimits())
+
+
+@dataclass(frozen=True)
+class SlowElbow(sm.Constraint):
+    """|q̇_4| ≤ limit [rad/s], as somebody who read the docstrings would write it."""
+
+    limit: float
+
+    def bind(self, robot: sm.RobotModel, task: sm.Task, start: Array, end: Array) -> "SlowNodes":
+        return SlowNodes(self.limit)
+
+    def requirement(self, robot: sm.RobotModel) -> sm.Requirement:
+        return SlowJudge(self.limit)
+
+
+@dataclass(frozen=True)
+class SlowNodes:
+    limit: float
+    name: str = "slow elbow"
+    equality: bool = False
+    tolerance: float = 1e-3
+
+    def residual(self, samples: sm.Samples) -> Array:
+        return np.abs(samples.qd[samples.nodes][:, 3:4]) / self.limit - 1.0 + 2e-3
+
+    def tangents(self, samples: sm.Samples, motion: sm.NodeTangents) -> Array:
+        signs = np.sign(samples.qd[samples.nodes][:, 3])
+        return (signs[:, None] * motion.qd[:, 3] / self.limit)[:, None]
+
+    def describe(self, samples: sm.Samples, row: int, column: int) -> str:
+        return f"the elbow turns at {samples.qd[samples.nodes][row, 3]:.3f} rad/s"
+
+
+@dataclass(frozen=True)
+class SlowJudge(sm.Requirement):
+    limit: float
+    name: str = "slow elbow"
+
+    def judge(self, motion: sm.FinishedMotion) -> sm.Finding:
+        speeds = np.abs(motion.qd[:, 3])
+        worst = int(np.argmax(speeds))
+        time, speed = float(motion.t[worst]), float(speeds[worst])
+        text = f"the elbow turns at {speed:.3f} rad/s at t = {time:.3f} s"
+        return sm.Finding(
+            self.name, "elbow", time, speed, self.limit, bool(speed <= self.limit), text
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Hop(sm.Path):
+    """Up by a height and down again, as a sine."""
+
+    start: Array
+    height: float
+    duration: float
+
+    def evaluate(self, t: Array) -> sm.PathSamples:
+        pose = np.asarray(self.start)
+        place, twist = np.tile(pose[:3, 3], (len(t), 1)), np.zeros((len(t), 6))
+        rate = np.pi / self.duration
+        place[:, 2] += self.height * np.sin(rate * t) ** 2
+        twist[:, 2] = self.height * rate * np.sin(2.0 * rate * t)
+        return sm.PathSamples(t, place, np.tile(pose[:3, :3], (len(t), 1, 1)), twist)
+
+
+@dataclass(frozen=True)
+class Cosines(NullMotion):
+    count: int = 3
+
+    @property
+    def fewest_steps(self) -> int:
+        return 4 * self.count
+
+    def functions(self, t: Array, duration: float) -> Array:
+        return np.cos(np.pi * np.outer(t / duration, np.arange(self.count)))
+
+
+@dataclass(frozen=True)
+class Warmth(sm.Cost):
+    """∫ Σ |q̇_i|³ dt."""
+
+    mu: float = 1.0
+    name: str = "warmth"
+
+    def value(self, samples: sm.Samples) -> Array:
+        return self.mu * np.sum(np.abs(samples.qd) ** 3, axis=1)
+
+    def gradient(self, samples: sm.Samples) -> sm.Partials:
+        return sm.Partials(qd=3.0 * self.mu * np.abs(samples.qd) * samples.qd)
+
+
+@pytest.fixture(scope="module")
+def problem() -> sm.Problem:
+    panda = sm.load_robot("panda")
+    hop = Hop(panda.pose(PANDA_HOME).homogeneous, 0.2, 3.0)
+    costs = [sm.JointVelocity(), Warmth(0.5)]
+    return sm.Problem(panda, hop, "position", PANDA_HOME, Cosines(), costs)
+
+
+@dataclass(frozen=True)
+class Careless(SlowElbow):
+    """Asks the optimiser for nothing, so that only its requirement can tell."""
+
+    def bind(self, robot: sm.RobotModel, task: sm.Task, start: Array, end: Array) -> SlowNodes:
+        return SlowNodes(1e3)
+
+
+@pytest.fixture(scope="module")
+def broken(problem: sm.Problem) -> sm.Plan:
+    """A plan whose own constraint is not kept."""
+    return sm.plan(dataclasses.replace(problem, constraints=(*LIMITS, Careless(0.02))))
+
+
+def test_what_is_ones_own_keeps_the_laws(problem: sm.Problem) -> None:
+    testing.check_path(problem.path)
+    testing.check_cost(Warmth())
+    testing.check_null_motion(Cosines())
+    testing.check_constraint(SlowElbow(0.3), problem)
+    assert sm.plan(problem).require().certificate.verified
+    kept = sm.plan(dataclasses.replace(problem, constraints=(*LIMITS, SlowElbow(0.3)))).require()
+    assert np.abs(kept.trajectory.qd[:, 3]).max() <= 0.3
+
+
+def test_a_broken_constraint_of_ones_own_is_judged(broken: sm.Plan, tmp_path: Path) -> None:
+    """Not verified, `require` raises, and the command line says so with exit code 1."""
+    assert not broken.certificate.verified
+    assert "not verified: the elbow turns at" in broken.report.message
+    assert "the elbow turns at" in broken.certificate.verdict
+    with pytest.raises(sm.PlanError, match="the elbow turns at"):
+        broken.require()
+    (finding,) = (f for f in broken.certificate.findings if f.requirement == "slow elbow")
+    assert (finding.requirement, finding.allowed, finding.kept) == ("slow elbow", 0.02, False)
+    broken.save(tmp_path / "plan.npz")
+    result = CliRunner().invoke(app, ["check", str(tmp_path / "plan.npz")])
+    assert result.exit_code == 1
+    assert "the elbow turns at" in result.output
+
+
+def test_plans_carry_what_is_ones_own(broken: sm.Plan, tmp_path: Path) -> None:
+    broken.save(tmp_path / "plan.npz")
+    again = sm.load_plan(tmp_path / "plan.npz").problem
+    assert isinstance(again.path, Hop)
+    assert again.constraints[-1] == Careless(0.02)
+    assert again.costs[-1] == Warmth(0.5)
+    assert again.null_motion == Cosines()
+    assert again.task is sm.Task.POSITION
+    np.testing.assert_array_equal(again.given_start, PANDA_HOME)
+    np.testing.assert_array_equal(
+        again.path.samples([0.3, 2.0]).translation,
+        broken.path.samples([0.3, 2.0]).translation,
+    )
+
+
+def test_code_that_is_not_imported_is_named(
+    broken: sm.Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Costs may be missing, since the motion can be judged without; paths and constraints not."""
+    file = tmp_path / "plan.npz"
+    broken.save(file)
+    with monkeypatch.context() as patch:
+        patch.delitem(sm.Cost._known, "Warmth")
+        lost = sm.load_plan(file)
+        assert not lost.check().verified
+        with pytest.raises(sm.ProblemError, match=r"'warmth' was a Warmth, which .* give it again"):
+            sm.plan(lost.problem)
+    for family, kind in ((sm.Path, "Hop"), (sm.Constraint, "Careless"), (NullMotion, "Cosines")):
+        with monkeypatch.context() as patch:
+            patch.delitem(family._known, kind)
+            with pytest.raises(sm.FileFormatError, match=f"kind is '{kind}'.*import its module"):
+                sm.load_plan(file)
+
+
+def test_a_function_as_cost_is_missed_when_it_is_needed(tmp_path: Path) -> None:
+    cost = sm.FunctionCost(lambda qd, q, t: np.sum(qd**2, axis=1), name="mine")
+    plan = sm.plan(dataclasses.replace(sm.sample_problem(), costs=[cost]))
+    plan.save(tmp_path / "plan.npz")
+    again = sm.load_plan(tmp_path / "plan.npz")
+    assert again.check().verified
+    with pytest.raises(sm.ProblemError, match="cost 'mine' was a FunctionCost"):
+        sm.plan(again.problem)
+    assert sm.plan(dataclasses.replace(again.problem, costs=[cost])).certificate.verified
+
+
+class NoRequirement:
+    def bind(self, robot: sm.RobotModel, task: sm.Task, start: Array, end: Array) -> SlowNodes:
+        return SlowNodes(1.0)
+
+
+@dataclass(frozen=True)
+class EmptyRequirement(SlowElbow, kind="empty"):
+    def requirement(self, robot: sm.RobotModel) -> sm.Requirement:
+        return None
+
+
+def test_a_constraint_that_nothing_judges_is_refused(problem: sm.Problem) -> None:
+    with pytest.raises(sm.ProblemError, match=r"is no Constraint; derive a class"):
+        dataclasses.replace(problem, constraints=[NoRequirement()])
+    with pytest.raises(TypeError, match=r"abstract method '?requirement"):
+        type("Half", (sm.Constraint,), {"bind": NoRequirement.bind})()
+    with pytest.raises(sm.ProblemError, match=r"EmptyRequirement: requirement\(\) returned None"):
+        dataclasses.replace(problem, constraints=[EmptyRequirement(1.0)])
+
+
+def test_two_classes_of_one_kind_are_refused() -> None:
+    with pytest.raises(TypeError, match="path kind 'line' is taken"):
+        type("Line2", (sm.Path,), {"evaluate": Hop.evaluate}, kind="line")
+
+
+@dataclass(frozen=True)
+class WrongGradient(Warmth, kind="wrong gradient"):
+    def gradient(self, samples: sm.Samples) -> sm.Partials:
+        return sm.Partials(qd=-super().gradient(samples).qd)
+
+
+@dataclass(frozen=True)
+class WritesToSamples(Warmth, kind="writes"):
+    def value(self, samples: sm.Samples) -> Array:
+        samples.qd[:] = 0.0
+        return super().value(samples)
+
+
+@dataclass(frozen=True, eq=False)
+class WrongTwist(Hop, kind="wrong twist"):
+    def evaluate(self, t: Array) -> sm.PathSamples:
+        return dataclasses.replace(super().evaluate(t), twist=np.zeros((len(t), 6)))
+
+
+@dataclass(frozen=True)
+class Deaf(SlowElbow, kind="deaf"):
+    def requirement(self, robot: sm.RobotModel) -> sm.Requirement:
+        return SlowJudge(np.inf)
+
+
+class Lazy:
+    def minimize(self, function: sm.Function, x0: Array, *_: object, **__: object) -> sm.Minimum:
+        return sm.Minimum(x0, function.value(x0), np.eye(len(x0)), (), sm.Status.CONVERGED)
+
+
+def test_checkers_refuse_what_is_wrong(problem: sm.Problem) -> None:
+    hop = problem.path
+    wrong_path = WrongTwist(hop.start, hop.height, hop.duration)
+    for check, message in (
+        (lambda: testing.check_cost(WrongGradient()), "gradient is not that of the value"),
+        (lambda: testing.check_path(wrong_path), r"velocity is not that .* at t ="),
+        (lambda: testing.check_constraint(Deaf(0.3), problem), "accepts every motion"),
+        (lambda: testing.check_optimizer(Lazy()), "above the minimum"),
+    ):
+        with pytest.raises(AssertionError, match=message):
+            check()
+    with pytest.raises(ValueError, match="read-only"):
+        testing.check_cost(WritesToSamples())
+
+
+def test_our_own_keep_the_laws_that_users_are_given(problem: sm.Problem) -> None:
+    free = dataclasses.replace(problem, constraints=())
+    box = sm.Box("box", [0.3, 0.25, 0.6], [0.1, 0.1, 0.1])
+    for constraint in (
+        sm.JointPositionLimits(),
+        sm.JointVelocityLimits(),
+        sm.JointAccelerationLimits(5.0),
+        sm.ClosedPath(),
+        sm.EndVelocity(),
+        sm.EndConfiguration(PANDA_HOME),
+        sm.Clearance((box,), 0.02),
+    ):
+        testing.check_constraint(constraint, free)
+    testing.check_optimizer(sm.QuasiNewton())
+    for motion in (sm.PolynomialNullMotion(5), sm.BSplineNullMotion(6)):
+        testing.check_null_motion(motion)
+
+
+def test_an_unknown_kind_lists_the_known_ones() -> None:
+    with pytest.raises(sm.FileFormatError, match=r"path kind is 'spiral'.*circle.*line.*waypoints"):
+        restore(sm.Path, {"kind": "spiral"})
