@@ -42,7 +42,7 @@ def pinocchio_loop(objective: Objective) -> Any:
     joints.
     """
     robot = objective.rollout.robot
-    model, data, tool = robot.model, robot.model.createData(), robot.tool_id
+    model, data, tool = robot.model, robot.model.createData(), robot.chain.tip
     axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     configurations = list(objective.samples(np.zeros(objective.size)).q.copy())
 

@@ -35,7 +35,7 @@ class Bare:
         self._q = HOME + 0.1 * np.random.default_rng(0).standard_normal((stages, robot.dof))
 
     def seconds(self):
-        model, data, tool = self._robot.model, self._data, self._robot.tool_id
+        model, data, tool = self._robot.model, self._data, self._robot.chain.tip
         began = time.perf_counter()
         for q in self._q:
             pin.computeJointJacobians(model, data, q)
@@ -127,7 +127,7 @@ def closed_loop(robot, task, costs, replanner, path, start):
     places, rates = np.concatenate(places), np.concatenate(rates)
     times = replanner.cycle * np.arange(len(places))
     samples = sm.Samples.along(
-        robot, sm.Task.of(task), sm.motion.Sampling.trapezoidal(times), places, rates
+        sm.Follows.of(robot, path, task), sm.motion.Sampling.trapezoidal(times), places, rates
     )
     return sum(float(samples.weights @ cost.value(samples)) for cost in costs), off
 

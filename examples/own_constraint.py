@@ -24,7 +24,7 @@ class SumBand(sm.Constraint):
     lower: float
     upper: float
 
-    def bind(self, robot, task, start, end):
+    def bind(self, follows, start, end):
         return BandConditions(self.lower, self.upper)
 
     def requirement(self, robot):

@@ -94,6 +94,7 @@ from selfmotion.costs import (
     SmallestSingularValue,
     Towards,
 )
+from selfmotion.follow import Follow, Follows
 from selfmotion.formats import (
     Job,
     read_job,
@@ -201,6 +202,8 @@ __all__ = [
     "FileFormatError",
     "Finding",
     "FinishedMotion",
+    "Follow",
+    "Follows",
     "FrameCoordinate",
     "Function",
     "FunctionCost",

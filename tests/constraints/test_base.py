@@ -17,6 +17,7 @@ from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import PolynomialNullMotion
 from selfmotion.optimise import pulled_back
 from support.arms import PANDA_HOME, central_difference, robot_named, short_line, start_of
+from support.followed import standing
 
 Circle = Callable[..., sm.Problem]
 
@@ -55,7 +56,7 @@ def objective_with(constraint: sm.Constraint, name: str, task: str) -> Objective
     motion = PolynomialNullMotion(1, "joint")
     problem = sm.Problem(robot, path, rows, start, motion, constraints=(), rest=False)
     still = StillMotion.on(problem, start, grid)
-    bound = constraint.bind(robot, rows, start, start)
+    bound = constraint.bind(standing(robot, rows), start, start)
     return Objective.of(problem, still, free=True, constraints=[bound])
 
 
@@ -76,7 +77,7 @@ def test_rows_equal_central_differences(constraint: str, name: str, task: str) -
 def test_tangents_equal_central_differences(constraint: str) -> None:
     made = CONSTRAINTS[constraint](robot_named("panda"))
     objective = objective_with(made, "panda", "pose")
-    bound = made.bind(robot_named("panda"), sm.Task.POSE, np.zeros(7), np.zeros(7))
+    bound = made.bind(standing(robot_named("panda"), sm.Task.POSE), np.zeros(7), np.zeros(7))
     x = 0.02 * np.random.default_rng(2).normal(size=objective.size)
     tangents: NodeTangents = objective.node_tangents(x)
     exact = bound.tangents(objective.samples(x), tangents)

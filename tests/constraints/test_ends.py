@@ -10,6 +10,7 @@ import selfmotion as sm
 from selfmotion.certificate import ClosedMotion, EndState
 from selfmotion.engine.start import FreeStart
 from support.arms import PANDA_HOME, short_line
+from support.followed import standing
 
 Circle = Callable[..., sm.Problem]
 
@@ -56,7 +57,7 @@ def test_end_configuration_is_reached(panda_circle: Circle) -> None:
     """The start itself, and a configuration further along the self-motion."""
     problem = panda_circle()
     robot, task = problem.robot, sm.Task.POSE
-    manifold = FreeStart(robot, task, PANDA_HOME)
+    manifold = FreeStart(standing(robot, task), PANDA_HOME)
     target = manifold.configuration(np.array([0.2]), problem.path.pose(0.0))
     assert target is not None
     constraints = (*LIMITS, sm.EndConfiguration(target))
@@ -97,7 +98,7 @@ def test_a_jump_in_velocity_is_refused_where_the_path_repeats(panda_circle: Circ
 
 def test_end_conditions_that_contradict_each_other_are_named(panda_circle: Circle) -> None:
     robot, path = panda_circle().robot, panda_circle().path
-    manifold = FreeStart(robot, sm.Task.POSE, PANDA_HOME)
+    manifold = FreeStart(standing(robot, sm.Task.POSE), PANDA_HOME)
     end = manifold.configuration(np.array([0.3]), path.pose(0.0))
     assert end is not None
     plan = sm.plan(panda_circle(constraints=[sm.ClosedPath(), sm.EndConfiguration(end)]))

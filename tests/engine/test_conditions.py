@@ -13,6 +13,7 @@ from selfmotion.costs import Samples
 from selfmotion.engine import Objective, StillMotion
 from selfmotion.engine.conditions import Conditions
 from selfmotion.engine.rollout import Rollout
+from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
 from selfmotion.task import Task
 from selfmotion.testing import check_constraint
@@ -53,7 +54,7 @@ def grid() -> Grid:
 def samples(grid: Grid) -> Samples:
     robot = robot_named("panda")
     start = start_of(robot, "pose")
-    rollout = Rollout(robot, short_line(robot, start), Task.POSE, grid)
+    rollout = Rollout(Follows.of(robot, short_line(robot, start), Task.POSE), grid)
     assert rollout.run(start, np.zeros((len(grid.stage_times), 7))) is None
     return rollout.samples()
 
@@ -198,8 +199,8 @@ def test_a_constraint_that_is_wrong_on_demand_does_not_pass(wrong: str) -> None:
     """Its tangents are right, but not what programmes are solved with."""
 
     class Mine(sm.JointVelocityLimits):
-        def bind(self, robot, task, start, end):
-            own = super().bind(robot, task, start, end)
+        def bind(self, follows, start, end):
+            own = super().bind(follows, start, end)
             known = SimpleNamespace(picked=own.picked, tangents_of=own.tangents_of)
             right = getattr(own, wrong)
             setattr(known, wrong, lambda *given: -right(*given))

@@ -15,6 +15,7 @@ from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.objective import Objective
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart
+from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.task.damping import DampingLaw
@@ -26,6 +27,7 @@ from support.arms import (
     short_line,
     start_of,
 )
+from support.followed import standing
 
 # Exact gradients against central differences, relative to the largest entry.
 GRADIENT = 1e-6
@@ -78,10 +80,10 @@ def objective_with(task: str, name: str, *, free: bool, damped: bool) -> Objecti
     law = DampingLaw(0.5, 0.25) if damped else None
     costs: list[sm.Cost] = [sm.JointVelocity(), sm.Posture(np.ones(7), posture=PANDA_HOME)]
     return objective_of(
-        Rollout(robot, path, rows, grid, damping=law),
+        Rollout(Follows.of(robot, path, rows), grid, damping=law),
         NullMotionTable(functions, None, robot.dof),
         [*costs, OffPath(100.0, rows.dimension)] if damped else costs,
-        FreeStart(robot, rows, start) if free else FixedStart(start),
+        FreeStart(standing(robot, rows), start) if free else FixedStart(start),
         deviation=Deviation(path, relaxations, grid.stage_times, (not free, False)),
     )
 

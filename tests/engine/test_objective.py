@@ -8,6 +8,7 @@ from selfmotion.basics import Array
 from selfmotion.engine import Objective, StillMotion
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart
+from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
 from support.arms import (
@@ -58,7 +59,7 @@ GRADIENT = 1e-6
 
 def rollout_of(case: Case, steps: int = 12) -> Rollout:
     robot, task, _, path = case
-    return Rollout(robot, path, task, Grid.aligned(path.knots, steps))
+    return Rollout(Follows.of(robot, path, task), Grid.aligned(path.knots, steps))
 
 
 COSTS = {
@@ -102,7 +103,7 @@ def test_panda_gradient_to_seven_digits() -> None:
     robot = robot_named("panda")
     start = start_of(robot, "pose")
     path = sm.Circle.around(robot.pose(start), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
-    rollout = Rollout(robot, path, sm.Task.POSE, Grid.aligned(path.knots, 50))
+    rollout = Rollout(Follows.of(robot, path, sm.Task.POSE), Grid.aligned(path.knots, 50))
     functions = PolynomialNullMotion(3, "joint").functions(rollout.grid.stage_times, 4.0)
     table = NullMotionTable(functions, None, robot.dof)
     costs = [sm.JointVelocity(), sm.InverseManipulability(0.01)]

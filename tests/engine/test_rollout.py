@@ -8,6 +8,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart
+from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import NullMotionTable
 from support.arms import Case, central_difference, objective_of, robot_named, short_line, start_of
@@ -23,7 +24,7 @@ GRADIENT = 1e-6
 
 def rollout_of(case: Case, steps: int = 12) -> Rollout:
     robot, task, _, path = case
-    return Rollout(robot, path, task, Grid.aligned(path.knots, steps))
+    return Rollout(Follows.of(robot, path, task), Grid.aligned(path.knots, steps))
 
 
 def test_null_space_projector(case: Case) -> None:
@@ -76,7 +77,9 @@ def test_integration_is_of_fourth_order(name: str, task: str) -> None:
     # From 40 steps on the feedback (20 over the motion) is resolved and the order shows.
     ends, steps = [], np.array([40, 80, 160, 320, 1600])
     for count in steps:
-        rollout = Rollout(robot, path, sm.Task.of(task), Grid.aligned(path.knots, int(count)))
+        rollout = Rollout(
+            Follows.of(robot, path, sm.Task.of(task)), Grid.aligned(path.knots, int(count))
+        )
         assert rollout.run(start, random_epsilon(rollout, 4, 0.5)) is None
         ends.append(rollout.samples().q[-1].copy())
     errors = [np.linalg.norm(end - ends[-1]) for end in ends[:-1]]
@@ -135,7 +138,7 @@ def test_breakdown_is_reported_not_raised(planar: sm.RobotModel) -> None:
     end = pose.copy()
     end.translation = pose.translation * 1.1
     path = sm.Line(pose, end, 1.0)
-    rollout = Rollout(planar, path, sm.Task.PLANAR, Grid.aligned(path.knots, 10))
+    rollout = Rollout(Follows.of(planar, path, sm.Task.PLANAR), Grid.aligned(path.knots, 10))
     assert rollout.run(start, np.zeros((41, 3))) == 0.0
     table = NullMotionTable(np.ones((41, 1)), None, 3)
     objective = objective_of(rollout, table, [sm.JointVelocity()], FixedStart(start))
@@ -163,7 +166,7 @@ def test_a_breakdown_has_the_time_of_the_first_number_that_is_not_finite(
     case: Case, last: bool
 ) -> None:
     robot, task, start, path = case
-    rollout = Rollout(robot, path, task, Grid.aligned(path.knots, 8))
+    rollout = Rollout(Follows.of(robot, path, task), Grid.aligned(path.knots, 8))
     times = rollout.grid.stage_times
     stage = len(times) - 1 if last else 13
     epsilon = np.zeros((len(times), robot.dof))
@@ -188,7 +191,7 @@ def test_polished_nodes_of_a_tilted_pointing_path_are_on_it(name: str, task: str
     end.rotation = pin.exp3(np.array([0.2, -0.3, 0.1])) @ pose.rotation
     path = sm.Line(pose, end, 1.5)
     rows = sm.Task.of(task)
-    rollout = Rollout(robot, path, rows, Grid.aligned(path.knots, 8))
+    rollout = Rollout(Follows.of(robot, path, rows), Grid.aligned(path.knots, 8))
     assert rollout.run(start, 0.1 * np.ones((33, robot.dof))) is None
     assert np.abs(rollout.drift[:, :5]).max() > 1e-7
     t, q, qd = rollout.polished()
@@ -204,7 +207,7 @@ def test_polishing_leaves_the_run_as_it_is(panda: sm.RobotModel) -> None:
     """What `samples` and `pullback` return is that of the last run."""
     start = start_of(panda, "pose")
     path = short_line(panda, start)
-    rollout = Rollout(panda, path, sm.Task.POSE, Grid.aligned(path.knots, 8))
+    rollout = Rollout(Follows.of(panda, path, sm.Task.POSE), Grid.aligned(path.knots, 8))
     assert rollout.run(start, 0.1 * np.ones((33, 7))) is None
     before, drift = rollout.samples().q.copy(), rollout.drift
     counted = rollout.jacobian_evaluations
@@ -219,7 +222,7 @@ def test_what_broke_down_is_polished_as_far_as_it_goes(panda: sm.RobotModel) -> 
     """Beyond the breakdown there is nothing that could be put onto the path."""
     start = start_of(panda, "pose")
     path = short_line(panda, start)
-    rollout = Rollout(panda, path, sm.Task.POSE, Grid.aligned(path.knots, 8))
+    rollout = Rollout(Follows.of(panda, path, sm.Task.POSE), Grid.aligned(path.knots, 8))
     epsilon = np.zeros((33, 7))
     epsilon[13] = np.inf
     assert rollout.run(start, epsilon) is not None

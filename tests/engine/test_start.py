@@ -5,6 +5,7 @@ import numpy as np
 import selfmotion as sm
 from selfmotion.engine.start import FreeStart
 from support.arms import robot_named, short_line, start_of
+from support.followed import standing
 
 
 def test_free_start_stays_on_the_path_and_knows_its_tangent() -> None:
@@ -12,7 +13,7 @@ def test_free_start_stays_on_the_path_and_knows_its_tangent() -> None:
         robot, rows = robot_named(name), sm.Task.of(task)
         start = start_of(robot, task)
         path = short_line(robot, start)
-        manifold = FreeStart(robot, rows, start)
+        manifold = FreeStart(standing(robot, rows), start)
         pose = path.pose(0.0)
         z = 0.2 * np.random.default_rng(4).normal(size=manifold.size)
         q = manifold.configuration(z, pose)

@@ -37,7 +37,7 @@ def test_pullback_of_one_stage_equals_central_differences(case: Case, damped: bo
         at.target_rotation[0] = pin.exp3(x[2 * n + 3 : 2 * n + 6]) @ goal.rotation
         at.target_twist[0] = twist + x[2 * n + 6 :]
         pin.computeJointJacobians(robot.model, data, at.q[0])
-        pose = pin.updateFramePlacement(robot.model, data, robot.tool_id)
+        pose = pin.updateFramePlacement(robot.model, data, robot.chain.tip)
         place = (data.J, pose.rotation, pose.translation)
         assert kernels.advance(0, *place, table, task.rows, kind, gain, law)
         return float(by_q @ at.q[0] + by_qd @ at.qd[0] + by_error @ at.error[0])

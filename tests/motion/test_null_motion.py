@@ -5,6 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.engine.rollout import Rollout
+from selfmotion.follow import Follows
 from selfmotion.motion import resting_window
 from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion, transport
@@ -19,7 +20,7 @@ ALGEBRA = 1e-10
 
 def rollout_of(case: Case, steps: int = 12) -> Rollout:
     robot, task, _, path = case
-    return Rollout(robot, path, task, Grid.aligned(path.knots, steps))
+    return Rollout(Follows.of(robot, path, task), Grid.aligned(path.knots, steps))
 
 
 def test_transported_basis_is_orthonormal_and_continuous(case: Case) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.engine import Rollout, settled_still_motion
+from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
 from selfmotion.replay import write_replay
 from support.arms import robot_named
@@ -141,7 +142,7 @@ def test_another_null_motion_where_x_0_breaks_down(planar: sm.RobotModel) -> Non
     inner, outer = here.copy(), here.copy()
     inner.translation, outer.translation = here.translation * 0.8, here.translation * 1.3
     inward = sm.Line(here, inner, 1.0)
-    back = Rollout(planar, inward, sm.Task.PLANAR, Grid.aligned(inward.knots, 8000))
+    back = Rollout(Follows.of(planar, inward, sm.Task.PLANAR), Grid.aligned(inward.knots, 8000))
     assert back.run(beside, np.zeros((32001, 3))) is None
     start = planar.inverse_kinematics(inner, "planar", seed=back.samples().q[-1])
     line = sm.Line(inner, outer, 4.0)
@@ -219,7 +220,7 @@ def test_poses_that_limits_put_out_of_reach_end_the_search(
         progress=lambda stage, number, of: stages.append(stage),
     )
     lengths = [np.linalg.norm(place.translation) for place in planar.model.jointPlacements][2:]
-    lengths.append(np.linalg.norm(planar.model.frames[planar.tool_id].placement.translation))
+    lengths.append(np.linalg.norm(planar.model.frames[planar.chain.tip].placement.translation))
     folded = sum(length * np.exp(1j * most * k) for k, length in enumerate(lengths))
     times = np.linspace(0.0, 3.0, 300_001)
     beyond = np.linalg.norm(line.samples(times).translation, axis=1) < abs(folded)

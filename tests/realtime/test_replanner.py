@@ -9,6 +9,7 @@ import selfmotion as sm
 from selfmotion.realtime import Flag, Replanner
 from support import realtime_scenarios as scenarios
 from support.arms import PANDA_HOME
+from support.followed import standing
 from support.loops import closed_loop
 
 # Segments meet in the same numbers, computed in the same way but for one shift of an index.
@@ -83,7 +84,7 @@ def test_a_closed_loop_costs_little_more_than_planning_all_at_once(panda: sm.Rob
     q = np.concatenate([segment.q[:count] for segment in segments])
     qd = np.concatenate([segment.qd[:count] for segment in segments])
     sampling = sm.motion.Sampling.trapezoidal(replanner.cycle * np.arange(len(q)))
-    samples = sm.Samples.along(panda, sm.Task.POSITION, sampling, q, qd)
+    samples = sm.Samples.along(standing(panda, sm.Task.POSITION), sampling, q, qd)
     cost = sum(float(samples.weights @ item.value(samples)) for item in costs)
     assert cost < 1.03 * full.cost
     assert cost < full.initial_cost

@@ -7,6 +7,7 @@ import selfmotion as sm
 from selfmotion.search import spread, targets
 from selfmotion.search.manifold import Manifold
 from support.arms import robot_named
+from support.followed import standing
 from support.paths import line_of
 
 CASES = (("panda", "position"), ("panda", "pointing"), ("tiago", "pose"), ("ur5", "pointing"))
@@ -17,21 +18,19 @@ def test_compiled_kinematics_that_are_not_those_of_pinocchio_are_refused(
     off: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = robot_named("panda")
-    rotations, positions, axes, turning = robot.joint_places()
-    wrong = positions.copy()
+    arrays = robot.chain.arrays
+    wrong = arrays.positions.copy()
     wrong[3, 0] += off
-    monkeypatch.setattr(
-        sm.RobotModel, "joint_places", lambda own: (rotations, wrong, axes, turning)
-    )
+    monkeypatch.setattr(robot.chain, "arrays", arrays._replace(positions=wrong))
     with pytest.raises(sm.RobotError, match="compiled kinematics put 'panda_hand_tcp'"):
-        Manifold(robot, sm.Task.POSITION, robot.lower, robot.upper)
+        Manifold(standing(robot, sm.Task.POSITION), robot.lower, robot.upper)
 
 
 @pytest.mark.parametrize(("name", "task"), CASES)
 def test_projection_is_onto_the_path_and_within_the_limits(name: str, task: str) -> None:
     robot, rows = robot_named(name), sm.Task.of(task)
     path = line_of(robot, task)
-    manifold = Manifold(robot, rows, robot.lower, robot.upper)
+    manifold = Manifold(standing(robot, rows), robot.lower, robot.upper)
     seeds = np.array(list(spread(robot, 100, np.random.default_rng(0))))
     q, arrived = manifold.project(seeds, targets(path, np.zeros(1))[0], far=True)
     # Of an arm near its limits not every seed leads there.
@@ -47,7 +46,7 @@ def test_a_joint_at_its_limit_stays_there_while_others_go_on() -> None:
     q = robot.dexterous_configuration("position")
     upper = robot.upper.copy()
     upper[3] = q[3]
-    manifold = Manifold(robot, sm.Task.POSITION, robot.lower, upper)
+    manifold = Manifold(standing(robot, sm.Task.POSITION), robot.lower, upper)
     pose = robot.pose(q + 0.05)
     target = np.concatenate([pose.translation, pose.rotation.ravel()])
     beyond = q.copy()
@@ -63,7 +62,7 @@ def test_bases_are_carried_without_turning() -> None:
     task = sm.Task.POSITION
     q0 = robot.dexterous_configuration(task)
     q = q0 + np.linspace(0.0, 0.5, 40)[:, None]
-    bases = Manifold(robot, task, robot.lower, robot.upper).carried_bases(q)
+    bases = Manifold(standing(robot, task), robot.lower, robot.upper).carried_bases(q)
     for here, basis in zip(q, bases, strict=True):
         np.testing.assert_allclose(robot.task_jacobian(here, task) @ basis, 0.0, atol=1e-12)
     # Between neighbours 0.03 rad apart, bases of the same planes turn about as much.

@@ -12,6 +12,7 @@ from selfmotion.motion import Sampling
 from selfmotion.search.chains import best_chains
 from selfmotion.search.measures import Length, RunningCost, measure_of
 from support.arms import robot_named
+from support.followed import standing
 
 COSTS = (
     sm.JointVelocity(2.0),
@@ -34,11 +35,11 @@ def smooth_motion(count: int) -> tuple[Array, Array, Array]:
 def test_a_chain_costs_what_its_motion_does() -> None:
     robot, task = robot_named("panda"), sm.Task.POSE
     t, q, qd = smooth_motion(801)
-    samples = Samples.along(robot, task, Sampling.trapezoidal(t), q, qd)
+    samples = Samples.along(standing(robot, task), Sampling.trapezoidal(t), q, qd)
     integral = sum(float(samples.weights @ cost.value(samples)) for cost in COSTS)
     errors = []
     for stride in (20, 10):
-        coarse = RunningCost.by(robot, task, COSTS, t[::stride])
+        coarse = RunningCost.by(standing(robot, task), COSTS, t[::stride])
         errors.append(abs(coarse.of(q[::stride]) / integral - 1.0))
     # The energy takes the inertia at the beginning of each step: first order.
     assert errors[1] < 0.6 * errors[0]
@@ -50,7 +51,7 @@ def test_faster_steps_count_as_spread_over_the_time_that_they_take() -> None:
     t = np.array([0.0, 0.1, 0.2])
     q = np.array(sm.NAMED_ARMS["panda"].home)
     jump = np.array([q, q + 0.5, q + 0.5])
-    measure = RunningCost.by(robot, task, [sm.JointVelocity()], t)
+    measure = RunningCost.by(standing(robot, task), [sm.JointVelocity()], t)
     moved = 0.5 * np.sqrt(7.0)
     assert measure.of(jump) == pytest.approx(0.5 * moved**2 / 0.1)
     # At twice the mean speed v: ½v² over |Δq| / v.
@@ -65,7 +66,7 @@ def test_the_cheapest_chain_is_that_of_brute_force_and_so_backwards() -> None:
     layers = [here + 0.1 * rng.normal(size=(4, 7)) for here in q]
     layers = [layer[np.argsort(layer[:, 0])] for layer in layers]
     step = np.full(7, 0.6)
-    measure = RunningCost.by(robot, task, COSTS, t).at_pace_of(q)
+    measure = RunningCost.by(standing(robot, task), COSTS, t).at_pace_of(q)
     costs = []
     for chain in itertools.product(range(4), repeat=len(layers)):
         motion = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
@@ -85,8 +86,8 @@ def test_the_cheapest_chain_is_that_of_brute_force_and_so_backwards() -> None:
 def test_lengths_are_measured_as_such_and_accelerations_left_out() -> None:
     robot, task, t = robot_named("panda"), sm.Task.POSE, np.linspace(0.0, 1.0, 5)
     ones = np.ones(7)
-    assert isinstance(measure_of(robot, task, [sm.PathLength()], t, ones), Length)
-    assert isinstance(measure_of(robot, task, [sm.JointAcceleration()], t, ones), Length)
-    both = measure_of(robot, task, [sm.JointVelocity(), sm.JointJerk()], t, ones)
+    assert isinstance(measure_of(standing(robot, task), [sm.PathLength()], t, ones), Length)
+    assert isinstance(measure_of(standing(robot, task), [sm.JointAcceleration()], t, ones), Length)
+    both = measure_of(standing(robot, task), [sm.JointVelocity(), sm.JointJerk()], t, ones)
     assert isinstance(both, RunningCost)
     assert [cost.name for cost in (*both.placed, *both.moving)] == ["joint velocity"]

@@ -6,10 +6,12 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.basics.errors import NoSequenceError
+from selfmotion.follow import Follows
 from selfmotion.search import targets
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.sampled import sampled_sequences
 from support.arms import robot_named
+from support.followed import standing
 from support.paths import line_of
 
 STEP = 0.5
@@ -24,7 +26,7 @@ def searched(robot: sm.RobotModel, path: sm.Path, **options: object) -> list[sm.
         "count": 2,
     }
     t = np.linspace(0.0, path.duration, 21)
-    return sampled_sequences(robot, path, sm.Task.POSITION, t, **(values | options))
+    return sampled_sequences(Follows.of(robot, path, sm.Task.POSITION), t, **(values | options))
 
 
 def test_sequences_follow_the_path_keep_all_and_are_as_long_as_they_say() -> None:
@@ -52,7 +54,7 @@ def test_it_is_not_longer_than_following_from_the_same_start() -> None:
     robot = robot_named("panda")
     path = line_of(robot, "position")
     best = searched(robot, path)[0]
-    manifold = Manifold(robot, sm.Task.POSITION, robot.lower, robot.upper)
+    manifold = Manifold(standing(robot, sm.Task.POSITION), robot.lower, robot.upper)
     q, length = best.q[:1], 0.0
     for target in targets(path, best.t)[1:]:
         following, arrived = manifold.project(q, target)

@@ -10,6 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.basics.errors import NoSequenceError, ProblemError
+from selfmotion.follow import Follows
 from selfmotion.search import Sequence, best_sequences
 from support.places import DATA
 
@@ -68,9 +69,7 @@ def flappy_bird() -> tuple[sm.RobotModel, sm.Waypoints, sm.CollisionModel | None
 def flappy_sequences(flappy_bird) -> list[Sequence]:
     robot, path, collision = flappy_bird
     return best_sequences(
-        robot,
-        path,
-        "pose",
+        Follows.of(robot, path, "pose"),
         path.waypoint_times,
         lower=robot.lower,
         upper=robot.upper,
@@ -130,7 +129,9 @@ def level(x: float, y: float) -> pin.SE3:
 
 def planar_search(arm: sm.RobotModel, path: sm.Path, **options) -> list[Sequence]:
     settings = {"lower": -2.9, "upper": 2.9, "largest_step": 0.3, "count": 2} | options
-    return best_sequences(arm, path, "planar", np.linspace(0.0, path.duration, 21), **settings)
+    return best_sequences(
+        Follows.of(arm, path, "planar"), np.linspace(0.0, path.duration, 21), **settings
+    )
 
 
 LINE = sm.Line(level(2.0, 1.0), level(3.0, -0.5), 1.0)
@@ -151,7 +152,11 @@ def test_a_continuous_joint_goes_on_past_pi() -> None:
     robot, path, _ = suite_problem("fetch_arm__circle")
     times = path.waypoint_times[:60]
     found = best_sequences(
-        robot, path, "pose", times, lower=robot.lower, upper=robot.upper, largest_step=STEP
+        Follows.of(robot, path, "pose"),
+        times,
+        lower=robot.lower,
+        upper=robot.upper,
+        largest_step=STEP,
     )
     for sequence in found:
         assert not faults(robot, path, sm.Task.POSE, sequence, robot.lower, robot.upper, STEP, None)
@@ -185,9 +190,7 @@ def test_a_box_in_the_way_is_named(panda: sm.RobotModel) -> None:
     box = sm.Box("crate", start.translation + np.array([0.0, 0.25, 0.0]), [0.3, 0.1, 0.3])
     with pytest.raises(NoSequenceError, match=r"collision.*'crate'") as error:
         best_sequences(
-            panda,
-            path,
-            "pose",
+            Follows.of(panda, path, "pose"),
             np.linspace(0.0, 1.0, 31),
             lower=panda.lower,
             upper=panda.upper,
@@ -214,7 +217,9 @@ def test_nonsense_is_refused(arm: sm.RobotModel, options, message: str) -> None:
 def test_other_redundancies_are_refused(panda: sm.RobotModel) -> None:
     path = sm.Line(panda.pose(np.zeros(7)), panda.pose(np.full(7, 0.1)), 1.0)
     with pytest.raises(ProblemError, match="has redundancy 4 for task 'position'"):
-        best_sequences(panda, path, "position", [0.0, 1.0], lower=-1.0, upper=1.0, largest_step=0.1)
+        best_sequences(
+            Follows.of(panda, path, "position"), [0.0, 1.0], lower=-1.0, upper=1.0, largest_step=0.1
+        )
 
 
 def test_room_for_several_turns_changes_neither_motion_nor_limits(arm: sm.RobotModel) -> None:
@@ -236,10 +241,12 @@ def test_steps_of_their_own_for_each_interval(arm: sm.RobotModel) -> None:
     times = np.concatenate([np.linspace(0.0, 0.5, 31), np.linspace(0.5, 1.0, 7)[1:]])
     step = 4.0 * np.diff(times)[:, None] * np.ones(3)
     found = best_sequences(
-        arm, LINE, "planar", times, lower=-2.9, upper=2.9, largest_step=step, count=1
+        Follows.of(arm, LINE, "planar"), times, lower=-2.9, upper=2.9, largest_step=step, count=1
     )[0]
     moved = np.abs(np.diff(found.q, axis=0))
     assert np.all(moved <= step * (1 + 1e-12))
     assert moved[30:].max() > step[0, 0]
     with pytest.raises(ProblemError, match="largest_step has shape"):
-        best_sequences(arm, LINE, "planar", times, lower=-2.9, upper=2.9, largest_step=step[1:])
+        best_sequences(
+            Follows.of(arm, LINE, "planar"), times, lower=-2.9, upper=2.9, largest_step=step[1:]
+        )

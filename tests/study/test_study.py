@@ -21,6 +21,7 @@ from selfmotion.study.published import (
     published_null_motion,
 )
 from selfmotion.study.results import Section, Table
+from support.followed import standing
 
 # Costs of the reading notes are given to four or five decimals.
 PRINTED = 1e-4
@@ -173,7 +174,7 @@ def test_solver_points_integrate_straight_lines(planar: sm.RobotModel) -> None:
     assert points.weights @ (3.0 * points.t + 1.0) == pytest.approx(2.5)
     assert points.weights @ points.t**2 > 1.0 / 3.0
     q = np.random.default_rng(0).normal(size=(4, 3))
-    samples = Samples.along(planar, sm.Task.PLANAR, points, q, np.zeros_like(q))
+    samples = Samples.along(standing(planar, sm.Task.PLANAR), points, q, np.zeros_like(q))
     for k in range(4):
         expected = planar.task_jacobian(q[k], sm.Task.PLANAR)
         np.testing.assert_array_equal(samples.task_jacobian[k], expected)
@@ -184,7 +185,7 @@ def test_samples_along_are_those_of_the_rollout(panda: sm.RobotModel) -> None:
     path = sm.Circle.around(panda.pose(start), 0.1, 2.0)
     objective = bind(sm.Problem(panda, path, "pointing", start), 8)
     ours = objective.samples(np.zeros(objective.size))
-    again = Samples.along(panda, sm.Task.POINTING, ours.sampling, ours.q, ours.qd)
+    again = Samples.along(standing(panda, sm.Task.POINTING), ours.sampling, ours.q, ours.qd)
     # Two orders of the same rotations' products.
     np.testing.assert_allclose(again.task_jacobian, ours.task_jacobian, atol=1e-12)
 

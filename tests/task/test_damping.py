@@ -12,6 +12,7 @@ from selfmotion.basics import Array
 from selfmotion.costs import OffPath
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart
+from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.task.damping import DampingLaw
@@ -30,7 +31,7 @@ def smallest_singular_values(rollout: Rollout) -> Array:
 
 
 def table_of(rollout: Rollout, degree: int = 2) -> NullMotionTable:
-    t, duration = rollout.grid.stage_times, rollout.path.duration
+    t, duration = rollout.grid.stage_times, rollout.follows.duration
     functions = PolynomialNullMotion(degree, "joint").functions(t, duration)
     return NullMotionTable(functions, None, rollout.robot.dof)
 
@@ -40,11 +41,13 @@ def partly_damped(case: Case, start: Array | None = None, steps: int = 8) -> Rol
     robot, task, given, path = case
     start = given if start is None else start
     grid = Grid.aligned(path.knots, steps)
-    free = Rollout(robot, path, task, grid)
+    free = Rollout(Follows.of(robot, path, task), grid)
     epsilon = np.zeros((len(grid.stage_times), robot.dof))
     assert free.run(start, epsilon) is None
     threshold = float(np.median(smallest_singular_values(free)))
-    rollout = Rollout(robot, path, task, grid, damping=DampingLaw(threshold, 0.5 * threshold))
+    rollout = Rollout(
+        Follows.of(robot, path, task), grid, damping=DampingLaw(threshold, 0.5 * threshold)
+    )
     assert rollout.run(start, epsilon) is None
     assert rollout.damped
     return rollout
@@ -76,10 +79,10 @@ def test_damping_out_of_reach_changes_no_bit(case: Case) -> None:
     robot, task, start, path = case
     grid = Grid.aligned(path.knots, 20)
     epsilon = 0.1 * np.random.default_rng(2).normal(size=(len(grid.stage_times), robot.dof))
-    free = Rollout(robot, path, task, grid)
+    free = Rollout(Follows.of(robot, path, task), grid)
     assert free.run(start, epsilon) is None
     threshold = 0.99 * float(smallest_singular_values(free).min())
-    damped = Rollout(robot, path, task, grid, damping=DampingLaw(threshold, threshold))
+    damped = Rollout(Follows.of(robot, path, task), grid, damping=DampingLaw(threshold, threshold))
     assert damped.run(start, epsilon) is None
     assert not damped.damped
     np.testing.assert_array_equal(damped.samples().q, free.samples().q)
