@@ -30,7 +30,7 @@ def constant(values: npt.ArrayLike, like: Array) -> Array:
 def product(a: Array, b: Array) -> Array:
     """Return the series of a product, as long as the shorter one."""
     length = min(len(a), len(b))
-    found = a[0] * b[:length]
+    found: Array = a[0] * b[:length]
     for k in range(1, length):
         found[k:] += a[k] * b[: length - k]
     return found

@@ -6,11 +6,11 @@ is measured at K Chebyshev nodes. The polynomial p through them misses it by at 
     |f - p| ≤ sup |∂ᴷf/∂uᴷ| / K! / 2^(K-1),    u = (t - m) / h
 
 (P. J. Davis, Interpolation and Approximation, 1963, th. 3.1.1), and the K-th derivative is bounded
-by the majorant series of f. Between two of the places u_i at which p is looked at, δ apart, p leaves
-its chord by at most δ²/8 sup|p''|, and |p''| ≤ Σ |a_k| k²(k² - 1)/3 for p = Σ a_k T_k (V. A. Markov).
-A convex size of f that grows no faster than |f| is then at most its largest value at the u_i plus
-both. Intervals on which this does not decide are halved. What is not known is rounding: some 1e-15
-of the size of what is measured.
+by the majorant series of f. Between two of the places u_i at which p is looked at, δ apart, p
+leaves its chord by at most δ²/8 sup|p''|, and |p''| ≤ Σ |a_k| k²(k² - 1)/3 for p = Σ a_k T_k
+(V. A. Markov). A convex size of f that grows no faster than |f| is then at most its largest value
+at the u_i plus both. Intervals on which this does not decide are halved. What is not known is
+rounding: some 1e-15 of the size of what is measured.
 
 A function without a majorant is bounded as measured: by the last two coefficients a_k in place of
 the first bound. That is no proof.
@@ -144,14 +144,12 @@ class _Found(NamedTuple):
     samples: int
 
 
-def bounded(
-    function: Bounded, robot: RobotModel, trajectory: Trajectory, edges: Array
-) -> Bounds:
+def bounded(function: Bounded, robot: RobotModel, trajectory: Trajectory, edges: Array) -> Bounds:
     """Bound a function of a motion between all edges (E,) [s], which contain the samples."""
     values, times = np.zeros(len(function.of)), np.full(len(function.of), edges[0])
     undecided: list[tuple[float, float]] = []
     proved, samples = True, 0
-    for intervals, found, left in _settled(function, robot, trajectory, edges):
+    for left, found in _settled(function, robot, trajectory, edges):
         proved, samples = proved and found.proved, samples + found.samples
         for size in range(len(values)) if len(found.values) else ():
             # Written so that NaN is worse than any.
@@ -159,14 +157,14 @@ def bounded(
             value = found.values[worst, size]
             if not (np.isnan(values[size]) or value <= values[size]):
                 values[size], times[size] = value, found.times[worst, size]
-        undecided += [(float(a), float(b)) for a, b in intervals[left]]
+        undecided += [(float(a), float(b)) for a, b in left]
     return Bounds(values, times, tuple(undecided), proved, samples + 1)
 
 
 def _settled(
     function: Bounded, robot: RobotModel, trajectory: Trajectory, edges: Array
-) -> Iterator[tuple[Array, _Found, Ints]]:
-    """Yield lots of intervals with what was found of those that settle, and which never do."""
+) -> Iterator[tuple[Array, _Found]]:
+    """Yield by lots the intervals (I, 2) that never settle, and what was found of all that did."""
     for first in range(0, len(edges) - 1, _LOT):
         part = edges[first : first + _LOT + 1]
         pending = np.stack([part[:-1], part[1:]], axis=1)
@@ -178,23 +176,24 @@ def _settled(
             settled = kept | broken
             left = np.flatnonzero(~settled)
             last = depth == _DEPTH or len(left) > _MOST
-            told = np.flatnonzero(settled & np.isfinite(found.values).all(axis=1) | broken)
-            shown = _Found(found.values[told], found.times[told], found.measured[told], *found[3:])
-            yield pending, _measured_instead(shown), left if last else left[:0]
+            told = np.arange(len(pending)) if last else np.flatnonzero(settled)
+            # Where there is no bound, what was measured: it is broken, or undecided.
+            values = np.where(np.isfinite(found.values), found.values, found.measured)
+            yield (
+                pending[left if last else left[:0]],
+                found._replace(values=values[told], times=found.times[told]),
+            )
             if last or not len(left):
                 break
             pending = halves(pending[left])
 
 
-def _measured_instead(found: _Found) -> _Found:
-    """Return what was found, with what was measured where there is no bound: it is broken."""
-    values = np.where(np.isfinite(found.values), found.values, found.measured)
-    return found._replace(values=values)
-
-
 def _measured(function: Bounded, stretch: Stretch) -> _Found:
     """Bound all sizes on the intervals of a stretch."""
-    count, known = len(stretch.middle), function.series(stretch)
+    count = len(stretch.middle)
+    # What is too wild for numbers is halved.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        known = function.series(stretch)
     sizes = len(function.of)
     values, times, measured = (np.empty((count, sizes)) for _ in range(3))
     nodes = np.full(count, _MEASURED)
@@ -258,7 +257,8 @@ def _matrices(count: int) -> tuple[Array, Array, Array, Array, Array]:
     into = np.linalg.inv(np.polynomial.chebyshev.chebvander(u, count - 1))
     between = np.polynomial.chebyshev.chebvander(places, count - 1)
     k = np.arange(float(count))
-    return u, places, into, between, (2.0 / (_PLACES - 1)) ** 2 / 8.0 * k**2 * (k**2 - 1.0) / 3.0
+    bends = (2.0 / (_PLACES - 1)) ** 2 / 24.0 * k**2 * (k**2 - 1.0)
+    return np.asarray(u), places, np.asarray(into), np.asarray(between), bends
 
 
 def halves(intervals: Array) -> Array:

@@ -9,7 +9,7 @@ x > 0, whose derivatives |g⁽ᵏ⁾|/k! are at most g(c) / (1 + c)ᵏ.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -119,9 +119,9 @@ def _edges(path: Path, trajectory: Trajectory, relaxations: Sequence[Relaxation]
     windows = [time for item in relaxations for time in item.window(path.duration)]
     marks = np.concatenate([trajectory.t, path.marks, windows])
     marks = np.unique(np.clip(marks, start, end))
-    marks = marks[np.append(True, np.diff(marks) > _SAME * path.duration)]
-    marks[-1] = end
-    return marks
+    kept: Array = marks[np.append(True, np.diff(marks) > _SAME * path.duration)]
+    kept[-1] = end
+    return kept
 
 
 class _PathErrors(Bounded):

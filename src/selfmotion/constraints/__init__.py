@@ -1,16 +1,16 @@
 """What a motion must keep: limits, end conditions, closed paths, clearance."""
 
 from selfmotion.constraints.band import Band
-from selfmotion.constraints.base import (
+from selfmotion.constraints.base import Constraint
+from selfmotion.constraints.binding import Binding
+from selfmotion.constraints.clearance import Clearance
+from selfmotion.constraints.conditions import (
     BoundConstraint,
-    Constraint,
     Linearised,
     NodeTangents,
     easing_of,
     linearised,
 )
-from selfmotion.constraints.binding import Binding
-from selfmotion.constraints.clearance import Clearance
 from selfmotion.constraints.ends import (
     ClosedPath,
     EndAcceleration,

@@ -19,7 +19,8 @@ from selfmotion.collision import (
     disabled_links,
     obstacle_from_dict,
 )
-from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
+from selfmotion.constraints.base import Constraint
+from selfmotion.constraints.conditions import NodeTangents, motion_of_order
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
 from selfmotion.follow import Follows

@@ -1,6 +1,15 @@
 """Tool motion over time: what the tool frame is to do, as pose and twist at any time."""
 
-from selfmotion.path.base import STILL, Path, PathSamples, PathSeries, TimeLaw, check_oriented, path_pose, path_series
+from selfmotion.path.base import (
+    STILL,
+    Path,
+    PathSamples,
+    PathSeries,
+    TimeLaw,
+    check_oriented,
+    path_pose,
+    path_series,
+)
 from selfmotion.path.feed import Feed
 from selfmotion.path.joined import Dwell, Joined, with_leads
 from selfmotion.path.pace import Pace, times_along

@@ -200,10 +200,10 @@ class Polyline(Path, kind="polyline"):
         before[:2] += np.stack([x, half])
         parts = series.of_polynomial(before), series.of_polynomial(after)
         moved, turned = (
-            sum(np.linalg.norm(rate[k], axis=1) * part for rate, part in zip(rates, parts, strict=True))
-            for rates in (corners[:2], corners[2:4])
+            np.linalg.norm(slow[k], axis=1) * parts[0] + np.linalg.norm(fast[k], axis=1) * parts[1]
+            for slow, fast in (corners[:2], corners[2:4])
         )
-        return PathSeries(np.asarray(moved), series.exponential(np.asarray(turned)))
+        return PathSeries(moved, series.exponential(turned))
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""

@@ -216,7 +216,8 @@ class Waypoints(Path, kind="waypoints"):
         k = np.clip(np.searchsorted(self._t, t, side="right") - 1, 0, len(self._t) - 2)
         a, b = 1.0 * ~self._stops[k], 1.0 * ~self._stops[k + 1]
         higher = 10 - 6 * a - 4 * b, -15 + 8 * a + 7 * b, 6 - 3 * a - 3 * b
-        return k, self._t[k + 1] - self._t[k], (a, *higher)
+        first, third, fourth, fifth = (np.asarray(item, dtype=np.float64) for item in (a, *higher))
+        return k, self._t[k + 1] - self._t[k], (first, third, fourth, fifth)
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
