@@ -37,7 +37,8 @@ def random_problem(robot: sm.RobotModel, rng: np.random.Generator) -> sm.Problem
             there = pose.copy()
             there.translation = point
             poses.append(there)
-        path = sm.Ramped(sm.Waypoints.from_poses(np.linspace(0.0, seconds, 6), poses), 0.5)
+        waypoints = sm.Waypoints.from_poses(np.linspace(0.0, seconds, 6), poses)
+        path = sm.section_at_rest(waypoints, ramp=0.5)
     if rng.random() < 0.3:
         away = rng.normal(size=3)
         box = pose.translation + 0.35 * away / np.linalg.norm(away)

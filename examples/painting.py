@@ -24,7 +24,7 @@ for point in points:
     pose = middle.copy()
     pose.translation = point
     poses.append(pose)
-lanes = sm.Ramped(sm.Waypoints.from_poses(times, poses, corners="stop"), ramp=0.4)
+lanes = sm.section_at_rest(sm.Waypoints.from_poses(times, poses, corners="stop"), ramp=0.4)
 
 for task in ("pose", "pointing"):
     problem = sm.Problem(xarm, lanes, task=task)

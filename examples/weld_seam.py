@@ -14,7 +14,7 @@ panda = sm.load_robot("panda", tool_offset=torch)
 # The seam is drawn on the workpiece; the workpiece stands here. Run up to 40 mm/s and down again.
 workpiece = [[1, 0, 0, 0.45], [0, 1, 0, -0.1], [0, 0, 1, 0.35], [0, 0, 0, 1]]
 seam = sm.read_path(HERE / "seam.csv", feed=0.04)
-path = sm.Ramped(sm.Placed(seam, workpiece), ramp=0.5)
+path = sm.section_at_rest(sm.Placed(seam, workpiece), ramp=0.5)
 
 problem = sm.Problem(
     panda,

@@ -9,8 +9,7 @@ from typer.testing import CliRunner
 
 import selfmotion as sm
 from selfmotion.basics import write_csv
-from selfmotion.cli import app
-from selfmotion.cli import main as command
+from selfmotion.cli import app, main as command
 from support.arms import PANDA_HOME
 
 

@@ -20,8 +20,8 @@ from selfmotion.collision import (
     Obstacle,
     Sphere,
     obstacle_from_dict,
+    obstacles as module,
 )
-from selfmotion.collision import obstacles as module
 from selfmotion.replay import scene
 from selfmotion.replay.payload import Payload
 from selfmotion.robot import load_robot

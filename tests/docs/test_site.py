@@ -11,6 +11,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion import realtime, replay, testing
+from support.doors import named
 from support.places import ROOT
 
 EXAMPLES = sorted(file.stem for file in (ROOT / "examples").glob("*.py"))
@@ -86,12 +87,12 @@ def test_equations_are_drawn_by_the_browser(site: Path) -> None:
 def test_every_public_name_is_on_one_page_of_the_api(site: Path) -> None:
     pages = "\n".join(page.read_text() for page in (ROOT / "docs/pages/api").glob("*.md"))
     listed = re.findall(r"^::: (\S+)$", pages, re.MULTILINE)
-    wanted = [f"selfmotion.{name}" for name in sm.__all__]
+    wanted = [f"selfmotion.{name}" for name in named(sm)]
     wanted += [f"selfmotion.testing.{name}" for name in testing.__all__]
-    wanted += [f"selfmotion.replay.{name}" for name in replay.__all__]
-    own = set(realtime.__all__) - set(sm.__all__)
+    wanted += [f"selfmotion.replay.{name}" for name in named(replay)]
+    own = set(named(realtime)) - set(named(sm))
     wanted += [f"selfmotion.realtime.{name}" for name in own]
     assert sorted(listed) == sorted(wanted)
     shown = "\n".join(page.read_text() for page in (site / "api").glob("*.html"))
-    for name in sm.__all__:
+    for name in named(sm):
         assert f'id="selfmotion.{name}"' in shown, name

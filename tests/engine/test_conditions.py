@@ -84,7 +84,6 @@ def test_conditions_stand_one_after_another(grid: Grid, samples: Samples) -> Non
     assert none.rows(samples, motion).picked(every[:0]).shape == (0, 4)
     assert none.rows(samples, motion).along(np.ones(4)).shape == (0,)
     assert none.penalty(samples) == 0.0
-    assert both.on(grid.halved()).constraints == (first, second)
 
 
 @pytest.mark.parametrize("equality", [False, True])

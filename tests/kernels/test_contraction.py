@@ -7,6 +7,7 @@ from selfmotion import kernels
 from selfmotion.kernels import contraction, damping
 from support.arms import Case, central_difference
 from support.compiled import compiled
+from support.followed import standing
 
 contract, damp = compiled(contraction.contract), compiled(damping.damp)
 
@@ -16,7 +17,8 @@ def test_contraction_with_the_hessian_and_a_twist(panda: sm.RobotModel) -> None:
     rng = np.random.default_rng(8)
     q, weights, twist = rng.normal(size=7), rng.normal(size=(6, 7)), rng.normal(size=6)
     out = np.ones(7)
-    contract(np.ascontiguousarray(panda.jacobian(q)), weights, twist, out)
+    layout = standing(panda, "pose").layout
+    contract(layout, 0, np.ascontiguousarray(panda.jacobian(q)), weights, twist, out)
     hessian = central_difference(lambda x: float((weights * panda.jacobian(x)).sum()), q)
     np.testing.assert_allclose(out, 1.0 + hessian + panda.jacobian(q).T @ twist, atol=1e-8)
 
@@ -29,8 +31,8 @@ def test_contraction_equals_the_jacobian_hessian(case: Case) -> None:
         robot.jacobian(start)[None],
         np.array(robot.pose(start).rotation)[None],
         weights[None],
-        task.rows,
-        task.tool_axes,
+        standing(robot, task).layout,
+        0,
     )[0]
     expected = central_difference(
         lambda q: float((weights * robot.task_jacobian(q, task)).sum()), start

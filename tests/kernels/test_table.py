@@ -8,25 +8,30 @@ from selfmotion.kernels import backward, table
 from support.compiled import compiled
 
 
+@pytest.mark.parametrize("tips", [1, 2, 3])
 @pytest.mark.parametrize(("n", "m"), [(3, 2), (7, 6), (8, 5), (2, 1)])
-def test_parts_tile_what_they_are_parts_of(n: int, m: int) -> None:
+def test_parts_tile_what_they_are_parts_of(n: int, m: int, tips: int) -> None:
     """Each number belongs to one part: no overlap, none left, none beyond the end."""
-    for parts, size in (
-        (table.parts, kernels.columns(n, m)),
-        (backward.divide, kernels.space_size(n, m)),
+    row = np.arange(float(kernels.columns(n, m, tips)))
+    space = np.arange(float(kernels.space_size(n, m, tips)))
+    of_tips = [part for f in range(tips) for part in table.tip_of(row, f, n, m)]
+    for numbers, parts in (
+        (row, [*table.parts(row, n, m), *of_tips]),
+        (space, backward.divide(space, n, m, tips)),
     ):
-        numbers = np.arange(float(size))
-        found = np.concatenate([part.ravel() for part in parts(numbers, n, m)])
+        found = np.concatenate([part.ravel() for part in parts])
         np.testing.assert_array_equal(np.sort(found), numbers)
 
 
 def test_compiled_parts_are_those_in_python() -> None:
     """Of a row, and q and q̇ by themselves."""
-    rows = np.random.default_rng(0).normal(size=(2, kernels.columns(7, 6)))
-    read = compiled(table.parts)
+    rows = np.random.default_rng(0).normal(size=(2, kernels.columns(7, 6, 2)))
+    read, read_tip = compiled(table.parts), compiled(table.tip_of)
     for s in range(2):
-        for mine, theirs in zip(read(rows[s], 7, 6), table.parts(rows[s], 7, 6), strict=True):
-            np.testing.assert_array_equal(mine, theirs)
+        mine = [*read(rows[s], 7, 6), *read_tip(rows[s], 1, 7, 6)]
+        theirs = [*table.parts(rows[s], 7, 6), *table.tip_of(rows[s], 1, 7, 6)]
+        for one, other in zip(mine, theirs, strict=True):
+            np.testing.assert_array_equal(one, other)
         np.testing.assert_array_equal(
             compiled(table.q_of)(rows, s, 7), kernels.parts(rows, 7, 6).q[s]
         )

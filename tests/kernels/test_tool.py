@@ -109,7 +109,8 @@ def test_selection_is_the_tasks_and_has_its_adjoint(task: sm.Task) -> None:
     """⟨S t, v⟩ = ⟨t, Sᵀ v⟩, and J = S J6 column by column."""
     rng = np.random.default_rng(7)
     rotation, jacobian = random_rotation(rng), rng.normal(size=(6, 7))
-    v, given = rng.normal(size=task.dimension), (task.rows, task.tool_axes, rotation)
+    layout = tool.layout_of([(task.rows, task.tool_axes, np.arange(7))], 7)
+    v, given = rng.normal(size=task.dimension), (layout, 0, rotation)
     rows, selected = np.empty((task.dimension, 7)), np.empty(task.dimension)
     back = np.empty(6)
     task_rows(*given, jacobian, rows)

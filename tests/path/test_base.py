@@ -26,8 +26,9 @@ PATHS = {
     "twist": lambda: sm.TwistPath(pose(1), tumbling, 2.0),
     "waypoints": random_waypoints,
     "waypoints with stops": lambda: random_waypoints("stop"),
-    "ramped line": lambda: sm.Ramped(sm.Line(pose(1), pose(2), 2.0, "constant"), 0.4),
-    "ramped waypoints": lambda: sm.Ramped(random_waypoints(), 0.9),
+    "ramped line": lambda: sm.section_at_rest(sm.Line(pose(1), pose(2), 2.0, "constant"), ramp=0.4),
+    "ramped waypoints": lambda: sm.section_at_rest(random_waypoints(), ramp=0.9),
+    "end of waypoints": lambda: sm.Section(random_waypoints(), 0.7, 1.9, crowding=True),
     "there and back": there_and_back,
 }
 
@@ -108,10 +109,13 @@ def test_bad_paths_are_refused(call, message: str) -> None:
             lambda: sm.Line(pose(1), pose(2), 2.0, "constant") + sm.Dwell(pose(2), 1.0),
             "faster or slower than piece 1 ends",
         ),
-        (lambda: sm.Ramped(sm.Line(pose(1), pose(2), 2.0), 3.0), "ramp is 3.0 s, expected"),
+        (
+            lambda: sm.section_at_rest(sm.Line(pose(1), pose(2), 2.0), ramp=3.0),
+            "ramp is 3.0 s, expected",
+        ),
         (lambda: sm.Dwell(pose(1), 0.0), "duration"),
     ],
 )
-def test_paths_that_cannot_be_joined_or_ramped(make, message: str) -> None:
+def test_paths_that_cannot_be_joined_or_run_up(make, message: str) -> None:
     with pytest.raises(sm.PathError, match=message):
         make()

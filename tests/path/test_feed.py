@@ -95,7 +95,7 @@ def test_positions_alone_are_for_tasks_that_leave_orientations_free(panda: sm.Ro
     for path in (
         sm.Feed(sm.Polyline(points), 0.05),
         sm.Placed(sm.Waypoints([0, 1, 2], points), np.eye(4)),
-        sm.Ramped(sm.Waypoints([0, 1, 2], points)),
+        sm.section_at_rest(sm.Waypoints([0, 1, 2], points)),
     ):
         with pytest.raises(sm.PathError, match="no orientations, which task 'pose' prescribes"):
             sm.Problem(panda, path, start=PANDA_HOME)

@@ -13,7 +13,6 @@ from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
 from selfmotion.replay import write_replay
 from support.arms import robot_named
-from support.paths import outward
 
 # The end of a part that only the workspace limits, relative to the closed form.
 EDGE = 1e-3
@@ -21,6 +20,14 @@ EDGE = 1e-3
 
 # Where limits are kept with a margin, and the end is bisected, besides.
 LIMITED = 5e-3
+
+
+def outward(planar: sm.RobotModel, factor: float, duration: float = 10.0) -> sm.Line:
+    """Return a line in the plane straight away from the base, from a distance of 4.66 m."""
+    pose = planar.pose([0.0, 0.5, 0.5])
+    end = pose.copy()
+    end.translation = pose.translation * factor
+    return sm.Line(pose, end, duration, time_law="constant")
 
 
 def time_at(line: sm.Line, distance: float) -> float:

@@ -61,7 +61,7 @@ def test_a_path_that_moves_at_its_ends_asks_for_no_rest(panda: sm.RobotModel) ->
     assert rest_orders(circle(panda, PANDA_HOME), sm.Task.POSE) == (2, 2)
     plan = sm.plan(sm.Problem(panda, path, start=PANDA_HOME))
     assert not any("rest" in what for what in plan.certificate.covers)
-    ramped = sm.Ramped(path)
+    ramped = sm.section_at_rest(path)
     assert rest_orders(ramped, sm.Task.POSE) == (2, 2)
     assert "rest at both ends" in sm.plan(sm.Problem(panda, ramped)).certificate.covers
 

@@ -1,14 +1,15 @@
-"""Rates of one cycle: eq. 4 within limits."""
+"""Commands of one cycle: eq. 4 within limits, which hold for ever, whatever is asked for."""
 
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 
 import selfmotion as sm
+from selfmotion import kernels
+from selfmotion.basics import Array
+from selfmotion.realtime import law
 from selfmotion.realtime.law import saturated_rates
-from selfmotion.realtime.viable import (
-    viable_box,
-)
+from selfmotion.realtime.viable import tightened
 from support.arms import PANDA_HOME
 
 # Segments meet in the same numbers, computed in the same way but for one shift of an index.
@@ -48,8 +49,74 @@ def test_the_self_motion_gives_before_the_tool_does(panda: sm.RobotModel) -> Non
     assert followed >= 0.97 * possible
 
 
-def test_a_box_without_any_acceleration_to_choose_is_no_trouble() -> None:
-    low, high = np.empty(1), np.empty(1)
-    limits = np.array([[-1.0], [1.0], [1.0], [5.0]])
-    viable_box(np.array([1.0]), np.array([0.0]), limits, 1e-3, low, high)
-    assert low[0] <= high[0] <= 0.0
+def random_limits(rng: np.random.Generator, n: int = 7) -> Array:
+    lower, upper = -rng.uniform(0.01, 3.0, n), rng.uniform(0.01, 3.0, n)
+    return np.array([lower, upper, rng.uniform(0.1, 3.0, n), rng.uniform(0.5, 20.0, n)])
+
+
+def nonsense(rng: np.random.Generator, cycles: int) -> Array:
+    """Return tables of cycles that ask for what nobody should ask for, 50 cycles of a kind."""
+    kinds = np.repeat(rng.integers(4, size=cycles // 50 + 1), 50)[:cycles, None]
+    wild = rng.standard_normal((cycles, 14 + law.REFERENCE))
+    asked = np.select(
+        [kinds == 0, kinds == 1, kinds == 2], [3.0 * wild, np.inf, np.nan], 1e9 * wild
+    )
+    # The pose is one, except where it is no number either.
+    asked[:, 14:26] = np.where(kinds == 2, np.nan, np.append(np.zeros(3), np.eye(3)))
+    return asked
+
+
+def commanded(rng: np.random.Generator, cycles: int, limits: Array, h: float) -> Array:
+    """Return states (cycles + 1, 3, 7) of commands to an arm whose Jacobians are arbitrary."""
+    states, inner = np.zeros((cycles + 1, 3, 7)), np.vstack([tightened(limits), np.zeros(7)])
+    states[0, 0] = rng.uniform(limits[0] + 1e-6, limits[1] - 1e-6)
+    task, table, here = sm.Task.POSE, nonsense(rng, cycles), np.eye(3)
+    kind = kernels.angle_kind(task.rows, task.tool_axes)
+    for cycle in range(cycles):
+        # Of full rank, of less, and of none.
+        jacobian = rng.standard_normal((6, 7)) * (rng.random((6, 1)) < rng.choice([0.0, 0.7, 1.0]))
+        arm = jacobian, here, np.zeros(3)
+        law.command(cycle, *arm, table, states, inner, task.rows, kind, 20.0, h)
+    return states
+
+
+def beyond(limits: Array, states: Array) -> float:
+    """Return by how much states (N, 3, n) are beyond limits, less than 0 where they are within."""
+    c, w, a = states[:, 0], states[:, 1], states[:, 2]
+    sides = limits[0] - c, c - limits[1], np.abs(w) - limits[2], np.abs(a) - limits[3]
+    # What is no number is beyond all.
+    return float(np.nan_to_num(np.max(sides), nan=np.inf))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_is_asked_for_limits_hold_for_ever(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    limits, h = random_limits(rng), float(rng.choice([1e-3, 4e-3, 1e-2]))
+    states = commanded(rng, 4000, limits, h)
+    assert np.any(states[1:, 1] != 0.0)
+    assert beyond(limits, states) <= 0.0
+
+
+def test_the_law_of_limits_rejects_a_command_that_is_only_clipped() -> None:
+    limits, h = np.array([[-0.5], [0.5], [2.0], [10.0]]), 1e-3
+    states = np.zeros((1001, 3, 1))
+    for cycle in range(1000):
+        a = float(np.clip((limits[2] - states[cycle, 1]) / h, -limits[3], limits[3])[0])
+        w = states[cycle, 1] + h * a
+        states[cycle + 1] = states[cycle, 0] + h * w, w, [a]
+    assert beyond(limits, states) > 0.1
+    assert beyond(limits, np.full((1, 3, 1), np.nan)) == np.inf
+
+
+def test_a_stop_from_any_viable_state_stays_within_limits() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        limits, h = random_limits(rng), 2e-3
+        cycles = int(rng.integers(1, 400))
+        states = np.zeros((4000, 3, 7))
+        states[: cycles + 1] = commanded(rng, cycles, limits, h)
+        inner = np.vstack([tightened(limits), np.zeros(7)])
+        end = law.brake(states, cycles, inner, h)
+        assert end < len(states) - 1
+        assert np.all(states[end, 1:] == 0.0)
+        assert beyond(limits, states[: end + 1]) <= 0.0

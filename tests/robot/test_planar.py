@@ -7,6 +7,7 @@ import selfmotion as sm
 from selfmotion import kernels
 from selfmotion.basics import Array
 from support.arms import central_difference
+from support.followed import standing
 
 LINKS = np.array([2.0, 2.0, 1.0])
 
@@ -73,8 +74,8 @@ def test_manipulability_gradient(planar: sm.RobotModel, q: Array) -> None:
         planar.jacobian(q)[None],
         planar.pose(q).rotation[None],
         weights[None],
-        sm.Task.PLANAR.rows,
-        False,
+        standing(planar, "planar").layout,
+        0,
     )[0]
     np.testing.assert_allclose(found, determinant_gradient(q), rtol=EXACT, atol=100 * EXACT)
 

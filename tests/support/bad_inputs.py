@@ -15,6 +15,7 @@ from support.bad_urdfs import loading_rows, rows
 from support.bad_values import cost_rows, path_rows
 
 PAGE = Path(__file__).parents[2] / "docs" / "errors.md"
+HEADER = ("| given | seen |", "| --- | --- |")
 _HEAD = """# What is refused, and how
 
 Written by `make errors`, checked by the tests: {count} inputs that cannot be used,
@@ -50,7 +51,7 @@ def page(lines: dict[Row, str]) -> str:
     """Return the page, given the lines of all rows."""
     parts = [_HEAD.format(count=len(lines))]
     for area, members in groupby(lines, key=lambda row: row.area):
-        parts += [f"\n## {area}\n", "| given | seen |", "| --- | --- |"]
+        parts += [f"\n## {area}\n", *HEADER]
         parts += [lines[row] for row in members]
     return "\n".join(parts) + "\n"
 

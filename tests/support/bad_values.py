@@ -173,8 +173,8 @@ def path_rows() -> list[Row]:
         ),
         *bad_values_of(
             area,
-            "Ramped",
-            sound(sm.Ramped, path=line(), ramp=0.5),
+            "section_at_rest",
+            sound(sm.section_at_rest, path=line(), ramp=0.5),
             path=PATHS,
             ramp={**POSITIVE, "longer than the path": 3.0},
         ),

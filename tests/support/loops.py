@@ -1,12 +1,10 @@
 """The loop, closed with an arm that follows at once."""
 
 import numpy as np
-import numpy.typing as npt
 
 import selfmotion as sm
+from selfmotion.basics import Array
 from selfmotion.realtime import Replanner, Segment
-
-Array = npt.NDArray[np.float64]
 
 
 def closed_loop(

@@ -8,14 +8,6 @@ import selfmotion as sm
 from selfmotion.basics import Array
 
 
-def outward(planar: sm.RobotModel, factor: float, duration: float = 10.0) -> sm.Line:
-    """Return a line in the plane straight away from the base, from a distance of 4.66 m."""
-    pose = planar.pose([0.0, 0.5, 0.5])
-    end = pose.copy()
-    end.translation = pose.translation * factor
-    return sm.Line(pose, end, duration, time_law="constant")
-
-
 def polygon(seed: int, scale: float = 0.1) -> tuple[Array, Array]:
     """Return 3 to 6 positions and quaternions near a Panda's home pose."""
     rng = np.random.default_rng(seed)

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.certificate import check as check_module
-from selfmotion.certificate import path_error
+from selfmotion.certificate import check as check_module, path_error
 from support.arms import PANDA_HOME, robot_named
 from support.oracle import Judge
 from support.own_kinematics import Arm, along

@@ -35,8 +35,8 @@ class Here:
         JJᵀ.
     command : (m,)
         ẋ + K e in the task's rows, with pose error e.
-    full_jacobian, rotation : (6, n), (3, 3)
-        The tool's Jacobian in world axes, and its orientation.
+    rotation : (3, 3)
+        The tool's orientation.
     twist : (6,)
         The path's twist.
     """
@@ -44,7 +44,6 @@ class Here:
     jacobian: Array
     gram: Array
     command: Array
-    full_jacobian: Array
     rotation: Array
     twist: Array
 
@@ -71,7 +70,7 @@ class PoseFeedback:
         wanted = target.twist[0] + self._gain * error
         jacobian = task.select(full, rotation)
         command = task.select(wanted[:, None], rotation)[:, 0]
-        return Here(jacobian, jacobian @ jacobian.T, command, full, rotation, target.twist[0])
+        return Here(jacobian, jacobian @ jacobian.T, command, rotation, target.twist[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,90 +1,50 @@
 """What every part of the package stands on: errors, arrays, progress, files, compilation."""
 
-from selfmotion.basics import series
-from selfmotion.basics.arrays import Array, Ints, per_joint, plain_numbers, read_only, shown
+from selfmotion.basics import series as series
+from selfmotion.basics.arrays import (
+    Array as Array,
+    Ints as Ints,
+    per_joint as per_joint,
+    plain_numbers as plain_numbers,
+    read_only as read_only,
+    shown as shown,
+)
 from selfmotion.basics.errors import (
-    BreakdownError,
-    CollisionError,
-    FileFormatError,
-    InverseKinematicsError,
-    NoSequenceError,
-    PathError,
-    PlanError,
-    ProblemError,
-    RedundancyError,
-    RenderError,
-    RobotError,
-    SelfmotionError,
-    StartError,
+    BreakdownError as BreakdownError,
+    CollisionError as CollisionError,
+    FileFormatError as FileFormatError,
+    InverseKinematicsError as InverseKinematicsError,
+    NoSequenceError as NoSequenceError,
+    PathError as PathError,
+    PlanError as PlanError,
+    ProblemError as ProblemError,
+    RedundancyError as RedundancyError,
+    RenderError as RenderError,
+    RobotError as RobotError,
+    SelfmotionError as SelfmotionError,
+    StartError as StartError,
 )
 from selfmotion.basics.files import (
-    as_path,
-    read_archive,
-    read_arrays,
-    read_rows,
-    read_table,
-    write_archive,
-    write_atomically,
-    write_csv,
+    as_path as as_path,
+    read_archive as read_archive,
+    read_arrays as read_arrays,
+    read_rows as read_rows,
+    read_table as read_table,
+    write_archive as write_archive,
+    write_atomically as write_atomically,
+    write_csv as write_csv,
 )
 from selfmotion.basics.inputs import (
-    as_choice,
-    as_flag,
-    as_number,
-    as_numbers,
-    as_several,
-    as_whole,
-    random_numbers,
+    as_choice as as_choice,
+    as_flag as as_flag,
+    as_number as as_number,
+    as_numbers as as_numbers,
+    as_several as as_several,
+    as_whole as as_whole,
+    random_numbers as random_numbers,
 )
-from selfmotion.basics.jit import inlined, kernel
-from selfmotion.basics.names import nearest
-from selfmotion.basics.progress import Progress, silent
-from selfmotion.basics.saved import Saved, is_known, restore
-from selfmotion.basics.threads import one_blas_thread
-
-__all__ = [
-    "Array",
-    "BreakdownError",
-    "CollisionError",
-    "FileFormatError",
-    "Ints",
-    "InverseKinematicsError",
-    "NoSequenceError",
-    "PathError",
-    "PlanError",
-    "ProblemError",
-    "Progress",
-    "RedundancyError",
-    "RenderError",
-    "RobotError",
-    "Saved",
-    "SelfmotionError",
-    "StartError",
-    "as_choice",
-    "as_flag",
-    "as_number",
-    "as_numbers",
-    "as_path",
-    "as_several",
-    "as_whole",
-    "inlined",
-    "is_known",
-    "kernel",
-    "nearest",
-    "one_blas_thread",
-    "per_joint",
-    "plain_numbers",
-    "random_numbers",
-    "read_archive",
-    "read_arrays",
-    "read_only",
-    "read_rows",
-    "read_table",
-    "restore",
-    "series",
-    "shown",
-    "silent",
-    "write_archive",
-    "write_atomically",
-    "write_csv",
-]
+from selfmotion.basics.jit import inlined as inlined, kernel as kernel
+from selfmotion.basics.names import nearest as nearest
+from selfmotion.basics.progress import Progress as Progress, silent as silent
+from selfmotion.basics.saved import Saved as Saved, is_known as is_known, restore as restore
+from selfmotion.basics.threads import one_blas_thread as one_blas_thread

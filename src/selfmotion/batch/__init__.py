@@ -1,15 +1,10 @@
 """Many problems at once: on the cores of this machine, or on a cluster."""
 
-from selfmotion.batch.folder import Row
-from selfmotion.batch.items import Item, grid_items
-from selfmotion.batch.run import Batch, BatchProgress, plan_items, plan_many
-
-__all__ = [
-    "Batch",
-    "BatchProgress",
-    "Item",
-    "Row",
-    "grid_items",
-    "plan_items",
-    "plan_many",
-]
+from selfmotion.batch.folder import Row as Row
+from selfmotion.batch.items import Item as Item, grid_items as grid_items
+from selfmotion.batch.run import (
+    Batch as Batch,
+    BatchProgress as BatchProgress,
+    plan_items as plan_items,
+    plan_many as plan_many,
+)

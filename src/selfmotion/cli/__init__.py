@@ -1,8 +1,3 @@
 """The command line."""
 
-from selfmotion.cli.app import app, main
-
-__all__ = [
-    "app",
-    "main",
-]
+from selfmotion.cli.app import app as app, main as main

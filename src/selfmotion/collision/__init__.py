@@ -1,36 +1,24 @@
 """Collisions: exact distances for certificates, smooth conservative ones for optimisation."""
 
-from selfmotion.collision.clearance import ClearanceModel, Clearances
-from selfmotion.collision.exact import CollisionModel
-from selfmotion.collision.found import Closest, Overlap, srdf_line
-from selfmotion.collision.obstacles import (
-    Box,
-    Capsule,
-    Cylinder,
-    Mesh,
-    Obstacle,
-    Sphere,
-    obstacle_from_dict,
-    obstacle_shapes,
+from selfmotion.collision.clearance import (
+    ClearanceModel as ClearanceModel,
+    Clearances as Clearances,
 )
-from selfmotion.collision.pairs import disabled_links
-from selfmotion.collision.solids import Solid
-
-__all__ = [
-    "Box",
-    "Capsule",
-    "ClearanceModel",
-    "Clearances",
-    "Closest",
-    "CollisionModel",
-    "Cylinder",
-    "Mesh",
-    "Obstacle",
-    "Overlap",
-    "Solid",
-    "Sphere",
-    "disabled_links",
-    "obstacle_from_dict",
-    "obstacle_shapes",
-    "srdf_line",
-]
+from selfmotion.collision.exact import CollisionModel as CollisionModel
+from selfmotion.collision.found import (
+    Closest as Closest,
+    Overlap as Overlap,
+    srdf_line as srdf_line,
+)
+from selfmotion.collision.obstacles import (
+    Box as Box,
+    Capsule as Capsule,
+    Cylinder as Cylinder,
+    Mesh as Mesh,
+    Obstacle as Obstacle,
+    Sphere as Sphere,
+    obstacle_from_dict as obstacle_from_dict,
+    obstacle_shapes as obstacle_shapes,
+)
+from selfmotion.collision.pairs import disabled_links as disabled_links
+from selfmotion.collision.solids import Solid as Solid

@@ -1,55 +1,30 @@
 """What a motion must keep: limits, end conditions, closed paths, clearance."""
 
-from selfmotion.constraints.band import Band
-from selfmotion.constraints.base import Constraint
-from selfmotion.constraints.binding import Binding
-from selfmotion.constraints.clearance import Clearance
+from selfmotion.constraints.band import Band as Band
+from selfmotion.constraints.base import Constraint as Constraint
+from selfmotion.constraints.binding import Binding as Binding
+from selfmotion.constraints.clearance import Clearance as Clearance
 from selfmotion.constraints.conditions import (
-    BoundConstraint,
-    Linearised,
-    NodeTangents,
-    easing_of,
-    linearised,
+    BoundConstraint as BoundConstraint,
+    Linearised as Linearised,
+    NodeTangents as NodeTangents,
+    easing_of as easing_of,
+    linearised as linearised,
 )
 from selfmotion.constraints.ends import (
-    ClosedPath,
-    EndAcceleration,
-    EndConfiguration,
-    EndVelocity,
-    StartAcceleration,
-    StartVelocity,
+    ClosedPath as ClosedPath,
+    EndAcceleration as EndAcceleration,
+    EndConfiguration as EndConfiguration,
+    EndVelocity as EndVelocity,
+    StartAcceleration as StartAcceleration,
+    StartVelocity as StartVelocity,
 )
-from selfmotion.constraints.envelope import Envelope
+from selfmotion.constraints.envelope import Envelope as Envelope
 from selfmotion.constraints.limits import (
-    JointAccelerationLimits,
-    JointJerkLimits,
-    JointPositionLimits,
-    JointVelocityLimits,
+    JointAccelerationLimits as JointAccelerationLimits,
+    JointJerkLimits as JointJerkLimits,
+    JointPositionLimits as JointPositionLimits,
+    JointVelocityLimits as JointVelocityLimits,
 )
-from selfmotion.constraints.tool import ToolLimits
-from selfmotion.constraints.torque import JointTorqueLimits
-
-__all__ = [
-    "Band",
-    "Binding",
-    "BoundConstraint",
-    "Clearance",
-    "ClosedPath",
-    "Constraint",
-    "EndAcceleration",
-    "EndConfiguration",
-    "EndVelocity",
-    "Envelope",
-    "JointAccelerationLimits",
-    "JointJerkLimits",
-    "JointPositionLimits",
-    "JointTorqueLimits",
-    "JointVelocityLimits",
-    "Linearised",
-    "NodeTangents",
-    "StartAcceleration",
-    "StartVelocity",
-    "ToolLimits",
-    "easing_of",
-    "linearised",
-]
+from selfmotion.constraints.tool import ToolLimits as ToolLimits
+from selfmotion.constraints.torque import JointTorqueLimits as JointTorqueLimits

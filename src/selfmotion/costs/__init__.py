@@ -1,49 +1,38 @@
 """What a motion costs: integrands G(q̇, q, t) of F = ∫ G dt, each with exact derivatives."""
 
-from selfmotion.costs.base import ERROR, Cost, Partials, weight_matrix
-from selfmotion.costs.dynamics import GravityTorque, KineticEnergy
-from selfmotion.costs.function import FunctionCost, LostCost, cost_from_dict
+from selfmotion.costs.base import (
+    ERROR as ERROR,
+    Cost as Cost,
+    Partials as Partials,
+    weight_matrix as weight_matrix,
+)
+from selfmotion.costs.dynamics import (
+    GravityTorque as GravityTorque,
+    KineticEnergy as KineticEnergy,
+)
+from selfmotion.costs.function import (
+    FunctionCost as FunctionCost,
+    LostCost as LostCost,
+    cost_from_dict as cost_from_dict,
+)
 from selfmotion.costs.joints import (
-    JointAcceleration,
-    JointJerk,
-    JointLimitDistance,
-    JointVelocity,
-    PathLength,
-    Posture,
+    JointAcceleration as JointAcceleration,
+    JointJerk as JointJerk,
+    JointLimitDistance as JointLimitDistance,
+    JointVelocity as JointVelocity,
+    PathLength as PathLength,
+    Posture as Posture,
 )
-from selfmotion.costs.limit_use import LimitUse
+from selfmotion.costs.limit_use import LimitUse as LimitUse
 from selfmotion.costs.manipulability import (
-    DirectionalManipulability,
-    InverseManipulability,
-    Manipulability,
-    SmallestSingularValue,
+    DirectionalManipulability as DirectionalManipulability,
+    InverseManipulability as InverseManipulability,
+    Manipulability as Manipulability,
+    SmallestSingularValue as SmallestSingularValue,
 )
-from selfmotion.costs.off_path import OffPath
-from selfmotion.costs.samples import Samples
-from selfmotion.costs.towards import Towards
-
-__all__ = [
-    "ERROR",
-    "Cost",
-    "DirectionalManipulability",
-    "FunctionCost",
-    "GravityTorque",
-    "InverseManipulability",
-    "JointAcceleration",
-    "JointJerk",
-    "JointLimitDistance",
-    "JointVelocity",
-    "KineticEnergy",
-    "LimitUse",
-    "LostCost",
-    "Manipulability",
-    "OffPath",
-    "Partials",
-    "PathLength",
-    "Posture",
-    "Samples",
-    "SmallestSingularValue",
-    "Towards",
-    "cost_from_dict",
-    "weight_matrix",
-]
+from selfmotion.costs.off_path import OffPath as OffPath
+from selfmotion.costs.samples import (
+    Samples as Samples,
+    TipSamples as TipSamples,
+)
+from selfmotion.costs.towards import Towards as Towards

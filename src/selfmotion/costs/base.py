@@ -22,8 +22,8 @@ class Partials:
     ----------
     q, qd, qdd, qddd : (S, n) or None
         ∂G/∂q, ∂G/∂q̇, ∂G/∂q̈ and ∂G/∂q⃛.
-    error : (S, 6) or None
-        ∂G/∂e, e the pose error.
+    error : (S, 6 F) or None
+        ∂G/∂e, e the pose errors of F tips, one after the other.
     """
 
     q: Array | None = None

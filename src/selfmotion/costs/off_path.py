@@ -7,7 +7,6 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.costs.base import ERROR, Cost, Partials
 from selfmotion.costs.samples import Samples
-from selfmotion.task import Task
 
 
 @dataclass(frozen=True)
@@ -43,11 +42,13 @@ class OffPath(Cost):
 
 
 def _selected(samples: Samples) -> Array:
-    """Return the pose error with 0 in the rows that are free, (S, 6) [m, rad].
+    """Return the pose errors with 0 in the rows that are free, (S, 6 F) [m, rad].
 
     Its length is that of S e also for `Task.POINTING`, whose error has no part about the tool's
     axis.
     """
-    task: Task = samples.task
-    counts = np.isin(np.arange(6), task.rows) | (task.tool_axes & (np.arange(6) >= 3))
-    return np.where(counts, samples.error, 0.0)
+    tasks = [item.task for item in samples.follows.items]
+    counts = [
+        np.isin(np.arange(6), task.rows) | (task.tool_axes & (np.arange(6) >= 3)) for task in tasks
+    ]
+    return np.where(np.concatenate(counts), samples.error, 0.0)

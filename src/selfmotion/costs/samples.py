@@ -1,5 +1,6 @@
 """A motion at sample times, as costs and constraints see it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -7,19 +8,47 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion import kernels
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Ints
 from selfmotion.follow import Follows
 from selfmotion.motion import Sampling
 from selfmotion.task import Task
 
-_ARRAYS = ("q", "qd", "jacobian", "rotation", "translation", "error", "task_jacobian")
+_ARRAYS = ("q", "qd", "task_jacobian")
+
+
+@dataclass(frozen=True, eq=False)
+class TipSamples:
+    """Where a tip is that follows a path, at S times, in its chain's base frame.
+
+    Attributes
+    ----------
+    jacobian : (S, 6, n)
+        The tip's Jacobian [v, ω].
+    rotation, translation : (S, 3, 3), (S, 3)
+        The tip's pose.
+    error : (S, 6)
+        Pose error e, from the tip to the path [m, rad]; see `Task.twist_error`.
+    """
+
+    jacobian: Array
+    rotation: Array
+    translation: Array
+    error: Array
+
+    def __post_init__(self) -> None:
+        _show(self, tuple(self.__dataclass_fields__))
+
+    def at(self, rows: Ints) -> "TipSamples":
+        """Return those of some of the times."""
+        return TipSamples(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A joint motion at S times, with the tool's kinematics there.
+    """A joint motion at S times, with the kinematics there of all that follows a path.
 
-    The arrays refuse to be written to.
+    The arrays refuse to be written to. `jacobian`, `rotation`, `translation` and `task` are those
+    of the first tip that follows a path, which mostly is the only one; `tips` has them all.
 
     Attributes
     ----------
@@ -27,43 +56,59 @@ class Samples:
         When the samples are taken.
     q, qd : (S, n)
         Joint coordinates and velocities.
-    jacobian : (S, 6, n)
-        The tool's Jacobian [v, ω], world axes.
-    rotation, translation : (S, 3, 3), (S, 3)
-        The tool's pose.
-    error : (S, 6)
-        Pose error e, from the tool to the path [m, rad], world axes; see `Task.twist_error`.
-    task : Task
-        The rows the path prescribes.
+    follows : Follows
+        What the arm follows.
+    tips : tuple of TipSamples
     task_jacobian : (S, m, n)
-        Those rows of the Jacobian.
+        The prescribed rows of all tips.
     """
 
     sampling: Sampling
     q: Array
     qd: Array
-    jacobian: Array
-    rotation: Array
-    translation: Array
-    error: Array
-    task: Task
+    follows: Follows
+    tips: tuple[TipSamples, ...]
     task_jacobian: Array
 
     def __post_init__(self) -> None:
-        for name in _ARRAYS:
-            # A view of its own: the owner may go on writing, whoever is shown it may not.
-            view = getattr(self, name).view()
-            view.setflags(write=False)
-            object.__setattr__(self, name, view)
+        _show(self, _ARRAYS)
 
     @classmethod
     def along(cls, follows: Follows, sampling: Sampling, q: Array, qd: Array) -> "Samples":
         """Return the samples of a motion on its path, q and q̇ (S, n) each."""
-        jacobian, rotation, translation = follows.only.chain.along(q)
-        task = follows.task
-        rows = task.select_along(jacobian, rotation)
-        error = np.zeros((len(q), 6))
-        return cls(sampling, q, qd, jacobian, rotation, translation, error, task, rows)
+        tips, rows = [], []
+        for item in follows.items:
+            jacobian, rotation, translation = item.chain.along(q)
+            rows.append(item.task.select_along(jacobian, rotation))
+            tips.append(TipSamples(jacobian, rotation, translation, np.zeros((len(q), 6))))
+        stacked = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
+        return cls(sampling, q, qd, follows, tuple(tips), stacked)
+
+    @property
+    def jacobian(self) -> Array:
+        """The tool's Jacobian [v, ω], world axes, (S, 6, n)."""
+        return self.tips[0].jacobian
+
+    @property
+    def rotation(self) -> Array:
+        """The tool's orientation, (S, 3, 3)."""
+        return self.tips[0].rotation
+
+    @property
+    def translation(self) -> Array:
+        """The tool's position [m], (S, 3)."""
+        return self.tips[0].translation
+
+    @property
+    def task(self) -> Task:
+        """The rows that the path prescribes."""
+        return self.follows.items[0].task
+
+    @property
+    def error(self) -> Array:
+        """Pose errors e of all tips [m, rad], one after the other, (S, 6 F)."""
+        errors = [tip.error for tip in self.tips]
+        return errors[0] if len(errors) == 1 else np.concatenate(errors, axis=1)
 
     @property
     def t(self) -> Array:
@@ -109,10 +154,17 @@ class Samples:
 
     def contract(self, weights: Array) -> Array:
         """Return ⟨M, ∂J/∂q_k⟩ for `weights` M (S, m, n) on the task Jacobian, (S, n)."""
-        return kernels.contract_task(
-            self.jacobian,
-            self.rotation,
-            np.ascontiguousarray(weights),
-            self.task.rows,
-            self.task.tool_axes,
-        )
+        weights, layout = np.ascontiguousarray(weights), self.follows.layout
+        parts = [
+            kernels.contract_task(tip.jacobian, tip.rotation, weights, layout, f)
+            for f, tip in enumerate(self.tips)
+        ]
+        return parts[0] if len(parts) == 1 else np.sum(parts, axis=0)
+
+
+def _show(owner: Samples | TipSamples, names: Sequence[str]) -> None:
+    """Make arrays views of their own: the owner may go on writing, whoever is shown one may not."""
+    for name in names:
+        view = getattr(owner, name).view()
+        view.setflags(write=False)
+        object.__setattr__(owner, name, view)

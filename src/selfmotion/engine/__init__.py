@@ -1,32 +1,15 @@
 """From a decision vector to the motion, its cost, and the gradient."""
 
-from selfmotion.engine.counts import Counts
-from selfmotion.engine.deviation import Deviation
-from selfmotion.engine.objective import Evaluation, Objective
-from selfmotion.engine.remaining import Remaining, finest
-from selfmotion.engine.rollout import Rollout
-from selfmotion.engine.start import FixedStart, FreeStart
+from selfmotion.engine.counts import Counts as Counts
+from selfmotion.engine.deviation import Deviation as Deviation
+from selfmotion.engine.objective import Evaluation as Evaluation, Objective as Objective
+from selfmotion.engine.remaining import Remaining as Remaining, finest as finest
+from selfmotion.engine.rollout import Rollout as Rollout
+from selfmotion.engine.start import FixedStart as FixedStart, FreeStart as FreeStart
 from selfmotion.engine.still import (
-    MOST_HALVINGS,
-    Guide,
-    StillMotion,
-    rough_still_motion,
-    settled_still_motion,
+    MOST_HALVINGS as MOST_HALVINGS,
+    Guide as Guide,
+    StillMotion as StillMotion,
+    rough_still_motion as rough_still_motion,
+    settled_still_motion as settled_still_motion,
 )
-
-__all__ = [
-    "MOST_HALVINGS",
-    "Counts",
-    "Deviation",
-    "Evaluation",
-    "FixedStart",
-    "FreeStart",
-    "Guide",
-    "Objective",
-    "Remaining",
-    "Rollout",
-    "StillMotion",
-    "finest",
-    "rough_still_motion",
-    "settled_still_motion",
-]

@@ -41,10 +41,6 @@ class Conditions:
         # How many each constraint has, once they were looked at.
         self._counts: list[int] = []
 
-    def on(self, grid: Grid) -> "Conditions":
-        """Return the same on another grid."""
-        return Conditions(self.constraints, grid)
-
     def residuals(self, samples: Samples) -> Residuals:
         """Return h of all conditions, with their tolerances."""
         tables = [item.residual(samples).ravel() for item in self.constraints]

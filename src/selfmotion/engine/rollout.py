@@ -5,10 +5,11 @@ import pinocchio as pin
 
 from selfmotion import kernels
 from selfmotion.basics import Array
-from selfmotion.costs import Samples
+from selfmotion.costs import Samples, TipSamples
 from selfmotion.follow import Follows
 from selfmotion.motion import Grid
 from selfmotion.path import PathSamples
+from selfmotion.robot import Kinematics, march
 from selfmotion.task import DampingLaw, feedback_rate
 
 # A tool this near to the path [m, rad] is on it; Newton's method needs few steps to that.
@@ -35,34 +36,41 @@ class Rollout:
     """
 
     def __init__(self, follows: Follows, grid: Grid, *, damping: DampingLaw | None = None) -> None:
-        path, task = follows.path, follows.task
-        self.follows, self.robot, self.task, self.grid = follows, follows.robot, task, grid
+        self.follows, self.robot, self.grid = follows, follows.robot, grid
         self.damping = damping
         self.jacobian_evaluations = 0
-        self._kinematics = follows.only.chain.kinematics()
+        first = follows.items[0].chain.kinematics()
+        others = [Kinematics(item.chain, first.data) for item in follows.items[1:]]
+        self._kinematics = [first, *others]
         self._law = None if damping is None else (damping.threshold, damping.strength)
-        self._gain = feedback_rate(path.duration)
-        self._rows, self._angle_kind = task.rows, kernels.angle_kind(task.rows, task.tool_axes)
-        self._table, self._at = self._new_table(len(grid.stage_times))
-        self._space = np.zeros(kernels.space_size(self.robot.dof, task.dimension))
+        self._gain = feedback_rate(follows.duration)
+        self._table, self._at, self._tips = self._new_table(len(grid.stage_times))
+        self._space = np.zeros(kernels.space_size(*self._sizes))
         # Of the last run, once they were asked for.
         self._samples: Samples | None = None
         # What `polished` works on: one stage, at a node.
-        self._node_table, self._node = self._new_table(1)
-        self.aim(path.samples(grid.stage_times))
+        self._node_table, self._node, self._node_tips = self._new_table(1)
+        for f, item in enumerate(follows.items):
+            self.aim(item.path.samples(grid.stage_times), f)
         self._at.step[:, 0] = grid.stage_steps
 
-    def _new_table(self, stages: int) -> tuple[Array, kernels.Stage]:
-        n, m = self.robot.dof, self.task.dimension
-        table = np.zeros((stages, kernels.columns(n, m)))
-        return table, kernels.parts(table, n, m)
+    @property
+    def _sizes(self) -> tuple[int, int, int]:
+        return self.robot.dof, self.follows.dimension, len(self.follows.items)
 
-    def aim(self, target: PathSamples) -> None:
-        """Follow other poses and twists from now on, given at the stages (S)."""
+    def _new_table(self, stages: int) -> tuple[Array, kernels.Stage, list[kernels.Tip]]:
+        n, m, count = self._sizes
+        table = np.zeros((stages, kernels.columns(n, m, count)))
+        tips = [kernels.tip_of(table, f, n, m) for f in range(count)]
+        return table, kernels.parts(table, n, m), tips
+
+    def aim(self, target: PathSamples, f: int = 0) -> None:
+        """Let tip f follow other poses and twists from now on, given at the stages (S)."""
         self._samples = None
-        self._at.target_translation[:] = target.translation
-        self._at.target_rotation[:] = target.rotation
-        self._at.target_twist[:] = target.twist
+        tip = self._tips[f]
+        tip.target_translation[:] = target.translation
+        tip.target_rotation[:] = target.rotation
+        tip.target_twist[:] = target.twist
 
     def run(self, start: Array, epsilon: Array) -> float | None:
         """Integrate from `start` (n,) under null motion `epsilon` (S, n) at the stage times.
@@ -88,8 +96,8 @@ class Rollout:
 
         `q` (S, n) is the table's own: each stage writes that of the next.
         """
-        return self._kinematics.march(
-            q, kernels.advance, table, self._rows, self._angle_kind, gain, self._law
+        return march(
+            self._kinematics, q, kernels.advance, table, self.follows.layout, gain, self._law
         )
 
     def polished(self) -> tuple[Array, Array, Array]:
@@ -107,7 +115,13 @@ class Rollout:
         q, qd = run.q[here], run.qd[here]
         if self.damped:
             return self.grid.nodes, q, qd
-        wrong = self.task.select_along(run.error[here, :, None], run.rotation[here])
+        wrong = np.concatenate(
+            [
+                item.task.select_along(tip.error[here, :, None], tip.rotation[here])
+                for item, tip in zip(self.follows.items, self._tips, strict=True)
+            ],
+            axis=1,
+        )
         nearer = q + _correction(run.task_jacobian[here], wrong)
         for i, stage in enumerate(here):
             self._node_table[0] = self._table[stage]
@@ -115,7 +129,12 @@ class Rollout:
             for _ in range(_POLISHING_STEPS):
                 if self._advance(self._node_table, node.q, 0.0) is not None:
                     break
-                left = self.task.select(node.error[0, :, None], node.rotation[0])
+                left = np.concatenate(
+                    [
+                        item.task.select(tip.error[0, :, None], tip.rotation[0])
+                        for item, tip in zip(self.follows.items, self._node_tips, strict=True)
+                    ]
+                )
                 q[i], qd[i] = node.q[0], node.qd[0]
                 if np.abs(left).max() < _POLISHED:
                     break
@@ -134,56 +153,58 @@ class Rollout:
             ∂ε/∂x at the stages.
         start_matrix : (n, d)
             ∂q(0)/∂x.
-        target_matrix : (S, 12, d), optional
-            That of the path's poses [m, world rotation vector] and twists; without it the path is
+        target_matrix : (S, 12 F, d), optional
+            That of the F paths' poses [m, rotation vector] and twists; without it the paths are
             fixed.
         """
         epsilon_matrix = np.ascontiguousarray(epsilon_matrix)
         by_q, by_qd = np.empty_like(epsilon_matrix), np.empty_like(epsilon_matrix)
         kernels.sensitivities(
             self._table,
-            self._rows,
-            self._angle_kind,
+            self.follows.layout,
             self._gain,
             self._law,
             self._space,
-            np.zeros(6),
+            np.zeros((len(self._tips), 6)),
             epsilon_matrix,
             np.ascontiguousarray(start_matrix),
-            None if target_matrix is None else np.ascontiguousarray(target_matrix),
+            None if target_matrix is None else self._by_tip(target_matrix),
             by_q,
             by_qd,
         )
         return by_q, by_qd
 
-    @property
-    def table_bytes(self) -> int:
-        """Memory that the tables take."""
-        return int(self._table.nbytes)
+    def _by_tip(self, table: Array) -> Array:
+        """Return a table (S, k F, …) as one for each tip, (S, F, k, …)."""
+        count, columns = len(self._tips), table.shape[1]
+        shape = (len(table), count, columns // count, *table.shape[2:])
+        return np.ascontiguousarray(table).reshape(shape)
 
     @property
     def error(self) -> Array:
-        """Pose error e of the last run at the stages, (S, 6) [m, rad], without copying."""
-        return self._at.error
+        """Pose errors e of the last run at the stages, (S, 6 F) [m, rad]."""
+        return self.samples().error
 
     @property
     def first_pose(self) -> pin.SE3:
-        """The pose that it follows at the start."""
-        at = self._at
-        return pin.SE3(np.array(at.target_rotation[0]), np.array(at.target_translation[0]))
+        """The pose that the first tip follows at the start."""
+        tip = self._tips[0]
+        return pin.SE3(np.array(tip.target_rotation[0]), np.array(tip.target_translation[0]))
 
     @property
-    def target(self) -> Array:
-        """Translations that it follows at the nodes [m], (N + 1, 3)."""
-        return self._at.target_translation[self.grid.node_stages]
+    def targets(self) -> list[Array]:
+        """Translations that the tips follow at the nodes [m], (N + 1, 3) each."""
+        return [tip.target_translation[self.grid.node_stages] for tip in self._tips]
 
     @property
     def drift(self) -> Array:
-        """Pose error of the last run at the nodes, (N + 1, 6) [m, rad].
+        """Pose errors of the last run in the prescribed rows at the nodes, (N + 1, m) [m, rad].
 
         What integration let in, and damping.
         """
-        return self._at.error[self.grid.node_stages]
+        errors = [tip.error[self.grid.node_stages] for tip in self._tips]
+        items = zip(self.follows.items, errors, strict=True)
+        return np.concatenate([error[:, item.task.rows] for item, error in items], axis=1)
 
     @property
     def damped(self) -> bool:
@@ -198,11 +219,11 @@ class Rollout:
                 sampling=self.grid.sampling,
                 q=at.q,
                 qd=at.qd,
-                jacobian=at.jacobian,
-                rotation=at.rotation,
-                translation=at.translation,
-                error=at.error,
-                task=self.task,
+                follows=self.follows,
+                tips=tuple(
+                    TipSamples(tip.jacobian, tip.rotation, tip.translation, tip.error)
+                    for tip in self._tips
+                ),
                 task_jacobian=at.task_jacobian,
             )
         return self._samples
@@ -218,8 +239,8 @@ class Rollout:
         ----------
         q_cotangent, qd_cotangent : (S, n)
             ∂F/∂q and ∂F/∂q̇ at the stages.
-        error_cotangent : (S, 6), optional
-            ∂F/∂e there, e the pose error; by default 0.
+        error_cotangent : (S, 6 F), optional
+            ∂F/∂e there, e the pose errors of F tips; by default 0.
 
         Returns
         -------
@@ -227,21 +248,20 @@ class Rollout:
             ∂F/∂ε at the stages.
         start_gradient : (n,)
             ∂F/∂q(0).
-        target_gradient : (S, 12)
-            With respect to the path's poses [m, world rotation vector] and twists.
+        target_gradient : (S, 12 F)
+            With respect to the paths' poses [m, rotation vector] and twists.
         """
-        count, n = len(self._table), self.robot.dof
+        count, (n, _, tips) = len(self._table), self._sizes
         epsilon_gradient, start_gradient = np.empty((count, n)), np.empty(n)
-        target_gradient = np.empty((count, 12))
+        target_gradient = np.empty((count, tips, 12))
         if error_cotangent is None:
-            error_cotangent = np.zeros((count, 6))
+            error_cotangent = np.zeros((count, 6 * tips))
         kernels.pullback(
             np.ascontiguousarray(q_cotangent),
             np.ascontiguousarray(qd_cotangent),
-            np.ascontiguousarray(error_cotangent),
+            self._by_tip(error_cotangent),
             self._table,
-            self._rows,
-            self._angle_kind,
+            self.follows.layout,
             self._gain,
             self._law,
             self._space,
@@ -249,7 +269,7 @@ class Rollout:
             start_gradient,
             target_gradient,
         )
-        return epsilon_gradient, start_gradient, target_gradient
+        return epsilon_gradient, start_gradient, target_gradient.reshape(count, -1)
 
 
 def _correction(jacobians: Array, errors: Array) -> Array:

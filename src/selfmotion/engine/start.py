@@ -67,7 +67,7 @@ class FreeStart:
         self._null = follows.null_basis(reference)
         self._at = reference
         self._tool = follows.only.chain.kinematics()
-        self._rows = task.rows, kernels.angle_kind(task.rows, task.tool_axes)
+        self._layout = follows.layout
         self._chart = np.ascontiguousarray(self._null), np.array(reference, dtype=np.float64)
 
     @property
@@ -84,7 +84,7 @@ class FreeStart:
             jacobian, rotation = (np.ascontiguousarray(a) for a in (tool.at(q), tool.rotation))
             place = rotation, tool.translation
             wrong = kernels.approach_start(
-                q, jacobian, *place, *target, *self._rows, *self._chart, z
+                q, jacobian, *place, *target, self._layout, *self._chart, z
             )
             # NaN arrives nowhere.
             if not wrong >= 0.0:

@@ -77,9 +77,7 @@ class StillMotion:
         idle = np.zeros((len(t), problem.robot.dof))
         own = idle if guide is None else problem.brought_to_rest(t, guide(t))
         broken = rollout.run(configuration, own)
-        samples, rows = rollout.samples(), problem.task.rows
-        extent = max(float(np.ptp(rollout.target, axis=0).max()), _SHORTEST)
-        drift = rollout.drift[:, rows] / np.where(rows < 3, extent, 1.0)
+        samples, drift = rollout.samples(), rollout.drift / _extents(rollout)
         if broken is not None:
             drift = np.where((grid.nodes > broken)[:, None], np.nan, drift)
         nodes = grid.node_stages
@@ -129,13 +127,22 @@ class StillMotion:
         problem = self.problem
         if space == "joint":
             return None
-        if problem.robot.dof == problem.task.dimension:
+        if problem.robot.dof == problem.follows.dimension:
             return np.zeros((len(t), problem.robot.dof, 0))
         return self._transported(t)
 
     @cached_property
     def _transported(self) -> TransportedFrame:
         return TransportedFrame(self.grid.nodes, self.jacobians)
+
+
+def _extents(rollout: Rollout) -> Array:
+    """Return how far the paths go [m], for the rows of positions, and 1 for the others, (m,)."""
+    extents = [max(float(np.ptp(path, axis=0).max()), _SHORTEST) for path in rollout.targets]
+    tasks = [item.task for item in rollout.follows.items]
+    return np.concatenate(
+        [np.where(task.rows < 3, far, 1.0) for task, far in zip(tasks, extents, strict=True)]
+    )
 
 
 def rough_still_motion(

@@ -1,6 +1,4 @@
 """What the arm follows: chains, their paths, and the rows of them that are prescribed."""
 
-from selfmotion.follow.follow import Follow
-from selfmotion.follow.follows import Follows
-
-__all__ = ["Follow", "Follows"]
+from selfmotion.follow.follow import Follow as Follow
+from selfmotion.follow.follows import Follows as Follows

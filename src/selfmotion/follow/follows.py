@@ -8,6 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError
 from selfmotion.follow.follow import Follow
+from selfmotion.kernels import Layout, layout_of
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel, null_space
 from selfmotion.task import Task
@@ -78,6 +79,13 @@ class Follows:
     def linear(self) -> Array:
         """1 for rows in metres, 0 for those in radians, (m,)."""
         return np.concatenate([item.task.rows < 3 for item in self.items]).astype(np.float64)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """What compiled kernels need of the rows."""
+        return layout_of(
+            [(f.task.rows, f.task.tool_axes, f.chain.joints) for f in self.items], self.robot.dof
+        )
 
     @property
     def row_names(self) -> tuple[str, ...]:

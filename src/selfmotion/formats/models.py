@@ -149,9 +149,8 @@ _OWN: Mapping[str, _Fields] = {
     "polyline": _SHAPE,
     "twist": {"start": (Pose, ...), "breaks": (Numbers, ...), "coefficients": (Numbers, ...)},
     "retimed": {"path": (Table, ...)},
-    "truncated": {"path": (Table, ...)},
+    "section": {"path": (Table, ...)},
     "feed": {"path": (Table, ...), **_SHAPE},
-    "ramped": {"path": (Table, ...)},
     "joined": {"pieces": (list[Table], ...)},  # type: ignore[valid-type]
     "placed": {"path": (Table, ...)},
     "Relaxation": {"rows": (Names, ...), "during": (Numbers, None)},

@@ -29,7 +29,7 @@ from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import LineSearch, Optimizer, QuasiNewton
-from selfmotion.path import Circle, Feed, Line, Path, Placed, Ramped
+from selfmotion.path import Circle, Feed, Line, Path, Placed, section_at_rest
 from selfmotion.planning import Search, plan
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
@@ -253,7 +253,7 @@ class _Reader:
                 del values["kind"]
                 ramp = values.pop("ramp", None)
                 path: Path = read_path(self._beside(values.pop("file")), **values)
-                path = path if ramp is None else Ramped(path, ramp)
+                path = path if ramp is None else section_at_rest(path, ramp=ramp)
             case "circle":
                 path = _circle(values)
             case "line":

@@ -2,7 +2,7 @@
 
 import dataclasses
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path
 from selfmotion.constraints import Constraint
@@ -12,9 +12,6 @@ from selfmotion.motion import NullMotion
 from selfmotion.path import Path
 from selfmotion.problem import NO_OVERLAP, Problem, check_problem
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot, mounting_of
-
-if TYPE_CHECKING:
-    from selfmotion.formats.problem_file import Job
 
 
 def write_problem(problem: Problem, file: str | FilePath) -> None:
@@ -29,20 +26,6 @@ def write_problem(problem: Problem, file: str | FilePath) -> None:
     """
     check_problem(problem)
     write_document(as_path(file), problem_table(problem))
-
-
-def write_job(job: "Job", file: str | FilePath) -> None:
-    """Write a problem with its settings; see `write_problem`."""
-    table = problem_table(job.problem)
-    for name, key in (("search", "search"), ("optimizer", "optimiser"), ("tolerance", "tolerance")):
-        value = getattr(job, name)
-        if value is not None:
-            table[key] = dataclasses.asdict(value)
-    if job.max_evaluations is not None:
-        table["max_evaluations"] = job.max_evaluations
-    if job.outputs:
-        table["outputs"] = [str(output.resolve()) for output in job.outputs]
-    write_document(as_path(file), table)
 
 
 def problem_table(problem: Problem) -> dict[str, Any]:

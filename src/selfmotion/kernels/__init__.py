@@ -1,9 +1,10 @@
 """What numba compiles: the small dense algebra around Pinocchio's Jacobians.
 
-Notation, per stage: J6 (6, n) the tool's Jacobian [v; ω] in world axes, S the selection of the
-task's rows, J = S J6 (m, n), ε the null motion, u = S(ẋ_d + K e) the commanded rows with pose
-error e, A = JJᵀ + λ²I = LLᵀ (λ = 0 except near singular poses, where damping is asked for),
-y = A⁻¹(u - Jε), and eq. 4 in the form that needs one solve:
+Notation, per stage: J6 (6, n) a tip's Jacobian [v; ω] in the axes of its chain's base, S the
+selection of its task's rows, J = S J6 (m, n) the rows of all tips, one below the other, ε the null
+motion, u = S(ẋ_d + K e) the commanded rows with pose errors e, A = JJᵀ + λ²I = LLᵀ (λ = 0 except
+near singular poses, where damping is asked for), y = A⁻¹(u - Jε), and eq. 4 in the form that needs
+one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 
@@ -12,34 +13,38 @@ made of small kernels, which LLVM inlines, and is compiled for what it is given:
 or a path that does not move, does not wait for theirs.
 """
 
-from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
-from selfmotion.kernels.backward import pullback, sensitivities, space_size
-from selfmotion.kernels.contraction import contract_task
-from selfmotion.kernels.damping import Law
-from selfmotion.kernels.forward import advance
-from selfmotion.kernels.start import approach_start
-from selfmotion.kernels.table import Stage, columns, part, parts
-from selfmotion.kernels.tool import POINTING, Rows, angle_kind, pose_error, select, task_rows
-
-__all__ = [
-    "POINTING",
-    "Law",
-    "Rows",
-    "Stage",
-    "advance",
-    "angle_kind",
-    "approach_start",
-    "cholesky",
-    "columns",
-    "contract_task",
-    "gram",
-    "part",
-    "parts",
-    "pose_error",
-    "pullback",
-    "select",
-    "sensitivities",
-    "solve_cholesky",
-    "space_size",
-    "task_rows",
-]
+from selfmotion.kernels.algebra import (
+    cholesky as cholesky,
+    gram as gram,
+    solve_cholesky as solve_cholesky,
+)
+from selfmotion.kernels.backward import (
+    pullback as pullback,
+    sensitivities as sensitivities,
+    space_size as space_size,
+)
+from selfmotion.kernels.contraction import contract_task as contract_task
+from selfmotion.kernels.damping import Law as Law
+from selfmotion.kernels.forward import (
+    advance as advance,
+    at_tip as at_tip,
+)
+from selfmotion.kernels.start import approach_start as approach_start
+from selfmotion.kernels.table import (
+    Stage as Stage,
+    Tip as Tip,
+    columns as columns,
+    part as part,
+    parts as parts,
+    tip_of as tip_of,
+)
+from selfmotion.kernels.tool import (
+    KIND as KIND,
+    Layout as Layout,
+    Rows as Rows,
+    layout_of as layout_of,
+    pose_error as pose_error,
+    rows_of as rows_of,
+    select as select,
+    task_rows as task_rows,
+)

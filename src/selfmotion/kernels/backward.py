@@ -5,9 +5,17 @@ from typing import NamedTuple
 from selfmotion.basics import Array, inlined, kernel
 from selfmotion.kernels.algebra import add_angular, angular, angular_part, cross, plus, respond
 from selfmotion.kernels.contraction import contract
-from selfmotion.kernels.damping import Law, pull_damping
-from selfmotion.kernels.table import Stage, part, parts
-from selfmotion.kernels.tool import NO_ANGLE, POINTING, Rows, pull_error, unselect
+from selfmotion.kernels.damping import Law, damping_slope, pull_damping
+from selfmotion.kernels.table import Stage, Tip, part, parts, tip_of
+from selfmotion.kernels.tool import (
+    KIND,
+    NO_ANGLE,
+    POINTING,
+    Layout,
+    pull_error,
+    rows_of,
+    unselect,
+)
 
 
 class Space(NamedTuple):
@@ -20,15 +28,17 @@ class Space(NamedTuple):
     z : (m,)
         -A⁻¹Jw.
     full_y, full_z : (6,)
-        Sᵀy and Sᵀz.
+        Sᵀy and Sᵀz of a tip.
     by_error, twist : (6,)
-        Cotangents of the pose error and of the tool's twist.
+        Cotangents of its pose error and of its twist.
     weights : (6, n)
         M, of which ⟨M, ∂J6⟩ is taken.
-    by_epsilon, by_q, by_target : (n,), (n,), (12,)
+    by_epsilon, by_q : (n,), (n,)
         What a stage's pullback gives.
     by_slope : (4, n)
         The last four of `by_q`.
+    by_target : (F, 12)
+        What a stage's pullback gives to the paths of F tips.
     """
 
     w: Array
@@ -40,13 +50,13 @@ class Space(NamedTuple):
     weights: Array
     by_epsilon: Array
     by_q: Array
-    by_target: Array
     by_slope: Array
+    by_target: Array
 
 
 @inlined
-def divide(space: Array, n: int, m: int) -> Space:
-    """Return the parts of the array to work in, for n joints and m rows of the task."""
+def divide(space: Array, n: int, m: int, tips: int) -> Space:
+    """Return the parts of the array to work in, for n joints and m rows of so many tips."""
     return Space(
         w=part(space, 0, (n,)),
         z=part(space, n, (m,)),
@@ -57,21 +67,21 @@ def divide(space: Array, n: int, m: int) -> Space:
         weights=part(space, n + m + 24, (6, n)),
         by_epsilon=part(space, 7 * n + m + 24, (n,)),
         by_q=part(space, 8 * n + m + 24, (n,)),
-        by_target=part(space, 9 * n + m + 24, (12,)),
-        by_slope=part(space, 9 * n + m + 36, (4, n)),
+        by_slope=part(space, 9 * n + m + 24, (4, n)),
+        by_target=part(space, 13 * n + m + 24, (tips, 12)),
     )
 
 
-def space_size(n: int, m: int) -> int:
+def space_size(n: int, m: int, tips: int) -> int:
     """Return how long the array to work in is."""
-    return 13 * n + m + 36
+    return 13 * n + m + 24 + 12 * tips
 
 
 @inlined
 def pull_stage(
-    at: Stage,
-    rows: Rows,
-    angle_kind: int,
+    row: Array,
+    n: int,
+    layout: Layout,
     gain: float,
     law: Law | None,
     space: Space,
@@ -79,48 +89,60 @@ def pull_stage(
     epsilon_bar: Array,
     target_bar: Array,
 ) -> None:
-    """Pull the cotangents `space.w` on q̇ and ē (6,) on the pose error back.
+    """Pull the cotangents `space.w` on q̇ and ē (F, 6) on the pose errors back.
 
-    To ε (set), q (added to `space.by_q`) and the path (set). z = -A⁻¹Jw and ε̄ = w + Jᵀz are eq. 4
+    To ε (set), q (added to `space.by_q`) and the paths (set). z = -A⁻¹Jw and ε̄ = w + Jᵀz are eq. 4
     itself, for ε = w and u = 0; q̄ = ⟨y ε̄ᵀ + z q̇ᵀ, ∂J/∂q⟩ + (ēᵀ - zᵀS K) ∂e/∂q, and where the
     angular rows are in tool axes, -zᵀ ∂S u. Damping adds (λ0² zᵀy + K zᵀS e) ∂f, see
-    `pull_damping`; K is (1 - f) times the `gain`. The path's cotangent (12,) is that of its pose
+    `pull_damping`; K is (1 - f) times the `gain`. A path's cotangent (12,) is that of its pose
     [m, rad], then -Sᵀz of its twist.
     """
-    pointing = angle_kind == POINTING
-    for i in range(rows.shape[0]):
+    m = rows_of(layout)
+    at = parts(row, n, m)
+    for i in range(m):
         space.z[i] = 0.0
     respond(at.task_jacobian, at.factor, space.z, space.w, epsilon_bar)
-    unselect(rows, pointing, at.rotation, at.y, space.full_y)
-    unselect(rows, pointing, at.rotation, space.z, space.full_z)
-    for i in range(6):
-        for k in range(epsilon_bar.shape[0]):
-            space.weights[i, k] = space.full_y[i] * epsilon_bar[k] + space.full_z[i] * at.qd[k]
     fade = 0.0 if law is None else at.damping[1]
-    for i in range(6):
-        space.by_error[i] = error_bar[i] - (1.0 - fade) * gain * space.full_z[i]
-    # Everything but ∂J6 acts through the tool's own twist J6 ∂q.
-    pull_error(angle_kind, at.error, at.rotation, at.target_rotation, space.by_error, space.twist)
-    # Moved together, target and tool turn the error with them: ∂e = ω × e.
-    for i in range(6):
-        target_bar[i], target_bar[6 + i] = -space.twist[i], -space.full_z[i]
-    if angle_kind != NO_ANGLE:
-        turned = cross(angular_part(at.error), angular_part(space.by_error))
-        add_angular(target_bar, 1.0, turned)
-    if pointing:
-        pull_axes(at, epsilon_bar, space)
+    slope = 0.0
     if law is not None and fade > 0.0:
-        pull_damping(at, rows, pointing, gain, space.z, space.full_z, space.weights, space.twist)
-    contract(at.jacobian, space.weights, space.twist, space.by_q)
+        slope = damping_slope(row, n, layout, gain, space.z)
+    for f in range(layout.shape[0]):
+        tip, back = tip_of(row, f, n, m), target_bar[f]
+        unselect(layout, f, tip.rotation, at.y, space.full_y)
+        unselect(layout, f, tip.rotation, space.z, space.full_z)
+        for i in range(6):
+            for k in range(n):
+                space.weights[i, k] = space.full_y[i] * epsilon_bar[k] + space.full_z[i] * at.qd[k]
+            space.by_error[i] = error_bar[f, i] - (1.0 - fade) * gain * space.full_z[i]
+        # Everything but ∂J6 acts through the tip's own twist J6 ∂q.
+        pull_error(
+            layout[f, KIND],
+            tip.error,
+            tip.rotation,
+            tip.target_rotation,
+            space.by_error,
+            space.twist,
+        )
+        # Moved together, target and tip turn the error with them: ∂e = ω × e.
+        for i in range(6):
+            back[i], back[6 + i] = -space.twist[i], -space.full_z[i]
+        if layout[f, KIND] != NO_ANGLE:
+            turned = cross(angular_part(tip.error), angular_part(space.by_error))
+            add_angular(back, 1.0, turned)
+        if layout[f, KIND] == POINTING:
+            pull_axes(at, tip, epsilon_bar, space)
+        if law is not None and fade > 0.0:
+            pull_damping(at, tip, layout, f, slope, space.weights, space.twist)
+        contract(layout, f, tip.jacobian, space.weights, space.twist, space.by_q)
 
 
 @inlined
-def pull_axes(at: Stage, epsilon_bar: Array, space: Space) -> None:
-    """Add what turning the tool's axes, ∂S, does to J and u, to the twist's cotangent."""
-    by_y, by_z = (0.0, 0.0, 0.0), angular_part(at.command)
+def pull_axes(at: Stage, tip: Tip, epsilon_bar: Array, space: Space) -> None:
+    """Add what turning the tip's axes, ∂S, does to J and u, to the twist's cotangent."""
+    by_y, by_z = (0.0, 0.0, 0.0), angular_part(tip.command)
     by_z = -by_z[0], -by_z[1], -by_z[2]
     for k in range(epsilon_bar.shape[0]):
-        turning = angular(at.jacobian, k)
+        turning = angular(tip.jacobian, k)
         by_y = plus(by_y, epsilon_bar[k], turning)
         by_z = plus(by_z, at.qd[k], turning)
     add_angular(space.twist, 1.0, cross(angular_part(space.full_y), by_y))
@@ -133,8 +155,7 @@ def pullback(
     qd_cotangent: Array,
     error_cotangent: Array,
     table: Array,
-    rows: Rows,
-    angle_kind: int,
+    layout: Layout,
     gain: float,
     law: Law | None,
     work: Array,
@@ -144,15 +165,16 @@ def pullback(
 ) -> None:
     """Reverse the Runge-Kutta recursion: cotangents on all stages → start (n,).
 
-    Sets those of ε (S, n), of the start (n,) and of the path (S, 12), see `pull_stage`.
+    Sets those of ε (S, n), of the start (n,) and of the paths (S, F, 12), see `pull_stage`.
 
     A stage's slope acts on the later stages of its step and on the step's end.
     """
     count, n = q_cotangent.shape
-    space = divide(work, n, rows.shape[0])
+    m = rows_of(layout)
+    space = divide(work, n, m, layout.shape[0])
     by_slope = space.by_slope
     for s in range(count - 1, -1, -1):
-        at = parts(table[s], n, rows.shape[0])
+        at = parts(table[s], n, m)
         i, h, last = s % 4, at.step[0], s == count - 1
         for k in range(n):
             w = qd_cotangent[s, k]
@@ -163,9 +185,9 @@ def pullback(
             space.w[k] = w
             space.by_q[k] = q_cotangent[s, k]
         pull_stage(
-            at,
-            rows,
-            angle_kind,
+            table[s],
+            n,
+            layout,
             gain,
             law,
             space,
@@ -184,8 +206,7 @@ def pullback(
 @kernel
 def sensitivities(
     table: Array,
-    rows: Rows,
-    angle_kind: int,
+    layout: Layout,
     gain: float,
     law: Law | None,
     work: Array,
@@ -199,25 +220,26 @@ def sensitivities(
     """Set ∂q/∂x and ∂q̇/∂x at all stages, (S, n, d).
 
     For ∂ε/∂x = `epsilon_matrix` (S, n, d), ∂q(0)/∂x = `start_matrix` (n, d) and that of the path's
-    poses and twists, `target_matrix` (S, 12, d), or None where the path is fixed.
+    poses and twists, `target_matrix` (S, F, 12, d), or None where the paths are fixed.
 
     The tangent of the Runge-Kutta recursion: ∂q̇ = (I - J⁺J) ∂ε + (∂q̇/∂q) ∂q + (∂q̇/∂path) ∂path
     at every stage. The rows of the matrices are pullbacks of the unit vectors.
     """
     count, n, d = epsilon_matrix.shape
-    space = divide(work, n, rows.shape[0])
+    m = rows_of(layout)
+    space = divide(work, n, m, layout.shape[0])
     for j in range(n):
         for x in range(d):
             q_matrix[0, j, x] = start_matrix[j, x]
     for s in range(count):
-        at = parts(table[s], n, rows.shape[0])
+        at = parts(table[s], n, m)
         for j in range(n):
             for k in range(n):
                 space.w[k], space.by_q[k] = (1.0 if k == j else 0.0), 0.0
             pull_stage(
-                at,
-                rows,
-                angle_kind,
+                table[s],
+                n,
+                layout,
                 gain,
                 law,
                 space,
@@ -234,9 +256,10 @@ def sensitivities(
                 for x in range(d):
                     slope[x] += space.by_q[k] * q_matrix[s, k, x]
             if target_matrix is not None:
-                for k in range(12):
-                    for x in range(d):
-                        slope[x] += space.by_target[k] * target_matrix[s, k, x]
+                for f in range(layout.shape[0]):
+                    for k in range(12):
+                        for x in range(d):
+                            slope[x] += space.by_target[f, k] * target_matrix[s, f, k, x]
         if s + 1 < count:
             step_matrix(q_matrix, qd_matrix, s, at.step[0])
 

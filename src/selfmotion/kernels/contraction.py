@@ -17,35 +17,40 @@ from selfmotion.kernels.algebra import (
     linear,
     plus,
 )
-from selfmotion.kernels.tool import Rows, unselect
+from selfmotion.kernels.tool import KIND, ORDER, POINTING, Layout, unselect
 
 
 @inlined
-def contract(jacobian: Array, weights: Array, twist: Array, out: Array) -> None:
+def contract(
+    layout: Layout, f: int, jacobian: Array, weights: Array, twist: Array, out: Array
+) -> None:
     """Add ⟨M, ∂J6/∂q_k⟩ + twist·J6_k to out[k], for M = `weights` (6, n) and `twist` (6,).
 
-    Two running sums of cross products, which start from what acts on all columns alike.
+    Two running sums of cross products along the chain of tip f, which start from what acts on all
+    columns alike.
     """
     n = jacobian.shape[1]
     # Σ_{i ≥ k} v_i × M_v,i + ω_i × M_ω,i
     outer = angular_part(twist)
-    for k in range(n - 1, -1, -1):
+    for i in range(n - 1, -1, -1):
+        k = layout[f, ORDER + i]
         v, w = linear(jacobian, k), angular(jacobian, k)
         outer = plus(outer, 1.0, cross(v, linear(weights, k)))
         outer = plus(outer, 1.0, cross(w, angular(weights, k)))
         out[k] += dot(w, outer)
     # Σ_{i < k} M_v,i × ω_i
     inner = (twist[0], twist[1], twist[2])
-    for k in range(n):
+    for i in range(n):
+        k = layout[f, ORDER + i]
         out[k] += dot(linear(jacobian, k), inner)
         inner = plus(inner, 1.0, cross(linear(weights, k), angular(jacobian, k)))
 
 
 @kernel
 def contract_task(
-    jacobian: Array, rotation: Array, weights: Array, rows: Rows, pointing: bool
+    jacobian: Array, rotation: Array, weights: Array, layout: Layout, f: int
 ) -> Array:
-    """Return ⟨M, ∂J/∂q_k⟩ of the task Jacobian for S samples: M = `weights` (S, m, n) → (S, n).
+    """Return ⟨M, ∂J/∂q_k⟩ of tip f's task Jacobian for S samples: M = `weights` (S, m, n) → (S, n).
 
     Where S depends on q (rows in tool axes), ∂S adds ω_k · Σ_i (SᵀM)_ω,i × ω_i.
     """
@@ -62,11 +67,11 @@ def contract_task(
         for k in range(n):
             for i in range(m):
                 values[i] = weights[s, i, k]
-            unselect(rows, pointing, turn, values, moment)
+            unselect(layout, f, turn, values, moment)
             for i in range(6):
                 here[i, k], full[i, k] = jacobian[s, i, k], moment[i]
-            if pointing:
+            if layout[f, KIND] == POINTING:
                 turning = cross(angular_part(moment), angular(here, k))
                 add_angular(twist, 1.0, turning)
-        contract(here, full, twist, out[s])
+        contract(layout, f, here, full, twist, out[s])
     return out

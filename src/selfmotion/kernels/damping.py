@@ -14,8 +14,8 @@ from selfmotion.kernels.algebra import (
     plus,
     smallest_eigenvector,
 )
-from selfmotion.kernels.table import Stage, part
-from selfmotion.kernels.tool import Rows, unselect
+from selfmotion.kernels.table import Stage, Tip, part, parts, tip_of
+from selfmotion.kernels.tool import KIND, POINTING, Layout, rows_of, unselect
 
 # The threshold σ0 and the strength λ0 [m, rad].
 Law = tuple[float, float]
@@ -56,36 +56,45 @@ def damp(gram: Array, law: Law, out: Array) -> float:
 
 
 @inlined
+def damping_slope(row: Array, n: int, layout: Layout, gain: float, z: Array) -> float:
+    """Return 2 df/dσ² (λ0² zᵀy + K zᵀS e): what ⟨v (Jᵀv)ᵀ, ∂J⟩ has to be multiplied by."""
+    m = rows_of(layout)
+    at, full = parts(row, n, m), np.empty(6)
+    slope = 0.0
+    for i in range(m):
+        slope += at.damping[0] * z[i] * at.y[i]
+    for f in range(layout.shape[0]):
+        tip = tip_of(row, f, n, m)
+        unselect(layout, f, tip.rotation, z, full)
+        for i in range(6):
+            slope += gain * full[i] * tip.error[i]
+    return float(2.0 * at.damping[2] * slope)
+
+
+@inlined
 def pull_damping(
     at: Stage,
-    rows: Rows,
-    pointing: bool,
-    gain: float,
-    z: Array,
-    full_z: Array,
+    tip: Tip,
+    layout: Layout,
+    f: int,
+    factor: float,
     weights: Array,
     twist: Array,
 ) -> None:
-    """Add what (λ0² zᵀy + K zᵀS e) ∂f leaves: on J6 to `weights` (6, n), on S to `twist` (6,).
+    """Add what `factor` ⟨v (Jᵀv)ᵀ, ∂J⟩ leaves: on J6 to `weights` (6, n), on S to `twist` (6,).
 
-    ∂f = df/dσ² 2 ⟨v (Jᵀv)ᵀ, ∂J⟩.
+    For tip f; see `damping_slope`.
     """
     m, n = at.task_jacobian.shape
-    strength, by_square, v = at.damping[0], at.damping[2], part(at.damping, 3, (m,))
-    slope = 0.0
-    for i in range(m):
-        slope += strength * z[i] * at.y[i]
-    for i in range(6):
-        slope += gain * full_z[i] * at.error[i]
-    factor = 2.0 * by_square * slope
+    v = part(at.damping, 3, (m,))
     left, turn = np.empty(6), (0.0, 0.0, 0.0)
-    unselect(rows, pointing, at.rotation, v, left)
+    unselect(layout, f, tip.rotation, v, left)
     for k in range(n):
         right = 0.0
         for i in range(m):
             right += at.task_jacobian[i, k] * v[i]
-        turn = plus(turn, right, angular(at.jacobian, k))
+        turn = plus(turn, right, angular(tip.jacobian, k))
         for i in range(6):
             weights[i, k] += factor * left[i] * right
-    if pointing:
+    if layout[f, KIND] == POINTING:
         add_angular(twist, factor, cross(angular_part(left), turn))

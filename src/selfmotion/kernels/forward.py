@@ -14,53 +14,57 @@ from selfmotion.kernels.algebra import (
     respond,
 )
 from selfmotion.kernels.damping import Law, damp
-from selfmotion.kernels.table import Stage, parts, q_of, qd_of
-from selfmotion.kernels.tool import POINTING, Rows, pose_error, select, task_rows
+from selfmotion.kernels.table import Tip, parts, q_of, qd_of, tip_of
+from selfmotion.kernels.tool import KIND, Layout, pose_error, rows_of, select, task_rows
 
 
 @kernel
 def advance(
     s: int,
-    world_jacobian: Array,
+    f: int,
+    base_jacobian: Array,
     rotation: Array,
     translation: Array,
     table: Array,
-    rows: Rows,
-    angle_kind: int,
+    layout: Layout,
     gain: float,
     law: Law | None,
 ) -> bool:
-    """Evaluate eq. 4 at stage s, q̇ = J⁺u + (I - J⁺J) ε, and set the next stage's q.
+    """Note where tip f is at stage s; after the last one evaluate eq. 4, and set the next q.
 
-    `world_jacobian` (6, n) is that of the point at the world's origin, `rotation` and `translation`
-    the tool's pose. False where the motion breaks down, see `evaluate`.
+    `base_jacobian` (6, n) is that of the point at the base's origin, `rotation` and `translation`
+    the tip's pose. False where the motion breaks down, see `evaluate`.
     """
-    at = parts(table[s], world_jacobian.shape[1], rows.shape[0])
-    observe(world_jacobian, rotation, translation, at)
-    if not evaluate(at, rows, angle_kind, gain, law):
+    n, m, row = base_jacobian.shape[1], rows_of(layout), table[s]
+    observe(base_jacobian, rotation, translation, tip_of(row, f, n, m))
+    if f + 1 < layout.shape[0]:
+        return True
+    if not evaluate(row, n, layout, gain, law):
         return False
-    step(table, s, at.q.shape[0], at.step[0])
+    step(table, s, n, parts(row, n, m).step[0])
     return True
 
 
 @inlined
-def evaluate(at: Stage, rows: Rows, angle_kind: int, gain: float, law: Law | None) -> bool:
-    """Evaluate eq. 4: q̇ = J⁺u + (I - J⁺J) ε, with u = S(ẋ_d + K e).
+def evaluate(row: Array, n: int, layout: Layout, gain: float, law: Law | None) -> bool:
+    """Evaluate eq. 4: q̇ = J⁺u + (I - J⁺J) ε, with u = S(ẋ_d + K e) of all tips.
 
     With a `law`, A = JJᵀ + λ²I is damped near singular poses, see `damp`, and the pose feedback K
     fades out as damping fades in: speeds would otherwise grow with an error that the arm cannot
     take out. False where A is not positive definite (a singular pose), or q̇ is not finite.
     """
-    pointing = angle_kind == POINTING
-    pose_error(
-        angle_kind, at.target_translation, at.target_rotation, at.translation, at.rotation, at.error
-    )
-    task_rows(rows, pointing, at.rotation, at.jacobian, at.task_jacobian)  # J = S J6
+    m = rows_of(layout)
+    at = parts(row, n, m)
+    for f in range(layout.shape[0]):
+        tip = tip_of(row, f, n, m)
+        task_rows(layout, f, tip.rotation, tip.jacobian, at.task_jacobian)  # J = S J6
     gram(at.task_jacobian, at.factor)  # A = JJᵀ
     if law is not None:
         gain *= damp(at.factor, law, at.damping)  # A = JJᵀ + λ²I
-    add_scaled(at.target_twist, gain, at.error, at.command)  # ẋ_d + K e
-    select(rows, pointing, at.rotation, at.command, at.y)  # y = u
+    for f in range(layout.shape[0]):
+        tip = tip_of(row, f, n, m)
+        aim(layout[f, KIND], gain, tip)  # ẋ_d + K e
+        select(layout, f, tip.rotation, tip.command, at.y)  # y = u
     if not cholesky(at.factor):
         return False
     respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)  # y = A⁻¹(u - Jε), q̇ = Jᵀy + ε
@@ -68,20 +72,33 @@ def evaluate(at: Stage, rows: Rows, angle_kind: int, gain: float, law: Law | Non
 
 
 @inlined
-def observe(world_jacobian: Array, rotation: Array, translation: Array, at: Stage) -> None:
-    """Set the tool's pose and its Jacobian J6 at a stage."""
+def aim(kind: int, gain: float, tip: Tip) -> None:
+    """Set a tip's pose error e, and its command ẋ_d + K e."""
+    pose_error(
+        kind, tip.target_translation, tip.target_rotation, tip.translation, tip.rotation, tip.error
+    )
+    add_scaled(tip.target_twist, gain, tip.error, tip.command)
+
+
+@inlined
+def observe(base_jacobian: Array, rotation: Array, translation: Array, tip: Tip) -> None:
+    """Set a tip's pose and its Jacobian J6."""
     for i in range(3):
-        at.translation[i] = translation[i]
+        tip.translation[i] = translation[i]
         for j in range(3):
-            at.rotation[i, j] = rotation[i, j]
-    for i in range(6):
-        for k in range(at.q.shape[0]):
-            at.jacobian[i, k] = world_jacobian[i, k]
-    # The velocity of the tool's origin is v = v_0 + ω × x.
+            tip.rotation[i, j] = rotation[i, j]
+    at_tip(base_jacobian, translation, tip.jacobian)
+
+
+@inlined
+def at_tip(base_jacobian: Array, translation: Array, out: Array) -> None:
+    """Set `out` (6, n) to the Jacobian of the tip's origin x: v = v_0 + ω × x."""
     x = (translation[0], translation[1], translation[2])
-    for k in range(at.q.shape[0]):
-        v = plus(linear(at.jacobian, k), 1.0, cross(angular(at.jacobian, k), x))
-        at.jacobian[0, k], at.jacobian[1, k], at.jacobian[2, k] = v
+    for k in range(out.shape[1]):
+        turning = angular(base_jacobian, k)
+        v = plus(linear(base_jacobian, k), 1.0, cross(turning, x))
+        out[0, k], out[1, k], out[2, k] = v
+        out[3, k], out[4, k], out[5, k] = turning
 
 
 @inlined

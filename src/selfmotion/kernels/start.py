@@ -4,7 +4,7 @@ import numpy as np
 
 from selfmotion.basics import Array, kernel
 from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
-from selfmotion.kernels.tool import POINTING, Rows, pose_error, select, task_rows
+from selfmotion.kernels.tool import KIND, Layout, pose_error, rows_of, select, task_rows
 
 
 @kernel
@@ -15,8 +15,7 @@ def approach_start(
     translation: Array,
     target_rotation: Array,
     target_translation: Array,
-    rows: Rows,
-    angle_kind: int,
+    layout: Layout,
     null: Array,
     reference: Array,
     z: Array,
@@ -26,13 +25,12 @@ def approach_start(
     B⁻¹ = Bᵀ(BBᵀ)⁻¹: errors of the product are taken out by the next step. -1 where B is singular,
     NaN where q is not finite.
     """
-    m, r, n = rows.shape[0], null.shape[1], q.shape[0]
+    m, r, n = rows_of(layout), null.shape[1], q.shape[0]
     error, b = np.zeros(6), np.empty(m + r)
     system, factor = np.empty((m + r, n)), np.empty((m + r, m + r))
-    pointing = angle_kind == POINTING
-    pose_error(angle_kind, target_translation, target_rotation, translation, rotation, error)
-    select(rows, pointing, rotation, error, b)
-    task_rows(rows, pointing, rotation, frame_jacobian, system)
+    pose_error(layout[0, KIND], target_translation, target_rotation, translation, rotation, error)
+    select(layout, 0, rotation, error, b)
+    task_rows(layout, 0, rotation, frame_jacobian, system)
     for i in range(r):
         b[m + i] = z[i]
         for k in range(n):

@@ -60,18 +60,10 @@ class Stage(NamedTuple):
     ----------
     q, qd, epsilon : (n,)
         q, q̇ and ε.
-    target_translation, target_rotation, target_twist : (3,), (3, 3), (6,)
-        Pose and twist ẋ_d of the path.
     step : (1,)
         The length [s] of the Runge-Kutta step.
-    translation, rotation : (3,), (3, 3)
-        The tool's pose.
-    error : (6,)
-        Its pose error e.
-    command : (6,)
-        ẋ_d + K e.
-    jacobian, task_jacobian : (6, n), (m, n)
-        J6 and J = S J6.
+    task_jacobian : (m, n)
+        J: the rows S J6 of all tips.
     factor, y : (m, m), (m,)
         The Cholesky factor of A, and y.
     damping : (3 + m,)
@@ -81,45 +73,70 @@ class Stage(NamedTuple):
     q: Array
     qd: Array
     epsilon: Array
-    target_translation: Array
-    target_rotation: Array
-    target_twist: Array
     step: Array
-    translation: Array
-    rotation: Array
-    error: Array
-    command: Array
-    jacobian: Array
     task_jacobian: Array
     factor: Array
     y: Array
     damping: Array
 
 
+class Tip(NamedTuple):
+    """The parts of a stage's row that belong to one tip, as views of it.
+
+    Attributes
+    ----------
+    target_translation, target_rotation, target_twist : (3,), (3, 3), (6,)
+        Pose and twist ẋ_d of its path.
+    translation, rotation : (3,), (3, 3)
+        The tip's pose.
+    error : (6,)
+        Its pose error e.
+    command : (6,)
+        ẋ_d + K e.
+    jacobian : (6, n)
+        J6.
+    """
+
+    target_translation: Array
+    target_rotation: Array
+    target_twist: Array
+    translation: Array
+    rotation: Array
+    error: Array
+    command: Array
+    jacobian: Array
+
+
 @inlined
 def parts(table: Array, n: int, m: int) -> Stage:
-    """Return the parts of a row or of a table, for n joints and m rows of the task."""
-    path = 3 * n
-    tool = path + 19
-    linear = tool + 24
-    solution = linear + (6 + m) * n
+    """Return the parts of a row or of a table, for n joints and m rows of all tips."""
+    linear = 3 * n + 1
+    solution = linear + m * n
     return Stage(
         q=part(table, 0, (n,)),
         qd=part(table, n, (n,)),
         epsilon=part(table, 2 * n, (n,)),
-        target_translation=part(table, path, (3,)),
-        target_rotation=part(table, path + 3, (3, 3)),
-        target_twist=part(table, path + 12, (6,)),
-        step=part(table, path + 18, (1,)),
-        translation=part(table, tool, (3,)),
-        rotation=part(table, tool + 3, (3, 3)),
-        error=part(table, tool + 12, (6,)),
-        command=part(table, tool + 18, (6,)),
-        jacobian=part(table, linear, (6, n)),
-        task_jacobian=part(table, linear + 6 * n, (m, n)),
+        step=part(table, 3 * n, (1,)),
+        task_jacobian=part(table, linear, (m, n)),
         factor=part(table, solution, (m, m)),
         y=part(table, solution + m * m, (m,)),
         damping=part(table, solution + m * m + m, (3 + m,)),
+    )
+
+
+@inlined
+def tip_of(table: Array, f: int, n: int, m: int) -> Tip:
+    """Return the parts of a row or of a table that belong to tip f; see `parts`."""
+    first = shared_columns(n, m) + f * tip_columns(n)
+    return Tip(
+        target_translation=part(table, first, (3,)),
+        target_rotation=part(table, first + 3, (3, 3)),
+        target_twist=part(table, first + 12, (6,)),
+        translation=part(table, first + 18, (3,)),
+        rotation=part(table, first + 21, (3, 3)),
+        error=part(table, first + 30, (6,)),
+        command=part(table, first + 36, (6,)),
+        jacobian=part(table, first + 42, (6, n)),
     )
 
 
@@ -135,6 +152,18 @@ def qd_of(table: Array, s: int, n: int) -> Array:
     return part(table[s], n, (n,))
 
 
-def columns(n: int, m: int) -> int:
+@inlined
+def shared_columns(n: int, m: int) -> int:
+    """Return the length of what a row holds once."""
+    return 3 * n + 4 + m * n + m * m + 2 * m
+
+
+@inlined
+def tip_columns(n: int) -> int:
+    """Return the length of what a row holds for each tip."""
+    return 42 + 6 * n
+
+
+def columns(n: int, m: int, tips: int) -> int:
     """Return the length of a row."""
-    return 9 * n + 43 + m * n + m * m + 2 * m + 3
+    return int(shared_columns(n, m) + tips * tip_columns(n))

@@ -1,5 +1,10 @@
-"""The tool, compiled: its pose error and the rows of the task, both ways."""
+"""Tips, compiled: their pose errors and the rows of their tasks, both ways.
 
+A layout (F, 9 + n) tells of each of F tips that are followed how its angles are measured, its first
+row among all, how many it has, these rows of [v, ω], and the joints in the order of its chain.
+"""
+
+from collections.abc import Sequence
 from math import atan2, sqrt, tan
 
 import numpy as np
@@ -18,6 +23,7 @@ from selfmotion.kernels.algebra import (
 )
 
 Rows = npt.NDArray[np.intp]
+Layout = npt.NDArray[np.int64]
 
 # How a task measures its angular error.
 NO_ANGLE, LOGARITHM, POINTING = 0, 1, 2
@@ -26,8 +32,25 @@ NO_ANGLE, LOGARITHM, POINTING = 0, 1, 2
 _SMALL = 0.05
 
 
-def angle_kind(rows: Rows, tool_axes: bool) -> int:
-    """Return how a task with these rows of [v, ω] measures its angular error."""
+# Columns of a layout.
+KIND, FIRST, COUNT, ROWS, ORDER = 0, 1, 2, 3, 9
+
+
+def layout_of(tasks: Sequence[tuple[Rows, bool, Rows]], dof: int) -> Layout:
+    """Return the layout of tips with rows of [v, ω], axes of the tool, and joints of a chain."""
+    layout = np.zeros((len(tasks), ORDER + dof), dtype=np.int64)
+    first = 0
+    for line, (rows, tool_axes, joints) in zip(layout, tasks, strict=True):
+        line[KIND] = _angle_kind(rows, tool_axes)
+        line[FIRST], line[COUNT] = first, len(rows)
+        line[ROWS : ROWS + len(rows)] = rows
+        # Joints off the chain have columns of zeros, wherever they stand.
+        line[ORDER:] = [*joints, *np.setdiff1d(np.arange(dof), joints)]
+        first += len(rows)
+    return layout
+
+
+def _angle_kind(rows: Rows, tool_axes: bool) -> int:
     if tool_axes:
         return POINTING
     return LOGARITHM if np.any(rows >= 3) else NO_ANGLE
@@ -145,38 +168,48 @@ def pointing_coefficients(sine: float, cosine: float) -> tuple[float, float]:
 
 
 @inlined
-def task_rows(rows: Rows, pointing: bool, rotation: Array, jacobian: Array, out: Array) -> None:
-    """Set `out` (m, n) to J = S J6; angular rows in tool axes where `pointing`."""
-    for i in range(rows.shape[0]):
-        row = rows[i]
-        if pointing and row >= 3:
+def task_rows(layout: Layout, f: int, rotation: Array, jacobian: Array, out: Array) -> None:
+    """Set the rows of tip f in `out` (m, n) to S J6; angular ones in tool axes where pointing."""
+    first = layout[f, FIRST]
+    for i in range(layout[f, COUNT]):
+        row = layout[f, ROWS + i]
+        if layout[f, KIND] == POINTING and row >= 3:
             axis = linear(rotation, row - 3)
             for k in range(jacobian.shape[1]):
-                out[i, k] = dot(axis, angular(jacobian, k))
+                out[first + i, k] = dot(axis, angular(jacobian, k))
         else:
             for k in range(jacobian.shape[1]):
-                out[i, k] = jacobian[row, k]
+                out[first + i, k] = jacobian[row, k]
 
 
 @inlined
-def select(rows: Rows, pointing: bool, rotation: Array, twist: Array, out: Array) -> None:
-    """Set `out` (m,) to S·twist (6,)."""
-    for i in range(rows.shape[0]):
-        row = rows[i]
-        if pointing and row >= 3:
-            out[i] = dot(linear(rotation, row - 3), angular_part(twist))
+def select(layout: Layout, f: int, rotation: Array, twist: Array, out: Array) -> None:
+    """Set the rows of tip f in `out` (m,) to S·twist (6,)."""
+    first = layout[f, FIRST]
+    for i in range(layout[f, COUNT]):
+        row = layout[f, ROWS + i]
+        if layout[f, KIND] == POINTING and row >= 3:
+            out[first + i] = dot(linear(rotation, row - 3), angular_part(twist))
         else:
-            out[i] = twist[row]
+            out[first + i] = twist[row]
 
 
 @inlined
-def unselect(rows: Rows, pointing: bool, rotation: Array, values: Array, out: Array) -> None:
-    """Set `out` (6,) to Sᵀ·values (m,)."""
+def unselect(layout: Layout, f: int, rotation: Array, values: Array, out: Array) -> None:
+    """Set `out` (6,) to Sᵀ·values (m,) of tip f."""
     for i in range(6):
         out[i] = 0.0
-    for i in range(rows.shape[0]):
-        row = rows[i]
-        if pointing and row >= 3:
-            add_angular(out, values[i], linear(rotation, row - 3))
+    first = layout[f, FIRST]
+    for i in range(layout[f, COUNT]):
+        row = layout[f, ROWS + i]
+        if layout[f, KIND] == POINTING and row >= 3:
+            add_angular(out, values[first + i], linear(rotation, row - 3))
         else:
-            out[row] += values[i]
+            out[row] += values[first + i]
+
+
+@inlined
+def rows_of(layout: Layout) -> int:
+    """Return the number m of rows of all tips."""
+    last = layout.shape[0] - 1
+    return int(layout[last, FIRST] + layout[last, COUNT])

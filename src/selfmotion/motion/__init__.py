@@ -1,33 +1,19 @@
 """The nouns of a joint motion over time: grid, trajectory, null motion."""
 
-from selfmotion.motion.grid import Grid
-from selfmotion.motion.joining import joined_motions, reversed_motion
-from selfmotion.motion.null_motion import (
-    BSplineNullMotion,
-    NullMotion,
-    NullMotionTable,
-    PolynomialNullMotion,
-    RefinedNullMotion,
-    TransportedFrame,
-    resting_window,
-    transport,
+from selfmotion.motion.grid import Grid as Grid
+from selfmotion.motion.joining import (
+    joined_motions as joined_motions,
+    reversed_motion as reversed_motion,
 )
-from selfmotion.motion.sampling import Sampling
-from selfmotion.motion.trajectory import Trajectory, column_names
-
-__all__ = [
-    "BSplineNullMotion",
-    "Grid",
-    "NullMotion",
-    "NullMotionTable",
-    "PolynomialNullMotion",
-    "RefinedNullMotion",
-    "Sampling",
-    "Trajectory",
-    "TransportedFrame",
-    "column_names",
-    "joined_motions",
-    "resting_window",
-    "reversed_motion",
-    "transport",
-]
+from selfmotion.motion.null_motion import (
+    BSplineNullMotion as BSplineNullMotion,
+    NullMotion as NullMotion,
+    NullMotionTable as NullMotionTable,
+    PolynomialNullMotion as PolynomialNullMotion,
+    RefinedNullMotion as RefinedNullMotion,
+    TransportedFrame as TransportedFrame,
+    resting_window as resting_window,
+    transport as transport,
+)
+from selfmotion.motion.sampling import Sampling as Sampling
+from selfmotion.motion.trajectory import Trajectory as Trajectory, column_names as column_names

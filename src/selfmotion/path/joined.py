@@ -202,5 +202,5 @@ def _check_joint(one: Path, other: Path, number: int) -> None:
     if jump > STILL:
         raise PathError(
             f"{where} {jump:.3g} m/s or rad/s faster or slower than piece {number} ends; let both "
-            f"rest there (time_law='minimum_jerk', Ramped)"
+            f"rest there (time_law='minimum_jerk', section_at_rest)"
         )

@@ -10,6 +10,9 @@ from selfmotion.path.retimed import Retimed
 
 # Knots this near to an end, as a share of the duration, are the end.
 _CLOSE = 1e-9
+# Crowding knots: as often the time left is halved, and of two this close, as a share of the time
+# left, one is enough.
+_HALVED, _ENOUGH = 14, 1e-3
 
 
 class Section(_Derived, kind="section"):
@@ -21,6 +24,9 @@ class Section(_Derived, kind="section"):
         The whole motion.
     first, last : float
         Where the stretch begins and ends [s].
+    crowding : bool
+        Whether knots crowd towards the end: a motion that ends near a singular pose changes there
+        faster than any equal steps resolve.
 
     Raises
     ------
@@ -28,7 +34,7 @@ class Section(_Derived, kind="section"):
         The times are not in order, or outside the motion.
     """
 
-    def __init__(self, path: Path, first: float, last: float) -> None:
+    def __init__(self, path: Path, first: float, last: float, crowding: bool = False) -> None:
         check_path(path, "section")
         first = as_number(first, "section: first", error=PathError)
         last = as_number(last, "section: last", error=PathError)
@@ -38,17 +44,26 @@ class Section(_Derived, kind="section"):
                 f"0..{path.duration:.6g} s"
             )
         self._path, self._first, self._last = path, first, last
-        self.duration = last - first
+        self._crowding, self.duration = bool(crowding), last - first
 
     @property
     def knots(self) -> Array:
         """See `Path.knots`."""
-        return self._within(self._path.knots)
+        knots = self._within(self._path.knots)
+        return self._crowded(knots) if self._crowding else knots
 
     @property
     def marks(self) -> Array:
         """See `Path.marks`."""
-        return self._within(self._path.marks)
+        marks = self._within(self._path.marks)
+        return np.union1d(self.knots, marks) if self._crowding else marks
+
+    def _crowded(self, knots: Array) -> Array:
+        left = self.duration * 0.5 ** np.arange(1.0, _HALVED + 1.0)
+        gaps = np.abs(self.duration - left[:, None] - knots[:-1]).min(axis=1)
+        inner = knots[(knots > 0.0) & (knots < (1.0 - _ENOUGH) * self.duration)]
+        graded = self.duration - left[gaps > _ENOUGH * left]
+        return read_only([0.0, *np.union1d(inner, graded), self.duration])
 
     def _within(self, times: Array) -> Array:
         near = _CLOSE * self.duration
@@ -66,35 +81,52 @@ class Section(_Derived, kind="section"):
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""
-        ends = {"first": self._first, "last": self._last}
+        ends = {"first": self._first, "last": self._last, "crowding": self._crowding}
         return {"kind": self.kind, "path": self._path.to_dict(), **ends}
 
 
 def section_at_rest(
-    path: Path, first: float, last: float, ramp: float, ramped: tuple[bool, bool]
+    path: Path,
+    first: float = 0.0,
+    last: float | None = None,
+    ramp: float = 0.5,
+    ramped: tuple[bool, bool] = (True, True),
 ) -> Retimed:
-    """Return a stretch of a motion that is run up from rest, and brought to rest, where asked.
+    """Return a stretch of a motion, run up from rest and brought to rest: only its ends are slower.
 
-    Each ramp lasts `ramp` [s], as in `Ramped`, or as long as the stretch allows; the stretch takes
-    half as much longer.
+    The time σ of the original has dσ/dt = u²(3 - 2u) with u = t / ramp at the start, likewise at
+    the end, and 1 in between: velocity and acceleration are continuous, and nothing but the first
+    and the last half ramp of the original changes its pace. It takes half a ramp longer for each.
 
     Parameters
     ----------
     path : Path
+        The original.
     first, last : float
-        Where the stretch begins and ends [s].
+        Where the stretch begins and ends [s]; by default all of it.
     ramp : float
-        [s].
+        How long each ramp lasts [s].
     ramped : (bool, bool)
         Whether its start and its end are.
+
+    Raises
+    ------
+    PathError
+        The times are not in order, the ramp is not above 0, or longer than the stretch.
     """
-    section = Section(path, first, last)
-    # Shorter than the stretch by some, so that the samples of the pace are in order.
-    up, down = (0.9 * min(ramp, section.duration) if asked else 0.0 for asked in ramped)
-    t = np.array(
-        [0.0, up, section.duration + 0.5 * (up - down), section.duration + 0.5 * (up + down)]
-    )
-    sigma = np.array([0.0, 0.5 * up, section.duration - 0.5 * down, section.duration])
+    last = check_path(path, "section at rest").duration if last is None else last
+    section = path if (first, last) == (0.0, path.duration) else Section(path, first, last)
+    ramp = as_number(ramp, "section at rest: ramp", above=0.0, error=PathError)
+    end = section.duration
+    if ramp > end:
+        raise PathError(
+            f"section at rest: ramp is {ramp} s, expected a time above 0 and up to the stretch's "
+            f"duration, {end:.6g} s"
+        )
+    up, down = (ramp if asked else 0.0 for asked in ramped)
+    t = np.array([0.0, up, end + 0.5 * (up - down), end + 0.5 * (up + down)])
+    sigma = np.array([0.0, 0.5 * up, end - 0.5 * down, end])
     rate = np.array([0.0 if ramped[0] else 1.0, 1.0, 1.0, 0.0 if ramped[1] else 1.0])
-    kept = np.array([True, ramped[0], ramped[1], True])
+    # Without a ramp, or between two that fill the stretch, there is nothing.
+    kept = np.append(True, np.diff(t) > _CLOSE * end)
     return Retimed(section, t[kept], sigma[kept], rate[kept], np.zeros(int(kept.sum())))

@@ -8,7 +8,7 @@ from selfmotion.basics import Array, BreakdownError
 from selfmotion.engine import Evaluation, Guide, StillMotion
 from selfmotion.motion import Grid, Sampling
 from selfmotion.optimise import Status
-from selfmotion.path import Truncated
+from selfmotion.path import Section
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.session import Session
 from selfmotion.problem import Problem
@@ -173,9 +173,8 @@ def _until(problem: Problem, time: float) -> Problem:
         for first, last in [item.window(problem.path.duration)]
         if first < time
     ]
-    return replace(
-        problem, path=Truncated(problem.path, time), constraints=kept, relaxations=relaxations
-    )
+    path = Section(problem.path, 0.0, time, crowding=True)
+    return replace(problem, path=path, constraints=kept, relaxations=relaxations)
 
 
 def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attempt:

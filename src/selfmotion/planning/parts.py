@@ -266,7 +266,7 @@ class _Planner:
         ends = float(piece.t[0]), float(piece.t[-1])
         orders = rest_orders(Section(whole.path, *ends), whole.task)
         ramped = cut[0] and orders[0] < _AT_REST, cut[1] and orders[1] < _AT_REST
-        path = section_at_rest(whole.path, *ends, self._ramp, ramped)
+        path = section_at_rest(whole.path, *ends, min(self._ramp, ends[1] - ends[0]), ramped)
         return replace(
             whole,
             path=path,

@@ -14,11 +14,13 @@ import numpy as np
 
 from selfmotion.basics import Array, inlined, kernel
 from selfmotion.kernels import (
-    POINTING,
-    Rows,
+    KIND,
+    Layout,
+    at_tip,
     cholesky,
     gram,
     pose_error,
+    rows_of,
     select,
     solve_cholesky,
     task_rows,
@@ -114,19 +116,6 @@ def saturate(
     return True
 
 
-@inlined
-def at_tool(world_jacobian: Array, translation: Array, out: Array) -> None:
-    """Set `out` (6, n) to the Jacobian of the tool's origin: v = v_0 + ω × x."""
-    for k in range(out.shape[1]):
-        for i in range(3):
-            j, other = (i + 1) % 3, (i + 2) % 3
-            out[3 + i, k] = world_jacobian[3 + i, k]
-            out[i, k] = world_jacobian[i, k] + (
-                world_jacobian[3 + j, k] * translation[other]
-                - world_jacobian[3 + other, k] * translation[j]
-            )
-
-
 @kernel
 def command(
     cycle: int,
@@ -136,8 +125,7 @@ def command(
     table: Array,
     states: Array,
     limits: Array,
-    rows: Rows,
-    angle_kind: int,
+    layout: Layout,
     gain: float,
     h: float,
 ) -> bool:
@@ -158,17 +146,16 @@ def command(
 
     Returns whether the tool moves as the reference asks.
     """
-    n, m = world_jacobian.shape[1], rows.shape[0]
-    row, pointing = table[cycle], angle_kind == POINTING
+    n, m, row = world_jacobian.shape[1], rows_of(layout), table[cycle]
     jacobian, task, error = np.empty((6, n)), np.empty((m, n)), np.zeros(6)
-    at_tool(world_jacobian, translation, jacobian)
+    at_tip(world_jacobian, translation, jacobian)
     target = row[2 * n + 3 : 2 * n + 12].copy().reshape(3, 3)
-    pose_error(angle_kind, row[2 * n : 2 * n + 3], target, translation, rotation, error)
+    pose_error(layout[0, KIND], row[2 * n : 2 * n + 3], target, translation, rotation, error)
     twist, wanted = np.empty(6), np.empty(m)
     for i in range(6):
         twist[i] = row[2 * n + 12 + i] + gain * error[i]
-    task_rows(rows, pointing, rotation, jacobian, task)
-    select(rows, pointing, rotation, twist, wanted)
+    task_rows(layout, 0, rotation, jacobian, task)
+    select(layout, 0, rotation, twist, wanted)
     c, w = states[cycle, 0], states[cycle, 1]
     low, high, rates = np.empty(n), np.empty(n), np.empty(n)
     for k in range(n):

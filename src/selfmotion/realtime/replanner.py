@@ -6,7 +6,6 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion import kernels
 from selfmotion.basics import Array, ProblemError, as_number, as_whole, one_blas_thread
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost, JointVelocity
@@ -21,7 +20,7 @@ from selfmotion.realtime.limits import joint_limits, planned_limits, stoppable
 from selfmotion.realtime.reference import Approach, Reference, resting
 from selfmotion.realtime.segment import Flag, Segment
 from selfmotion.realtime.viable import tightened
-from selfmotion.robot import RobotModel
+from selfmotion.robot import RobotModel, march
 from selfmotion.task import Task
 
 # The pose feedback between two steps [1/s]. A motion that breaks down within this time [s] is not
@@ -129,8 +128,7 @@ class Replanner:
             self._around,
         )
         self._kinematics = follows.only.chain.kinematics()
-        self._rows = self.task.rows
-        self._kind = kernels.angle_kind(self._rows, self.task.tool_axes)
+        self._layout = follows.layout
         self._delay = round(latency / self.cycle)
         self._prepare(round(self.period / self.cycle) + round(reserve / self.cycle))
         self._reference = Reference(follows, approach or Approach(), self._times)
@@ -367,15 +365,17 @@ class Replanner:
         places = table[: self._cycles, :n]
         follows = True
 
-        def step(cycle: int, jacobian: Array, rotation: Array, translation: Array) -> bool:
+        def step(
+            cycle: int, tip: int, jacobian: Array, rotation: Array, translation: Array
+        ) -> bool:
             nonlocal follows
             follows &= law.command(
-                cycle, jacobian, rotation, translation, table, states, limits, rows, kind, _GAIN, h
+                cycle, jacobian, rotation, translation, table, states, limits, layout, _GAIN, h
             )
             return True
 
-        rows, kind = self._rows, self._kind
-        self._kinematics.march(places, step)
+        layout = self._layout
+        march([self._kinematics], places, step)
         return follows
 
     def _segment(

@@ -17,7 +17,7 @@ there is always a next command.
 
 from math import floor, inf, sqrt
 
-from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics import Array, inlined
 
 # What rounding may add to a limit: the set is that much smaller, relative to each limit.
 _ROUNDING = 1e-9
@@ -58,37 +58,6 @@ def viable_accelerations(
     if low > high:
         low = high = low if w < 0.0 else high
     return low, high
-
-
-@kernel
-def viable_box(c: Array, w: Array, limits: Array, h: float, low: Array, high: Array) -> None:
-    """Set `low` and `high` (n,) to `viable_accelerations` of all joints.
-
-    `limits` (4, n) are lower, upper, speed and acceleration.
-    """
-    for k in range(c.shape[0]):
-        low[k], high[k] = viable_accelerations(
-            c[k], w[k], limits[0, k], limits[1, k], limits[2, k], limits[3, k], h
-        )
-
-
-@kernel
-def advance_state(c: Array, w: Array, a: Array, wanted: Array, limits: Array, h: float) -> bool:
-    """Go on by one cycle with the viable acceleration next to `wanted` (n,); all in place.
-
-    Returns whether it is what was wanted. What is no number is taken as the wish to stop.
-    """
-    as_wanted = True
-    for k in range(c.shape[0]):
-        low, high = viable_accelerations(
-            c[k], w[k], limits[0, k], limits[1, k], limits[2, k], limits[3, k], h
-        )
-        wish = wanted[k] if wanted[k] == wanted[k] else -w[k] / h
-        a[k] = min(max(wish, low), high)
-        as_wanted = as_wanted and a[k] == wanted[k]
-        w[k] += h * a[k]
-        c[k] += h * w[k]
-    return as_wanted
 
 
 def tightened(limits: Array) -> Array:

@@ -10,7 +10,7 @@ with R the base frame's orientation, p the tip's position, and s_j = 1 where joi
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -18,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, Ints
-from selfmotion.robot.placements import Flags
+from selfmotion.robot.placements import Flags, rebase
 
 # The frame that does not move.
 WORLD = 0
@@ -56,23 +56,27 @@ class Kinematics:
     Parameters
     ----------
     chain : Chain
+    data : pinocchio.Data, optional
+        Those of another chain of the tree, to be shared.
 
     Attributes
     ----------
+    jacobian : (6, n)
+        [v, ω] of the tip's body at the base's origin, in its axes.
     rotation, translation : (3, 3), (3,)
         The tip's pose in the base frame at the last configuration: views of memory that each call
         of `at` refreshes.
     """
 
-    __slots__ = ("_base", "_chain", "_data", "_tip", "jacobian", "rotation", "translation")
+    __slots__ = ("_base", "_tip", "chain", "data", "jacobian", "rotation", "translation")
 
-    def __init__(self, chain: "Chain") -> None:
-        self._chain, self._data = chain, chain.model.createData()
-        tip, base = self._data.oMf[chain.tip], self._data.oMf[chain.base]
+    def __init__(self, chain: "Chain", data: Any = None) -> None:
+        self.chain, self.data = chain, data or chain.model.createData()
+        tip, base = self.data.oMf[chain.tip], self.data.oMf[chain.base]
         self._tip, self._base = (tip.rotation, tip.translation), (base.rotation, base.translation)
         if chain.is_rooted:
             # Views of Pinocchio's own memory.
-            self.jacobian: Array = self._data.J
+            self.jacobian: Array = self.data.J
             self.rotation, self.translation = self._tip
         else:
             self.jacobian = np.zeros((6, chain.dof), order="F")
@@ -80,42 +84,31 @@ class Kinematics:
 
     def refresh(self, q: Array) -> None:
         """Set the tip's pose at q (n,), and `jacobian` (6, n), [v, ω] at the base's origin."""
-        chain = self._chain
-        pin.computeJointJacobians(chain.model, self._data, q)
-        pin.updateFramePlacement(chain.model, self._data, chain.tip)
-        if not chain.is_rooted:
-            pin.updateFramePlacement(chain.model, self._data, chain.base)
-            self._rebase()
+        pin.computeJointJacobians(self.chain.model, self.data, q)
+        self.place_frames()
 
-    def march(self, q: Array, step: Callable[..., bool], *arguments: Any) -> int | None:
-        """Refresh at each of q (S, n) and call ``step(s, jacobian, rotation, translation, …)``.
-
-        Each step may set the next row of q. Returns the first s at which it returned False.
-        """
-        jacobian, rotation, translation = self.jacobian, self.rotation, self.translation
-        chain, data = self._chain, self._data
+    def place_frames(self) -> None:
+        """Do the rest of `refresh` where the joints' Jacobians are known already."""
+        chain = self.chain
+        pin.updateFramePlacement(chain.model, self.data, chain.tip)
         if not chain.is_rooted:
-            for s, configuration in enumerate(q):
-                self.refresh(configuration)
-                if not step(s, jacobian, rotation, translation, *arguments):
-                    return s
-            return None
-        # Written out: this loop is where the engine spends its time.
-        model, tip = chain.model, chain.tip
-        jacobians, place = pin.computeJointJacobians, pin.updateFramePlacement
-        for s, configuration in enumerate(q):
-            jacobians(model, data, configuration)
-            place(model, data, tip)
-            if not step(s, jacobian, rotation, translation, *arguments):
-                return s
-        return None
+            pin.updateFramePlacement(chain.model, self.data, chain.base)
+            rebase(
+                self.data.J,
+                *self._base,
+                *self._tip,
+                chain.signs,
+                self.jacobian,
+                self.rotation,
+                self.translation,
+            )
 
     def at(self, q: Array) -> Array:
         """Return the Jacobian at q (n,), (6, n): rows [v, ω] of the tip in the base's axes."""
         self.refresh(q)
-        chain = self._chain
+        chain = self.chain
         if chain.is_rooted:
-            jacobian: Array = pin.getFrameJacobian(chain.model, self._data, chain.tip, _AXES)
+            jacobian: Array = pin.getFrameJacobian(chain.model, self.data, chain.tip, _AXES)
             # Of a single joint it comes as a vector.
             return jacobian.reshape(6, -1)
         jacobian = self.jacobian.copy()
@@ -124,24 +117,42 @@ class Kinematics:
 
     def place(self, q: Array) -> pin.SE3:
         """Return the tip's pose at q (n,), a copy; cheaper than with its Jacobian."""
-        chain = self._chain
-        pin.forwardKinematics(chain.model, self._data, q)
-        tip = pin.updateFramePlacement(chain.model, self._data, chain.tip)
+        chain = self.chain
+        pin.forwardKinematics(chain.model, self.data, q)
+        tip = pin.updateFramePlacement(chain.model, self.data, chain.tip)
         if chain.is_rooted:
             return pin.SE3(tip)
-        base = pin.updateFramePlacement(chain.model, self._data, chain.base)
+        base = pin.updateFramePlacement(chain.model, self.data, chain.base)
         return base.actInv(tip)
 
-    def _rebase(self) -> None:
-        """Set what is asked of the base frame from what is known of the world."""
-        turn, place = self._base
-        world: Array = self._data.J
-        signs = self._chain.signs
-        moving = world[:3] + np.cross(world[3:].T, place).T
-        self.jacobian[:3] = signs * (turn.T @ moving)
-        self.jacobian[3:] = signs * (turn.T @ world[3:])
-        self.rotation[:] = turn.T @ self._tip[0]
-        self.translation[:] = turn.T @ (self._tip[1] - place)
+
+def march(
+    tips: Sequence[Kinematics], q: Array, step: Callable[..., bool], *arguments: Any
+) -> int | None:
+    """Place tips at each of q (S, n), and call ``step(s, f, jacobian, rotation, translation, …)``.
+
+    For each tip f in turn; the last step may set the next row of q. Returns the first s at which a
+    step returned False. The tips are of one tree and share their data.
+    """
+    first, others = tips[0], list(enumerate(tips))[1:]
+    chain, data = first.chain, first.data
+    jacobian, rotation, translation = first.jacobian, first.rotation, first.translation
+    # Written out: in this loop the engine spends its time.
+    model, tip, is_rooted = chain.model, chain.tip, chain.is_rooted
+    jacobians, place = pin.computeJointJacobians, pin.updateFramePlacement
+    for s, configuration in enumerate(q):
+        jacobians(model, data, configuration)
+        if is_rooted:
+            place(model, data, tip)
+        else:
+            first.place_frames()
+        if not step(s, 0, jacobian, rotation, translation, *arguments):
+            return s
+        for f, own in others:
+            own.place_frames()
+            if not step(s, f, own.jacobian, own.rotation, own.translation, *arguments):
+                return s
+    return None
 
 
 class Chain:

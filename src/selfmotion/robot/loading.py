@@ -3,7 +3,7 @@
 import dataclasses
 import importlib.metadata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +12,13 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion.basics import RobotError, as_number, nearest, read_only, shown
-from selfmotion.robot.chain import Chain
+from selfmotion.robot.composing import composed
 from selfmotion.robot.expansion import expand
 from selfmotion.robot.full_model import full_model, name_links
 from selfmotion.robot.held import locked_configuration
 from selfmotion.robot.model import RobotModel
 from selfmotion.robot.mounting import with_base, with_tool_offset
-from selfmotion.robot.urdf import Urdf, package_folders, parse_urdf, read_urdf
+from selfmotion.robot.urdf import Urdf, UrdfJoint, package_folders, parse_urdf, read_urdf
 from selfmotion.task import as_pose
 
 
@@ -81,28 +81,39 @@ _OWN_ARMS = (Path(__file__).parent / "arms", Path(__file__).parents[3] / "robots
 
 
 def load_robot(
-    robot: str | Path,
-    tool: str | None = None,
+    robot: str | Path | Mapping[str, str | Path],
+    tool: str | Sequence[str] | None = None,
     lock: Mapping[str, float] | None = None,
     *,
-    base: pin.SE3 | npt.ArrayLike | None = None,
+    reference: str | None = None,
+    base: pin.SE3 | npt.ArrayLike | Mapping[str, pin.SE3 | npt.ArrayLike] | None = None,
+    on: Mapping[str, str] | None = None,
     tool_offset: pin.SE3 | npt.ArrayLike | None = None,
     arguments: Mapping[str, str] | None = None,
 ) -> RobotModel:
-    """Load an arm.
+    """Load an arm, or a cell of several robots.
 
     Parameters
     ----------
-    robot : str or Path
+    robot : str, Path or dict
         A name from `NAMED_ARMS` (``"panda"``, ``"planar_3r"``, …) or the path of a ``.urdf`` or
-        ``.xacro`` file.
-    tool : str, optional
-        Tool frame (a link). Default: the named arm's usual one; for a file, its only leaf link.
+        ``.xacro`` file; or several of these by name, as one tree: links and joints of part
+        ``"arm"`` are called ``arm/NAME`` then.
+    tool : str or sequence of str, optional
+        Tool frame (a link), or several: the first is the one that paths are for where nothing else
+        is said. Default: the named arm's usual one; for a file, its only leaf link; of several
+        robots, that of the first.
     lock : dict, optional
-        Joints to hold, with their coordinate [rad or m]. Joints off the chain to the tool are
-        held anyway, at 0 or the nearest limit unless given here.
+        Joints to hold, with their coordinate [rad or m]. Joints that move no tool relative to the
+        reference are held anyway, at 0 or the nearest limit unless given here.
+    reference : str, optional
+        The link in whose frame poses, twists and paths are given: a part that a table turns, or
+        that another hand holds. By default the world.
     base : SE3 or (4, 4), optional
-        Pose of the URDF's root link in the world.
+        Pose of the URDF's root link in the world; of several robots a dict, by part.
+    on : dict, optional
+        Of several robots: part → link of another part (``rail/carriage``) that it stands on, `base`
+        being its pose there.
     tool_offset : SE3 or (4, 4), optional
         Pose of the frame that follows the path in that of `tool`: a pen in a gripper.
     arguments : dict, optional
@@ -122,41 +133,127 @@ def load_robot(
     >>> load_robot("panda").dof
     7
     """
-    if not isinstance(robot, str | Path):
+    if not isinstance(robot, str | Path | Mapping):
         raise RobotError(f"robot is {shown(robot)}, expected a name or the path of a file")
-    for name, given in (("lock", lock), ("arguments", arguments)):
+    for name, given in (("lock", lock), ("arguments", arguments), ("on", on)):
         if not isinstance(given, Mapping | None):
             raise RobotError(f"{name} is {shown(given)}, expected a dict")
-    touching: tuple[tuple[str, str], ...] = ()
-    published: Mapping[str, Any] = {}
-    if isinstance(robot, str) and robot in NAMED_ARMS:
-        arm = NAMED_ARMS[robot]
-        urdf, frame, touching = _read_named(arm), tool or arm.tool, arm.touching
-        published = _published(robot)
-    else:
-        urdf = _read_file(Path(robot), arguments or {}, str(robot))
-        frame = tool or _only_leaf(urdf)
-    if base is not None:
-        urdf = with_base(urdf, as_pose(base, f"{urdf.source}: base", RobotError))
+    source = (
+        _parts(robot, base, on, arguments or {})
+        if isinstance(robot, Mapping)
+        else _single(robot, base, on, arguments or {})
+    )
+    urdf = source.urdf
+    if tool is None:
+        tool = source.tool or _only_leaf(urdf)
+    frames = _tool_frames(tool, urdf)
     if tool_offset is not None:
         offset = as_pose(tool_offset, f"{urdf.source}: tool_offset", RobotError)
-        urdf, frame = with_tool_offset(urdf, frame, offset)
-    built = build_robot(urdf, frame, lock or {})
+        urdf, frames[0] = with_tool_offset(urdf, frames[0], offset)
+    built = build_robot(urdf, frames, lock or {}, reference)
     acceleration, jerk = (
-        read_only([published.get(kind, {}).get(joint, np.inf) for joint in built.joint_names])
+        read_only([source.limits.get(kind, {}).get(joint, np.inf) for joint in built.joint_names])
         for kind in ("acceleration", "jerk")
     )
     return dataclasses.replace(
-        built, touching=touching, acceleration_limit=acceleration, jerk_limit=jerk
+        built, touching=source.touching, acceleration_limit=acceleration, jerk_limit=jerk
     )
 
 
-def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
-    """Build the chain from the root of a validated URDF to `tool`; see `load_robot`."""
-    urdf.check_tool(tool)
+def _tool_frames(tool: Any, urdf: Urdf) -> list[str]:
+    frames = [tool] if isinstance(tool, str) else tool
+    if not isinstance(frames, list | tuple) or not frames:
+        raise RobotError(
+            f"{urdf.source}: tool is {shown(tool)}, expected the name of a link, or several"
+        )
+    return list(frames)
+
+
+@dataclass(frozen=True)
+class _Source:
+    """What is known of a robot before its joints are chosen.
+
+    Attributes
+    ----------
+    urdf : Urdf
+    tool : str or None
+        Its usual tool frame; None where it has none.
+    touching : tuple of (str, str)
+        See `NamedArm.touching`.
+    limits : dict
+        What its maker publishes, by kind and joint.
+    """
+
+    urdf: Urdf
+    tool: str | None
+    touching: tuple[tuple[str, str], ...] = ()
+    limits: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+
+def _read(robot: str | Path, arguments: Mapping[str, str]) -> _Source:
+    if isinstance(robot, str) and robot in NAMED_ARMS:
+        arm = NAMED_ARMS[robot]
+        return _Source(_read_named(arm), arm.tool, arm.touching, _published(robot))
+    urdf = _read_file(Path(robot), arguments, str(robot))
+    return _Source(urdf, None)
+
+
+def _single(
+    robot: str | Path, base: Any, on: Mapping[str, str] | None, arguments: Mapping[str, str]
+) -> _Source:
+    if isinstance(base, Mapping) or on is not None:
+        what = "on" if on is not None else "base"
+        raise RobotError(f"{what} is a dict of parts, but there is one robot, '{robot}'")
+    source = _read(robot, arguments)
+    urdf = source.urdf
+    if base is not None:
+        urdf = with_base(urdf, as_pose(base, f"{urdf.source}: base", RobotError))
+    return dataclasses.replace(source, urdf=urdf)
+
+
+def _parts(
+    robots: Mapping[str, str | Path],
+    base: Any,
+    on: Mapping[str, str] | None,
+    arguments: Mapping[str, str],
+) -> _Source:
+    """Return several robots as one."""
+    for name in robots:
+        if not (isinstance(name, str) and name.isidentifier()):
+            raise RobotError(
+                f"robot: a part is called {shown(name)}, expected a name of letters, digits and _"
+            )
+    if not robots:
+        raise RobotError("robot: there is no part, expected names with robots")
+    if not isinstance(base, Mapping | None):
+        raise RobotError(f"base is {shown(base)}, expected a dict, since there are several robots")
+    sources = {name: _read(robot, arguments) for name, robot in robots.items()}
+    poses = {
+        name: as_pose(at, f"base of '{name}'", RobotError) for name, at in (base or {}).items()
+    }
+    urdf = composed({name: source.urdf for name, source in sources.items()}, poses, on or {})
+    first, source = next(iter(sources.items()))
+    own = source.tool
+    limits: dict[str, dict[str, float]] = {}
+    for name, part in sources.items():
+        for kind, values in part.limits.items():
+            for joint, value in values.items():
+                limits.setdefault(kind, {})[f"{name}/{joint}"] = value
+    touching = tuple(
+        (f"{name}/{a}", f"{name}/{b}") for name, part in sources.items() for a, b in part.touching
+    )
+    return _Source(urdf, None if own is None else f"{first}/{own}", touching, limits)
+
+
+def build_robot(
+    urdf: Urdf, tools: Sequence[str], lock: Mapping[str, float], reference: str | None = None
+) -> RobotModel:
+    """Build the tree of all joints that move `tools` of a validated URDF; see `load_robot`."""
+    for frame in (*tools, *([] if reference is None else [reference])):
+        urdf.check_tool(frame)
     full = full_model(urdf)
     _check_lock(urdf, full, lock)
-    chain = [joint for joint in urdf.chain(tool) if joint.kind != "fixed"]
+    chain = _moving(urdf, tools, reference)
     for joint in chain:
         if joint.kind in ("floating", "planar"):
             raise RobotError(
@@ -165,27 +262,31 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
             )
         if joint.mimics is not None and joint.name not in lock:
             raise RobotError(
-                f"{urdf.source}: joint '{joint.name}' on the way to '{tool}' mimics "
+                f"{urdf.source}: joint '{joint.name}' on the way to '{tools[0]}' mimics "
                 f"'{joint.mimics}'; choose a tool before it, or hold it with lock="
             )
     free = [joint.name for joint in chain if joint.name not in lock]
+    where = "the root" if reference is None else f"'{reference}'"
     if not chain:
         moved = [link for link in urdf.links if any(j.kind != "fixed" for j in urdf.chain(link))]
         which = f"one that does, of: {', '.join(moved)}" if moved else "another arm"
-        raise RobotError(f"{urdf.source}: no joint moves the tool '{tool}'; choose {which}")
+        relative = "" if reference is None else f" relative to '{reference}'"
+        raise RobotError(
+            f"{urdf.source}: no joint moves the tool '{tools[0]}'{relative}; choose {which}"
+        )
     if not free:
         raise RobotError(
-            f"{urdf.source}: no joint is left free between the root and '{tool}': lock holds all "
-            f"of {', '.join(joint.name for joint in chain)}"
+            f"{urdf.source}: no joint is left free between {where} and '{tools[0]}': lock holds "
+            f"all of {', '.join(joint.name for joint in chain)}"
         )
     locked = _locked_joints(urdf, full, free, lock)
-    reference, locked_ids = locked_configuration(full, locked)
-    model = pin.buildReducedModel(full, locked_ids, reference)
+    configuration, locked_ids = locked_configuration(full, locked)
+    model = pin.buildReducedModel(full, locked_ids, configuration)
     name_links(urdf, model)
     names = tuple(model.names[1:])
     if model.nq != len(free) or set(names) != set(free):
         raise RobotError(
-            f"{urdf.source}: the chain to '{tool}' has joints {free}, but Pinocchio built "
+            f"{urdf.source}: the chain to '{tools[0]}' has joints {free}, but Pinocchio built "
             f"{list(names)}"
         )
     continuous = np.array([name in urdf.continuous() for name in names])
@@ -193,13 +294,14 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
     effort = np.array(model.upperEffortLimit, dtype=np.float64)
     return RobotModel(
         name=model.name,
-        tool=tool,
+        tools=tuple(tools),
+        reference=reference,
         joint_names=names,
         lower=read_only(np.where(continuous, -np.inf, model.lowerPositionLimit)),
         upper=read_only(np.where(continuous, np.inf, model.upperPositionLimit)),
         velocity_limit=read_only(np.where(velocity > 0, velocity, np.inf)),
         locked=locked,
-        chain=Chain(model, model.getFrameId(tool, pin.FrameType.BODY)),
+        model=model,
         urdf=urdf,
         effort_limit=read_only(np.where(effort > 0.0, effort, np.inf)),
         acceleration_limit=read_only(np.full(len(names), np.inf)),
@@ -207,25 +309,39 @@ def build_robot(urdf: Urdf, tool: str, lock: Mapping[str, float]) -> RobotModel:
     )
 
 
+def _moving(urdf: Urdf, tools: Sequence[str], reference: str | None) -> list[UrdfJoint]:
+    """Return the joints that move one of the tools relative to the reference."""
+    on_the_way = [] if reference is None else urdf.chain(reference)
+    chains = [urdf.chain(tool) for tool in tools]
+    found: dict[str, UrdfJoint] = {}
+    for chain in chains:
+        both = {joint.name for joint in chain} & {joint.name for joint in on_the_way}
+        for joint in (*chain, *on_the_way):
+            if joint.kind != "fixed" and joint.name not in both:
+                found[joint.name] = joint
+    return list(found.values())
+
+
 def rebuild_robot(
     text: str,
     package_dirs: Sequence[str],
     source: str,
     continuous: Sequence[str],
-    tool: str,
+    tool: str | Sequence[str],
     locked: Mapping[str, float],
     touching: Sequence[Sequence[str]],
     acceleration_limit: Sequence[float],
     jerk_limit: Sequence[float],
+    reference: str | None = None,
 ) -> RobotModel:
     """Build an arm from what a saved plan carries of it."""
     urdf = parse_urdf(text, source=source, package_dirs=tuple(package_dirs))
     # The text has the continuous joints as revolute ones already.
-    for name in continuous:
-        urdf.joints[name] = dataclasses.replace(urdf.joints[name], kind="continuous")
+    urdf = urdf.with_continuous(continuous)
+    tools = [tool] if isinstance(tool, str) else tool
     pairs = tuple((first, second) for first, second in touching)
     return dataclasses.replace(
-        build_robot(urdf, tool, locked),
+        build_robot(urdf, tools, locked, reference),
         touching=pairs,
         acceleration_limit=read_only(acceleration_limit),
         jerk_limit=read_only(jerk_limit),

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from selfmotion.basics import (
     random_numbers,
     shown,
 )
-from selfmotion.robot.chain import Chain
+from selfmotion.robot.chain import WORLD, Chain
 from selfmotion.robot.full_model import full_model, link_geometry
 from selfmotion.robot.held import locked_configuration
 from selfmotion.robot.mesh_files import bad_meshes, without_meshes
@@ -36,8 +37,10 @@ class RobotModel:
     ----------
     name : str
         Name from the URDF.
-    tool : str
-        The tool frame.
+    tools : tuple of str
+        Tool frames; `tool` is the first.
+    reference : str or None
+        The link in whose frame poses and paths are given; None for the world.
     joint_names : tuple of str
         The n joints, base to tool.
     lower, upper : (n,)
@@ -46,8 +49,8 @@ class RobotModel:
         Speed limits [rad/s or m/s]; inf where the URDF gives none.
     locked : dict
         Joint name → coordinate at which it is held.
-    chain : Chain
-        From the root frame to the tool, on Pinocchio's model of all joints, nq = nv = n.
+    model : pinocchio.Model
+        The tree of its joints, nq = nv = n. Not to be modified.
     urdf : Urdf
         What it was made from.
     touching : tuple of (str, str)
@@ -60,27 +63,48 @@ class RobotModel:
     """
 
     name: str
-    tool: str
+    tools: tuple[str, ...]
     joint_names: tuple[str, ...]
     lower: Array
     upper: Array
     velocity_limit: Array
     locked: Mapping[str, float]
-    chain: Chain = field(repr=False)
+    model: Any = field(repr=False)
     urdf: Urdf = field(repr=False)
     effort_limit: Array
     acceleration_limit: Array
     jerk_limit: Array
     touching: tuple[tuple[str, str], ...] = ()
+    reference: str | None = None
 
     def __repr__(self) -> str:
         """Return one line: name, tool and joints."""
         return f"RobotModel({self.name}, tool '{self.tool}', joints {', '.join(self.joint_names)})"
 
     @property
-    def model(self) -> Any:
-        """The ``pinocchio.Model`` of its joints. Not to be modified."""
-        return self.chain.model
+    def tool(self) -> str:
+        """The tool frame that paths are for where nothing else is said."""
+        return self.tools[0]
+
+    @cached_property
+    def chain(self) -> Chain:
+        """From the reference to the tool."""
+        return self.chain_to(self.tool, self.reference)
+
+    def chain_to(self, tool: str, reference: str | None = None) -> Chain:
+        """Return the chain from a link, or the world, to another link.
+
+        Raises
+        ------
+        RobotError
+            There is no such link.
+        """
+        frames = [WORLD if link is None else self._frame(link) for link in (tool, reference)]
+        return Chain(self.model, *frames)
+
+    def _frame(self, link: str) -> int:
+        self.urdf.check_tool(link)
+        return int(self.model.getFrameId(link, pin.FrameType.BODY))
 
     @property
     def dof(self) -> int:

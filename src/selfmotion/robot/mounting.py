@@ -36,9 +36,7 @@ class Mounting(NamedTuple):
 
 def with_base(urdf: Urdf, pose: pin.SE3) -> Urdf:
     """Return the URDF with its root at `pose` in the world."""
-    children = {joint.child for joint in urdf.joints.values()}
-    root = next(link for link in urdf.links if link not in children)
-    return _joined(urdf, BASE_JOINT, _BASE_LINK, root, _BASE_LINK, pose)
+    return _joined(urdf, BASE_JOINT, _BASE_LINK, urdf.root, _BASE_LINK, pose)
 
 
 def with_tool_offset(urdf: Urdf, tool: str, pose: pin.SE3) -> tuple[Urdf, str]:
@@ -71,17 +69,23 @@ def _joined(urdf: Urdf, joint: str, parent: str, child: str, new: str, pose: pin
         )
     root = ElementTree.fromstring(urdf.text)
     ElementTree.SubElement(root, "link", name=new)
-    element = ElementTree.SubElement(root, "joint", name=joint, type="fixed")
-    ElementTree.SubElement(element, "parent", link=parent)
-    ElementTree.SubElement(element, "child", link=child)
-    xyz, rpy = pose.translation.tolist(), pin.rpy.matrixToRpy(pose.rotation).tolist()
-    ElementTree.SubElement(element, "origin", xyz=_text(xyz), rpy=_text(rpy))
+    root.append(placed(joint, parent, child, pose))
     return dataclasses.replace(
         urdf,
         text=ElementTree.tostring(root, encoding="unicode"),
         joints={**urdf.joints, joint: UrdfJoint(joint, "fixed", parent, child, None)},
         links=(*urdf.links, new),
     )
+
+
+def placed(joint: str, parent: str, child: str, pose: pin.SE3) -> ElementTree.Element:
+    """Return a fixed joint that puts link `child` at a pose in the frame of link `parent`."""
+    element = ElementTree.Element("joint", name=joint, type="fixed")
+    ElementTree.SubElement(element, "parent", link=parent)
+    ElementTree.SubElement(element, "child", link=child)
+    xyz, rpy = pose.translation.tolist(), pin.rpy.matrixToRpy(pose.rotation).tolist()
+    ElementTree.SubElement(element, "origin", xyz=_text(xyz), rpy=_text(rpy))
+    return element
 
 
 def _text(values: Sequence[float]) -> str:

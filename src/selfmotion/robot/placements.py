@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, inlined
+from selfmotion.basics import Array, inlined, kernel
 
 Flags = npt.NDArray[np.bool_]
 
@@ -64,3 +64,40 @@ def placements(
         for a in range(3):
             slide[a] = 0.0 if is_revolute[j] else q[j] * axes[j, a]
         compose(middle, shift, turn, slide, r[j + 1], p[j + 1])
+
+
+@kernel
+def rebase(
+    world: Array,
+    base_rotation: Array,
+    base: Array,
+    tip_rotation: Array,
+    tip: Array,
+    signs: Array,
+    jacobian: Array,
+    rotation: Array,
+    translation: Array,
+) -> None:
+    """Set a tip's Jacobian at a base frame's origin, and its pose, in the base frame's axes.
+
+    From the Jacobian `world` (6, n) of all joints at the world's origin, both frames' places in the
+    world, and which joints move which of them; see `Chain`.
+    """
+    for i in range(3):
+        translation[i] = 0.0
+        for a in range(3):
+            translation[i] += base_rotation[a, i] * (tip[a] - base[a])
+            rotation[i, a] = 0.0
+            for b in range(3):
+                rotation[i, a] += base_rotation[b, i] * tip_rotation[b, a]
+    moving = np.empty(3)
+    for k in range(world.shape[1]):
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            moving[a] = world[a, k] + world[3 + b, k] * base[c] - world[3 + c, k] * base[b]
+        for i in range(3):
+            linear, angular = 0.0, 0.0
+            for a in range(3):
+                linear += base_rotation[a, i] * moving[a]
+                angular += base_rotation[a, i] * world[3 + a, k]
+            jacobian[i, k], jacobian[3 + i, k] = signs[k] * linear, signs[k] * angular

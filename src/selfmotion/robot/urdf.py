@@ -8,7 +8,8 @@ become single-angle joints without limits; mesh addresses become absolute.
 import contextlib
 import hashlib
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,19 @@ class Urdf:
     def continuous(self) -> set[str]:
         """Return the names of joints that the file declares continuous."""
         return {joint.name for joint in self.joints.values() if joint.kind == "continuous"}
+
+    def with_continuous(self, names: Iterable[str]) -> "Urdf":
+        """Return the same, some joints of which were continuous before they became revolute."""
+        joints = dict(self.joints)
+        for name in names:
+            joints[name] = replace(joints[name], kind="continuous")
+        return replace(self, joints=joints)
+
+    @property
+    def root(self) -> str:
+        """The link that no joint carries."""
+        children = {joint.child for joint in self.joints.values()}
+        return next(link for link in self.links if link not in children)
 
     def check_tool(self, tool: str) -> None:
         """Raise RobotError unless `tool` is one of the links; the nearest names are offered."""

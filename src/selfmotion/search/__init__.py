@@ -1,28 +1,25 @@
 """Where to begin: start configurations, self-motion curves, chains over them, reach."""
 
-from selfmotion.search.curves import Curve, CurveSet, SelfMotion, targets
-from selfmotion.search.guides import SequenceGuide, guides, has_curves
-from selfmotion.search.pieces import Piece, Pieces, turned_towards
-from selfmotion.search.reach import Reach, reachable
-from selfmotion.search.sequences import SPACING, Sequence, best_sequences
-from selfmotion.search.starts import spread, start_candidates
-
-__all__ = [
-    "SPACING",
-    "Curve",
-    "CurveSet",
-    "Piece",
-    "Pieces",
-    "Reach",
-    "SelfMotion",
-    "Sequence",
-    "SequenceGuide",
-    "best_sequences",
-    "guides",
-    "has_curves",
-    "reachable",
-    "spread",
-    "start_candidates",
-    "targets",
-    "turned_towards",
-]
+from selfmotion.search.curves import (
+    Curve as Curve,
+    CurveSet as CurveSet,
+    SelfMotion as SelfMotion,
+    targets as targets,
+)
+from selfmotion.search.guides import (
+    SequenceGuide as SequenceGuide,
+    guides as guides,
+    has_curves as has_curves,
+)
+from selfmotion.search.pieces import (
+    Piece as Piece,
+    Pieces as Pieces,
+    turned_towards as turned_towards,
+)
+from selfmotion.search.reach import Reach as Reach, reachable as reachable
+from selfmotion.search.sequences import (
+    SPACING as SPACING,
+    Sequence as Sequence,
+    best_sequences as best_sequences,
+)
+from selfmotion.search.starts import spread as spread, start_candidates as start_candidates

@@ -153,7 +153,7 @@ class SelfMotion:
         jacobian, rotation = (np.ascontiguousarray(a) for a in (tool.at(q), tool.rotation))
         place = rotation, tool.translation
         length = kernels.correct(
-            q.copy(), jacobian, *place, target, *self._manifold.rows, tangent, _LONGEST
+            q.copy(), jacobian, *place, target, self._manifold.layout, tangent, _LONGEST
         )
         return tangent if length >= 0.0 and np.all(np.isfinite(tangent)) else None
 
@@ -193,7 +193,7 @@ class SelfMotion:
         """Return the samples (K, n) from `start` on, and whether they lead back to it."""
         samples, on = np.empty((_MOST_SAMPLES, self.robot.dof)), self._manifold
         count, closed = kernels.walk(
-            start, tangent, target, on.chain, *on.rows, self.spacing, samples
+            start, tangent, target, on.chain, on.layout, self.spacing, samples
         )
         return samples[:count].copy(), closed
 

@@ -5,12 +5,14 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, inlined, kernel
 from selfmotion.kernels import (
-    POINTING,
+    KIND,
+    Layout,
     Rows,
     cholesky,
     gram,
     part,
     pose_error,
+    rows_of,
     select,
     solve_cholesky,
     task_rows,
@@ -48,8 +50,7 @@ def correct(
     rotation: Array,
     translation: Array,
     target: Array,
-    rows: Rows,
-    angle_kind: int,
+    layout: Layout,
     tangent: Array,
     longest: float,
 ) -> float:
@@ -58,15 +59,19 @@ def correct(
     `target` is the tool's translation (3) and rotation (9). Returns the norm of the correction
     before it was shortened; -1 where J has no full rank.
     """
-    n, m = frame_jacobian.shape[1], rows.shape[0]
+    n, m = frame_jacobian.shape[1], rows_of(layout)
     error, z, along = np.zeros(6), np.empty(m), np.zeros(m)
     jacobian, factor = np.empty((m, n)), np.empty((m, m))
-    pointing = angle_kind == POINTING
     pose_error(
-        angle_kind, part(target, 0, (3,)), part(target, 3, (3, 3)), translation, rotation, error
+        layout[0, KIND],
+        part(target, 0, (3,)),
+        part(target, 3, (3, 3)),
+        translation,
+        rotation,
+        error,
     )
-    select(rows, pointing, rotation, error, z)
-    task_rows(rows, pointing, rotation, frame_jacobian, jacobian)
+    select(layout, 0, rotation, error, z)
+    task_rows(layout, 0, rotation, frame_jacobian, jacobian)
     for i in range(m):
         for k in range(n):
             along[i] += jacobian[i, k] * tangent[k]
@@ -97,8 +102,7 @@ def walk(
     tangent: Array,
     target: Array,
     chain: ChainArrays,
-    rows: Rows,
-    angle_kind: int,
+    layout: Layout,
     spacing: float,
     samples: Array,
 ) -> tuple[int, bool]:
@@ -123,8 +127,7 @@ def walk(
             rotation,
             position,
             target,
-            rows,
-            angle_kind,
+            layout,
             chain.is_revolute,
             samples,
             tangents,
@@ -140,8 +143,7 @@ def _advance(
     rotation: Array,
     translation: Array,
     target: Array,
-    rows: Rows,
-    angle_kind: int,
+    layout: Layout,
     revolute: Mask,
     samples: Array,
     tangents: Array,
@@ -156,7 +158,7 @@ def _advance(
     n, count = q.shape[0], int(state[2])
     last = samples[count - 1]
     length = correct(
-        q, frame_jacobian, rotation, translation, target, rows, angle_kind, tangents[1], state[3]
+        q, frame_jacobian, rotation, translation, target, layout, tangents[1], state[3]
     )
     state[1] += 1
     if length > CONVERGED and state[1] < _CORRECTIONS:
@@ -371,8 +373,7 @@ def project_all(
     q: Array,
     targets: Array,
     chain: ChainArrays,
-    rows: Rows,
-    angle_kind: int,
+    layout: Layout,
     lower: Array,
     upper: Array,
     longest: float,
@@ -410,7 +411,7 @@ def project_all(
                     for i in range(6):
                         jacobian[i, j] = 0.0
             length = correct(
-                q[k], jacobian, rotation, position, targets[k], rows, angle_kind, unused, longest
+                q[k], jacobian, rotation, position, targets[k], layout, unused, longest
             )
             # Singular, or not a number.
             if not length >= 0.0:

@@ -5,7 +5,6 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, RobotError
 from selfmotion.follow import Follows
-from selfmotion.kernels import angle_kind
 from selfmotion.motion import transport
 from selfmotion.search import kernels
 
@@ -30,8 +29,8 @@ class Manifold:
     revolute : (n,)
     chain : ChainArrays
         What compiled kinematics need: `Chain.arrays`.
-    rows : tuple
-        The task's rows, and how they measure angles.
+    layout : (1, 9 + n)
+        See `Follows.layout`.
 
     Raises
     ------
@@ -45,7 +44,7 @@ class Manifold:
         self._limits = np.array(lower), np.array(upper)
         self.chain = follows.only.chain.arrays
         self.revolute: npt.NDArray[np.bool_] = self.chain.is_revolute
-        self.rows = (self.task.rows, angle_kind(self.task.rows, self.task.tool_axes))
+        self.layout = follows.layout
         self._check()
 
     def project(
@@ -65,7 +64,7 @@ class Manifold:
         wanted = np.array(np.broadcast_to(target, (len(q), 12)), order="C")
         steps = _FAR_STEPS if far else _NEAR_STEPS
         kernels.project_all(
-            found, wanted, self.chain, *self.rows, *self._limits, _LONGEST, steps, arrived
+            found, wanted, self.chain, self.layout, *self._limits, _LONGEST, steps, arrived
         )
         return found, arrived
 

@@ -203,7 +203,8 @@ class RunningCost(Measure):
             q=before[first] + 0.5 * difference,
             qd=difference / lasting[:, None],
             # The kinematics hardly change on the way.
-            **{name: getattr(here.samples, name)[first] for name in _KINEMATICS},
+            tips=tuple(tip.at(first) for tip in here.samples.tips),
+            task_jacobian=here.samples.task_jacobian[first],
         )
         still = replace(samples, qd=np.zeros_like(difference))
         moving = sum(cost.value(samples) - cost.value(still) for cost in self.moving)
@@ -279,7 +280,6 @@ class Backwards(Measure):
         return self.measure
 
 
-_KINEMATICS = ("jacobian", "rotation", "translation", "error", "task_jacobian")
 # Layers whose kinematics are kept, per waypoint.
 _MANY = 3
 

@@ -1,9 +1,7 @@
 """The paper, whole: every figure, table and claim re-run, its open questions answered."""
 
-from selfmotion.study.engine import Scale
-from selfmotion.study.figures import require_matplotlib
-from selfmotion.study.page import write
-from selfmotion.study.results import Claim, Study, Verdict
-from selfmotion.study.run import PARTS, run
-
-__all__ = ["PARTS", "Claim", "Scale", "Study", "Verdict", "require_matplotlib", "run", "write"]
+from selfmotion.study.engine import Scale as Scale
+from selfmotion.study.figures import require_matplotlib as require_matplotlib
+from selfmotion.study.page import write as write
+from selfmotion.study.results import Claim as Claim, Study as Study, Verdict as Verdict
+from selfmotion.study.run import PARTS as PARTS, run as run

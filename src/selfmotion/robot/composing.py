@@ -1,0 +1,81 @@
+"""One tree from several robots: each with its part's name before its own, on a common world.
+
+Parts become one URDF text, so that kinematics, bodies, saved plans and replays know of them
+without a word.
+"""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+
+import pinocchio as pin
+
+from selfmotion.basics import RobotError, nearest
+from selfmotion.robot.mounting import placed
+from selfmotion.robot.urdf import Urdf, parse_urdf
+
+WORLD_LINK = "world"
+# What of a URDF carries the name of a link, a joint or a material, by element and attribute.
+_NAMES = (
+    ("link", "name"),
+    ("joint", "name"),
+    ("joint/parent", "link"),
+    ("joint/child", "link"),
+    ("joint/mimic", "joint"),
+    ("material", "name"),
+    ("link/visual/material", "name"),
+)
+
+
+def composed(
+    parts: Mapping[str, Urdf],
+    base: Mapping[str, pin.SE3],
+    on: Mapping[str, str],
+) -> Urdf:
+    """Return several URDFs as one tree, whose root is the link "world".
+
+    Parameters
+    ----------
+    parts : dict
+        Name of a part → its URDF; links and joints are called ``PART/NAME`` from now on.
+    base : dict
+        Part → pose of its root link in the world, or on the link that carries it.
+    on : dict
+        Part → link that carries it, ``PART/LINK``.
+
+    Raises
+    ------
+    RobotError
+        A part that is placed does not exist, a link that carries one does not, or they carry each
+        other.
+    """
+    for what, given in (("base", base), ("on", on)):
+        for name in given:
+            if name not in parts:
+                raise RobotError(
+                    f"{what} names part '{name}', which there is not{nearest(name, parts)}; parts: "
+                    f"{', '.join(parts)}"
+                )
+    cell = ElementTree.Element("robot", name="+".join(parts))
+    ElementTree.SubElement(cell, "link", name=WORLD_LINK)
+    links = {f"{name}/{link}" for name, urdf in parts.items() for link in urdf.links}
+    for name, urdf in parts.items():
+        carrier = on.get(name, WORLD_LINK)
+        if carrier not in links and carrier != WORLD_LINK:
+            raise RobotError(
+                f"on: part '{name}' stands on '{carrier}', which is no link"
+                f"{nearest(carrier, sorted(links))}; links are called PART/LINK"
+            )
+        root = ElementTree.fromstring(urdf.text)
+        for path, attribute in _NAMES:
+            for element in root.findall(path):
+                if element.get(attribute):
+                    element.set(attribute, f"{name}/{element.get(attribute)}")
+        cell.extend(root.findall("material") + root.findall("link") + root.findall("joint"))
+        pose = base.get(name, pin.SE3.Identity())
+        cell.append(placed(f"{name}/placement", carrier, f"{name}/{urdf.root}", pose))
+    text = ElementTree.tostring(cell, encoding="unicode")
+    folders = dict.fromkeys(folder for urdf in parts.values() for folder in urdf.package_dirs)
+    found = parse_urdf(text, source=" + ".join(parts), package_dirs=tuple(folders))
+    return found.with_continuous(
+        f"{name}/{joint}" for name, urdf in parts.items() for joint in urdf.continuous()
+    )
