@@ -60,6 +60,8 @@ class Quantity:
         vectors (`selfmotion.basics.series`). By default none: it is judged as measured.
     components : int
         Length c of vectors; 1 for numbers.
+    of_pace : bool
+        Whether a slower pace may keep its limits.
     period : float
         What two equal values may differ by: 2π for angles.
     covers : tuple of str, optional
@@ -74,6 +76,7 @@ class Quantity:
     center: npt.ArrayLike = 0.0
     series: Callable[[Stretch], Array | None] | None = None
     components: int = 1
+    of_pace: bool = False
     period: float = np.inf
     covers: tuple[str, ...] | None = None
 
@@ -97,9 +100,13 @@ class Quantity:
         upper: float,
         values: Callable[[Array, Array, Array], Array],
         derivatives: Callable[[Array, Array, Array], tuple[Array, ...]],
+        series: Callable[[Stretch], Array] | None = None,
         unit: str = "",
     ) -> "Quantity":
-        """Return one number that is to stay within a band, its `values` (K,)."""
+        """Return one number that is to stay within a band.
+
+        Its `values` are (K,), its `derivatives` (K, n) each, its `series` (K + 1, I).
+        """
         return cls(
             name,
             (Column(name, name, unit),),
@@ -107,6 +114,7 @@ class Quantity:
             lambda *motion: tuple(np.asarray(by)[:, None] for by in derivatives(*motion)),
             limit=0.5 * (upper - lower),
             center=0.5 * (upper + lower),
+            series=None if series is None else lambda stretch: series(stretch)[None],
         )
 
     @property
@@ -194,7 +202,7 @@ class QuantityKept(Requirement):
         if found.undecided and not share > 1.0:
             first, last = found.undecided[0]
             time, text = first, self._open(found, first, last)
-        return Finding(self.name, subject, time, share, 1.0, kept, text)
+        return Finding(self.name, subject, time, share, 1.0, kept, text, quantity.of_pace)
 
     def _amount(self, motion: FinishedMotion, column: int, time: float, share: float) -> float:
         """Return how far a column is from its centre at a time, in size what was bounded."""

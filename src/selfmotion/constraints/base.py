@@ -26,6 +26,13 @@ class Constraint(Saved, ABC, family="constraint"):
     ----------
     margin : float
         Share of a quantity's limits that is aimed to be left unused; at least half of it is.
+    of_pace : bool
+        Whether it limits the pace of a motion rather than its way.
+    closes : bool
+        Whether it asks that the motion ends as it began, so that no part of it can keep it.
+    kept_moving : bool
+        Whether what its envelope says is all that it asks, so that it can be kept while the arm
+        moves.
     pins : (bool, bool)
         Whether the tool has to be on the path itself, not only within what is relaxed, at the start
         and at the end of the motion.
@@ -37,6 +44,9 @@ class Constraint(Saved, ABC, family="constraint"):
     """
 
     margin: float = 1e-2
+    of_pace: ClassVar[bool] = False
+    closes: ClassVar[bool] = False
+    kept_moving: ClassVar[bool] = False
     pins: ClassVar[tuple[bool, bool]] = (False, False)
     sets_velocity: ClassVar[tuple[bool, bool]] = (False, False)
     sets_acceleration: ClassVar[tuple[bool, bool]] = (False, False)
@@ -72,6 +82,10 @@ class Constraint(Saved, ABC, family="constraint"):
     def envelope(self, robot: RobotModel) -> Envelope:
         """Return what it asks of single configurations and velocities; by default nothing."""
         return Envelope.unbounded(robot.dof)
+
+    def fixed_end(self, robot: RobotModel) -> Array | None:
+        """Return the configuration (n,) that the motion has to end in, where it says one."""
+        return None
 
     def at_rest(self) -> "Constraint":
         """Return what is left to ask of a motion that rests at both ends by itself."""

@@ -67,6 +67,10 @@ class EndConfiguration(Constraint):
                     f"robot.inverse_kinematics(path.pose(path.duration), task, seed=q)"
                 )
 
+    def fixed_end(self, robot: RobotModel) -> Array:
+        """See `Constraint.fixed_end`."""
+        return robot.configuration(self.q)
+
     def on_part(self) -> None:
         """See `Constraint.on_part`: the part ends elsewhere."""
 
@@ -222,6 +226,7 @@ class ClosedPath(Constraint):
     """
 
     pins: ClassVar[tuple[bool, bool]] = (True, True)
+    closes: ClassVar[bool] = True
 
     velocity: bool = True
 

@@ -35,6 +35,8 @@ class JointPositionLimits(Constraint):
         Whether these stand in place of the URDF's limits. By default both are kept.
     """
 
+    kept_moving: ClassVar[bool] = True
+
     lower: npt.ArrayLike | None = None
     upper: npt.ArrayLike | None = None
     margin: float = 2e-4
@@ -86,6 +88,7 @@ class _RateLimits(Constraint):
     """Limits of |q̇|, |q̈| or of the jerk: one's own, and those of the URDF or the arm's maker."""
 
     order: ClassVar[int]
+    of_pace: ClassVar[bool] = True
     limit: npt.ArrayLike | None
     replace: bool
 
@@ -139,6 +142,7 @@ class JointVelocityLimits(_RateLimits):
     """
 
     order: ClassVar[int] = 1
+    kept_moving: ClassVar[bool] = True
 
     limit: npt.ArrayLike | None = None
     margin: float = 2e-3
@@ -160,6 +164,7 @@ class JointAccelerationLimits(_RateLimits):
     """
 
     order: ClassVar[int] = 2
+    kept_moving: ClassVar[bool] = True
 
     limit: npt.ArrayLike | None = None
     margin: float = 1e-2

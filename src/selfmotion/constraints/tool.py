@@ -93,6 +93,7 @@ class ToolLimits(Constraint):
             values,
             derivatives,
             limit=self.limit,
+            of_pace=True,
             series=known,
             components=3,
             covers=tuple(

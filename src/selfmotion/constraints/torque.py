@@ -48,6 +48,7 @@ class JointTorqueLimits(Constraint):
             dynamics.torques,
             dynamics.derivatives,
             limit=self.of(robot),
+            of_pace=True,
             series=lambda stretch: dynamics.series(stretch.chain()),
             covers=("torques",),
         )
