@@ -8,6 +8,7 @@ from selfmotion.robot.chain import (
     march as march,
     null_space as null_space,
 )
+from selfmotion.robot.chain_series import ChainSeries as ChainSeries
 from selfmotion.robot.coordinates import (
     Coordinate as Coordinate,
     FrameCoordinate as FrameCoordinate,
