@@ -39,10 +39,6 @@ from selfmotion.kernels.table import (
     tip_of as tip_of,
 )
 from selfmotion.kernels.tool import (
-    KIND as KIND,
-    Layout as Layout,
-    Rows as Rows,
-    layout_of as layout_of,
     pose_error as pose_error,
     rows_of as rows_of,
     select as select,

@@ -1,6 +1,7 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
 from selfmotion.robot.chain import (
+    WORLD as WORLD,
     Chain as Chain,
     ChainArrays as ChainArrays,
     Kinematics as Kinematics,

@@ -250,6 +250,26 @@ class Chain:
             rotations[k], translations[k] = own.rotation, own.translation
         return jacobians, rotations, translations
 
+    def rooted(self) -> tuple[Any, int]:
+        """Return a model in which the base is the world, and the tip's frame there.
+
+        Its joints are those of `joints`, in this order.
+        """
+        if self.base == WORLD and len(self.joints) == self.dof:
+            return self.model, self.tip
+        model, (tree, rotation, position) = pin.Model(), self.arrays
+        parent = 0
+        for j in range(len(tree.joints)):
+            kind = (
+                pin.JointModelRevoluteUnaligned
+                if tree.is_revolute[j]
+                else (pin.JointModelPrismaticUnaligned)
+            )
+            place = pin.SE3(tree.rotations[j], tree.positions[j])
+            parent = model.addJoint(parent, kind(tree.axes[j]), place, str(j))
+        place = pin.SE3(rotation, position)
+        return model, model.addFrame(pin.Frame("tip", parent, 0, place, pin.FrameType.OP_FRAME))
+
     @cached_property
     def joints(self) -> Ints:
         """Coordinates of the chain's joints, from base to tip, (c,)."""

@@ -3,11 +3,9 @@
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics import Array, Ints, inlined, kernel
+from selfmotion.basics.layout import KIND, Layout
 from selfmotion.kernels import (
-    KIND,
-    Layout,
-    Rows,
     cholesky,
     gram,
     part,
@@ -218,7 +216,7 @@ def _passes_start(samples: Array, count: int, revolute: Mask, tangents: Array) -
 
 @kernel
 def locate(
-    q: Array, samples: Array, curve: Rows, revolute: Mask, near: float
+    q: Array, samples: Array, curve: Ints, revolute: Mask, near: float
 ) -> tuple[int, float, float]:
     """Return the nearest segment's first sample, the share along it, and the distance to q.
 
@@ -261,7 +259,7 @@ def extend(
     turning: Mask,
     weights: Array,
     reach: Array,
-    parent: Rows,
+    parent: Ints,
 ) -> None:
     """Set `reach` (M,), the least cost at `after` (M, n) over steps from `before` (N, n).
 
@@ -292,7 +290,7 @@ def extend(
 @kernel
 def near_pairs(
     before: Array, after: Array, largest_step: Array, turning: Mask
-) -> tuple[Rows, Rows]:
+) -> tuple[Ints, Ints]:
     """Return the pairs of nodes (P,), (P,) from `before` (N, n) to `after` (M, n) that are near.
 
     No joint may move by more than `largest_step`; otherwise as `extend`.
@@ -325,7 +323,7 @@ def near_pairs(
 
 
 @kernel
-def spread_out(q: Array, apart: Array, most: int) -> Rows:
+def spread_out(q: Array, apart: Array, most: int) -> Ints:
     """Return the rows of q (K, n) to keep, at most so many: the earlier ones of near ones.
 
     First those farther from all kept ones in some coordinate than apart[0], then apart[1], ….
@@ -355,7 +353,7 @@ def spread_out(q: Array, apart: Array, most: int) -> Rows:
 
 @kernel
 def cheapest(
-    first: Rows, second: Rows, price: Array, cost: Array, reach: Array, parent: Rows
+    first: Ints, second: Ints, price: Array, cost: Array, reach: Array, parent: Ints
 ) -> None:
     """Lower `reach` (M,) to the least cost over steps with prices (P,), and set `parent`."""
     for k in range(len(first)):
