@@ -20,7 +20,7 @@ from selfmotion.realtime.limits import joint_limits, planned_limits, stoppable
 from selfmotion.realtime.reference import Approach, Reference, resting
 from selfmotion.realtime.segment import Flag, Segment
 from selfmotion.realtime.viable import tightened
-from selfmotion.robot import RobotModel, march
+from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
 # The pose feedback between two steps [1/s]. A motion that breaks down within this time [s] is not
@@ -375,7 +375,7 @@ class Replanner:
             return True
 
         layout = self._layout
-        march([self._kinematics], places, step)
+        self._kinematics.march(places, step)
         return follows
 
     def _segment(

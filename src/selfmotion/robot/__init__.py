@@ -6,7 +6,6 @@ from selfmotion.robot.chain import (
     ChainArrays as ChainArrays,
     Kinematics as Kinematics,
     TreeArrays as TreeArrays,
-    march as march,
     null_space as null_space,
 )
 from selfmotion.robot.chain_series import ChainSeries as ChainSeries

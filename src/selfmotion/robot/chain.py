@@ -122,6 +122,37 @@ class Kinematics:
                 self.translation,
             )
 
+    def march(
+        self,
+        q: Array,
+        step: Callable[..., bool],
+        *arguments: Any,
+        beside: Sequence["Kinematics"] = (),
+    ) -> int | None:
+        """Place tips at each of q (S, n), call ``step(s, f, jacobian, rotation, translation, …)``.
+
+        For this tip and those `beside` it, f = 0, 1, …, which share its data; the last step may set
+        the next row of q. Returns the first s at which a step returned False.
+        """
+        chain, data, others = self.chain, self.data, list(enumerate(beside, 1))
+        jacobian, rotation, translation = self.jacobian, self.rotation, self.translation
+        # Written out: in this loop the engine spends its time.
+        model, tip, is_rooted = chain.model, chain.tip, chain.is_rooted
+        jacobians, place = pin.computeJointJacobians, pin.updateFramePlacement
+        for s, configuration in enumerate(q):
+            jacobians(model, data, configuration)
+            if is_rooted:
+                place(model, data, tip)
+            else:
+                self.place_frames()
+            if not step(s, 0, jacobian, rotation, translation, *arguments):
+                return s
+            for f, own in others:
+                own.place_frames()
+                if not step(s, f, own.jacobian, own.rotation, own.translation, *arguments):
+                    return s
+        return None
+
     def at(self, q: Array) -> Array:
         """Return the Jacobian at q (n,), (6, n): rows [v, ω] of the tip in the base's axes."""
         pin.computeJointJacobians(self.chain.model, self.data, q)
@@ -148,35 +179,6 @@ class Kinematics:
             return pin.SE3(tip)
         base = pin.updateFramePlacement(chain.model, self.data, chain.base)
         return base.actInv(tip)
-
-
-def march(
-    tips: Sequence[Kinematics], q: Array, step: Callable[..., bool], *arguments: Any
-) -> int | None:
-    """Place tips at each of q (S, n), and call ``step(s, f, jacobian, rotation, translation, …)``.
-
-    For each tip f in turn; the last step may set the next row of q. Returns the first s at which a
-    step returned False. The tips are of one tree and share their data.
-    """
-    first, others = tips[0], list(enumerate(tips))[1:]
-    chain, data = first.chain, first.data
-    jacobian, rotation, translation = first.jacobian, first.rotation, first.translation
-    # Written out: in this loop the engine spends its time.
-    model, tip, is_rooted = chain.model, chain.tip, chain.is_rooted
-    jacobians, place = pin.computeJointJacobians, pin.updateFramePlacement
-    for s, configuration in enumerate(q):
-        jacobians(model, data, configuration)
-        if is_rooted:
-            place(model, data, tip)
-        else:
-            first.place_frames()
-        if not step(s, 0, jacobian, rotation, translation, *arguments):
-            return s
-        for f, own in others:
-            own.place_frames()
-            if not step(s, f, own.jacobian, own.rotation, own.translation, *arguments):
-                return s
-    return None
 
 
 class Chain:
