@@ -2,6 +2,7 @@
 
 from selfmotion.basics.arrays import (
     Array as Array,
+    Flags as Flags,
     Ints as Ints,
     per_joint as per_joint,
     plain_numbers as plain_numbers,

@@ -10,7 +10,7 @@ from math import atan2, sqrt, tan
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, inlined
+from selfmotion.basics import Array, Ints, inlined
 from selfmotion.kernels.algebra import (
     Vector,
     add_angular,
@@ -22,7 +22,6 @@ from selfmotion.kernels.algebra import (
     plus,
 )
 
-Rows = npt.NDArray[np.intp]
 Layout = npt.NDArray[np.int64]
 
 # How a task measures its angular error.
@@ -36,7 +35,7 @@ _SMALL = 0.05
 KIND, FIRST, COUNT, ROWS, ORDER = 0, 1, 2, 3, 9
 
 
-def layout_of(tasks: Sequence[tuple[Rows, bool, Rows]], dof: int) -> Layout:
+def layout_of(tasks: Sequence[tuple[Ints, bool, Ints]], dof: int) -> Layout:
     """Return the layout of tips with rows of [v, ω], axes of the tool, and joints of a chain."""
     layout = np.zeros((len(tasks), ORDER + dof), dtype=np.int64)
     first = 0
@@ -50,7 +49,7 @@ def layout_of(tasks: Sequence[tuple[Rows, bool, Rows]], dof: int) -> Layout:
     return layout
 
 
-def _angle_kind(rows: Rows, tool_axes: bool) -> int:
+def _angle_kind(rows: Ints, tool_axes: bool) -> int:
     if tool_axes:
         return POINTING
     return LOGARITHM if np.any(rows >= 3) else NO_ANGLE

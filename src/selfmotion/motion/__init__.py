@@ -11,9 +11,7 @@ from selfmotion.motion.null_motion import (
     NullMotionTable as NullMotionTable,
     PolynomialNullMotion as PolynomialNullMotion,
     RefinedNullMotion as RefinedNullMotion,
-    TransportedFrame as TransportedFrame,
     resting_window as resting_window,
-    transport as transport,
 )
 from selfmotion.motion.sampling import Sampling as Sampling
 from selfmotion.motion.trajectory import Trajectory as Trajectory, column_names as column_names

@@ -103,7 +103,7 @@ class SequentialQuadratic:
             With multipliers, one per condition. Where it did not converge: the best point found,
             which is the cheapest that keeps all conditions, or the one that violates them least.
         """
-        run = _Run(self, function, x0, max_evaluations, callback)
+        run = _Minimisation(self, function, x0, max_evaluations, callback)
         try:
             status = run.until_done(inverse_hessian)
         except KeyboardInterrupt:
@@ -111,7 +111,7 @@ class SequentialQuadratic:
         return run.minimum(status)
 
 
-class _Run:
+class _Minimisation:
     """The state of one minimisation; p, gradients and rows are those of scaled variables."""
 
     def __init__(

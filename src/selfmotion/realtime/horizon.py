@@ -14,11 +14,12 @@ from selfmotion.basics import Array, ProblemError
 from selfmotion.costs import Cost, Samples
 from selfmotion.engine import Rollout
 from selfmotion.follow import Follows
+from selfmotion.kernels import transport
 from selfmotion.motion import Grid, NullMotion
 from selfmotion.path import PathSamples
 from selfmotion.realtime.clear import Surroundings
-from selfmotion.realtime.law import transport_frame
-from selfmotion.realtime.programme import best_step
+from selfmotion.realtime.law import PIVOT
+from selfmotion.realtime.programme import elastic_step
 from selfmotion.robot import null_space
 
 # Added to the Gauss-Newton matrix, relative to its trace: directions that do not act stay put.
@@ -173,7 +174,7 @@ class Horizon:
         if not len(self._frames) and not self._begin(q):
             return False
         first = np.empty((1, *self._frames.shape[1:]))
-        transport_frame(self._frames[0], jacobian[None], first)
+        transport(self._frames[0], jacobian[None], PIVOT, first)
         self._frames[0] = first[0]
         free = self._coefficients @ self._rest
         self._coefficients = np.outer(first[0].T @ rate, self._first) + free @ self._rest.T
@@ -200,7 +201,7 @@ class Horizon:
         better = self._coefficients + step.reshape(self.redundancy, -1) @ self._rest.T
         if not self._guesses or self._falls(q, stages, better, cost, predicted):
             self._coefficients = better
-        transport_frame(first[0], here, self._frames)
+        transport(first[0], here, PIVOT, self._frames)
         return True
 
     def _cost(self, samples: Samples) -> float:
@@ -229,7 +230,8 @@ class Horizon:
             return False
         jacobians = self.rollout.samples().task_jacobian[self.grid.node_stages]
         self._frames = np.empty((len(jacobians), len(q), self.redundancy))
-        transport_frame(null_space(jacobians[0]), np.ascontiguousarray(jacobians), self._frames)
+        first, here = null_space(jacobians[0]), np.ascontiguousarray(jacobians)
+        transport(first, here, PIVOT, self._frames)
         return True
 
     def _run(self, q: Array, epsilon: Array) -> bool:
@@ -265,7 +267,7 @@ class Horizon:
         metric[np.diag_indices(d)] += _REGULAR * (np.trace(metric) + 1e-12)
         limits = self._conditions(samples, by_q, by_qd)
         try:
-            step, self.relaxed = best_step(metric, gradient, *limits)
+            step, self.relaxed = elastic_step(metric, gradient, *limits)
         except np.linalg.LinAlgError:
             return None
         return step, float(-gradient @ step - 0.5 * step @ metric @ step)

@@ -13,7 +13,7 @@ _ROUNDS = 4
 _BREAKING, _DISTANCES = 1e3, 0.1
 
 
-def best_step(
+def elastic_step(
     metric: Array, gradient: Array, rows: Array, low: Array, high: Array
 ) -> tuple[Array, bool]:
     """Return the step p of least cost that keeps low ≤ rows p ≤ high, found by the few that bind.

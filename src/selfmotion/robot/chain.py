@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import Array, Ints
-from selfmotion.robot.placements import Flags, rebase
+from selfmotion.basics import Array, Flags, Ints
+from selfmotion.robot.placements import rebase
 
 # The frame that does not move.
 WORLD = 0

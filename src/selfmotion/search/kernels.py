@@ -1,25 +1,21 @@
 """What numba compiles for self-motion curves: Newton's corrector, continuation, nearest segment."""
 
 import numpy as np
-import numpy.typing as npt
 
-from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics import Array, Flags, Ints, inlined, kernel
 from selfmotion.kernels import (
     KIND,
     Layout,
-    Rows,
     cholesky,
     gram,
-    part,
     pose_error,
     rows_of,
     select,
     solve_cholesky,
     task_rows,
+    view,
 )
 from selfmotion.robot import ChainArrays, compose, placements
-
-Mask = npt.NDArray[np.bool_]
 
 # What is known of a curve on the way.
 GOING, CLOSED, ENDED = 0, 1, 2
@@ -64,8 +60,8 @@ def correct(
     jacobian, factor = np.empty((m, n)), np.empty((m, m))
     pose_error(
         layout[0, KIND],
-        part(target, 0, (3,)),
-        part(target, 3, (3, 3)),
+        view(target, 0, (3,)),
+        view(target, 3, (3, 3)),
         translation,
         rotation,
         error,
@@ -144,7 +140,7 @@ def _advance(
     translation: Array,
     target: Array,
     layout: Layout,
-    revolute: Mask,
+    revolute: Flags,
     samples: Array,
     tangents: Array,
     state: Array,
@@ -195,7 +191,7 @@ def _advance(
 
 
 @inlined
-def _passes_start(samples: Array, count: int, revolute: Mask, tangents: Array) -> bool:
+def _passes_start(samples: Array, count: int, revolute: Flags, tangents: Array) -> bool:
     """Whether the last segment passes the start, modulo turns; then it is made to end there."""
     n = samples.shape[1]
     square, dot, cosine = 0.0, 0.0, 0.0
@@ -222,7 +218,7 @@ def _passes_start(samples: Array, count: int, revolute: Mask, tangents: Array) -
 
 @kernel
 def locate(
-    q: Array, samples: Array, curve: Rows, revolute: Mask, near: float
+    q: Array, samples: Array, curve: Ints, revolute: Flags, near: float
 ) -> tuple[int, float, float]:
     """Return the nearest segment's first sample, the share along it, and the distance to q.
 
@@ -262,10 +258,10 @@ def extend(
     cost: Array,
     after: Array,
     largest_step: Array,
-    turning: Mask,
+    turning: Flags,
     weights: Array,
     reach: Array,
-    parent: Rows,
+    parent: Ints,
 ) -> None:
     """Set `reach` (M,), the least cost at `after` (M, n) over steps from `before` (N, n).
 
@@ -295,8 +291,8 @@ def extend(
 
 @kernel
 def near_pairs(
-    before: Array, after: Array, largest_step: Array, turning: Mask
-) -> tuple[Rows, Rows]:
+    before: Array, after: Array, largest_step: Array, turning: Flags
+) -> tuple[Ints, Ints]:
     """Return the pairs of nodes (P,), (P,) from `before` (N, n) to `after` (M, n) that are near.
 
     No joint may move by more than `largest_step`; otherwise as `extend`.
@@ -329,7 +325,7 @@ def near_pairs(
 
 
 @kernel
-def spread_out(q: Array, apart: Array, most: int) -> Rows:
+def spread_out(q: Array, apart: Array, most: int) -> Ints:
     """Return the rows of q (K, n) to keep, at most so many: the earlier ones of near ones.
 
     First those farther from all kept ones in some coordinate than apart[0], then apart[1], ….
@@ -359,7 +355,7 @@ def spread_out(q: Array, apart: Array, most: int) -> Rows:
 
 @kernel
 def cheapest(
-    first: Rows, second: Rows, price: Array, cost: Array, reach: Array, parent: Rows
+    first: Ints, second: Ints, price: Array, cost: Array, reach: Array, parent: Ints
 ) -> None:
     """Lower `reach` (M,) to the least cost over steps with prices (P,), and set `parent`."""
     for k in range(len(first)):
@@ -378,7 +374,7 @@ def project_all(
     upper: Array,
     longest: float,
     steps: int,
-    arrived: Mask,
+    arrived: Flags,
 ) -> None:
     """Put each of q (K, n) onto its target (K, 12) by Newton's method, in place.
 
@@ -438,7 +434,7 @@ def _place(
 
 @inlined
 def _jacobian(
-    r: Array, p: Array, axes: Array, is_revolute: Mask, tool: Array, jacobian: Array
+    r: Array, p: Array, axes: Array, is_revolute: Flags, tool: Array, jacobian: Array
 ) -> None:
     """Write the Jacobian [v, ω] (6, n) of the tool's origin, world axes."""
     axis = np.empty(3)

@@ -4,8 +4,8 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, RobotError
+from selfmotion.engine import transport
 from selfmotion.follow import Follows
-from selfmotion.motion import transport
 from selfmotion.search import kernels
 
 _NEAR_STEPS, _FAR_STEPS = 10, 60

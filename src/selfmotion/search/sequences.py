@@ -6,13 +6,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, NoSequenceError, ProblemError, Progress, read_only, silent
+from selfmotion.basics import (
+    Array,
+    Flags,
+    NoSequenceError,
+    ProblemError,
+    Progress,
+    read_only,
+    silent,
+)
 from selfmotion.collision import CollisionModel
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
 from selfmotion.search.chains import best_chains, diverse_chains, unlike, unturned
 from selfmotion.search.curves import CurveSet, SelfMotion, curves_along, targets
-from selfmotion.search.measures import Length, Mask, Measure
+from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible, place_nodes
 from selfmotion.search.reasons import why_blocked
 from selfmotion.search.starts import spread
@@ -187,7 +195,7 @@ def best_sequences(
 
 def _rough_motions(
     nodes: CurveLayers, steps: Array, times: Array, count: int, asked: Measure | None
-) -> tuple[list[Array], Mask, Measure]:
+) -> tuple[list[Array], Flags, Measure]:
     """Return the best unlike motions (W, n) over samples, whose turns did not count, and by what.
 
     Turns of joints with room for several are left out at first, and the motion put inside the
@@ -229,7 +237,7 @@ def _rough_motions(
 
 
 def ranked(
-    times: Array, motions: list[Array], turning: Mask, weights: Array, measure: Measure
+    times: Array, motions: list[Array], turning: Flags, weights: Array, measure: Measure
 ) -> list[Sequence]:
     """Return the sequences, the best first, without those that became like a better one."""
     length = Length(weights)
@@ -255,7 +263,7 @@ def _free_samples(
     return found
 
 
-def connected(layers: list[Array], chain: list[int], turning: Mask) -> Array:
+def connected(layers: list[Array], chain: list[int], turning: Flags) -> Array:
     """Return a chain's configurations (W, n); joints that turn without end do not jump."""
     q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
     steps = unturned(np.diff(q, axis=0), turning)
