@@ -1,7 +1,7 @@
 """A constraint of one's own: joint 2 + joint 3 of a Panda stay within a band.
 
-This file is all there is to write: the conditions that the optimiser follows (`BandConditions`),
-and the requirement that the certificate judges the finished motion by (`BandRequirement`).
+`SumBand` is all there is to write: what is measured, once, with its derivative. The optimiser's
+conditions and the certificate's requirement follow from it.
 """
 
 from dataclasses import dataclass
@@ -13,8 +13,6 @@ from selfmotion.testing import check_constraint
 
 # The two joints' shares in what is limited.
 SUM = np.array([0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
-# Aimed to be kept from the limits [rad], since the conditions are looked at in the nodes alone.
-MARGIN = 1e-3
 
 
 @dataclass(frozen=True)
@@ -24,58 +22,15 @@ class SumBand(sm.Constraint):
     lower: float
     upper: float
 
-    def bind(self, follows, start, end):
-        return BandConditions(self.lower, self.upper)
-
-    def requirement(self, robot):
-        return BandRequirement(self.lower, self.upper)
-
-
-@dataclass(frozen=True)
-class BandConditions:
-    """h = (sum - upper, lower - sum) + margin ≤ 0 at each node."""
-
-    lower: float
-    upper: float
-    name: str = "sum band"
-    equality: bool = False
-    tolerance: float = 0.5 * MARGIN
-
-    def residual(self, samples):
-        total = samples.q[samples.nodes] @ SUM
-        return np.stack([total - self.upper, self.lower - total], axis=1) + MARGIN
-
-    def tangents(self, samples, motion):
-        total = np.einsum("n,knd->kd", SUM, motion.q)
-        return np.stack([total, -total], axis=1)
-
-    def describe(self, samples, row, column):
-        total = samples.q[samples.nodes][row] @ SUM
-        return f"q2 + q3 is {total:.3f} rad at t = {samples.t[samples.nodes][row]:.3f} s"
-
-
-@dataclass(frozen=True)
-class BandRequirement(sm.Requirement):
-    """The same, measured on the finished motion."""
-
-    lower: float
-    upper: float
-    name: str = "sum band"
-
-    def judge(self, motion):
-        total = motion.q @ SUM
-        beyond = np.maximum(total - self.upper, self.lower - total)
-        worst = int(np.argmax(beyond))
-        time, amount = float(motion.t[worst]), float(total[worst])
-        return sm.Finding(
-            requirement=self.name,
-            subject="joints 2 and 3",
-            time=time,
-            amount=amount,
-            allowed=self.upper if amount > self.upper else self.lower,
-            kept=bool(beyond[worst] <= 0.0),
-            text=f"q2 + q3 is {amount:.4f} rad at t = {time:.3f} s, wanted {self.lower} to "
-            f"{self.upper}: widen the band, or move the path",
+    def quantity(self, robot):
+        return sm.Quantity.between(
+            "q2 + q3",
+            self.lower,
+            self.upper,
+            values=lambda q, qd, qdd: q @ SUM,
+            derivatives=lambda q, qd, qdd: (np.tile(SUM, (len(q), 1)),),
+            series=lambda stretch: np.tensordot(SUM, stretch.chain().joints, 1),
+            unit="rad",
         )
 
 

@@ -34,9 +34,11 @@ from selfmotion.basics import (
 from selfmotion.batch import Batch as Batch, plan_many as plan_many
 from selfmotion.certificate import (
     Certificate as Certificate,
+    Column as Column,
     Extreme as Extreme,
     Finding as Finding,
     FinishedMotion as FinishedMotion,
+    Quantity as Quantity,
     Requirement as Requirement,
     Tolerance as Tolerance,
     certify as certify,

@@ -15,7 +15,6 @@ from selfmotion.certificate import (
     KeepsApart,
 )
 from selfmotion.certificate.apart import Approach, _nearer, closest_at_all_times
-from selfmotion.certificate.path_error import bound_errors
 from selfmotion.collision import Closest
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 from support.motions import motion_of
@@ -30,19 +29,6 @@ def test_a_distance_that_is_only_a_bound_is_no_approach() -> None:
     found = _nearer(before, model, t, values, np.array([[1.0, 0.5], [0.5, 1.0]]))
     assert (found.closest.value, found.time) == (0.7, 0.4)
     assert (found.closest.first, found.closest.second) == ("c", "d")
-
-
-@pytest.mark.parametrize(("intervals", "each"), [(4096, 8), (4097, 4)])
-def test_of_many_intervals_fewer_points_are_looked_at(intervals: int, each: int) -> None:
-    robot = robot_named("planar_3r")
-    q = robot.dexterous_configuration("planar")
-    pose, t = robot.pose(q), np.linspace(0.0, 1.0, intervals + 1)
-    rest = np.zeros((len(t), 3))
-    trajectory = sm.Trajectory(t, np.tile(q, (len(t), 1)), rest, robot.joint_names)
-    path = sm.Dwell(pose, 1.0)
-    found = bound_errors(robot, path, sm.Task.PLANAR, trajectory, sm.Tolerance(), ())
-    assert found.samples == each * intervals + 1
-    assert found.position.value < 1e-12
 
 
 class Bodies:

@@ -9,7 +9,12 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.certificate.deviation import _turns, deviation_from, deviation_size, excess
+from selfmotion.certificate.deviation import (
+    deviation_from,
+    deviation_size,
+    excess,
+    rotation_vectors,
+)
 from support.arms import robot_named
 
 ROUNDING = 1e-12
@@ -52,7 +57,7 @@ def test_the_deviation_is_that_of_the_poses(task: sm.Task, in_tool_axes: bool) -
 def test_half_a_turn_and_none_are_what_they_are(task: str) -> None:
     half = np.diag([1.0, -1.0, -1.0])
     actual = np.array([half, np.eye(3)])
-    found = _turns(sm.Task.of(task), np.tile(np.eye(3), (2, 1, 1)), actual)
+    found = rotation_vectors(sm.Task.of(task), np.asarray(actual))
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), [np.pi, 0.0])
 
 

@@ -1,14 +1,10 @@
 """Joint limits and rates: margins, shares, and what a pace would change."""
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.certificate import JointLimits, JointTorques
-from selfmotion.certificate.shares import largest_share
+from selfmotion.certificate import JointLimits
 from support.motions import motion_of
 
 ROUNDING = 1e-12
@@ -80,11 +76,6 @@ def test_slow_rates_say_how_much_shorter_it_could_take(order: int, power: float)
     assert f"give it {0.25**power:.5g} times the duration" in found.text
 
 
-def test_where_nothing_is_used_the_first_column_is_told_at_the_start() -> None:
-    motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0]], np.zeros((2, 3)), [2.0, 3.0]).trajectory
-    assert largest_share(motion, lambda q, *_: 0.0 * q) == (0.0, 2.0, 0)
-
-
 @pytest.mark.parametrize(
     ("order", "lower", "upper"),
     [
@@ -102,22 +93,3 @@ def test_limits_that_cannot_be_kept_are_refused(order: int, lower: float, upper:
     assert JointLimits(0, np.zeros(3), np.zeros(3)).order == 0
     with pytest.raises(sm.ProblemError, match="expected"):
         JointLimits(0, np.zeros(3), np.ones(2))
-
-
-def test_a_joint_that_needs_nothing_may_have_no_limit() -> None:
-    """0 of infinity is no number."""
-    dynamics: Any = SimpleNamespace(torques=lambda q, qd, qdd: 0.0 * q)
-    motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
-    found = JointTorques(dynamics, np.full(3, np.inf)).judge(motion)
-    assert found.kept
-    assert "needs 0 Nm or N" in found.text
-    assert "nan" not in found.text
-
-
-def test_rates_are_seen_on_both_sides_of_a_sample() -> None:
-    """Accelerations jump there: from -6 to 6."""
-    motion = motion_of([[0.0] * 3, [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], np.zeros((3, 3))).trajectory
-    for sign in (1.0, -1.0):
-        found = largest_share(motion, lambda q, qd, qdd, sign=sign: np.maximum(sign * qdd, 0.0))
-        assert found is not None
-        assert found.share == pytest.approx(6.0, rel=1e-3)

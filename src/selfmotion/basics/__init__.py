@@ -1,5 +1,6 @@
 """What every part of the package stands on: errors, arrays, progress, files, compilation."""
 
+from selfmotion.basics import series as series
 from selfmotion.basics.arrays import (
     Array as Array,
     Flags as Flags,

@@ -1,7 +1,7 @@
 """Re-checks finished motions: the path, and each requirement."""
 
 from selfmotion.certificate.apart import KeepsApart as KeepsApart
-from selfmotion.certificate.band import CoordinateBand as CoordinateBand
+from selfmotion.certificate.bounding import Stretch as Stretch
 from selfmotion.certificate.check import certify as certify
 from selfmotion.certificate.ends import (
     QUANTITIES as QUANTITIES,
@@ -21,14 +21,13 @@ from selfmotion.certificate.limits import (
     arm_limits as arm_limits,
 )
 from selfmotion.certificate.path_error import errors_between as errors_between
+from selfmotion.certificate.quantity import (
+    Column as Column,
+    Quantity as Quantity,
+    QuantityKept as QuantityKept,
+)
 from selfmotion.certificate.requirement import (
     FinishedMotion as FinishedMotion,
     Requirement as Requirement,
 )
-from selfmotion.certificate.tool import (
-    TOOL_RATES as TOOL_RATES,
-    ToolMotion as ToolMotion,
-    tool_sizes as tool_sizes,
-)
-from selfmotion.certificate.torques import JointTorques as JointTorques
 from selfmotion.certificate.verdict import Certificate as Certificate

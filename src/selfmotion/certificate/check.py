@@ -16,6 +16,9 @@ from selfmotion.path import Path, check_oriented
 from selfmotion.robot import RobotModel
 from selfmotion.task import DampingLaw, Relaxation, Task
 
+# What is said of paths without bounds of their derivatives.
+_MEASURED = "the path is judged as measured between its marks: it gives no bounds (Path.series)"
+
 
 def certify(
     robot: RobotModel,
@@ -92,6 +95,7 @@ def certify(
         remarks=tuple(remark for item in wanted for remark in item.remarks),
         deviations=path_check.deviations,
         damped=damped,
+        notes=() if path_check.proved else (_MEASURED,),
     )
 
 

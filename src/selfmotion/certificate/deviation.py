@@ -21,12 +21,12 @@ def deviation_from(
     Rows x, y, z [m] and rx, ry, rz [rad] as `Relaxation` has them; zero where the task leaves them
     free.
     """
-    rotation, translation = _poses(robot, q)
+    rotation, translation = poses(robot, q)
     target = path.samples(t)
     linear = task.rows[task.rows < 3]
     miss = np.zeros((len(t), 6))
     miss[:, linear] = (translation - target.translation)[:, linear]
-    miss[:, 3:] = _turns(task, target.rotation, rotation)
+    miss[:, 3:] = rotation_vectors(task, relative_turns(target.rotation, rotation))
     if in_tool_axes:
         miss[:, :3] = np.einsum("kji,kj->ki", target.rotation, miss[:, :3])
     return miss
@@ -44,7 +44,7 @@ def smallest_singular_values(robot: RobotModel, task: Task, q: Array) -> Array:
     return values[:, -1].astype(np.float64)
 
 
-def _poses(robot: RobotModel, q: Array) -> tuple[Array, Array]:
+def poses(robot: RobotModel, q: Array) -> tuple[Array, Array]:
     """Return rotations and translations of the tool at q (K, n).
 
     By calls of its own: what checks a motion must not share a fault with what made it.
@@ -60,34 +60,38 @@ def _poses(robot: RobotModel, q: Array) -> tuple[Array, Array]:
     return rotation, translation
 
 
-def _turns(task: Task, target: Array, actual: Array) -> Array:
-    """Return the rotation vectors from target to actual in target's axes, (K, 3) [rad].
+def relative_turns(target: Array, actual: Array) -> Array:
+    """Return the rotations from target to actual in target's axes, (K, 3, 3)."""
+    return np.asarray(target.transpose(0, 2, 1) @ actual)
+
+
+def rotation_vectors(task: Task, relative: Array) -> Array:
+    """Return the rotation vectors of turns (…, 3, 3), (…, 3) [rad].
 
     Those of the whole orientation, or of the tool's z axis alone; zero where no angle counts.
     """
-    if not np.any(task.rows >= 3):
-        return np.zeros((len(actual), 3))
-    relative = target.transpose(0, 2, 1) @ actual
+    if not task.angular:
+        return np.zeros(relative.shape[:-1])
     if task.tool_axes:
         # From (0, 0, 1) to the z axis as seen from the target, by the shortest way.
-        axis = relative[:, :, 2]
-        normal = np.stack([-axis[:, 1], axis[:, 0], np.zeros(len(axis))], axis=1)
-        cosine = axis[:, 2]
+        axis = relative[..., 2]
+        normal = np.stack([-axis[..., 1], axis[..., 0], np.zeros(axis.shape[:-1])], axis=-1)
+        cosine = axis[..., 2]
     else:
         normal = 0.5 * np.stack(
             [
-                relative[:, 2, 1] - relative[:, 1, 2],
-                relative[:, 0, 2] - relative[:, 2, 0],
-                relative[:, 1, 0] - relative[:, 0, 1],
+                relative[..., 2, 1] - relative[..., 1, 2],
+                relative[..., 0, 2] - relative[..., 2, 0],
+                relative[..., 1, 0] - relative[..., 0, 1],
             ],
-            axis=1,
+            axis=-1,
         )
-        cosine = 0.5 * (np.trace(relative, axis1=1, axis2=2) - 1.0)
-    sine = np.linalg.norm(normal, axis=1)
+        cosine = 0.5 * (np.trace(relative, axis1=-2, axis2=-1) - 1.0)
+    sine = np.linalg.norm(normal, axis=-1)
     # Half a turn has no sine to scale; its axis does not matter, its angle does.
     normal[sine == 0.0] = [1.0, 0.0, 0.0]
     angle = np.arctan2(sine, cosine)
-    return np.asarray(normal * (angle / np.where(sine > 0.0, sine, 1.0))[:, None])
+    return np.asarray(normal * (angle / np.where(sine > 0.0, sine, 1.0))[..., None])
 
 
 def excess(relaxations: Sequence[Relaxation], duration: float, t: Array, deviation: Array) -> Array:

@@ -80,6 +80,8 @@ class Finding:
         Whether the requirement is kept at all times.
     text : str
         In words: who, how much, when, what was wanted, and what to do about it.
+    of_pace : bool
+        Whether a slower pace may keep what is not kept.
     """
 
     requirement: str
@@ -89,6 +91,7 @@ class Finding:
     allowed: float
     kept: bool
     text: str
+    of_pace: bool = False
 
     @property
     def extreme(self) -> Extreme:

@@ -84,7 +84,7 @@ class JointLimits(Requirement):
         time = float(times[side, joint])
         name = motion.robot.joint_names[int(joint)]
         text = _TEXTS[self.order](name, amount, time)
-        return Finding(self.name, name, time, amount, allowed, kept, text)
+        return Finding(self.name, name, time, amount, allowed, kept, text, self.order > 0)
 
     def _jump(self, motion: FinishedMotion) -> Finding | None:
         """Return the worst jump of q̈ that no limited jerk makes, if there is one."""
@@ -98,7 +98,7 @@ class JointLimits(Requirement):
             f"the acceleration of joint '{name}' jumps by {jumps[joint]:.4g} at t = {time:.3f} s, "
             f"which no limited jerk does: give the motion's accelerations as well, or more samples"
         )
-        return Finding(self.name, name, time, float(shares[joint]), 1.0, False, text)
+        return Finding(self.name, name, time, float(shares[joint]), 1.0, False, text, True)
 
 
 def arm_limits(robot: RobotModel, requirements: Sequence[Requirement]) -> tuple[JointLimits, ...]:

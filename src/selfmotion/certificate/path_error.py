@@ -1,39 +1,41 @@
 """How far the tool is off its path at any time: a bound, not only samples.
 
 Between the trajectory's samples, the path's own marks and the ends of relaxed windows, the
-deviation of the tool from the path is smooth. On each such interval it is measured at 2k + 1
-points; the polynomial through every other of them predicts the rest, and the largest miss r of
-these predictions bounds how far the polynomial through all points is off between them (its own
-error is smaller by the order of two further halvings). The bound is the largest value of that
-polynomial at 33 points, plus what it may rise by between these, plus r. Intervals on which it does
-not decide are halved.
+deviation of the tool from the path is smooth, and `bounded` has the rest. The turn by an angle θ
+from the path's orientation R_d to the tool's R is measured by |R_dᵀR - I| / √2 = 2 sin(θ/2), in
+Frobenius' norm, or by that of the tool's z axis alone; it is the rotation vector where some of its
+rows are relaxed: (sin θ) n g(cos θ) with g(c) = arccos(c) / √(1 - c²) = ∫ dx / (x² + 2cx + 1) over
+x > 0, whose derivatives |g⁽ᵏ⁾|/k! are at most g(c) / (1 + c)ᵏ.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError
-from selfmotion.certificate.deviation import deviation_from, deviation_size, excess
+from selfmotion.basics import Array, ProblemError, series
+from selfmotion.certificate.bounding import Bounded, Stretch, bounded
+from selfmotion.certificate.deviation import (
+    deviation_from,
+    deviation_size,
+    excess,
+    poses,
+    relative_turns,
+    rotation_vectors,
+)
 from selfmotion.certificate.findings import Extreme, Tolerance
-from selfmotion.certificate.interpolation import SAG, stencil
 from selfmotion.motion import Trajectory
-from selfmotion.path import Path
+from selfmotion.path import Path, path_series
 from selfmotion.robot import RobotModel
 from selfmotion.task import Relaxation, Task
 
-# Points per interval, where there are many intervals and where not.
-_FEW, _MANY, _CROWD = 5, 9, 4096
-# No joint moves more than this [rad or m] in one interval: the deviation is smooth on its scale.
-_TRAVEL = 0.2
-# Where joints turn farther from one sample to the next [rad or m], the path is not looked for.
-_WILD = 200.0
-# An interval is halved this many times before it counts as undecided.
-_DEPTH = 12
 # Marks nearer to each other than this share of the duration are one.
 _SAME = 1e-12
+# Deviations are interpolated to this share of the tolerance at least.
+_FINE = 1e-4
+# Where the tool is turned by more than this cosine, rotation vectors have no bound.
+_TURNED = -0.99
+_FROBENIUS = 3.0**0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,9 @@ class PathCheck:
     deviations : tuple of Extreme
         Bounds of the deviation of each relaxation's rows.
     undecided : tuple of (float, float)
-        Intervals [s] on which the measurements do not settle.
+        Intervals [s] on which the bounds do not settle.
+    proved : bool
+        Whether the bounds are theorems; else the path is judged as measured between its marks.
     samples : int
         How many poses were looked at.
     """
@@ -56,15 +60,8 @@ class PathCheck:
     rotation: Extreme
     deviations: tuple[Extreme, ...]
     undecided: tuple[tuple[float, float], ...]
+    proved: bool
     samples: int
-
-
-class _Bounds(NamedTuple):
-    """For I intervals: bounds of 2 + R quantities, about when, and the errors measured."""
-
-    values: Array
-    times: Array
-    measured: Array
 
 
 def bound_errors(
@@ -77,33 +74,17 @@ def bound_errors(
 ) -> PathCheck:
     """Bound the errors of a motion; parameters as in `certify`."""
     _check_times(path, trajectory)
-    allowed = np.array([tolerance.position, tolerance.rotation])
-    edges = _edges(path, trajectory, relaxations)
-    pending = np.stack([edges[:-1], edges[1:]], axis=1)
-    count = _MANY if len(pending) <= _CROWD else _FEW
-    width = 2 + len(relaxations)
-    worst = [Extreme(0.0, float(edges[0]), "")] * width
-    samples = 0
-    for depth in range(_DEPTH + 1):
-        found = _bounds(robot, path, task, trajectory, relaxations, pending, count)
-        samples += len(pending) * (count - 1)
-        # Written so that NaN settles nothing and is no small error either.
-        kept = np.asarray(found.values[:, :2] <= allowed).all(axis=1)
-        broken = ~np.asarray(found.measured <= allowed).all(axis=1)
-        unsettled = ~(kept | broken)
-        done = ~unsettled if depth < _DEPTH else np.ones(len(pending), dtype=bool)
-        worst = [
-            _larger(one, found.values[done, k], found.times[done, k]) for k, one in enumerate(worst)
-        ]
-        if depth == _DEPTH or not unsettled.any():
-            break
-        middle = pending[unsettled].mean(axis=1)
-        halves = [pending[unsettled, 0], middle, middle, pending[unsettled, 1]]
-        pending = np.stack(halves, axis=1).reshape(-1, 2)
-    gaps = tuple((float(a), float(b)) for a, b in [*pending[unsettled], *_wild(trajectory)])
+    errors = _PathErrors(path, task, tolerance, relaxations)
+    found = bounded(errors, robot, trajectory, _edges(path, trajectory, relaxations))
+    values = errors.angles(found.values)
     names = (robot.tool, robot.tool, *(item.name for item in relaxations))
-    extremes = tuple(replace(one, name=name) for one, name in zip(worst, names, strict=True))
-    return PathCheck(extremes[0], extremes[1], extremes[2:], gaps, samples + 1)
+    extremes = tuple(
+        Extreme(float(value), float(time), name)
+        for value, time, name in zip(values, found.times, names, strict=True)
+    )
+    return PathCheck(
+        extremes[0], extremes[1], extremes[2:], found.undecided, found.proved, found.samples
+    )
 
 
 def errors_between(
@@ -117,7 +98,8 @@ def errors_between(
     t = 0.5 * (trajectory.t[:-1] + trajectory.t[1:])
     in_tool_axes = any(item.in_tool_axes for item in relaxations)
     miss = deviation_from(robot, path, task, t, trajectory(t), in_tool_axes)
-    return np.asarray(_quantities(miss[:, None], t[:, None], path.duration, relaxations)[:, 0, :2])
+    beyond = excess(relaxations, path.duration, t, miss)
+    return np.stack([_length(beyond[:, :3]), _length(beyond[:, 3:])], axis=1)
 
 
 def _check_times(path: Path, trajectory: Trajectory) -> None:
@@ -130,97 +112,129 @@ def _check_times(path: Path, trajectory: Trajectory) -> None:
         )
 
 
-def _wild(trajectory: Trajectory) -> Array:
-    """Return the intervals (K, 2) on which some joint turns many times, which no arm does."""
-    rows = np.flatnonzero(_travel(trajectory, trajectory.t) > _WILD)
-    return np.stack([trajectory.t[rows], trajectory.t[rows + 1]], axis=1)
-
-
-def _travel(trajectory: Trajectory, marks: Array) -> Array:
-    """Return how far joints go at most between marks (M,), about, (M - 1,) [rad or m]."""
-    lengths = np.diff(marks)
-    inner = marks[:-1, None] + lengths[:, None] * np.linspace(0.0, 1.0, 5)
-    speeds = np.abs(trajectory(np.minimum(inner.ravel(), marks[-1]), order=1)).max(axis=1)
-    return np.asarray(lengths * speeds.reshape(inner.shape).max(axis=1))
-
-
-def _larger(worst: Extreme, values: Array, times: Array) -> Extreme:
-    """Return the worst of an extreme and values (I,) at times (I,); NaN is worse than any."""
-    if not len(values):
-        return worst
-    k = int(np.argmax(np.where(np.isnan(values), np.inf, values)))
-    if np.isnan(worst.value) or values[k] <= worst.value:
-        return worst
-    return Extreme(float(values[k]), float(times[k]), worst.name)
-
-
 def _edges(path: Path, trajectory: Trajectory, relaxations: Sequence[Relaxation]) -> Array:
-    """Return the times between which the deviation is smooth, no joint moving far, (E,)."""
+    """Return the times between which the deviation is smooth, (E,)."""
     end = min(float(trajectory.t[-1]), path.duration)
     start = max(float(trajectory.t[0]), 0.0)
     windows = [time for item in relaxations for time in item.window(path.duration)]
     marks = np.concatenate([trajectory.t, path.marks, windows])
     marks = np.unique(np.clip(marks, start, end))
-    gaps = np.diff(marks)
-    kept = np.append(True, gaps > _SAME * path.duration)
-    marks = marks[kept]
-    marks[-1] = end
-    travel = _travel(trajectory, marks)
-    # What is wild is not settled however finely it is cut.
-    travel = np.where(travel <= _WILD, travel, 0.0)
-    pieces = np.maximum(np.ceil(travel / _TRAVEL), 1.0).astype(int)
-    fine = [
-        first + (last - first) * np.arange(number) / number
-        for first, last, number in zip(marks[:-1], marks[1:], pieces, strict=True)
-        if number > 1
-    ]
-    return np.unique(np.concatenate([marks, *fine]))
+    kept: Array = marks[np.append(True, np.diff(marks) > _SAME * path.duration)]
+    kept[-1] = end
+    return kept
 
 
-def _bounds(
-    robot: RobotModel,
-    path: Path,
-    task: Task,
-    trajectory: Trajectory,
-    relaxations: Sequence[Relaxation],
-    intervals: Array,
-    count: int,
-) -> _Bounds:
-    """Measure intervals (I, 2) at `count` points each."""
-    shares, predict, dense_shares, dense = stencil(count)
-    starts, lengths = intervals[:, :1], np.diff(intervals, axis=1)
-    t = starts + lengths * shares
-    in_tool_axes = any(item.in_tool_axes for item in relaxations)
-    q = trajectory(np.minimum(t, intervals[:, 1:]).ravel())
-    miss = deviation_from(robot, path, task, t.ravel(), q, in_tool_axes)
-    miss = miss.reshape(len(intervals), count, 6)
-    left = np.abs(miss[:, 1::2] - np.einsum("ab,ibk->iak", predict, miss[:, ::2]))
-    between = np.einsum("ab,ibk->iak", dense, miss)
-    rest = _largest(left) + SAG * _largest(np.diff(between, 2, axis=1))
-    times = starts + lengths * dense_shares
-    values = _quantities(between, times, path.duration, relaxations)
-    measured = _quantities(miss, t, path.duration, relaxations)[:, :, :2].max(axis=1)
-    which = np.argmax(np.where(np.isnan(values), np.inf, values), axis=1)
-    rows = np.arange(len(intervals))[:, None]
-    angular = [0, 1, *(int(item.angular) for item in relaxations)]
-    bounds = values[rows, which, np.arange(values.shape[2])] + rest[:, angular]
-    return _Bounds(bounds, times[rows, which], measured)
+class _PathErrors(Bounded):
+    """Errors of position and rotation beyond relaxations, and the deviation of each.
+
+    The first block is the position's deviation, the second one the rotation's: its rotation vector
+    where some of its rows are relaxed, else what `relative_turns` returns.
+    """
+
+    def __init__(
+        self, path: Path, task: Task, tolerance: Tolerance, relaxations: Sequence[Relaxation]
+    ) -> None:
+        self._path, self._task, self._relaxations = path, task, relaxations
+        self._as_vectors = any(item.angular for item in relaxations)
+        self._in_tool_axes = any(item.in_tool_axes for item in relaxations)
+        self.blocks = np.array([0, 3])
+        self.of = np.array([0, 1, *(int(item.angular) for item in relaxations)])
+        rotation = tolerance.rotation
+        if not self._as_vectors:
+            rotation = 2.0 * np.sin(0.5 * min(rotation, np.pi))
+        self.allowed = np.array([tolerance.position, rotation, *(np.inf for _ in relaxations)])
+        self.wanted = _FINE * self.allowed[:2]
+
+    def angles(self, values: Array) -> Array:
+        """Return bounds (2 + R,), the rotation's in radians."""
+        if not self._as_vectors:
+            values[1] = 2.0 * np.arcsin(np.minimum(0.5 * values[1], 1.0))
+        return values
+
+    def series(self, stretch: Stretch) -> Array | None:
+        """See `Bounded.series`."""
+        path = path_series(self._path, stretch.middle, stretch.half)
+        if path is None:
+            return None
+        chain, tip = stretch.chain(), stretch.robot.chain.tip
+        apart = chain.place(tip) + path.translation
+        turned = series.product(path.rotation, chain.orientation(tip))
+        if self._in_tool_axes or self._as_vectors:
+            miss, relative = self._looked_at(stretch, np.zeros(1))
+            apart[0] = _length(miss[:, 0]) + series.after_first(apart)
+            apart = series.product(path.rotation, apart)
+        if not self._task.angular:
+            return np.stack([apart, np.zeros_like(apart)])
+        if self._as_vectors:
+            return np.stack([apart, _vector_series(turned, self._cosine(relative[:, 0]))])
+        share = 1.0 if self._task.tool_axes else _FROBENIUS / 2.0**0.5
+        return np.stack([apart, share * turned])
+
+    def values(self, stretch: Stretch, u: Array) -> Array:
+        """See `Bounded.values`."""
+        miss, relative = self._looked_at(stretch, u)
+        if not self._task.angular:
+            turns = np.zeros((*miss.shape[:2], 1))
+        elif self._as_vectors:
+            turns = rotation_vectors(self._task, relative)
+        elif self._task.tool_axes:
+            turns = relative[..., 2] - [0.0, 0.0, 1.0]
+        else:
+            turns = (relative - np.eye(3)).reshape(*miss.shape[:2], 9) / 2.0**0.5
+        return np.concatenate([miss, turns], axis=2)
+
+    def sizes(self, values: Array, stretch: Stretch) -> Array:
+        """See `Bounded.sizes`."""
+        if not self._relaxations:
+            return np.stack([_length(values[..., :3]), _length(values[..., 3:])], axis=2)
+        shape = values.shape[:2]
+        deviation = np.zeros((*shape, 6))
+        deviation[..., :3] = values[..., :3]
+        turns = values[..., 3:] if self._as_vectors else np.zeros((*shape, 3))
+        deviation[..., 3:] = turns
+        flat = deviation.reshape(-1, 6)
+        # The windows of an interval are those of its middle.
+        t, last = np.repeat(stretch.middle, shape[1]), self._path.duration
+        beyond = excess(self._relaxations, last, t, flat).reshape(*shape, 6)
+        turned = beyond[..., 3:] if self._as_vectors else values[..., 3:]
+        sizes = [_length(beyond[..., :3]), _length(turned)]
+        sizes += [deviation_size(x, last, t, flat).reshape(shape) for x in self._relaxations]
+        return np.stack(sizes, axis=2)
+
+    def _looked_at(self, stretch: Stretch, u: Array) -> tuple[Array, Array]:
+        """Return the position's deviation (I, P, 3) and R_dᵀR (I, P, 3, 3) at places u (P,)."""
+        target = self._path.samples(stretch.times(u).ravel())
+        rotation, translation = poses(stretch.robot, stretch.motion(u))
+        rows = self._task.rows[self._task.rows < 3]
+        miss = np.zeros((len(translation), 3))
+        miss[:, rows] = (translation - target.translation)[:, rows]
+        if self._in_tool_axes:
+            miss = np.einsum("kji,kj->ki", target.rotation, miss)
+        relative = relative_turns(target.rotation, rotation)
+        shape = len(stretch.middle), len(u)
+        return miss.reshape(*shape, 3), relative.reshape(*shape, 3, 3)
+
+    def _cosine(self, relative: Array) -> Array:
+        """Return the cosine of the angle of turns (I, 3, 3), (I,)."""
+        if self._task.tool_axes:
+            return relative[:, 2, 2]
+        return np.asarray(0.5 * (np.trace(relative, axis1=1, axis2=2) - 1.0))
 
 
-def _quantities(miss: Array, t: Array, duration: float, relaxations: Sequence[Relaxation]) -> Array:
-    """Return for deviations (I, P, 6) the errors beyond relaxations, and what these take."""
-    flat, times = miss.reshape(-1, 6), t.ravel()
-    beyond = excess(relaxations, duration, times, flat)
-    columns = [_length(beyond[:, :3]), _length(beyond[:, 3:])]
-    columns += [deviation_size(item, duration, times, flat) for item in relaxations]
-    return np.stack(columns, axis=1).reshape(*t.shape, -1)
+def _vector_series(turned: Array, cosine: Array) -> Array:
+    """Return the majorant of rotation vectors of turns with a majorant and a cosine in the middle.
 
-
-def _largest(parts: Array) -> Array:
-    """Return the largest lengths of translations and rotations (I, P, 6), (I, 2)."""
-    both = np.stack([_length(parts[:, :, :3]), _length(parts[:, :, 3:])], axis=2)
-    return np.asarray(both.max(axis=1))
+    inf where the turn may come near half a turn.
+    """
+    spread = 1.5 * turned
+    low = np.clip(cosine, -1.0, 1.0) - series.after_first(spread)
+    known = low > _TURNED
+    low = np.where(known, np.clip(low, -1.0, 1.0), 0.0)
+    factor = np.where(low < 1.0, np.arccos(low) / np.sqrt(np.maximum(1.0 - low**2, 1e-300)), 1.0)
+    outer = factor / (1.0 + low) ** np.arange(len(turned))[:, None]
+    found = series.product(turned, series.composed(outer, spread))
+    return np.where(known, found, np.inf)
 
 
 def _length(rows: Array) -> Array:
-    return np.asarray(np.linalg.norm(rows, axis=-1))
+    return np.asarray(np.sqrt(np.einsum("...c,...c->...", rows, rows)))

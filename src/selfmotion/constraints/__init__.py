@@ -1,16 +1,16 @@
 """What a motion must keep: limits, end conditions, closed paths, clearance."""
 
 from selfmotion.constraints.band import Band as Band
-from selfmotion.constraints.base import (
+from selfmotion.constraints.base import Constraint as Constraint
+from selfmotion.constraints.binding import Binding as Binding
+from selfmotion.constraints.clearance import Clearance as Clearance
+from selfmotion.constraints.conditions import (
     BoundConstraint as BoundConstraint,
-    Constraint as Constraint,
     Linearised as Linearised,
     NodeTangents as NodeTangents,
     easing_of as easing_of,
     linearised as linearised,
 )
-from selfmotion.constraints.binding import Binding as Binding
-from selfmotion.constraints.clearance import Clearance as Clearance
 from selfmotion.constraints.ends import (
     ClosedPath as ClosedPath,
     EndAcceleration as EndAcceleration,

@@ -6,11 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, as_number, restore, shown
-from selfmotion.certificate import CoordinateBand
-from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
-from selfmotion.costs import Samples
-from selfmotion.follow import Follows
+from selfmotion.basics import Array, ProblemError, as_number, restore, series, shown
+from selfmotion.certificate import Column, Quantity, Stretch
+from selfmotion.constraints.base import Constraint
 from selfmotion.robot import Coordinate, RobotModel, SwivelAngle
 
 # Centre of the swivel angle from upwards, about the direction from shoulder to wrist [rad].
@@ -68,66 +66,27 @@ class Band(Constraint):
             )
         return cls(SwivelAngle(**names), _SIDES[side], half)
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundBand":
-        """See `Constraint.bind`."""
-        robot = follows.robot
-        self.coordinate(robot, start[None])
-        return BoundBand(robot, self.coordinate, float(self.center), float(self.half), self.margin)
+    def quantity(self, robot: RobotModel) -> Quantity:
+        """See `Constraint.quantity`."""
+        coordinate = self.coordinate
+        coordinate(robot, np.zeros((1, robot.dof)))
 
-    def requirement(self, robot: RobotModel) -> CoordinateBand:
-        """See `Constraint.requirement`."""
-        self.coordinate(robot, np.zeros((1, robot.dof)))
-        return CoordinateBand(robot, self.coordinate, float(self.center), float(self.half))
+        def known(stretch: Stretch) -> Array | None:
+            found = coordinate.series(stretch.chain(), stretch.motion(np.zeros(1)))
+            return None if found is None else found[None]
+
+        return Quantity(
+            f"band of {coordinate.name}",
+            (Column(coordinate.name, coordinate.name, coordinate.unit),),
+            lambda q, *_: coordinate(robot, q)[0][:, None],
+            lambda q, *_: (coordinate(robot, q)[1][:, None],),
+            limit=float(self.half),
+            center=float(self.center),
+            series=known if series.holds_for(coordinate, "__call__") else None,
+            period=coordinate.period,
+        )
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Band":
         """See `Saved.from_dict`."""
         return cls(**{**values, "coordinate": restore(Coordinate, values["coordinate"])})
-
-
-@dataclass(frozen=True, eq=False)
-class BoundBand:
-    """h = ±(c - center) / half - 1 + margin."""
-
-    robot: RobotModel
-    coordinate: Coordinate
-    center: float
-    half: float
-    margin: float
-    equality = False
-
-    @property
-    def name(self) -> str:
-        """See `BoundConstraint.name`."""
-        return f"band of {self.coordinate.name}"
-
-    @property
-    def tolerance(self) -> float:
-        """See `BoundConstraint.tolerance`: half the margin."""
-        return 0.5 * self.margin
-
-    def residual(self, samples: Samples) -> Array:
-        """See `BoundConstraint.residual`."""
-        values, _ = self.coordinate(self.robot, motion_of_order(samples, 0))
-        away = self.coordinate.away(values, self.center)[:, None] / self.half
-        return np.hstack([away, -away]) - 1.0 + self.margin
-
-    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
-        """See `BoundConstraint.tangents`."""
-        _, gradient = self.coordinate(self.robot, motion_of_order(samples, 0))
-        change = np.einsum("kn,knd->kd", gradient, motion.q)[:, None] / self.half
-        return np.concatenate([change, -change], axis=1)
-
-    def easing(self, column: int) -> tuple[float, str]:
-        """See `easing_of`: 2 % of the half band, on both sides."""
-        return 0.02, f"2 % more room for {self.coordinate.name}"
-
-    def describe(self, samples: Samples, row: int, column: int) -> str:
-        """See `BoundConstraint.describe`."""
-        values, _ = self.coordinate(self.robot, motion_of_order(samples, 0)[row : row + 1])
-        unit = self.coordinate.unit
-        return (
-            f"{self.coordinate.name} is {values[0]:.4g} {unit} at t = "
-            f"{samples.sampling.node_times[row]:.3f} s, expected {self.center - self.half:.4g} to "
-            f"{self.center + self.half:.4g}"
-        )

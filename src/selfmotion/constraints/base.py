@@ -1,82 +1,38 @@
-"""What a constraint is: conditions h ≤ 0 or h = 0 on the motion at the nodes of the grid.
+"""What a constraint is: something that a motion must keep, written down without an arm.
 
-A constraint is written down without an arm (`Constraint`) and bound to one when a plan is made
-(`BoundConstraint`). Limits are kept with a margin, so that the motion between nodes and the last
-digits of the optimisation stay within the limits themselves.
+It is bound to one when a plan is made (`selfmotion.constraints.conditions`).
 """
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from functools import cached_property
-from typing import ClassVar, Protocol
+from abc import ABC
+from typing import ClassVar
 
-import numpy as np
-
-from selfmotion.basics import Array, Ints, ProblemError, Saved
-from selfmotion.certificate import Requirement
+from selfmotion.basics import Array, ProblemError, Saved
+from selfmotion.certificate import Quantity, QuantityKept, Requirement
+from selfmotion.constraints.conditions import BoundConstraint, BoundQuantity
 from selfmotion.constraints.envelope import Envelope
-from selfmotion.costs import Samples
 from selfmotion.follow import Follows
-from selfmotion.motion import Sampling
 from selfmotion.robot import RobotModel
-
-
-@dataclass(frozen=True, eq=False)
-class NodeTangents:
-    """How the motion at the nodes changes with d decision variables.
-
-    Attributes
-    ----------
-    q, qd : (N + 1, n, d)
-    sampling : Sampling
-        When.
-    """
-
-    q: Array
-    qd: Array
-    sampling: Sampling
-
-    @property
-    def size(self) -> int:
-        """The number d of variables."""
-        return int(self.q.shape[2])
-
-    def along(self, p: Array) -> "NodeTangents":
-        """Return the tangents by one variable, the length along p (d,)."""
-        return NodeTangents((self.q @ p)[:, :, None], (self.qd @ p)[:, :, None], self.sampling)
-
-    def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
-        """Return the tangents of some of the joints at some of the nodes (k,), (k, d)."""
-        if order < 2:
-            return (self.q, self.qd)[order][nodes, joints]
-        rows = np.empty((len(nodes), self.size))
-        operator = self.sampling.node_differentiation(order - 1)
-        for joint in np.unique(joints):
-            own = joints == joint
-            rows[own] = operator[nodes[own]] @ self.qd[:, joint]
-        return rows
-
-    def of_order(self, order: int) -> Array:
-        """Return the tangents of q (0), q̇ (1), q̈ (2) or the jerk (3), (N + 1, n, d)."""
-        return (self.q, self.qd)[order] if order < 2 else self._faster[order - 2]
-
-    @cached_property
-    def _faster(self) -> tuple[Array, Array]:
-        flat = self.qd.reshape(len(self.qd), -1)
-        operators = (self.sampling.node_differentiation(order) for order in (1, 2))
-        first, second = ((operator @ flat).reshape(self.qd.shape) for operator in operators)
-        return first, second
 
 
 class Constraint(Saved, ABC, family="constraint"):
     """Something that a motion must keep, not yet bound to an arm.
 
-    It says so twice: `bind` tells the optimiser, and `requirement` the certificate, which measures
-    the finished motion on its own. A constraint of one's own gives both; what else there is has
-    defaults. `selfmotion.testing.check_constraint` checks it.
+    One of one's own says what it measures, once: `quantity`. From that follow the conditions that
+    the optimiser keeps (`bind`), and what the certificate judges the finished motion by, on its own
+    (`requirement`). What is no quantity within limits gives these two instead.
+    `selfmotion.testing.check_constraint` checks either.
 
     Attributes
     ----------
+    margin : float
+        Share of a quantity's limits that is aimed to be left unused; at least half of it is.
+    of_pace : bool
+        Whether it limits the pace of a motion rather than its way.
+    closes : bool
+        Whether it asks that the motion ends as it began, so that no part of it can keep it.
+    kept_moving : bool
+        Whether what its envelope says is all that it asks, so that it can be kept while the arm
+        moves.
     pins : (bool, bool)
         Whether the tool has to be on the path itself, not only within what is relaxed, at the start
         and at the end of the motion.
@@ -87,20 +43,31 @@ class Constraint(Saved, ABC, family="constraint"):
         Likewise whether it says how the arm accelerates there.
     """
 
+    margin: float = 1e-2
+    of_pace: ClassVar[bool] = False
+    closes: ClassVar[bool] = False
+    kept_moving: ClassVar[bool] = False
     pins: ClassVar[tuple[bool, bool]] = (False, False)
     sets_velocity: ClassVar[tuple[bool, bool]] = (False, False)
     sets_acceleration: ClassVar[tuple[bool, bool]] = (False, False)
 
-    @abstractmethod
-    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundConstraint":
+    def quantity(self, robot: RobotModel) -> Quantity:
+        """Return what it measures and what that may be; ProblemError where it misfits the arm."""
+        raise ProblemError(
+            f"constraint {type(self).__name__} does not say what it asks for: give it "
+            f"quantity(robot), or bind(…) and requirement(robot)"
+        )
+
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundConstraint:
         """Return the conditions on the motion of an arm; ProblemError where it misfits.
 
         `start` and `end` (n,) are those of the motion that the optimisation begins with.
         """
+        return BoundQuantity(self.quantity(follows.robot), self.margin)
 
-    @abstractmethod
     def requirement(self, robot: RobotModel) -> Requirement:
         """Return what the certificate judges; ProblemError where it misfits the arm."""
+        return QuantityKept(self.quantity(robot))
 
     def applies(self, robot: RobotModel) -> bool:
         """Return whether it asks anything of an arm: not where it keeps limits nobody knows."""
@@ -116,6 +83,10 @@ class Constraint(Saved, ABC, family="constraint"):
         """Return what it asks of single configurations and velocities; by default nothing."""
         return Envelope.unbounded(robot.dof)
 
+    def fixed_end(self, robot: RobotModel) -> Array | None:
+        """Return the configuration (n,) that the motion has to end in, where it says one."""
+        return None
+
     def at_rest(self) -> "Constraint":
         """Return what is left to ask of a motion that rests at both ends by itself."""
         return self
@@ -127,111 +98,3 @@ class Constraint(Saved, ABC, family="constraint"):
     def on_last_part(self) -> "Constraint | None":
         """Return what it asks of a motion along the last part of the path; None for nothing."""
         return self
-
-
-class BoundConstraint(Protocol):
-    """A condition on the motion of one arm."""
-
-    @property
-    def name(self) -> str:
-        """What to call it in messages."""
-
-    @property
-    def equality(self) -> bool:
-        """Whether h = 0 is meant, rather than h ≤ 0."""
-
-    @property
-    def tolerance(self) -> float:
-        """What h (|h| for an equality) may be and still count as kept."""
-
-    def residual(self, samples: Samples) -> Array:
-        """Return h: (N + 1, C) for conditions at every node, (1, C) for conditions on the whole."""
-
-    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
-        """Return ∂h/∂x for d variables: h's shape with d appended."""
-
-    def describe(self, samples: Samples, row: int, column: int) -> str:
-        """Return what is wrong where h[row, column] is too large, with names and numbers."""
-
-
-class Linear(Protocol):
-    """How conditions change with the motion of the nodes, at one motion."""
-
-    def tangents_of(self, motion: NodeTangents) -> Array:
-        """Return what `BoundConstraint.tangents` does."""
-
-    def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
-        """Return its entries for some rows and columns of h, (k,) each: (k, d)."""
-
-
-class Linearised:
-    """The derivatives of a constraint's conditions at one motion, all of h in one row.
-
-    Parameters
-    ----------
-    shape : (int, int)
-        That of h.
-    known : Linear or (rows × columns, d)
-    """
-
-    def __init__(self, shape: tuple[int, int], known: Linear | Array) -> None:
-        self._shape, self._known = shape, known
-
-    @property
-    def count(self) -> int:
-        """Number C of conditions."""
-        return self._shape[0] * self._shape[1]
-
-    def along(self, p: Array, motion: NodeTangents) -> Array:
-        """Return the derivatives (C,) along p (d,), of which `motion` are the tangents."""
-        known = self._known
-        return known @ p if isinstance(known, np.ndarray) else known.tangents_of(motion).ravel()
-
-    def picked(self, motion: NodeTangents, which: Ints) -> Array:
-        """Return the rows (k, d) of some conditions (k,)."""
-        known = self._known
-        if isinstance(known, np.ndarray):
-            return known[which]
-        return known.picked(motion, *np.divmod(which, self._shape[1]))
-
-
-def linearised(bound: BoundConstraint, samples: Samples, motion: NodeTangents) -> Linearised:
-    """Return the derivatives of a constraint's conditions at a motion.
-
-    What its own ``linearised_at(samples)`` returns, where it has one: the shape of h, and a
-    `Linear` that computes as much as it is asked for. By default all `tangents`; ProblemError where
-    these are not of the shape that they should have.
-    """
-    own = getattr(bound, "linearised_at", None)
-    if callable(own):
-        return Linearised(*own(samples))
-    tangents = bound.tangents(samples, motion)
-    if np.ndim(tangents) != 3 or tangents.shape[2] != motion.size:
-        raise ProblemError(
-            f"constraint '{bound.name}': tangents() has shape {np.shape(tangents)}, expected that "
-            f"of the residual with ({motion.size},) appended"
-        )
-    return Linearised(tangents.shape[:2], tangents.reshape(-1, motion.size))
-
-
-def easing_of(bound: BoundConstraint, column: int) -> tuple[float, str]:
-    """Return how much larger h may be to ask for a little less, and what that means in words.
-
-    What a constraint's own `easing(column)` says, where it has one: ``(0.02, "2 % more speed for
-    joint 'elbow'")``. Columns with the same words are eased together.
-    """
-    own = getattr(bound, "easing", None)
-    return (0.01, f"{bound.name} eased by 0.01") if own is None else own(column)
-
-
-def motion_of_order(samples: Samples, order: int) -> Array:
-    """Return q (0), q̇ (1), q̈ (2) or the jerk (3) at the nodes, (N + 1, n)."""
-    table = (samples.q, samples.qd)[order] if order < 2 else (samples.qdd, samples.qddd)[order - 2]
-    nodes: Array = table[samples.nodes]
-    return nodes
-
-
-def motion_at_nodes(samples: Samples) -> tuple[Array, Array, Array]:
-    """Return q, q̇ and q̈ at the nodes, (N + 1, n) each."""
-    q, qd, qdd = (motion_of_order(samples, order) for order in range(3))
-    return q, qd, qdd

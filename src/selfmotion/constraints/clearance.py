@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -19,7 +19,8 @@ from selfmotion.collision import (
     disabled_links,
     obstacle_from_dict,
 )
-from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
+from selfmotion.constraints.base import Constraint
+from selfmotion.constraints.conditions import NodeTangents, motion_of_order
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
 from selfmotion.follow import Follows
@@ -50,6 +51,8 @@ class Clearance(Constraint):
     CollisionError
         The SRDF cannot be read.
     """
+
+    kept_moving: ClassVar[bool] = True
 
     obstacles: tuple[Obstacle, ...] = ()
     distance: float = 5e-3

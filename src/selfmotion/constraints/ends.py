@@ -8,16 +8,16 @@ the reference, and so are two velocities with the same tool velocity; the residu
 the integration leaves of the path error.
 """
 
-from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, as_flag, as_numbers, per_joint, read_only
 from selfmotion.certificate import QUANTITIES, ClosedMotion, EndState
-from selfmotion.constraints.base import Constraint, NodeTangents, motion_of_order
+from selfmotion.constraints.base import Constraint
+from selfmotion.constraints.conditions import NodeTangents, motion_of_order
 from selfmotion.costs import Samples
 from selfmotion.follow import Follows
 from selfmotion.path import STILL
@@ -67,20 +67,33 @@ class EndConfiguration(Constraint):
                     f"robot.inverse_kinematics(path.pose(path.duration), task, seed=q)"
                 )
 
+    def fixed_end(self, robot: RobotModel) -> Array:
+        """See `Constraint.fixed_end`."""
+        return robot.configuration(self.q)
+
     def on_part(self) -> None:
         """See `Constraint.on_part`: the part ends elsewhere."""
 
 
 class _EndRate(Constraint):
-    """What velocities and accelerations at one end share."""
+    """A velocity or an acceleration at one end: the one field of each class."""
 
     order: ClassVar[int]
     at_start: ClassVar[bool]
 
+    def __init_subclass__(cls, *, order: int, at_start: bool, **options: Any) -> None:
+        cls.order, cls.at_start = order, at_start
+        here = (at_start, not at_start)
+        cls.pins = here
+        cls.sets_velocity = here if order == 1 else (False, False)
+        cls.sets_acceleration = here if order == 2 else (False, False)
+        super().__init_subclass__(**options)
+
     @property
-    @abstractmethod
     def asked(self) -> npt.ArrayLike:
         """What is asked for, (n,) or one number."""
+        given: npt.ArrayLike = getattr(self, "q" + "d" * self.order)
+        return given
 
     @property
     def _name(self) -> str:
@@ -111,7 +124,7 @@ class _EndRate(Constraint):
 
 
 @dataclass(frozen=True, eq=False)
-class EndVelocity(_EndRate):
+class EndVelocity(_EndRate, order=1, at_start=False):
     """The motion ends with a joint velocity; 0 for rest.
 
     The tool's rows of it have to be those of the path's end: for rest, the path has to end at rest.
@@ -122,17 +135,7 @@ class EndVelocity(_EndRate):
         q̇(T) [rad/s or m/s].
     """
 
-    order: ClassVar[int] = 1
-    at_start: ClassVar[bool] = False
-    pins: ClassVar[tuple[bool, bool]] = (False, True)
-    sets_velocity: ClassVar[tuple[bool, bool]] = (False, True)
-
     qd: npt.ArrayLike = 0.0
-
-    @property
-    def asked(self) -> npt.ArrayLike:
-        """See `_EndRate.asked`."""
-        return self.qd
 
     def check(self, follows: Follows) -> None:
         """See `Constraint.check`: a motion ends at rest only where its path does."""
@@ -148,7 +151,7 @@ class EndVelocity(_EndRate):
 
 
 @dataclass(frozen=True, eq=False)
-class StartVelocity(_EndRate):
+class StartVelocity(_EndRate, order=1, at_start=True):
     """The motion begins with a joint velocity: that of an arm that moves already.
 
     Needs a given start, where the tool's rows of it have to be those of the path's start.
@@ -159,17 +162,7 @@ class StartVelocity(_EndRate):
         q̇(0) [rad/s or m/s].
     """
 
-    order: ClassVar[int] = 1
-    at_start: ClassVar[bool] = True
-    pins: ClassVar[tuple[bool, bool]] = (True, False)
-    sets_velocity: ClassVar[tuple[bool, bool]] = (True, False)
-
     qd: npt.ArrayLike = 0.0
-
-    @property
-    def asked(self) -> npt.ArrayLike:
-        """See `_EndRate.asked`."""
-        return self.qd
 
     def check_start(self, follows: Follows, start: Array | None) -> None:
         """See `Constraint.check_start`: the tool has to begin as the path does."""
@@ -189,7 +182,7 @@ class StartVelocity(_EndRate):
 
 
 @dataclass(frozen=True, eq=False)
-class StartAcceleration(_EndRate):
+class StartAcceleration(_EndRate, order=2, at_start=True):
     """The motion begins with a joint acceleration: with `StartVelocity`, the hand-over of an arm.
 
     Its part that moves the tool has to be what the path and the velocity make of it. An arm that
@@ -201,17 +194,7 @@ class StartAcceleration(_EndRate):
         q̈(0) [rad/s² or m/s²].
     """
 
-    order: ClassVar[int] = 2
-    at_start: ClassVar[bool] = True
-    pins: ClassVar[tuple[bool, bool]] = (True, False)
-    sets_acceleration: ClassVar[tuple[bool, bool]] = (True, False)
-
     qdd: npt.ArrayLike = 0.0
-
-    @property
-    def asked(self) -> npt.ArrayLike:
-        """See `_EndRate.asked`."""
-        return self.qdd
 
     def check_start(self, follows: Follows, start: Array | None) -> None:
         """See `Constraint.check_start`: of a free start no acceleration is known."""
@@ -220,7 +203,7 @@ class StartAcceleration(_EndRate):
 
 
 @dataclass(frozen=True, eq=False)
-class EndAcceleration(_EndRate):
+class EndAcceleration(_EndRate, order=2, at_start=False):
     """The motion ends with a joint acceleration; see `StartAcceleration`.
 
     Parameters
@@ -229,17 +212,7 @@ class EndAcceleration(_EndRate):
         q̈(T) [rad/s² or m/s²].
     """
 
-    order: ClassVar[int] = 2
-    at_start: ClassVar[bool] = False
-    pins: ClassVar[tuple[bool, bool]] = (False, True)
-    sets_acceleration: ClassVar[tuple[bool, bool]] = (False, True)
-
     qdd: npt.ArrayLike = 0.0
-
-    @property
-    def asked(self) -> npt.ArrayLike:
-        """See `_EndRate.asked`."""
-        return self.qdd
 
 
 @dataclass(frozen=True)
@@ -253,6 +226,7 @@ class ClosedPath(Constraint):
     """
 
     pins: ClassVar[tuple[bool, bool]] = (True, True)
+    closes: ClassVar[bool] = True
 
     velocity: bool = True
 

@@ -1,6 +1,5 @@
 """Limits of joint position, velocity, acceleration and jerk."""
 
-from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -9,17 +8,15 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Ints, ProblemError, as_flag, as_number, per_joint, read_only
 from selfmotion.certificate import LIMIT_NAMES, JointLimits
-from selfmotion.constraints.base import (
-    Constraint,
-    NodeTangents,
-    motion_of_order,
-)
+from selfmotion.constraints.base import Constraint
+from selfmotion.constraints.conditions import NodeTangents, motion_of_order
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
 
 _QUANTITIES = ("position", "speed", "acceleration", "jerk")
+_RATES = ("position", "velocity", "acceleration", "jerk")
 # Joints with limits turn less than this [rad].
 _MOST_TURNS = 4.0 * np.pi
 
@@ -38,6 +35,8 @@ class JointPositionLimits(Constraint):
         Whether these stand in place of the URDF's limits. By default both are kept.
     """
 
+    kept_moving: ClassVar[bool] = True
+
     lower: npt.ArrayLike | None = None
     upper: npt.ArrayLike | None = None
     margin: float = 2e-4
@@ -50,7 +49,7 @@ class JointPositionLimits(Constraint):
     def bind(self, follows: Follows, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
         robot = follows.robot
-        return BoundLimits.of(robot, LIMIT_NAMES[0], 0, self.limits(robot), self.margin)
+        return BoundLimits.of(robot, self.requirement(robot), self.margin)
 
     def requirement(self, robot: RobotModel) -> JointLimits:
         """See `Constraint.requirement`."""
@@ -86,20 +85,37 @@ class JointPositionLimits(Constraint):
 
 
 class _RateLimits(Constraint):
-    """What limits of |q̇|, |q̈| and of the jerk share."""
+    """Limits of |q̇|, |q̈| or of the jerk: one's own, and those of the URDF or the arm's maker."""
 
     order: ClassVar[int]
-    margin: float
+    of_pace: ClassVar[bool] = True
+    limit: npt.ArrayLike | None
+    replace: bool
 
-    @abstractmethod
+    def __post_init__(self) -> None:
+        _check_margin(self.margin)
+        as_flag(self.replace, f"{type(self).__name__}: replace")
+
+    def published(self, robot: RobotModel) -> Array:
+        """Return the arm's, (n,); inf where none are known."""
+        known: Array = getattr(robot, f"{_RATES[self.order]}_limit")
+        return known
+
     def of(self, robot: RobotModel) -> Array:
         """Return the limits for an arm, (n,) [rad or m, per s^order]."""
+        if self.limit is None:
+            return self.published(robot)
+        what = f"{robot.name}: {LIMIT_NAMES[self.order]}"
+        own = per_joint(self.limit, robot.dof, what, positive=True)
+        return own if self.replace else read_only(np.minimum(own, self.published(robot)))
+
+    def applies(self, robot: RobotModel) -> bool:
+        """See `Constraint.applies`."""
+        return bool(np.isfinite(self.of(robot)).any())
 
     def bind(self, follows: Follows, start: Array, end: Array) -> "BoundLimits":
         """See `Constraint.bind`."""
-        robot = follows.robot
-        name = LIMIT_NAMES[self.order]
-        return BoundLimits.symmetric(robot, name, self.order, self.of(robot), self.margin)
+        return BoundLimits.of(follows.robot, self.requirement(follows.robot), self.margin)
 
     def requirement(self, robot: RobotModel) -> JointLimits:
         """See `Constraint.requirement`."""
@@ -109,33 +125,6 @@ class _RateLimits(Constraint):
     def envelope(self, robot: RobotModel) -> Envelope:
         """See `Constraint.envelope`."""
         return Envelope.of_limits(self.requirement(robot))
-
-
-class _MakersLimits(_RateLimits):
-    """Limits that no URDF gives: one's own, and those that the maker publishes, if any."""
-
-    limit: npt.ArrayLike | None
-    replace: bool
-
-    def __post_init__(self) -> None:
-        _check_margin(self.margin)
-        as_flag(self.replace, f"{type(self).__name__}: replace")
-
-    @abstractmethod
-    def published(self, robot: RobotModel) -> Array:
-        """Return the maker's, (n,); inf where none are known."""
-
-    def applies(self, robot: RobotModel) -> bool:
-        """See `Constraint.applies`."""
-        return bool(np.isfinite(self.of(robot)).any())
-
-    def of(self, robot: RobotModel) -> Array:
-        """See `_RateLimits.of`."""
-        if self.limit is None:
-            return self.published(robot)
-        what = f"{robot.name}: {LIMIT_NAMES[self.order]}"
-        own = per_joint(self.limit, robot.dof, what, positive=True)
-        return own if self.replace else read_only(np.minimum(own, self.published(robot)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,25 +142,15 @@ class JointVelocityLimits(_RateLimits):
     """
 
     order: ClassVar[int] = 1
+    kept_moving: ClassVar[bool] = True
 
     limit: npt.ArrayLike | None = None
     margin: float = 2e-3
     replace: bool = False
 
-    def __post_init__(self) -> None:
-        _check_margin(self.margin)
-        as_flag(self.replace, f"{type(self).__name__}: replace")
-
-    def of(self, robot: RobotModel) -> Array:
-        """Return the limits for an arm, (n,) [rad/s or m/s]."""
-        if self.limit is None:
-            return robot.velocity_limit
-        own = per_joint(self.limit, robot.dof, f"{robot.name}: {LIMIT_NAMES[1]}", positive=True)
-        return own if self.replace else read_only(np.minimum(own, robot.velocity_limit))
-
 
 @dataclass(frozen=True, eq=False)
-class JointAccelerationLimits(_MakersLimits):
+class JointAccelerationLimits(_RateLimits):
     """Joint accelerations stay below limits.
 
     Parameters
@@ -185,18 +164,15 @@ class JointAccelerationLimits(_MakersLimits):
     """
 
     order: ClassVar[int] = 2
+    kept_moving: ClassVar[bool] = True
 
     limit: npt.ArrayLike | None = None
     margin: float = 1e-2
     replace: bool = False
 
-    def published(self, robot: RobotModel) -> Array:
-        """See `_MakersLimits.published`."""
-        return robot.acceleration_limit
-
 
 @dataclass(frozen=True, eq=False)
-class JointJerkLimits(_MakersLimits):
+class JointJerkLimits(_RateLimits):
     """Joint jerks, the derivatives of accelerations, stay below limits.
 
     Parameters
@@ -214,10 +190,6 @@ class JointJerkLimits(_MakersLimits):
     limit: npt.ArrayLike | None = None
     margin: float = 5e-2
     replace: bool = False
-
-    def published(self, robot: RobotModel) -> Array:
-        """See `_MakersLimits.published`."""
-        return robot.jerk_limit
 
 
 def _check_margin(margin: float) -> None:
@@ -254,26 +226,13 @@ class BoundLimits:
     equality = False
 
     @classmethod
-    def symmetric(
-        cls, robot: RobotModel, name: str, order: int, limit: Array, margin: float
-    ) -> "BoundLimits":
-        """Return -limit ≤ x ≤ limit, relative to the limit."""
-        if np.any(np.asarray(limit) <= 0.0):
-            raise ProblemError(f"{robot.name}: {name} {limit} must be positive")
-        return cls.of(robot, name, order, (-np.asarray(limit), np.asarray(limit)), margin)
-
-    @classmethod
-    def of(
-        cls, robot: RobotModel, name: str, order: int, limits: tuple[Array, Array], margin: float
-    ) -> "BoundLimits":
-        """Return lower ≤ x ≤ upper for the joints with a finite limit on either side."""
-        lower, upper = limits
-        if not margin > 0.0:
-            raise ProblemError(f"{robot.name}: {name}: margin is {margin}, expected > 0")
+    def of(cls, robot: RobotModel, limits: JointLimits, margin: float) -> "BoundLimits":
+        """Return what is judged, for the joints with a finite limit on either side."""
+        lower, upper, order = limits.lower, limits.upper, limits.order
         joints = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
         scale = np.ones(len(joints)) if order == 0 else upper[joints]
         names = tuple(robot.joint_names[k] for k in joints)
-        return cls(name, order, joints, names, lower[joints], upper[joints], scale, margin)
+        return cls(limits.name, order, joints, names, lower[joints], upper[joints], scale, margin)
 
     @property
     def tolerance(self) -> float:

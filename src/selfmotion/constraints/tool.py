@@ -3,14 +3,19 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, as_number
-from selfmotion.certificate import TOOL_RATES, ToolMotion, tool_sizes
-from selfmotion.constraints.base import Constraint, NodeTangents, motion_at_nodes
-from selfmotion.costs import Samples
-from selfmotion.follow import Follows
+from selfmotion.certificate import Column, Quantity, Stretch
+from selfmotion.constraints.base import Constraint
 from selfmotion.robot import RobotModel, ToolRates
+
+# What of the tool is limited, as [v, ω] and [dv/dt, dω/dt] have it, and in which units.
+TOOL_RATES = (
+    ("speed", "m/s"),
+    ("turn rate", "rad/s"),
+    ("acceleration", "m/s²"),
+    ("turn acceleration", "rad/s²"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,68 +65,38 @@ class ToolLimits(Constraint):
         """Speed, turn rate, acceleration and turn acceleration, (4,); inf where there is none."""
         return np.array(self._given, dtype=np.float64)
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundToolLimits":
-        """See `Constraint.bind`."""
-        robot = follows.robot
-        return BoundToolLimits(ToolRates(robot), robot.tool, self.limit, self.margin)
+    def quantity(self, robot: RobotModel) -> Quantity:
+        """See `Constraint.quantity`."""
+        rates, tool = ToolRates(robot), robot.tool
+        limited = np.isfinite(self.limit)
 
-    def requirement(self, robot: RobotModel) -> ToolMotion:
-        """See `Constraint.requirement`."""
-        return ToolMotion(robot, self.limit)
+        def values(q: Array, qd: Array, qdd: Array) -> Array:
+            return np.stack(rates(q, qd, qdd), axis=1).reshape(-1, 4, 3)
 
+        def derivatives(q: Array, qd: Array, qdd: Array) -> tuple[Array, ...]:
+            speeds, accelerations = rates.derivatives(q, qd, qdd)
+            # A speed does not depend on q̈.
+            pairs = zip((*speeds, np.zeros_like(speeds[0])), accelerations, strict=True)
+            return tuple(np.stack(pair, axis=1).reshape(-1, 4, 3, robot.dof) for pair in pairs)
 
-@dataclass(frozen=True, eq=False)
-class BoundToolLimits:
-    """h = |x|² / limit² - (1 - margin)² for those of v, ω, dv/dt and dω/dt that have a limit."""
+        def known(stretch: Stretch) -> Array:
+            found = rates.series(stretch.chain())
+            length = min(map(len, found))
+            return np.stack([item[:length] for item in found])
 
-    rates: ToolRates
-    tool: str
-    limit: Array
-    margin: float
-    name: str = "tool limits"
-    equality = False
-
-    @property
-    def tolerance(self) -> float:
-        """See `BoundConstraint.tolerance`: half the margin is left."""
-        return (1.0 - 0.5 * self.margin) ** 2 - (1.0 - self.margin) ** 2
-
-    @property
-    def _limited(self) -> npt.NDArray[np.intp]:
-        return np.flatnonzero(np.isfinite(self.limit))
-
-    def residual(self, samples: Samples) -> Array:
-        """See `BoundConstraint.residual`."""
-        shares = tool_sizes(self.rates, *motion_at_nodes(samples)) / self.limit**2
-        return np.asarray(shares[:, self._limited] - (1.0 - self.margin) ** 2)
-
-    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
-        """See `BoundConstraint.tangents`."""
-        state = motion_at_nodes(samples)
-        values, changes = self.rates(*state), self.rates.derivatives(*state)
-        found = []
-        for value, by in zip(values, changes, strict=True):
-            of = (motion.of_order(order) for order in range(3))
-            tangent = sum(
-                np.einsum("kcj,kjd->kcd", part, x) for part, x in zip(by, of, strict=False)
-            )
-            each = 2.0 * value[:, :, None] * np.asarray(tangent)
-            found += [each[:, :3].sum(axis=1), each[:, 3:].sum(axis=1)]
-        scaled = np.stack(found, axis=1) / (self.limit**2)[:, None]
-        return np.asarray(scaled[:, self._limited])
-
-    def easing(self, column: int) -> tuple[float, str]:
-        """See `easing_of`: 2 % of a limit."""
-        name = TOOL_RATES[self._limited[column]][0]
-        return 0.04, f"2 % more {name} for the tool"
-
-    def describe(self, samples: Samples, row: int, column: int) -> str:
-        """See `BoundConstraint.describe`."""
-        which = int(self._limited[column])
-        state = (part[row : row + 1] for part in motion_at_nodes(samples))
-        reached = tool_sizes(self.rates, *state)[0, which] ** 0.5
-        name, unit = TOOL_RATES[which]
-        return (
-            f"the tool '{self.tool}' has a {name} of {reached:.4g} {unit} at t = "
-            f"{samples.sampling.node_times[row]:.3f} s, limit {self.limit[which]:.4g}"
+        return Quantity(
+            "tool limits",
+            [
+                Column(tool, f"{name} of the tool '{tool}'", unit, 1 if k < 2 else 2)
+                for k, (name, unit) in enumerate(TOOL_RATES)
+            ],
+            values,
+            derivatives,
+            limit=self.limit,
+            of_pace=True,
+            series=known,
+            components=3,
+            covers=tuple(
+                f"tool {name}" for (name, _), own in zip(TOOL_RATES, limited, strict=True) if own
+            ),
         )

@@ -11,11 +11,13 @@ import numpy.typing as npt
 from selfmotion.basics import (
     Array,
     FileFormatError,
+    Ints,
     as_number,
     as_path,
     plain_numbers,
     read_only,
     read_table,
+    series,
     shown,
 )
 from selfmotion.motion.polynomials import (
@@ -303,6 +305,16 @@ class Trajectory:
         k, s = self._place(times)
         return evaluated(pieces[:, k], s[..., None])
 
+    def polynomials(self, middle: Array, half: Array) -> Array:
+        """Return the motion on intervals without samples, as polynomials of u, (m, I, n).
+
+        Coefficients of 1, u, u² … with u from -1 to 1 over the interval of this middle and half
+        width (I,) [s].
+        """
+        k, s = self._place(middle)
+        share = half / (self.t[k + 1] - self.t[k])
+        return series.recentred(self._pieces_of(k), s[:, None], share[:, None])
+
     def sample_times(self, rate: float) -> Array:
         """Return the times from the start [s] of `rate` samples per second, and of the end, (K,).
 
@@ -353,21 +365,22 @@ class Trajectory:
     @cached_property
     def _derivatives(self) -> list[Array]:
         """The pieces of q, and of its derivatives as far as they were asked for."""
-        h, start, rate = (
-            np.diff(self.t)[:, None],
-            self.q[:-1],
-            np.diff(self.t)[:, None] * self.qd[:-1],
-        )
+        return [self._pieces_of(np.arange(len(self.t) - 1))]
+
+    def _pieces_of(self, k: Ints) -> Array:
+        """Return the coefficients of q in some of the intervals (I,), (m, I, n)."""
+        h = (self.t[k + 1] - self.t[k])[:, None]
+        start, rate = self.q[k], h * self.qd[k]
         if self.qdd is None:
-            rise, gain = np.diff(self.q, axis=0) - rate, h * self.qd[1:] - rate
-            return [np.stack([start, rate, 3.0 * rise - gain, gain - 2.0 * rise])]
-        bend = 0.5 * h**2 * self.qdd[:-1]
-        rise = np.diff(self.q, axis=0) - rate - bend
-        gain = h * self.qd[1:] - rate - 2.0 * bend
-        surge = 0.5 * h**2 * self.qdd[1:] - bend
+            rise, gain = self.q[k + 1] - start - rate, h * self.qd[k + 1] - rate
+            return np.stack([start, rate, 3.0 * rise - gain, gain - 2.0 * rise])
+        bend = 0.5 * h**2 * self.qdd[k]
+        rise = self.q[k + 1] - start - rate - bend
+        gain = h * self.qd[k + 1] - rate - 2.0 * bend
+        surge = 0.5 * h**2 * self.qdd[k + 1] - bend
         higher = (
             10.0 * rise - 4.0 * gain + surge,
             7.0 * gain - 15.0 * rise - 2.0 * surge,
             6.0 * rise - 3.0 * gain + surge,
         )
-        return [np.stack([start, rate, bend, *higher])]
+        return np.stack([start, rate, bend, *higher])

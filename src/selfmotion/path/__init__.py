@@ -4,9 +4,11 @@ from selfmotion.path.base import (
     STILL as STILL,
     Path as Path,
     PathSamples as PathSamples,
+    PathSeries as PathSeries,
     TimeLaw as TimeLaw,
     check_oriented as check_oriented,
     path_pose as path_pose,
+    path_series as path_series,
 )
 from selfmotion.path.feed import Feed as Feed
 from selfmotion.path.joined import Dwell as Dwell, Joined as Joined, with_leads as with_leads

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -19,12 +19,17 @@ from selfmotion.basics import (
     plain_numbers,
     read_only,
     restore,
+    series,
     shown,
 )
 from selfmotion.task import Task, as_pose
 
 # Rounding of a last time such as 50 * 0.02 must not count as outside the motion.
 _TIME_SLACK = 1e-9
+# Stands for no time at all.
+_TINY = np.finfo(float).tiny
+# Minimum jerk's coefficients of 1, τ, τ² …
+_JERK = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
 # Longer motions than this [s] are typing errors.
 _LONGEST = 1e9
 
@@ -49,6 +54,19 @@ class PathSamples:
     translation: Array
     rotation: Array
     twist: Array
+
+
+class PathSeries(NamedTuple):
+    """Majorants of a tool motion over I intervals of time; see `selfmotion.basics.series`.
+
+    Attributes
+    ----------
+    translation, rotation : (K + 1, I)
+        Of the position [m], from its first derivative on, and of the orientation.
+    """
+
+    translation: Array
+    rotation: Array
 
 
 class Path(Saved, ABC, family="path"):
@@ -93,6 +111,14 @@ class Path(Saved, ABC, family="path"):
 
         The twist must be the time derivative of the pose.
         """
+
+    def series(self, middle: Array, half: Array) -> PathSeries | None:
+        """Return bounds of all derivatives, for proofs; None where they are not known.
+
+        For intervals of these middles and half widths (I,) [s], none of which contains a mark. A
+        path without is judged as measured between its marks, and the verdict says so.
+        """
+        return None
 
     def samples(self, t: npt.ArrayLike) -> PathSamples:
         """Return the motion at times `t` (K,) [s].
@@ -150,10 +176,28 @@ class _Derived(Path):
         twist = original.twist * rate[:, None]
         return PathSamples(t, original.translation, original.rotation, twist)
 
+    def _series_at(self, sigma: Array, pace: Array) -> PathSeries | None:
+        """Return the original's series at its times σ (I,) in the middle, σ having a series."""
+        reach = series.after_first(pace)
+        known = path_series(self._path, sigma, np.maximum(reach, _TINY))
+        share = pace / np.maximum(reach, _TINY)
+        return known and PathSeries(*(series.composed(item, share) for item in known))
+
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> Self:
         """See `Saved.from_dict`."""
         return cls(**{**values, "path": restore(Path, values["path"])})
+
+
+def path_series(path: Path, middle: Array, half: Array) -> PathSeries | None:
+    """Return `Path.series`, but None where a class derived from ours moves otherwise than ours."""
+    moving = ("evaluate", "samples", "knots", "marks")
+    return path.series(middle, half) if series.holds_for(path, *moving) else None
+
+
+def turning(bounds: Array) -> PathSeries:
+    """Return the series of a tool that turns by rotation vectors of these bounds, at a place."""
+    return PathSeries(np.zeros_like(bounds), series.exponential(bounds))
 
 
 # What is slower than this [m/s, rad/s] is at rest: waypoints and velocity functions come to rest
@@ -182,6 +226,11 @@ class TimeLaw(Enum):
         Constant speed: s = τ. Minimum jerk: s = 10τ³ - 15τ⁴ + 6τ⁵ (Flash and Hogan 1985).
         """
         return _TIME_LAWS[self](tau)
+
+    def series(self, middle: Array, half: Array) -> Array:
+        """Return the series of s on intervals of τ, (K + 1, I)."""
+        coefficients = np.array([0.0, 1.0] if self is TimeLaw.CONSTANT else _JERK)[:, None]
+        return series.of_polynomial(series.recentred(coefficients, middle, half))
 
 
 def _constant(tau: Array) -> tuple[Array, Array]:

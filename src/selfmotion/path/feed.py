@@ -1,13 +1,14 @@
 """A path at a constant feed."""
 
+from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, PathError, as_number, read_only
-from selfmotion.path.base import STILL, Path, PathSamples, _Derived, check_path
+from selfmotion.basics import Array, PathError, as_number, read_only, series
+from selfmotion.path.base import STILL, Path, PathSamples, PathSeries, _Derived, check_path
 from selfmotion.path.pace import Pace, times_along, times_when
 
 # Nodes of the pace between two knots of the original, at least, and in all, about.
@@ -97,7 +98,8 @@ class Feed(_Derived, kind="feed"):
     def marks(self) -> Array:
         """See `Path.marks`."""
         inner = [pace.t + start for start, _, pace in self._paces]
-        inner.append(self._moved(self._path.marks))
+        # The length as a function of time, and time as one of the length, are splines.
+        inner.append(self._moved(np.union1d(self._path.marks, self._sigma)))
         return _apart(np.concatenate(inner), self.duration)
 
     def _moved(self, wanted: Array) -> Array:
@@ -108,14 +110,30 @@ class Feed(_Derived, kind="feed"):
 
     def pace(self, t: Array) -> tuple[Array, Array]:
         """Return the original's time σ and dσ/dt at times `t` (K,)."""
-        which = np.searchsorted([end for _, end, _ in self._paces[:-1]], t, side="right")
         reached, rate = np.empty(len(t)), np.empty(len(t))
-        for number, (start, end, pace) in enumerate(self._paces):
-            here = which == number
-            own = np.clip(t[here] - start, 0.0, end - start)
+        for here, own, pace in self._stretches(t):
             reached[here], rate[here] = pace(own), np.maximum(pace(own, 1), 0.0)
         sigma = np.clip(self._original(reached), 0.0, self._path.duration)
         return sigma, rate * np.maximum(self._original(reached, nu=1), 0.0)
+
+    def _stretches(self, t: Array) -> Iterator[tuple[Array, Array, Pace]]:
+        """Yield for each stretch which of times (K,) lie in it, its own times, and its pace."""
+        which = np.searchsorted([end for _, end, _ in self._paces[:-1]], t, side="right")
+        for number, (start, end, pace) in enumerate(self._paces):
+            here = which == number
+            yield here, np.clip(t[here] - start, 0.0, end - start), pace
+
+    def series(self, middle: Array, half: Array) -> PathSeries | None:
+        """See `Path.series`: the original's time over the length, that over time."""
+        reached, length = np.empty(len(middle)), np.empty((series.LENGTH, len(middle)))
+        for here, own, pace in self._stretches(middle):
+            reached[here], length[:, here] = pace(own), pace.series(own, half[here])
+        reach = series.after_first(length)
+        reach = np.where(reach > 0.0, reach, 1.0)
+        spline = self._original
+        part = series.of_pieces(spline.x, spline.c[::-1], reached, reach)
+        sigma = series.composed(series.of_polynomial(part), length / reach)
+        return self._series_at(np.clip(spline(reached), 0.0, self._path.duration), sigma)
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""

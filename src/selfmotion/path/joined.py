@@ -9,15 +9,18 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, PathError, as_number, read_only, restore, shown
+from selfmotion.basics import Array, Ints, PathError, as_number, read_only, restore, series, shown
 from selfmotion.path.base import (
     STILL,
     Path,
     PathSamples,
+    PathSeries,
     check_duration,
     check_path,
     check_vector,
     path_pose,
+    path_series,
+    turning,
 )
 from selfmotion.path.shapes import Line
 
@@ -53,6 +56,10 @@ class Dwell(Path, kind="dwell"):
             np.tile(self.at.rotation, (count, 1, 1)),
             np.zeros((count, 6)),
         )
+
+    def series(self, middle: Array, half: Array) -> PathSeries:
+        """See `Path.series`."""
+        return turning(np.zeros((series.LENGTH, len(middle))))
 
 
 def with_leads(
@@ -139,7 +146,7 @@ class Joined(Path, kind="joined"):
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
-        which = np.minimum(np.searchsorted(self._ends, t, side="right"), len(self.pieces) - 1)
+        which = self._which(t)
         translation, rotation = np.empty((len(t), 3)), np.empty((len(t), 3, 3))
         twist = np.empty((len(t), 6))
         for number, piece in enumerate(self.pieces):
@@ -151,6 +158,25 @@ class Joined(Path, kind="joined"):
             translation[here], rotation[here] = part.translation, part.rotation
             twist[here] = part.twist
         return PathSamples(t, translation, rotation, twist)
+
+    def series(self, middle: Array, half: Array) -> PathSeries | None:
+        """See `Path.series`."""
+        which = self._which(middle)
+        found = turning(np.zeros((series.LENGTH, len(middle))))
+        for number in np.unique(which):
+            here, piece = which == number, self.pieces[number]
+            own = middle[here] - (self._ends[number] - piece.duration)
+            known = path_series(piece, own, half[here])
+            if known is None:
+                return None
+            for whole, part in zip(found, known, strict=True):
+                whole[:, here] = part
+        return found
+
+    def _which(self, t: Array) -> Ints:
+        """Return the pieces of times (K,)."""
+        later = np.searchsorted(self._ends, t, side="right")
+        return np.minimum(later, len(self.pieces) - 1)
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, series
 
 # Of samples within this share of a window the first is kept: the jerk of more would be rounding.
 _CLOSE = 0.1
@@ -69,6 +69,18 @@ class Pace:
         """Return σ (`order` 0), dσ/dt (1) or d²σ/dt² (2) at times (K,)."""
         found: Array = self._spline(t, nu=order)
         return np.clip(found, self.sigma[0], self.sigma[-1]) if order == 0 else found
+
+    def series(self, middle: Array, half: Array) -> Array:
+        """Return the majorants of σ on intervals between samples, (K + 1, I)."""
+        breaks, coefficients = self._pieces
+        return series.of_polynomial(series.of_pieces(breaks, coefficients, middle, half))
+
+    @cached_property
+    def _pieces(self) -> tuple[Array, Array]:
+        from scipy.interpolate import PPoly
+
+        pieces = PPoly.from_bernstein_basis(self._spline)
+        return pieces.x, pieces.c[::-1]
 
     @cached_property
     def _spline(self) -> Any:

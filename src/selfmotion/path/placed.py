@@ -7,7 +7,15 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion.basics import Array
-from selfmotion.path.base import Path, PathSamples, _Derived, check_path, path_pose
+from selfmotion.path.base import (
+    Path,
+    PathSamples,
+    PathSeries,
+    _Derived,
+    check_path,
+    path_pose,
+    path_series,
+)
 
 
 class Placed(_Derived, kind="placed"):
@@ -42,6 +50,10 @@ class Placed(_Derived, kind="placed"):
         twist = np.hstack([inner.twist[:, :3] @ turn.T, inner.twist[:, 3:] @ turn.T])
         translation = inner.translation @ turn.T + self._frame.translation
         return PathSamples(t, translation, turn @ inner.rotation, twist)
+
+    def series(self, middle: Array, half: Array) -> PathSeries | None:
+        """See `Path.series`: lengths and angles stay."""
+        return path_series(self._path, middle, half)
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""

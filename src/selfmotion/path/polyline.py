@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, PathError, as_number, as_numbers, read_only, shown
-from selfmotion.path.base import Path, PathSamples, path_pose, rotvecs, unit
+from selfmotion.basics import Array, PathError, as_number, as_numbers, read_only, series, shown
+from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
 
 # The pace of a polyline itself, to be replaced by `Feed`: [m/s], and [rad/s] where it only turns.
 _SPEED, _TURN_RATE = 1.0, 10.0
@@ -17,6 +17,8 @@ _SPEED, _TURN_RATE = 1.0, 10.0
 _SAME = 1e-9
 # The corner is passed at this share of d |Δv|, where the velocity changes by Δv within ± d.
 _MISS = 5.0 / 32.0
+# m(x) / d over u = x / d in the corner, coefficients of 1, u, u² …: ∫∫ 15/16 (1 - u²)² du du.
+_WAY = np.array([_MISS, 0.5, 15.0 / 32.0, 0.0, -15.0 / 96.0, 0.0, 1.0 / 32.0])
 
 
 class Polyline(Path, kind="polyline"):
@@ -184,6 +186,25 @@ class Polyline(Path, kind="polyline"):
         twist = np.hstack([slow + (fast - slow) * share, turning])
         return PathSamples(t, position, rotation.as_matrix(), twist)
 
+    def series(self, middle: Array, half: Array) -> PathSeries:
+        """See `Path.series`."""
+        k = np.searchsorted(0.5 * (self._times[:-1] + self._times[1:]), middle, side="right")
+        corners, x = self._corners, middle - self._times[k]
+        wide = np.where(corners.half[k] > 0.0, corners.half[k], 1.0)
+        inside = np.abs(x) < corners.half[k]
+        bend = wide * series.recentred(_WAY[:, None], x / wide, half / wide)
+        beside = np.zeros_like(bend)
+        beside[:2] = np.where(x > 0.0, np.stack([x, half]), 0.0)
+        after = np.where(inside, bend, beside)
+        before = -after
+        before[:2] += np.stack([x, half])
+        parts = series.of_polynomial(before), series.of_polynomial(after)
+        moved, turned = (
+            np.linalg.norm(slow[k], axis=1) * parts[0] + np.linalg.norm(fast[k], axis=1) * parts[1]
+            for slow, fast in (corners[:2], corners[2:4])
+        )
+        return PathSeries(moved, series.exponential(turned))
+
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""
         return {
@@ -208,8 +229,8 @@ class _Corners(NamedTuple):
 def _passed(x: Array, half: Array) -> tuple[Array, Array]:
     """Return m(x), which goes over from 0 to x within ± d, and m'(x)."""
     u = np.clip(x / np.where(half > 0.0, half, 1.0), -1.0, 1.0)
-    # ∫ 15/16 (1 - u²)² du, and the integral of that.
+    # ∫ 15/16 (1 - u²)² du.
     share = 0.5 + 15.0 / 16.0 * (u - 2.0 / 3.0 * u**3 + u**5 / 5.0)
-    way = 0.5 * u + 15.0 / 16.0 * (u**2 / 2.0 - u**4 / 6.0 + u**6 / 30.0) + _MISS
+    way = np.polynomial.polynomial.polyval(u, _WAY)
     inside = np.abs(x) < half
     return np.where(inside, half * way, np.maximum(x, 0.0)), np.where(inside, share, x > 0.0)

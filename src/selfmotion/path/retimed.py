@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, PathError, as_numbers, read_only
-from selfmotion.path.base import Path, PathSamples, _Derived, check_path
+from selfmotion.path.base import Path, PathSamples, PathSeries, _Derived, check_path
 from selfmotion.path.pace import Pace, times_when
 
 
@@ -83,6 +83,11 @@ class Retimed(_Derived, kind="retimed"):
         """See `Path.evaluate`."""
         sigma = np.clip(self._pace(t), 0.0, self._path.duration)
         return self._at_pace(t, sigma, self._pace(t, 1))
+
+    def series(self, middle: Array, half: Array) -> PathSeries | None:
+        """See `Path.series`."""
+        sigma = np.clip(self._pace(middle), 0.0, self._path.duration)
+        return self._series_at(sigma, self._pace.series(middle, half))
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""

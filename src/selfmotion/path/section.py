@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, PathError, as_number, read_only
-from selfmotion.path.base import Path, PathSamples, _Derived, check_path
+from selfmotion.path.base import Path, PathSamples, PathSeries, _Derived, check_path, path_series
 from selfmotion.path.retimed import Retimed
 
 # Knots this near to an end, as a share of the duration, are the end.
@@ -74,6 +74,10 @@ class Section(_Derived, kind="section"):
         """See `Path.evaluate`."""
         found = self._path.samples(np.clip(self._first + t, self._first, self._last))
         return PathSamples(t, found.translation, found.rotation, found.twist)
+
+    def series(self, middle: Array, half: Array) -> PathSeries | None:
+        """See `Path.series`."""
+        return path_series(self._path, self._first + middle, half)
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""

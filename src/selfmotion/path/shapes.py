@@ -7,10 +7,11 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, PathError, as_flag, as_number, read_only
+from selfmotion.basics import Array, PathError, as_flag, as_number, read_only, series
 from selfmotion.path.base import (
     Path,
     PathSamples,
+    PathSeries,
     TimeLaw,
     check_duration,
     check_vector,
@@ -62,6 +63,14 @@ class Line(Path, kind="line"):
             rotations_about(axis, s * angle) @ self.start.rotation,
             (speed / self.duration)[:, None] * np.concatenate([offset, turn]),
         )
+
+    def series(self, middle: Array, half: Array) -> PathSeries:
+        """See `Path.series`."""
+        law, last = TimeLaw.of(self.time_law), self.duration
+        way = law.series(middle / last, half / last)
+        length = float(np.linalg.norm(self.end.translation - self.start.translation))
+        angle = float(np.linalg.norm(pin.log3(self.end.rotation @ self.start.rotation.T)))
+        return PathSeries(length * way, series.exponential(angle * way))
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,3 +169,11 @@ class Circle(Path, kind="circle"):
             angular = np.zeros_like(omega)
         twist = np.hstack([np.cross(omega, arms), angular])
         return PathSamples(t, self.center + arms, rotation, twist)
+
+    def series(self, middle: Array, half: Array) -> PathSeries:
+        """See `Path.series`."""
+        law, last = TimeLaw.of(self.time_law), self.duration
+        way = 2.0 * np.pi * abs(self.turns) * law.series(middle / last, half / last)
+        round_axis = series.exponential(way)
+        still = series.constant(1.0, way)
+        return PathSeries(self.radius * round_axis, round_axis if self.turn_tool else still)

@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pinocchio as pin
 from numpy.polynomial import chebyshev
 
-from selfmotion.basics import Array, PathError, as_numbers, shown
-from selfmotion.path.base import Path, PathSamples, check_duration, path_pose
+from selfmotion.basics import Array, PathError, as_numbers, series, shown
+from selfmotion.path.base import Path, PathSamples, PathSeries, check_duration, path_pose
 
 _DEGREE = 24
 # Chebyshev tail, relative to the largest velocity, at which a piece counts as resolved.
@@ -151,6 +151,19 @@ class TwistPath(Path, kind="twist"):
         position = self._start.translation + offsets[k]
         position = position + np.einsum("kd,kdi->ki", basis, integrals[k])
         return PathSamples(t, position, self._rotation(t), self._twist(t))
+
+    def series(self, middle: Array, half: Array) -> PathSeries:
+        """See `Path.series`: with Ṙ = [ω]R, R is bounded by the exponential of ∫|ω|."""
+        k, _ = self._local(middle)
+        share = 2.0 * half / np.diff(self._breaks)[k]
+        pieces = self._coefficients[k].transpose(1, 0, 2)
+        step = half / np.arange(1.0, series.LENGTH)[:, None]
+        found = []
+        for rates in (pieces[:, :, :3], pieces[:, :, 3:]):
+            way = np.zeros((series.LENGTH, len(middle)))
+            way[1:] = series.of_chebyshev(rates, share)[:-1] * step
+            found.append(way)
+        return PathSeries(found[0], series.exponential(found[1]))
 
     def _rotation(self, t: Array) -> Array:
         if self._orientation is None:

@@ -13,6 +13,7 @@ import pinocchio as pin
 from selfmotion.basics import (
     Array,
     FileFormatError,
+    Ints,
     PathError,
     as_choice,
     as_number,
@@ -20,9 +21,10 @@ from selfmotion.basics import (
     as_path,
     read_only,
     read_table,
+    series,
     shown,
 )
-from selfmotion.path.base import Path, PathSamples, path_pose, rotvecs, unit
+from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
 
 _COLUMNS = ("t", "x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
@@ -198,19 +200,24 @@ class Waypoints(Path, kind="waypoints"):
         return bounds[:-1], splines
 
     def _warp(self, t: Array) -> tuple[Array, Array]:
-        """Return the time τ on the splines and dτ/dt: τ = t, but resting at the corners.
+        """Return the time τ on the splines and dτ/dt: τ = t, but resting at the corners."""
+        k, h, (a, c3, c4, c5) = self._warps(t)
+        u = (t - self._t[k]) / h
+        tau = a * u + u**3 * (c3 + u * (c4 + u * c5))
+        slope = a + u**2 * (3 * c3 + u * (4 * c4 + 5 * u * c5))
+        return self._t[k] + h * tau, slope
+
+    def _warps(self, t: Array) -> tuple[Ints, Array, tuple[Array, Array, Array, Array]]:
+        """Return the legs of times (K,), how long they last, and τ's coefficients of u, u³, u⁴, u⁵.
 
         Next to a corner τ is the quintic between the waypoints' times with slope 0 at the corner,
         1 at the other end, and no acceleration at either.
         """
         k = np.clip(np.searchsorted(self._t, t, side="right") - 1, 0, len(self._t) - 2)
-        h = self._t[k + 1] - self._t[k]
-        u = (t - self._t[k]) / h
         a, b = 1.0 * ~self._stops[k], 1.0 * ~self._stops[k + 1]
-        c3, c4, c5 = 10 - 6 * a - 4 * b, -15 + 8 * a + 7 * b, 6 - 3 * a - 3 * b
-        tau = a * u + u**3 * (c3 + u * (c4 + u * c5))
-        slope = a + u**2 * (3 * c3 + u * (4 * c4 + 5 * u * c5))
-        return self._t[k] + h * tau, slope
+        higher = 10 - 6 * a - 4 * b, -15 + 8 * a + 7 * b, 6 - 3 * a - 3 * b
+        first, third, fourth, fifth = (np.asarray(item, dtype=np.float64) for item in (a, *higher))
+        return k, self._t[k + 1] - self._t[k], (first, third, fourth, fifth)
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
@@ -229,6 +236,32 @@ class Waypoints(Path, kind="waypoints"):
             twist[here, :3] = line(tau[here], 1)
             twist[here, 3:] = turned.apply(turn(tau[here], 1))  # its rates are in tool axes
         return PathSamples(t, position, rotation, twist * slope[:, None])
+
+    def series(self, middle: Array, half: Array) -> PathSeries:
+        """See `Path.series`: cubics of positions and of rotation vectors, after the warp."""
+        k, lasts, (first, *higher) = self._warps(middle)
+        none = np.zeros_like(first)
+        warp = np.stack([none, first, none, *higher]) * lasts
+        tau = series.of_polynomial(
+            series.recentred(warp, (middle - self._t[k]) / lasts, half / lasts)
+        )
+        at, _ = self._warp(middle)
+        # Of the range of τ; where it does not move, of any.
+        reach = np.where(series.after_first(tau) > 0.0, series.after_first(tau), 1.0)
+        starts, splines = self._pieces
+        piece = np.searchsorted(self._t[starts], at, side="right") - 1
+        found = PathSeries(np.empty_like(tau), np.empty_like(tau))
+        for index, (line, turn) in enumerate(splines):
+            here = piece == index
+            if not np.any(here):
+                continue
+            for spline, whole in zip((line, turn.interpolator), found, strict=True):
+                part = series.of_pieces(spline.x, spline.c[::-1], at[here], reach[here])
+                bounds = series.of_vectors(part)
+                if whole is found.rotation:
+                    bounds = series.exponential(bounds)
+                whole[:, here] = series.composed(bounds, tau[:, here] / reach[here])
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""

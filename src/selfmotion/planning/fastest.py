@@ -7,20 +7,13 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, PlanError, ProblemError, Progress, per_joint, silent
-from selfmotion.constraints import (
-    Constraint,
-    JointAccelerationLimits,
-    JointJerkLimits,
-    JointVelocityLimits,
-)
+from selfmotion.constraints import Constraint
 from selfmotion.costs import LimitUse
 from selfmotion.path import Path, Retimed
 from selfmotion.planning.run import plan
 from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Plan, retime
 
-# What limits the pace rather than the way.
-_OF_PACE = (JointVelocityLimits, JointAccelerationLimits, JointJerkLimits)
 # Rounds end when one gains less than this share, or after so many.
 _GAIN, _ROUNDS = 2e-3, 8
 # The power of the cost: the larger, the nearer to the largest share, and the harder to minimise.
@@ -89,7 +82,7 @@ def fastest(
     """
     check_problem(problem)
     v, a = _limits(problem, acceleration, velocity)
-    geometric = tuple(item for item in problem.constraints if not isinstance(item, _OF_PACE))
+    geometric = tuple(item for item in problem.constraints if not item.of_pace)
     free = replace(problem, constraints=geometric, costs=(LimitUse(v, a, _POWER),))
     best: Plan | None = None
     path, times, verdict, still = problem.path, [], "", np.inf

@@ -14,7 +14,7 @@ from selfmotion.path import Line
 from selfmotion.planning.roadmap import Roadmap
 from selfmotion.planning.run import plan
 from selfmotion.problem import Problem
-from selfmotion.result import OF_PACE, Move
+from selfmotion.result import Move
 
 # Largest velocity, acceleration and jerk of 10τ³ - 15τ⁴ + 6τ⁵ for 0 ≤ τ ≤ 1.
 _SPEED, _ACCELERATION, _JERK = 1.875, 10.0 / np.sqrt(3.0), 60.0
@@ -129,7 +129,7 @@ class Mover:
             t = np.concatenate([[0.0], np.cumsum(durations)])
             motion = Trajectory(t, way, still, self._problem.robot.joint_names, still)
             findings = self._judge(motion)
-            if not any(not item.kept and item.requirement in OF_PACE for item in findings):
+            if not any(not item.kept and item.of_pace for item in findings):
                 break
             durations = _FACTOR * durations
         return motion, findings

@@ -21,7 +21,7 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.constraints import ClosedPath, Constraint
+from selfmotion.constraints import Constraint
 from selfmotion.path import Retimed, Section, section_at_rest
 from selfmotion.planning.moves import Mover, Retreat, between_parts
 from selfmotion.planning.run import plan, plan_along
@@ -206,7 +206,7 @@ class _Planner:
     ) -> None:
         self._problem, self._stretches, self._ramp = problem, stretches, ramp
         self._tolerance, self._progress = tolerance, progress
-        self._closed = any(isinstance(item, ClosedPath) for item in problem.constraints)
+        self._closed = any(item.closes for item in problem.constraints)
         generator = np.random.default_rng(rng)
         self._mover = Mover(between_parts(problem), retreat, generator, progress)
         self.failure: SelfmotionError = PlanError("no part was planned")
@@ -286,7 +286,7 @@ class _Planner:
 
 def _asked_of_part(problem: Problem, is_first: bool, is_last: bool) -> Iterator[Constraint]:
     for item in problem.constraints:
-        kept: Constraint | None = None if isinstance(item, ClosedPath) else item
+        kept: Constraint | None = None if item.closes else item
         if kept is not None and not is_last:
             kept = kept.on_part()
         if kept is not None and not is_first:

@@ -54,7 +54,7 @@ def as_asked(
     wanted = as_several(costs, "costs", Cost)  # type: ignore[type-abstract]
     for cost in wanted:
         cost.check(follows)
-    kept = as_several(constraints, "constraints", Constraint)  # type: ignore[type-abstract]
+    kept = as_several(constraints, "constraints", Constraint)
     return wanted, kept
 
 

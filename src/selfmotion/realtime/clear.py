@@ -1,13 +1,12 @@
 """Clearance from obstacles that move."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, ProblemError, nearest
 from selfmotion.collision import ClearanceModel, CollisionModel
-from selfmotion.constraints import Clearance
 from selfmotion.costs import Samples
 from selfmotion.robot import RobotModel
 from selfmotion.task import as_pose
@@ -32,8 +31,8 @@ class Surroundings:
     Parameters
     ----------
     robot : RobotModel
-    clearance : Clearance
-        The distance, the obstacles and where they are at first.
+    bodies : sequence of (CollisionModel, float)
+        The bodies, with obstacles where they are at first, and the distance to keep [m].
 
     Attributes
     ----------
@@ -43,54 +42,74 @@ class Surroundings:
         What is too near, and when.
     """
 
-    def __init__(self, robot: RobotModel, clearance: Clearance) -> None:
-        # A model of its own: that of the certificate has obstacles that stand still.
-        exact = CollisionModel(robot, clearance.obstacles, clearance.disabled)
-        self._model = ClearanceModel(exact, clearance.distance + _NEAR)
-        self._distance = clearance.distance
-        self._names = [item.name for item in clearance.obstacles]
-        # Obstacles that came too near are to be left again, at this speed; links need not.
-        self._leaving = np.array(
-            [_LEAVING * (pair[1] in self._names) for pair in self._model.pairs]
-        )
+    def __init__(self, robot: RobotModel, bodies: Sequence[tuple[CollisionModel, float]]) -> None:
+        # Models of its own: those of the certificate have obstacles that stand still.
+        self._models = [
+            (ClearanceModel(CollisionModel(robot, own.obstacles, own.disabled), far + _NEAR), far)
+            for own, far in bodies
+        ]
+        self._names = [{item.name for item in own.obstacles} for own, _ in bodies]
         self.blocked, self.message = False, ""
 
     def move(self, obstacles: Mapping[str, pin.SE3]) -> None:
         """Put obstacles somewhere else: name → pose in world axes."""
+        known = sorted(set().union(*self._names))
         for name, pose in obstacles.items():
-            if name not in self._names:
-                hint = nearest(name, self._names)
+            if name not in known:
+                hint = nearest(name, known)
                 raise ProblemError(
-                    f"obstacle '{name}' is none of the clearance's: {', '.join(self._names)}{hint}"
+                    f"obstacle '{name}' is none of the clearance's: {', '.join(known)}{hint}"
                 )
-            self._model.move(name, as_pose(pose, f"obstacle '{name}'"))
+            for (model, _), names in zip(self._models, self._names, strict=True):
+                if name in names:
+                    model.move(name, as_pose(pose, f"obstacle '{name}'"))
 
     def distances(self, q: Array) -> Array:
         """Return the smallest distance at configurations (K, n), levelled off, (K,) [m]."""
-        return np.asarray(self._model.clearances(q).values.min(axis=1, initial=np.inf))
+        each = [model.clearances(q).values.min(axis=1, initial=np.inf) for model, _ in self._models]
+        return np.asarray(np.min(each, axis=0))
 
     def rows(self, samples: Samples, by_q: Array) -> tuple[Array, Array]:
         """Return what keeps a step of the plan clear: rows (R, d) and their largest values (R,).
 
         Notes whether the plan is blocked as it is.
         """
+        self.blocked, self.message = False, ""
+        found = [
+            self._rows(model, far, names, samples, by_q)
+            for (model, far), names in zip(self._models, self._names, strict=True)
+        ]
+        rows, room = zip(*found, strict=True)
+        return np.concatenate(rows), np.concatenate(room)
+
+    def _rows(
+        self,
+        model: ClearanceModel,
+        distance: float,
+        names: set[str],
+        samples: Samples,
+        by_q: Array,
+    ) -> tuple[Array, Array]:
+        """Return the rows of one model."""
         nodes = samples.nodes
-        found = self._model.clearances(samples.q[nodes])
+        found = model.clearances(samples.q[nodes])
         values = found.values
         times = samples.sampling.node_times
         soon = values[times <= _SOON]
-        allowed = np.minimum(self._distance, soon[0] - _NEARER) if soon.size else soon
-        self.blocked = bool((soon[1:] < allowed).any())
-        if self.blocked:
+        allowed = np.minimum(distance, soon[0] - _NEARER) if soon.size else soon
+        if (soon[1:] < allowed).any():
             row, pair = np.argwhere(soon[1:] < allowed)[0]
-            first, second = self._model.pairs[pair]
+            first, second = model.pairs[pair]
+            self.blocked = True
             self.message = (
                 f"'{first}' and '{second}' would be {soon[row + 1, pair] * 1e3:.1f} mm apart in "
-                f"{times[row + 1]:.2f} s, wanted {self._distance * 1e3:.1f} mm"
+                f"{times[row + 1]:.2f} s, wanted {distance * 1e3:.1f} mm"
             )
         rows = -(found.slopes[:, None] @ by_q[nodes[found.rows]])[:, 0]
-        # From where the arm is, no more can be asked for than to come no nearer.
-        reached = values[0] + times[:, None] * self._leaving
-        room = values - np.minimum(self._distance + _MARGIN, reached)
+        # From where the arm is, no more can be asked for than to come no nearer. Obstacles that
+        # came too near are to be left again, at this speed; links need not.
+        leaving = np.array([_LEAVING * (pair[1] in names) for pair in model.pairs])
+        reached = values[0] + times[:, None] * leaving
+        room = values - np.minimum(distance + _MARGIN, reached)
         later = found.rows > 0
         return rows[later], room[found.rows, found.columns][later]

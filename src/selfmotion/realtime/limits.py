@@ -1,12 +1,13 @@
 """Limits of the joints, as the loop keeps them."""
 
 from collections.abc import Sequence
+from functools import reduce
+from operator import and_
 
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError, StartError
 from selfmotion.constraints import (
-    Clearance,
     Constraint,
     JointAccelerationLimits,
     JointPositionLimits,
@@ -18,7 +19,7 @@ from selfmotion.robot import RobotModel
 # What a plan leaves of the limits to the command: distance from the ends [rad or m], and share of
 # speed and acceleration. The tool's feedback and the time between nodes need some.
 _ENDS, _SPEED, _ACCELERATION = 5e-3, 0.98, 0.9
-_KEPT = (JointPositionLimits, JointVelocityLimits, JointAccelerationLimits, Clearance)
+_USUAL = (JointPositionLimits, JointVelocityLimits, JointAccelerationLimits)
 
 
 def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
@@ -33,25 +34,16 @@ def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
         acceleration.
     """
     for item in constraints:
-        if not isinstance(item, _KEPT):
-            names = ", ".join(kind.__name__ for kind in _KEPT)
+        if not item.kept_moving:
             raise ProblemError(
-                f"constraint {type(item).__name__} is not kept while moving, expected: {names}"
+                f"constraint {type(item).__name__} is not kept while moving, expected limits of "
+                f"joint position, velocity and acceleration, or a Clearance"
             )
     kinds = {type(item) for item in constraints}
     # Where none are given, those of the arm and its maker.
-    asked = [*constraints, *(kind() for kind in _KEPT[:3] if kind not in kinds)]
-    places = [item.limits(robot) for item in asked if isinstance(item, JointPositionLimits)]
-    speeds = [item.of(robot) for item in asked if isinstance(item, JointVelocityLimits)]
-    hardest = [item.of(robot) for item in asked if isinstance(item, JointAccelerationLimits)]
-    limits = np.array(
-        [
-            np.max([lower for lower, _ in places], axis=0),
-            np.min([upper for _, upper in places], axis=0),
-            np.min(speeds, axis=0),
-            np.min(hardest, axis=0),
-        ]
-    )
+    asked = [*constraints, *(kind() for kind in _USUAL if kind not in kinds)]
+    envelope = reduce(and_, (item.envelope(robot) for item in asked))
+    limits = np.array([envelope.lower, envelope.upper, envelope.speed, envelope.acceleration])
     endless = np.flatnonzero(~np.isfinite(limits[2:]).all(axis=0))
     if endless.size:
         raise ProblemError(

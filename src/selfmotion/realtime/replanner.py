@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion.basics import Array, ProblemError, as_number, as_whole, one_blas_thread
-from selfmotion.constraints import Clearance, Constraint
+from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost, JointVelocity
 from selfmotion.follow import Follows
 from selfmotion.motion import NullMotion, PolynomialNullMotion
@@ -116,8 +116,8 @@ class Replanner:
         self._inner = np.vstack([tightened(limits), np.zeros(robot.dof)])
         null_motion = in_null_space(null_motion or PolynomialNullMotion())
         steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
-        clearances = [item for item in constraints if isinstance(item, Clearance)]
-        self._around = Surroundings(robot, clearances[0]) if clearances else None
+        bodies = [pair for item in constraints for pair in item.envelope(robot).bodies]
+        self._around = Surroundings(robot, bodies) if bodies else None
         self._horizon = Horizon(
             follows,
             costs,

@@ -3,4 +3,4 @@
 from selfmotion.result.parts import Move as Move, Parts as Parts
 from selfmotion.result.plan import Plan as Plan, Views as Views, load_plan as load_plan
 from selfmotion.result.report import Gap as Gap, Report as Report
-from selfmotion.result.retiming import OF_PACE as OF_PACE, retime as retime, slowdown as slowdown
+from selfmotion.result.retiming import retime as retime, slowdown as slowdown

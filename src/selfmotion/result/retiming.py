@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, PlanError, ProblemError, per_joint, shown
-from selfmotion.certificate import LIMIT_NAMES
 from selfmotion.constraints import (
     Constraint,
     Envelope,
@@ -29,8 +28,7 @@ _ROUNDING = 1e-9
 # Grid points of toppra, and samples of the new motion, per sample of the old one: the first that
 # keeps the plan's tolerance.
 _DENSITIES = (4, 8, 16)
-# Requirements that a slower pace may keep, by how much slower it is tried, and how often.
-OF_PACE = {*LIMIT_NAMES[1:], "joint torque limits", "tool limits"}
+# By how much slower a pace is tried, and how often.
 _FACTOR, _SLOWER = 1.15, 16
 
 
@@ -122,8 +120,9 @@ def _positive(robot: RobotModel, limit: npt.ArrayLike, name: str) -> Array:
 
 def _is_too_fast(plan: Plan) -> bool:
     """Return whether a plan breaks nothing but what a slower pace may keep."""
-    broken = {item.requirement for item in plan.certificate.findings if not item.kept}
-    return bool(broken) and broken <= OF_PACE and plan.certificate.on_path
+    broken = [item for item in plan.certificate.findings if not item.kept]
+    of_pace = bool(broken) and all(item.of_pace for item in broken)
+    return of_pace and plan.certificate.on_path
 
 
 def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:

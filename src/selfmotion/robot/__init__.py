@@ -4,9 +4,11 @@ from selfmotion.robot.chain import (
     Chain as Chain,
     ChainArrays as ChainArrays,
     Kinematics as Kinematics,
+    TreeArrays as TreeArrays,
     march as march,
     null_space as null_space,
 )
+from selfmotion.robot.chain_series import ChainSeries as ChainSeries
 from selfmotion.robot.coordinates import (
     Coordinate as Coordinate,
     FrameCoordinate as FrameCoordinate,

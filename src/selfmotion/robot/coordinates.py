@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, ProblemError, Saved, as_numbers, nearest
+from selfmotion.basics import Array, ProblemError, Saved, as_numbers, nearest, series
+from selfmotion.robot.chain_series import ChainSeries
 from selfmotion.robot.model import RobotModel
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -47,6 +48,14 @@ class Coordinate(Saved, ABC, family="coordinate"):
             The arm has no such joint or frame; the nearest names are offered.
         """
 
+    def series(self, chain: ChainSeries, q: Array) -> Array | None:
+        """Return majorants (K + 1, I) on intervals whose middles are q (I, n); None for unknown.
+
+        Where there is no bound, inf. Only rows from 1 on count. A coordinate without is judged as
+        measured: no proof.
+        """
+        return None
+
     def away(self, values: Array, center: float) -> Array:
         """Return how far values (K,) are from a centre; of angles the short way."""
         away = values - center
@@ -81,6 +90,10 @@ class JointCoordinate(Coordinate):
         k = robot.joint_names.index(self.joint)
         return q[:, k], np.tile(np.eye(robot.dof)[k], (len(q), 1))
 
+    def series(self, chain: ChainSeries, q: Array) -> Array:
+        """See `Coordinate.series`: the joint's own."""
+        return np.asarray(chain.joints[chain.robot.joint_names.index(self.joint)])
+
 
 @dataclass(frozen=True, eq=False)
 class FrameCoordinate(Coordinate):
@@ -114,6 +127,10 @@ class FrameCoordinate(Coordinate):
         direction = direction / np.linalg.norm(direction)
         ((places, jacobians),) = _points(robot, q, (self.frame,))
         return places @ direction, np.einsum("c,kcn->kn", direction, jacobians)
+
+    def series(self, chain: ChainSeries, q: Array) -> Array:
+        """See `Coordinate.series`."""
+        return chain.place(_frame(chain.robot, self.frame))
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +192,38 @@ class SwivelAngle(Coordinate):
         size = np.maximum(sine**2 + cosine**2, (_STRAIGHT * length) ** 2)[:, None]
         gradient = (cosine[:, None] * by_sine - sine[:, None] * by_cosine) / size
         return np.arctan2(sine, cosine), gradient
+
+    def series(self, chain: ChainSeries, q: Array) -> Array:
+        """See `Coordinate.series`: that of arg(C + iS) with |a|² = 1 multiplied out.
+
+        With l = W - S and L = |l|: S = L l·(r × e) and C = L² r·e - (l·r)(l·e). The logarithm of
+        C + iS has a majorant where it keeps away from 0, and none near the stretched arm.
+        """
+        points = _points(chain.robot, q, self.frames(chain.robot))
+        s, e, w = (chain.place(_frame(chain.robot, name)) for name in self.frames(chain.robot))
+        (at_s, _), (at_e, _), (at_w, _) = points
+        r = np.asarray(self.reference, dtype=np.float64)
+        r = r / np.linalg.norm(r)
+        middle_line, middle_arm = at_w - at_s, at_e - at_s
+        line, arm = w + s, e + s
+        line[0] = np.linalg.norm(middle_line, axis=1) + series.after_first(line)
+        arm[0] = np.linalg.norm(middle_arm, axis=1) + series.after_first(arm)
+        squared = series.product(line, line)
+        length = np.einsum("kc,kc->k", middle_line, middle_line)
+        low = length - series.after_first(squared)
+        known = low > 0.0
+        root = series.root(np.where(known, low, 1.0), squared[0], len(line))
+        area = series.product(line, arm)
+        sine = series.product(series.composed(root, squared), area)
+        cosine = series.product(squared, arm) + series.product(line, area)
+        number = sine + cosine
+        at_sine = np.sqrt(length) * np.einsum("kc,kc->k", middle_line, np.cross(r, middle_arm))
+        at_cosine = length * (middle_arm @ r)
+        at_cosine -= (middle_line @ r) * np.einsum("kc,kc->k", middle_line, middle_arm)
+        least = np.hypot(at_sine, at_cosine) - series.after_first(number)
+        known &= least > 0.0
+        found = series.logarithm(number / np.where(known, least, 1.0))
+        return np.where(known, found, np.inf)
 
     def frames(self, robot: RobotModel) -> tuple[str, str, str]:
         """Return the links of shoulder, elbow and wrist; ProblemError where they are not known."""

@@ -4,7 +4,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array, ProblemError, series
+from selfmotion.robot.chain_series import ChainSeries
 from selfmotion.robot.model import RobotModel
 
 
@@ -64,6 +65,37 @@ class Dynamics:
         rows = zip(q, qd, qdd, strict=True)
         found = [pin.rnea(self._model, self._data, *row).copy() for row in rows]
         return np.array(found).reshape(q.shape)
+
+    def series(self, chain: ChainSeries) -> Array:
+        """Return the torques' majorants, (n, K + 1, I): Newton's and Euler's equations of them.
+
+        In world axes: f = m (c̈ - g) and n = d/dt (R I Rᵀ ω) of each body, summed from the tip.
+        """
+        model, half, count = self._model, chain.half, len(chain.joints)
+        gravity = float(np.linalg.norm(model.gravity.linear))
+        forces, moments = [], []
+        for body in range(count + 1):
+            inertia, turned = model.inertias[body], chain.turned[body]
+            lever = float(np.linalg.norm(inertia.lever)) * turned
+            at = chain.places[body] + lever
+            pull = series.derivative(series.derivative(at, half), half)
+            pull[0] += gravity
+            force = inertia.mass * pull
+            about = np.linalg.norm(inertia.inertia, 2) * series.product(turned, turned)
+            moment = series.derivative(series.product(about, chain.spins[body]), half)
+            forces.append(force)
+            moments.append(moment + series.product(lever, force))
+        found = np.empty((count, *forces[0].shape))
+        for joint in reversed(range(count)):
+            body, parent = joint + 1, chain.parent(joint)
+            carried = moments[body] if chain.is_revolute(joint) else forces[body]
+            faster = series.derivative(chain.rate(joint), half)
+            found[joint] = series.product(chain.turned[parent], carried)
+            found[joint] += model.armature[joint] * faster
+            forces[parent] = forces[parent] + forces[body]
+            arm = series.product(chain.steps[body], forces[body])
+            moments[parent] = moments[parent] + moments[body] + arm
+        return found
 
     def derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
         """Return ∂τ/∂q, ∂τ/∂q̇ and ∂τ/∂q̈ = M, (K, n, n) each."""

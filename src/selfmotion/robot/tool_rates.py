@@ -3,7 +3,8 @@
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, series
+from selfmotion.robot.chain_series import ChainSeries
 from selfmotion.robot.model import RobotModel
 
 _AXES = pin.ReferenceFrame.LOCAL
@@ -34,6 +35,14 @@ class ToolRates:
             velocity[k] = pin.getFrameVelocity(model, data, frame, _AXES).vector
             acceleration[k] = pin.getFrameClassicalAcceleration(model, data, frame, _AXES).vector
         return velocity, acceleration
+
+    def series(self, chain: ChainSeries) -> tuple[Array, Array, Array, Array]:
+        """Return the majorants of v, ω, dv/dt and dω/dt, (K + 1, I) each."""
+        turned, spin = chain.orientation(self._frame), chain.spin(self._frame)
+        speed = series.derivative(chain.place(self._frame), chain.half)
+        rates = speed, spin, *(series.derivative(x, chain.half) for x in (speed, spin))
+        v, w, dv, dw = (series.product(rate, turned) for rate in rates)
+        return v, w, dv, dw
 
     def derivatives(
         self, q: Array, qd: Array, qdd: Array

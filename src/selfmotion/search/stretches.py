@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, NoSequenceError, Progress, silent
-from selfmotion.constraints import EndConfiguration
 from selfmotion.problem import Problem
 from selfmotion.search.chains import best_chains, unturned
 from selfmotion.search.guides import MARGIN, has_curves, waypoint_times
@@ -137,8 +136,9 @@ class Stretches:
         if start is not None:
             samples[0] = start[None]
         for item in self.problem.constraints:
-            if isinstance(item, EndConfiguration):
-                samples[-1] = self.problem.robot.configuration(item.q)[None]
+            end = item.fixed_end(self.problem.robot)
+            if end is not None:
+                samples[-1] = end[None]
                 self._keep_given(-1, "end configuration asked for")
         if start is not None:
             self._keep_given(0, "given start")

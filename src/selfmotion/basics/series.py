@@ -1,0 +1,159 @@
+"""Majorant series: bounds of all derivatives of smooth functions on intervals of time.
+
+A series a (K + 1, I) belongs to a function f (of numbers, vectors or matrices) on I intervals
+|t - m| ≤ h: with u = (t - m) / h, sup |∂ᵏf/∂uᵏ| / k! ≤ a_k for k = 0 … K over each of them. By the
+rules of Leibniz and Faà di Bruno, majorants of products and compositions follow from those of their
+parts as if they were power series (A. Cauchy; H. Cartan, Théorie élémentaire des fonctions
+analytiques, 1961, ch. VII), in any norm with |xy| ≤ |x||y|.
+"""
+
+from functools import cache
+from math import comb
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics.arrays import Array
+
+# Coefficients that a series has: up to ORDER nodes of an interval, and two derivatives besides.
+ORDER = 12
+LENGTH = ORDER + 3
+
+
+def constant(values: npt.ArrayLike, like: Array) -> Array:
+    """Return the series of constants (I,) or one number, of the shape of another one."""
+    series = np.zeros_like(like)
+    series[0] = values
+    return series
+
+
+def product(a: Array, b: Array) -> Array:
+    """Return the series of a product, as long as the shorter one."""
+    length = min(len(a), len(b))
+    found: Array = a[0] * b[:length]
+    for k in range(1, length):
+        found[k:] += a[k] * b[: length - k]
+    return found
+
+
+def exponential(a: Array) -> Array:
+    """Return exp(a - a₀), the series of exp(A(t)) for skew A with the series a.
+
+    As exp(A + B) = e^A + ∫ e^((1-s)A) B e^(sA) ds + …, with e^(sA) orthogonal, the n-th term is at
+    most |B|ⁿ/n! (F. J. Dyson, Phys. Rev. 75, 1949; R. M. Wilcox, J. Math. Phys. 8, 1967).
+    """
+    weighted = a * np.arange(float(len(a)))[:, None]
+    found = np.zeros_like(a)
+    found[0] = 1.0
+    for k in range(1, len(a)):
+        found[k] = np.einsum("ji,ji->i", weighted[1 : k + 1], found[k - 1 :: -1]) / k
+    return found
+
+
+def composed(outer: Array, inner: Array) -> Array:
+    """Return the series of f(g(t)): that of f, over the range of g, at that of g.
+
+    The outer one's coefficients are per unit of g.
+    """
+    moved = inner.copy()
+    moved[0] = 0.0
+    found = np.zeros_like(inner)
+    for coefficient in outer[::-1]:
+        found = product(found, moved)
+        found[0] += coefficient
+    return found
+
+
+def root(low: Array, high: Array, length: int) -> Array:
+    """Return the outer series of √x for 0 < low ≤ x ≤ high, (I,) each: binomial coefficients."""
+    found, factor = np.empty((length, len(low))), 0.5
+    found[0] = np.sqrt(high)
+    for k in range(1, length):
+        found[k] = abs(factor) * low ** (0.5 - k)
+        factor *= (0.5 - k) / (k + 1)
+    return found
+
+
+def logarithm(a: Array) -> Array:
+    """Return -log(1 - (a - a₀)), the series of log(1 + f) about where f = 0, but for its size."""
+    found = np.zeros_like(a)
+    for k in range(1, len(a)):
+        inner = sum(j * found[j] * a[k - j] for j in range(1, k))
+        found[k] = a[k] + inner / k
+    return found
+
+
+def derivative(a: Array, half: Array) -> Array:
+    """Return the series of df/dt, one shorter, on intervals of half widths (I,)."""
+    return np.asarray(a[1:] * np.arange(1.0, len(a))[:, None] / half)
+
+
+def of_polynomial(coefficients: Array) -> Array:
+    """Return the series of polynomials Σ c_k uᵏ (m + 1, …) on |u| ≤ 1: Σ_j C(j, k) |c_j|."""
+    size = len(coefficients)
+    found = np.zeros((LENGTH, *coefficients.shape[1:]))
+    found[:size] = np.tensordot(_binomials(size), np.abs(coefficients), 1)
+    return found
+
+
+def of_vectors(coefficients: Array) -> Array:
+    """Return the series of vectors of polynomials (m + 1, I, 3) on |u| ≤ 1."""
+    return of_polynomial(np.linalg.norm(coefficients, axis=2))
+
+
+def of_pieces(breaks: Array, coefficients: Array, middle: Array, half: Array) -> Array:
+    """Return what piecewise polynomials are on intervals, as polynomials of u, (m + 1, I, …).
+
+    Coefficients (m + 1, P, …) are those of 1, x, x² … with x from the beginning of each piece; the
+    piece is that of the middle.
+    """
+    k = np.clip(np.searchsorted(breaks, middle, side="right") - 1, 0, len(breaks) - 2)
+    shape = (-1, *np.ones(coefficients.ndim - 2, dtype=int))
+    inside = (middle - breaks[k]).reshape(shape)
+    return recentred(coefficients[:, k], inside, half.reshape(shape))
+
+
+def of_chebyshev(coefficients: Array, share: Array) -> Array:
+    """Return the series of vectors Σ a_j T_j(x) (m + 1, I, 3) where x = x₀ + share · u in [-1, 1].
+
+    V. A. Markov: the derivatives of T_j are largest at 1.
+    """
+    sizes, found = np.linalg.norm(coefficients, axis=2), np.zeros((LENGTH, len(share)))
+    slopes, j = np.ones(len(coefficients)), np.arange(float(len(coefficients)))
+    for k in range(LENGTH):
+        found[k] = slopes @ sizes * share**k
+        slopes = slopes * np.maximum(j**2 - k**2, 0.0) / ((2.0 * k + 1.0) * (k + 1.0))
+    return found
+
+
+def recentred(coefficients: Array, middle: Array, half: Array) -> Array:
+    """Return the coefficients of p(middle + half · u); both broadcast with one coefficient."""
+    found = np.zeros(
+        (len(coefficients), *np.broadcast_shapes(coefficients.shape[1:], middle.shape))
+    )
+    for coefficient in coefficients[::-1]:
+        risen = middle * found
+        risen[1:] += half * found[:-1]
+        risen[0] += coefficient
+        found = risen
+    return found
+
+
+def holds_for(item: object, *methods: str) -> bool:
+    """Return whether the `series` of an object was written for these methods of it as they are.
+
+    A class of one's own that derives from one of ours and moves otherwise has none.
+    """
+    order = type(item).__mro__
+    first = next(k for k, kind in enumerate(order) if "series" in vars(kind))
+    return not any(name in vars(kind) for kind in order[:first] for name in methods)
+
+
+def after_first(a: Array) -> Array:
+    """Return how far the function is from its value in the middle of the interval at most, (I,)."""
+    return np.asarray(a[1:].sum(axis=0))
+
+
+@cache
+def _binomials(size: int) -> Array:
+    return np.array([[comb(j, k) for j in range(size)] for k in range(size)], dtype=np.float64)

@@ -1,0 +1,268 @@
+"""How large functions of a motion become at any time: one loop of bounds, each a theorem.
+
+On an interval |t - m| ≤ h on which the motion is smooth, a function f with values in a normed space
+is measured at K Chebyshev nodes. The polynomial p through them misses it by at most
+
+    |f - p| ≤ sup |∂ᴷf/∂uᴷ| / K! / 2^(K-1),    u = (t - m) / h
+
+(P. J. Davis, Interpolation and Approximation, 1963, th. 3.1.1), and the K-th derivative is bounded
+by the majorant series of f. Between two of the places u_i at which p is looked at, δ apart, p
+leaves its chord by at most δ²/8 sup|p''|, and |p''| ≤ Σ |a_k| k²(k² - 1)/3 for p = Σ a_k T_k
+(V. A. Markov). A convex size of f that grows no faster than |f| is then at most its largest value
+at the u_i plus both. Intervals on which this does not decide are halved. What is not known is
+rounding: some 1e-15 of the size of what is measured.
+
+A function without a majorant is bounded as measured: by the last two coefficients a_k in place of
+the first bound. That is no proof.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, Ints, series
+from selfmotion.motion import Trajectory
+from selfmotion.robot import ChainSeries, RobotModel
+
+# Nodes of an interval: at least, and without a majorant.
+_FEWEST, _MEASURED = 3, 9
+# The polynomials are looked at in so many places of an interval.
+_PLACES = 33
+# Intervals that are looked at together; how often one is halved; how many of one lot are then left.
+_LOT, _DEPTH, _MOST = 2048, 16, 16_384
+
+
+class Stretch:
+    """The motion of an arm on I intervals, none of which contains a sample.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    trajectory : Trajectory
+    intervals : (I, 2)
+        Beginnings and ends [s].
+    """
+
+    def __init__(self, robot: RobotModel, trajectory: Trajectory, intervals: Array) -> None:
+        self.robot, self.trajectory, self.intervals = robot, trajectory, intervals
+        self.middle = 0.5 * (intervals[:, 0] + intervals[:, 1])
+        self.half = 0.5 * (intervals[:, 1] - intervals[:, 0])
+        self._joints = trajectory.polynomials(self.middle, self.half)
+
+    def chain(self) -> ChainSeries:
+        """Return the majorants of the chain's motion."""
+        joints = series.of_polynomial(self._joints).transpose(2, 0, 1)
+        return ChainSeries(self.robot, joints, self.half)
+
+    def some(self, rows: Ints) -> "Stretch":
+        """Return some of the intervals."""
+        return Stretch(self.robot, self.trajectory, self.intervals[rows])
+
+    def times(self, u: Array) -> Array:
+        """Return the times of places u (P,) of each interval, -1 to 1, (I, P)."""
+        return self.middle[:, None] + self.half[:, None] * u
+
+    def motion(self, u: Array, order: int = 0) -> Array:
+        """Return q (`order` 0), q̇, q̈ or the jerk at places u (P,) of all intervals, (I · P, n)."""
+        powers = np.vander(u, len(self._joints), increasing=True)
+        table, scale = self._joints, np.ones(len(self.half))
+        for _ in range(order):
+            table = table[1:] * np.arange(1.0, len(table))[:, None, None]
+            scale = scale * self.half
+        found = np.einsum("pk,kin->ipn", powers[:, : len(table)], table)
+        found /= scale[:, None, None]
+        return np.ascontiguousarray(found.reshape(-1, found.shape[2]))
+
+
+class Bounded(ABC):
+    """A function of a motion: vectors in blocks, and sizes of them.
+
+    Attributes
+    ----------
+    blocks : (B,)
+        Where each block begins among the C components.
+    of : (G,)
+        Which block's errors each size inherits.
+    allowed : (G,)
+        What sizes should not exceed; inf where all is allowed.
+    wanted : (B,)
+        How well the blocks are to be interpolated at least.
+    """
+
+    blocks: Ints
+    of: Ints
+    allowed: Array
+    wanted: Array
+
+    @abstractmethod
+    def series(self, stretch: Stretch) -> Array | None:
+        """Return the blocks' majorants (B, K + 1, I); None where they are not known."""
+
+    @abstractmethod
+    def values(self, stretch: Stretch, u: Array) -> Array:
+        """Return the components at places u (P,) of the intervals, (I, P, C)."""
+
+    @abstractmethod
+    def sizes(self, values: Array, stretch: Stretch) -> Array:
+        """Return the sizes of components (I, P, C), (I, P, G): convex, growing no faster."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """What is known of a function on a whole motion.
+
+    Attributes
+    ----------
+    values, times : (G,)
+        Bounds of the sizes, and about when [s]; they hold but on the intervals that are undecided.
+    undecided : tuple of (float, float)
+        Intervals [s].
+    proved : bool
+        Whether the bounds are theorems everywhere.
+    samples : int
+        How many times were looked at.
+    """
+
+    values: Array
+    times: Array
+    undecided: tuple[tuple[float, float], ...]
+    proved: bool
+    samples: int
+
+
+class _Found(NamedTuple):
+    """For I intervals: bounds, about when, sizes measured, (I, G); proved, and samples."""
+
+    values: Array
+    times: Array
+    measured: Array
+    proved: bool
+    samples: int
+
+
+def bounded(function: Bounded, robot: RobotModel, trajectory: Trajectory, edges: Array) -> Bounds:
+    """Bound a function of a motion between all edges (E,) [s], which contain the samples."""
+    values, times = np.zeros(len(function.of)), np.full(len(function.of), edges[0])
+    undecided: list[tuple[float, float]] = []
+    proved, samples = True, 0
+    for left, found in _settled(function, robot, trajectory, edges):
+        proved, samples = proved and found.proved, samples + found.samples
+        for size in range(len(values)) if len(found.values) else ():
+            # Written so that NaN is worse than any.
+            worst = int(np.argmax(np.where(np.isnan(found.values), np.inf, found.values)[:, size]))
+            value = found.values[worst, size]
+            if not (np.isnan(values[size]) or value <= values[size]):
+                values[size], times[size] = value, found.times[worst, size]
+        undecided += [(float(a), float(b)) for a, b in left]
+    return Bounds(values, times, tuple(undecided), proved, samples + 1)
+
+
+def _settled(
+    function: Bounded, robot: RobotModel, trajectory: Trajectory, edges: Array
+) -> Iterator[tuple[Array, _Found]]:
+    """Yield by lots the intervals (I, 2) that never settle, and what was found of all that did."""
+    for first in range(0, len(edges) - 1, _LOT):
+        part = edges[first : first + _LOT + 1]
+        pending = np.stack([part[:-1], part[1:]], axis=1)
+        for depth in range(_DEPTH + 1):
+            found = _measured(function, Stretch(robot, trajectory, pending))
+            # Written so that NaN settles nothing and is no small error either.
+            kept = np.asarray(found.values <= function.allowed).all(axis=1)
+            broken = ~np.asarray(found.measured <= function.allowed).all(axis=1)
+            settled = kept | broken
+            left = np.flatnonzero(~settled)
+            last = depth == _DEPTH or len(left) > _MOST
+            told = np.arange(len(pending)) if last else np.flatnonzero(settled)
+            # Where there is no bound, what was measured: it is broken, or undecided.
+            values = np.where(np.isfinite(found.values), found.values, found.measured)
+            yield (
+                pending[left if last else left[:0]],
+                found._replace(values=values[told], times=found.times[told]),
+            )
+            if last or not len(left):
+                break
+            pending = halves(pending[left])
+
+
+def _measured(function: Bounded, stretch: Stretch) -> _Found:
+    """Bound all sizes on the intervals of a stretch."""
+    count = len(stretch.middle)
+    # What is too wild for numbers is halved.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        known = function.series(stretch)
+    sizes = len(function.of)
+    values, times, measured = (np.empty((count, sizes)) for _ in range(3))
+    nodes = np.full(count, _MEASURED)
+    rest = np.full((len(function.blocks), count), np.nan)
+    if known is not None:
+        nodes, rest = _nodes(known, function)
+    samples = 0
+    for number in np.unique(nodes):
+        rows = np.flatnonzero(nodes == number)
+        some = stretch.some(rows) if len(rows) < count else stretch
+        found = _interpolated(function, some, int(number), rest[:, rows])
+        values[rows], times[rows], measured[rows] = found
+        samples += len(rows) * int(number)
+    return _Found(values, times, measured, known is not None, samples)
+
+
+def _nodes(known: Array, function: Bounded) -> tuple[Ints, Array]:
+    """Return how many nodes each interval gets (I,), and what the polynomials miss (B, I)."""
+    powers = np.arange(_FEWEST, series.ORDER + 1)
+    missed = known[:, powers] / 2.0 ** (powers - 1.0)[:, None]
+    good = (missed <= function.wanted[:, None, None]).all(axis=0)
+    limits = np.full(len(function.blocks), np.inf)
+    np.minimum.at(limits, function.of, function.allowed)
+    usable = (missed[:, -1] <= 0.5 * limits[:, None]).all(axis=0)
+    enough = good.any(axis=0)
+    which = np.where(enough, np.argmax(good, axis=0), np.where(usable, len(powers) - 1, 0))
+    rest = np.take_along_axis(missed, which[None, None], axis=1)[:, 0]
+    return powers[which], np.where(enough | usable, rest, np.inf)
+
+
+def _interpolated(
+    function: Bounded, stretch: Stretch, count: int, rest: Array
+) -> tuple[Array, Array, Array]:
+    """Return bounds, about when, and measured sizes (I, G) by polynomials through nodes."""
+    u, places, into, between, bends = _matrices(count)
+    values = function.values(stretch, u)
+    coefficients = np.einsum("kp,ipc->ikc", into, values)
+    lengths = _lengths(coefficients, function.blocks)
+    if np.isnan(rest).all():
+        rest = 2.0 * lengths[:, -2:].sum(axis=1).T
+    left = rest.T + np.einsum("k,ikb->ib", bends, lengths)
+    dense = function.sizes(np.einsum("pk,ikc->ipc", between, coefficients), stretch)
+    measured = function.sizes(values, stretch).max(axis=1)
+    which = np.argmax(np.where(np.isnan(dense), np.inf, dense), axis=1)
+    times = stretch.times(places)
+    rows = np.arange(len(times))[:, None]
+    bounds = dense[rows, which, np.arange(dense.shape[2])] + left[:, function.of]
+    return bounds, times[rows, which], measured
+
+
+def _lengths(vectors: Array, blocks: Ints) -> Array:
+    """Return the lengths of blocks of components (I, K, C), (I, K, B)."""
+    return np.asarray(np.sqrt(np.add.reduceat(vectors**2, blocks, axis=2)))
+
+
+@cache
+def _matrices(count: int) -> tuple[Array, Array, Array, Array, Array]:
+    """Return nodes; places; from values to Chebyshev coefficients; to the places; their sag."""
+    u = np.polynomial.chebyshev.chebpts1(count)
+    places = np.linspace(-1.0, 1.0, _PLACES)
+    into = np.linalg.inv(np.polynomial.chebyshev.chebvander(u, count - 1))
+    between = np.polynomial.chebyshev.chebvander(places, count - 1)
+    k = np.arange(float(count))
+    bends = (2.0 / (_PLACES - 1)) ** 2 / 24.0 * k**2 * (k**2 - 1.0)
+    return np.asarray(u), places, np.asarray(into), np.asarray(between), bends
+
+
+def halves(intervals: Array) -> Array:
+    """Return both halves of each interval (I, 2), (2 I, 2)."""
+    middle = intervals.mean(axis=1)
+    both = np.stack([intervals[:, 0], middle, middle, intervals[:, 1]], axis=1)
+    return both.reshape(-1, 2)

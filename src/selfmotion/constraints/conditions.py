@@ -1,0 +1,247 @@
+"""Conditions h ≤ 0 or h = 0 on the motion at the nodes of the grid, as the optimiser sees them.
+
+Limits are kept with a margin, so that the motion between nodes and the last digits of the
+optimisation stay within the limits themselves.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from selfmotion.basics import Array, Ints, ProblemError
+from selfmotion.certificate import Column, Quantity
+from selfmotion.costs import Samples
+from selfmotion.motion import Sampling
+
+
+@dataclass(frozen=True, eq=False)
+class NodeTangents:
+    """How the motion at the nodes changes with d decision variables.
+
+    Attributes
+    ----------
+    q, qd : (N + 1, n, d)
+    sampling : Sampling
+        When.
+    """
+
+    q: Array
+    qd: Array
+    sampling: Sampling
+
+    @property
+    def size(self) -> int:
+        """The number d of variables."""
+        return int(self.q.shape[2])
+
+    def along(self, p: Array) -> "NodeTangents":
+        """Return the tangents by one variable, the length along p (d,)."""
+        return NodeTangents((self.q @ p)[:, :, None], (self.qd @ p)[:, :, None], self.sampling)
+
+    def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
+        """Return the tangents of some of the joints at some of the nodes (k,), (k, d)."""
+        if order < 2:
+            return (self.q, self.qd)[order][nodes, joints]
+        rows = np.empty((len(nodes), self.size))
+        operator = self.sampling.node_differentiation(order - 1)
+        for joint in np.unique(joints):
+            own = joints == joint
+            rows[own] = operator[nodes[own]] @ self.qd[:, joint]
+        return rows
+
+    def of_order(self, order: int) -> Array:
+        """Return the tangents of q (0), q̇ (1), q̈ (2) or the jerk (3), (N + 1, n, d)."""
+        return (self.q, self.qd)[order] if order < 2 else self._faster[order - 2]
+
+    @cached_property
+    def _faster(self) -> tuple[Array, Array]:
+        flat = self.qd.reshape(len(self.qd), -1)
+        operators = (self.sampling.node_differentiation(order) for order in (1, 2))
+        first, second = ((operator @ flat).reshape(self.qd.shape) for operator in operators)
+        return first, second
+
+
+class BoundConstraint(Protocol):
+    """A condition on the motion of one arm."""
+
+    @property
+    def name(self) -> str:
+        """What to call it in messages."""
+
+    @property
+    def equality(self) -> bool:
+        """Whether h = 0 is meant, rather than h ≤ 0."""
+
+    @property
+    def tolerance(self) -> float:
+        """What h (|h| for an equality) may be and still count as kept."""
+
+    def residual(self, samples: Samples) -> Array:
+        """Return h: (N + 1, C) for conditions at every node, (1, C) for conditions on the whole."""
+
+    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
+        """Return ∂h/∂x for d variables: h's shape with d appended."""
+
+    def describe(self, samples: Samples, row: int, column: int) -> str:
+        """Return what is wrong where h[row, column] is too large, with names and numbers."""
+
+
+class Linear(Protocol):
+    """How conditions change with the motion of the nodes, at one motion."""
+
+    def tangents_of(self, motion: NodeTangents) -> Array:
+        """Return what `BoundConstraint.tangents` does."""
+
+    def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
+        """Return its entries for some rows and columns of h, (k,) each: (k, d)."""
+
+
+class Linearised:
+    """The derivatives of a constraint's conditions at one motion, all of h in one row.
+
+    Parameters
+    ----------
+    shape : (int, int)
+        That of h.
+    known : Linear or (rows × columns, d)
+    """
+
+    def __init__(self, shape: tuple[int, int], known: Linear | Array) -> None:
+        self._shape, self._known = shape, known
+
+    @property
+    def count(self) -> int:
+        """Number C of conditions."""
+        return self._shape[0] * self._shape[1]
+
+    def along(self, p: Array, motion: NodeTangents) -> Array:
+        """Return the derivatives (C,) along p (d,), of which `motion` are the tangents."""
+        known = self._known
+        return known @ p if isinstance(known, np.ndarray) else known.tangents_of(motion).ravel()
+
+    def picked(self, motion: NodeTangents, which: Ints) -> Array:
+        """Return the rows (k, d) of some conditions (k,)."""
+        known = self._known
+        if isinstance(known, np.ndarray):
+            return known[which]
+        return known.picked(motion, *np.divmod(which, self._shape[1]))
+
+
+def linearised(bound: BoundConstraint, samples: Samples, motion: NodeTangents) -> Linearised:
+    """Return the derivatives of a constraint's conditions at a motion.
+
+    What its own ``linearised_at(samples)`` returns, where it has one: the shape of h, and a
+    `Linear` that computes as much as it is asked for. By default all `tangents`; ProblemError where
+    these are not of the shape that they should have.
+    """
+    own = getattr(bound, "linearised_at", None)
+    if callable(own):
+        return Linearised(*own(samples))
+    tangents = bound.tangents(samples, motion)
+    if np.ndim(tangents) != 3 or tangents.shape[2] != motion.size:
+        raise ProblemError(
+            f"constraint '{bound.name}': tangents() has shape {np.shape(tangents)}, expected that "
+            f"of the residual with ({motion.size},) appended"
+        )
+    return Linearised(tangents.shape[:2], tangents.reshape(-1, motion.size))
+
+
+def easing_of(bound: BoundConstraint, column: int) -> tuple[float, str]:
+    """Return how much larger h may be to ask for a little less, and what that means in words.
+
+    What a constraint's own `easing(column)` says, where it has one: ``(0.02, "2 % more speed for
+    joint 'elbow'")``. Columns with the same words are eased together.
+    """
+    own = getattr(bound, "easing", None)
+    return (0.01, f"{bound.name} eased by 0.01") if own is None else own(column)
+
+
+def motion_of_order(samples: Samples, order: int) -> Array:
+    """Return q (0), q̇ (1), q̈ (2) or the jerk (3) at the nodes, (N + 1, n)."""
+    table = (samples.q, samples.qd)[order] if order < 2 else (samples.qdd, samples.qddd)[order - 2]
+    nodes: Array = table[samples.nodes]
+    return nodes
+
+
+def motion_at_nodes(samples: Samples) -> tuple[Array, Array, Array]:
+    """Return q, q̇ and q̈ at the nodes, (N + 1, n) each."""
+    q, qd, qdd = (motion_of_order(samples, order) for order in range(3))
+    return q, qd, qdd
+
+
+@dataclass(frozen=True, eq=False)
+class BoundQuantity:
+    """A quantity's limits, for the columns that have one, with a margin.
+
+    Of numbers h = ±x / limit - 1 + margin, with x the distance from the centre; of vectors
+    h = |x|² / limit² - (1 - margin)².
+
+    Attributes
+    ----------
+    quantity : Quantity
+    margin : float
+        Share of each limit that is aimed to be left unused; at least half of it is.
+    """
+
+    quantity: Quantity
+    margin: float
+    equality = False
+
+    @property
+    def name(self) -> str:
+        """See `BoundConstraint.name`."""
+        return self.quantity.name
+
+    @property
+    def tolerance(self) -> float:
+        """See `BoundConstraint.tolerance`: half the margin is left."""
+        if self.quantity.components == 1:
+            return 0.5 * self.margin
+        return (1.0 - 0.5 * self.margin) ** 2 - (1.0 - self.margin) ** 2
+
+    def residual(self, samples: Samples) -> Array:
+        """See `BoundConstraint.residual`."""
+        used = self._used(samples)
+        if self.quantity.components == 1:
+            return np.hstack([used, -used]) - 1.0 + self.margin
+        return np.asarray(np.sum(used**2, axis=2) - (1.0 - self.margin) ** 2)
+
+    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
+        """See `BoundConstraint.tangents`."""
+        changes = self.quantity.derivatives(*motion_at_nodes(samples))
+        some, limit = self.quantity.limited, self._limit
+        pairs = zip(changes, (motion.of_order(k) for k in range(3)), strict=False)
+        by = np.asarray(sum(np.einsum("k...j,kjd->k...d", part[:, some], x) for part, x in pairs))
+        if self.quantity.components == 1:
+            above = by / limit[:, None]
+            return np.concatenate([above, -above], axis=1)
+        by /= limit[:, None, None]
+        return np.asarray(2.0 * np.einsum("kmc,kmcd->kmd", self._used(samples), by))
+
+    def easing(self, column: int) -> tuple[float, str]:
+        """See `easing_of`: 2 % of a limit, in both directions."""
+        share = 0.02 if self.quantity.components == 1 else 0.04
+        return share, f"2 % more room for the {self._column(column).label}"
+
+    def describe(self, samples: Samples, row: int, column: int) -> str:
+        """See `BoundConstraint.describe`."""
+        which = column % len(self.quantity.limited)
+        away = self._used(samples)[row, which] * self._limit[which]
+        size = float(away) if self.quantity.components == 1 else float(np.linalg.norm(away))
+        time = float(samples.sampling.node_times[row])
+        return self.quantity.said(int(self.quantity.limited[which]), size, time)
+
+    @property
+    def _limit(self) -> Array:
+        return self.quantity.bounds[self.quantity.limited]
+
+    def _column(self, column: int) -> Column:
+        limited = self.quantity.limited
+        return self.quantity.columns[int(limited[column % len(limited)])]
+
+    def _used(self, samples: Samples) -> Array:
+        """Return shares of limits at the nodes, (N + 1, m) or of vectors (N + 1, m, c)."""
+        away = self.quantity.away(*motion_at_nodes(samples))[:, self.quantity.limited]
+        return np.asarray(away / (self._limit if away.ndim == 2 else self._limit[:, None]))

@@ -1,0 +1,100 @@
+"""Bounds of all derivatives of where and how a chain moves, by majorant series."""
+
+from collections.abc import Iterator
+from functools import cached_property
+
+import numpy as np
+
+from selfmotion.basics import Array, series
+from selfmotion.robot.model import RobotModel
+
+
+class ChainSeries:
+    """Majorants of a chain's motion over I intervals of time; see `selfmotion.basics.series`.
+
+    A joint that turns by q is bounded by exp(Q), a product of rotations by the exponential of the
+    sum, a place by the sum of what is carried times what carries it.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    joints : (n, K + 1, I)
+        The joints' own series.
+    half : (I,)
+        Half the width of each interval [s].
+    """
+
+    def __init__(self, robot: RobotModel, joints: Array, half: Array) -> None:
+        self.robot, self.joints, self.half = robot, joints, half
+        self._is_revolute = [not robot.is_prismatic(name) for name in robot.joint_names]
+
+    @cached_property
+    def turned(self) -> list[Array]:
+        """The orientation of the world and of each joint's frame, (K + 1, I) each."""
+        sums = [np.zeros_like(self.joints[0])]
+        for joint, parent, _ in self._links():
+            sums.append(sums[parent] + self.joints[joint] * self._is_revolute[joint])
+        return [series.exponential(total) for total in sums]
+
+    @cached_property
+    def steps(self) -> list[Array]:
+        """From the parent's frame to each joint's, world axes [m]; of the world 0."""
+        found = [np.zeros_like(self.joints[0])]
+        for joint, parent, length in self._links():
+            step = length * self.turned[parent]
+            if not self._is_revolute[joint]:
+                step = step + series.product(self.joints[joint], self.turned[parent])
+            found.append(step)
+        return found
+
+    @cached_property
+    def places(self) -> list[Array]:
+        """The places of the world and of each joint's frame [m]."""
+        found = [self.steps[0]]
+        for joint, parent, _ in self._links():
+            found.append(found[parent] + self.steps[joint + 1])
+        return found
+
+    @cached_property
+    def spins(self) -> list[Array]:
+        """The angular velocities of the world and of each joint's frame [rad/s]."""
+        found = [np.zeros_like(self.joints[0][1:])]
+        for joint, parent, _ in self._links():
+            spin = found[parent]
+            if self._is_revolute[joint]:
+                spin = spin + series.product(self.rate(joint), self.turned[parent])
+            found.append(spin)
+        return found
+
+    def is_revolute(self, joint: int) -> bool:
+        """Return whether a joint turns."""
+        return self._is_revolute[joint]
+
+    def parent(self, joint: int) -> int:
+        """Return the parent of a joint, 0 for the world, else 1 + its number."""
+        return int(self.robot.model.parents[joint + 1])
+
+    def rate(self, joint: int) -> Array:
+        """Return a joint's velocity."""
+        return series.derivative(self.joints[joint], self.half)
+
+    def place(self, frame: int) -> Array:
+        """Return where a frame is [m], by its number."""
+        at = self.robot.model.frames[frame]
+        length = float(np.linalg.norm(at.placement.translation))
+        parent = int(at.parentJoint)
+        return np.asarray(self.places[parent] + length * self.turned[parent])
+
+    def orientation(self, frame: int) -> Array:
+        """Return how a frame is turned."""
+        return self.turned[int(self.robot.model.frames[frame].parentJoint)]
+
+    def spin(self, frame: int) -> Array:
+        """Return how fast a frame turns [rad/s]."""
+        return self.spins[int(self.robot.model.frames[frame].parentJoint)]
+
+    def _links(self) -> Iterator[tuple[int, int, float]]:
+        """Return each joint with its parent and how far it is from there [m]."""
+        placements = list(self.robot.model.jointPlacements)[1:]
+        for joint, placement in enumerate(placements):
+            yield joint, self.parent(joint), float(np.linalg.norm(placement.translation))

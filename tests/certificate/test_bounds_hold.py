@@ -1,0 +1,112 @@
+"""The law of the bound: on 10,000 random intervals it is never below the truth, nor far above."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.certificate import Stretch
+from selfmotion.certificate.bounding import Bounded, _measured
+from selfmotion.certificate.path_error import _PathErrors
+from selfmotion.certificate.quantity import _Shares
+from support.arms import robot_named
+
+ROUNDING = 1e-9
+# Intervals of each kind; with ten kinds 10,000 in all.
+COUNT = 1000
+# Places of each interval at which the truth is looked for.
+DENSE = np.linspace(-1.0, 1.0, 41)
+
+
+def random_motion(robot: sm.RobotModel, rng: np.random.Generator) -> sm.Trajectory:
+    """Steps of 5 to 80 ms at speeds of order 1 rad/s, rough where samples meet."""
+    t = np.append(0.0, np.cumsum(rng.uniform(0.005, 0.08, COUNT)))
+    rate, phase = rng.uniform(1.0, 4.0, robot.dof), rng.uniform(0.0, 6.0, robot.dof)
+    turned, size = np.outer(t, rate) + phase, 0.25
+    q = robot.dexterous_configuration("pose") + size * np.sin(turned)
+    qd = size * rate * np.cos(turned) + rng.normal(0.0, 0.05, q.shape)
+    qdd = -size * rate**2 * np.sin(turned) + rng.normal(0.0, 2.0, q.shape)
+    return sm.Trajectory(t, q, qd, robot.joint_names, qdd)
+
+
+class Wide:
+    """The same function, with everything allowed."""
+
+    def __init__(self, function: Bounded) -> None:
+        self._function = function
+        self.blocks, self.of = function.blocks, function.of
+        self.allowed = np.full(len(function.of), np.inf)
+        self.wanted = np.full(len(function.blocks), 1e-3)
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._function, name)
+
+
+def kinds(robot: sm.RobotModel, motion: sm.Trajectory) -> dict[str, Bounded]:
+    pose = robot.pose(motion.q[0])
+    path = sm.Circle.around(pose, 0.1, float(motion.t[-1]), turns=0.05, turn_tool=True)
+    free = (sm.Relaxation("rz", 0.1), sm.Relaxation(("x", "y"), 1e-2, axes="tool"))
+    given = sm.Tolerance()
+    return {
+        "path": _PathErrors(path, sm.Task.POSE, given, ()),
+        "pointing": _PathErrors(path, sm.Task.POINTING, given, ()),
+        "relaxed": _PathErrors(path, sm.Task.POSE, given, free),
+    } | {
+        name: _Shares(constraint.quantity(robot))
+        for name, constraint in {
+            "joint": sm.Band(sm.JointCoordinate(robot.joint_names[2]), 0.1, 0.5),
+            "height": sm.Band(sm.FrameCoordinate(robot.joint_names[4]), 0.2, 0.5),
+            "swivel": sm.Band(sm.SwivelAngle(), 0.2, 0.5),
+            "torques": sm.JointTorqueLimits(30.0, payload=2.0, center=(0.0, 0.1, 0.1)),
+            "speed": sm.ToolLimits(1.0),
+            "rates": sm.ToolLimits(turn_rate=1.0, turn_acceleration=10.0),
+            "acceleration": sm.ToolLimits(acceleration=10.0),
+        }.items()
+    }
+
+
+NAMES = [
+    "path",
+    "pointing",
+    "relaxed",
+    "joint",
+    "height",
+    "swivel",
+    "torques",
+    "speed",
+    "rates",
+    "acceleration",
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_bounds_are_never_below_the_truth_nor_far_above(name: str) -> None:
+    robot, rng = robot_named("panda"), np.random.default_rng(sum(map(ord, name)))
+    motion = random_motion(robot, rng)
+    function = Wide(kinds(robot, motion)[name])
+    # The swivel of a nearly stretched arm is known on short intervals only.
+    ends = motion.t[:-1] + np.diff(motion.t) * (0.1 if name == "swivel" else 1.0)
+    stretch = Stretch(robot, motion, np.stack([motion.t[:-1], ends], axis=1))
+    found = _measured(function, stretch)  # type: ignore[arg-type]  # it has all that is asked for
+    truth = _truth(function, stretch)
+    assert found.proved
+    known = np.isfinite(found.values).all(axis=1)
+    # Near the stretched arm a swivel has none.
+    assert known.mean() >= (0.5 if name == "swivel" else 0.99)
+    assert np.all(truth[known] <= found.values[known] + ROUNDING)
+    assert np.all(np.median(found.values[known] / np.maximum(truth[known], 1e-6), axis=0) <= 100.0)
+
+
+def _truth(function: Wide, stretch: Stretch) -> Array:
+    values = function.values(stretch, DENSE)  # type: ignore[operator]
+    return np.asarray(function.sizes(values, stretch).max(axis=1))  # type: ignore[operator]
+
+
+def test_a_bound_without_its_remainder_is_caught() -> None:
+    """The law is shown to refuse: with too few nodes and no remainder the truth is above."""
+    robot, rng = robot_named("panda"), np.random.default_rng(0)
+    motion = random_motion(robot, rng)
+    function = Wide(kinds(robot, motion)["path"])
+    stretch = Stretch(robot, motion, np.stack([motion.t[:-1], motion.t[1:]], axis=1))
+    coarse = function.sizes(function.values(stretch, np.zeros(1)), stretch).max(axis=1)  # type: ignore[operator]
+    assert np.any(_truth(function, stretch) > coarse + 1e-3)

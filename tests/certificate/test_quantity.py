@@ -1,0 +1,103 @@
+"""What a constraint measures is told once: judged with its unit, its share and what helps."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.certificate import Column, Quantity, QuantityKept
+from support.arms import robot_named
+from support.motions import motion_of
+
+
+@pytest.mark.parametrize("column", range(4))
+def test_the_tools_rates_are_told_with_the_time_they_take(column: int) -> None:
+    """The stretched arm turning about its base at 2 rad/s: ω r, ω, ω² r, and no turn faster."""
+    robot = robot_named("planar_3r")
+    reach = float(np.linalg.norm(robot.pose(np.zeros(3)).translation[:2]))
+    motion = motion_of([[0.0] * 3, [2.0, 0.0, 0.0]], [[2.0, 0.0, 0.0]] * 2)
+    rates = [2.0 * reach, 2.0, 4.0 * reach, 0.0]
+    limit = np.full(4, np.inf)
+    limit[column] = rates[column] / 4.0 if column < 3 else 1.0
+    requirement = sm.ToolLimits(*limit.tolist()).requirement(robot)
+    found = requirement.judge(motion)
+    names = ("speed", "turn rate", "acceleration", "turn acceleration")
+    assert requirement.covers == (f"tool {names[column]}",)
+    assert found.amount == pytest.approx(4.0 if column < 3 else 0.0, rel=1e-3, abs=1e-6)
+    assert found.kept is (column == 3)
+    if column < 3:
+        longer = found.amount if column < 2 else found.amount**0.5
+        assert f"{names[column]} of the tool 'tool' is {found.amount * limit[column]:.4g}" in (
+            found.text
+        )
+        assert f"give it {longer:.5g} times the duration" in found.text
+
+
+def test_a_band_is_half_its_width_from_its_middle() -> None:
+    robot = robot_named("planar_3r")
+    name = robot.joint_names[1]
+    motion = motion_of([[0.0, 0.2, 0.0], [0.0, 0.5, 0.0]], [[0.0, 0.3, 0.0]] * 2)
+    for center, half, share in ((0.1, 0.5, 0.8), (0.1, 0.3, 4.0 / 3.0), (0.7, 1.0, 0.5)):
+        band = sm.Band(sm.JointCoordinate(name), center, half)
+        found = band.requirement(robot).judge(motion)
+        assert found.amount == pytest.approx(share, rel=1e-3)
+        assert found.kept is (share <= 1.0)
+        assert f"expected {center - half:.4g} to {center + half:.4g}" in found.text
+
+
+def test_what_has_no_limit_is_not_covered_and_said() -> None:
+    robot = robot_named("panda")
+    none = sm.JointTorqueLimits(np.full(7, np.inf)).requirement(robot)
+    assert none.covers == ()
+    assert all(name in none.remarks[0] for name in robot.joint_names)
+    assert "not limited" in none.remarks[0]
+    one = np.full(7, np.inf)
+    one[2] = 30.0
+    some = sm.JointTorqueLimits(one).requirement(robot)
+    assert some.covers == ("torques",)
+    assert robot.joint_names[2] not in some.remarks[0]
+
+
+def sum_of(series: bool, reach: float = 1.0) -> Quantity:
+    """The sum of two joints, with a majorant or without."""
+    return Quantity(
+        "sum",
+        (Column("sum", "sum", "rad"),),
+        lambda q, *_: q[:, :1] + q[:, 1:2],
+        lambda q, *_: (np.tile([1.0, 1.0, 0.0], (len(q), 1, 1)),),
+        limit=reach,
+        series=(lambda stretch: stretch.chain().joints[:2].sum(axis=0)[None]) if series else None,
+    )
+
+
+@pytest.mark.parametrize("series", [True, False])
+def test_a_quantity_without_a_majorant_is_judged_as_measured(series: bool) -> None:
+    motion = motion_of([[0.0] * 3, [0.3, 0.5, 0.0]], np.zeros((2, 3)))
+    requirement = QuantityKept(sum_of(series))
+    found = requirement.judge(motion)
+    assert found.kept
+    assert found.amount == pytest.approx(0.8, rel=1e-3)
+    assert ("judged as measured" in " ".join(requirement.remarks)) is not series
+    assert not QuantityKept(sum_of(series, 0.7)).judge(motion).kept
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, np.nan])
+def test_limits_that_make_no_sense_are_refused(limit: float) -> None:
+    with pytest.raises(sm.ProblemError, match="expected numbers above 0"):
+        sum_of(True, limit)
+
+
+def test_a_quintic_that_vanishes_where_it_may_be_looked_at_is_caught() -> None:
+    """Zero at both samples and at a quarter, the half and three quarters between them."""
+    robot, h = robot_named("ur5"), 4.0
+    q0 = np.array([0.3, -1.2, 1.5, -1.0, 1.2, 0.4])
+    q, qd, qdd = np.tile(q0, (2, 1)), np.zeros((2, 6)), np.zeros((2, 6))
+    qd[:, 1] = 0.09375 / h
+    qdd[:, 1] = [-1.5625 / h**2, 1.5625 / h**2]
+    motion = sm.FinishedMotion(robot, sm.Trajectory([0.0, h], q, qd, robot.joint_names, qdd))
+    t = np.linspace(0.0, h, 4001)
+    for coordinate in (sm.JointCoordinate(robot.joint_names[1]), sm.FrameCoordinate("tool0")):
+        center = float(coordinate(robot, q0[None])[0][0])
+        away = np.abs(coordinate(robot, motion.trajectory(t))[0] - center).max()
+        for share in (0.999, 1.001):
+            band = sm.Band(coordinate, center, away * share)
+            assert band.requirement(robot).judge(motion).kept is (share > 1.0)
