@@ -11,7 +11,7 @@ from selfmotion.basics import Array, Flags, Ints
 from selfmotion.costs import Cost, PathLength, Samples
 from selfmotion.follow import Follows
 from selfmotion.motion import Sampling
-from selfmotion.search import kernels
+from selfmotion.search import edges
 
 # Steps faster than this many times the mean speed of the shortest chain are changes from sample to
 # sample, which the finished motion spreads over more time.
@@ -76,7 +76,7 @@ class Length(Measure):
         """See `Measure.extended`."""
         reach, source = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
         longest = np.ascontiguousarray(step)
-        kernels.extend(before, cost, after, longest, turning, self.weights, reach, source)
+        edges.extend(before, cost, after, longest, turning, self.weights, reach, source)
         return reach, source
 
     def of(self, q: Array) -> float:
@@ -153,7 +153,7 @@ class RunningCost(Measure):
         known = self._steps.get((id(before), id(after)))
         if known is None or known.before is not before or known.after is not after:
             longest = np.ascontiguousarray(step)
-            first, second = kernels.near_pairs(before, after, longest, turning)
+            first, second = edges.near_pairs(before, after, longest, turning)
             price = self._prices(k, before, after, first, second, turning)
             known = _Steps(before, after, first, second, price)
             _note(self._steps, (id(before), id(after)), known, _MANY * len(self.t))
@@ -249,7 +249,7 @@ def _cheapest(
     first: Ints, second: Ints, price: Array, cost: Array, count: int
 ) -> tuple[Array, Ints]:
     reach, source = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
-    kernels.cheapest(first, second, price, cost, reach, source)
+    edges.cheapest(first, second, price, cost, reach, source)
     return reach, source
 
 
