@@ -23,6 +23,7 @@ from support.arms import (
     start_of,
 )
 from support.random_cells import LEFT, RIGHT, random_cell, random_follows
+from support.rollouts import rollout_of
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -58,11 +59,6 @@ def test_the_metric_is_the_differenced_gauss_newton_matrix(
 
 # Exact gradients against central differences of F, relative to the gradient's largest entry.
 GRADIENT = 1e-6
-
-
-def rollout_of(case: Case, steps: int = 12) -> Rollout:
-    robot, task, _, path = case
-    return Rollout(Follows.of(robot, path, task), Grid.aligned(path.knots, steps))
 
 
 COSTS = {

@@ -58,7 +58,7 @@ class Rollout:
         n, m, count = self._sizes
         table = np.zeros((stages, kernels.columns(n, m, count)))
         tips = [kernels.tip_of(table, f, n, m) for f in range(count)]
-        return table, kernels.parts(table, n, m), tips
+        return table, kernels.stage_of(table, n, m), tips
 
     def aim(self, target: PathSamples, f: int = 0) -> None:
         """Let tip f follow other poses and twists from now on, given at the stages (S)."""

@@ -15,7 +15,7 @@ from selfmotion.kernels.algebra import (
     respond,
 )
 from selfmotion.kernels.damping import Law, damp
-from selfmotion.kernels.table import Tip, parts, q_of, qd_of, tip_of
+from selfmotion.kernels.table import Tip, q_of, qd_of, stage_of, tip_of
 from selfmotion.kernels.tool import pose_error, rows_of, select, task_rows
 
 
@@ -42,7 +42,7 @@ def advance(
         return True
     if not evaluate(row, n, layout, gain, law):
         return False
-    step(table, s, n, parts(row, n, m).step[0])
+    step(table, s, n, stage_of(row, n, m).step[0])
     return True
 
 
@@ -55,7 +55,7 @@ def evaluate(row: Array, n: int, layout: Layout, gain: float, law: Law | None) -
     take out. False where A is not positive definite (a singular pose), or q̇ is not finite.
     """
     m = rows_of(layout)
-    at = parts(row, n, m)
+    at = stage_of(row, n, m)
     for f in range(layout.shape[0]):
         tip = tip_of(row, f, n, m)
         task_rows(layout, f, tip.rotation, tip.jacobian, at.task_jacobian)  # J = S J6

@@ -27,7 +27,6 @@ from selfmotion.robot.mounting import (
     mounting_of as mounting_of,
 )
 from selfmotion.robot.placements import (
-    Flags as Flags,
     compose as compose,
     placements as placements,
 )

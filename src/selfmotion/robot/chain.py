@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, Ints
-from selfmotion.robot.placements import Flags, rebase
+from selfmotion.basics import Array, Flags, Ints
+from selfmotion.robot.placements import rebase
 
 # The frame that does not move.
 WORLD = 0
