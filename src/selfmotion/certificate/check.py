@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, shown
+from selfmotion.basics import Array, ProblemError, Progress, shown, silent
 from selfmotion.certificate.deviation import smallest_singular_values
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import arm_limits
@@ -16,6 +16,8 @@ from selfmotion.path import Path, check_oriented
 from selfmotion.robot import RobotModel
 from selfmotion.task import DampingLaw, Relaxation, Task
 
+# Of a long motion the distance from singular poses, which proves nothing, is looked at so often.
+_MOST_POSES = 50_000
 # What is said of paths without bounds of their derivatives.
 _MEASURED = "the path is judged as measured between its marks: it gives no bounds (Path.series)"
 
@@ -31,6 +33,7 @@ def certify(
     relaxations: Sequence[Relaxation] = (),
     damping: DampingLaw | None = None,
     ending: str = "",
+    progress: Progress = silent,
 ) -> Certificate:
     """Check a motion against its path, the arm's limits and what else is required.
 
@@ -51,6 +54,8 @@ def certify(
     ending : str
         Why the motion ends before its path does, where it is known to; such a motion is never
         verified.
+    progress : callable, optional
+        Called with ``("checking", lot, lots)`` while a long motion is looked at.
 
     Returns
     -------
@@ -70,17 +75,18 @@ def certify(
     check_oriented(path, task)
     trajectory = trajectory.of_joints(robot.joint_names)
     motion = FinishedMotion(robot, trajectory)
-    path_check = bound_errors(robot, path, task, trajectory, tolerance, relaxations)
+    path_check = bound_errors(robot, path, task, trajectory, tolerance, relaxations, progress)
     position, rotation = path_check.position, path_check.rotation
-    singular = smallest_singular_values(robot, task, motion.q)
-    damped = () if damping is None else _damped_stretches(damping, motion.t, singular)
+    t = motion.t[:: -(-len(motion.t) // _MOST_POSES)] if damping is None else motion.t
+    singular = smallest_singular_values(robot, task, trajectory(t))
+    damped = () if damping is None else _damped_stretches(damping, t, singular)
     _check(requirements)
     wanted = (*arm_limits(robot, requirements), *requirements)
     findings = tuple(_judged(item, motion) for item in wanted)
     return Certificate(
         position,
         rotation,
-        smallest_singular_value=_least(singular, motion.t, robot.tool),
+        smallest_singular_value=_least(singular, t, robot.tool),
         closure=float(np.abs(trajectory.q[-1] - trajectory.q[0]).max()),
         samples=path_check.samples,
         tolerance=tolerance,

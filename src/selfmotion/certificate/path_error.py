@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, series
+from selfmotion.basics import Array, ProblemError, Progress, series, silent
 from selfmotion.certificate.bounding import Bounded, Stretch, bounded
 from selfmotion.certificate.deviation import (
     deviation_from,
@@ -71,11 +71,12 @@ def bound_errors(
     trajectory: Trajectory,
     tolerance: Tolerance,
     relaxations: Sequence[Relaxation],
+    progress: Progress = silent,
 ) -> PathCheck:
     """Bound the errors of a motion; parameters as in `certify`."""
     _check_times(path, trajectory)
     errors = _PathErrors(path, task, tolerance, relaxations)
-    found = bounded(errors, robot, trajectory, _edges(path, trajectory, relaxations))
+    found = bounded(errors, robot, trajectory, _edges(path, trajectory, relaxations), progress)
     values = errors.angles(found.values)
     names = (robot.tool, robot.tool, *(item.name for item in relaxations))
     extremes = tuple(
