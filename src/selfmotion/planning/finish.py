@@ -64,6 +64,8 @@ def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progres
             misses.append(check.position_error.value + check.rotation_error.value)
             if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
                 break
+            if session.steps >= session.most_steps:
+                break
             session.refine()
             if rough and not session.cut_short:
                 session.minimize()
