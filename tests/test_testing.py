@@ -12,6 +12,7 @@ import selfmotion as sm
 from selfmotion import testing
 from selfmotion.basics import Array, restore
 from selfmotion.cli import app
+from selfmotion.follow import Follows
 from selfmotion.motion import NullMotion
 from support.arms import PANDA_HOME
 
@@ -24,7 +25,7 @@ class SlowElbow(sm.Constraint):
 
     limit: float
 
-    def bind(self, follows: sm.Follows, start: Array, end: Array) -> "SlowNodes":
+    def bind(self, follows: Follows, start: Array, end: Array) -> "SlowNodes":
         return SlowNodes(self.limit)
 
     def requirement(self, robot: sm.RobotModel) -> sm.Requirement:
@@ -119,7 +120,7 @@ def problem() -> sm.Problem:
 class Careless(SlowElbow):
     """Asks the optimiser for nothing, so that only its requirement can tell."""
 
-    def bind(self, follows: sm.Follows, start: Array, end: Array) -> SlowNodes:
+    def bind(self, follows: Follows, start: Array, end: Array) -> SlowNodes:
         return SlowNodes(1e3)
 
 
@@ -200,7 +201,7 @@ def test_a_function_as_cost_is_missed_when_it_is_needed(tmp_path: Path) -> None:
 
 
 class NoRequirement:
-    def bind(self, follows: sm.Follows, start: Array, end: Array) -> SlowNodes:
+    def bind(self, follows: Follows, start: Array, end: Array) -> SlowNodes:
         return SlowNodes(1.0)
 
 

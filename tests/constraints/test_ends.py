@@ -58,7 +58,7 @@ def test_end_configuration_is_reached(panda_circle: Circle) -> None:
     problem = panda_circle()
     robot, task = problem.robot, sm.Task.POSE
     manifold = FreeStart(standing(robot, task), PANDA_HOME)
-    target = manifold.configuration(np.array([0.2]), problem.path.pose(0.0))
+    target = manifold.configuration(np.array([0.2]), problem.follows.targets(np.zeros(1))[0])
     assert target is not None
     constraints = (*LIMITS, sm.EndConfiguration(target))
     plan = sm.plan(panda_circle(constraints=constraints))
@@ -97,9 +97,10 @@ def test_a_jump_in_velocity_is_refused_where_the_path_repeats(panda_circle: Circ
 
 
 def test_end_conditions_that_contradict_each_other_are_named(panda_circle: Circle) -> None:
-    robot, path = panda_circle().robot, panda_circle().path
-    manifold = FreeStart(standing(robot, sm.Task.POSE), PANDA_HOME)
-    end = manifold.configuration(np.array([0.3]), path.pose(0.0))
+    follows = panda_circle().follows
+    end = FreeStart(follows, PANDA_HOME).configuration(
+        np.array([0.3]), follows.targets(np.zeros(1))[0]
+    )
     assert end is not None
     plan = sm.plan(panda_circle(constraints=[sm.ClosedPath(), sm.EndConfiguration(end)]))
     assert not plan.certificate.verified

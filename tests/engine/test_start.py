@@ -1,32 +1,62 @@
-"""A free start stays on the path and knows its tangent."""
+"""A free start stays on the paths and knows its tangent."""
 
 import numpy as np
+import pinocchio as pin
+import pytest
 
-import selfmotion as sm
+from selfmotion.basics import Array
 from selfmotion.engine.start import FreeStart
+from selfmotion.follow import Follows
 from support.arms import robot_named, short_line, start_of
-from support.followed import standing
+from support.two_arms import both_arms
+
+STEP = 1e-6
 
 
-def test_free_start_stays_on_the_path_and_knows_its_tangent() -> None:
-    for name, task in (("planar_3r", "planar"), ("panda", "pose"), ("ur5", "position")):
-        robot, rows = robot_named(name), sm.Task.of(task)
-        start = start_of(robot, task)
-        path = short_line(robot, start)
-        manifold = FreeStart(standing(robot, rows), start)
-        pose = path.pose(0.0)
-        z = 0.2 * np.random.default_rng(4).normal(size=manifold.size)
-        q = manifold.configuration(z, pose)
-        assert q is not None
-        assert max(rows.miss(path.pose(0.0), robot.pose(q))) < 1e-11
-        tangent, _ = manifold.tangent()
-        for i in range(manifold.size):
-            ends = []
-            for sign in (1.0, -1.0):
-                shift = np.zeros_like(z)
-                shift[i] = sign * 1e-6
-                moved = manifold.configuration(z + shift, pose)
-                assert moved is not None
-                ends.append(moved)
-            np.testing.assert_allclose(tangent[:, i], (ends[0] - ends[1]) / 2e-6, atol=1e-7)
-    assert manifold.configuration(np.full(manifold.size, 50.0), pose) is None
+def _one(name: str, task: str) -> tuple[Follows, Array]:
+    robot = robot_named(name)
+    start = start_of(robot, task)
+    return Follows.of(robot, short_line(robot, start), task), start
+
+
+CASES = {
+    "planar": lambda: _one("planar_3r", "planar"),
+    "pose": lambda: _one("panda", "pose"),
+    "position": lambda: _one("ur5", "position"),
+    "both arms": lambda: both_arms("pose", "pointing"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_free_start_stays_on_the_paths_and_knows_its_tangent(case: str) -> None:
+    """For changes along the self-motion, and of the poses that are followed."""
+    follows, start = CASES[case]()
+    manifold, target = FreeStart(follows, start), follows.targets(np.zeros(1))[0]
+    z = 0.2 * np.random.default_rng(4).normal(size=manifold.size)
+    q = manifold.configuration(z, target)
+    assert q is not None
+    for item in follows.items:
+        assert max(item.miss(item.path.pose(0.0), q)) < 1e-11
+    by_z, by_pose = manifold.tangent()
+
+    def moved(change: Array) -> Array:
+        shift, poses = change[: manifold.size], target.copy()
+        for f, twist in enumerate(change[manifold.size :].reshape(-1, 6)):
+            place = poses[12 * f : 12 * f + 12]
+            place[3:] = (pin.exp3(twist[3:]) @ place[3:].reshape(3, 3)).ravel()
+            place[:3] += twist[:3]
+        found = manifold.configuration(z + shift, poses)
+        assert found is not None
+        return np.array(found)
+
+    size = manifold.size + 6 * len(follows.items)
+    differences = [moved(STEP * e) - moved(-STEP * e) for e in np.eye(size)]
+    expected = np.array(differences).T / (2.0 * STEP)
+    np.testing.assert_allclose(np.hstack([by_z, by_pose]), expected, atol=1e-7)
+
+
+def test_what_is_too_far_along_the_self_motion_is_no_start() -> None:
+    follows, start = CASES["position"]()
+    manifold = FreeStart(follows, start)
+    far = np.full(manifold.size, 50.0)
+    assert manifold.configuration(far, follows.targets(np.zeros(1))[0]) is None

@@ -22,7 +22,7 @@ class Corridor(sm.Constraint):
 
     motion: sm.Trajectory
 
-    def bind(self, robot: sm.RobotModel, task: sm.Task, start: Array, end: Array) -> "Nodes":
+    def bind(self, follows: sm.Follows, start: Array, end: Array) -> "Nodes":
         return Nodes(self.motion)
 
     def requirement(self, robot: sm.RobotModel) -> sm.Requirement:

@@ -71,12 +71,12 @@ def commanded(rng: np.random.Generator, cycles: int, limits: Array, h: float) ->
     states, inner = np.zeros((cycles + 1, 3, 7)), np.vstack([tightened(limits), np.zeros(7)])
     states[0, 0] = rng.uniform(limits[0] + 1e-6, limits[1] - 1e-6)
     task, table, here = sm.Task.POSE, nonsense(rng, cycles), np.eye(3)
-    kind = kernels.angle_kind(task.rows, task.tool_axes)
+    layout = kernels.layout_of([(task.rows, task.tool_axes, np.arange(7))], 7)
     for cycle in range(cycles):
         # Of full rank, of less, and of none.
         jacobian = rng.standard_normal((6, 7)) * (rng.random((6, 1)) < rng.choice([0.0, 0.7, 1.0]))
         arm = jacobian, here, np.zeros(3)
-        law.command(cycle, *arm, table, states, inner, task.rows, kind, 20.0, h)
+        law.command(cycle, *arm, table, states, inner, layout, 20.0, h)
     return states
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.search import spread, targets
+from selfmotion.follow import Follows
+from selfmotion.search import spread
 from selfmotion.search.manifold import Manifold
 from support.arms import robot_named
 from support.followed import standing
@@ -19,9 +20,10 @@ def test_compiled_kinematics_that_are_not_those_of_pinocchio_are_refused(
 ) -> None:
     robot = robot_named("panda")
     arrays = robot.chain.arrays
-    wrong = arrays.positions.copy()
+    wrong = arrays.tree.positions.copy()
     wrong[3, 0] += off
-    monkeypatch.setattr(robot.chain, "arrays", arrays._replace(positions=wrong))
+    tree = arrays.tree._replace(positions=wrong)
+    monkeypatch.setattr(robot.chain, "arrays", arrays._replace(tree=tree))
     with pytest.raises(sm.RobotError, match="compiled kinematics put 'panda_hand_tcp'"):
         Manifold(standing(robot, sm.Task.POSITION), robot.lower, robot.upper)
 
@@ -32,7 +34,9 @@ def test_projection_is_onto_the_path_and_within_the_limits(name: str, task: str)
     path = line_of(robot, task)
     manifold = Manifold(standing(robot, rows), robot.lower, robot.upper)
     seeds = np.array(list(spread(robot, 100, np.random.default_rng(0))))
-    q, arrived = manifold.project(seeds, targets(path, np.zeros(1))[0], far=True)
+    q, arrived = manifold.project(
+        seeds, Follows.of(robot, path, "pose").targets(np.zeros(1))[0], far=True
+    )
     # Of an arm near its limits not every seed leads there.
     assert arrived.sum() > 10
     for here in q[arrived]:

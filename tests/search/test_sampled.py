@@ -7,7 +7,6 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.basics.errors import NoSequenceError
 from selfmotion.follow import Follows
-from selfmotion.search import targets
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.sampled import sampled_sequences
 from support.arms import robot_named
@@ -56,7 +55,7 @@ def test_it_is_not_longer_than_following_from_the_same_start() -> None:
     best = searched(robot, path)[0]
     manifold = Manifold(standing(robot, sm.Task.POSITION), robot.lower, robot.upper)
     q, length = best.q[:1], 0.0
-    for target in targets(path, best.t)[1:]:
+    for target in Follows.of(robot, path, "pose").targets(best.t)[1:]:
         following, arrived = manifold.project(q, target)
         assert arrived.all()
         length += float(np.abs(following - q).sum())

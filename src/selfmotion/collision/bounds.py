@@ -23,7 +23,7 @@ class BoundingBoxes:
     """
 
     def __init__(self, robot: RobotModel, bodies: Sequence[Body]) -> None:
-        self._chain = robot.chain.arrays[:4]
+        self._tree = robot.tree
         joints = np.array([body.joint for body in bodies], dtype=np.int64)
         turns = np.array([body.place.rotation for body in bodies]).reshape(-1, 3, 3)
         middles = [body.place.act(0.5 * (body.solid.low + body.solid.high)) for body in bodies]
@@ -57,4 +57,4 @@ class BoundingBoxes:
         # Here, because importing numba takes longer than everything else in the package.
         from selfmotion.collision import kernels
 
-        return kernels.lower_bounds(q, *self._chain, *self._boxes, pairs, limit)
+        return kernels.lower_bounds(q, *self._tree, *self._boxes, pairs, limit)

@@ -65,6 +65,8 @@ def separation(
 @kernel
 def lower_bounds(
     q: Array,
+    coordinates: Ints,
+    parents: Ints,
     rotations: Array,
     positions: Array,
     axes: Array,
@@ -76,7 +78,7 @@ def lower_bounds(
     pairs: Ints,
     limit: float,
 ) -> Array:
-    """Return `BoundingBoxes.lower_bounds`; the chain as in `placements`."""
+    """Return `BoundingBoxes.lower_bounds`; the tree as in `placements`."""
     bounds = np.empty((len(q), len(pairs)))
     r, p = np.empty((q.shape[1] + 1, 3, 3)), np.empty((q.shape[1] + 1, 3))
     turned, place = np.empty((len(joints), 3, 3)), np.empty((len(joints), 3))
@@ -85,7 +87,7 @@ def lower_bounds(
         h = halves[i]
         radii[i] = math.sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2])
     for k in range(len(q)):
-        placements(q[k], rotations, positions, axes, is_revolute, r, p)
+        placements(q[k], coordinates, parents, rotations, positions, axes, is_revolute, r, p)
         for i in range(len(joints)):
             j = joints[i]
             compose(r[j], p[j], turns[i], middles[i], turned[i], place[i])

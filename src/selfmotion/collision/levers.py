@@ -56,7 +56,7 @@ def pair_levers(distances: Array, moved: npt.NDArray[np.bool_], pairs: Ints) -> 
 
 def is_turned(robot: RobotModel) -> npt.NDArray[np.bool_]:
     """Return which joints are revolute, (n,)."""
-    return np.asarray(robot.chain.arrays.is_revolute, dtype=np.bool_)
+    return robot.is_revolute
 
 
 def travel_beyond(robot: RobotModel, farthest: Array) -> float:
@@ -76,7 +76,7 @@ class _Chain:
     def __init__(self, robot: RobotModel) -> None:
         model = robot.model
         self._places = [pin.SE3(place) for place in model.jointPlacements]
-        axes, is_revolute = robot.chain.arrays[2:4]
+        axes, is_revolute = robot.tree.axes, robot.tree.is_revolute
         self.is_revolute = [False, *is_revolute.tolist()]
         self._axes = [np.zeros(3), *axes]
         self._travel = [0.0, *_travel(robot).tolist()]

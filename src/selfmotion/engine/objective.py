@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from selfmotion.basics import Array, ProblemError
 from selfmotion.constraints import BoundConstraint, NodeTangents
@@ -17,7 +16,6 @@ from selfmotion.engine.start import FixedStart, FreeStart, Start
 from selfmotion.engine.still import StillMotion
 from selfmotion.motion import Grid, NullMotion, NullMotionTable, Trajectory
 from selfmotion.optimise import Residuals, Rows
-from selfmotion.path import PathSamples
 from selfmotion.problem import Problem
 
 
@@ -89,7 +87,7 @@ class Objective:
         # ∂q/∂x and ∂q̇/∂x there, once they were asked for.
         self._tangents: tuple[Array, Array] | None = None
         self._terms: dict[str, float] = {}
-        self._first = rollout.first_pose
+        self._first = rollout.first_target
 
     @classmethod
     def of(
@@ -330,12 +328,11 @@ class Objective:
 
     def _evaluate(self, x: Array) -> None:
         z, coefficients, c = self.parts(x)
-        pose = self._first
+        first = self._first
         if self._deviation.size:
-            target = self._deviation.target(c)
-            self.rollout.aim(target)
-            pose = _first_pose(target)
-        start = self.start.configuration(z, pose)
+            self.rollout.aim(self._deviation.target(c))
+            first = self.rollout.first_target
+        start = self.start.configuration(z, first)
         if start is None:
             return
         if self.rollout.run(start, self.null_motion.epsilon(coefficients)) is not None:
@@ -385,7 +382,3 @@ class Objective:
         target_matrix[:, :, last:] = self._deviation.matrix(x[last:])
         start_matrix[:, last:] = by_pose @ target_matrix[0, :6, last:]
         return self.rollout.sensitivities(epsilon_matrix, start_matrix, target_matrix)
-
-
-def _first_pose(target: PathSamples) -> pin.SE3:
-    return pin.SE3(target.rotation[0], target.translation[0])

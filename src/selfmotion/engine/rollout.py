@@ -1,7 +1,6 @@
 """Integrates eq. 4 with Pinocchio's frame Jacobians, and pulls gradients back through it."""
 
 import numpy as np
-import pinocchio as pin
 
 from selfmotion import kernels
 from selfmotion.basics import Array
@@ -9,7 +8,7 @@ from selfmotion.costs import Samples, TipSamples
 from selfmotion.follow import Follows
 from selfmotion.motion import Grid
 from selfmotion.path import PathSamples
-from selfmotion.robot import Kinematics, march
+from selfmotion.robot import march
 from selfmotion.task import DampingLaw, feedback_rate
 
 # A tool this near to the path [m, rad] is on it; Newton's method needs few steps to that.
@@ -39,9 +38,7 @@ class Rollout:
         self.follows, self.robot, self.grid = follows, follows.robot, grid
         self.damping = damping
         self.jacobian_evaluations = 0
-        first = follows.items[0].chain.kinematics()
-        others = [Kinematics(item.chain, first.data) for item in follows.items[1:]]
-        self._kinematics = [first, *others]
+        self._kinematics = follows.kinematics().each
         self._law = None if damping is None else (damping.threshold, damping.strength)
         self._gain = feedback_rate(follows.duration)
         self._table, self._at, self._tips = self._new_table(len(grid.stage_times))
@@ -186,10 +183,12 @@ class Rollout:
         return self.samples().error
 
     @property
-    def first_pose(self) -> pin.SE3:
-        """The pose that the first tip follows at the start."""
-        tip = self._tips[0]
-        return pin.SE3(np.array(tip.target_rotation[0]), np.array(tip.target_translation[0]))
+    def first_target(self) -> Array:
+        """The poses that the tips follow at the start, as in `Follows.targets`, (12 F,)."""
+        parts = [
+            part for tip in self._tips for part in (tip.target_translation, tip.target_rotation)
+        ]
+        return np.concatenate([part[0].ravel() for part in parts])
 
     @property
     def targets(self) -> list[Array]:

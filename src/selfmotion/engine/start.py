@@ -3,7 +3,6 @@
 from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from selfmotion import kernels
 from selfmotion.basics import Array
@@ -15,19 +14,22 @@ _STEPS, _ARRIVED = 20, 1e-9
 
 
 class Start(Protocol):
-    """q(0) as a function of `size` decision variables z and of the tool's first pose."""
+    """q(0) as a function of `size` decision variables z and of the tips' first poses."""
 
     @property
     def size(self) -> int:
         """Number of decision variables."""
 
-    def configuration(self, z: Array, pose: pin.SE3) -> Array | None:
-        """Return q(0) (n,), or None where no configuration belongs to z and the pose."""
+    def configuration(self, z: Array, target: Array) -> Array | None:
+        """Return q(0) (n,), or None where no configuration belongs to z and the poses.
+
+        These are as `Follows.targets` has them, (12 F,).
+        """
 
     def tangent(self) -> tuple[Array, Array]:
-        """Return ∂q(0)/∂z (n, size) and that with respect to the pose (n, 6), at the last q(0).
+        """Return ∂q(0)/∂z (n, size) and that with respect to the poses (n, 6 F), at the last q(0).
 
-        The pose's change is [m, world rotation vector].
+        A pose's change is [m, rotation vector].
         """
 
 
@@ -39,7 +41,7 @@ class FixedStart:
     def __init__(self, q: Array) -> None:
         self._q = q
 
-    def configuration(self, z: Array, pose: pin.SE3) -> Array:
+    def configuration(self, z: Array, target: Array) -> Array:
         """See `Start.configuration`."""
         return self._q
 
@@ -49,7 +51,7 @@ class FixedStart:
 
 
 class FreeStart:
-    """The start moves along the self-motion manifold of the tool's first pose.
+    """The start moves along the self-motion manifold of the tips' first poses.
 
     q(0) solves F(q) = x(0) and N0ᵀ(q - q_ref) = z, with N0 an orthonormal null-space basis at the
     reference: coordinates of the manifold, exact and smooth near it.
@@ -58,16 +60,14 @@ class FreeStart:
     ----------
     follows : Follows
     reference : (n,)
-        q_ref, on the path's first pose; z = 0.
+        q_ref, on the first poses; z = 0.
     """
 
     def __init__(self, follows: Follows, reference: Array) -> None:
-        task = follows.task
-        self._task, self._reference = task, reference
+        self._follows, self._reference = follows, reference
         self._null = follows.null_basis(reference)
         self._at = reference
-        self._tool = follows.only.chain.kinematics()
-        self._layout = follows.layout
+        self._tips = follows.kinematics()
         self._chart = np.ascontiguousarray(self._null), np.array(reference, dtype=np.float64)
 
     @property
@@ -75,17 +75,11 @@ class FreeStart:
         """See `Start.size`: the redundancy r."""
         return int(self._null.shape[1])
 
-    def configuration(self, z: Array, pose: pin.SE3) -> Array | None:
+    def configuration(self, z: Array, target: Array) -> Array | None:
         """See `Start.configuration`."""
-        q, tool = self._reference + self._null @ z, self._tool
-        target = np.array(pose.rotation, order="C"), np.array(pose.translation)
+        q, layout = self._reference + self._null @ z, self._follows.layout
         for _ in range(_STEPS):
-            # In one order, for which the rest of the package is compiled, too.
-            jacobian, rotation = (np.ascontiguousarray(a) for a in (tool.at(q), tool.rotation))
-            place = rotation, tool.translation
-            wrong = kernels.approach_start(
-                q, jacobian, *place, *target, self._layout, *self._chart, z
-            )
+            wrong = kernels.approach_start(q, *self._tips.at(q), target, layout, *self._chart, z)
             # NaN arrives nowhere.
             if not wrong >= 0.0:
                 return None
@@ -96,10 +90,17 @@ class FreeStart:
 
     def tangent(self) -> tuple[Array, Array]:
         """See `Start.tangent`: [J; N0ᵀ]⁻¹ [0; I] and [J; N0ᵀ]⁻¹ [S; 0]."""
-        m, r = self._task.dimension, self.size
-        jacobian = self._task.select(self._tool.at(self._at), self._tool.rotation)
-        right = np.zeros((m + r, r + 6))
+        items, r = self._follows.items, self.size
+        m, count = self._follows.dimension, len(items)
+        jacobians, rotations, _ = self._tips.at(self._at)
+        right = np.zeros((m + r, r + 6 * count))
         right[m:, :r] = np.eye(r)
-        right[:m, r:] = self._task.select(np.eye(6), self._tool.rotation)
-        both = np.linalg.solve(np.vstack([jacobian, self._null.T]), right)
+        rows, first = [], 0
+        for f, item in enumerate(items):
+            rows.append(item.task.select(jacobians[f], rotations[f]))
+            last = first + item.task.dimension
+            here = slice(r + 6 * f, r + 6 * f + 6)
+            right[first:last, here] = item.task.select(np.eye(6), rotations[f])
+            first = last
+        both = np.linalg.solve(np.vstack([*rows, self._null.T]), right)
         return np.asarray(both[:, :r]), np.asarray(both[:, r:])

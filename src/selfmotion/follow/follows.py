@@ -8,6 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError
 from selfmotion.follow.follow import Follow
+from selfmotion.follow.kinematics import TipKinematics
 from selfmotion.kernels import Layout, layout_of
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel, null_space
@@ -79,6 +80,18 @@ class Follows:
     def linear(self) -> Array:
         """1 for rows in metres, 0 for those in radians, (m,)."""
         return np.concatenate([item.task.rows < 3 for item in self.items]).astype(np.float64)
+
+    def kinematics(self) -> TipKinematics:
+        """Return the kinematics of all tips with data of their own, for whoever asks often."""
+        return TipKinematics([item.chain for item in self.items])
+
+    def targets(self, t: Array) -> Array:
+        """Return where the tips have to be at times t (W,): translation and rotation, (W, 12 F)."""
+        parts = []
+        for item in self.items:
+            samples = item.target(t)
+            parts += [samples.translation, samples.rotation.reshape(len(samples.t), 9)]
+        return np.ascontiguousarray(np.hstack(parts))
 
     @cached_property
     def layout(self) -> Layout:

@@ -1,16 +1,11 @@
 """From a problem back to its file."""
 
-import dataclasses
 from pathlib import Path as FilePath
 from typing import Any
 
 from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path
-from selfmotion.constraints import Constraint
-from selfmotion.costs import Cost
 from selfmotion.formats.documents import write_document
-from selfmotion.motion import NullMotion
-from selfmotion.path import Path
-from selfmotion.problem import NO_OVERLAP, Problem, check_problem
+from selfmotion.problem import Problem, check_problem, problem_to_dict
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot, mounting_of
 
 
@@ -30,31 +25,9 @@ def write_problem(problem: Problem, file: str | FilePath) -> None:
 
 def problem_table(problem: Problem) -> dict[str, Any]:
     """Return the table of a problem file; see `write_problem`."""
-    start = problem.given_start
-    table: dict[str, Any] = {
-        "task": problem.task.value,
-        "start": "free" if start is None else start.tolist(),
-    }
-    if problem.collision is None:
-        table["collision"] = False
-    if not problem.rest:
-        table["rest"] = False
-    if problem.damping is not None:
-        table["damping"] = dataclasses.asdict(problem.damping)
-    table["robot"] = _robot(problem.robot)
-    table["path"] = _described(problem.path, Path)
-    table["null_motion"] = _described(problem.null_motion, NullMotion)
-    table["costs"] = [_described(cost, Cost) for cost in problem.costs]
-    table["constraints"] = [_described(item, Constraint) for item in problem.constraints]
-    if problem.relaxations:
-        # Those at their defaults would put an infinite band into JSON.
-        table["relaxations"] = [
-            {key: value for key, value in item.to_dict().items() if value != float("inf")}
-            for item in problem.relaxations
-        ]
-    if problem.collision not in (None, NO_OVERLAP):
-        described = _described(problem.collision, Constraint)
-        table["collision"] = {key: value for key, value in described.items() if key != "kind"}
+    table = problem_to_dict(problem, _robot, _described)
+    if isinstance(table.get("collision"), dict):
+        del table["collision"]["kind"]
     return {key: _without_none(value) for key, value in table.items()}
 
 
@@ -84,10 +57,11 @@ def _is_named(robot: RobotModel, name: str) -> bool:
     return known.urdf.text == robot.urdf.bare_text() and known.touching == robot.touching
 
 
-def _described(value: Saved, family: type[Saved]) -> dict[str, Any]:
+def _described(value: Saved) -> dict[str, Any]:
     """Return the description of a value, its class named by module where it is the user's own."""
     described, cls = value.to_dict(), type(value)
     if described["kind"] != cls.kind:
+        family = next(base for base in cls.__mro__ if Saved in base.__bases__)
         raise ProblemError(
             f"{cls.__name__} '{getattr(value, 'name', '')}' holds a function, which a file cannot "
             f"carry; derive a class from selfmotion.{family.__name__}"

@@ -4,17 +4,17 @@ import numpy as np
 
 from selfmotion.basics import Array, kernel
 from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
+from selfmotion.kernels.table import part
 from selfmotion.kernels.tool import KIND, Layout, pose_error, rows_of, select, task_rows
 
 
 @kernel
 def approach_start(
     q: Array,
-    frame_jacobian: Array,
-    rotation: Array,
-    translation: Array,
-    target_rotation: Array,
-    target_translation: Array,
+    jacobians: Array,
+    rotations: Array,
+    translations: Array,
+    target: Array,
     layout: Layout,
     null: Array,
     reference: Array,
@@ -22,15 +22,18 @@ def approach_start(
 ) -> float:
     """Add B⁻¹b to q (n,), with B = [J; N0ᵀ] and b = [e; z - N0ᵀ(q - q_ref)]; return max |b|.
 
-    B⁻¹ = Bᵀ(BBᵀ)⁻¹: errors of the product are taken out by the next step. -1 where B is singular,
-    NaN where q is not finite.
+    Of all tips, (F, 6, n), (F, 3, 3) and (F, 3), and their targets' translations and rotations,
+    (12 F,). B⁻¹ = Bᵀ(BBᵀ)⁻¹: errors of the product are taken out by the next step. -1 where B is
+    singular, NaN where q is not finite.
     """
     m, r, n = rows_of(layout), null.shape[1], q.shape[0]
     error, b = np.zeros(6), np.empty(m + r)
     system, factor = np.empty((m + r, n)), np.empty((m + r, m + r))
-    pose_error(layout[0, KIND], target_translation, target_rotation, translation, rotation, error)
-    select(layout, 0, rotation, error, b)
-    task_rows(layout, 0, rotation, frame_jacobian, system)
+    for f in range(layout.shape[0]):
+        place, turn = part(target, 12 * f, (3,)), part(target, 12 * f + 3, (3, 3))
+        pose_error(layout[f, KIND], place, turn, translations[f], rotations[f], error)
+        select(layout, f, rotations[f], error, b)
+        task_rows(layout, f, rotations[f], jacobians[f], system)
     for i in range(r):
         b[m + i] = z[i]
         for k in range(n):

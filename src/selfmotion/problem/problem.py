@@ -40,11 +40,8 @@ from selfmotion.constraints import (
 from selfmotion.costs import Cost, JointVelocity, OffPath
 from selfmotion.follow import Follows
 from selfmotion.motion import NullMotion, RefinedNullMotion, Trajectory, resting_window
-from selfmotion.path import Path, check_oriented
-from selfmotion.problem.path_scale import check_pace, check_units
-from selfmotion.problem.redundancy import check_redundancy
-from selfmotion.problem.relaxed_rows import check_relaxations
-from selfmotion.problem.rest import rest_orders
+from selfmotion.path import Path
+from selfmotion.problem.fit import check_fit, rest_orders
 from selfmotion.robot import RobotModel
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 
@@ -149,16 +146,12 @@ class Problem:
             object.__setattr__(self, "costs", (JointVelocity.usual(self.robot),))
         for name, each in _SEQUENCES.items():
             object.__setattr__(self, name, as_several(getattr(self, name), name, each))
-        check_oriented(self.path, self.task)
-        check_relaxations(self.relaxations, self.path, self.task)
+        check_fit(self.follows, self.relaxations)
         if isinstance(self.start, str):
             if self.start != "free":
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
             object.__setattr__(self, "start", None)
         object.__setattr__(self, "rest", as_flag(self.rest, "rest"))
-        check_redundancy(self.follows, bool(self.relaxations))
-        check_units(self.robot, self.path)
-        check_pace(self.robot, self.path)
         self._check_costs()
         self._check_constraints()
         if self.start is not None:

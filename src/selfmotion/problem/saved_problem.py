@@ -3,44 +3,66 @@
 import dataclasses
 import json
 from collections.abc import Callable, Mapping, MutableMapping
+from operator import methodcaller
 from typing import Any
 
-from selfmotion.basics import restore
+from selfmotion.basics import Saved, restore
 from selfmotion.constraints import Constraint
 from selfmotion.costs import cost_from_dict
 from selfmotion.motion import NullMotion
 from selfmotion.path import Path
 from selfmotion.problem.problem import NO_OVERLAP, Problem
-from selfmotion.robot import rebuild_robot
+from selfmotion.robot import RobotModel, rebuild_robot
 from selfmotion.task import Damping, Relaxation
 
 
-def problem_to_dict(problem: Problem) -> dict[str, Any]:
-    """Return a problem as JSON-safe values, the URDF's text among them; functions are lost."""
-    robot, start = problem.robot, problem.given_start
-    return {
-        "robot": {
-            "text": robot.urdf.text,
-            "package_dirs": list(robot.urdf.package_dirs),
-            "source": robot.urdf.source,
-            "continuous": sorted(robot.urdf.continuous()),
-            "tool": list(robot.tools),
-            "reference": robot.reference,
-            "locked": dict(robot.locked),
-            "touching": [list(pair) for pair in robot.touching],
-            "acceleration_limit": robot.acceleration_limit.tolist(),
-            "jerk_limit": robot.jerk_limit.tolist(),
-        },
-        "path": problem.path.to_dict(),
+def problem_to_dict(
+    problem: Problem,
+    describe_robot: Callable[[RobotModel], dict[str, Any]] | None = None,
+    describe: Callable[[Saved], dict[str, Any]] = methodcaller("to_dict"),
+) -> dict[str, Any]:
+    """Return a problem as JSON-safe values: the document of plans' files and of problem files.
+
+    By default with the URDF's text, and without functions of the user's. A problem file names the
+    arm instead, and refuses what it cannot carry.
+    """
+    start, collision = problem.given_start, problem.collision
+    document: dict[str, Any] = {
         "task": problem.task.value,
-        "start": None if start is None else start.tolist(),
-        "null_motion": problem.null_motion.to_dict(),
-        "costs": [cost.to_dict() for cost in problem.costs],
-        "constraints": [item.to_dict() for item in problem.constraints],
-        "relaxations": [item.to_dict() for item in problem.relaxations],
-        "damping": None if problem.damping is None else dataclasses.asdict(problem.damping),
-        "collision": None if problem.collision is None else problem.collision.to_dict(),
-        "rest": problem.rest,
+        "start": "free" if start is None else start.tolist(),
+        "robot": (describe_robot or _robot_to_dict)(problem.robot),
+        "path": describe(problem.path),
+        "null_motion": describe(problem.null_motion),
+        "costs": [describe(cost) for cost in problem.costs],
+        "constraints": [describe(item) for item in problem.constraints],
+    }
+    if problem.relaxations:
+        # Those at their defaults would put an infinite band into JSON.
+        document["relaxations"] = [
+            {key: value for key, value in item.to_dict().items() if value != float("inf")}
+            for item in problem.relaxations
+        ]
+    if problem.damping is not None:
+        document["damping"] = dataclasses.asdict(problem.damping)
+    if collision != NO_OVERLAP:
+        document["collision"] = False if collision is None else describe(collision)
+    if not problem.rest:
+        document["rest"] = False
+    return document
+
+
+def _robot_to_dict(robot: RobotModel) -> dict[str, Any]:
+    return {
+        "text": robot.urdf.text,
+        "package_dirs": list(robot.urdf.package_dirs),
+        "source": robot.urdf.source,
+        "continuous": sorted(robot.urdf.continuous()),
+        "tool": list(robot.tools),
+        "reference": robot.reference,
+        "locked": dict(robot.locked),
+        "touching": [list(pair) for pair in robot.touching],
+        "acceleration_limit": robot.acceleration_limit.tolist(),
+        "jerk_limit": robot.jerk_limit.tolist(),
     }
 
 
@@ -62,7 +84,9 @@ def problem_from_dict(
         return once(item, lambda: restore(Constraint, item))
 
     robot = once(values["robot"], lambda: rebuild_robot(**values["robot"]))
-    damping, collision = values["damping"], values["collision"]
+    damping, collision = values.get("damping"), values.get("collision", NO_OVERLAP)
+    if isinstance(collision, Mapping):
+        collision = constraint(collision)
     return Problem(
         robot,
         restore(Path, values["path"]),
@@ -71,8 +95,8 @@ def problem_from_dict(
         restore(NullMotion, values["null_motion"]),
         tuple(cost_from_dict(item, robot) for item in values["costs"]),
         tuple(constraint(item) for item in values["constraints"]),
-        tuple(Relaxation(**item) for item in values["relaxations"]),
+        tuple(Relaxation(**item) for item in values.get("relaxations", ())),
         None if damping is None else Damping(**damping),
-        collision and (NO_OVERLAP if collision == NO_OVERLAP.to_dict() else constraint(collision)),
-        values["rest"],
+        collision or None,
+        values.get("rest", True),
     )

@@ -4,6 +4,7 @@ from selfmotion.robot.chain import (
     Chain as Chain,
     ChainArrays as ChainArrays,
     Kinematics as Kinematics,
+    TreeArrays as TreeArrays,
     march as march,
     null_space as null_space,
 )

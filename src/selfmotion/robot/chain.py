@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion.basics import Array, Ints
@@ -25,24 +26,42 @@ WORLD = 0
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
-class ChainArrays(NamedTuple):
-    """What compiled kinematics need of a chain of c joints, from base to tip.
+class TreeArrays(NamedTuple):
+    """What compiled kinematics need of c joints; see `placements`.
 
     Attributes
     ----------
+    joints : (c,)
+        Their coordinates.
+    parents : (c,)
+        The row that each is placed in: 0 the base, j + 1 that of joint j.
     rotations, positions : (c, 3, 3), (c, 3)
-        Of each joint at q = 0 in the frame of the one before, the first in the base frame [m].
+        Of each joint at q = 0 in the frame of the row before [m].
     axes : (c, 3)
         In the joints' own frames; turned round where a joint is passed from its far side.
     is_revolute : (c,)
-    tip_rotation, tip_position : (3, 3), (3,)
-        Of the tip in the frame of the last joint [m].
     """
 
+    joints: Ints
+    parents: Ints
     rotations: Array
     positions: Array
     axes: Array
     is_revolute: Flags
+
+
+class ChainArrays(NamedTuple):
+    """What compiled kinematics need of a chain.
+
+    Attributes
+    ----------
+    tree : TreeArrays
+        Its joints from base to tip, each placed in the one before.
+    tip_rotation, tip_position : (3, 3), (3,)
+        Of the tip in the frame of the last joint [m].
+    """
+
+    tree: TreeArrays
     tip_rotation: Array
     tip_position: Array
 
@@ -105,7 +124,12 @@ class Kinematics:
 
     def at(self, q: Array) -> Array:
         """Return the Jacobian at q (n,), (6, n): rows [v, ω] of the tip in the base's axes."""
-        self.refresh(q)
+        pin.computeJointJacobians(self.chain.model, self.data, q)
+        return self.beside()
+
+    def beside(self) -> Array:
+        """Return the same where the data are those of the configuration already."""
+        self.place_frames()
         chain = self.chain
         if chain.is_rooted:
             jacobian: Array = pin.getFrameJacobian(chain.model, self.data, chain.tip, _AXES)
@@ -190,6 +214,11 @@ class Chain:
         """Whether the base is the world, and all joints are on the way to the tip."""
         return self.base == WORLD and len(self.joints) == self.dof
 
+    @property
+    def tip_name(self) -> str:
+        """Name of the tip's frame."""
+        return str(self.model.frames[self.tip].name)
+
     def kinematics(self) -> Kinematics:
         """Return the chain's kinematics with data of their own, for whoever asks often."""
         return Kinematics(self)
@@ -247,34 +276,47 @@ class Chain:
         """What compiled kinematics need."""
         model, frames = self.model, self.model.frames
         place = frames[self.base].placement.inverse()
-        rotations, positions, axes, kinds = [], [], [], []
+        places = []
         for joint, sign in self._passed:
             if sign > 0:
                 place = place * model.jointPlacements[joint]
-            twist = _motion(model, joint)
-            is_revolute = bool(np.any(twist.angular))
-            rotations.append(np.array(place.rotation))
-            positions.append(np.array(place.translation))
-            axes.append(sign * np.array(twist.angular if is_revolute else twist.linear))
-            kinds.append(is_revolute)
+            places.append(place)
             place = pin.SE3.Identity() if sign > 0 else model.jointPlacements[joint].inverse()
         place = place * frames[self.tip].placement
         return ChainArrays(
-            np.array(rotations).reshape(-1, 3, 3),
-            np.array(positions).reshape(-1, 3),
-            np.array(axes).reshape(-1, 3),
-            np.array(kinds, dtype=np.bool_),
+            _arrays(model, self.joints, np.arange(len(self.joints)), places, self.signs),
             np.array(place.rotation),
             np.array(place.translation),
         )
 
 
-def _motion(model: Any, joint: int) -> pin.Motion:
-    """Return the twist of a joint at unit speed, in its own frame."""
+def tree_arrays(model: Any) -> TreeArrays:
+    """Return what compiled kinematics need of all joints of a model, placed in the world."""
+    joints = np.arange(model.nv, dtype=np.int64)
+    places = list(model.jointPlacements)[1:]
+    return _arrays(model, joints, list(model.parents)[1:], places, np.ones(model.nv))
+
+
+def _arrays(
+    model: Any, joints: Ints, parents: npt.ArrayLike, places: Sequence[pin.SE3], signs: Array
+) -> TreeArrays:
     data = model.createData()
     # Columns [v, ω] at the world's origin; of one joint Pinocchio returns a vector.
-    columns = pin.computeJointJacobians(model, data, pin.neutral(model)).reshape(6, -1)
-    return data.oMi[joint].actInv(pin.Motion(columns[:, joint - 1]))
+    columns = pin.computeJointJacobians(model, data, pin.neutral(model)).reshape(6, -1).T
+    twists = [data.oMi[int(j) + 1].actInv(pin.Motion(columns[j])) for j in joints]
+    is_revolute = [bool(np.any(twist.angular)) for twist in twists]
+    axes = [
+        signs[j] * np.array(twist.angular if turns else twist.linear)
+        for j, twist, turns in zip(joints, twists, is_revolute, strict=True)
+    ]
+    return TreeArrays(
+        np.array(joints, dtype=np.int64),
+        np.array(parents, dtype=np.int64),
+        np.array([place.rotation for place in places]).reshape(-1, 3, 3),
+        np.array([place.translation for place in places]).reshape(-1, 3),
+        np.array(axes).reshape(-1, 3),
+        np.array(is_revolute, dtype=np.bool_),
+    )
 
 
 def null_space(jacobians: Array) -> Array:

@@ -18,10 +18,11 @@ from selfmotion.basics import (
     random_numbers,
     shown,
 )
-from selfmotion.robot.chain import WORLD, Chain
+from selfmotion.robot.chain import WORLD, Chain, TreeArrays, tree_arrays
 from selfmotion.robot.full_model import full_model, link_geometry
 from selfmotion.robot.held import locked_configuration
 from selfmotion.robot.mesh_files import bad_meshes, without_meshes
+from selfmotion.robot.placements import Flags
 from selfmotion.robot.urdf import Urdf
 from selfmotion.task import Task, as_pose
 
@@ -111,6 +112,16 @@ class RobotModel:
         """Number n of joints."""
         return len(self.joint_names)
 
+    @cached_property
+    def tree(self) -> TreeArrays:
+        """What compiled kinematics need of all joints, placed in the world."""
+        return tree_arrays(self.model)
+
+    @property
+    def is_revolute(self) -> Flags:
+        """Which joints' coordinates are angles, (n,)."""
+        return self.tree.is_revolute
+
     def is_prismatic(self, joint: str) -> bool:
         """Whether a joint's coordinate is a length [m]."""
         return self.urdf.joints[joint].kind == "prismatic"
@@ -119,7 +130,7 @@ class RobotModel:
     def reach(self) -> float:
         """How far from its root the tool can be at most [m]: an upper bound, link by link."""
         arrays = self.chain.arrays
-        links = np.vstack([arrays.positions, arrays.tip_position])
+        links = np.vstack([arrays.tree.positions, arrays.tip_position])
         slides = [
             float(max(abs(low), abs(high)))
             for name, low, high in zip(self.joint_names, self.lower, self.upper, strict=True)
@@ -136,12 +147,11 @@ class RobotModel:
         links beyond [rad/m].
         """
         arrays = self.chain.arrays
-        links = np.linalg.norm([*arrays.positions[1:], arrays.tip_position], axis=1)
+        links = np.linalg.norm([*arrays.tree.positions[1:], arrays.tip_position], axis=1)
         beyond = np.cumsum(links[::-1])[::-1]
-        slides = np.array([self.is_prismatic(name) for name in self.joint_names])
-        levers = beyond[~slides]
+        levers = beyond[arrays.tree.is_revolute]
         mean = float(levers.mean()) if levers.size and levers.max() > 0.0 else 1.0
-        return np.where(slides, 1.0 / mean, 1.0)
+        return np.where(self.is_revolute, 1.0, 1.0 / mean)
 
     def configuration(self, q: npt.ArrayLike) -> Array:
         """Return `q` as a float64 vector of n finite numbers.

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics import Array, Ints, inlined, kernel
 
 Flags = npt.NDArray[np.bool_]
 
@@ -40,6 +40,8 @@ def compose(first: Array, at: Array, second: Array, there: Array, r: Array, p: A
 @inlined
 def placements(
     q: Array,
+    joints: Ints,
+    parents: Ints,
     rotations: Array,
     positions: Array,
     axes: Array,
@@ -47,10 +49,10 @@ def placements(
     r: Array,
     p: Array,
 ) -> None:
-    """Write where q (n,) places the joints of a chain: (n + 1, 3, 3) and (n + 1, 3).
+    """Write where q (n,) places the joints of a tree: (c + 1, 3, 3) and (c + 1, 3).
 
-    Row 0 is the world. Each joint has a place in the frame of the one before, (n, 3, 3) and (n, 3),
-    and an axis in its own, (n, 3).
+    Row 0 is the base. Each joint has a coordinate, `joints` (c,), a place in the frame of another
+    row, `parents` (c,), which is (c, 3, 3) and (c, 3), and an axis in its own, (c, 3).
     """
     # Loops: numba takes seconds for what NumPy checks of shapes.
     turn, middle, shift, slide = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
@@ -58,11 +60,12 @@ def placements(
         p[0, a] = 0.0
         for b in range(3):
             r[0, a, b] = 1.0 if a == b else 0.0
-    for j in range(len(q)):
-        compose(r[j], p[j], rotations[j], positions[j], middle, shift)
-        turned(axes[j], q[j] if is_revolute[j] else 0.0, turn)
+    for j in range(len(joints)):
+        x, before = q[joints[j]], parents[j]
+        compose(r[before], p[before], rotations[j], positions[j], middle, shift)
+        turned(axes[j], x if is_revolute[j] else 0.0, turn)
         for a in range(3):
-            slide[a] = 0.0 if is_revolute[j] else q[j] * axes[j, a]
+            slide[a] = 0.0 if is_revolute[j] else x * axes[j, a]
         compose(middle, shift, turn, slide, r[j + 1], p[j + 1])
 
 

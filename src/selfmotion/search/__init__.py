@@ -4,7 +4,6 @@ from selfmotion.search.curves import (
     Curve as Curve,
     CurveSet as CurveSet,
     SelfMotion as SelfMotion,
-    targets as targets,
 )
 from selfmotion.search.guides import (
     SequenceGuide as SequenceGuide,

@@ -8,7 +8,6 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Progress, read_only, silent
 from selfmotion.follow import Follows
-from selfmotion.path import Path
 from selfmotion.search import kernels
 from selfmotion.search.manifold import Manifold
 
@@ -116,8 +115,8 @@ class SelfMotion:
     def __init__(self, follows: Follows, spacing: float) -> None:
         robot = follows.robot
         self.robot, self.spacing = robot, spacing
-        self.revolute = np.array([not robot.is_prismatic(name) for name in robot.joint_names])
-        self._tool = follows.only.chain.kinematics()
+        self.revolute = robot.is_revolute
+        self._tips = follows.kinematics()
         everywhere = np.full(robot.dof, np.inf)
         self._manifold = Manifold(follows, -everywhere, everywhere)
         # Any direction that is not a row of the Jacobian gives the tangent by projection.
@@ -130,7 +129,7 @@ class SelfMotion:
         ----------
         q : (n,)
         target : (12,)
-            The tool's translation and rotation (see `targets`).
+            The tool's translation and rotation (see `Follows.targets`).
         far : bool
             Whether q is any configuration instead of one near the solution.
         """
@@ -148,13 +147,8 @@ class SelfMotion:
 
     def tangent(self, q: Array, target: Array) -> Array | None:
         """Return a unit null vector of J at q, a solution; None where q is singular."""
-        tangent, tool = self._direction.copy(), self._tool
-        # In the order of what compiled kinematics make: so `correct` is compiled only once.
-        jacobian, rotation = (np.ascontiguousarray(a) for a in (tool.at(q), tool.rotation))
-        place = rotation, tool.translation
-        length = kernels.correct(
-            q.copy(), jacobian, *place, target, self._manifold.layout, tangent, _LONGEST
-        )
+        tangent, layout = self._direction.copy(), self._manifold.layout
+        length = kernels.correct(q.copy(), *self._tips.at(q), target, layout, tangent, _LONGEST)
         return tangent if length >= 0.0 and np.all(np.isfinite(tangent)) else None
 
     def trace(self, q: Array, target: Array) -> Curve | None:
@@ -193,17 +187,9 @@ class SelfMotion:
         """Return the samples (K, n) from `start` on, and whether they lead back to it."""
         samples, on = np.empty((_MOST_SAMPLES, self.robot.dof)), self._manifold
         count, closed = kernels.walk(
-            start, tangent, target, on.chain, on.layout, self.spacing, samples
+            start, tangent, target, on.chains, on.revolute, on.layout, self.spacing, samples
         )
         return samples[:count].copy(), closed
-
-
-def targets(path: Path, t: Array) -> Array:
-    """Return the tool's translation and rotation at times t (W,), in rows (W, 12)."""
-    samples = path.samples(t)
-    return np.ascontiguousarray(
-        np.hstack([samples.translation, samples.rotation.reshape(len(samples.t), 9)])
-    )
 
 
 def curves_along(

@@ -17,7 +17,7 @@ from selfmotion.kernels import (
     solve_cholesky,
     task_rows,
 )
-from selfmotion.robot import ChainArrays, compose, placements
+from selfmotion.robot import ChainArrays, TreeArrays, compose, placements
 
 Mask = npt.NDArray[np.bool_]
 
@@ -46,9 +46,9 @@ def wrapped(difference: float, revolute: bool) -> float:
 @kernel
 def correct(
     q: Array,
-    frame_jacobian: Array,
-    rotation: Array,
-    translation: Array,
+    jacobians: Array,
+    rotations: Array,
+    translations: Array,
     target: Array,
     layout: Layout,
     tangent: Array,
@@ -56,22 +56,18 @@ def correct(
 ) -> float:
     """Add J⁺e to q, no longer than `longest`, and project `tangent` onto the null space of J.
 
-    `target` is the tool's translation (3) and rotation (9). Returns the norm of the correction
+    Of all tips, (F, 6, n), (F, 3, 3) and (F, 3); `target` (12 F,) is as `Follows.targets` has it.
+    Returns the norm of the correction
     before it was shortened; -1 where J has no full rank.
     """
-    n, m = frame_jacobian.shape[1], rows_of(layout)
+    n, m = jacobians.shape[2], rows_of(layout)
     error, z, along = np.zeros(6), np.empty(m), np.zeros(m)
     jacobian, factor = np.empty((m, n)), np.empty((m, m))
-    pose_error(
-        layout[0, KIND],
-        part(target, 0, (3,)),
-        part(target, 3, (3, 3)),
-        translation,
-        rotation,
-        error,
-    )
-    select(layout, 0, rotation, error, z)
-    task_rows(layout, 0, rotation, frame_jacobian, jacobian)
+    for f in range(layout.shape[0]):
+        place, turn = part(target, 12 * f, (3,)), part(target, 12 * f + 3, (3, 3))
+        pose_error(layout[f, KIND], place, turn, translations[f], rotations[f], error)
+        select(layout, f, rotations[f], error, z)
+        task_rows(layout, f, rotations[f], jacobians[f], jacobian)
     for i in range(m):
         for k in range(n):
             along[i] += jacobian[i, k] * tangent[k]
@@ -101,7 +97,8 @@ def walk(
     start: Array,
     tangent: Array,
     target: Array,
-    chain: ChainArrays,
+    chains: tuple[ChainArrays, ...],
+    revolute: Mask,
     layout: Layout,
     spacing: float,
     samples: Array,
@@ -110,9 +107,10 @@ def walk(
 
     Sets `samples` (K, n); returns how many there are, and whether they lead back to the start.
     """
-    n = len(start)
+    n, tips = len(start), layout.shape[0]
     r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
-    rotation, position, jacobian = np.empty((3, 3)), np.empty(3), np.zeros((6, n))
+    rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
+    jacobians = np.zeros((tips, 6, n))
     tangents, q = np.empty((3, n)), np.empty(n)
     for k in range(n):
         samples[0, k], q[k] = start[k], start[k] + spacing * tangent[k]
@@ -120,15 +118,15 @@ def walk(
             tangents[i, k] = tangent[k]
     state, code = np.array([spacing, 0.0, 1.0, spacing]), GOING
     while code == GOING:
-        _place(q, chain, r, p, rotation, position, jacobian)
+        _place(q, chains, r, p, rotations, positions, jacobians)
         code = _advance(
             q,
-            jacobian,
-            rotation,
-            position,
+            jacobians,
+            rotations,
+            positions,
             target,
             layout,
-            chain.is_revolute,
+            revolute,
             samples,
             tangents,
             state,
@@ -139,9 +137,9 @@ def walk(
 @inlined
 def _advance(
     q: Array,
-    frame_jacobian: Array,
-    rotation: Array,
-    translation: Array,
+    jacobians: Array,
+    rotations: Array,
+    translations: Array,
     target: Array,
     layout: Layout,
     revolute: Mask,
@@ -157,9 +155,7 @@ def _advance(
     """
     n, count = q.shape[0], int(state[2])
     last = samples[count - 1]
-    length = correct(
-        q, frame_jacobian, rotation, translation, target, layout, tangents[1], state[3]
-    )
+    length = correct(q, jacobians, rotations, translations, target, layout, tangents[1], state[3])
     state[1] += 1
     if length > CONVERGED and state[1] < _CORRECTIONS:
         return GOING
@@ -372,7 +368,7 @@ def cheapest(
 def project_all(
     q: Array,
     targets: Array,
-    chain: ChainArrays,
+    chains: tuple[ChainArrays, ...],
     layout: Layout,
     lower: Array,
     upper: Array,
@@ -380,15 +376,15 @@ def project_all(
     steps: int,
     arrived: Mask,
 ) -> None:
-    """Put each of q (K, n) onto its target (K, 12) by Newton's method, in place.
+    """Put each of q (K, n) onto its target (K, 12 F) by Newton's method, in place.
 
     A joint that would leave its limits stays at the limit, and the others do the rest. `arrived`
     (K,) says of which that was possible within so many steps.
     """
-    n = q.shape[1]
+    n, tips = q.shape[1], layout.shape[0]
     r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
-    rotation, position = np.empty((3, 3)), np.empty(3)
-    jacobian, unused = np.zeros((6, n)), np.empty(n)
+    rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
+    jacobians, unused = np.zeros((tips, 6, n)), np.empty(n)
     held = np.zeros(n, dtype=np.bool_)
     for k in range(len(q)):
         arrived[k] = False
@@ -404,14 +400,15 @@ def project_all(
             if inside and length < CONVERGED:
                 arrived[k] = True
                 break
-            _place(q[k], chain, r, p, rotation, position, jacobian)
+            _place(q[k], chains, r, p, rotations, positions, jacobians)
             for j in range(n):
                 unused[j] = 1.0
                 if held[j]:
-                    for i in range(6):
-                        jacobian[i, j] = 0.0
+                    for f in range(tips):
+                        for i in range(6):
+                            jacobians[f, i, j] = 0.0
             length = correct(
-                q[k], jacobian, rotation, position, targets[k], layout, unused, longest
+                q[k], jacobians, rotations, positions, targets[k], layout, unused, longest
             )
             # Singular, or not a number.
             if not length >= 0.0:
@@ -421,39 +418,49 @@ def project_all(
 @inlined
 def _place(
     q: Array,
-    chain: ChainArrays,
+    chains: tuple[ChainArrays, ...],
     r: Array,
     p: Array,
-    rotation: Array,
-    position: Array,
-    jacobian: Array,
+    rotations: Array,
+    positions: Array,
+    jacobians: Array,
 ) -> None:
-    """Set the joints' places, the tool's, and its Jacobian (6, n) at q (n,)."""
-    rotations, positions, axes, is_revolute, tool_rotation, tool_position = chain
-    n = len(q)
-    placements(q, rotations, positions, axes, is_revolute, r, p)
-    compose(r[n], p[n], tool_rotation, tool_position, rotation, position)
-    _jacobian(r, p, axes, is_revolute, position, jacobian)
+    """Set the tips' places, and their Jacobians (F, 6, n), at q (n,)."""
+    for f in range(len(chains)):
+        tree, tip_rotation, tip_position = chains[f]
+        placements(
+            q,
+            tree.joints,
+            tree.parents,
+            tree.rotations,
+            tree.positions,
+            tree.axes,
+            tree.is_revolute,
+            r,
+            p,
+        )
+        last = len(tree.joints)
+        compose(r[last], p[last], tip_rotation, tip_position, rotations[f], positions[f])
+        _jacobian(r, p, tree, positions[f], jacobians[f])
 
 
 @inlined
-def _jacobian(
-    r: Array, p: Array, axes: Array, is_revolute: Mask, tool: Array, jacobian: Array
-) -> None:
-    """Write the Jacobian [v, ω] (6, n) of the tool's origin, world axes."""
+def _jacobian(r: Array, p: Array, tree: TreeArrays, tip: Array, jacobian: Array) -> None:
+    """Write the columns of a tip's Jacobian [v, ω] (6, n) at its origin, in the base's axes."""
     axis = np.empty(3)
-    for j in range(len(axes)):
+    for j in range(len(tree.joints)):
+        column = tree.joints[j]
         for a in range(3):
             axis[a] = 0.0
             for b in range(3):
-                axis[a] += r[j + 1, a, b] * axes[j, b]
-        if is_revolute[j]:
-            x, y, z = tool[0] - p[j + 1, 0], tool[1] - p[j + 1, 1], tool[2] - p[j + 1, 2]
-            jacobian[0, j] = axis[1] * z - axis[2] * y
-            jacobian[1, j] = axis[2] * x - axis[0] * z
-            jacobian[2, j] = axis[0] * y - axis[1] * x
+                axis[a] += r[j + 1, a, b] * tree.axes[j, b]
+        if tree.is_revolute[j]:
+            x, y, z = tip[0] - p[j + 1, 0], tip[1] - p[j + 1, 1], tip[2] - p[j + 1, 2]
+            jacobian[0, column] = axis[1] * z - axis[2] * y
+            jacobian[1, column] = axis[2] * x - axis[0] * z
+            jacobian[2, column] = axis[0] * y - axis[1] * x
             for a in range(3):
-                jacobian[3 + a, j] = axis[a]
+                jacobian[3 + a, column] = axis[a]
         else:
             for a in range(3):
-                jacobian[a, j], jacobian[3 + a, j] = axis[a], 0.0
+                jacobian[a, column], jacobian[3 + a, column] = axis[a], 0.0

@@ -27,8 +27,8 @@ class Manifold:
     Attributes
     ----------
     revolute : (n,)
-    chain : ChainArrays
-        What compiled kinematics need: `Chain.arrays`.
+    chains : tuple of ChainArrays
+        What compiled kinematics need: `Chain.arrays` of each tip.
     layout : (1, 9 + n)
         See `Follows.layout`.
 
@@ -39,11 +39,11 @@ class Manifold:
     """
 
     def __init__(self, follows: Follows, lower: Array, upper: Array) -> None:
-        self.follows, self.robot, self.task = follows, follows.robot, follows.task
+        self.follows, self.robot = follows, follows.robot
         # Copies: kernels are compiled anew for what may not be written to.
         self._limits = np.array(lower), np.array(upper)
-        self.chain = follows.only.chain.arrays
-        self.revolute: npt.NDArray[np.bool_] = self.chain.is_revolute
+        self.chains = tuple(item.chain.arrays for item in follows.items)
+        self.revolute: npt.NDArray[np.bool_] = follows.robot.is_revolute
         self.layout = follows.layout
         self._check()
 
@@ -55,16 +55,16 @@ class Manifold:
         Parameters
         ----------
         q : (K, n)
-        target : (12,) or (K, 12)
-            See `targets`.
+        target : (12 F,) or (K, 12 F)
+            See `Follows.targets`.
         far : bool
             Whether q is any configuration instead of one near the solution.
         """
         found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
-        wanted = np.array(np.broadcast_to(target, (len(q), 12)), order="C")
+        wanted = np.array(np.broadcast_to(target, (len(q), np.shape(target)[-1])), order="C")
         steps = _FAR_STEPS if far else _NEAR_STEPS
         kernels.project_all(
-            found, wanted, self.chain, self.layout, *self._limits, _LONGEST, steps, arrived
+            found, wanted, self.chains, self.layout, *self._limits, _LONGEST, steps, arrived
         )
         return found, arrived
 
@@ -77,12 +77,16 @@ class Manifold:
         ends = zip(self._limits, self.robot.finite_limits(), strict=True)
         lower, upper = (np.where(np.isfinite(own), own, finite) for own, finite in ends)
         for q in np.random.default_rng(0).uniform(lower, upper, (3, self.robot.dof)):
-            pose = self.robot.pose(q)
-            target = np.concatenate([pose.translation, pose.rotation.ravel()])
+            items = self.follows.items
+            poses = [item.chain.place(q) for item in items]
+            target = np.concatenate(
+                [part for pose in poses for part in (pose.translation, pose.rotation.ravel())]
+            )
             found, arrived = self.project(q[None], target)
-            miss = max(self.task.miss(pose, self.robot.pose(found[0])))
-            if not (arrived[0] and miss < _AGREE):
-                raise RobotError(
-                    f"{self.robot.name}: compiled kinematics put '{self.robot.tool}' {miss:.3g} "
-                    f"off where Pinocchio does; this is an error of selfmotion's"
-                )
+            for item, pose in zip(items, poses, strict=True):
+                miss = max(item.miss(pose, found[0]))
+                if not (arrived[0] and miss < _AGREE):
+                    raise RobotError(
+                        f"{self.robot.name}: compiled kinematics put '{item.chain.tip_name}' "
+                        f"{miss:.3g} off where Pinocchio does; this is an error of selfmotion's"
+                    )

@@ -7,7 +7,6 @@ import numpy as np
 from selfmotion.basics import Array, InverseKinematicsError
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
-from selfmotion.search.curves import targets
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.starts import spread, start_candidates
 
@@ -83,7 +82,8 @@ class _Poses:
 
     def __init__(self, robot: RobotModel, problem: Problem, rng: np.random.Generator) -> None:
         self._robot, self._path, self._task, self._rng = robot, problem.path, problem.task, rng
-        self._manifold = Manifold(problem.follows.for_robot(robot), robot.lower, robot.upper)
+        self._follows = problem.follows.for_robot(robot)
+        self._manifold = Manifold(self._follows, robot.lower, robot.upper)
         self._seeds = np.array(list(spread(robot, _SEEDS, rng)))
 
     def solutions(self, t: float, known: Array) -> Array:
@@ -111,7 +111,7 @@ class _Poses:
 
     def _reached(self, t: float, seeds: Array, *, far: bool = False) -> Array:
         """Return what Newton's method makes of seeds (K, n) for the pose at t, (K', n)."""
-        target = targets(self._path, np.array([t]))[0]
+        target = self._follows.targets(np.array([t]))[0]
         found, arrived = self._manifold.project(seeds, target, far=far)
         return np.asarray(found[arrived])
 

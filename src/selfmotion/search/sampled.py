@@ -10,7 +10,6 @@ from selfmotion.collision import CollisionModel
 from selfmotion.follow import Follows
 from selfmotion.search import kernels
 from selfmotion.search.chains import best_chains, diverse_chains
-from selfmotion.search.curves import targets
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible
@@ -67,7 +66,7 @@ class SampledLayers:
         """Return those of a task that leaves any redundancy; see `sampled_sequences`."""
         manifold = Manifold(follows, *limits)
         bounds = Admissible(*limits, manifold.revolute, bodies)
-        x, generator = targets(follows.path, t), np.random.default_rng(rng)
+        x, generator = follows.targets(t), np.random.default_rng(rng)
         layers = _layers(manifold, bounds, x, largest_step, weights, generator, progress)
         return cls(manifold, x, bounds, layers)
 

@@ -11,7 +11,7 @@ from selfmotion.collision import CollisionModel
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
 from selfmotion.search.chains import best_chains, diverse_chains, unlike, unturned
-from selfmotion.search.curves import CurveSet, SelfMotion, curves_along, targets
+from selfmotion.search.curves import CurveSet, SelfMotion, curves_along
 from selfmotion.search.measures import Length, Mask, Measure
 from selfmotion.search.nodes import Admissible, place_nodes
 from selfmotion.search.reasons import why_blocked
@@ -84,7 +84,7 @@ class CurveLayers:
         """Return those of a task that leaves redundancy 1; see `best_sequences`."""
         motion = SelfMotion(follows, SPACING)
         bounds = Admissible(*limits, motion.revolute, bodies)
-        x = targets(follows.path, t)
+        x = follows.targets(t)
         seeds = list(spread(follows.robot, _SEEDS, np.random.default_rng(rng)))
         curves = curves_along(motion, x, seeds, _EVERY, progress)
         samples = _free_samples(motion, x, curves, bounds, progress)

@@ -7,7 +7,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
-from selfmotion.search.curves import SelfMotion, targets
+from selfmotion.search.curves import SelfMotion
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.nodes import Admissible
 
@@ -61,7 +61,7 @@ def _along_curves(follows: Follows, count: int, rng: np.random.Generator) -> lis
     """Return up to `count` configurations within the limits, evenly over all curves."""
     robot, motion = follows.robot, SelfMotion(follows, _SPACING)
     bounds = Admissible(robot.lower, robot.upper, motion.revolute, ())
-    curves = motion.curves(targets(follows.path, np.zeros(1))[0], spread(robot, _SEEDS, rng)).curves
+    curves = motion.curves(follows.targets(np.zeros(1))[0], spread(robot, _SEEDS, rng)).curves
     # The last sample of a closed curve is its first one.
     samples = [curve.q[: len(curve.q) - curve.closed] for curve in curves]
     inside = [q[bounds.free(q)] for q in samples]
@@ -76,7 +76,7 @@ def _scattered(follows: Follows, count: int, rng: np.random.Generator) -> list[A
     robot = follows.robot
     manifold = Manifold(follows, robot.lower, robot.upper)
     seeds = np.array(list(spread(robot, _TRIES * count, rng)))
-    q, arrived = manifold.project(seeds, targets(follows.path, np.zeros(1))[0], far=True)
+    q, arrived = manifold.project(seeds, follows.targets(np.zeros(1))[0], far=True)
     found: list[Array] = []
     for one in q[arrived]:
         if len(found) < count and all(np.linalg.norm(one - other) > _SAME for other in found):

@@ -1,13 +1,14 @@
-"""Rest to rest: where the tool begins or ends at rest, so does the arm; hand-over at a speed."""
+"""Paths that fit or do not; rest to rest: where the tool rests at an end, so does the arm."""
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 import selfmotion as sm
 from selfmotion.certificate import AtRest
-from selfmotion.problem.rest import rest_orders
+from selfmotion.problem.fit import check_relaxations, rest_orders
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 
 # At rest by construction: what is left is the rounding of the path's own twist.
@@ -175,3 +176,27 @@ def test_an_arm_at_rest_ends_with_the_acceleration_that_is_asked_for(panda: sm.R
     assert last.certificate.verified, last.certificate.verdict
     with pytest.raises(sm.ProblemError, match="needs a given start"):
         sm.Problem(panda, path, constraints=[start])
+
+
+@pytest.mark.parametrize(
+    ("task", "relaxations", "message"),
+    [
+        ("position", [sm.Relaxation("rx")], "does not prescribe rx"),
+        ("pointing", [sm.Relaxation("rz", 0.1)], "does not prescribe rz"),
+        ("planar_pose", [sm.Relaxation("rz", 0.1)], "does not prescribe rz"),
+        ("planar", [sm.Relaxation("x", 0.1, axes="tool")], "tool axes need"),
+        ("pose", [sm.Relaxation("x", during=(1.0, 4.5))], "ends at 4.5 s"),
+        ("pose", [sm.Relaxation("x", 0.1), sm.Relaxation(("x", "y"), 0.1)], "relaxed twice"),
+        ("pose", [sm.Relaxation("x", 0.1), sm.Relaxation("y", 0.1, axes="tool")], "choose one"),
+    ],
+)
+def test_relaxations_that_misfit_are_refused(
+    panda_circle: Callable, task: str, relaxations: list, message: str
+) -> None:
+    with pytest.raises(sm.ProblemError, match=message):
+        check_relaxations(relaxations, panda_circle().path, sm.Task.of(task))
+
+
+def test_problem_refuses_what_is_no_relaxation(panda_circle: Callable) -> None:
+    with pytest.raises(sm.ProblemError, match="relaxations"):
+        panda_circle(relaxations=[0.1])

@@ -1,0 +1,175 @@
+"""Does this path fit this arm? Its rows, its units, how it begins and ends, what is relaxed."""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from selfmotion.basics import ProblemError, RedundancyError
+from selfmotion.follow import Follows
+from selfmotion.path import STILL, Path, check_oriented
+from selfmotion.robot import RobotModel
+from selfmotion.task import POSITION_ROWS, ROW_NAMES, Relaxation, Task
+
+# Speeds are compared this share of the duration from an end, and twice as far from it.
+_NEAR_END = 1e-4
+# Speed that grows with at least this power of the time has no acceleration at the end.
+_SMOOTH = 1.5
+# A path that is nowhere nearer than so many times the arm's reach is in other units.
+_FAR = 20.0
+# Joints without a limit of speed are taken to have this one [rad/s or m/s]; a path that is so many
+# times faster than the arm is in other units. What is less is planned, to be slowed down.
+_FAST, _HOPELESS = 100.0, 100.0
+# Reach that counts for the speed of an arm on an endless slide [m].
+_LONG = 1e3
+
+
+def check_fit(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
+    """Refuse a path that an arm cannot follow in a task's rows, whatever the joint motion.
+
+    Raises
+    ------
+    PathError
+        The task prescribes orientations that the path does not have.
+    ProblemError
+        The arm cannot move the tool in all rows, a relaxation does not fit, or the path can only be
+        meant in other units.
+    RedundancyError
+        There are as many rows as joints, and none is relaxed.
+    """
+    check_oriented(follows.path, follows.task)
+    check_relaxations(relaxations, follows.path, follows.task)
+    _check_redundancy(follows, bool(relaxations))
+    _check_units(follows.robot, follows.path)
+    _check_pace(follows.robot, follows.path)
+
+
+def check_relaxations(relaxations: Sequence[Relaxation], path: Path, task: Task) -> None:
+    """Check that relaxations fit a path and a task, and each other.
+
+    Raises
+    ------
+    ProblemError
+        A row is not among those the task prescribes, a window ends after the path, two relaxations
+        share a row at the same time, or positions are relaxed in different axes.
+    """
+    prescribed = _prescribed(path, task)
+    for item in relaxations:
+        free = [row for row in item.rows if row not in prescribed]
+        if free:
+            raise ProblemError(
+                f"relaxation {item.name}: task '{task.value}' does not prescribe "
+                f"{', '.join(free)}, only {', '.join(prescribed)}"
+            )
+        if item.in_tool_axes and not set(POSITION_ROWS) <= set(prescribed):
+            raise ProblemError(
+                f"relaxation {item.name}: tool axes need a task that prescribes x, y and z, which "
+                f"'{task.value}' does not"
+            )
+        if item.window(path.duration)[1] > path.duration * (1.0 + 1e-9):
+            raise ProblemError(
+                f"relaxation {item.name}: its window ends at {item.window(path.duration)[1]:.6g} "
+                f"s, the path at {path.duration:.6g} s"
+            )
+    for first, second in combinations(relaxations, 2):
+        twice = set(first.rows) & set(second.rows)
+        one, other = first.window(path.duration), second.window(path.duration)
+        if twice and one[0] < other[1] and other[0] < one[1]:
+            raise ProblemError(f"row {', '.join(sorted(twice))} is relaxed twice at the same time")
+    if len({item.in_tool_axes for item in relaxations if not item.angular}) > 1:
+        raise ProblemError("positions are relaxed in world axes and in tool axes; choose one")
+
+
+def _prescribed(path: Path, task: Task) -> list[str]:
+    """Return the rows of the deviation that the task prescribes."""
+    rows = [ROW_NAMES[k] for k in task.rows]
+    if task is Task.PLANAR_POSE:
+        # Its angle is about the world's z axis: only there is rz that angle.
+        axes = path.samples(np.linspace(0.0, path.duration, 9)).rotation[:, :, 2]
+        if not np.allclose(axes, [0.0, 0.0, 1.0]):
+            rows.remove("rz")
+    return rows
+
+
+def _check_redundancy(follows: Follows, is_relaxed: bool) -> None:
+    robot, task = follows.robot, follows.task
+    if not robot.can_follow(task):
+        others = _redundant_tasks(robot)
+        choice = (
+            f"choose another task ({', '.join(others)})"
+            if others
+            else "no other task is left: choose a tool that more joints move"
+        )
+        raise ProblemError(
+            f"{robot.name}: task '{task.value}' prescribes {task.dimension} rows "
+            f"({', '.join(task.row_names)}), but the arm cannot move '{robot.tool}' freely in "
+            f"all of them; {choice}"
+        )
+    if follows.redundancy == 0 and not is_relaxed:
+        others = _redundant_tasks(robot)
+        choice = f"choose a task with fewer rows ({', '.join(others)}), " if others else ""
+        raise RedundancyError(
+            f"{robot.name}: {robot.dof} joints and task '{task.value}' with "
+            f"{task.dimension} rows leave no self-motion; {choice}relax some (relaxations=), "
+            f"or take an arm with more joints",
+            dof=robot.dof,
+            rows=task.dimension,
+        )
+
+
+def _redundant_tasks(robot: RobotModel) -> list[str]:
+    """Return the tasks that the arm can follow and that leave self-motion."""
+    return [x.value for x in Task if x.dimension < robot.dof and robot.can_follow(x)]
+
+
+def _check_units(robot: RobotModel, path: Path) -> None:
+    """Raise ProblemError for a path that can only be meant in millimetres."""
+    times = np.linspace(0.0, path.duration, 9)
+    distances = np.linalg.norm(path.samples(times).translation, axis=1)
+    reach = robot.reach
+    if np.isfinite(reach) and distances.min() > _FAR * reach:
+        raise ProblemError(
+            f"{robot.name}: the path is {distances.min():.4g} m away from the arm's root "
+            f"and more, the arm reaches {reach:.4g} m; positions are in metres"
+        )
+
+
+def _check_pace(robot: RobotModel, path: Path) -> None:
+    """Raise ProblemError for a path that no arm could follow at a hundred times its speed."""
+    fastest = np.minimum(robot.velocity_limit, _FAST)
+    slides = np.array([robot.is_prismatic(name) for name in robot.joint_names])
+    bound = float(np.sum(np.where(slides, fastest, fastest * min(robot.reach, _LONG))))
+    times = np.linspace(0.0, path.duration, 9)
+    speeds = np.linalg.norm(path.samples(times).twist[:, :3], axis=1)
+    k = int(np.argmax(speeds))
+    # Written so that NaN is refused too.
+    if not speeds[k] <= _HOPELESS * bound:
+        raise ProblemError(
+            f"{robot.name}: the path is too fast: {speeds[k]:.3g} m/s at t = {times[k]:.3g} s, "
+            f"while its joints move the tool at {bound:.3g} m/s at most; durations are in seconds"
+        )
+
+
+def rest_orders(path: Path, task: Task) -> tuple[int, int]:
+    """Return how smoothly the prescribed rows begin and end.
+
+    Of each end: 0 where the tool moves, 1 where it rests, 2 where it rests and does not accelerate
+    either, so that a motion from standstill is smooth there.
+    """
+    step = _NEAR_END * path.duration
+    t = np.array([0.0, step, 2.0 * step])
+    first, last = (_speeds(path, task, times) for times in (t, path.duration - t))
+    return _order(first), _order(last)
+
+
+def _speeds(path: Path, task: Task, t: np.ndarray) -> list[float]:
+    samples = path.samples(t)
+    rows = task.select_along(samples.twist[:, :, None], samples.rotation)[:, :, 0]
+    return [float(speed) for speed in np.abs(rows).max(axis=1)]
+
+
+def _order(speeds: list[float]) -> int:
+    at, near, far = speeds
+    if at > STILL:
+        return 0
+    return 2 if far == 0.0 or near <= far * 0.5**_SMOOTH else 1
