@@ -6,6 +6,7 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError, Progress, shown, silent
 from selfmotion.certificate.deviation import smallest_singular_values
+from selfmotion.certificate.feed import FeedReached
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import arm_limits
 from selfmotion.certificate.path_error import bound_errors
@@ -81,7 +82,8 @@ def certify(
     singular = smallest_singular_values(robot, task, trajectory(t))
     damped = () if damping is None else _damped_stretches(damping, t, singular)
     _check(requirements)
-    wanted = (*arm_limits(robot, requirements), *requirements)
+    feeds = tuple(FeedReached(item) for item in path.feeds)
+    wanted = (*arm_limits(robot, requirements), *requirements, *feeds)
     findings = tuple(_judged(item, motion) for item in wanted)
     return Certificate(
         position,

@@ -124,6 +124,12 @@ class Polyline(Path, kind="polyline"):
         return read_only(self._edges)
 
     @property
+    def rounded(self) -> Array:
+        """See `Path.rounded`."""
+        half, at = self._corners.half[1:-1], self.corner_times
+        return np.stack([at - half, at + half], axis=1)
+
+    @property
     def corner_times(self) -> Array:
         """When the corners are passed, without both ends [s], (N - 2,)."""
         return self._times[1:-1]
