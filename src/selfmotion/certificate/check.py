@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, shown
+from selfmotion.basics import Array, ProblemError, Progress, shown, silent
 from selfmotion.certificate.deviation import smallest_singular_values
+from selfmotion.certificate.feed import FeedReached
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import arm_limits
 from selfmotion.certificate.path_error import PathCheck, bound_errors
@@ -17,6 +18,8 @@ from selfmotion.path import Path, check_oriented
 from selfmotion.robot import RobotModel
 from selfmotion.task import DampingLaw, Relaxation, Task
 
+# Of a long motion the distance from singular poses, which proves nothing, is looked at so often.
+_MOST_POSES = 50_000
 # What is said of paths without bounds of their derivatives.
 _MEASURED = "the path is judged as measured between its marks: it gives no bounds (Path.series)"
 
@@ -33,6 +36,7 @@ def certify(
     relaxations: Sequence[Relaxation] = (),
     damping: DampingLaw | None = None,
     ending: str = "",
+    progress: Progress = silent,
 ) -> Certificate:
     """Check a motion against its path, the arm's limits and what else is required.
 
@@ -55,6 +59,8 @@ def certify(
     ending : str
         Why the motion ends before its path does, where it is known to; such a motion is never
         verified.
+    progress : callable, optional
+        Called with ``("checking", lot, lots)`` while a long motion is looked at.
 
     Returns
     -------
@@ -77,19 +83,21 @@ def certify(
     trajectory = trajectory.of_joints(robot.joint_names)
     motion = FinishedMotion(robot, trajectory)
     checks = [
-        bound_errors(robot, item, trajectory, tolerance, () if k else relaxations)
+        bound_errors(robot, item, trajectory, tolerance, () if k else relaxations, progress)
         for k, item in enumerate(follows.items)
     ]
     path_check = checks[0]
-    singular = smallest_singular_values(follows, motion.q)
-    damped = () if damping is None else _damped_stretches(damping, motion.t, singular)
+    t = motion.t[:: -(-len(motion.t) // _MOST_POSES)] if damping is None else motion.t
+    singular = smallest_singular_values(follows, trajectory(t))
+    damped = () if damping is None else _damped_stretches(damping, t, singular)
     _check(requirements)
-    wanted = (*arm_limits(robot, requirements), *requirements)
+    feeds = tuple(FeedReached(item) for item in path.feeds)
+    wanted = (*arm_limits(robot, requirements), *requirements, *feeds)
     findings = tuple(_judged(item, motion) for item in wanted)
     return Certificate(
         path_check.position,
         path_check.rotation,
-        smallest_singular_value=_least(singular, motion.t, robot.tool),
+        smallest_singular_value=_least(singular, t, robot.tool),
         closure=float(np.abs(trajectory.q[-1] - trajectory.q[0]).max()),
         samples=sum(check.samples for check in checks),
         tolerance=tolerance,

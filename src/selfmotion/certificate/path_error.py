@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, series
+from selfmotion.basics import Array, ProblemError, Progress, series, silent
 from selfmotion.certificate.bounding import Bounded, Stretch, bounded
 from selfmotion.certificate.deviation import (
     deviation_from,
@@ -71,12 +71,13 @@ def bound_errors(
     trajectory: Trajectory,
     tolerance: Tolerance,
     relaxations: Sequence[Relaxation],
+    progress: Progress = silent,
 ) -> PathCheck:
     """Bound the errors of a motion on one of its paths; parameters as in `certify`."""
     path, tip = follow.path, follow.chain.tip_name
     _check_times(path, trajectory)
     errors = _PathErrors(follow, tolerance, relaxations)
-    found = bounded(errors, robot, trajectory, _edges(path, trajectory, relaxations))
+    found = bounded(errors, robot, trajectory, _edges(path, trajectory, relaxations), progress)
     values = errors.angles(found.values)
     names = (tip, tip, *(item.name for item in relaxations))
     extremes = tuple(

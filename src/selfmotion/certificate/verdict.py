@@ -12,7 +12,7 @@ _EXPECTED = ("path", "joint limits", "speeds", "accelerations", "self-collision"
 
 @dataclass(frozen=True)
 class Certificate:
-    """What forward kinematics says about a finished motion, on a grid finer than its samples.
+    """What forward kinematics says about a finished motion, at all times.
 
     Attributes
     ----------
