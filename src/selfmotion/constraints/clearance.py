@@ -146,8 +146,8 @@ class _Models:
             )
         if wanted.obstacles and not self.exact.checks_obstacles:
             raise ProblemError(
-                f"{robot.name}: a clearance from obstacles is asked for, but no link that moves has "
-                f"collision geometry; add <collision> to those, or leave the obstacles out"
+                f"{robot.name}: a clearance from obstacles is asked for, but no link that moves "
+                f"has collision geometry; add <collision> to those, or leave the obstacles out"
             )
 
     @cached_property

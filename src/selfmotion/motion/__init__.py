@@ -16,4 +16,8 @@ from selfmotion.motion.null_motion import (
     transport as transport,
 )
 from selfmotion.motion.sampling import Sampling as Sampling
-from selfmotion.motion.trajectory import Trajectory as Trajectory, column_names as column_names
+from selfmotion.motion.trajectory import (
+    MOST_SAMPLES as MOST_SAMPLES,
+    Trajectory as Trajectory,
+    column_names as column_names,
+)

@@ -36,7 +36,7 @@ _MOMENT = 0.5e-9
 # Intervals that are looked at together.
 _LOT = 16_384
 # More samples than this do not fit into memory, and no controller wants them.
-_MOST_SAMPLES = 1e7
+MOST_SAMPLES = 1e7
 
 
 def column_names(joint_names: Sequence[str]) -> list[str]:
@@ -331,10 +331,10 @@ class Trajectory:
             The rate is not positive, or gives too many samples.
         """
         rate = as_number(rate, "rate", above=0.0, error=ValueError)
-        if self.duration * rate > _MOST_SAMPLES:
+        if self.duration * rate > MOST_SAMPLES:
             raise ValueError(
                 f"rate is {rate:g} samples per second, which are {self.duration * rate:.3g} in "
-                f"all; expected at most {_MOST_SAMPLES:g}"
+                f"all; expected at most {MOST_SAMPLES:g}"
             )
         count = int(np.floor(self.duration * rate * (1.0 + 1e-12)))
         t = np.arange(count + 1) / rate
