@@ -12,7 +12,7 @@ from selfmotion.follow import Follows
 from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import NullMotionTable
 from support.arms import Case, central_difference, objective_of, robot_named, short_line, start_of
-from support.rollouts import random_epsilon
+from support.rollouts import random_epsilon, rollout_of
 
 # Products of well-conditioned matrices with entries of order 1.
 ALGEBRA = 1e-10
@@ -20,11 +20,6 @@ ALGEBRA = 1e-10
 
 # Exact gradients against central differences of F, relative to the gradient's largest entry.
 GRADIENT = 1e-6
-
-
-def rollout_of(case: Case, steps: int = 12) -> Rollout:
-    robot, task, _, path = case
-    return Rollout(Follows.of(robot, path, task), Grid.aligned(path.knots, steps))
 
 
 def test_null_space_projector(case: Case) -> None:

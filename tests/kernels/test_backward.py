@@ -36,7 +36,7 @@ def check_stage(follows: Follows, start: Array, damped: bool) -> None:
     q, epsilon = start + 0.02 * rng.normal(size=n), rng.normal(size=n)
     goals = [item.path.pose(0.0) for item in follows.items]
     table = np.zeros((1, kernels.columns(n, m, count)))
-    at = kernels.parts(table, n, m)
+    at = kernels.stage_of(table, n, m)
     tips = [kernels.tip_of(table, f, n, m) for f in range(count)]
     places = [item.chain.kinematics() for item in follows.items]
     gain, layout = 3.0, follows.layout

@@ -16,7 +16,7 @@ def test_parts_tile_what_they_are_parts_of(n: int, m: int, tips: int) -> None:
     space = np.arange(float(kernels.space_size(n, m, tips)))
     of_tips = [part for f in range(tips) for part in table.tip_of(row, f, n, m)]
     for numbers, parts in (
-        (row, [*table.parts(row, n, m), *of_tips]),
+        (row, [*table.stage_of(row, n, m), *of_tips]),
         (space, backward.divide(space, n, m, tips)),
     ):
         found = np.concatenate([part.ravel() for part in parts])
@@ -26,15 +26,15 @@ def test_parts_tile_what_they_are_parts_of(n: int, m: int, tips: int) -> None:
 def test_compiled_parts_are_those_in_python() -> None:
     """Of a row, and q and q̇ by themselves."""
     rows = np.random.default_rng(0).normal(size=(2, kernels.columns(7, 6, 2)))
-    read, read_tip = compiled(table.parts), compiled(table.tip_of)
+    read, read_tip = compiled(table.stage_of), compiled(table.tip_of)
     for s in range(2):
         mine = [*read(rows[s], 7, 6), *read_tip(rows[s], 1, 7, 6)]
-        theirs = [*table.parts(rows[s], 7, 6), *table.tip_of(rows[s], 1, 7, 6)]
+        theirs = [*table.stage_of(rows[s], 7, 6), *table.tip_of(rows[s], 1, 7, 6)]
         for one, other in zip(mine, theirs, strict=True):
             np.testing.assert_array_equal(one, other)
         np.testing.assert_array_equal(
-            compiled(table.q_of)(rows, s, 7), kernels.parts(rows, 7, 6).q[s]
+            compiled(table.q_of)(rows, s, 7), kernels.stage_of(rows, 7, 6).q[s]
         )
         np.testing.assert_array_equal(
-            compiled(table.qd_of)(rows, s, 7), kernels.parts(rows, 7, 6).qd[s]
+            compiled(table.qd_of)(rows, s, 7), kernels.stage_of(rows, 7, 6).qd[s]
         )

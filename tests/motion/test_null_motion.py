@@ -4,47 +4,11 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.engine.rollout import Rollout
-from selfmotion.follow import Follows
 from selfmotion.motion import resting_window
-from selfmotion.motion.grid import Grid
-from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion, transport
-from support.arms import (
-    Case,
-)
-from support.rollouts import random_epsilon
+from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
 
 # Products of well-conditioned matrices with entries of order 1.
 ALGEBRA = 1e-10
-
-
-def rollout_of(case: Case, steps: int = 12) -> Rollout:
-    robot, task, _, path = case
-    return Rollout(Follows.of(robot, path, task), Grid.aligned(path.knots, steps))
-
-
-def test_transported_basis_is_orthonormal_and_continuous(case: Case) -> None:
-    robot, task, start, _ = case
-    rollout = rollout_of(case, 60)
-    assert rollout.run(start, random_epsilon(rollout, 3)) is None
-    jacobians = rollout.samples().task_jacobian[rollout.grid.node_stages]
-    bases = transport(jacobians)
-    redundancy = robot.dof - task.dimension
-    for jacobian, basis in zip(jacobians, bases, strict=True):
-        np.testing.assert_allclose(jacobian @ basis, 0.0, atol=ALGEBRA)
-        np.testing.assert_allclose(basis.T @ basis, np.eye(redundancy), atol=ALGEBRA)
-    assert np.abs(np.diff(bases, axis=0)).max() < 0.1
-
-
-def test_transport_survives_flipped_singular_vectors() -> None:
-    """Rows reordered and negated from node to node leave the basis continuous."""
-    rng = np.random.default_rng(11)
-    base, slope = rng.normal(size=(2, 2, 5))
-    jacobians = []
-    for k in range(50):
-        jacobian = base + 0.02 * k * slope
-        jacobians.append((-1.0) ** k * jacobian[:: (-1) ** k])
-    assert np.abs(np.diff(transport(np.array(jacobians)), axis=0)).max() < 0.1
 
 
 def test_null_motion_table_and_its_transpose() -> None:

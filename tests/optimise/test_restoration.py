@@ -227,7 +227,7 @@ def test_restorations_go_on_as_long_as_they_help(
         share[0] *= kept
         return x + 1e-3, None
 
-    monkeypatch.setattr("selfmotion.optimise.sqp.restored", restoring)
+    monkeypatch.setattr("selfmotion.optimise.sqp_state.restored", restoring)
     SequentialQuadratic().minimize(function, np.full(5, 0.1))
     assert asked == weights
     # Five steps that take nothing out of the violation are enough, each tried once.

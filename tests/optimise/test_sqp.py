@@ -170,7 +170,9 @@ def test_far_from_where_it_was_made_the_matrix_is_made_anew(
     counts = []
     for never in (False, True):
         if never:
-            monkeypatch.setattr("selfmotion.optimise.sqp._Run._is_far", lambda _: False)
+            monkeypatch.setattr(
+                "selfmotion.optimise.sqp_state.Minimisation._is_far", lambda _: False
+            )
         before = function.evaluations
         found = SequentialQuadratic().minimize(function, np.array([3.0, -1.0, 2.0, -1.0]))
         np.testing.assert_allclose(found.x, 1.0, atol=1e-3)

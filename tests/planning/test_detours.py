@@ -124,7 +124,7 @@ def test_the_default_takes_more_freedom_before_it_restores(monkeypatch: pytest.M
     path = sm.Waypoints.from_csv(POSES)
     start = robot.inverse_kinematics(path.pose(0.0), seed=[0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8])
     cubic = sm.plan(sm.Problem(robot, path, start=start, null_motion=sm.PolynomialNullMotion()))
-    monkeypatch.setattr("selfmotion.optimise.sqp.restored", unwanted)
+    monkeypatch.setattr("selfmotion.optimise.sqp_state.restored", unwanted)
     default = sm.plan(sm.Problem(robot, path, start=start))
     assert default.certificate.verified
     assert default.report.cost < cubic.report.cost

@@ -20,7 +20,7 @@ from selfmotion.study.published import (
     flops_per_rate,
     published_null_motion,
 )
-from selfmotion.study.results import Section, Table
+from selfmotion.study.results import Chapter, Table
 from support.followed import standing
 
 # Costs of the reading notes are given to four or five decimals.
@@ -62,8 +62,8 @@ def report(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(study, tmp_path_factory.mktemp("study"))[0]
 
 
-def section(study: Study, key: str) -> Section:
-    return next(part for part in study.sections if part.key == key)
+def chapter(study: Study, key: str) -> Chapter:
+    return next(part for part in study.chapters if part.key == key)
 
 
 def column(table: Table, name: str) -> dict[str, float]:
@@ -83,12 +83,12 @@ def test_every_claim_is_decided_by_a_number(study: Study) -> None:
 
 
 def test_the_reading_notes_numbers(study: Study) -> None:
-    rows = section(study, "sample").tables[0]
+    rows = chapter(study, "sample").tables[0]
     assert column(rows, "F at x = 0")["eq. 12, μ = 1, T = 1"] == pytest.approx(
         15.500547, abs=PRINTED
     )
     assert column(rows, "F")["eq. 12, μ = 1, T = 1"] == pytest.approx(10.48497, abs=PRINTED)
-    optima = column(section(study, "questions").tables[0], "F")
+    optima = column(chapter(study, "questions").tables[0], "F")
     assert optima["null space, degree 3"] == pytest.approx(10.5137, abs=PRINTED)
     assert optima["null space, degree 7"] == pytest.approx(10.4931, abs=PRINTED)
     assert optima["32-term expansion"] == pytest.approx(10.48496, abs=PRINTED)
@@ -96,7 +96,7 @@ def test_the_reading_notes_numbers(study: Study) -> None:
 
 
 def test_the_published_scheme_lands_within_half_a_percent(study: Study) -> None:
-    rows = section(study, "sample").tables[0]
+    rows = chapter(study, "sample").tables[0]
     assert column(rows, "F")["as published, μ = 1"] < 10.48497 * 1.005
     assert column(rows, "evaluations of F")["as published, μ = 1"] > 100
 
@@ -115,7 +115,7 @@ def test_the_report_stands_alone(report: Path) -> None:
 
 def test_numbers_and_pictures_lie_beside_the_page(report: Path, study: Study) -> None:
     numbers = json.loads((report.parent / "study.json").read_text(encoding="utf-8"))
-    assert [part["key"] for part in numbers["sections"]] == [s.key for s in study.sections]
+    assert [part["key"] for part in numbers["chapters"]] == [s.key for s in study.chapters]
     for plot in study.plots:
         assert (report.parent / f"{plot.name}.png").read_bytes().startswith(b"\x89PNG")
 
@@ -126,7 +126,7 @@ def test_verdicts_follow_the_numbers() -> None:
     turned = dataclasses.replace(claim, verdict=Verdict.CONFIRMED)
     pages = []
     for shown in (claim, turned):
-        parts = (Section("s", "S", claims=(shown,)),)
+        parts = (Chapter("s", "S", claims=(shown,)),)
         from selfmotion.study.page import html
 
         pages.append(html(Study(parts, 0.0, "test")))
@@ -230,7 +230,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         for part in study.PARTS:
             progress(part)
         claim = Claim("k", "It is so.", Verdict.REFUTED, "0 of 1", "Not so.")
-        return Study((Section("s", "S", claims=(claim,)),), 0.0, scale.name)
+        return Study((Chapter("s", "S", claims=(claim,)),), 0.0, scale.name)
 
     monkeypatch.setattr(study, "run", short)
     result = CliRunner().invoke(cli.app, ["study", "--out", str(tmp_path / "a")])

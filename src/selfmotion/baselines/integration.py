@@ -74,7 +74,7 @@ class PoseFeedback:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Integrated:
     """An integrated motion.
 
     Attributes
@@ -102,7 +102,7 @@ def start_of(problem: Problem) -> Array:
     return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task)
 
 
-def integrate(problem: Problem, rate: Rate) -> Run:
+def integrate(problem: Problem, rate: Rate) -> Integrated:
     """Integrate q̇ = rate(t, q) from the problem's start by DOP853, piece by piece of the path.
 
     Raises
@@ -157,4 +157,4 @@ def integrate(problem: Problem, rate: Rate) -> Run:
         rows = zip(t, configurations, strict=True)
         return configurations, np.array([rate(float(time), row) for time, row in rows])
 
-    return Run(at, rates)
+    return Integrated(at, rates)

@@ -3,6 +3,7 @@
 from selfmotion.basics import series as series
 from selfmotion.basics.arrays import (
     Array as Array,
+    Flags as Flags,
     Ints as Ints,
     per_joint as per_joint,
     plain_numbers as plain_numbers,

@@ -10,6 +10,7 @@ from selfmotion.basics.errors import ProblemError
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
+Flags = npt.NDArray[np.bool_]
 
 _short = reprlib.Repr()
 _short.maxother = _short.maxstring = 60

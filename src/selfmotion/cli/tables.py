@@ -1,11 +1,10 @@
 """Plans, certificates and robots as tables for the terminal; legible in a log as well."""
 
-import dataclasses
 import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich import box
@@ -181,18 +180,6 @@ def show_batch(batch: "Batch", console: Console) -> None:
 _SHOWN = 10
 
 
-def batch_json(batch: "Batch") -> dict[str, Any]:
-    """Return the rows of a batch as JSON-safe values."""
-    rows = [
-        {key: str(value) if key == "file" else value for key, value in vars(row).items()}
-        for row in batch.rows
-    ]
-    for row in rows:
-        if row["error"]:
-            row["cost"] = row["initial_cost"] = None
-    return {"folder": str(batch.folder), "resumed": batch.resumed, "rows": rows}
-
-
 def show_robots(robots: Mapping[str, RobotModel], console: Console) -> None:
     """Print a row per arm: joints, tool frame, and the freedom each task leaves."""
     table = _table()
@@ -204,20 +191,6 @@ def show_robots(robots: Mapping[str, RobotModel], console: Console) -> None:
     for name, robot in robots.items():
         table.add_row(name, str(robot.dof), robot.tool, ", ".join(_freedom(robot)))
     console.print(table)
-
-
-def robots_json(robots: Mapping[str, RobotModel]) -> dict[str, Any]:
-    """Return arms by name, as JSON-safe values."""
-    return {
-        name: {
-            "joints": list(robot.joint_names),
-            "tool": robot.tool,
-            "redundancy": {
-                task.value: robot.redundancy(task) for task in Task if robot.can_follow(task)
-            },
-        }
-        for name, robot in robots.items()
-    }
 
 
 def show_claims(claims: Sequence["Claim"], console: Console) -> None:
@@ -270,32 +243,3 @@ def _prices(report: Report) -> Table:
 def _compare(before: float, after: float) -> tuple[str, str, str]:
     change = f"{100.0 * (after - before) / abs(before):+.1f} %" if before else ""
     return f"{before:.6g}", f"{after:.6g}", change
-
-
-def certificate_json(certificate: Certificate) -> dict[str, Any]:
-    """Return a certificate as JSON-safe values, the verdict first."""
-    return {
-        "verified": certificate.verified,
-        "verdict": certificate.verdict,
-        **dataclasses.asdict(certificate),
-    }
-
-
-def plan_json(plan: Plan) -> dict[str, Any]:
-    """Return how a plan was found and what the check says, as JSON-safe values."""
-    report = plan.report
-    return {
-        "robot": plan.robot.name,
-        "task": plan.task.value,
-        "cost": report.cost,
-        "initial_cost": report.initial_cost,
-        "terms": dict(report.terms),
-        "initial_terms": dict(report.initial_terms),
-        "evaluations": report.evaluations,
-        "iterations": report.iterations,
-        "seconds": report.seconds,
-        "status": report.status.value,
-        "message": report.message,
-        "duration": plan.trajectory.duration,
-        "certificate": certificate_json(plan.certificate),
-    }

@@ -166,7 +166,7 @@ class CollisionModel:
     @cached_property
     def moved(self) -> npt.NDArray[np.bool_]:
         """Which bodies each joint moves, (B, n): those on its link and on all beyond."""
-        return levers.moved_by(self._bodies, self.robot.dof)
+        return levers.moved_by(self._bodies, self.robot)
 
     @cached_property
     def lever_arms(self) -> Array:

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, inlined, kernel
-from selfmotion.robot import Flags, compose, placements
+from selfmotion.basics import Array, Flags, inlined, kernel
+from selfmotion.robot import compose, placements
 
 Ints = npt.NDArray[np.int64]
 Vector = tuple[float, float, float]

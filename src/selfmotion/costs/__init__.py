@@ -20,7 +20,6 @@ from selfmotion.costs.joints import (
     JointJerk as JointJerk,
     JointLimitDistance as JointLimitDistance,
     JointVelocity as JointVelocity,
-    PathLength as PathLength,
     Posture as Posture,
 )
 from selfmotion.costs.limit_use import LimitUse as LimitUse
@@ -31,6 +30,7 @@ from selfmotion.costs.manipulability import (
     SmallestSingularValue as SmallestSingularValue,
 )
 from selfmotion.costs.off_path import OffPath as OffPath
+from selfmotion.costs.path_length import PathLength as PathLength
 from selfmotion.costs.samples import (
     Samples as Samples,
     TipSamples as TipSamples,

@@ -2,6 +2,7 @@
 
 from selfmotion.engine.counts import Counts as Counts
 from selfmotion.engine.deviation import Deviation as Deviation
+from selfmotion.engine.frame import transport as transport
 from selfmotion.engine.objective import Evaluation as Evaluation, Objective as Objective
 from selfmotion.engine.remaining import Remaining as Remaining, finest as finest
 from selfmotion.engine.rollout import Rollout as Rollout

@@ -8,7 +8,6 @@ from selfmotion.costs import Samples, TipSamples
 from selfmotion.follow import Follows
 from selfmotion.motion import Grid
 from selfmotion.path import PathSamples
-from selfmotion.robot import march
 from selfmotion.task import DampingLaw, feedback_rate
 
 # A tool this near to the path [m, rad] is on it; Newton's method needs few steps to that.
@@ -59,7 +58,7 @@ class Rollout:
         n, m, count = self._sizes
         table = np.zeros((stages, kernels.columns(n, m, count)))
         tips = [kernels.tip_of(table, f, n, m) for f in range(count)]
-        return table, kernels.parts(table, n, m), tips
+        return table, kernels.stage_of(table, n, m), tips
 
     def aim(self, target: PathSamples, f: int = 0) -> None:
         """Let tip f follow other poses and twists from now on, given at the stages (S)."""
@@ -93,9 +92,9 @@ class Rollout:
 
         `q` (S, n) is the table's own: each stage writes that of the next.
         """
-        return march(
-            self._kinematics, q, kernels.advance, table, self.follows.layout, gain, self._law
-        )
+        first, *others = self._kinematics
+        given = table, self.follows.layout, gain, self._law
+        return first.march(q, kernels.advance, *given, beside=others)
 
     def polished(self) -> tuple[Array, Array, Array]:
         """Return the nodes of the last run, put exactly onto the path; the run stays as it is.

@@ -7,8 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError
+from selfmotion.engine.frame import TransportedFrame
 from selfmotion.engine.rollout import Rollout
-from selfmotion.motion import Grid, TransportedFrame
+from selfmotion.motion import Grid
 from selfmotion.problem import Problem
 
 Guide = Callable[[Array], Array]

@@ -28,10 +28,10 @@ from selfmotion.formats.poses import pose_of as pose_of
 from selfmotion.formats.problem_file import (
     Job as Job,
     job_of as job_of,
-    obstacle as obstacle,
     read_job as read_job,
     read_problem as read_problem,
 )
+from selfmotion.formats.problem_parts import obstacle as obstacle
 from selfmotion.formats.problem_writing import (
     write_problem as write_problem,
 )

@@ -1,9 +1,6 @@
 """Tool motions from files: tables, arrays, and what ROS writes."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path as FilePath
-from typing import Any
 
 import numpy as np
 
@@ -14,10 +11,8 @@ from selfmotion.basics import (
     as_choice,
     as_number,
     as_path,
-    read_arrays,
-    read_rows,
 )
-from selfmotion.formats.documents import read_document
+from selfmotion.formats.path_rows import READERS, PoseRows
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints
 
@@ -28,39 +23,6 @@ _FAR, _ROUND = 50.0, 2.0 * np.pi + 1e-6
 _JUMP, _FLIP = 0.5, 2.6
 # Legs that bend by more than this [rad] make a corner, unless another angle is given.
 _BEND = np.pi / 6
-_POSITION = ("x", "y", "z")
-# Columns of an orientation → its key in `ORIENTATIONS`.
-_COLUMNS: Mapping[tuple[str, ...], str] = {
-    ("qw", "qx", "qy", "qz"): "quaternion",
-    ("rx", "ry", "rz"): "rotation_vector",
-    ("roll", "pitch", "yaw"): "rpy",
-    ("nx", "ny", "nz"): "normal",
-}
-_KNOWN = {"t", *_POSITION, *(name for names in _COLUMNS for name in names)}
-_UNITS = {"_mm": (_POSITION, 1e-3), "_deg": (("rx", "ry", "rz", "roll", "pitch", "yaw"), None)}
-
-
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """Poses as a file has them, and what to call each of them.
-
-    Attributes
-    ----------
-    places : sequence of str
-        "line 7", "poses[6]", …
-    positions : (N, 3)
-    orientation : str
-        Key in `ORIENTATIONS`; "" for none.
-    values : (N, …)
-        Numbers of the orientations.
-    t : (N,) or None
-    """
-
-    places: Sequence[str]
-    positions: Array
-    orientation: str
-    values: Array
-    t: Array | None
 
 
 def read_path(
@@ -113,10 +75,10 @@ def read_path(
     for name, value in (("feed", feed), ("duration", duration)):
         if value is not None:
             as_number(value, f"{path}: {name}", above=0.0, error=FileFormatError)
-    reader = _READERS.get(path.suffix)
+    reader = READERS.get(path.suffix)
     if reader is None:
         raise FileFormatError(
-            f"{path}: has suffix '{path.suffix}', expected one of {', '.join(_READERS)}"
+            f"{path}: has suffix '{path.suffix}', expected one of {', '.join(READERS)}"
         )
     rows = reader(path)
     if len(rows.positions) < 2:
@@ -147,117 +109,7 @@ def _at_feed(through: Waypoints, feed: float) -> Path:
     return pieces[0] if len(pieces) == 1 else Joined(pieces)
 
 
-def _read_table(file: FilePath) -> _Rows:
-    header, table, lines = read_rows(file)
-    columns = _columns(file, header, table)
-    missing = [name for name in _POSITION if name not in columns]
-    if missing:
-        raise FileFormatError(
-            f"{file}: column '{missing[0]}' is missing; the header is {','.join(header)}, expected "
-            f"x,y,z [m] (or x_mm,…), t [s], and an orientation"
-        )
-    given = [names for names in _COLUMNS if set(names) & set(columns)]
-    if len(given) > 1:
-        raise FileFormatError(
-            f"{file}: has columns {','.join(given[0])} and {','.join(given[1])}; keep one "
-            f"orientation"
-        )
-    values = np.zeros((len(table), 0))
-    for names in given:
-        lacking = [name for name in names if name not in columns]
-        if lacking:
-            raise FileFormatError(
-                f"{file}: column '{lacking[0]}' is missing, expected {','.join(names)}"
-            )
-        values = np.stack([columns[name] for name in names], axis=1)
-    return _Rows(
-        [f"line {number}" for number in lines],
-        np.stack([columns[name] for name in _POSITION], axis=1),
-        _COLUMNS[given[0]] if given else "",
-        values,
-        columns.get("t"),
-    )
-
-
-def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, Array]:
-    """Return the columns in SI units, by their names without unit."""
-    columns: dict[str, Array] = {}
-    for k, title in enumerate(header):
-        name, scale = title, 1.0
-        for suffix, (names, factor) in _UNITS.items():
-            if title.endswith(suffix) and title.removesuffix(suffix) in names:
-                name, scale = title.removesuffix(suffix), factor or np.pi / 180.0
-        if name not in _KNOWN:
-            raise FileFormatError(
-                f"{file}: unknown column '{title}', expected t, x,y,z and "
-                f"{' or '.join(','.join(names) for names in _COLUMNS)}"
-            )
-        if name in columns:
-            raise FileFormatError(f"{file}: column '{name}' appears twice, in two units")
-        columns[name] = scale * table[:, k]
-    return columns
-
-
-def _read_array(file: FilePath) -> _Rows:
-    (array,) = read_arrays(file).values()
-    if array.dtype.kind not in "iuf":
-        raise FileFormatError(f"{file}: holds no array of numbers")
-    places = [f"row {k}" for k in range(1, 1 + (len(array) if array.ndim else 0))]
-    if array.ndim == 3 and array.shape[1:] == (4, 4):
-        return _Rows(places, array[:, :3, 3] * 1.0, "rotation", array[:, :3, :3] * 1.0, None)
-    if array.ndim != 2 or array.shape[1] not in (3, 4, 7, 8):
-        raise FileFormatError(
-            f"{file}: has shape {array.shape}, expected (N, 4, 4) poses, or (N, 3) x,y,z, "
-            f"(N, 4) t,x,y,z, (N, 7) x,y,z,qw,qx,qy,qz, (N, 8) with t first"
-        )
-    t = array[:, 0] * 1.0 if array.shape[1] in (4, 8) else None
-    rest = array[:, 1:] * 1.0 if t is not None else array * 1.0
-    return _Rows(places, rest[:, :3], "quaternion" if rest.shape[1] == 7 else "", rest[:, 3:], t)
-
-
-def _read_ros(file: FilePath) -> _Rows:
-    poses = read_document(file).get("poses")
-    if not isinstance(poses, list) or not poses:
-        raise FileFormatError(
-            f"{file}: has no list of poses, expected a nav_msgs/Path or geometry_msgs/PoseArray"
-        )
-    places = [f"poses[{k}]" for k in range(len(poses))]
-    rows = [_ros_pose(file, place, pose) for place, pose in zip(places, poses, strict=True)]
-    stamps = [_stamp(file, place, pose) for place, pose in zip(places, poses, strict=True)]
-    # Publishers that know no times leave all stamps at the same one.
-    t = None if len(set(stamps)) == 1 else np.array(stamps, dtype=np.float64) - (stamps[0] or 0.0)
-    table = np.array(rows)
-    return _Rows(places, table[:, :3], "quaternion", table[:, 3:], t)
-
-
-def _ros_pose(file: FilePath, place: str, given: Any) -> list[float]:
-    pose = given.get("pose", given) if isinstance(given, Mapping) else given
-    found = []
-    for part, keys in (("position", "xyz"), ("orientation", "wxyz")):
-        for key in keys:
-            try:
-                found.append(float(pose[part][key]))
-            except (KeyError, OverflowError, TypeError, ValueError):
-                raise FileFormatError(
-                    f"{file}: {place}: {part}.{key} is missing or no number"
-                ) from None
-    return found
-
-
-def _stamp(file: FilePath, place: str, given: Mapping[str, Any]) -> float | None:
-    header = given.get("header")
-    if header is None:
-        return None
-    try:
-        stamp = header["stamp"]
-        return int(stamp["sec"]) + 1e-9 * int(stamp["nanosec"])
-    except (KeyError, OverflowError, TypeError, ValueError):
-        raise FileFormatError(
-            f"{file}: {place}: header.stamp is incomplete, expected sec and nanosec"
-        ) from None
-
-
-def _check_rows(file: FilePath, rows: _Rows) -> None:
+def _check_rows(file: FilePath, rows: PoseRows) -> None:
     parts = [("position", rows.positions), (rows.orientation, rows.values)]
     if rows.t is not None:
         parts.append(("time", rows.t[:, None]))
@@ -288,7 +140,7 @@ def _check_rows(file: FilePath, rows: _Rows) -> None:
             )
 
 
-def _rotations(file: FilePath, rows: _Rows) -> Array:
+def _rotations(file: FilePath, rows: PoseRows) -> Array:
     if not rows.orientation:
         return np.tile(np.eye(3), (len(rows.positions), 1, 1))
     _, rotation = ORIENTATIONS[rows.orientation]
@@ -301,7 +153,7 @@ def _rotations(file: FilePath, rows: _Rows) -> Array:
     return np.array(found)
 
 
-def _check_jumps(file: FilePath, rows: _Rows, rotations: Array, jump: float) -> None:
+def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) -> None:
     steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
     cosines = np.einsum("kij,kij->k", rotations[:-1], rotations[1:])
     turns = np.arccos(np.clip(0.5 * (cosines - 1.0), -1.0, 1.0))
@@ -325,7 +177,7 @@ def _remedy(jump: float) -> str:
     )
 
 
-def _times(file: FilePath, rows: _Rows, feed: float | None, duration: float | None) -> Array:
+def _times(file: FilePath, rows: PoseRows, feed: float | None, duration: float | None) -> Array:
     given = {"feed": feed, "duration": duration}
     named = [name for name, value in given.items() if value is not None]
     if rows.t is not None:
@@ -352,14 +204,3 @@ def _quaternions(rotations: Array) -> Array:
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_matrix(rotations).as_quat(scalar_first=True))
-
-
-_READERS: Mapping[str, Callable[[FilePath], _Rows]] = {
-    ".csv": _read_table,
-    ".txt": _read_table,
-    ".tsv": _read_table,
-    ".npy": _read_array,
-    ".yaml": _read_ros,
-    ".yml": _read_ros,
-    ".json": _read_ros,
-}

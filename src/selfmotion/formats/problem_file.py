@@ -1,16 +1,13 @@
 """From a problem file to a problem, and how to plan it."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from selfmotion.basics import (
-    Array,
     FileFormatError,
     ProblemError,
     RobotError,
@@ -19,17 +16,14 @@ from selfmotion.basics import (
     restore,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.collision import obstacle_from_dict
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost, FunctionCost
 from selfmotion.formats.code import FUNCTION, name_kinds
 from selfmotion.formats.documents import PER_JOINT, in_si, read_document
 from selfmotion.formats.joint_limits import read_joint_limits
-from selfmotion.formats.path_files import read_path
-from selfmotion.formats.poses import ORIENTATIONS
+from selfmotion.formats.problem_parts import obstacle, path_of, start_of
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import LineSearch, Optimizer, QuasiNewton
-from selfmotion.path import Circle, Feed, Line, Path, Placed, section_at_rest
 from selfmotion.planning import Search, plan
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
@@ -37,7 +31,7 @@ from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
 from selfmotion.task import Damping, Relaxation, Task
 
 if TYPE_CHECKING:
-    import pinocchio as pin
+    pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,9 +170,9 @@ class _Reader:
         with _named(file, "start"):
             given = table.get("start", "free")
             asked = (table["robot"], given, task.value)
-            start = self._once(asked, lambda _: _start(given, robot, task))
+            start = self._once(asked, lambda _: start_of(given, robot, task))
         with _named(file, "path"):
-            path = self._path(dict(table["path"]), robot, start)
+            path = path_of(table["path"], robot, start, self._beside)
         options: dict[str, Any] = {"rest": table.get("rest", True)}
         if "null_motion" in table:
             with _named(file, "null_motion"):
@@ -230,38 +224,6 @@ class _Reader:
         arguments = {key: str(value) for key, value in values.pop("arguments", {}).items()}
         chosen = name if file is None else self._beside(file)
         return load_robot(chosen, **values, arguments=arguments)
-
-    def _path(self, values: dict[str, Any], robot: RobotModel, start: Array | None) -> Path:
-        kind = values.get("kind")
-        frame = None if kind == Placed.kind else values.pop("frame", None)
-        if kind in ("circle", "line") and "start" not in values:
-            if start is None:
-                raise ProblemError(
-                    "start: is missing, and there is no start configuration whose pose to take; "
-                    "give the pose here, or the problem's start = 'dexterous' or numbers"
-                )
-            if frame is not None:
-                raise ProblemError("frame: needs start, the tool's first pose in that frame")
-            values["start"] = robot.pose(start)
-        feed = values.pop("feed", None) if kind in ("circle", "line") else None
-        if kind in ("circle", "line"):
-            _exactly_one({**values, "feed": feed} if feed else values, "duration", "feed")
-            # At a feed, the shape's own pace does not matter.
-            values.setdefault("duration", 1.0)
-        match kind:
-            case "file":
-                del values["kind"]
-                ramp = values.pop("ramp", None)
-                path: Path = read_path(self._beside(values.pop("file")), **values)
-                path = path if ramp is None else section_at_rest(path, ramp=ramp)
-            case "circle":
-                path = _circle(values)
-            case "line":
-                path = _line(values)
-            case _:
-                path = _restored(values)
-        path = path if feed is None else Feed(path, feed)
-        return path if frame is None else Placed(path, frame)
 
     def _cost(self, values: Mapping[str, Any], robot: RobotModel) -> Cost:
         if values["kind"] == FUNCTION:
@@ -315,75 +277,3 @@ class _Reader:
 
     def _beside(self, name: str) -> FilePath:
         return FilePath(name) if self.file is None else self.file.parent / name
-
-
-def obstacle(values: Mapping[str, Any], beside: Callable[[str], FilePath]) -> Any:
-    """Return an obstacle from a table with its pose in any of the ways of `pose_of`."""
-    from selfmotion.formats.poses import pose_of
-
-    given = dict(values)
-    keys = [key for key in ("position", *ORIENTATIONS) if key in given]
-    try:
-        pose = pose_of({key: given.pop(key) for key in keys})
-    except ValueError as error:
-        raise FileFormatError(f"obstacle '{values.get('name')}': {error}") from error
-    if "file" in given:
-        given["file"] = str(beside(given["file"]))
-    position, rotation = pose.translation.tolist(), pose.rotation.tolist()
-    return obstacle_from_dict({**given, "position": position, "rotation": rotation})
-
-
-def _start(given: Any, robot: RobotModel, task: Task) -> Array | None:
-    if given == "free":
-        return None
-    if given == "dexterous":
-        return robot.dexterous_configuration(task)
-    if given != "home":
-        return robot.configuration(given)
-    for arm in NAMED_ARMS.values():
-        if arm.home is not None and robot.urdf.source.endswith(arm.urdf):
-            return robot.configuration(np.array(arm.home))
-    homes = ", ".join(name for name, arm in NAMED_ARMS.items() if arm.home is not None)
-    raise RobotError(f"is 'home', which is known of {homes} only; give numbers, or 'dexterous'")
-
-
-def _restored(values: Mapping[str, Any]) -> Path:
-    """Return a path of tables of numbers, such as a plan's file has; ProblemError for others."""
-    try:
-        with np.errstate(invalid="raise", over="raise"):
-            path: Path = restore(Path, values)
-            path.samples([0.0, 0.5 * path.duration, path.duration])
-    except (ArithmeticError, IndexError, TypeError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise ProblemError(f"{values['kind']}: is no path with these numbers: {reason}") from error
-    return path
-
-
-def _circle(values: dict[str, Any]) -> Path:
-    del values["kind"]
-    values.setdefault("normal", [0.0, 0.0, 1.0])
-    _exactly_one(values, "center", "radius")
-    start = values.pop("start")
-    if "center" in values:
-        return Circle(start, **values)
-    return Circle.around(start, values.pop("radius"), values.pop("duration"), **values)
-
-
-def _line(values: dict[str, Any]) -> Path:
-    del values["kind"]
-    _exactly_one(values, "end", "by")
-    start: pin.SE3 = values["start"]
-    if "by" in values:
-        by = np.asarray(values.pop("by"), dtype=np.float64)
-        if by.shape != (3,):
-            raise ProblemError(f"by: is {by.tolist()}, expected three numbers [m]")
-        values["end"] = start.copy()
-        values["end"].translation = start.translation + by
-    return Line(**values)
-
-
-def _exactly_one(values: Mapping[str, Any], *names: str) -> None:
-    given: Sequence[str] = [name for name in names if name in values]
-    if len(given) != 1:
-        found = " and ".join(given) or "neither"
-        raise ProblemError(f"has {found}, expected either {' or '.join(names)}")

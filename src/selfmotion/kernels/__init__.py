@@ -8,7 +8,8 @@ one solve:
 
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 
-Python calls `advance`, `approach_start`, `pullback`, `sensitivities` and `contract_task`. Each is
+Python calls `advance`, `approach_start`, `pullback`, `sensitivities`, `contract_task` and
+`transport`. Each is
 made of small kernels, which LLVM inlines, and is compiled for what it is given: who has no damping,
 or a path that does not move, does not wait for theirs.
 """
@@ -29,20 +30,17 @@ from selfmotion.kernels.forward import (
     advance as advance,
     at_tip as at_tip,
 )
+from selfmotion.kernels.null_space import factor_damped as factor_damped, transport as transport
 from selfmotion.kernels.start import approach_start as approach_start
 from selfmotion.kernels.table import (
     Stage as Stage,
     Tip as Tip,
     columns as columns,
-    part as part,
-    parts as parts,
+    stage_of as stage_of,
     tip_of as tip_of,
+    view as view,
 )
 from selfmotion.kernels.tool import (
-    KIND as KIND,
-    Layout as Layout,
-    Rows as Rows,
-    layout_of as layout_of,
     pose_error as pose_error,
     rows_of as rows_of,
     select as select,

@@ -3,19 +3,12 @@
 from typing import NamedTuple
 
 from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics.layout import KIND, NO_ANGLE, POINTING, Layout
 from selfmotion.kernels.algebra import add_angular, angular, angular_part, cross, plus, respond
 from selfmotion.kernels.contraction import contract
 from selfmotion.kernels.damping import Law, damping_slope, pull_damping
-from selfmotion.kernels.table import Stage, Tip, part, parts, tip_of
-from selfmotion.kernels.tool import (
-    KIND,
-    NO_ANGLE,
-    POINTING,
-    Layout,
-    pull_error,
-    rows_of,
-    unselect,
-)
+from selfmotion.kernels.table import Stage, Tip, stage_of, tip_of, view
+from selfmotion.kernels.tool import pull_error, rows_of, unselect
 
 
 class Space(NamedTuple):
@@ -58,17 +51,17 @@ class Space(NamedTuple):
 def divide(space: Array, n: int, m: int, tips: int) -> Space:
     """Return the parts of the array to work in, for n joints and m rows of so many tips."""
     return Space(
-        w=part(space, 0, (n,)),
-        z=part(space, n, (m,)),
-        full_y=part(space, n + m, (6,)),
-        full_z=part(space, n + m + 6, (6,)),
-        by_error=part(space, n + m + 12, (6,)),
-        twist=part(space, n + m + 18, (6,)),
-        weights=part(space, n + m + 24, (6, n)),
-        by_epsilon=part(space, 7 * n + m + 24, (n,)),
-        by_q=part(space, 8 * n + m + 24, (n,)),
-        by_slope=part(space, 9 * n + m + 24, (4, n)),
-        by_target=part(space, 13 * n + m + 24, (tips, 12)),
+        w=view(space, 0, (n,)),
+        z=view(space, n, (m,)),
+        full_y=view(space, n + m, (6,)),
+        full_z=view(space, n + m + 6, (6,)),
+        by_error=view(space, n + m + 12, (6,)),
+        twist=view(space, n + m + 18, (6,)),
+        weights=view(space, n + m + 24, (6, n)),
+        by_epsilon=view(space, 7 * n + m + 24, (n,)),
+        by_q=view(space, 8 * n + m + 24, (n,)),
+        by_slope=view(space, 9 * n + m + 24, (4, n)),
+        by_target=view(space, 13 * n + m + 24, (tips, 12)),
     )
 
 
@@ -98,7 +91,7 @@ def pull_stage(
     [m, rad], then -Sᵀz of its twist.
     """
     m = rows_of(layout)
-    at = parts(row, n, m)
+    at = stage_of(row, n, m)
     for i in range(m):
         space.z[i] = 0.0
     respond(at.task_jacobian, at.factor, space.z, space.w, epsilon_bar)
@@ -174,7 +167,7 @@ def pullback(
     space = divide(work, n, m, layout.shape[0])
     by_slope = space.by_slope
     for s in range(count - 1, -1, -1):
-        at = parts(table[s], n, m)
+        at = stage_of(table[s], n, m)
         i, h, last = s % 4, at.step[0], s == count - 1
         for k in range(n):
             w = qd_cotangent[s, k]
@@ -232,7 +225,7 @@ def sensitivities(
         for x in range(d):
             q_matrix[0, j, x] = start_matrix[j, x]
     for s in range(count):
-        at = parts(table[s], n, m)
+        at = stage_of(table[s], n, m)
         for j in range(n):
             for k in range(n):
                 space.w[k], space.by_q[k] = (1.0 if k == j else 0.0), 0.0

@@ -5,6 +5,7 @@ from math import isfinite
 import numpy as np
 
 from selfmotion.basics import Array, inlined
+from selfmotion.basics.layout import KIND, POINTING, Layout
 from selfmotion.kernels.algebra import (
     add_angular,
     angular,
@@ -14,8 +15,8 @@ from selfmotion.kernels.algebra import (
     plus,
     smallest_eigenvector,
 )
-from selfmotion.kernels.table import Stage, Tip, part, parts, tip_of
-from selfmotion.kernels.tool import KIND, POINTING, Layout, rows_of, unselect
+from selfmotion.kernels.table import Stage, Tip, stage_of, tip_of, view
+from selfmotion.kernels.tool import rows_of, unselect
 
 # The threshold σ0 and the strength λ0 [m, rad].
 Law = tuple[float, float]
@@ -43,7 +44,7 @@ def damp(gram: Array, law: Law, out: Array) -> float:
     # left to the factor of `gram` itself.
     if cholesky(spare) or not isfinite(trace):
         return 1.0
-    v = part(out, 3, (m,))
+    v = view(out, 3, (m,))
     rest = 1.0 - max(smallest_eigenvector(full, spare, v), 0.0) / square
     if rest <= 0.0:
         for i in range(m):
@@ -59,7 +60,7 @@ def damp(gram: Array, law: Law, out: Array) -> float:
 def damping_slope(row: Array, n: int, layout: Layout, gain: float, z: Array) -> float:
     """Return 2 df/dσ² (λ0² zᵀy + K zᵀS e): what ⟨v (Jᵀv)ᵀ, ∂J⟩ has to be multiplied by."""
     m = rows_of(layout)
-    at, full = parts(row, n, m), np.empty(6)
+    at, full = stage_of(row, n, m), np.empty(6)
     slope = 0.0
     for i in range(m):
         slope += at.damping[0] * z[i] * at.y[i]
@@ -86,7 +87,7 @@ def pull_damping(
     For tip f; see `damping_slope`.
     """
     m, n = at.task_jacobian.shape
-    v = part(at.damping, 3, (m,))
+    v = view(at.damping, 3, (m,))
     left, turn = np.empty(6), (0.0, 0.0, 0.0)
     unselect(layout, f, tip.rotation, v, left)
     for k in range(n):

@@ -3,6 +3,7 @@
 from math import isfinite
 
 from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics.layout import KIND, Layout
 from selfmotion.kernels.algebra import (
     add_scaled,
     angular,
@@ -14,8 +15,8 @@ from selfmotion.kernels.algebra import (
     respond,
 )
 from selfmotion.kernels.damping import Law, damp
-from selfmotion.kernels.table import Tip, parts, q_of, qd_of, tip_of
-from selfmotion.kernels.tool import KIND, Layout, pose_error, rows_of, select, task_rows
+from selfmotion.kernels.table import Tip, q_of, qd_of, stage_of, tip_of
+from selfmotion.kernels.tool import pose_error, rows_of, select, task_rows
 
 
 @kernel
@@ -41,7 +42,7 @@ def advance(
         return True
     if not evaluate(row, n, layout, gain, law):
         return False
-    step(table, s, n, parts(row, n, m).step[0])
+    step(table, s, n, stage_of(row, n, m).step[0])
     return True
 
 
@@ -54,7 +55,7 @@ def evaluate(row: Array, n: int, layout: Layout, gain: float, law: Law | None) -
     take out. False where A is not positive definite (a singular pose), or q̇ is not finite.
     """
     m = rows_of(layout)
-    at = parts(row, n, m)
+    at = stage_of(row, n, m)
     for f in range(layout.shape[0]):
         tip = tip_of(row, f, n, m)
         task_rows(layout, f, tip.rotation, tip.jacobian, at.task_jacobian)  # J = S J6

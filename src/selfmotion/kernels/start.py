@@ -3,9 +3,10 @@
 import numpy as np
 
 from selfmotion.basics import Array, kernel
+from selfmotion.basics.layout import KIND, Layout
 from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
-from selfmotion.kernels.table import part
-from selfmotion.kernels.tool import KIND, Layout, pose_error, rows_of, select, task_rows
+from selfmotion.kernels.table import view
+from selfmotion.kernels.tool import pose_error, rows_of, select, task_rows
 
 
 @kernel
@@ -30,7 +31,7 @@ def approach_start(
     error, b = np.zeros(6), np.empty(m + r)
     system, factor = np.empty((m + r, n)), np.empty((m + r, m + r))
     for f in range(layout.shape[0]):
-        place, turn = part(target, 12 * f, (3,)), part(target, 12 * f + 3, (3, 3))
+        place, turn = view(target, 12 * f, (3,)), view(target, 12 * f + 3, (3, 3))
         pose_error(layout[f, KIND], place, turn, translations[f], rotations[f], error)
         select(layout, f, rotations[f], error, b)
         task_rows(layout, f, rotations[f], jacobians[f], system)

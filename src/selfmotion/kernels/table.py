@@ -13,7 +13,7 @@ from numba.extending import lower_builtin, type_callable
 from selfmotion.basics import Array, inlined
 
 
-def part(row: Array, first: int, shape: tuple[int, ...]) -> Array:
+def view(row: Array, first: int, shape: tuple[int, ...]) -> Array:
     """Return a view of a part of a row (or of each row of a table), as an array of `shape`.
 
     Compiled, it is an address and a shape. A slice with `reshape` would be the same at a multiple
@@ -22,35 +22,35 @@ def part(row: Array, first: int, shape: tuple[int, ...]) -> Array:
     return row[..., first : first + prod(shape)].reshape(row.shape[:-1] + shape)
 
 
-@type_callable(part)
-def _type_part(context: Any) -> Any:
+@type_callable(view)
+def _type_view(context: Any) -> Any:
     def typer(row: Any, first: Any, shape: Any) -> Any:
         return types.Array(types.float64, len(shape), "C")
 
     return typer
 
 
-@lower_builtin(part, types.Array, types.Integer, types.BaseTuple)
-def _lower_part(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+@lower_builtin(view, types.Array, types.Integer, types.BaseTuple)
+def _lower_view(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     # Only compiling needs these, and they take as long to import as a tenth of the package.
     from numba.core import cgutils
     from numba.np.arrayobj import make_array, populate_array
 
     row = make_array(signature.args[0])(context, builder, arguments[0])
-    view = make_array(signature.return_type)(context, builder)
+    found = make_array(signature.return_type)(context, builder)
     shape = cgutils.unpack_tuple(builder, arguments[2])
     strides = [context.get_constant(types.intp, 8)]
     for size in reversed(shape[1:]):
         strides.insert(0, builder.mul(strides[0], size))
     populate_array(
-        view,
+        found,
         data=builder.gep(row.data, [arguments[1]]),
         shape=shape,
         strides=strides,
         itemsize=strides[-1],
         meminfo=None,
     )
-    return view._getvalue()
+    return found._getvalue()
 
 
 class Stage(NamedTuple):
@@ -108,48 +108,48 @@ class Tip(NamedTuple):
 
 
 @inlined
-def parts(table: Array, n: int, m: int) -> Stage:
+def stage_of(table: Array, n: int, m: int) -> Stage:
     """Return the parts of a row or of a table, for n joints and m rows of all tips."""
     linear = 3 * n + 1
     solution = linear + m * n
     return Stage(
-        q=part(table, 0, (n,)),
-        qd=part(table, n, (n,)),
-        epsilon=part(table, 2 * n, (n,)),
-        step=part(table, 3 * n, (1,)),
-        task_jacobian=part(table, linear, (m, n)),
-        factor=part(table, solution, (m, m)),
-        y=part(table, solution + m * m, (m,)),
-        damping=part(table, solution + m * m + m, (3 + m,)),
+        q=view(table, 0, (n,)),
+        qd=view(table, n, (n,)),
+        epsilon=view(table, 2 * n, (n,)),
+        step=view(table, 3 * n, (1,)),
+        task_jacobian=view(table, linear, (m, n)),
+        factor=view(table, solution, (m, m)),
+        y=view(table, solution + m * m, (m,)),
+        damping=view(table, solution + m * m + m, (3 + m,)),
     )
 
 
 @inlined
 def tip_of(table: Array, f: int, n: int, m: int) -> Tip:
-    """Return the parts of a row or of a table that belong to tip f; see `parts`."""
+    """Return the parts of a row or of a table that belong to tip f; see `stage_of`."""
     first = shared_columns(n, m) + f * tip_columns(n)
     return Tip(
-        target_translation=part(table, first, (3,)),
-        target_rotation=part(table, first + 3, (3, 3)),
-        target_twist=part(table, first + 12, (6,)),
-        translation=part(table, first + 18, (3,)),
-        rotation=part(table, first + 21, (3, 3)),
-        error=part(table, first + 30, (6,)),
-        command=part(table, first + 36, (6,)),
-        jacobian=part(table, first + 42, (6, n)),
+        target_translation=view(table, first, (3,)),
+        target_rotation=view(table, first + 3, (3, 3)),
+        target_twist=view(table, first + 12, (6,)),
+        translation=view(table, first + 18, (3,)),
+        rotation=view(table, first + 21, (3, 3)),
+        error=view(table, first + 30, (6,)),
+        command=view(table, first + 36, (6,)),
+        jacobian=view(table, first + 42, (6, n)),
     )
 
 
 @inlined
 def q_of(table: Array, s: int, n: int) -> Array:
-    """Return q of stage s, as `parts` has it."""
-    return part(table[s], 0, (n,))
+    """Return q of stage s, as `stage_of` has it."""
+    return view(table[s], 0, (n,))
 
 
 @inlined
 def qd_of(table: Array, s: int, n: int) -> Array:
-    """Return q̇ of stage s, as `parts` has it."""
-    return part(table[s], n, (n,))
+    """Return q̇ of stage s, as `stage_of` has it."""
+    return view(table[s], n, (n,))
 
 
 @inlined

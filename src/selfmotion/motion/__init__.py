@@ -1,5 +1,6 @@
 """The nouns of a joint motion over time: grid, trajectory, null motion."""
 
+from selfmotion.motion.columns import column_names as column_names
 from selfmotion.motion.grid import Grid as Grid
 from selfmotion.motion.joining import (
     joined_motions as joined_motions,
@@ -11,13 +12,7 @@ from selfmotion.motion.null_motion import (
     NullMotionTable as NullMotionTable,
     PolynomialNullMotion as PolynomialNullMotion,
     RefinedNullMotion as RefinedNullMotion,
-    TransportedFrame as TransportedFrame,
     resting_window as resting_window,
-    transport as transport,
 )
 from selfmotion.motion.sampling import Sampling as Sampling
-from selfmotion.motion.trajectory import (
-    MOST_SAMPLES as MOST_SAMPLES,
-    Trajectory as Trajectory,
-    column_names as column_names,
-)
+from selfmotion.motion.trajectory import MOST_SAMPLES as MOST_SAMPLES, Trajectory as Trajectory

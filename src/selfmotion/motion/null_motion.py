@@ -8,7 +8,6 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from selfmotion.basics import Array, ProblemError, Saved, as_choice, as_number, as_whole, shown
-from selfmotion.robot import null_space
 
 # Intervals of a spline that is worth its while, and coefficients beyond which quadratic programmes
 # take seconds.
@@ -260,43 +259,6 @@ class NullMotionTable:
         own = full[:, :, before : before + self.size].reshape(stages, n, self.rows, count)
         np.multiply(frame[:, :, :, None], self.functions[:, None, None, :], out=own)
         return full
-
-
-class TransportedFrame:
-    """A null-space basis carried along a motion without turning inside the null space.
-
-    At each node the basis is the orthonormal one nearest to its predecessor (the polar factor of
-    its projection), a discrete parallel transport: continuous whatever the signs and order of the
-    singular vectors do. Between nodes the entries follow a cubic spline.
-
-    Parameters
-    ----------
-    t : (N,)
-        Times of the nodes [s].
-    jacobians : (N, m, n)
-        Task Jacobians there.
-    """
-
-    def __init__(self, t: Array, jacobians: Array) -> None:
-        from scipy.interpolate import CubicSpline
-
-        self._spline = CubicSpline(t, transport(jacobians))
-
-    def __call__(self, t: Array) -> Array:
-        """Return the basis at times `t` (S,), (S, n, r)."""
-        return np.asarray(self._spline(t))
-
-
-def transport(jacobians: Array) -> Array:
-    """Return orthonormal null-space bases of `jacobians` (N, m, n) along a motion, (N, n, r)."""
-    null = null_space(jacobians)
-    # The polar factor of A R is that of A times R, for an orthogonal R: so all at once.
-    u, _, v = np.linalg.svd(null[1:].transpose(0, 2, 1) @ null[:-1])
-    turns = np.empty((len(null), null.shape[2], null.shape[2]))
-    turns[0] = np.eye(null.shape[2])
-    for k, turn in enumerate(u @ v, start=1):
-        turns[k] = turn @ turns[k - 1]
-    return np.asarray(null @ turns)
 
 
 def _check_degree(degree: int) -> None:

@@ -103,3 +103,25 @@ def _bernstein(degree: int) -> Array:
     return np.array(
         [[comb(i, k) / comb(degree, k) for k in range(degree + 1)] for i in rows]
     ).reshape(-1, degree + 1)
+
+
+def hermite(h: Array, *given: tuple[Array, Array]) -> Array:
+    """Return the coefficients of 1, s, s² … that meet both ends of intervals, (4 or 6, I, n).
+
+    Of intervals h (I, 1) long: values and slopes at both ends, (I, n) each, and for a quintic
+    second derivatives; s goes from 0 to 1.
+    """
+    (start, end), (rate, last) = given[0], (h * side for side in given[1])
+    if len(given) == 2:
+        rise, gain = end - start - rate, last - rate
+        return np.stack([start, rate, 3.0 * rise - gain, gain - 2.0 * rise])
+    bend, bent = (0.5 * h**2 * side for side in given[2])
+    rise = end - start - rate - bend
+    gain = last - rate - 2.0 * bend
+    surge = bent - bend
+    higher = (
+        10.0 * rise - 4.0 * gain + surge,
+        7.0 * gain - 15.0 * rise - 2.0 * surge,
+        6.0 * rise - 3.0 * gain + surge,
+    )
+    return np.stack([start, rate, bend, *higher])

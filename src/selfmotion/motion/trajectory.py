@@ -13,35 +13,27 @@ from selfmotion.basics import (
     FileFormatError,
     Ints,
     as_number,
-    as_path,
     plain_numbers,
     read_only,
-    read_table,
     series,
     shown,
 )
+from selfmotion.motion.columns import read_columns
 from selfmotion.motion.polynomials import (
     differentiated,
     evaluated,
+    hermite,
     inner_roots,
     may_pass,
     may_vanish,
 )
 
-# What follows a joint's name in the header of the columns of its velocity and acceleration.
-_MANY = {"_velocity": "velocities", "_acceleration": "accelerations"}
-_RATES = tuple(_MANY)
 # A last sample as near to its end as this [s] is at its end.
 _MOMENT = 0.5e-9
 # Intervals that are looked at together.
 _LOT = 16_384
 # More samples than this do not fit into memory, and no controller wants them.
 MOST_SAMPLES = 1e7
-
-
-def column_names(joint_names: Sequence[str]) -> list[str]:
-    """Return what the columns of a motion's table are called: t, and each joint's q, q̇ and q̈."""
-    return ["t", *(name + ending for ending in ("", *_RATES) for name in joint_names)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,35 +125,9 @@ class Trajectory:
         FileFormatError
             The file cannot be read, a column is missing, or a row is wrong; it is named.
         """
-        header, table = read_table(as_path(file))
-        column = {name: table[:, i] for i, name in enumerate(header)}
-        names = [name for name in header if name != "t" and not name.endswith(_RATES)]
-        if "t" not in column or not names:
-            raise FileFormatError(
-                f"{file}: the header is {','.join(header)}, expected t and a column per joint"
-            )
-        scale = np.pi / 180.0 if degrees else 1.0
-        tables = [scale * np.stack([column[name] for name in names], axis=1)]
-        for ending in _RATES:
-            found = {name for name in header if name.endswith(ending)}
-            if not found:
-                continue
-            if found != {name + ending for name in names}:
-                odd = found ^ {name + ending for name in names}
-                raise FileFormatError(
-                    f"{file}: column '{min(odd)}' does not match; {_MANY[ending]} are given for "
-                    f"all joints or for none, as NAME{ending}"
-                )
-            if ending == _RATES[1] and len(tables) == 1:
-                raise FileFormatError(
-                    f"{file}: has accelerations but no velocities; give NAME{_RATES[0]} as well"
-                )
-            tables.append(scale * np.stack([column[name + ending] for name in names], axis=1))
-        t, q, qd, qdd = column["t"], tables[0], None, None
-        if len(tables) > 1:
-            qd, qdd = tables[1], tables[2] if len(tables) > 2 else None
+        t, names, (q, qd, qdd) = read_columns(file, degrees)
         try:
-            given = cls(t, q, q if qd is None else qd, tuple(names), qdd)
+            given = cls(t, q, q if qd is None else qd, names, qdd)
         except FileFormatError as error:
             raise FileFormatError(f"{file}: {error}") from error
         if qd is not None:
@@ -382,25 +348,9 @@ class Trajectory:
         return [self._differentiated(every, order) for order in range(4)]
 
     def _differentiated(self, k: Ints, order: int) -> Array:
-        pieces = self._quintics(k)
+        h, ends = (self.t[k + 1] - self.t[k])[..., None], (k, k + 1)
+        given = (self.q, self.qd) if self.qdd is None else (self.q, self.qd, self.qdd)
+        pieces = hermite(h, *((table[ends[0]], table[ends[1]]) for table in given))
         for _ in range(order):
-            pieces = differentiated(pieces) / (self.t[k + 1] - self.t[k])[..., None]
+            pieces = differentiated(pieces) / h
         return pieces
-
-    def _quintics(self, k: Ints) -> Array:
-        """Return the pieces of q in intervals k; cubic where accelerations are not known."""
-        h = (self.t[k + 1] - self.t[k])[..., None]
-        start, rate = self.q[k], h * self.qd[k]
-        if self.qdd is None:
-            rise, gain = self.q[k + 1] - start - rate, h * self.qd[k + 1] - rate
-            return np.stack([start, rate, 3.0 * rise - gain, gain - 2.0 * rise])
-        bend = 0.5 * h**2 * self.qdd[k]
-        rise = self.q[k + 1] - start - rate - bend
-        gain = h * self.qd[k + 1] - rate - 2.0 * bend
-        surge = 0.5 * h**2 * self.qdd[k + 1] - bend
-        higher = (
-            10.0 * rise - 4.0 * gain + surge,
-            7.0 * gain - 15.0 * rise - 2.0 * surge,
-            6.0 * rise - 3.0 * gain + surge,
-        )
-        return np.stack([start, rate, bend, *higher])

@@ -95,7 +95,7 @@ class QuasiNewton:
         """
         if inverse_hessian is None and self.initial_metric == "gauss-newton":
             inverse_hessian = inverse_metric(function.metric(x0))
-        run = _Run(self, function, x0, inverse_hessian, max_evaluations, callback)
+        run = _Minimisation(self, function, x0, inverse_hessian, max_evaluations, callback)
         try:
             status = run.until_done()
         except KeyboardInterrupt:
@@ -103,7 +103,7 @@ class QuasiNewton:
         return run.minimum(status)
 
 
-class _Run:
+class _Minimisation:
     """The state of one minimisation."""
 
     def __init__(

@@ -5,7 +5,6 @@ from selfmotion.path.base import (
     Path as Path,
     PathSamples as PathSamples,
     PathSeries as PathSeries,
-    TimeLaw as TimeLaw,
     check_oriented as check_oriented,
     path_pose as path_pose,
     path_series as path_series,
@@ -19,5 +18,6 @@ from selfmotion.path.polyline import Polyline as Polyline
 from selfmotion.path.retimed import Retimed as Retimed
 from selfmotion.path.section import Section as Section, section_at_rest as section_at_rest
 from selfmotion.path.shapes import Circle as Circle, Line as Line
+from selfmotion.path.time_law import TimeLaw as TimeLaw
 from selfmotion.path.twist import TwistPath as TwistPath
 from selfmotion.path.waypoints import Waypoints as Waypoints

@@ -1,9 +1,8 @@
 """What every tool motion offers."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -29,8 +28,6 @@ from selfmotion.task import Task, as_pose
 _TIME_SLACK = 1e-9
 # Stands for no time at all.
 _TINY = np.finfo(float).tiny
-# Minimum jerk's coefficients of 1, τ, τ² …
-_JERK = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
 # Longer motions than this [s] are typing errors.
 _LONGEST = 1e9
 
@@ -214,48 +211,6 @@ def turning(bounds: Array) -> PathSeries:
 # What is slower than this [m/s, rad/s] is at rest: waypoints and velocity functions come to rest
 # up to their own rounding.
 STILL = 1e-7
-
-
-class TimeLaw(Enum):
-    """How far along the path (0 to 1) the tool is at normalised time τ (0 to 1)."""
-
-    CONSTANT = "constant"
-    MINIMUM_JERK = "minimum_jerk"
-
-    @classmethod
-    def of(cls, law: "TimeLaw | str") -> "TimeLaw":
-        """Return the time law of that name; PathError where there is none."""
-        try:
-            return cls(law)
-        except ValueError:
-            names = ", ".join(member.value for member in cls)
-            raise PathError(f"unknown time law {shown(law)}, expected one of: {names}") from None
-
-    def __call__(self, tau: Array) -> tuple[Array, Array]:
-        """Return s(τ) and ds/dτ.
-
-        Constant speed: s = τ. Minimum jerk: s = 10τ³ - 15τ⁴ + 6τ⁵ (Flash and Hogan 1985).
-        """
-        return _TIME_LAWS[self](tau)
-
-    def series(self, middle: Array, half: Array) -> Array:
-        """Return the series of s on intervals of τ, (K + 1, I)."""
-        coefficients = np.array([0.0, 1.0] if self is TimeLaw.CONSTANT else _JERK)[:, None]
-        return series.of_polynomial(series.recentred(coefficients, middle, half))
-
-
-def _constant(tau: Array) -> tuple[Array, Array]:
-    return tau, np.ones_like(tau)
-
-
-def _minimum_jerk(tau: Array) -> tuple[Array, Array]:
-    return tau**3 * (10.0 + tau * (6.0 * tau - 15.0)), 30.0 * (tau * (1.0 - tau)) ** 2
-
-
-_TIME_LAWS: dict[TimeLaw, Callable[[Array], tuple[Array, Array]]] = {
-    TimeLaw.CONSTANT: _constant,
-    TimeLaw.MINIMUM_JERK: _minimum_jerk,
-}
 
 
 def path_pose(pose: pin.SE3 | npt.ArrayLike, name: str) -> pin.SE3:

@@ -12,13 +12,13 @@ from selfmotion.path.base import (
     Path,
     PathSamples,
     PathSeries,
-    TimeLaw,
     check_duration,
     check_vector,
     path_pose,
     rotations_about,
     unit,
 )
+from selfmotion.path.time_law import TimeLaw
 
 
 @dataclass(frozen=True, eq=False)

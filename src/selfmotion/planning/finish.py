@@ -9,7 +9,7 @@ from selfmotion.certificate import LIMIT_NAMES, Certificate, KeepsApart, Toleran
 from selfmotion.engine import MOST_HALVINGS, Evaluation
 from selfmotion.motion import Trajectory
 from selfmotion.optimise import Status
-from selfmotion.planning.largest_part import Part
+from selfmotion.planning.largest_part import LargestPart
 from selfmotion.planning.session import Session
 from selfmotion.problem import Problem
 
@@ -36,7 +36,9 @@ class Finished:
     certificate: Certificate
 
 
-def finish(problem: Problem, part: Part, tolerance: Tolerance, progress: Progress) -> Finished:
+def finish(
+    problem: Problem, part: LargestPart, tolerance: Tolerance, progress: Progress
+) -> Finished:
     """Return what there is on the first grid on which the motion holds the tolerance."""
     session = part.session
     finished: Finished | None = None

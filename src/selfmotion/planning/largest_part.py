@@ -31,7 +31,7 @@ _PUSHES = (0.5, 2.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class LargestPart:
     """A motion along the first part of a path.
 
     Attributes
@@ -84,7 +84,7 @@ class _Attempt:
         return self.session is not None and self.session.cut_short
 
 
-def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
+def largest_part(problem: Problem, reach: Reach, effort: Effort) -> LargestPart | None:
     """Return an optimised motion along the largest part [0, t] of the path that can be found.
 
     Motions up to where single poses are in reach, by the same optimiser as any; where none
@@ -102,7 +102,7 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
 
     Returns
     -------
-    Part or None
+    LargestPart or None
         None where nothing worth the name is left.
     """
     goal = reach.time * (1.0 - _MARGIN) if reach.reason else reach.time
@@ -122,7 +122,7 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> Part | None:
     return _bisect(problem, furthest, reach, effort)
 
 
-def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) -> Part | None:
+def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) -> LargestPart | None:
     """Return the candidate's motion on the largest part on which it arrives."""
     arrived: _Attempt | None = None
     edge: _Attempt | None = None
@@ -149,7 +149,7 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
     return None if arrived is None else _part(problem, arrived, reach, failed.reason)
 
 
-def _part(problem: Problem, found: _Attempt, reach: Reach, further: str) -> Part:
+def _part(problem: Problem, found: _Attempt, reach: Reach, further: str) -> LargestPart:
     """Return the part, with the reason why nothing goes `further` in words."""
     if found.session is None:
         raise RuntimeError("a part is made of a motion that was found")
@@ -158,7 +158,7 @@ def _part(problem: Problem, found: _Attempt, reach: Reach, further: str) -> Part
     reasons = [reach.reason] if reach.reason else []
     reasons += [f"no motion found {nearer}: {further}"] if further else []
     ending = f"the motion ends at t = {end:.6g} s of {whole:.6g} s: {'; '.join(reasons)}"
-    return Part(found.problem, found.session, ending if end < whole else "")
+    return LargestPart(found.problem, found.session, ending if end < whole else "")
 
 
 def _until(problem: Problem, time: float) -> Problem:
@@ -173,8 +173,8 @@ def _until(problem: Problem, time: float) -> Problem:
         for first, last in [item.window(problem.path.duration)]
         if first < time
     ]
-    path = Section(problem.path, 0.0, time, crowding=True)
-    return replace(problem, path=path, constraints=kept, relaxations=relaxations)
+    shorter = problem.along(lambda path: Section(path, 0.0, time, crowding=True))
+    return replace(problem, **shorter, constraints=kept, relaxations=relaxations)
 
 
 def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attempt:

@@ -28,7 +28,14 @@ from selfmotion.planning.run import plan, plan_along
 from selfmotion.planning.settings import Search
 from selfmotion.problem import Problem, check_problem, rest_orders
 from selfmotion.result import Move, Parts, Plan
-from selfmotion.search import Piece, Pieces, Sequence, SequenceGuide, has_curves, turned_towards
+from selfmotion.search import (
+    Sequence,
+    SequenceGuide,
+    Stretch,
+    Stretches,
+    has_curves,
+    turned_towards,
+)
 from selfmotion.task import Relaxation
 
 # Other cuts are tried where parts could not be planned, so often; they are so far away at least, as
@@ -110,17 +117,17 @@ def plan_in_parts(
         whole = _whole(problem, rng, tolerance, progress)
         if whole is not None:
             return Parts(problem, (whole,))
-    pieces = Pieces.of(problem, rng, progress)
-    chains = pieces.fewest(set())
+    stretches = Stretches.of(problem, rng, progress)
+    chains = stretches.fewest(set())
     if knows and len(chains) == 1:
         whole = _whole(problem, rng, tolerance, progress)
         if whole is not None:
             return Parts(problem, (whole,))
-    planner = _Planner(problem, pieces, retreats, ramp, rng, tolerance, progress)
-    return _best_of(planner, pieces, chains)
+    planner = _Planner(problem, stretches, retreats, ramp, rng, tolerance, progress)
+    return _best_of(planner, stretches, chains)
 
 
-def _best_of(planner: "_Planner", pieces: Pieces, chains: list[Piece]) -> Parts:
+def _best_of(planner: "_Planner", stretches: Stretches, chains: list[Stretch]) -> Parts:
     """Return the parts along chains, or along others where some of these fail."""
     best: Parts | None = None
     forbidden: set[int] = set()
@@ -132,7 +139,7 @@ def _best_of(planner: "_Planner", pieces: Pieces, chains: list[Piece]) -> Parts:
             break
         forbidden |= failed
         try:
-            chains = pieces.fewest(forbidden)
+            chains = stretches.fewest(forbidden)
         except NoSequenceError:
             break
     if best is None:
@@ -190,14 +197,14 @@ class _Planner:
     def __init__(
         self,
         problem: Problem,
-        pieces: Pieces,
+        stretches: Stretches,
         retreat: Retreat | None,
         ramp: float,
         rng: np.random.Generator | int,
         tolerance: Tolerance,
         progress: Progress,
     ) -> None:
-        self._problem, self._pieces, self._ramp = problem, pieces, ramp
+        self._problem, self._stretches, self._ramp = problem, stretches, ramp
         self._tolerance, self._progress = tolerance, progress
         self._closed = any(item.closes for item in problem.constraints)
         generator = np.random.default_rng(rng)
@@ -205,24 +212,24 @@ class _Planner:
         self.failure: SelfmotionError = PlanError("no part was planned")
         self._turning = np.isinf(problem.robot.lower) & np.isinf(problem.robot.upper)
 
-    def plan(self, chains: list[Piece]) -> tuple[Parts | None, set[int]]:
+    def plan(self, chains: list[Stretch]) -> tuple[Parts | None, set[int]]:
         """Return the parts, and the waypoints where a cut has led to one that fails.
 
         None where one has no complete motion; `failure` then says why.
         """
         plans: list[Plan] = []
         failed: set[int] = set()
-        for number, piece in enumerate(chains, 1):
+        for number, stretch in enumerate(chains, 1):
             self._progress("part", number, len(chains))
             try:
-                plans.append(self._part(piece, plans[-1] if plans else None))
+                plans.append(self._part(stretch, plans[-1] if plans else None))
             except (BreakdownError, InverseKinematicsError, NoSequenceError) as error:
                 self.failure = error
-                return None, failed | self._around(piece)
+                return None, failed | self._around(stretch)
             if not plans[-1].certificate.verified:
-                failed |= self._around(piece)
-        cuts = tuple(float(piece.t[-1]) for piece in chains[:-1])
-        endings = tuple(piece.ending for piece in chains[:-1])
+                failed |= self._around(stretch)
+        cuts = tuple(float(stretch.t[-1]) for stretch in chains[:-1])
+        endings = tuple(stretch.ending for stretch in chains[:-1])
         moves = self._moves(plans)
         return Parts(self._problem, tuple(plans), moves, cuts, endings), failed
 
@@ -236,17 +243,17 @@ class _Planner:
         ends = [(one.trajectory.q[-1], other.trajectory.q[0]) for one, other in pairs]
         return tuple(self._mover.move(*each) for each in ends)
 
-    def _around(self, piece: Piece) -> set[int]:
-        """Return the waypoints at which the parts to both sides of a piece's ends are not cut."""
-        last = len(self._pieces.t) - 1
+    def _around(self, stretch: Stretch) -> set[int]:
+        """Return the waypoints at which the parts to both sides of a stretch's ends are not cut."""
+        last = len(self._stretches.t) - 1
         width = max(1, round(_ELSEWHERE * last))
-        cuts = {piece.first, piece.last} - {0, last}
+        cuts = {stretch.first, stretch.last} - {0, last}
         return {i for cut in cuts for i in range(cut - width, cut + width + 1)}
 
-    def _part(self, piece: Piece, before: Plan | None) -> Plan:
-        """Return the plan along a piece that follows another one's plan."""
-        problem = self._part_problem(piece)
-        t, q = piece.t, piece.q
+    def _part(self, stretch: Stretch, before: Plan | None) -> Plan:
+        """Return the plan along a stretch that follows another one's plan."""
+        problem = self._part_problem(stretch)
+        t, q = stretch.t, stretch.q
         if isinstance(problem.path, Retimed):
             t = problem.path.when(t - t[0])
         if before is not None:
@@ -257,21 +264,21 @@ class _Planner:
         guide = SequenceGuide(Sequence(t, q, 0.0))
         return plan_along(problem, guide, self._tolerance, self._progress)
 
-    def _part_problem(self, piece: Piece) -> Problem:
-        """Return the problem of a piece: at rest where it is cut, with what is asked of it."""
-        whole, last = self._problem, len(self._pieces.t) - 1
-        cut = piece.first > 0 or self._closed, piece.last < last or self._closed
+    def _part_problem(self, stretch: Stretch) -> Problem:
+        """Return the problem of a stretch: at rest where it is cut, with what is asked of it."""
+        whole, last = self._problem, len(self._stretches.t) - 1
+        cut = stretch.first > 0 or self._closed, stretch.last < last or self._closed
         if not any(cut):
             return whole
-        ends = float(piece.t[0]), float(piece.t[-1])
+        ends = float(stretch.t[0]), float(stretch.t[-1])
         orders = rest_orders(Section(whole.path, *ends), whole.task)
         ramped = cut[0] and orders[0] < _AT_REST, cut[1] and orders[1] < _AT_REST
         path = section_at_rest(whole.path, *ends, min(self._ramp, ends[1] - ends[0]), ramped)
         return replace(
             whole,
             path=path,
-            start=whole.start if piece.first == 0 else None,
-            constraints=list(_asked_of_part(whole, piece.first == 0, piece.last == last)),
+            start=whole.start if stretch.first == 0 else None,
+            constraints=list(_asked_of_part(whole, stretch.first == 0, stretch.last == last)),
             relaxations=list(relaxed_along(whole, path, ends)),
             rest=True,
         )

@@ -27,7 +27,7 @@ from selfmotion.planning.candidates import Candidates
 from selfmotion.planning.deadline import Deadline, TimedCounts
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import Finished, finish
-from selfmotion.planning.largest_part import Part, largest_part
+from selfmotion.planning.largest_part import LargestPart, largest_part
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import Search
 from selfmotion.planning.warm_start import check_warm_start
@@ -155,7 +155,7 @@ class _Settings(NamedTuple):
 
 
 def _plan(problem: Problem, effort: Effort, search: Search, settings: _Settings) -> Plan:
-    found = _Run(problem, effort, search, settings).plan()
+    found = _Planning(problem, effort, search, settings).plan()
     # Few motions take an arm into itself: the others need not wait for distances.
     if not _overlaps(found) or found.report.status in _ENDED:
         return found
@@ -166,7 +166,7 @@ def _plan(problem: Problem, effort: Effort, search: Search, settings: _Settings)
         efforts += [(effort, whole), (replace(effort, apart=True), whole)]
     for another, how in efforts:
         try:
-            rival = _Run(problem, another, how, settings).plan()
+            rival = _Planning(problem, another, how, settings).plan()
         except SelfmotionError:
             return found
         except KeyboardInterrupt:
@@ -216,7 +216,7 @@ def _check(problem: Problem, search: Search | None, max_evaluations: int | None)
         as_whole(max_evaluations, "max_evaluations", least=1, most=10**9)
 
 
-class _Run:
+class _Planning:
     """What the stages of one plan share."""
 
     def __init__(
@@ -258,7 +258,7 @@ class _Run:
                 raise
             return shorter
         rival_cost = self._settle(best, candidates.rival)
-        whole = Part(self._problem, best, "")
+        whole = LargestPart(self._problem, best, "")
         finished = finish(self._problem, whole, self._tolerance, self._progress)
         result = self._gather(whole, finished, self._gap(rival_cost, finished))
         if self._stands(best, finished):
@@ -349,7 +349,7 @@ class _Run:
             best.end(Status.INTERRUPTED)
         return None
 
-    def _gather(self, part: Part, finished: Finished, gap: Gap | None) -> Plan:
+    def _gather(self, part: LargestPart, finished: Finished, gap: Gap | None) -> Plan:
         session, motion, still = part.session, finished.motion, finished.still
         if self._deadline.passed and session.status is Status.INTERRUPTED:
             session.end(Status.DEADLINE)
@@ -402,7 +402,7 @@ class _Run:
         )
 
 
-def _message(part: Part, finished: Finished, notes: list[str]) -> str:
+def _message(part: LargestPart, finished: Finished, notes: list[str]) -> str:
     """Return in words how the optimisation ended, and what came of it."""
     session, violations = part.session, part.session.violations
     certificate = finished.certificate

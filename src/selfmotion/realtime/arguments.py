@@ -67,3 +67,13 @@ def as_measured(values: Any, dof: int) -> Array:
     """Return a measured state (n,) as it is, or NaN where it is no numbers at all."""
     numbers = plain_numbers(values)
     return np.full(dof, np.nan) if numbers is None else numbers
+
+
+def in_null_space(motion: NullMotion) -> NullMotion:
+    """Return a null motion; ProblemError unless it is one in the null space."""
+    if motion.space != "null":
+        raise ProblemError(
+            f"null motion: space is '{motion.space}', expected 'null': while the arm moves, "
+            f"self-motions are in the null space"
+        )
+    return motion

@@ -10,15 +10,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array
 from selfmotion.costs import Cost, Samples
 from selfmotion.engine import Rollout
 from selfmotion.follow import Follows
+from selfmotion.kernels import transport
 from selfmotion.motion import Grid, NullMotion
 from selfmotion.path import PathSamples
 from selfmotion.realtime.clear import Surroundings
-from selfmotion.realtime.law import transport_frame
-from selfmotion.realtime.programme import best_step
+from selfmotion.realtime.law import PIVOT
+from selfmotion.realtime.programme import elastic_step, graded, model_of
 from selfmotion.robot import null_space
 
 # Added to the Gauss-Newton matrix, relative to its trace: directions that do not act stay put.
@@ -30,8 +31,6 @@ _LESS, _MORE, _LEAST, _MOST = 0.3, 4.0, 1e-3, 1e6
 _WELL, _BADLY = 0.75, 0.25
 # A joint that moves so many times as fast as it may has been thrown out of a singular pose.
 _WILD = 20.0
-# The first nodes are so far apart [s], unless there are enough for less.
-_NEAR = 0.1
 # What rows may be broken by, relative to their range.
 _BROKEN = 1e-6
 
@@ -76,7 +75,7 @@ class Horizon:
         steps: int,
         surroundings: Surroundings | None = None,
     ) -> None:
-        self.grid = Grid(_graded(duration, steps))
+        self.grid = Grid(graded(duration, steps))
         robot = follows.robot
         self.rollout = Rollout(follows, self.grid)
         self.redundancy = follows.redundancy
@@ -173,7 +172,7 @@ class Horizon:
         if not len(self._frames) and not self._begin(q):
             return False
         first = np.empty((1, *self._frames.shape[1:]))
-        transport_frame(self._frames[0], jacobian[None], first)
+        transport(self._frames[0], jacobian[None], PIVOT, first)
         self._frames[0] = first[0]
         free = self._coefficients @ self._rest
         self._coefficients = np.outer(first[0].T @ rate, self._first) + free @ self._rest.T
@@ -200,7 +199,7 @@ class Horizon:
         better = self._coefficients + step.reshape(self.redundancy, -1) @ self._rest.T
         if not self._guesses or self._falls(q, stages, better, cost, predicted):
             self._coefficients = better
-        transport_frame(first[0], here, self._frames)
+        transport(first[0], here, PIVOT, self._frames)
         return True
 
     def _cost(self, samples: Samples) -> float:
@@ -229,7 +228,8 @@ class Horizon:
             return False
         jacobians = self.rollout.samples().task_jacobian[self.grid.node_stages]
         self._frames = np.empty((len(jacobians), len(q), self.redundancy))
-        transport_frame(null_space(jacobians[0]), np.ascontiguousarray(jacobians), self._frames)
+        first, here = null_space(jacobians[0]), np.ascontiguousarray(jacobians)
+        transport(first, here, PIVOT, self._frames)
         return True
 
     def _run(self, q: Array, epsilon: Array) -> bool:
@@ -258,14 +258,15 @@ class Horizon:
 
         None where numbers are not finite.
         """
-        gradient, metric = self._model(samples, by_q, by_qd)
+        guess = self._damping if self._guesses else 0.0
+        gradient, metric = model_of(self._costs, self._metrics, guess, samples, by_q, by_qd)
         if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(metric))):
             return None
         d = self.size
         metric[np.diag_indices(d)] += _REGULAR * (np.trace(metric) + 1e-12)
         limits = self._conditions(samples, by_q, by_qd)
         try:
-            step, self.relaxed = best_step(metric, gradient, *limits)
+            step, self.relaxed = elastic_step(metric, gradient, *limits)
         except np.linalg.LinAlgError:
             return None
         return step, float(-gradient @ step - 0.5 * step @ metric @ step)
@@ -281,37 +282,6 @@ class Horizon:
             low = np.concatenate([low, np.full(len(more), -np.inf)])
         return rows, low, high
 
-    def _model(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array]:
-        """Return the gradient of the cost and its Gauss-Newton matrix, (d,) and (d, d)."""
-        d, sampling = self.size, samples.sampling
-        weights = samples.weights[:, None]
-        nodes = by_qd[sampling.nodes].reshape(len(sampling.nodes), -1)
-        flat = {0: by_q.reshape(-1, d), 1: by_qd.reshape(-1, d)}
-
-        def tangent(order: int) -> Array:
-            if order not in flat:
-                flat[order] = (sampling.differentiation(order - 1) @ nodes).reshape(-1, d)
-            return flat[order]
-
-        gradient, metric = np.zeros(d), np.zeros((d, d))
-        for cost in self._costs:
-            partials = cost.gradient(samples)
-            parts = partials.q, partials.qd, partials.qdd, partials.qddd
-            for order, part in enumerate(parts):
-                if part is not None:
-                    gradient += (weights * part).ravel() @ tangent(order)
-        for order, weight in self._metrics:
-            one = tangent(order)
-            heavy = (weights[:, :, None] * (weight @ one.reshape(*samples.q.shape, d))).reshape(
-                -1, d
-            )
-            metric += one.T @ heavy
-        if self._guesses:
-            one = tangent(1)
-            heavy = (weights[:, :, None] * one.reshape(*samples.q.shape, d)).reshape(-1, d)
-            metric += self._damping * (one.T @ heavy)
-        return gradient, metric
-
     def _rows(self, samples: Samples, by_q: Array, by_qd: Array) -> tuple[Array, Array, Array]:
         """Return the limits at the nodes as rows of the step, with what they may be."""
         nodes, d = samples.nodes, self.size
@@ -322,24 +292,3 @@ class Horizon:
         rows = np.stack([by_q[nodes[1:]], moves[1:], harder]).reshape(-1, d)
         slack = _BROKEN * self._range
         return rows, self._low - value - slack, self._high - value + slack
-
-
-def _graded(duration: float, steps: int) -> Array:
-    """Return nodes from 0 to `duration` [s]: the first ones `_NEAR` apart, later ones farther.
-
-    Even ones where there are enough for that. What comes next is commanded, what comes later is
-    what it is to be good for.
-    """
-    s = np.linspace(0.0, 1.0, steps + 1)
-    even = np.clip((_NEAR / duration * steps**2 - 1.0) / (steps - 1.0), 0.0, 1.0)
-    return np.asarray(duration * (even * s + (1.0 - even) * s * s))
-
-
-def in_null_space(motion: NullMotion) -> NullMotion:
-    """Return a null motion; ProblemError unless it is one in the null space."""
-    if motion.space != "null":
-        raise ProblemError(
-            f"null motion: space is '{motion.space}', expected 'null': while the arm moves, "
-            f"self-motions are in the null space"
-        )
-    return motion

@@ -13,12 +13,10 @@ from math import sqrt
 import numpy as np
 
 from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics.layout import KIND, Layout
 from selfmotion.kernels import (
-    KIND,
-    Layout,
     at_tip,
-    cholesky,
-    gram,
+    factor_damped,
     pose_error,
     rows_of,
     select,
@@ -28,28 +26,11 @@ from selfmotion.kernels import (
 from selfmotion.realtime.viable import viable_accelerations
 
 # Below this pivot of JJᵀ [m², rad²] the inverse is damped, by up to λ² = the same.
-_PIVOT = 1e-3
+PIVOT = 1e-3
 # What the tool may lack of the rate that was asked for, and count as following [m/s, rad/s].
 _FOLLOWED = 1e-3
 # Entries of a cycle's row besides its n-vectors: the reference's position, rotation and twist.
 REFERENCE = 18
-
-
-@inlined
-def factor_damped(jacobian: Array, factor: Array) -> None:
-    """Set `factor` to the Cholesky factor of JJᵀ + λ²I, λ = 0 unless a pivot is small."""
-    gram(jacobian, factor)
-    least = np.inf
-    if cholesky(factor):
-        for i in range(factor.shape[0]):
-            least = min(least, 1.0 / (factor[i, i] * factor[i, i]))
-    else:
-        least = 0.0
-    if least < _PIVOT:
-        gram(jacobian, factor)
-        for i in range(factor.shape[0]):
-            factor[i, i] += _PIVOT - least
-        cholesky(factor)
 
 
 @kernel
@@ -83,7 +64,7 @@ def saturate(
             y[i] = wanted[i]
             for k in range(n):
                 y[i] -= jacobian[i, k] * (rates[k] if held[k] else epsilon[k])
-        factor_damped(moving, factor)
+        factor_damped(moving, PIVOT, factor)
         solve_cholesky(factor, y)
         worst, most = -1, 0.0
         for k in range(n):
@@ -295,49 +276,3 @@ def shift_reference(
                     total += turn[i, a] * rotation[k, a, j]
                 out[k, 3 + 3 * i + j] = total
             out[k, 15 + i] = rate
-
-
-@kernel
-def transport_frame(first: Array, jacobians: Array, frames: Array) -> None:
-    """Carry a basis (n, r) of the null space along task Jacobians (N, m, n): `frames` (N, n, r).
-
-    Each is the orthonormal basis nearest to its predecessor's projection onto the null space (the
-    polar factor, by the Newton-Schulz iteration), as in `selfmotion.motion.transport`.
-    """
-    count, m, n = jacobians.shape
-    r = first.shape[1]
-    factor, y, inner = np.empty((m, m)), np.empty(m), np.empty((r, r))
-    basis, better = first.copy(), np.empty((n, r))
-    for s in range(count):
-        jacobian = jacobians[s]
-        factor_damped(jacobian, factor)
-        for x in range(r):
-            for i in range(m):
-                y[i] = 0.0
-                for k in range(n):
-                    y[i] += jacobian[i, k] * basis[k, x]
-            solve_cholesky(factor, y)
-            for k in range(n):
-                for i in range(m):
-                    basis[k, x] -= jacobian[i, k] * y[i]
-        for _ in range(_POLAR):
-            off = 0.0
-            for a in range(r):
-                for b in range(r):
-                    inner[a, b] = 0.0
-                    for k in range(n):
-                        inner[a, b] += basis[k, a] * basis[k, b]
-                    off = max(off, abs(inner[a, b] - (1.0 if a == b else 0.0)))
-            if not off > 1e-12:
-                break
-            for k in range(n):
-                for a in range(r):
-                    better[k, a] = 1.5 * basis[k, a]
-                    for b in range(r):
-                        better[k, a] -= 0.5 * basis[k, b] * inner[b, a]
-            basis[:] = better
-        frames[s] = basis
-
-
-# Steps of the iteration: it converges quadratically once a basis is nearly orthonormal.
-_POLAR = 20

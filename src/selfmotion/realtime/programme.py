@@ -1,19 +1,24 @@
-"""The quadratic programme of a step: small, and answered whatever it asks."""
+"""The quadratic programme of a step: its model, and an answer whatever it asks."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.costs import Cost, Samples
 from selfmotion.optimise import minimize_quadratic
 
 # How far coefficients may go in one cycle [rad/s √s].
 _REACH = 1.0
+# The first nodes are so far apart [s], unless there are enough for less.
+_NEAR = 0.1
 # Programmes of a cycle: each has the rows that the one before broke.
 _ROUNDS = 4
 # What breaking a row by all of its range costs, next to a step's cost; the range of distances [m].
 _BREAKING, _DISTANCES = 1e3, 0.1
 
 
-def best_step(
+def elastic_step(
     metric: Array, gradient: Array, rows: Array, low: Array, high: Array
 ) -> tuple[Array, bool]:
     """Return the step p of least cost that keeps low ≤ rows p ≤ high, found by the few that bind.
@@ -63,3 +68,51 @@ def _elastic(metric: Array, gradient: Array, rows: Array, low: Array, high: Arra
         stiff = metric + weight * (scaled.T @ scaled)
         step = np.linalg.solve(stiff, weight * wanted - gradient)
     return np.asarray(step * min(1.0, _REACH / max(float(np.abs(step).max()), 1e-12)))
+
+
+def model_of(
+    costs: Sequence[Cost],
+    metrics: Sequence[tuple[int, Array]],
+    guess: float,
+    samples: Samples,
+    by_q: Array,
+    by_qd: Array,
+) -> tuple[Array, Array]:
+    """Return the gradient of the cost and its Gauss-Newton matrix, (d,) and (d, d).
+
+    `metrics` are what costs tell of their curvature, order of the derivative and weight (n, n); a
+    `guess` for the others is so many times that of the joints' speed. Tangents are (S, n, d).
+    """
+    d, sampling = by_q.shape[-1], samples.sampling
+    weights = samples.weights[:, None]
+    nodes = by_qd[sampling.nodes].reshape(len(sampling.nodes), -1)
+    flat = {0: by_q.reshape(-1, d), 1: by_qd.reshape(-1, d)}
+
+    def tangent(order: int) -> Array:
+        if order not in flat:
+            flat[order] = (sampling.differentiation(order - 1) @ nodes).reshape(-1, d)
+        return flat[order]
+
+    gradient, metric = np.zeros(d), np.zeros((d, d))
+    for cost in costs:
+        partials = cost.gradient(samples)
+        parts = partials.q, partials.qd, partials.qdd, partials.qddd
+        for order, part in enumerate(parts):
+            if part is not None:
+                gradient += (weights * part).ravel() @ tangent(order)
+    for order, weight in (*metrics, *([(1, guess * np.eye(samples.q.shape[1]))] if guess else [])):
+        one = tangent(order)
+        heavy = weights[:, :, None] * (weight @ one.reshape(*samples.q.shape, d))
+        metric += one.T @ heavy.reshape(-1, d)
+    return gradient, metric
+
+
+def graded(duration: float, steps: int) -> Array:
+    """Return nodes from 0 to `duration` [s]: the first ones `_NEAR` apart, later ones farther.
+
+    Even ones where there are enough for that. What comes next is commanded, what comes later is
+    what it is to be good for.
+    """
+    s = np.linspace(0.0, 1.0, steps + 1)
+    even = np.clip((_NEAR / duration * steps**2 - 1.0) / (steps - 1.0), 0.0, 1.0)
+    return np.asarray(duration * (even * s + (1.0 - even) * s * s))

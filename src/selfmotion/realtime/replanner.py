@@ -6,27 +6,32 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, ProblemError, as_number, as_whole, one_blas_thread
+from selfmotion.basics import Array, as_number, as_whole, one_blas_thread
 from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost, JointVelocity
 from selfmotion.follow import Follows
 from selfmotion.motion import NullMotion, PolynomialNullMotion
 from selfmotion.path import Dwell, Path, PathSamples
 from selfmotion.realtime import law
-from selfmotion.realtime.arguments import as_asked, as_begun, as_measured, check_kinds
+from selfmotion.realtime.arguments import (
+    as_asked,
+    as_begun,
+    as_measured,
+    check_kinds,
+    in_null_space,
+)
 from selfmotion.realtime.clear import Surroundings
-from selfmotion.realtime.horizon import Horizon, in_null_space
-from selfmotion.realtime.limits import joint_limits, planned_limits, stoppable
+from selfmotion.realtime.commands import Commands
+from selfmotion.realtime.horizon import Horizon
+from selfmotion.realtime.limits import joint_limits, planned_limits
 from selfmotion.realtime.reference import Approach, Reference, resting
 from selfmotion.realtime.segment import Flag, Segment
-from selfmotion.realtime.viable import tightened
-from selfmotion.robot import RobotModel, march
+from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
-# The pose feedback between two steps [1/s]. A motion that breaks down within this time [s] is not
-# followed: the arm can stop in less; nor within the second, where limits already hold it up. A
-# command so far from the arm [rad or m] is not what it does.
-_GAIN, _SOON, _AHEAD, _FARTHEST = 20.0, 0.5, 2.0, 0.5
+# A motion that breaks down within this time [s] is not followed: the arm can stop in less; nor
+# within the second, where limits already hold it up.
+_SOON, _AHEAD = 0.5, 2.0
 
 
 class Replanner:
@@ -105,7 +110,7 @@ class Replanner:
         self.cycle = as_number(cycle, "cycle", above=0.0)
         self.period = as_number(period, "period", least=self.cycle, most=self.horizon)
         self._patience = as_number(patience, "patience", least=0.0)
-        self._settling = as_number(settling, "settling", above=0.0)
+        settling = as_number(settling, "settling", above=0.0)
         latency = as_number(latency, "latency", least=0.0)
         as_number(reserve, "reserve", least=0.0, most=self.horizon)
         somewhere = Dwell(robot.pose(robot.dexterous_configuration()), self.horizon)
@@ -113,7 +118,6 @@ class Replanner:
         costs, constraints = as_asked(follows, costs, constraints)
         limits = joint_limits(robot, constraints)
         self.limits = limits
-        self._inner = np.vstack([tightened(limits), np.zeros(robot.dof)])
         null_motion = in_null_space(null_motion or PolynomialNullMotion())
         steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
         bodies = [pair for item in constraints for pair in item.envelope(robot).bodies]
@@ -129,18 +133,15 @@ class Replanner:
         )
         self._kinematics = follows.only.chain.kinematics()
         self._layout = follows.layout
-        self._delay = round(latency / self.cycle)
-        self._prepare(round(self.period / self.cycle) + round(reserve / self.cycle))
+        self._cycles = round(self.period / self.cycle) + round(reserve / self.cycle)
+        self._commands = Commands(robot, limits, self.cycle, self._cycles, latency, settling)
+        self._prepare()
         self._reference = Reference(follows, approach or Approach(), self._times)
         self._begun = False
 
-    def _prepare(self, cycles: int) -> None:
-        """Make all tables of a step, for so many cycles that follow the path."""
-        n, h, grid = self.robot.dof, self.cycle, self._horizon.grid
-        # In so many cycles every joint comes to rest from its highest speed.
-        stopping = int(np.ceil((self.limits[2] / (self.limits[3] * h)).max())) + 3
-        self._cycles = cycles
-        self._states = np.zeros((cycles + stopping + 1, 3, n))
+    def _prepare(self) -> None:
+        """Make all tables of a step, for the cycles that follow the path."""
+        n, h, grid, cycles = self.robot.dof, self.cycle, self._horizon.grid, self._cycles
         self._table = np.zeros((cycles, 2 * n + law.REFERENCE))
         ahead = h * np.arange(1.5, cycles + 1.0)
         halves = np.interp(np.arange(2 * grid.steps + 1), 2 * np.arange(grid.steps + 1), grid.nodes)
@@ -148,7 +149,6 @@ class Replanner:
         self._functions = self._horizon.functions(ahead)
         four = np.tile([0, 1, 1, 2], (grid.steps, 1)) + 2 * np.arange(grid.steps)[:, None]
         self._stages = np.append(four.ravel(), 2 * grid.steps)
-        self._sent = np.zeros((self._delay + 1, n))
 
     def reset(self) -> None:
         """Forget all: the next step begins at its measured state."""
@@ -157,7 +157,7 @@ class Replanner:
     @property
     def deviation(self) -> Array:
         """What the arm is off its command, filtered, (n,) [rad or m]."""
-        return np.array(self._inner[4])
+        return np.array(self._commands.deviation)
 
     def step(
         self,
@@ -210,53 +210,33 @@ class Replanner:
         if not self._begun:
             self._begin(t, as_begun(q, "q", dof), as_begun(qd, "qd", dof))
         q, qd = as_measured(q, dof), as_measured(qd, dof)
-        t, passed = self._go_on(t)
+        commands = self._commands
+        passed = commands.go_on(t)
         reasons: list[str] = []
         if self._around is not None:
             self._around.move(obstacles)
         moving = self._measure(q, passed, reasons)
-        target = self._target(t, path, passed, reasons)
+        target = self._target(commands.time, path, passed, reasons)
         error, flag, follows = np.zeros(2), Flag.STOPPING, False
         first = 0
         if target is not None:
-            rate = self._states[0, 1] - 0.5 * self.cycle * self._states[0, 2]
-            place = self._positions(self._states[:1])[0] + self._inner[4]
+            rate, place = commands.rate, commands.place
             error = self._reference.begin(place, rate, target, self._held_up(passed))
             flag = self._plan(passed, rate, place, reasons)
             if moving and flag is not Flag.STOPPING:
-                follows = self._follow()
+                follows = commands.follow(self._kinematics, self._layout, self._table)
                 first = self._cycles
             else:
                 flag = Flag.STOPPING
         self._follows = follows or flag is Flag.STOPPING
-        end = law.brake(self._states, first, self._inner, self.cycle)
-        return self._segment(t, end, flag, reasons, follows, error)
+        return commands.segment(first, flag, tuple(reasons), follows, error)
 
     def _begin(self, t: float, q: Array, qd: Array) -> None:
-        c = stoppable(self.robot, self._inner, q, qd, self.cycle)
-        self._states[:] = 0.0
-        self._states[:, 0], self._states[0, 1] = c, qd
-        law.brake(self._states, 0, self._inner, self.cycle)
-        self._time, self._inner[4], self._sent[:] = t, 0.0, q
+        self._commands.begin(t, q, qd)
         self._path: Path | None = None
         self._without_path = self._without_state = self._without_way = 0.0
         self._horizon.forget()
         self._follows = self._begun = True
-
-    def _go_on(self, t: float) -> tuple[float, float]:
-        """Make the state that is commanded at `t` the first one; return its time, what passed."""
-        passed = round((t - self._time) / self.cycle) if np.isfinite(t) else -1
-        if passed < 0:
-            raise ProblemError(f"t is {t} s, expected no less than the last step's {self._time} s")
-        end = len(self._states) - 1
-        here = min(passed, end)
-        sent = self._positions(self._states[: here + 1])
-        if passed > end:
-            sent = np.vstack([sent, np.repeat(sent[-1:], min(passed - end, len(self._sent)), 0)])
-        self._sent = np.vstack([self._sent, sent[1:]])[-len(self._sent) :]
-        self._states[0] = self._states[here]
-        self._time += passed * self.cycle
-        return self._time, passed * self.cycle
 
     def _held_up(self, passed: float) -> Array | None:
         """Return the twist that the reference had come to, where limits kept the tool from it.
@@ -270,28 +250,16 @@ class Replanner:
         rows = self._table[cycle - 2 : cycle, -6:]
         return np.asarray(0.5 * (rows[0] + rows[1]))
 
-    def _positions(self, states: Array) -> Array:
-        """Return q of states: the spline at its knots, (c⁻ + 4 c + c⁺)/6."""
-        h = self.cycle
-        return np.asarray(states[:, 0] - h * states[:, 1] + h * h / 6.0 * states[:, 2])
-
     def _measure(self, q: Array, passed: float, reasons: list[str]) -> bool:
         """Take in a measured position; return whether the arm may go on moving."""
-        if q.shape != self._inner[4].shape or not np.all(np.isfinite(q)):
+        if q.shape != (self.robot.dof,) or not np.all(np.isfinite(q)):
             self._without_state += max(passed, self.cycle)
             reasons.append("the measured state is missing, or not finite")
             return self._without_state <= self._patience
         self._without_state = 0.0
-        off = q - self._sent[0]
-        worst = int(np.argmax(np.abs(off)))
-        if abs(off[worst]) > _FARTHEST:
-            reasons.append(
-                f"joint '{self.robot.joint_names[worst]}' is {off[worst]:.3g} from its command"
-            )
-            return False
-        share = 1.0 - np.exp(-passed / self._settling)
-        self._inner[4] += share * (off - self._inner[4])
-        return True
+        off = self._commands.measure(q, passed)
+        reasons += [off] if off else []
+        return not off
 
     def _target(
         self, t: float, path: Path, passed: float, reasons: list[str]
@@ -356,43 +324,3 @@ class Replanner:
             reasons.append(f"planning failed: {type(error).__name__}: {error}")
             self._horizon.forget()
         return False
-
-    def _follow(self) -> bool:
-        """Command the cycles one after the other; return whether the tool moves as asked."""
-        states, table, limits = self._states, self._table, self._inner
-        h, n = self.cycle, self.robot.dof
-        table[0, :n] = states[0, 0] + 0.5 * h * states[0, 1] + limits[4]
-        places = table[: self._cycles, :n]
-        follows = True
-
-        def step(
-            cycle: int, tip: int, jacobian: Array, rotation: Array, translation: Array
-        ) -> bool:
-            nonlocal follows
-            follows &= law.command(
-                cycle, jacobian, rotation, translation, table, states, limits, layout, _GAIN, h
-            )
-            return True
-
-        layout = self._layout
-        march([self._kinematics], places, step)
-        return follows
-
-    def _segment(
-        self, t: float, end: int, flag: Flag, reasons: list[str], follows: bool, error: Array
-    ) -> Segment:
-        h = self.cycle
-        # What comes after the end is rest, too.
-        self._states[end + 1 :] = self._states[end]
-        end = max(end, 1)
-        states = self._states[: end + 1]
-        return Segment(
-            t=np.asarray(t + h * np.arange(end + 1), dtype=np.float64),
-            q=self._positions(states),
-            qd=states[:, 1] - 0.5 * h * states[:, 2],
-            qdd=states[:, 2],
-            flag=flag,
-            reasons=tuple(reasons),
-            follows=follows,
-            tool_error=error,
-        )

@@ -40,7 +40,7 @@ class KeyFrames:
     position: Array
     quaternion: Array
 
-    def part(self, which: npt.NDArray[np.intp] | slice) -> "KeyFrames":
+    def picked(self, which: npt.NDArray[np.intp] | slice) -> "KeyFrames":
         """Return some of the key frames."""
         return KeyFrames(self.t[which], self.position[which], self.quaternion[which])
 
@@ -59,7 +59,7 @@ def key_frames(robot: RobotModel, trajectory: Trajectory) -> KeyFrames:
     duration = trajectory.duration
     times = np.linspace(0.0, duration, max(9, int(np.ceil(20 * duration)) + 1))
     frames = _poses(robot, trajectory, times)
-    start, end = frames.part(slice(None, -1)), frames.part(slice(1, None))
+    start, end = frames.picked(slice(None, -1)), frames.picked(slice(1, None))
     while len(start.t):
         middle = _poses(robot, trajectory, 0.5 * (start.t + end.t))
         guess = _homogeneous(
@@ -67,10 +67,10 @@ def key_frames(robot: RobotModel, trajectory: Trajectory) -> KeyFrames:
         )
         miss = np.abs(guess - _homogeneous(middle.position, middle.quaternion)).max(axis=(1, 2, 3))
         wrong = np.flatnonzero((miss > _TOLERANCE) & (end.t - start.t > _SHORTEST))
-        start, middle, end = start.part(wrong), middle.part(wrong), end.part(wrong)
+        start, middle, end = start.picked(wrong), middle.picked(wrong), end.picked(wrong)
         frames = _joined(frames, middle)
         start, end = _joined(start, middle), _joined(middle, end)
-    return frames.part(np.argsort(frames.t))
+    return frames.picked(np.argsort(frames.t))
 
 
 def _joined(a: KeyFrames, b: KeyFrames) -> KeyFrames:

@@ -1,11 +1,11 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
 from selfmotion.robot.chain import (
+    WORLD as WORLD,
     Chain as Chain,
     ChainArrays as ChainArrays,
     Kinematics as Kinematics,
     TreeArrays as TreeArrays,
-    march as march,
     null_space as null_space,
 )
 from selfmotion.robot.chain_series import ChainSeries as ChainSeries
@@ -27,7 +27,6 @@ from selfmotion.robot.mounting import (
     mounting_of as mounting_of,
 )
 from selfmotion.robot.placements import (
-    Flags as Flags,
     compose as compose,
     placements as placements,
 )

@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from selfmotion.basics import (
     Array,
+    Flags,
     InverseKinematicsError,
     RobotError,
     as_whole,
@@ -22,7 +23,6 @@ from selfmotion.robot.chain import WORLD, Chain, TreeArrays, tree_arrays
 from selfmotion.robot.full_model import full_model, link_geometry
 from selfmotion.robot.held import locked_configuration
 from selfmotion.robot.mesh_files import bad_meshes, without_meshes
-from selfmotion.robot.placements import Flags
 from selfmotion.robot.urdf import Urdf
 from selfmotion.task import Task, as_pose
 

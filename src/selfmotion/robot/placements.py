@@ -3,11 +3,8 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-from selfmotion.basics import Array, Ints, inlined, kernel
-
-Flags = npt.NDArray[np.bool_]
+from selfmotion.basics import Array, Flags, Ints, inlined, kernel
 
 
 @inlined

@@ -10,11 +10,6 @@ from selfmotion.search.guides import (
     guides as guides,
     has_curves as has_curves,
 )
-from selfmotion.search.pieces import (
-    Piece as Piece,
-    Pieces as Pieces,
-    turned_towards as turned_towards,
-)
 from selfmotion.search.reach import Reach as Reach, reachable as reachable
 from selfmotion.search.sequences import (
     SPACING as SPACING,
@@ -22,3 +17,8 @@ from selfmotion.search.sequences import (
     best_sequences as best_sequences,
 )
 from selfmotion.search.starts import spread as spread, start_candidates as start_candidates
+from selfmotion.search.stretches import (
+    Stretch as Stretch,
+    Stretches as Stretches,
+    turned_towards as turned_towards,
+)

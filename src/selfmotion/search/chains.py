@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array
-from selfmotion.search.measures import Length, Mask, Measure, Rows
+from selfmotion.basics import Array, Flags, Ints
+from selfmotion.search.measures import Length, Measure
 
 # Chains are unlike when some joint differs by this [rad or m] at this share of the waypoints.
 _UNLIKE, _LONG = 0.3, 0.1
@@ -31,7 +31,7 @@ class Chains:
     """
 
     cost: tuple[Array, ...]
-    parent: tuple[Rows, ...]
+    parent: tuple[Ints, ...]
 
     @property
     def blocked(self) -> int | None:
@@ -50,7 +50,7 @@ class Chains:
 
 
 def best_chains(
-    layers: list[Array], largest_step: Array, turning: Mask, measure: Measure | None = None
+    layers: list[Array], largest_step: Array, turning: Flags, measure: Measure | None = None
 ) -> Chains:
     """Return the cheapest chains from the first layer on (Bellman's recursion, exact).
 
@@ -80,7 +80,7 @@ def diverse_chains(
     layers: list[Array],
     forward: Chains,
     largest_step: Array,
-    turning: Mask,
+    turning: Flags,
     count: int,
     measure: Measure | None = None,
 ) -> list[list[int]]:
@@ -120,12 +120,12 @@ def diverse_chains(
     return (chosen + mirrored)[:count]
 
 
-def unlike(q: Array, other: Array, turning: Mask) -> bool:
+def unlike(q: Array, other: Array, turning: Flags) -> bool:
     """Whether two motions (W, n) differ by much for long."""
     return bool(np.mean(_apart(q, other, turning) > _UNLIKE) >= _LONG)
 
 
-def _mirrors(q: Array, other: Array, turning: Mask) -> bool:
+def _mirrors(q: Array, other: Array, turning: Flags) -> bool:
     """Whether each joint has moved by about as much in both motions, at all times."""
     moved, also = (
         np.cumsum(np.abs(unturned(np.diff(motion, axis=0), turning)), axis=0)
@@ -134,12 +134,12 @@ def _mirrors(q: Array, other: Array, turning: Mask) -> bool:
     return bool(np.abs(moved - also).max() < _SAME_TRAVEL)
 
 
-def _apart(q: Array, other: Array, turning: Mask) -> Array:
+def _apart(q: Array, other: Array, turning: Flags) -> Array:
     """Return the largest difference of any joint, (…,)."""
     return np.asarray(np.abs(unturned(q - other, turning)).max(axis=-1))
 
 
-def unturned(difference: Array, turning: Mask) -> Array:
+def unturned(difference: Array, turning: Flags) -> Array:
     """Return differences (…, n) modulo turns in the joints that turn without end."""
     turn = 2.0 * np.pi
     return np.where(turning, difference - turn * np.round(difference / turn), difference)

@@ -8,8 +8,9 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, Progress, read_only, silent
 from selfmotion.follow import Follows
-from selfmotion.search import kernels
+from selfmotion.search import continuation
 from selfmotion.search.manifold import Manifold
+from selfmotion.search.projection import correct
 
 # Longest single correction [rad or m]: a far start wanders where J is nearly singular.
 _LONGEST = 0.5
@@ -80,7 +81,7 @@ class CurveSet:
         """Return the curve that q is on and the arc length there; None when it is on no curve."""
         if not self.curves:
             return None
-        i, share, distance = kernels.locate(
+        i, share, distance = continuation.locate(
             q, self._samples, self._curve, self._revolute, self._near
         )
         if not distance < ON_CURVE:
@@ -148,7 +149,7 @@ class SelfMotion:
     def tangent(self, q: Array, target: Array) -> Array | None:
         """Return a unit null vector of J at q, a solution; None where q is singular."""
         tangent, layout = self._direction.copy(), self._manifold.layout
-        length = kernels.correct(q.copy(), *self._tips.at(q), target, layout, tangent, _LONGEST)
+        length = correct(q.copy(), *self._tips.at(q), target, layout, tangent, _LONGEST)
         return tangent if length >= 0.0 and np.all(np.isfinite(tangent)) else None
 
     def trace(self, q: Array, target: Array) -> Curve | None:
@@ -186,7 +187,7 @@ class SelfMotion:
     def _walk(self, start: Array, tangent: Array, target: Array) -> tuple[Array, bool]:
         """Return the samples (K, n) from `start` on, and whether they lead back to it."""
         samples, on = np.empty((_MOST_SAMPLES, self.robot.dof)), self._manifold
-        count, closed = kernels.walk(
+        count, closed = continuation.walk(
             start, tangent, target, on.chains, on.revolute, on.layout, self.spacing, samples
         )
         return samples[:count].copy(), closed

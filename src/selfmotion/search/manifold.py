@@ -4,9 +4,9 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, RobotError
+from selfmotion.engine import transport
 from selfmotion.follow import Follows
-from selfmotion.motion import transport
-from selfmotion.search import kernels
+from selfmotion.search import projection
 
 _NEAR_STEPS, _FAR_STEPS = 10, 60
 # Longest single correction [rad or m].
@@ -63,7 +63,7 @@ class Manifold:
         found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
         wanted = np.array(np.broadcast_to(target, (len(q), np.shape(target)[-1])), order="C")
         steps = _FAR_STEPS if far else _NEAR_STEPS
-        kernels.project_all(
+        projection.project_all(
             found, wanted, self.chains, self.layout, *self._limits, _LONGEST, steps, arrived
         )
         return found, arrived

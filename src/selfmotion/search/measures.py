@@ -6,16 +6,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
-import numpy.typing as npt
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Flags, Ints
 from selfmotion.costs import Cost, PathLength, Samples
 from selfmotion.follow import Follows
 from selfmotion.motion import Sampling
-from selfmotion.search import kernels
-
-Mask = npt.NDArray[np.bool_]
-Rows = npt.NDArray[np.intp]
+from selfmotion.search import edges
 
 # Steps faster than this many times the mean speed of the shortest chain are changes from sample to
 # sample, which the finished motion spreads over more time.
@@ -27,8 +23,8 @@ class Measure(ABC):
 
     @abstractmethod
     def extended(
-        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Mask
-    ) -> tuple[Array, Rows]:
+        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
+    ) -> tuple[Array, Ints]:
         """Return the least cost at the nodes of waypoint k + 1, and the nodes that it comes from.
 
         Parameters
@@ -75,12 +71,12 @@ class Length(Measure):
     weights: Array
 
     def extended(
-        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Mask
-    ) -> tuple[Array, Rows]:
+        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
+    ) -> tuple[Array, Ints]:
         """See `Measure.extended`."""
         reach, source = np.empty(len(after)), np.empty(len(after), dtype=np.intp)
         longest = np.ascontiguousarray(step)
-        kernels.extend(before, cost, after, longest, turning, self.weights, reach, source)
+        edges.extend(before, cost, after, longest, turning, self.weights, reach, source)
         return reach, source
 
     def of(self, q: Array) -> float:
@@ -146,18 +142,18 @@ class RunningCost(Measure):
         return cls(follows, t, tuple(placed), tuple(moving), robot.joint_weights)
 
     def extended(
-        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Mask
-    ) -> tuple[Array, Rows]:
+        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
+    ) -> tuple[Array, Ints]:
         """See `Measure.extended`."""
         steps = self.steps(k, before, after, step, turning)
         return _cheapest(steps.first, steps.second, steps.price, cost, len(after))
 
-    def steps(self, k: int, before: Array, after: Array, step: Array, turning: Mask) -> "_Steps":
+    def steps(self, k: int, before: Array, after: Array, step: Array, turning: Flags) -> "_Steps":
         """Return the steps that are short enough from waypoint k to the next; see `extended`."""
         known = self._steps.get((id(before), id(after)))
         if known is None or known.before is not before or known.after is not after:
             longest = np.ascontiguousarray(step)
-            first, second = kernels.near_pairs(before, after, longest, turning)
+            first, second = edges.near_pairs(before, after, longest, turning)
             price = self._prices(k, before, after, first, second, turning)
             known = _Steps(before, after, first, second, price)
             _note(self._steps, (id(before), id(after)), known, _MANY * len(self.t))
@@ -183,7 +179,7 @@ class RunningCost(Measure):
         return replace(self, speed=_FAST * mean if mean > 0.0 else np.inf, _steps={})
 
     def _prices(
-        self, k: int, before: Array, after: Array, first: Rows, second: Rows, turning: Mask
+        self, k: int, before: Array, after: Array, first: Ints, second: Ints, turning: Flags
     ) -> Array:
         """Return what the steps between pairs of nodes cost, (P,)."""
         span = float(self.t[k + 1] - self.t[k])
@@ -238,8 +234,8 @@ class _Steps:
 
     before: Array
     after: Array
-    first: Rows
-    second: Rows
+    first: Ints
+    second: Ints
     price: Array
 
 
@@ -250,10 +246,10 @@ def _note(known: dict[Any, Any], key: Any, value: Any, most: int) -> None:
 
 
 def _cheapest(
-    first: Rows, second: Rows, price: Array, cost: Array, count: int
-) -> tuple[Array, Rows]:
+    first: Ints, second: Ints, price: Array, cost: Array, count: int
+) -> tuple[Array, Ints]:
     reach, source = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
-    kernels.cheapest(first, second, price, cost, reach, source)
+    edges.cheapest(first, second, price, cost, reach, source)
     return reach, source
 
 
@@ -264,8 +260,8 @@ class Backwards(Measure):
     measure: RunningCost
 
     def extended(
-        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Mask
-    ) -> tuple[Array, Rows]:
+        self, k: int, before: Array, cost: Array, after: Array, step: Array, turning: Flags
+    ) -> tuple[Array, Ints]:
         """See `Measure.extended`."""
         last = len(self.measure.t) - 2
         steps = self.measure.steps(last - k, after, before, step, turning)

@@ -8,7 +8,7 @@ import numpy as np
 from selfmotion.basics import Array, NoSequenceError, Progress, silent
 from selfmotion.collision import CollisionModel
 from selfmotion.follow import Follows
-from selfmotion.search import kernels
+from selfmotion.search import edges
 from selfmotion.search.chains import best_chains, diverse_chains
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.measures import Length, Measure
@@ -222,7 +222,7 @@ def _smooth_motions(
 def _spread_out(q: Array, cost: Array, count: int) -> Array:
     """Return up to `count` of q (K, n), far from each other first, the cheaper of near ones."""
     ranked = np.ascontiguousarray(q[np.argsort(cost, kind="stable")])
-    return np.asarray(ranked[kernels.spread_out(ranked, np.array(_APART), count)])
+    return np.asarray(ranked[edges.spread_out(ranked, np.array(_APART), count)])
 
 
 def _sorted(q: Array) -> Array:

@@ -6,13 +6,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, NoSequenceError, ProblemError, Progress, read_only, silent
+from selfmotion.basics import (
+    Array,
+    Flags,
+    NoSequenceError,
+    Progress,
+    read_only,
+    silent,
+)
 from selfmotion.collision import CollisionModel
 from selfmotion.follow import Follows
-from selfmotion.robot import RobotModel
+from selfmotion.search.arguments import as_joint_values, as_times, check_asked
 from selfmotion.search.chains import best_chains, diverse_chains, unlike, unturned
 from selfmotion.search.curves import CurveSet, SelfMotion, curves_along
-from selfmotion.search.measures import Length, Mask, Measure
+from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible, place_nodes
 from selfmotion.search.reasons import why_blocked
 from selfmotion.search.starts import spread
@@ -157,16 +164,16 @@ def best_sequences(
     NoSequenceError
         No chain exists among the samples; tells the waypoint at which the last one ends, and why.
     """
-    robot, times = follows.robot, _times(t)
+    robot, times = follows.robot, as_times(t)
     limits = [
-        _joint_values(robot, values, name, shape)
+        as_joint_values(robot, values, name, shape)
         for values, name, shape in (
             (lower, "lower", (robot.dof,)),
             (upper, "upper", (robot.dof,)),
             (largest_step, "largest_step", (len(times) - 1, robot.dof)),
         )
     ]
-    _check(follows, limits, count)
+    check_asked(follows, limits, count)
     lower, upper, steps = limits
     layers = CurveLayers.of(follows, times, (lower, upper), tuple(bodies), rng, progress)
     motion, x, bounds = layers.motion, layers.x, layers.bounds
@@ -187,7 +194,7 @@ def best_sequences(
 
 def _rough_motions(
     nodes: CurveLayers, steps: Array, times: Array, count: int, asked: Measure | None
-) -> tuple[list[Array], Mask, Measure]:
+) -> tuple[list[Array], Flags, Measure]:
     """Return the best unlike motions (W, n) over samples, whose turns did not count, and by what.
 
     Turns of joints with room for several are left out at first, and the motion put inside the
@@ -229,7 +236,7 @@ def _rough_motions(
 
 
 def ranked(
-    times: Array, motions: list[Array], turning: Mask, weights: Array, measure: Measure
+    times: Array, motions: list[Array], turning: Flags, weights: Array, measure: Measure
 ) -> list[Sequence]:
     """Return the sequences, the best first, without those that became like a better one."""
     length = Length(weights)
@@ -255,42 +262,8 @@ def _free_samples(
     return found
 
 
-def connected(layers: list[Array], chain: list[int], turning: Mask) -> Array:
+def connected(layers: list[Array], chain: list[int], turning: Flags) -> Array:
     """Return a chain's configurations (W, n); joints that turn without end do not jump."""
     q = np.array([layer[k] for layer, k in zip(layers, chain, strict=True)])
     steps = unturned(np.diff(q, axis=0), turning)
     return np.where(turning, np.vstack([q[:1], q[0] + np.cumsum(steps, axis=0)]), q)
-
-
-def _times(t: npt.ArrayLike) -> Array:
-    times = np.asarray(t, dtype=np.float64)
-    if times.ndim != 1 or len(times) < 2 or not np.all(np.diff(times) > 0):
-        raise ProblemError(f"t has shape {times.shape}, expected at least two increasing times [s]")
-    return times
-
-
-def _joint_values(
-    robot: RobotModel, values: npt.ArrayLike, name: str, shape: tuple[int, ...]
-) -> Array:
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape not in ((), (robot.dof,), shape) or np.any(np.isnan(array)):
-        raise ProblemError(
-            f"{name} has shape {array.shape}, expected a number for each of {robot.dof} joints"
-        )
-    return np.ascontiguousarray(np.broadcast_to(array, shape))
-
-
-def _check(follows: Follows, limits: list[Array], count: int) -> None:
-    robot, redundancy = follows.robot, follows.redundancy
-    if redundancy != 1:
-        raise ProblemError(
-            f"{robot.name} has redundancy {redundancy} for task '{follows.task.value}'; the search "
-            f"over self-motion curves needs 1, use multiple starts instead"
-        )
-    if np.any(limits[0] > limits[1]):
-        k = int(np.flatnonzero(limits[0] > limits[1])[0])
-        raise ProblemError(f"joint '{robot.joint_names[k]}' has its lower limit above the upper")
-    if not np.all(limits[2] > 0.0):
-        raise ProblemError("largest_step has numbers that are not positive")
-    if count < 1:
-        raise ProblemError(f"count is {count}, expected at least 1")

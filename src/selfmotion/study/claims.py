@@ -10,17 +10,17 @@ from selfmotion.motion import PolynomialNullMotion
 from selfmotion.robot import RobotModel, load_robot
 from selfmotion.study.context import Context, finely, run_published
 from selfmotion.study.engine import bind, optimum
-from selfmotion.study.results import Claim, Plot, PlottedCurve, Section, Verdict
+from selfmotion.study.results import Chapter, Claim, Plot, PlottedCurve, Verdict
 from selfmotion.task import Task
 
 # A norm of the coefficients at which, in the test of growth, the guard steps in.
 _GUARD = 1e3
 
 
-def section(context: Context) -> Section:
+def chapter(context: Context) -> Chapter:
     """Return the claims about convergence, gains and singular poses."""
     growth, claim = _velocity_term(context)
-    return Section(
+    return Chapter(
         "claims_tested",
         "Claims, one by one",
         plots=(growth,),

@@ -22,7 +22,7 @@ from selfmotion.problem import Problem, sample_problem
 from selfmotion.result import Plan
 from selfmotion.robot import NAMED_ARMS, load_robot
 from selfmotion.study.context import Context
-from selfmotion.study.results import Claim, Section, Table, Verdict
+from selfmotion.study.results import Chapter, Claim, Table, Verdict
 
 _COLUMNS = (
     "method",
@@ -41,7 +41,7 @@ _COLUMNS = (
 _AGREEMENT = 1e-4
 
 
-def section(context: Context) -> Section:
+def chapter(context: Context) -> Chapter:
     """Return the table for each problem, and the claims about other works."""
     sample = sample_problem()
     tables = [_table("Sample problem (free end)", sample, cyclic=False)]
@@ -49,7 +49,7 @@ def section(context: Context) -> Section:
         there_and_back = sample_problem(duration=2.0)
         tables.append(_table("Sample problem, there and back", there_and_back, cyclic=True))
         tables.append(_table("Panda, circle of 0.15 m, pose task", panda_circle(), cyclic=True))
-    return Section(
+    return Chapter(
         "others",
         "Other works, side by side",
         (

@@ -18,7 +18,7 @@ from selfmotion.study.published import (
     flops_per_rate,
     published_null_motion,
 )
-from selfmotion.study.results import Claim, Plot, PlottedCurve, Section, Table, Verdict
+from selfmotion.study.results import Chapter, Claim, Plot, PlottedCurve, Table, Verdict
 
 # Iterations of the published scheme on each chain: the same for all, so that costs compare.
 _ITERATIONS = 4
@@ -27,12 +27,12 @@ _ITERATIONS = 4
 _SHORT, _LONG = (8, 4e6), (31, 23e6)
 
 
-def section(context: Context) -> Section:
+def chapter(context: Context) -> Chapter:
     """Return the counts for the sample problem and for planar chains."""
     run = context.published()
     each = flops_per_rate(3, 2, 3)
     table, plot, growth = _growth(context)
-    return Section(
+    return Chapter(
         "expense",
         "What it costs",
         (

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.study.figures import to_svg, write_png
-from selfmotion.study.results import Claim, Section, Study, Table
+from selfmotion.study.results import Chapter, Claim, Study, Table
 
 
 def write(study: Study, folder: Path) -> list[Path]:
@@ -25,7 +25,7 @@ def write(study: Study, folder: Path) -> list[Path]:
 def html(study: Study) -> str:
     """Return the page: no script, no network, dark mode by the reader's preference."""
     style = resources.files(__package__).joinpath("page.css").read_text(encoding="utf-8")
-    links = "".join(f'<a href="#{s.key}">{escape(s.title)}</a>' for s in study.sections)
+    links = "".join(f'<a href="#{s.key}">{escape(s.title)}</a>' for s in study.chapters)
     claims = study.claims
     counts = ", ".join(
         f"{sum(claim.verdict is verdict for claim in claims)} {verdict.value}"
@@ -41,7 +41,7 @@ def html(study: Study) -> str:
         f"<code>selfmotion study</code> ({study.scale}, {study.seconds:.0f} s). "
         f"{len(claims)} claims tested: {counts}.</p>"
         f'<nav><a href="#claims">Claims and verdicts</a>{links}</nav></header><main>'
-        f"{_overview(claims)}{''.join(map(_section, study.sections))}</main></body></html>"
+        f"{_overview(claims)}{''.join(map(_chapter, study.chapters))}</main></body></html>"
     )
 
 
@@ -71,13 +71,13 @@ def _overview(claims: tuple[Claim, ...]) -> str:
     )
 
 
-def _section(section: Section) -> str:
-    paragraphs = "".join(f"<p>{escape(text)}</p>" for text in section.paragraphs)
-    plots = "".join(f"<figure>{to_svg(plot)}</figure>" for plot in section.plots)
+def _chapter(chapter: Chapter) -> str:
+    paragraphs = "".join(f"<p>{escape(text)}</p>" for text in chapter.paragraphs)
+    plots = "".join(f"<figure>{to_svg(plot)}</figure>" for plot in chapter.plots)
     return (
-        f'<section id="{section.key}"><h2>{escape(section.title)}</h2>{paragraphs}'
-        f'<div class="plots">{plots}</div>{"".join(map(_table, section.tables))}'
-        f"{''.join(map(_claim, section.claims))}</section>"
+        f'<section id="{chapter.key}"><h2>{escape(chapter.title)}</h2>{paragraphs}'
+        f'<div class="plots">{plots}</div>{"".join(map(_table, chapter.tables))}'
+        f"{''.join(map(_claim, chapter.claims))}</section>"
     )
 
 

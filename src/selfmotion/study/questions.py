@@ -21,7 +21,7 @@ from selfmotion.robot import load_robot
 from selfmotion.study.context import FINE, Context, finely
 from selfmotion.study.engine import bind, optimum
 from selfmotion.study.published import ODE23_TOLERANCE, PublishedFunction
-from selfmotion.study.results import Claim, Plot, PlottedCurve, Section, Table, Verdict
+from selfmotion.study.results import Chapter, Claim, Plot, PlottedCurve, Table, Verdict
 
 # A tolerance of the integrator, tight for its order.
 _TIGHT = 1e-6
@@ -30,7 +30,7 @@ _TIGHT = 1e-6
 _SPREAD = 10.0
 
 
-def section(context: Context) -> Section:
+def chapter(context: Context) -> Chapter:
     """Return the answers, a table or plot each."""
     tables, plots, claims = zip(
         _specification(context),
@@ -41,7 +41,7 @@ def section(context: Context) -> Section:
         _minima(context),
         strict=True,
     )
-    return Section(
+    return Chapter(
         "questions",
         "Open questions, answered",
         tables=tuple(table for table in tables if table is not None),

@@ -108,7 +108,7 @@ class Plot:
 
 
 @dataclass(frozen=True)
-class Section:
+class Chapter:
     """A part of the report.
 
     Attributes
@@ -133,23 +133,23 @@ class Study:
 
     Attributes
     ----------
-    sections : tuple of Section
+    chapters : tuple of Chapter
     seconds : float
         Wall time of the run.
     scale : str
         ``"full"`` or ``"reduced"``.
     """
 
-    sections: tuple[Section, ...]
+    chapters: tuple[Chapter, ...]
     seconds: float
     scale: str
 
     @property
     def claims(self) -> tuple[Claim, ...]:
         """All claims, in the report's order."""
-        return tuple(claim for section in self.sections for claim in section.claims)
+        return tuple(claim for chapter in self.chapters for claim in chapter.claims)
 
     @property
     def plots(self) -> tuple[Plot, ...]:
         """All plots, in the report's order."""
-        return tuple(plot for section in self.sections for plot in section.plots)
+        return tuple(plot for chapter in self.chapters for plot in chapter.plots)

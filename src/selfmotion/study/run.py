@@ -13,15 +13,15 @@ from selfmotion.study import (
 )
 from selfmotion.study.context import Context
 from selfmotion.study.engine import Scale
-from selfmotion.study.results import Section, Study
+from selfmotion.study.results import Chapter, Study
 
-_PARTS: dict[str, Callable[[Context], Section]] = {
-    "sample trajectory": trajectory.section,
-    "claims": claims.section,
-    "surging": surging.section,
-    "cost of the method": expense.section,
-    "open questions": questions.section,
-    "other works": comparison.section,
+_PARTS: dict[str, Callable[[Context], Chapter]] = {
+    "sample trajectory": trajectory.chapter,
+    "claims": claims.chapter,
+    "surging": surging.chapter,
+    "cost of the method": expense.chapter,
+    "open questions": questions.chapter,
+    "other works": comparison.chapter,
 }
 
 # Part names in order, for a progress bar.
@@ -45,9 +45,9 @@ def run(scale: Scale | None = None, progress: Callable[[str], None] | None = Non
     began = time.perf_counter()
     scale = scale or Scale.full()
     context = Context(scale)
-    sections = []
+    chapters = []
     for name, part in _PARTS.items():
         if progress is not None:
             progress(name)
-        sections.append(part(context))
-    return Study(tuple(sections), time.perf_counter() - began, scale.name)
+        chapters.append(part(context))
+    return Study(tuple(chapters), time.perf_counter() - began, scale.name)

@@ -9,7 +9,7 @@ from selfmotion.optimise import Minimum
 from selfmotion.study.context import Context
 from selfmotion.study.engine import bind, optimum
 from selfmotion.study.published import published_null_motion
-from selfmotion.study.results import Claim, Plot, PlottedCurve, Section, Table, Verdict
+from selfmotion.study.results import Chapter, Claim, Plot, PlottedCurve, Table, Verdict
 
 # A surge: after the first two iterations, a drop more than this many times the one before, and
 # above this share of F.
@@ -41,7 +41,7 @@ _VARIANTS = (
 )
 
 
-def section(context: Context) -> Section:
+def chapter(context: Context) -> Chapter:
     """Return the comparison of gradients, bases, H0 and line searches, and the verdict."""
     runs = []
     for variant in _VARIANTS:
@@ -61,7 +61,7 @@ def section(context: Context) -> Section:
         f"scaling H0 it no longer matters. A surge is a drop of F more than {_FACTOR:g} times the "
         f"one before it, and above {_VISIBLE:.0e} of F. Exact gradients but in the first row."
     )
-    return Section(
+    return Chapter(
         "surging",
         "Surging, and its cause",
         tables=(Table("The same F, searched in nine ways", columns, rows, note),),

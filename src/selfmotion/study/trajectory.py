@@ -6,7 +6,7 @@ from selfmotion.basics import Array
 from selfmotion.costs import Cost, InverseManipulability, JointVelocity, Manipulability
 from selfmotion.study.context import Context, Result, finely
 from selfmotion.study.engine import optimum
-from selfmotion.study.results import Claim, Plot, PlottedCurve, Section, Table, Verdict
+from selfmotion.study.results import Chapter, Claim, Plot, PlottedCurve, Table, Verdict
 
 _LINKS = np.array([2.0, 2.0, 1.0])
 
@@ -25,11 +25,11 @@ _COLUMNS = (
 )
 
 
-def section(context: Context) -> Section:
+def chapter(context: Context) -> Chapter:
     """Return figures 1 to 3, the arm on its path, the table, and the claims about μ."""
     still, best, run = context.still, context.best, context.published()
     ratio = np.abs(best.qd).max() / np.abs(still.qd).max()
-    return Section(
+    return Chapter(
         "sample",
         "The sample trajectory",
         (

@@ -1,11 +1,4 @@
-"""Laws that your own costs, constraints, paths, null motions and optimisers have to keep.
-
-One checker per protocol, for your tests as for ours: it returns nothing, or raises AssertionError
-with the law, the place and both numbers. All seeds are fixed.
-
->>> from selfmotion.testing import check_cost
->>> check_cost(sm.InverseManipulability(0.01))
-"""
+"""The laws, one function for each kind of class."""
 
 import json
 from collections.abc import Callable
@@ -16,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import Array, Saved, read_only, restore
+from selfmotion.basics import Array, Saved, restore
 from selfmotion.certificate import Finding, FinishedMotion, Requirement
 from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost
@@ -27,8 +20,7 @@ from selfmotion.path import Line, Path
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel, load_robot
 from selfmotion.task import Task
-
-__all__ = ["check_constraint", "check_cost", "check_null_motion", "check_optimizer", "check_path"]
+from selfmotion.testing.functions import Bowl, Valley
 
 # Exact gradients against central differences of F, relative to the largest entry.
 GRADIENT = 1e-6
@@ -191,10 +183,10 @@ def check_optimizer(optimizer: Optimizer) -> None:
         A law is broken; says which one.
     """
     for function, x0, best in (
-        (_Bowl(offset=1.0), np.full(4, 2.0), 1.0),
+        (Bowl(offset=1.0), np.full(4, 2.0), 1.0),
         # F < 0: relative tolerances have to take its size.
-        (_Bowl(offset=-50.0), np.full(4, 2.0), -50.0),
-        (_Valley(), np.array([-1.2, 1.0]), 1.0),
+        (Bowl(offset=-50.0), np.full(4, 2.0), -50.0),
+        (Valley(), np.array([-1.2, 1.0]), 1.0),
     ):
         history: list[Iteration] = []
         found = optimizer.minimize(function, x0, callback=history.append)
@@ -205,13 +197,13 @@ def check_optimizer(optimizer: Optimizer) -> None:
         costs = [iteration.cost for iteration in history]
         _require(bool(costs), f"{name}: the callback was never called")
         _require(found.cost <= min(costs), f"{name}: worse than a point on the way")
-    limited = _Valley()
+    limited = Valley()
     start = np.array([-1.2, 1.0])
     few = optimizer.minimize(limited, start, max_evaluations=3)
     # The limit is looked at between steps; a gradient may stand for one more.
     _require(limited.evaluations <= 4, f"took {limited.evaluations} evaluations, allowed 3")
-    _require(few.cost <= _Valley().value(start), "ends worse than it began")
-    stopped: Minimum = optimizer.minimize(_Valley(), start, callback=lambda _: True)
+    _require(few.cost <= Valley().value(start), "ends worse than it began")
+    stopped: Minimum = optimizer.minimize(Valley(), start, callback=lambda _: True)
     _require(len(stopped.history) <= 1, "went on though the callback asked to stop")
 
 
@@ -298,45 +290,3 @@ def _near(
             f"{message}{when}: {actual[worst]:.9g} against {expected[worst]:.9g} (off by "
             f"{miss[worst]:.2e}, allowed {tolerance:.1e})"
         )
-
-
-class _Bowl:
-    """½ (x - 1)ᵀ A (x - 1) + offset, with condition number 100."""
-
-    def __init__(self, offset: float) -> None:
-        self._hessian, self._offset = np.diag(np.geomspace(1.0, 100.0, 4)), offset
-        self.evaluations = 0
-
-    def value(self, x: Array) -> float:
-        self.evaluations += 1
-        return float(0.5 * (x - 1.0) @ self._hessian @ (x - 1.0)) + self._offset
-
-    def gradient(self, x: Array) -> Array:
-        return np.asarray(self._hessian @ (x - 1.0))
-
-    def slope(self, x: Array, direction: Array) -> float:
-        return float(self.gradient(x) @ direction)
-
-    def metric(self, x: Array) -> Array:
-        return read_only(np.eye(len(x)))
-
-
-class _Valley:
-    """Rosenbrock's function, with its least value 1."""
-
-    def __init__(self) -> None:
-        self.evaluations = 0
-
-    def value(self, x: Array) -> float:
-        self.evaluations += 1
-        return float((1.0 - x[0]) ** 2 + 100.0 * (x[1] - x[0] ** 2) ** 2) + 1.0
-
-    def gradient(self, x: Array) -> Array:
-        across = x[1] - x[0] ** 2
-        return np.array([-2.0 * (1.0 - x[0]) - 400.0 * x[0] * across, 200.0 * across])
-
-    def slope(self, x: Array, direction: Array) -> float:
-        return float(self.gradient(x) @ direction)
-
-    def metric(self, x: Array) -> Array:
-        return read_only(np.eye(2))

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from selfmotion.basics import Array, NoSequenceError, Progress, silent
+from selfmotion.basics import Array, Flags, Ints, NoSequenceError, Progress, silent
 from selfmotion.problem import Problem
 from selfmotion.search.chains import best_chains, unturned
 from selfmotion.search.guides import MARGIN, has_curves, waypoint_times
-from selfmotion.search.measures import Length, Mask, Rows
+from selfmotion.search.measures import Length
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sampled import SampledLayers
 from selfmotion.search.sequences import CurveLayers, connected
@@ -19,7 +19,7 @@ _BREAK = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class Stretch:
     """A chain of configurations along a stretch of a path.
 
     Attributes
@@ -31,7 +31,7 @@ class Piece:
     q : (W, n)
         Configurations [rad or m].
     ending : str
-        Why no chain from its first waypoint goes all the way; "" for the last piece.
+        Why no chain from its first waypoint goes all the way; "" for the last one.
     """
 
     first: int
@@ -42,8 +42,8 @@ class Piece:
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
-    """Nodes along a path, over which the fewest chains are looked for; made by `Pieces.of`.
+class Stretches:
+    """Nodes along a path, over which the fewest chains are looked for; made by `Stretches.of`.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Pieces:
     @classmethod
     def of(
         cls, problem: Problem, rng: np.random.Generator | int = 0, progress: Progress = silent
-    ) -> "Pieces":
+    ) -> "Stretches":
         """Return the nodes of a problem: samples of all self-motions, free and within limits.
 
         Raises
@@ -84,7 +84,7 @@ class Pieces:
         found._check()
         return found
 
-    def fewest(self, forbidden: set[int]) -> list[Piece]:
+    def fewest(self, forbidden: set[int]) -> list[Stretch]:
         """Return the fewest chains that follow the path one after the other, the shortest such.
 
         Each begins in the pose in which the one before it ends, in another configuration; the ways
@@ -120,7 +120,7 @@ class Pieces:
                 upper=np.where(beyond, bounds.upper, relaxed.upper),
             )
         return [
-            Piece(
+            Stretch(
                 first,
                 first + len(q) - 1,
                 self.t[first : first + len(q)],
@@ -164,9 +164,9 @@ class Pieces:
         length, turning = Length(self.problem.robot.joint_weights), bounds.turning
         anywhere = np.full(len(turning), np.inf)
         cost = np.zeros(len(layers[0]))
-        parents: list[Rows] = [np.arange(len(cost))]
+        parents: list[Ints] = [np.arange(len(cost))]
         # From which node of its own waypoint a node is changed to; itself where it is not.
-        changes: list[Rows] = [np.arange(len(cost))]
+        changes: list[Ints] = [np.arange(len(cost))]
         for i, (before, after) in enumerate(itertools.pairwise(layers), 1):
             cost, parent = length.extended(i - 1, before, cost, after, self._steps[i - 1], turning)
             if not np.any(np.isfinite(cost)):
@@ -207,9 +207,9 @@ class Pieces:
 
 
 def _traced_back(
-    parents: list[Rows], changes: list[Rows], node: int
+    parents: list[Ints], changes: list[Ints], node: int
 ) -> list[tuple[int, list[int]]]:
-    """Return the chains that end in a node of the last waypoint; see `Pieces`."""
+    """Return the chains that end in a node of the last waypoint; see `Stretches`."""
     chains: list[tuple[int, list[int]]] = []
     chain: list[int] = []
     for i in range(len(parents) - 1, 0, -1):
@@ -223,7 +223,7 @@ def _traced_back(
     return chains[::-1]
 
 
-def turned_towards(q: Array, before: Array, turning: Mask) -> Array:
+def turned_towards(q: Array, before: Array, turning: Flags) -> Array:
     """Return a motion (W, n), joints that turn without end by the turns that lead it nearest."""
     step = q[0] - before
     return np.asarray(q + (unturned(step, turning) - step))

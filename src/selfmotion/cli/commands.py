@@ -1,0 +1,255 @@
+"""The commands around one plan: parse, call, print."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import selfmotion as sm
+from selfmotion import formats
+from selfmotion.cli import documents, json_tables, options, outputs, tables
+from selfmotion.cli.app import (
+    NOT_VERIFIED,
+    VERIFIED,
+    app,
+    plan_with_progress,
+    terminal,
+)
+
+
+@app.command(
+    epilog="Example: selfmotion plan panda --circle 0.15 --duration 4 --out plan.npz --html a.html"
+    "; or: selfmotion plan cell.toml"
+)
+def plan(
+    context: typer.Context,
+    problem: options.ProblemArgument,
+    path: options.PathOption = None,
+    circle: options.CircleOption = None,
+    line: options.LineOption = None,
+    normal: options.NormalOption = None,
+    duration: options.DurationOption = None,
+    feed: options.FeedOption = None,
+    jump: options.JumpOption = None,
+    frame: options.FrameOption = None,
+    ramp: options.RampOption = None,
+    corners: options.CornersOption = "blend",
+    corner_tolerance: options.CornerToleranceOption = None,
+    task: options.PlannedTaskOption = None,
+    relax: options.RelaxOption = None,
+    start: options.StartOption = None,
+    warm: options.FromOption = None,
+    tool: options.ToolOption = None,
+    lock: options.LockOption = None,
+    degree: options.DegreeOption = 3,
+    mu: options.MuOption = 0.0,
+    cost: options.CostOption = None,
+    velocity: options.VelocityOption = None,
+    acceleration: options.AccelerationOption = None,
+    joint_limits: options.JointLimitsOption = None,
+    closed: options.ClosedOption = False,
+    obstacles: options.ObstaclesOption = None,
+    clearance: options.ClearanceOption = 0.0,
+    srdf: options.SrdfOption = None,
+    no_collision: options.NoCollisionOption = False,
+    damped: options.DampedOption = False,
+    settings: options.SetOption = None,
+    max_evaluations: options.LimitOption = None,
+    search: options.SearchOption = None,
+    compare: options.CompareOption = False,
+    allow_code: options.AllowCodeOption = False,
+    out: options.OutOption = None,
+    html: options.HtmlOption = None,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Plan a motion, check it, and write it."""
+    warm_start = None if warm is None else sm.load_plan(warm)
+    job = documents.read(context, problem, settings or [], allow_code, warm_start)
+    outputs.check_suffixes([*job.outputs, *(out or [])])
+    asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
+    given = {key: value for key, value in asked.items() if value is not None}
+    result = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
+    if as_json:
+        terminal.print_json(data=json_tables.plan_json(result))
+    else:
+        tables.show(result, terminal)
+    outputs.write(result, [*job.outputs, *(out or [])], html, terminal, quiet=as_json)
+    raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion init panda; then: selfmotion plan panda.toml")
+def init(
+    robot: Annotated[str, typer.Argument(help="Name (see `selfmotion robots`).")],
+    out: Annotated[Path | None, typer.Option(help="File; by default ROBOT.toml.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
+) -> None:
+    """Write a commented problem file to begin with."""
+    file = Path(f"{robot}.toml") if out is None else out
+    text = formats.example_text(robot, file.name)
+    if file.exists() and not force:
+        raise sm.FileFormatError(f"{file}: is there already; give --out or --force")
+    formats.write_text(file, text)
+    terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+
+
+@app.command(epilog="Example: selfmotion schema --out problem.schema.json")
+def schema(
+    out: Annotated[Path | None, typer.Option(help="File; by default the terminal.")] = None,
+) -> None:
+    """Write the JSON Schema of problem files, for completion in an editor."""
+    text = json.dumps(formats.json_schema(), indent=1)
+    if out is None:
+        typer.echo(text)
+        return
+    formats.write_text(out, text + "\n")
+    terminal.print(f"wrote {out}", markup=False, soft_wrap=True)
+
+
+@app.command(
+    epilog="Example: selfmotion check motion.csv --robot panda --path seam.csv --acceleration 10"
+)
+def check(
+    file: options.CheckedArgument,
+    robot: options.RobotOption = None,
+    path: options.PathOption = None,
+    feed: options.FeedOption = None,
+    corners: options.CheckedCornersOption = None,
+    task: options.CheckedTaskOption = None,
+    tool: options.ToolOption = None,
+    lock: options.LockOption = None,
+    degrees: options.DegreesOption = False,
+    velocity: options.VelocityOption = None,
+    acceleration: options.AccelerationOption = None,
+    joint_limits: options.JointLimitsOption = None,
+    obstacles: options.ObstaclesOption = None,
+    clearance: options.ClearanceOption = 0.0,
+    srdf: options.SrdfOption = None,
+    tolerance: options.ToleranceOption = None,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Check a motion by forward kinematics: a saved plan, or one that something else made."""
+    judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf
+    within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
+    if file.suffix == ".npz":
+        own: dict[str, Any] = {"robot": robot, "path": path, "feed": feed, "corners": corners}
+        own |= {"task": task, "tool": tool, "lock": lock, "degrees": degrees or None}
+        for name, value in own.items():
+            if value:
+                raise sm.ProblemError(f"{file}: --{name} is the plan's own: leave it out")
+        plan = sm.load_plan(file)
+        certificate = plan.certificate
+        if within is not None or any(judged):
+            certificate = plan.check(within, options.requirements(plan.robot, *judged))
+    else:
+        if robot is None or path is None:
+            raise sm.ProblemError(
+                f"{file}: a motion is checked against a robot and a path: give --robot and --path"
+            )
+        arm = sm.load_robot(robot, tool=tool, lock=options.locks(lock or []))
+        certificate = sm.certify(
+            arm,
+            formats.read_path(path, feed=feed, corners=corners or "blend"),
+            task or "pose",
+            sm.read_motion(file, degrees=degrees),
+            within,
+            options.requirements(arm, *judged),
+        )
+    if as_json:
+        terminal.print_json(data=json_tables.certificate_json(certificate))
+    else:
+        tables.show_certificate(certificate, terminal)
+    raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500")
+def export(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    out: Annotated[
+        list[Path],
+        typer.Option(
+            help="File: .csv, .npz, .json, .yaml (ROS 2 JointTrajectory), .xml (MuJoCo keyframes), "
+            ".script (URScript). Repeatable."
+        ),
+    ],
+    rate: Annotated[
+        float | None, typer.Option(help="Samples per second; by default the plan's own.")
+    ] = None,
+    form: Annotated[
+        str | None,
+        typer.Option("--format", help=f"Whatever the suffix: {', '.join(formats.FORMS)}."),
+    ] = None,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Write a plan's motion for controllers and simulators, and check what was written."""
+    saved = sm.load_plan(file)
+    verified, verdicts = not saved.altered, dict[str, str]()
+    for target in out:
+        sm.write_motion(saved, target, rate=rate, form=form)
+        if form in formats.READABLE or (form is None and target.suffix not in (".xml", ".script")):
+            found = saved.problem.certify(
+                sm.read_motion(target), saved.tolerance, saved.report.ending
+            )
+            verified = verified and found.verified
+            verdicts[str(target)] = f"read back: {found.verdict}"
+        else:
+            verified = verified and saved.certificate.verified
+            verdicts[str(target)] = ""
+    miss = formats.linear_miss(saved, rate)
+    if as_json:
+        terminal.print_json(
+            data={"verified": verified, "written": verdicts, "linear_miss": miss._asdict()}
+        )
+        raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
+    for name, verdict in verdicts.items():
+        terminal.print(f"wrote {name}{verdict and '; '}{verdict}", markup=False, soft_wrap=True)
+    terminal.print(
+        f"joined by straight lines, the samples stay within {miss.position:.2g} m and "
+        f"{miss.rotation:.2g} rad of the motion; --rate {miss.rate:.0f} keeps the plan's tolerance",
+        markup=False,
+        soft_wrap=True,
+    )
+    raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion compare a.npz b.npz")
+def compare(
+    plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz.")],
+    as_json: options.JsonOption = False,
+) -> None:
+    """Compare plans: costs, durations, margins and verdicts, side by side."""
+    saved = {str(file): sm.load_plan(file) for file in plans}
+    if as_json:
+        terminal.print_json(
+            data={name: json_tables.plan_json(plan) for name, plan in saved.items()}
+        )
+    else:
+        tables.show_comparison(saved, terminal)
+
+
+@app.command(
+    epilog="Example: selfmotion replay plan.npz --html replay.html --png 1.5 --gif motion.gif"
+)
+def replay(
+    plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz, of one robot.")],
+    html: Annotated[Path, typer.Option(help="The page to write.")] = Path("replay.html"),
+    png: Annotated[
+        float | None, typer.Option(help="Also draw the scene at this time (s), beside the page.")
+    ] = None,
+    gif: Annotated[Path | None, typer.Option(help="Also draw the motion as a GIF.")] = None,
+) -> None:
+    """Write a page that replays plans in a browser, offline; several get a switch.
+
+    Pictures need a browser (chromium) on this machine.
+    """
+    from selfmotion.replay import render_gif, render_png, write_replay
+
+    saved = [sm.load_plan(plan) for plan in plans]
+    labels = [plan.stem for plan in plans] if len(plans) > 1 else None
+    written = [write_replay(saved, html, labels=labels)]
+    if png is not None:
+        written.append(render_png(saved[0], html.with_suffix(".png"), t=png))
+    if gif is not None:
+        written.append(render_gif(saved[0], gif))
+    for file in written:
+        terminal.print(f"wrote {file}", markup=False, soft_wrap=True)

@@ -1,0 +1,68 @@
+"""What the commands print for programs."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from selfmotion.certificate import Certificate
+from selfmotion.result import Plan
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
+
+if TYPE_CHECKING:
+    from selfmotion.batch import Batch
+
+
+def batch_json(batch: "Batch") -> dict[str, Any]:
+    """Return the rows of a batch as JSON-safe values."""
+    rows = [
+        {key: str(value) if key == "file" else value for key, value in vars(row).items()}
+        for row in batch.rows
+    ]
+    for row in rows:
+        if row["error"]:
+            row["cost"] = row["initial_cost"] = None
+    return {"folder": str(batch.folder), "resumed": batch.resumed, "rows": rows}
+
+
+def robots_json(robots: Mapping[str, RobotModel]) -> dict[str, Any]:
+    """Return arms by name, as JSON-safe values."""
+    return {
+        name: {
+            "joints": list(robot.joint_names),
+            "tool": robot.tool,
+            "redundancy": {
+                task.value: robot.redundancy(task) for task in Task if robot.can_follow(task)
+            },
+        }
+        for name, robot in robots.items()
+    }
+
+
+def certificate_json(certificate: Certificate) -> dict[str, Any]:
+    """Return a certificate as JSON-safe values, the verdict first."""
+    return {
+        "verified": certificate.verified,
+        "verdict": certificate.verdict,
+        **dataclasses.asdict(certificate),
+    }
+
+
+def plan_json(plan: Plan) -> dict[str, Any]:
+    """Return how a plan was found and what the check says, as JSON-safe values."""
+    report = plan.report
+    return {
+        "robot": plan.robot.name,
+        "task": plan.task.value,
+        "cost": report.cost,
+        "initial_cost": report.initial_cost,
+        "terms": dict(report.terms),
+        "initial_terms": dict(report.initial_terms),
+        "evaluations": report.evaluations,
+        "iterations": report.iterations,
+        "seconds": report.seconds,
+        "status": report.status.value,
+        "message": report.message,
+        "duration": plan.trajectory.duration,
+        "certificate": certificate_json(plan.certificate),
+    }

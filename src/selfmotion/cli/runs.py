@@ -1,0 +1,141 @@
+"""Commands that plan many problems, or what is shown of the project itself."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import selfmotion as sm
+from selfmotion.cli import json_tables, options, outputs, tables
+from selfmotion.cli.app import (
+    NOT_VERIFIED,
+    VERIFIED,
+    app,
+    complain,
+    plan_with_progress,
+    stages,
+    terminal,
+)
+from selfmotion.cli.batch_display import BatchDisplay, executor_at
+from selfmotion.cli.showcase import panda_past_a_box
+from selfmotion.cli.stage_display import StageDisplay
+
+
+@app.command(epilog="Example: selfmotion batch cell.toml --workers 2 --out out/batch")
+def batch(
+    files: Annotated[
+        list[Path], typer.Argument(help="Problem files; of a [grid], all combinations.")
+    ],
+    out: Annotated[
+        Path, typer.Option(help="Folder for plans and tables; a run that was killed goes on there.")
+    ] = Path("out/batch"),
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes; by default one for each core.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
+    ] = None,
+    replays: Annotated[
+        int, typer.Option(min=0, help="Write replays of so many of the best plans.")
+    ] = 3,
+    allow_code: options.AllowCodeOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Plan many problems at once, into a folder with a ranked table."""
+    from selfmotion.batch import grid_items, plan_items
+
+    items = [item for file in files for item in grid_items(file, allow_code=allow_code)]
+    names = [item.name for item in items]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise sm.ProblemError(f"two problem files are called '{twice}'; rename one of them")
+    try:
+        with executor_at(dask) as executor, BatchDisplay(stages) as display:
+            result = plan_items(
+                items, executor, out=out, workers=workers, replays=replays, progress=display.show
+            )
+    except KeyboardInterrupt:
+        complain(f"stopped; what is finished is in '{out}': run again to go on")
+        raise typer.Exit(NOT_VERIFIED) from None
+    if as_json:
+        terminal.print_json(data=json_tables.batch_json(result))
+    else:
+        tables.show_batch(result, terminal)
+    sound = all(row.verified for row in result.rows)
+    raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion robots")
+def robots(as_json: options.JsonOption = False) -> None:
+    """List the arms known by name: joints, tool frame, and redundancy for each task."""
+    arms = {name: sm.load_robot(name) for name in sm.NAMED_ARMS}
+    if as_json:
+        terminal.print_json(data=json_tables.robots_json(arms))
+    else:
+        tables.show_robots(arms, terminal)
+
+
+@app.command(epilog="Example: selfmotion demo --out out")
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder for plans and replays.")] = Path("out"),
+) -> None:
+    """Plan, check and replay the paper's planar arm, and a Panda that draws circles past a box."""
+    problems = {"planar": sm.sample_problem(), "panda": panda_past_a_box()}
+    verified = True
+    for name, problem in problems.items():
+        terminal.print(name, style="bold", markup=False)
+        result = plan_with_progress(problem)
+        tables.show(result, terminal)
+        files = [out / f"{name}.npz", out / f"{name}.csv"]
+        outputs.write(result, files, out / f"{name}.html", terminal)
+        verified = verified and result.certificate.verified
+    tracked = sm.plan_by(problem, sm.PseudoInverse()).certificate
+    terminal.print(
+        f"the pseudo-inverse on the same problem: {tracked.verdict}", markup=False, soft_wrap=True
+    )
+    raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion track --seconds 12 --out out/track")
+def track(
+    task: options.TaskOption = "pose",
+    seconds: Annotated[float, typer.Option(help="How long (s).", min=1.0, max=600.0)] = 12.0,
+    horizon: Annotated[float, typer.Option(help="Planned ahead (s).", min=0.1)] = 2.0,
+    seed: Annotated[int, typer.Option(help="Of the noise.", min=0)] = 0,
+    out: Annotated[Path, typer.Option(help="Folder for replay and histogram.")] = Path("out/track"),
+) -> None:
+    """Plan while the arm moves: a simulated Panda keeps up with a conveyor.
+
+    It answers late, is measured with noise, and is pushed off its command at 3 s; at 6 s a ball
+    appears beside its elbow. Exit code 0 if all limits were kept.
+    """
+    from selfmotion.cli import tracking
+
+    replanner, record, result = tracking.conveyor_run(task, seconds, seed, horizon)
+    kept = tracking.show(replanner, record, tracking.least_distance(result), terminal)
+    for file in tracking.write(record, result, out):
+        terminal.print(f"wrote {file}", markup=False)
+    raise typer.Exit(VERIFIED if kept else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion study --out out/study")
+def study(
+    out: Annotated[Path, typer.Option(help="Folder for the report.")] = Path("out/study"),
+    reduced: Annotated[
+        bool, typer.Option("--reduced", help="Fewer starts, chains and arms: half a minute.")
+    ] = False,
+) -> None:
+    """Re-run the paper: figures, tables and claims, as one HTML page, PNGs and JSON.
+
+    Takes minutes. Needs matplotlib (the extra `plots`).
+    """
+    from selfmotion.study import PARTS, Scale, require_matplotlib, run, write
+
+    # Before minutes of work that could not be shown.
+    require_matplotlib()
+    scale = Scale.reduced() if reduced else Scale.full()
+    with StageDisplay(stages) as display:
+        result = run(scale, lambda part: display.stage(part, PARTS.index(part) + 1, len(PARTS)))
+    files = write(result, out)
+    tables.show_claims(result.claims, terminal)
+    terminal.print(f"wrote {files[0]} and {len(files) - 1} files beside it", markup=False)

@@ -1,0 +1,177 @@
+"""Rows of poses, as files of several kinds hold them."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    read_arrays,
+    read_rows,
+)
+from selfmotion.formats.documents import read_document
+
+_POSITION = ("x", "y", "z")
+
+
+# Columns of an orientation → its key in `ORIENTATIONS`.
+_COLUMNS: Mapping[tuple[str, ...], str] = {
+    ("qw", "qx", "qy", "qz"): "quaternion",
+    ("rx", "ry", "rz"): "rotation_vector",
+    ("roll", "pitch", "yaw"): "rpy",
+    ("nx", "ny", "nz"): "normal",
+}
+
+
+_KNOWN = {"t", *_POSITION, *(name for names in _COLUMNS for name in names)}
+
+
+_UNITS = {"_mm": (_POSITION, 1e-3), "_deg": (("rx", "ry", "rz", "roll", "pitch", "yaw"), None)}
+
+
+@dataclass(frozen=True, eq=False)
+class PoseRows:
+    """Poses as a file has them, and what to call each of them.
+
+    Attributes
+    ----------
+    places : sequence of str
+        "line 7", "poses[6]", …
+    positions : (N, 3)
+    orientation : str
+        Key in `ORIENTATIONS`; "" for none.
+    values : (N, …)
+        Numbers of the orientations.
+    t : (N,) or None
+    """
+
+    places: Sequence[str]
+    positions: Array
+    orientation: str
+    values: Array
+    t: Array | None
+
+
+def _read_table(file: FilePath) -> PoseRows:
+    header, table, lines = read_rows(file)
+    columns = _columns(file, header, table)
+    missing = [name for name in _POSITION if name not in columns]
+    if missing:
+        raise FileFormatError(
+            f"{file}: column '{missing[0]}' is missing; the header is {','.join(header)}, expected "
+            f"x,y,z [m] (or x_mm,…), t [s], and an orientation"
+        )
+    given = [names for names in _COLUMNS if set(names) & set(columns)]
+    if len(given) > 1:
+        raise FileFormatError(
+            f"{file}: has columns {','.join(given[0])} and {','.join(given[1])}; keep one "
+            f"orientation"
+        )
+    values = np.zeros((len(table), 0))
+    for names in given:
+        lacking = [name for name in names if name not in columns]
+        if lacking:
+            raise FileFormatError(
+                f"{file}: column '{lacking[0]}' is missing, expected {','.join(names)}"
+            )
+        values = np.stack([columns[name] for name in names], axis=1)
+    return PoseRows(
+        [f"line {number}" for number in lines],
+        np.stack([columns[name] for name in _POSITION], axis=1),
+        _COLUMNS[given[0]] if given else "",
+        values,
+        columns.get("t"),
+    )
+
+
+def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, Array]:
+    """Return the columns in SI units, by their names without unit."""
+    columns: dict[str, Array] = {}
+    for k, title in enumerate(header):
+        name, scale = title, 1.0
+        for suffix, (names, factor) in _UNITS.items():
+            if title.endswith(suffix) and title.removesuffix(suffix) in names:
+                name, scale = title.removesuffix(suffix), factor or np.pi / 180.0
+        if name not in _KNOWN:
+            raise FileFormatError(
+                f"{file}: unknown column '{title}', expected t, x,y,z and "
+                f"{' or '.join(','.join(names) for names in _COLUMNS)}"
+            )
+        if name in columns:
+            raise FileFormatError(f"{file}: column '{name}' appears twice, in two units")
+        columns[name] = scale * table[:, k]
+    return columns
+
+
+def _read_array(file: FilePath) -> PoseRows:
+    (array,) = read_arrays(file).values()
+    if array.dtype.kind not in "iuf":
+        raise FileFormatError(f"{file}: holds no array of numbers")
+    places = [f"row {k}" for k in range(1, 1 + (len(array) if array.ndim else 0))]
+    if array.ndim == 3 and array.shape[1:] == (4, 4):
+        return PoseRows(places, array[:, :3, 3] * 1.0, "rotation", array[:, :3, :3] * 1.0, None)
+    if array.ndim != 2 or array.shape[1] not in (3, 4, 7, 8):
+        raise FileFormatError(
+            f"{file}: has shape {array.shape}, expected (N, 4, 4) poses, or (N, 3) x,y,z, "
+            f"(N, 4) t,x,y,z, (N, 7) x,y,z,qw,qx,qy,qz, (N, 8) with t first"
+        )
+    t = array[:, 0] * 1.0 if array.shape[1] in (4, 8) else None
+    rest = array[:, 1:] * 1.0 if t is not None else array * 1.0
+    return PoseRows(places, rest[:, :3], "quaternion" if rest.shape[1] == 7 else "", rest[:, 3:], t)
+
+
+def _read_ros(file: FilePath) -> PoseRows:
+    poses = read_document(file).get("poses")
+    if not isinstance(poses, list) or not poses:
+        raise FileFormatError(
+            f"{file}: has no list of poses, expected a nav_msgs/Path or geometry_msgs/PoseArray"
+        )
+    places = [f"poses[{k}]" for k in range(len(poses))]
+    rows = [_ros_pose(file, place, pose) for place, pose in zip(places, poses, strict=True)]
+    stamps = [_stamp(file, place, pose) for place, pose in zip(places, poses, strict=True)]
+    # Publishers that know no times leave all stamps at the same one.
+    t = None if len(set(stamps)) == 1 else np.array(stamps, dtype=np.float64) - (stamps[0] or 0.0)
+    table = np.array(rows)
+    return PoseRows(places, table[:, :3], "quaternion", table[:, 3:], t)
+
+
+def _ros_pose(file: FilePath, place: str, given: Any) -> list[float]:
+    pose = given.get("pose", given) if isinstance(given, Mapping) else given
+    found = []
+    for part, keys in (("position", "xyz"), ("orientation", "wxyz")):
+        for key in keys:
+            try:
+                found.append(float(pose[part][key]))
+            except (KeyError, OverflowError, TypeError, ValueError):
+                raise FileFormatError(
+                    f"{file}: {place}: {part}.{key} is missing or no number"
+                ) from None
+    return found
+
+
+def _stamp(file: FilePath, place: str, given: Mapping[str, Any]) -> float | None:
+    header = given.get("header")
+    if header is None:
+        return None
+    try:
+        stamp = header["stamp"]
+        return int(stamp["sec"]) + 1e-9 * int(stamp["nanosec"])
+    except (KeyError, OverflowError, TypeError, ValueError):
+        raise FileFormatError(
+            f"{file}: {place}: header.stamp is incomplete, expected sec and nanosec"
+        ) from None
+
+
+READERS: Mapping[str, Callable[[FilePath], PoseRows]] = {
+    ".csv": _read_table,
+    ".txt": _read_table,
+    ".tsv": _read_table,
+    ".npy": _read_array,
+    ".yaml": _read_ros,
+    ".yml": _read_ros,
+    ".json": _read_ros,
+}

@@ -1,0 +1,137 @@
+"""What the tables of a problem file describe: tool motions, obstacles, starts."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    ProblemError,
+    RobotError,
+    restore,
+)
+from selfmotion.collision import obstacle_from_dict
+from selfmotion.formats.path_files import read_path
+from selfmotion.formats.poses import ORIENTATIONS
+from selfmotion.path import Circle, Feed, Line, Path, Placed, section_at_rest
+from selfmotion.robot import NAMED_ARMS, RobotModel
+from selfmotion.task import Task
+
+if TYPE_CHECKING:
+    import pinocchio as pin
+
+
+def path_of(
+    given: Mapping[str, Any],
+    robot: RobotModel,
+    start: Array | None,
+    beside: Callable[[str], FilePath],
+) -> Path:
+    """Return the tool motion of a problem file; files that it names are looked for `beside` it."""
+    values = dict(given)
+    kind = values.get("kind")
+    frame = None if kind == Placed.kind else values.pop("frame", None)
+    if kind in ("circle", "line") and "start" not in values:
+        if start is None:
+            raise ProblemError(
+                "start: is missing, and there is no start configuration whose pose to take; "
+                "give the pose here, or the problem's start = 'dexterous' or numbers"
+            )
+        if frame is not None:
+            raise ProblemError("frame: needs start, the tool's first pose in that frame")
+        values["start"] = robot.pose(start)
+    feed = values.pop("feed", None) if kind in ("circle", "line") else None
+    if kind in ("circle", "line"):
+        _exactly_one({**values, "feed": feed} if feed else values, "duration", "feed")
+        # At a feed, the shape's own pace does not matter.
+        values.setdefault("duration", 1.0)
+    match kind:
+        case "file":
+            del values["kind"]
+            ramp = values.pop("ramp", None)
+            path: Path = read_path(beside(values.pop("file")), **values)
+            path = path if ramp is None else section_at_rest(path, ramp=ramp)
+        case "circle":
+            path = _circle(values)
+        case "line":
+            path = _line(values)
+        case _:
+            path = _restored(values)
+    path = path if feed is None else Feed(path, feed)
+    return path if frame is None else Placed(path, frame)
+
+
+def obstacle(values: Mapping[str, Any], beside: Callable[[str], FilePath]) -> Any:
+    """Return an obstacle from a table with its pose in any of the ways of `pose_of`."""
+    from selfmotion.formats.poses import pose_of
+
+    given = dict(values)
+    keys = [key for key in ("position", *ORIENTATIONS) if key in given]
+    try:
+        pose = pose_of({key: given.pop(key) for key in keys})
+    except ValueError as error:
+        raise FileFormatError(f"obstacle '{values.get('name')}': {error}") from error
+    if "file" in given:
+        given["file"] = str(beside(given["file"]))
+    position, rotation = pose.translation.tolist(), pose.rotation.tolist()
+    return obstacle_from_dict({**given, "position": position, "rotation": rotation})
+
+
+def start_of(given: Any, robot: RobotModel, task: Task) -> Array | None:
+    """Return the start configuration (n,) that a file asks for, None for a free one."""
+    if given == "free":
+        return None
+    if given == "dexterous":
+        return robot.dexterous_configuration(task)
+    if given != "home":
+        return robot.configuration(given)
+    for arm in NAMED_ARMS.values():
+        if arm.home is not None and robot.urdf.source.endswith(arm.urdf):
+            return robot.configuration(np.array(arm.home))
+    homes = ", ".join(name for name, arm in NAMED_ARMS.items() if arm.home is not None)
+    raise RobotError(f"is 'home', which is known of {homes} only; give numbers, or 'dexterous'")
+
+
+def _restored(values: Mapping[str, Any]) -> Path:
+    """Return a path of tables of numbers, such as a plan's file has; ProblemError for others."""
+    try:
+        with np.errstate(invalid="raise", over="raise"):
+            path: Path = restore(Path, values)
+            path.samples([0.0, 0.5 * path.duration, path.duration])
+    except (ArithmeticError, IndexError, TypeError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise ProblemError(f"{values['kind']}: is no path with these numbers: {reason}") from error
+    return path
+
+
+def _circle(values: dict[str, Any]) -> Path:
+    del values["kind"]
+    values.setdefault("normal", [0.0, 0.0, 1.0])
+    _exactly_one(values, "center", "radius")
+    start = values.pop("start")
+    if "center" in values:
+        return Circle(start, **values)
+    return Circle.around(start, values.pop("radius"), values.pop("duration"), **values)
+
+
+def _line(values: dict[str, Any]) -> Path:
+    del values["kind"]
+    _exactly_one(values, "end", "by")
+    start: pin.SE3 = values["start"]
+    if "by" in values:
+        by = np.asarray(values.pop("by"), dtype=np.float64)
+        if by.shape != (3,):
+            raise ProblemError(f"by: is {by.tolist()}, expected three numbers [m]")
+        values["end"] = start.copy()
+        values["end"].translation = start.translation + by
+    return Line(**values)
+
+
+def _exactly_one(values: Mapping[str, Any], *names: str) -> None:
+    given: Sequence[str] = [name for name in names if name in values]
+    if len(given) != 1:
+        found = " and ".join(given) or "neither"
+        raise ProblemError(f"has {found}, expected either {' or '.join(names)}")

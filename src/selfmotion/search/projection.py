@@ -1,0 +1,171 @@
+"""What numba compiles of Newton's method onto self-motions: for one configuration, or many."""
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, inlined, kernel
+from selfmotion.basics.layout import KIND, Layout
+from selfmotion.kernels import (
+    cholesky,
+    gram,
+    pose_error,
+    rows_of,
+    select,
+    solve_cholesky,
+    task_rows,
+    view,
+)
+from selfmotion.robot import ChainArrays, TreeArrays, compose, placements
+
+# A Newton correction of this size [rad or m] leaves an error of its square.
+CONVERGED = 1e-6
+
+
+@kernel
+def correct(
+    q: Array,
+    jacobians: Array,
+    rotations: Array,
+    translations: Array,
+    target: Array,
+    layout: Layout,
+    tangent: Array,
+    longest: float,
+) -> float:
+    """Add J⁺e to q, no longer than `longest`, and project `tangent` onto the null space of J.
+
+    Of all tips, (F, 6, n), (F, 3, 3) and (F, 3); `target` (12 F,) is as `Follows.targets` has it.
+    Returns the norm of the correction
+    before it was shortened; -1 where J has no full rank.
+    """
+    n, m = jacobians.shape[2], rows_of(layout)
+    error, z, along = np.zeros(6), np.empty(m), np.zeros(m)
+    jacobian, factor = np.empty((m, n)), np.empty((m, m))
+    for f in range(layout.shape[0]):
+        place, turn = view(target, 12 * f, (3,)), view(target, 12 * f + 3, (3, 3))
+        pose_error(layout[f, KIND], place, turn, translations[f], rotations[f], error)
+        select(layout, f, rotations[f], error, z)
+        task_rows(layout, f, rotations[f], jacobians[f], jacobian)
+    for i in range(m):
+        for k in range(n):
+            along[i] += jacobian[i, k] * tangent[k]
+    gram(jacobian, factor)
+    if not cholesky(factor):
+        return -1.0
+    solve_cholesky(factor, z)
+    solve_cholesky(factor, along)
+    length, norm = 0.0, 0.0
+    step = np.zeros(n)
+    for k in range(n):
+        for i in range(m):
+            step[k] += jacobian[i, k] * z[i]
+            tangent[k] -= jacobian[i, k] * along[i]
+        length += step[k] ** 2
+        norm += tangent[k] ** 2
+    length, norm = np.sqrt(length), np.sqrt(norm)
+    scale = longest / length if length > longest else 1.0
+    for k in range(n):
+        q[k] += scale * step[k]
+        tangent[k] /= norm
+    return float(length)
+
+
+@kernel
+def project_all(
+    q: Array,
+    targets: Array,
+    chains: tuple[ChainArrays, ...],
+    layout: Layout,
+    lower: Array,
+    upper: Array,
+    longest: float,
+    steps: int,
+    arrived: Flags,
+) -> None:
+    """Put each of q (K, n) onto its target (K, 12 F) by Newton's method, in place.
+
+    A joint that would leave its limits stays at the limit, and the others do the rest. `arrived`
+    (K,) says of which that was possible within so many steps.
+    """
+    n, tips = q.shape[1], layout.shape[0]
+    r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
+    jacobians, unused = np.zeros((tips, 6, n)), np.empty(n)
+    held = np.zeros(n, dtype=np.bool_)
+    for k in range(len(q)):
+        arrived[k] = False
+        for j in range(n):
+            held[j] = False
+        length = np.inf
+        for _ in range(steps):
+            inside = True
+            for j in range(n):
+                if q[k, j] < lower[j] or q[k, j] > upper[j]:
+                    q[k, j] = min(max(q[k, j], lower[j]), upper[j])
+                    held[j], inside = True, False
+            if inside and length < CONVERGED:
+                arrived[k] = True
+                break
+            place_tips(q[k], chains, r, p, rotations, positions, jacobians)
+            for j in range(n):
+                unused[j] = 1.0
+                if held[j]:
+                    for f in range(tips):
+                        for i in range(6):
+                            jacobians[f, i, j] = 0.0
+            length = correct(
+                q[k], jacobians, rotations, positions, targets[k], layout, unused, longest
+            )
+            # Singular, or not a number.
+            if not length >= 0.0:
+                break
+
+
+@inlined
+def place_tips(
+    q: Array,
+    chains: tuple[ChainArrays, ...],
+    r: Array,
+    p: Array,
+    rotations: Array,
+    positions: Array,
+    jacobians: Array,
+) -> None:
+    """Set the tips' places, and their Jacobians (F, 6, n), at q (n,)."""
+    for f in range(len(chains)):
+        tree, tip_rotation, tip_position = chains[f]
+        placements(
+            q,
+            tree.joints,
+            tree.parents,
+            tree.rotations,
+            tree.positions,
+            tree.axes,
+            tree.is_revolute,
+            r,
+            p,
+        )
+        last = len(tree.joints)
+        compose(r[last], p[last], tip_rotation, tip_position, rotations[f], positions[f])
+        _jacobian(r, p, tree, positions[f], jacobians[f])
+
+
+@inlined
+def _jacobian(r: Array, p: Array, tree: TreeArrays, tip: Array, jacobian: Array) -> None:
+    """Write the columns of a tip's Jacobian [v, ω] (6, n) at its origin, in the base's axes."""
+    axis = np.empty(3)
+    for j in range(len(tree.joints)):
+        column = tree.joints[j]
+        for a in range(3):
+            axis[a] = 0.0
+            for b in range(3):
+                axis[a] += r[j + 1, a, b] * tree.axes[j, b]
+        if tree.is_revolute[j]:
+            x, y, z = tip[0] - p[j + 1, 0], tip[1] - p[j + 1, 1], tip[2] - p[j + 1, 2]
+            jacobian[0, column] = axis[1] * z - axis[2] * y
+            jacobian[1, column] = axis[2] * x - axis[0] * z
+            jacobian[2, column] = axis[0] * y - axis[1] * x
+            for a in range(3):
+                jacobian[3 + a, column] = axis[a]
+        else:
+            for a in range(3):
+                jacobian[a, column], jacobian[3 + a, column] = axis[a], 0.0
