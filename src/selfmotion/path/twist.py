@@ -126,16 +126,18 @@ class TwistPath(Path, kind="twist"):
         # Piece by piece: what a piece resolves, steps from afar would pass over.
         at, solutions = pin.Quaternion(self._start.rotation).coeffs(), []
         for left, right in pairwise(self._breaks.tolist()):
-            solution = solve_ivp(
-                rate,
-                (left, right),
-                at,
-                method="DOP853",
-                rtol=1e-12,
-                atol=1e-13,
-                max_step=_STEP * (right - left),
-                dense_output=True,
-            )
+            # Of errors too small for numbers the solver divides nothing by nothing.
+            with np.errstate(invalid="ignore"):
+                solution = solve_ivp(
+                    rate,
+                    (left, right),
+                    at,
+                    method="DOP853",
+                    rtol=1e-12,
+                    atol=1e-13,
+                    max_step=_STEP * (right - left),
+                    dense_output=True,
+                )
             solutions.append(solution.sol)
             at = solution.y[:, -1]
 
