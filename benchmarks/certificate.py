@@ -54,11 +54,12 @@ def plain_check(plan: sm.Plan, model: sm.CollisionModel | None) -> tuple[float, 
     shares = np.arange(5) / 5
     t = np.append((motion.t[:-1, None] + np.diff(motion.t)[:, None] * shares).ravel(), motion.t[-1])
     q, qd = motion(t), motion(t, order=1)
-    miss = deviation_from(robot, plan.path, plan.task, t, q, False)
+    follows = plan.problem.follows
+    miss = deviation_from(follows.only, t, q, False)
     found = [float(np.linalg.norm(part, axis=1).max()) for part in (miss[:, :3], miss[:, 3:])]
     found += [float(np.minimum(q - robot.lower, robot.upper - q).min())]
     found += [float((np.abs(qd) / robot.velocity_limit).max())]
-    found += [float(smallest_singular_values(robot, plan.task, q).min())]
+    found += [float(smallest_singular_values(follows, q).min())]
     return (*found, model.worst(q).value) if model else tuple(found)
 
 

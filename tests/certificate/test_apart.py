@@ -35,7 +35,7 @@ class Bodies:
     """Pairs of bodies whose distances are given functions of q, with one lever on all joints."""
 
     open_meshes = overlapping = disabled = obstacles = ()
-    checks_links = True
+    checks_links, checks_obstacles, stuck = True, False, None
 
     def __init__(self, *distances: Callable[[Array], Array], lever: float = 1.0) -> None:
         self._given, self._lever, self.asked = distances, lever, 0

@@ -10,6 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate.check import _because, _damped_stretches, _undecided
+from selfmotion.certificate.path_error import PathCheck
 from selfmotion.task import DampingLaw
 from support.arms import PANDA_HOME, robot_named
 from support.motions import motion_of
@@ -48,13 +49,19 @@ def test_where_damping_acts_is_told_stretch_by_stretch() -> None:
 
 
 def test_what_is_undecided_is_counted() -> None:
-    assert _undecided(()) == ()
+    extreme = sm.Extreme(0.0, 0.0, "tip")
+
+    def said(count: int) -> tuple[str, ...]:
+        open_ = ((0.25, 0.5),) * count
+        return _undecided(PathCheck(extreme, extreme, (), open_, True, 1))
+
+    assert said(0) == ()
     for count, words in (
         (1, "decided:"),
         (2, "and on 1 other interval:"),
         (3, "2 other intervals:"),
     ):
-        (text,) = _undecided(((0.25, 0.5),) * count)
+        (text,) = said(count)
         assert "from t = 0.25 to 0.5 s is not decided" in text
         assert words in text
 

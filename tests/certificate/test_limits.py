@@ -43,7 +43,9 @@ def test_shares_of_rates_say_how_much_longer_it_takes(order: int, longer: float)
     assert f"{found.amount:.5g} times its limit" in found.text
     assert f"give it {longer:.5g} times the duration" in found.text
     known = ("speeds", "accelerations", "jerks")[order - 1]
-    assert limits.covers == ((known,) if order == 1 else ())
+    # Not of all joints, so that nothing is said to have been checked.
+    assert limits.covers == ()
+    assert limits.remarks == (f"{limits.name}: 1 joints are not limited",)
     exact = JointLimits(order, np.full(3, -most), np.full(3, most))
     assert exact.covers == (known,)
     assert exact.judge(motion).amount == pytest.approx(1.0)

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -115,8 +115,8 @@ def check(
     robot: options.RobotOption = None,
     path: options.PathOption = None,
     feed: options.FeedOption = None,
-    corners: options.CornersOption = "blend",
-    task: options.TaskOption = "pose",
+    corners: options.CheckedCornersOption = None,
+    task: options.CheckedTaskOption = None,
     tool: options.ToolOption = None,
     reference: options.ReferenceOption = None,
     lock: options.LockOption = None,
@@ -127,12 +127,22 @@ def check(
     obstacles: options.ObstaclesOption = None,
     clearance: options.ClearanceOption = 0.0,
     srdf: options.SrdfOption = None,
-    tolerance: options.ToleranceOption = 1e-6,
+    tolerance: options.ToleranceOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
     """Check a motion by forward kinematics: a saved plan, or one that something else made."""
+    judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf
+    within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
     if file.suffix == ".npz":
-        certificate = sm.load_plan(file).certificate
+        own: dict[str, Any] = {"robot": robot, "path": path, "feed": feed, "corners": corners}
+        own |= {"task": task, "tool": tool, "lock": lock, "degrees": degrees or None}
+        for name, value in own.items():
+            if value:
+                raise sm.ProblemError(f"{file}: --{name} is the plan's own: leave it out")
+        plan = sm.load_plan(file)
+        certificate = plan.certificate
+        if within is not None or any(judged):
+            certificate = plan.check(within, options.requirements(plan.robot, *judged))
     else:
         if robot is None or path is None:
             raise sm.ProblemError(
@@ -141,13 +151,11 @@ def check(
         arm = sm.load_robot(robot, tool=tool, lock=options.locks(lock or []), reference=reference)
         certificate = sm.certify(
             arm,
-            formats.read_path(path, feed=feed, corners=corners),
-            task,
+            formats.read_path(path, feed=feed, corners=corners or "blend"),
+            task or "pose",
             sm.read_motion(file, degrees=degrees),
-            sm.Tolerance(tolerance, tolerance),
-            options.requirements(
-                arm, velocity, acceleration, joint_limits, obstacles, clearance, srdf
-            ),
+            within,
+            options.requirements(arm, *judged),
         )
     if as_json:
         terminal.print_json(data=json_tables.certificate_json(certificate))

@@ -132,7 +132,7 @@ class Shell:
         found.append({"kind": "JointJerkLimits"})
         if self.closed:
             found.append({"kind": "ClosedPath"})
-        if self.obstacles is not None or self.clearance > 0.0 or self.srdf is not None:
+        if self.obstacles is not None or self.clearance != 0.0 or self.srdf is not None:
             bodies = [] if self.obstacles is None else options.obstacle_tables(self.obstacles)
             clearance = {"kind": "Clearance", "obstacles": bodies, "distance": self.clearance}
             found.append(clearance if self.srdf is None else {**clearance, "srdf": str(self.srdf)})

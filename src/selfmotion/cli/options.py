@@ -68,11 +68,17 @@ CornersOption = Annotated[
         "corner between straight legs."
     ),
 ]
+CheckedCornersOption = Annotated[
+    Corners | None, typer.Option(help="At kinks of --path: as for a plan; blend by default.")
+]
 CornerToleranceOption = Annotated[
     float | None,
     typer.Option(help="Distance from rounded corners (m; 0.001 by default).", min=1e-6),
 ]
 TaskOption = Annotated[TaskName, typer.Option(help="What the path prescribes.")]
+CheckedTaskOption = Annotated[
+    TaskName | None, typer.Option(help="What the path prescribes; pose by default.")
+]
 PlannedTaskOption = Annotated[
     TaskName | None,
     typer.Option(help="What the path prescribes; pose by default, of a planar arm planar."),
@@ -182,7 +188,12 @@ ClearanceOption = Annotated[
 SrdfOption = Annotated[
     Path | None, typer.Option(help="SRDF whose disabled pairs of links are left out.")
 ]
-ToleranceOption = Annotated[float, typer.Option(help="What the path may be missed by (m and rad).")]
+ToleranceOption = Annotated[
+    float | None,
+    typer.Option(
+        help="What the path may be missed by (m and rad); 1e-6 by default, or the plan's."
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the outcome as JSON.")]
 
 
@@ -252,7 +263,7 @@ def requirements(
         asked.append(sm.JointAccelerationLimits(one_or_each(acceleration, "--acceleration")))
     if joint_limits is not None:
         asked += formats.read_joint_limits(joint_limits, robot)
-    if obstacles is not None or clearance > 0.0 or srdf is not None:
+    if obstacles is not None or clearance != 0.0 or srdf is not None:
         bodies = () if obstacles is None else read_obstacles(obstacles)
         asked.append(sm.Clearance(bodies, clearance, srdf))
     return tuple(item.requirement(robot) for item in asked)

@@ -62,6 +62,10 @@ def show(plan: Plan, console: Console) -> None:
     show_certificate(plan.certificate, console)
 
 
+# How much of a limit is used.
+_SHARE = "{:.1%} of its limit"
+
+
 def show_certificate(certificate: Certificate, console: Console) -> None:
     """Print what forward kinematics found, and the verdict."""
     title = f"checked at all times, with {certificate.samples} poses"
@@ -73,10 +77,10 @@ def show_certificate(certificate: Certificate, console: Console) -> None:
     rows = (
         ("position error", certificate.position_error, "{:.2e} m"),
         ("rotation error", certificate.rotation_error, "{:.2e} rad"),
-        ("margin to joint limits", certificate.limit_margin, "{:.4g}"),
-        ("speed over its limit", certificate.velocity_ratio, "{:.3f}"),
+        ("margin to joint limits", certificate.limit_margin, "{:.4g} rad or m"),
+        ("speed", certificate.velocity_ratio, _SHARE),
         ("smallest singular value", certificate.smallest_singular_value, "{:.4g}"),
-        ("acceleration over its limit", certificate.acceleration_ratio, "{:.3f}"),
+        ("acceleration", certificate.acceleration_ratio, _SHARE),
         ("clearance", certificate.clearance, "{:.4g} m"),
     )
     for name, worst, form in rows:
@@ -87,14 +91,17 @@ def show_certificate(certificate: Certificate, console: Console) -> None:
     shown = {"clearance", *LIMIT_NAMES}
     for finding in certificate.findings:
         if finding.requirement not in shown:
-            name = f"{finding.requirement} (allowed: {finding.allowed:.4g})"
-            value, time = f"{finding.amount:.4g}", f"{finding.time:.3f} s"
+            name, value = finding.requirement, _SHARE.format(finding.amount)
+            if finding.allowed != 1.0:
+                name = f"{finding.requirement} (allowed: {finding.allowed:.4g})"
+                value = f"{finding.amount:.4g}"
+            time = f"{finding.time:.3f} s"
             table.add_row(escape(name), value, time, escape(finding.subject))
     for worst in certificate.deviations:
         unit = "rad" if "r" in worst.name else "m"
         value, time = f"{worst.value:.4g} {unit}", f"{worst.time:.3f} s"
         table.add_row(f"relaxed {worst.name}", value, time, "off the path, as allowed")
-    table.add_row("end to start", f"{certificate.closure:.4g}", "", "")
+    table.add_row("from end to start", f"{certificate.closure:.4g} rad or m", "", "")
     console.print(table)
     for remark in certificate.remarks:
         console.print(remark, style="dim", markup=False, soft_wrap=not console.is_terminal)
@@ -136,9 +143,9 @@ def show_comparison(plans: Mapping[str, Plan], console: Console) -> None:
 _WORST = {
     "position error, m": "position_error",
     "rotation error, rad": "rotation_error",
-    "margin to joint limits": "limit_margin",
-    "speed over its limit": "velocity_ratio",
-    "acceleration over its limit": "acceleration_ratio",
+    "margin to joint limits, rad or m": "limit_margin",
+    "speed, share of its limit": "velocity_ratio",
+    "acceleration, share of its limit": "acceleration_ratio",
     "smallest singular value": "smallest_singular_value",
     "clearance, m": "clearance",
 }

@@ -76,7 +76,8 @@ def write_motion(
 def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
     """Read a motion that `write_motion`, or something else, wrote: csv, npz, json, ros, moveit.
 
-    With accelerations where the file has them; see `Trajectory`.
+    With accelerations where the file has them; see `Trajectory`. With `degrees` all coordinates are
+    taken for angles in degrees, in any format.
 
     Raises
     ------
@@ -87,11 +88,19 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
     if path.suffix == ".csv":
         return Trajectory.from_csv(path, degrees=degrees)
     if path.suffix == ".npz":
-        return _read_npz(path)
+        return _in_radians(_read_npz(path), degrees)
     document = read_document(path)
-    if "t" in document:
-        return _of_tables(path, document)
-    return ros.trajectory(path, document)
+    read = _of_tables if "t" in document else ros.trajectory
+    return _in_radians(read(path, document), degrees)
+
+
+def _in_radians(motion: Trajectory, degrees: bool) -> Trajectory:
+    """Return a motion whose coordinates were all read in degrees, or not, in radians."""
+    if not degrees:
+        return motion
+    q, qd = np.radians(motion.q), np.radians(motion.qd)
+    qdd = None if motion.qdd is None else np.radians(motion.qdd)
+    return Trajectory(motion.t, q, qd, motion.joint_names, qdd)
 
 
 def _write_csv(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:

@@ -1,12 +1,13 @@
 """A joint motion at the times that a file has it."""
 
 from dataclasses import dataclass
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError
-from selfmotion.motion import Trajectory
+from selfmotion.basics import Array, ProblemError, shown
+from selfmotion.motion import MOST_SAMPLES, Trajectory
 from selfmotion.result import Plan
 from selfmotion.task import Task
 
@@ -47,10 +48,12 @@ class MotionSamples:
         if rate is None:
             t = np.round(motion.t - motion.t[0], _DIGITS)
         else:
-            if not (np.isfinite(rate) and rate * motion.duration >= 1.0):
+            known = isinstance(rate, Real) and np.isfinite(float(rate))
+            if not (known and 1.0 <= rate * motion.duration <= MOST_SAMPLES):
                 raise ProblemError(
-                    f"rate is {rate} Hz, expected a number above {1.0 / motion.duration:.4g}, so "
-                    f"that the motion of {motion.duration:.6g} s has samples"
+                    f"rate is {shown(rate)} Hz, expected a number above "
+                    f"{1.0 / motion.duration:.4g} and up to {MOST_SAMPLES / motion.duration:.4g}, "
+                    f"so that the motion of {motion.duration:.6g} s has samples, not too many"
                 )
             t = np.round(motion.sample_times(rate), _DIGITS)
         times = np.clip(motion.t[0] + t, motion.t[0], motion.t[-1])

@@ -15,4 +15,4 @@ from selfmotion.motion.null_motion import (
     resting_window as resting_window,
 )
 from selfmotion.motion.sampling import Sampling as Sampling
-from selfmotion.motion.trajectory import Trajectory as Trajectory
+from selfmotion.motion.trajectory import MOST_SAMPLES as MOST_SAMPLES, Trajectory as Trajectory

@@ -33,7 +33,7 @@ _MOMENT = 0.5e-9
 # Intervals that are looked at together.
 _LOT = 16_384
 # More samples than this do not fit into memory, and no controller wants them.
-_MOST_SAMPLES = 1e7
+MOST_SAMPLES = 1e7
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,10 +297,10 @@ class Trajectory:
             The rate is not positive, or gives too many samples.
         """
         rate = as_number(rate, "rate", above=0.0, error=ValueError)
-        if self.duration * rate > _MOST_SAMPLES:
+        if self.duration * rate > MOST_SAMPLES:
             raise ValueError(
                 f"rate is {rate:g} samples per second, which are {self.duration * rate:.3g} in "
-                f"all; expected at most {_MOST_SAMPLES:g}"
+                f"all; expected at most {MOST_SAMPLES:g}"
             )
         count = int(np.floor(self.duration * rate * (1.0 + 1e-12)))
         t = np.arange(count + 1) / rate
@@ -348,13 +348,9 @@ class Trajectory:
         return [self._differentiated(every, order) for order in range(4)]
 
     def _differentiated(self, k: Ints, order: int) -> Array:
-        pieces = self._pieces_of(k)
-        for _ in range(order):
-            pieces = differentiated(pieces) / (self.t[k + 1] - self.t[k])[..., None]
-        return pieces
-
-    def _pieces_of(self, k: Ints) -> Array:
-        """Return the coefficients of q in some of the intervals (I,), (m, I, n)."""
-        h, ends = self.t[k + 1] - self.t[k], (k, k + 1)
+        h, ends = (self.t[k + 1] - self.t[k])[..., None], (k, k + 1)
         given = (self.q, self.qd) if self.qdd is None else (self.q, self.qd, self.qdd)
-        return hermite(h[..., None], *((table[ends[0]], table[ends[1]]) for table in given))
+        pieces = hermite(h, *((table[ends[0]], table[ends[1]]) for table in given))
+        for _ in range(order):
+            pieces = differentiated(pieces) / h
+        return pieces

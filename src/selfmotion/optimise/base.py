@@ -100,8 +100,8 @@ _MESSAGES = {
     "JointVelocity cost",
     Status.INFEASIBLE: "no step brings the conditions nearer: they contradict each other or are "
     "out of reach from here; allow more (limits, null motion), or start elsewhere",
-    Status.GRADIENT: "the cost does not change as its gradient says: the gradient is wrong "
-    "(selfmotion.testing.check_cost tells), or the cost has a kink here",
+    Status.GRADIENT: "the cost does not change as its gradient says: it has a kink here, or, of a "
+    "cost of one's own, the gradient is wrong (selfmotion.testing.check_cost tells)",
     Status.STOPPED: "the callback asked to stop",
     Status.INTERRUPTED: "interrupted; this is the best found so far",
     Status.DEADLINE: "the deadline has passed; this is the best found so far",

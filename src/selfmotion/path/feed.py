@@ -242,15 +242,27 @@ class Feed(_Derived, kind="feed"):
         return _sizes((late - early) / (2.0 * beside) / share)
 
     @cached_property
+    def _caps(self) -> Array:
+        """What the square of the pace may be by feed and accelerations, (K, 3)."""
+        bends = 1.0 / np.maximum(self._bends / self._half, 1e-300)
+        return np.hstack([np.ones((len(bends), 1)), bends])
+
+    @cached_property
     def _most(self) -> Array:
         """What the square of the pace may be by the feed and by bends near each node, (K,)."""
-        bend = (self._bends / self._half).max(axis=1)
-        most = np.minimum(1.0, 1.0 / np.maximum(bend, 1e-300))
+        most: Array = self._caps.min(axis=1)[self._narrowest]
+        return most
+
+    @cached_property
+    def _narrowest(self) -> Ints:
+        """The node near each one at which the pace may be least, (K,)."""
+        most = self._caps.min(axis=1)
         # What is kept half a window before and after is kept by the mean in the middle.
         lengths, reach = self._lengths, 0.5 * self._limits["smoothing"] * np.sqrt(most)
         first = np.searchsorted(lengths, lengths - reach)
         after = np.searchsorted(lengths, lengths + reach, side="right")
-        return np.array([most[k:m].min() for k, m in zip(first, after, strict=True)])
+        pairs = zip(first, after, strict=True)
+        return np.array([k + int(np.argmin(most[k:m])) for k, m in pairs])
 
     @cached_property
     def _gain(self) -> Array:
@@ -279,14 +291,11 @@ class Feed(_Derived, kind="feed"):
         """Return when nodes are passed (K,), whether the feed counts there, and what holds it."""
         sigma, window = self._sigma, self._limits["smoothing"]
         speeds = _sizes(self._path.samples(sigma).twist) / self._shares[:, None]
-        caps = np.hstack(
-            [np.ones((len(sigma), 1)), 1.0 / np.maximum(self._bends / self._half, 1e-300)]
-        )
-        causes = [_CAUSES[k] for k in np.argmin(caps, axis=1)]
+        causes = [_CAUSES[k] for k in np.argmin(self._caps, axis=1)[self._narrowest]]
         turning = speeds[:, 0] < (1.0 - 0.5 * self._within) * self.feed
         corners = self._path.rounded
         inside = (sigma[:, None] >= corners[:, 0]) & (sigma[:, None] <= corners[:, 1])
-        free = inside.any(axis=1) | (speeds[:, 0] <= _RESTS * self.feed)
+        free = (inside.any(axis=1) | (speeds[:, 0] <= _RESTS * self.feed))[self._narrowest]
         times, exempt, held = [], [], []
         stops = np.searchsorted(sigma, self._stops)
         for (first, last), (start, _, _) in zip(pairwise(stops), self._paces, strict=True):

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, cast
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,8 +17,13 @@ _DEGREE = 24
 # Chebyshev tail, relative to the largest velocity, at which a piece counts as resolved.
 _TAIL = 1e-13
 _SHORTEST = 2.0**-12
+# Between its nodes a piece is compared with the velocity at so many places, or as many of so many
+# on the whole path as lie in it; and may differ by this share of the largest velocity.
+_BESIDES, _IN_ALL, _MISSED = 16, 2048, 1e-9
 # What two pieces may differ by where they meet, relative to the largest velocity.
 _JUMP = 1e-9
+# The longest step of the orientation's integration, as a share of a piece.
+_STEP = 0.25
 # A path that turns farther than this [rad] is not meant.
 _MOST_TURNED = 300.0
 
@@ -25,8 +31,10 @@ _MOST_TURNED = 300.0
 class TwistPath(Path, kind="twist"):
     """A start pose and a velocity function.
 
-    The function is represented by piecewise Chebyshev polynomials to 13 digits; positions are
-    their exact integral, orientations that of an eighth-order Runge-Kutta method (DOP853).
+    The function is represented by piecewise Chebyshev polynomials to 13 digits where it is looked
+    at, which is at 2,048 places at least: what comes and goes within less than a thousandth of the
+    duration may be missed. Positions are their exact integral, orientations that of an eighth-order
+    Runge-Kutta method (DOP853) from piece to piece.
 
     Parameters
     ----------
@@ -115,16 +123,32 @@ class TwistPath(Path, kind="twist"):
             x, w = quaternion[:3], quaternion[3]
             return 0.5 * np.append(w * omega + np.cross(omega, x), -omega @ x)
 
-        solution = solve_ivp(
-            rate,
-            (0.0, self.duration),
-            pin.Quaternion(self._start.rotation).coeffs(),
-            method="DOP853",
-            rtol=1e-12,
-            atol=1e-13,
-            dense_output=True,
-        )
-        return cast(Callable[[Array], Array], solution.sol)
+        # Piece by piece: what a piece resolves, steps from afar would pass over.
+        at, solutions = pin.Quaternion(self._start.rotation).coeffs(), []
+        for left, right in pairwise(self._breaks.tolist()):
+            # Of errors too small for numbers the solver divides nothing by nothing.
+            with np.errstate(invalid="ignore"):
+                solution = solve_ivp(
+                    rate,
+                    (left, right),
+                    at,
+                    method="DOP853",
+                    rtol=1e-12,
+                    atol=1e-13,
+                    max_step=_STEP * (right - left),
+                    dense_output=True,
+                )
+            solutions.append(solution.sol)
+            at = solution.y[:, -1]
+
+        def quaternions(t: Array) -> Array:
+            k, _ = self._local(t)
+            found = np.empty((4, len(t)))
+            for number in np.unique(k):
+                found[:, k == number] = solutions[number](t[k == number])
+            return found
+
+        return quaternions
 
     def twist(self, t: float) -> Array:
         """See `Path.twist`; without the pose, which takes most of the time."""
@@ -195,7 +219,8 @@ def _resolve(
         values = np.array([_sample(velocity, t) for t in times])
         coefficients = chebyshev.chebfit(nodes, values, _DEGREE)
         scale = max(scale, float(np.abs(values).max()))
-        if np.abs(coefficients[-3:]).max() <= _TAIL * max(scale, 1e-300):
+        resolved = np.abs(coefficients[-3:]).max() <= _TAIL * max(scale, 1e-300)
+        if resolved and _fits(velocity, left, right, coefficients, duration, scale):
             pieces.append(coefficients)
             breaks.append(right)
         elif right - left < _SHORTEST * duration:
@@ -209,6 +234,22 @@ def _resolve(
     _check_jumps(breaks, pieces, scale)
     _check_ends(velocity, duration, pieces, scale)
     return breaks, pieces
+
+
+def _fits(
+    velocity: Callable[[float], npt.ArrayLike],
+    left: float,
+    right: float,
+    coefficients: Array,
+    duration: float,
+    scale: float,
+) -> bool:
+    """Return whether a piece is the velocity at places in between, which its nodes may miss."""
+    count = max(_BESIDES, int(np.ceil(_IN_ALL * (right - left) / duration)))
+    s = np.linspace(-1.0, 1.0, count + 1)[:-1] + 1.0 / count
+    values = np.array([_sample(velocity, t) for t in 0.5 * (left + right + (right - left) * s)])
+    missed = np.abs(chebyshev.chebval(s, coefficients).T - values).max()
+    return bool(missed <= _MISSED * max(scale, 1e-300))
 
 
 def _check_jumps(breaks: list[float], pieces: list[Array], scale: float) -> None:

@@ -60,4 +60,7 @@ def coefficients_of(
     null = np.swapaxes(null_space(jacobians), 1, 2)
     acting = null @ table.matrix()
     wanted = np.einsum("srn,sn->sr", null, qd)
+    if not wanted.size:
+        # No self-motion is left, only what is relaxed.
+        return np.zeros(table.size)
     return np.asarray(np.linalg.lstsq(acting.reshape(-1, table.size), wanted.ravel())[0])

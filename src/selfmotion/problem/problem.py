@@ -317,11 +317,16 @@ class Problem:
         return reduce(and_, own, self.asked_envelope)
 
     def certify(
-        self, trajectory: Trajectory, tolerance: Tolerance | None = None, ending: str = ""
+        self,
+        trajectory: Trajectory,
+        tolerance: Tolerance | None = None,
+        ending: str = "",
+        besides: Sequence[Requirement] = (),
     ) -> Certificate:
         """Return the certificate of a motion, by all that the problem asks for; see `certify`.
 
-        A motion with an `ending` stops before it can rest at the end of the path.
+        And by requirements `besides`. A motion with an `ending` stops before it can rest at the end
+        of the path.
         """
         rests = self._rest(self.rests[0], self.rests[1] and not ending)
         return certify(
@@ -330,7 +335,7 @@ class Problem:
             self.task,
             trajectory,
             tolerance,
-            (*rests, *self._asked),
+            (*rests, *self._asked, *besides),
             also=self.also,
             relaxations=self.relaxations,
             damping=self.damping_law,

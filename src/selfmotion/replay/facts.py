@@ -1,5 +1,6 @@
 """A plan's report and certificate as the rows of a table."""
 
+from dataclasses import replace
 from typing import Any
 
 from selfmotion.certificate import Extreme
@@ -21,9 +22,10 @@ def facts(plan: Plan) -> dict[str, Cell]:
     rows["position error, worst"] = _extreme(certificate.position_error, "m")
     rows["rotation error, worst"] = _extreme(certificate.rotation_error, "rad")
     rows["margin to a joint limit, least"] = _extreme(certificate.limit_margin, "rad or m")
-    rows["speed over its limit, most"] = _extreme(certificate.velocity_ratio, "")
+    fastest = certificate.velocity_ratio
+    rows["speed, most"] = _extreme(replace(fastest, value=100.0 * fastest.value), "% of its limit")
     rows["smallest singular value"] = _extreme(certificate.smallest_singular_value, "")
-    rows["end to start"] = (f"{certificate.closure:.3g} rad or m", "")
+    rows["from end to start"] = (f"{certificate.closure:.3g} rad or m", "")
     rows["checked at"] = (f"{certificate.samples} times", "by forward kinematics")
     rows["duration"] = (f"{plan.trajectory.duration:.4g} s", "")
     rows["task"] = (plan.task.value, f"{plan.task.dimension} rows, {plan.robot.dof} joints")

@@ -1,5 +1,6 @@
 """A finished plan: the motion, the problem it solves, how it was found, and what the check says."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, ClassVar, Protocol
@@ -110,9 +111,17 @@ class Plan:
         """The bodies of the world that the requirements are about."""
         return tuple(body for item in self.requirements for body in item.obstacles)
 
-    def check(self) -> Certificate:
-        """Return a new certificate of the motion, by the same tolerance and requirements."""
-        found = self.problem.certify(self.trajectory, self.tolerance, self.report.ending)
+    def check(
+        self, tolerance: Tolerance | None = None, requirements: Sequence[Requirement] = ()
+    ) -> Certificate:
+        """Return a new certificate of the motion.
+
+        By all that the problem asks for and by `requirements` besides; with another tolerance than
+        the plan's where one is given.
+        """
+        found = self.problem.certify(
+            self.trajectory, tolerance or self.tolerance, self.report.ending, requirements
+        )
         if not self.altered:
             return found
         return replace(found, failures=(self.altered, *found.failures))

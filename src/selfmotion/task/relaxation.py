@@ -118,7 +118,8 @@ class Relaxation:
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe description: ``Relaxation(**description)`` restores it."""
-        return {**asdict(self), "rows": list(self.rows)}
+        window = None if self.during is None else list(self.during)
+        return {**asdict(self), "rows": list(self.rows), "during": window}
 
 
 def _check_types(rows: Any, band: Any, during: Any) -> None:

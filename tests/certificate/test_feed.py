@@ -1,0 +1,99 @@
+"""A feed that was asked for is kept, or the motion is not verified."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.certificate.feed import _rounded_down
+from support.arms import robot_named
+
+
+def saddle(feed: float, **options) -> sm.Feed:
+    """The seam of two pipes, 60 and 30 mm in radius."""
+    a = np.linspace(0.0, 2.0 * np.pi, 200)
+    y = 0.03 * np.sin(a)
+    places = np.stack([0.5 + 0.03 * np.cos(a), y, 0.2 + np.sqrt(0.06**2 - y**2)], axis=1)
+    return sm.Feed(sm.Waypoints(a, places), feed, **options)
+
+
+def certified(path: sm.Path) -> sm.Certificate:
+    """A certificate of a motion somewhere else: the feed is a matter of the path."""
+    panda = robot_named("panda")
+    q = panda.dexterous_configuration()
+    rest = sm.Trajectory([0.0, path.duration], [q, q], np.zeros((2, 7)), panda.joint_names)
+    return sm.certify(panda, path, "position", rest, 10.0)
+
+
+def test_a_feed_of_millimetres_is_refused_at_once() -> None:
+    with pytest.raises(sm.PathError, match=r"10 m/s is faster than any arm.*not mm/s"):
+        saddle(10.0)
+
+
+@pytest.mark.parametrize("feed", [0.005, 0.01, 0.03])
+def test_a_feed_that_is_kept_is_told(feed: float) -> None:
+    path = saddle(feed)
+    (found,) = path.feeds
+    assert found.kept
+    certificate = certified(path)
+    assert certificate.verified, certificate.verdict
+    assert "feed" in certificate.covers
+    assert f"the feed of {feed:g} m/s is reached" in certificate.findings[-1].text
+    # Where it counts, and that is nearly everywhere, by the path's own twist.
+    t = np.linspace(0.0, path.duration, 20_001)
+    speeds = np.linalg.norm(path.samples(t).twist[:, :3], axis=1)
+    assert np.mean(speeds >= 0.98 * feed) >= 0.9
+    waiting = path + sm.Dwell(path.pose(path.duration), 1.0)
+    for placed in (sm.Placed(path, pin.SE3.Identity()), waiting):
+        assert placed.feeds[0].slowest == found.slowest
+
+
+@pytest.mark.parametrize(
+    ("options", "held_by"),
+    [
+        ({"acceleration": 0.02}, "the acceleration in a bend"),
+        ({"within": 1e-12}, "the"),
+    ],
+)
+def test_a_feed_that_is_held_is_not_verified(options: dict, held_by: str) -> None:
+    path = saddle(0.03, **options)
+    (found,) = path.feeds
+    certificate = certified(path)
+    assert not certificate.verified
+    assert f"held by {held_by}" in certificate.verdict
+    assert found.slowest < (1.0 - found.within) * 0.03
+    speed = np.linalg.norm(path.twist(found.time)[:3])
+    assert speed == pytest.approx(found.slowest, rel=1e-6)
+    if "acceleration" in options:
+        # What the message says to ask for is kept.
+        advised = _rounded_down(found.slowest)
+        assert f"ask for {advised:g} m/s" in certificate.verdict
+        assert saddle(advised, **options).feeds[0].kept
+
+
+def test_a_way_too_short_to_run_up_reaches_no_feed() -> None:
+    start = pin.SE3.Identity()
+    end = pin.SE3(np.eye(3), np.array([0.01, 0.0, 0.0]))
+    (found,) = sm.Feed(sm.Line(start, end, 1.0), 0.5).feeds
+    assert not found.kept
+    assert found.held_by == "run-up and run-down"
+
+
+def test_rounded_corners_and_turning_on_the_spot_do_not_count() -> None:
+    corner = sm.Polyline([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.3, 0.3, 0.0]], tolerance=2e-3)
+    (found,) = sm.Feed(corner, 0.2).feeds
+    assert found.kept
+    t = np.linspace(0.0, sm.Feed(corner, 0.2).duration, 20_001)
+    speeds = np.linalg.norm(sm.Feed(corner, 0.2).samples(t).twist[:, :3], axis=1)
+    inner = (t > 1.0) & (t < t[-1] - 1.0)
+    # In the corner it is slower indeed.
+    assert speeds[inner].min() < 0.9 * 0.2
+    turned = np.array([[1.0, 0.0, 0.0, 0.0], [0.9, 0.4, 0.0, 0.0], [0.9, 0.4, 0.0, 0.0]])
+    spot = sm.Polyline([[0.0] * 3, [0.0] * 3, [0.3, 0.0, 0.0]], turned, turn_tolerance=1e-3)
+    assert sm.Feed(spot, 0.05).feeds[0].kept
+
+
+@pytest.mark.parametrize("speed", [0.0123, 0.05, 0.0999, 1.0])
+def test_an_advised_feed_has_two_digits_and_is_no_larger(speed: float) -> None:
+    advised = _rounded_down(speed)
+    assert 0.9 * speed < advised <= speed
