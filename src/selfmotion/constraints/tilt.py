@@ -8,6 +8,7 @@ import numpy.typing as npt
 from selfmotion.basics import Array, ProblemError, as_number, as_numbers, nearest, shown
 from selfmotion.certificate import Column, Quantity, Stretch
 from selfmotion.constraints.base import Constraint
+from selfmotion.constraints.envelope import Envelope
 from selfmotion.robot import RobotModel
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -46,6 +47,10 @@ class Tilt(Constraint):
         _direction(self.towards, "tilt: towards")
         as_number(self.within, "tilt: within", above=0.0, most=np.pi * (1.0 - 1e-6))
         as_number(self.margin, "tilt: margin", above=0.0, most=1.0)
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return Envelope.of_quantity(self.quantity(robot), robot.dof)
 
     def quantity(self, robot: RobotModel) -> Quantity:
         """See `Constraint.quantity`."""

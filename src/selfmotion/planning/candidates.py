@@ -24,7 +24,7 @@ from selfmotion.planning.settings import Search
 from selfmotion.planning.warm_start import start_of
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
-from selfmotion.search import Reach, SequenceGuide, guides, start_candidates
+from selfmotion.search import Admits, Reach, SequenceGuide, guides, start_candidates
 
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 _SECOND_EFFORT = 4
@@ -182,7 +182,7 @@ class Candidates:
     def _try_candidates(self, starts: int, finalists: int, rng: np.random.Generator) -> None:
         problem = self._problem
         arm = problem.envelope.arm(problem.robot)
-        candidates = start_candidates(problem.follows.for_robot(arm), starts, rng)
+        candidates = start_candidates(problem.follows.for_robot(arm), starts, rng, self._admits)
         rough = self._best_of(candidates, finalists) if len(candidates) > finalists else []
         self._waiting = sessions = self._resumed(rough) if rough else self._sessions(candidates)
         for number, session in enumerate(sessions, 1):
@@ -192,6 +192,11 @@ class Candidates:
             if self._is_out_of_reach():
                 break
         self._waiting = ()
+
+    @property
+    def _admits(self) -> Admits | None:
+        asked = self._problem.envelope
+        return asked.admits if asked.quantities else None
 
     def _best_of(self, candidates: list[Array], finalists: int) -> list[Trajectory]:
         """Return the best rough motions; none where these all break down."""

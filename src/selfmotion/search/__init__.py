@@ -16,7 +16,11 @@ from selfmotion.search.sequences import (
     Sequence as Sequence,
     best_sequences as best_sequences,
 )
-from selfmotion.search.starts import spread as spread, start_candidates as start_candidates
+from selfmotion.search.starts import (
+    Admits as Admits,
+    spread as spread,
+    start_candidates as start_candidates,
+)
 from selfmotion.search.stretches import (
     Stretch as Stretch,
     Stretches as Stretches,
