@@ -1,16 +1,12 @@
 """A seam on a table that tilts and turns: arm and table move together, the seam kept flat."""
 
-from pathlib import Path
-
 import numpy as np
 import pinocchio as pin
 
 import selfmotion as sm
 
-ROBOTS = Path(__file__).parent.parent / "robots"
-
 cell = sm.load_robot(
-    {"arm": "panda", "table": ROBOTS / "positioner.urdf"},
+    {"arm": "panda", "table": "positioner"},
     base={"table": pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.0]))},
     tool="arm/panda_hand_tcp",
     reference="table/plate",
