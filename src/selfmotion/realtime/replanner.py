@@ -116,8 +116,7 @@ class Replanner:
         somewhere = Dwell(robot.pose(robot.dexterous_configuration()), self.horizon)
         follows = Follows.of(robot, somewhere, self.task)
         costs, constraints = as_asked(follows, costs, constraints)
-        limits = joint_limits(robot, constraints)
-        self.limits = limits
+        self.limits = limits = joint_limits(robot, constraints)
         null_motion = in_null_space(null_motion or PolynomialNullMotion())
         steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
         bodies = [pair for item in constraints for pair in item.envelope(robot).bodies]
@@ -131,8 +130,7 @@ class Replanner:
             steps,
             self._around,
         )
-        self._kinematics = follows.only.chain.kinematics()
-        self._layout = follows.layout
+        self._kinematics, self._layout = follows.only.chain.kinematics(), follows.layout
         self._cycles = round(self.period / self.cycle) + round(reserve / self.cycle)
         self._commands = Commands(robot, limits, self.cycle, self._cycles, latency, settling)
         self._prepare()
