@@ -85,6 +85,7 @@ def load(folder: Path) -> PathProblem:
         source,
         tool=description["tip_frame"],
         lock=locked if isinstance(locked, dict) else _all_but(source, description),
+        reference=description["base_frame"] if description.get("base_moves") else None,
     )
     free_axis = description.get("free_axis")
     if free_axis not in (None, "z"):

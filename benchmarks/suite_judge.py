@@ -122,6 +122,10 @@ class SuiteJudge:
     def _misses(self, targets: list[Any], q: Array) -> tuple[float, float]:
         """Return the largest miss in position [m] and rotation [deg]."""
         turn, at = self._arm.place(self._arm.tool, q)
+        if self._robot.reference is not None:
+            base, origin = self._arm.place(self._robot.reference, q)
+            at = np.einsum("kji,kj->ki", base, at - origin)
+            turn = np.einsum("kji,kjl->kil", base, turn)
         wanted = np.array([pose.rotation for pose in targets])
         position = np.linalg.norm(at - [pose.translation for pose in targets], axis=1)
         if self._free_axis is None:

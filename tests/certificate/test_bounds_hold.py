@@ -1,5 +1,7 @@
 """The law of the bound: on 10,000 random intervals it is never below the truth, nor far above."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,9 @@ from selfmotion.certificate import Stretch
 from selfmotion.certificate.bounding import Bounded, _measured
 from selfmotion.certificate.path_error import _PathErrors
 from selfmotion.certificate.quantity import _Shares
+from selfmotion.follow import BoundFollow
 from support.arms import robot_named
+from support.two_arms import baxter_with_both_arms
 
 ROUNDING = 1e-9
 # Intervals of each kind; with ten kinds 10,000 in all.
@@ -46,11 +50,18 @@ def kinds(robot: sm.RobotModel, motion: sm.Trajectory) -> dict[str, Bounded]:
     pose = robot.pose(motion.q[0])
     path = sm.Circle.around(pose, 0.1, float(motion.t[-1]), turns=0.05, turn_tool=True)
     free = (sm.Relaxation("rz", 0.1), sm.Relaxation(("x", "y"), 1e-2, axes="tool"))
-    given = sm.Tolerance()
+    given, pointing = sm.Tolerance(), sm.Task.POINTING
+    follow = BoundFollow(robot.chain, path, sm.Task.POSE)
+    if robot.reference is not None:
+        limits = sm.ToolLimits(1.0, 1.0, 10.0, 10.0)
+        return {
+            "relative": _PathErrors(follow, given, ()),
+            "relative rates": _Shares(limits.quantity(robot)),
+        }
     return {
-        "path": _PathErrors(path, sm.Task.POSE, given, ()),
-        "pointing": _PathErrors(path, sm.Task.POINTING, given, ()),
-        "relaxed": _PathErrors(path, sm.Task.POSE, given, free),
+        "path": _PathErrors(follow, given, ()),
+        "pointing": _PathErrors(replace(follow, task=pointing), given, ()),
+        "relaxed": _PathErrors(follow, given, free),
     } | {
         name: _Shares(constraint.quantity(robot))
         for name, constraint in {
@@ -76,12 +87,20 @@ NAMES = [
     "speed",
     "rates",
     "acceleration",
+    "relative",
+    "relative rates",
 ]
+
+
+def robot_of(name: str) -> sm.RobotModel:
+    """A Panda, or Baxter's left hand as its right one sees it."""
+    relative = name.startswith("relative")
+    return baxter_with_both_arms("right_gripper") if relative else robot_named("panda")
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_bounds_are_never_below_the_truth_nor_far_above(name: str) -> None:
-    robot, rng = robot_named("panda"), np.random.default_rng(sum(map(ord, name)))
+    robot, rng = robot_of(name), np.random.default_rng(sum(map(ord, name)))
     motion = random_motion(robot, rng)
     function = Wide(kinds(robot, motion)[name])
     # The swivel of a nearly stretched arm is known on short intervals only.

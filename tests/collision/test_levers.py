@@ -7,6 +7,7 @@ import pytest
 from selfmotion.collision import Box, CollisionModel, Sphere
 from selfmotion.collision.bodies import Body, link_bodies
 from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
+from support.two_arms import baxter_with_both_arms
 
 WORLD = (Box("box", [0.6, 0.3, 0.5], [0.2, 0.3, 0.4]), Sphere("ball", [-0.4, 0.5, 0.9], 0.1))
 
@@ -22,9 +23,10 @@ EXACT = 1e-12
 DISTANCE = 1e-6
 
 
-@pytest.fixture(scope="module", params=ARMS)
+@pytest.fixture(scope="module", params=[*ARMS, "both arms of baxter"])
 def model(request: pytest.FixtureRequest) -> CollisionModel:
-    return CollisionModel(load_robot(request.param), WORLD)
+    both = request.param not in ARMS
+    return CollisionModel(baxter_with_both_arms() if both else load_robot(request.param), WORLD)
 
 
 def samples(robot: RobotModel, count: int, seed: int = 0) -> np.ndarray:

@@ -24,7 +24,7 @@ def free(panda: sm.RobotModel) -> sm.Plan:
 
 
 def test_derivatives_equal_central_differences(panda: sm.RobotModel) -> None:
-    rates, rng, h = ToolRates(panda), np.random.default_rng(0), 1e-6
+    rates, rng, h = ToolRates(panda.chain), np.random.default_rng(0), 1e-6
     state = [rng.normal(size=(4, 7)) for _ in range(3)]
     by_velocity, by_acceleration = rates.derivatives(*state)
     for order in range(3):
@@ -51,7 +51,7 @@ def test_the_constraint_keeps_the_laws(panda: sm.RobotModel, task: str) -> None:
 def test_what_the_task_leaves_free_keeps_its_limit(
     panda: sm.RobotModel, free: sm.Plan, tmp_path
 ) -> None:
-    rates, t = ToolRates(panda), np.linspace(0.0, 3.0, 20_001)
+    rates, t = ToolRates(panda.chain), np.linspace(0.0, 3.0, 20_001)
 
     def turn_rate(plan: sm.Plan) -> float:
         motion = plan.trajectory

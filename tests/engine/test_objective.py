@@ -1,5 +1,7 @@
 """F, its gradient and its metric equal central differences."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,7 @@ from support.arms import (
     short_line,
     start_of,
 )
+from support.random_cells import LEFT, RIGHT, random_cell, random_follows
 from support.rollouts import rollout_of
 
 
@@ -92,6 +95,24 @@ def test_gradient_equals_central_differences(case: Case, cost: str) -> None:
     # Where the self-motion leaves a cost unchanged (UR's last joint), rounding of F remains.
     scale = max(np.abs(differences).max(), 1e-2 * abs(objective.value(x)))
     assert np.abs(exact - differences).max() <= GRADIENT * scale
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_gradient_with_several_tips_and_moving_frames(seed: int, tmp_path: Path) -> None:
+    """Cells made at random: to seven digits, differences extrapolated."""
+    rng = np.random.default_rng(seed)
+    robot = sm.load_robot(random_cell(rng, tmp_path), tool=(LEFT, RIGHT))
+    follows, start = random_follows(rng, robot)
+    rollout = Rollout(follows, Grid.aligned(follows.items[0].path.knots, 10))
+    functions = PolynomialNullMotion(2, "joint").functions(rollout.grid.stage_times, 2.0)
+    table = NullMotionTable(functions, None, robot.dof)
+    costs = [sm.JointVelocity(), sm.InverseManipulability(1e-3), sm.KineticEnergy(robot)]
+    objective = objective_of(rollout, table, costs, FixedStart(start))
+    x = 0.05 * rng.normal(size=objective.size)
+    exact = objective.gradient(x)
+    fine, coarse = (central_difference(objective.value, x, step) for step in (1e-4, 2e-4))
+    differences = (4.0 * fine - coarse) / 3.0
+    assert np.abs(exact - differences).max() <= 1e-7 * max(np.abs(differences).max(), 1.0)
 
 
 def test_panda_gradient_to_seven_digits() -> None:

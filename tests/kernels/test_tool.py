@@ -6,6 +6,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.basics.layout import LOGARITHM, POINTING, layout_of
 from selfmotion.kernels import tool
 from support.arms import central_difference
 from support.compiled import compiled
@@ -60,7 +61,7 @@ def test_pullback_of_the_rotation_error_is_pinocchios(angle: float) -> None:
     axis = rng.normal(size=3)
     phi = angle * axis / np.linalg.norm(axis)
     error, z, out = np.concatenate([np.zeros(3), phi]), rng.normal(size=6), np.empty(6)
-    pull_error(tool.LOGARITHM, error, np.eye(3), np.eye(3), z, out)
+    pull_error(LOGARITHM, error, np.eye(3), np.eye(3), z, out)
     expected = -pin.Jlog3(np.asarray(pin.exp3(phi))).T @ z[3:]
     np.testing.assert_allclose(out[:3], -z[:3])
     # Pinocchio's own logarithm loses digits near π.
@@ -68,11 +69,11 @@ def test_pullback_of_the_rotation_error_is_pinocchios(angle: float) -> None:
 
 
 @pytest.mark.parametrize("angle", [1e-3, 0.0499, 0.0501, 0.5, 2.0, 3.0])
-@pytest.mark.parametrize("kind", [tool.LOGARITHM, tool.POINTING])
+@pytest.mark.parametrize("kind", [LOGARITHM, POINTING])
 def test_pullback_of_the_pose_error_equals_central_differences(kind: int, angle: float) -> None:
     rng = np.random.default_rng(6)
     rotation = random_rotation(rng)
-    across = rotation @ [np.cos(0.7), np.sin(0.7), 0.3 * (kind == tool.LOGARITHM)]
+    across = rotation @ [np.cos(0.7), np.sin(0.7), 0.3 * (kind == LOGARITHM)]
     target = np.asarray(pin.exp3(angle * across / np.linalg.norm(across))) @ rotation
     z, error, out = rng.normal(size=6), np.empty(6), np.empty(6)
 
@@ -109,7 +110,7 @@ def test_selection_is_the_tasks_and_has_its_adjoint(task: sm.Task) -> None:
     """⟨S t, v⟩ = ⟨t, Sᵀ v⟩, and J = S J6 column by column."""
     rng = np.random.default_rng(7)
     rotation, jacobian = random_rotation(rng), rng.normal(size=(6, 7))
-    layout = tool.layout_of([(task.rows, task.tool_axes, np.arange(7))], 7)
+    layout = layout_of([(task.rows, task.tool_axes, np.arange(7))], 7)
     v, given = rng.normal(size=task.dimension), (layout, 0, rotation)
     rows, selected = np.empty((task.dimension, 7)), np.empty(task.dimension)
     back = np.empty(6)

@@ -59,3 +59,17 @@ def test_orientation_kinks_and_both_ends_come_to_rest() -> None:
     for time in path.corner_times:
         assert np.abs(path.twist(time)).max() <= RESTS
     assert np.abs(path.twist(1.0)).max() > 0.05
+
+
+def test_corners_that_meet_share_a_knot() -> None:
+    """Steps of microseconds between them would turn rounding into accelerations."""
+    places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1e-3, 0.0], [3.0, 3e-3, 0.0]])
+    places = np.vstack([places, [4.0000113, 6e-3, 0.0], [5.0, 1e-2, 0.0]])
+    path = sm.Polyline(places, tolerance=0.5)
+    gaps = np.diff(path.knots)
+    assert gaps.min() > 0.1
+    assert np.all(np.isin(path.knots, path.marks))
+    assert np.diff(path.marks).min() < 1e-2 < gaps.min()
+    # Where legs between corners are straight, each has its two.
+    sharp = sm.Polyline(places, tolerance=1e-6)
+    assert len(sharp.knots) == len(sharp.marks) == 2 + 2 * 4

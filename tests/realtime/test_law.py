@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import linprog
 
 import selfmotion as sm
-from selfmotion import kernels
 from selfmotion.basics import Array
+from selfmotion.basics.layout import layout_of
 from selfmotion.realtime import law
 from selfmotion.realtime.law import saturated_rates
 from selfmotion.realtime.viable import tightened
@@ -71,7 +71,7 @@ def commanded(rng: np.random.Generator, cycles: int, limits: Array, h: float) ->
     states, inner = np.zeros((cycles + 1, 3, 7)), np.vstack([tightened(limits), np.zeros(7)])
     states[0, 0] = rng.uniform(limits[0] + 1e-6, limits[1] - 1e-6)
     task, table, here = sm.Task.POSE, nonsense(rng, cycles), np.eye(3)
-    layout = kernels.layout_of([(task.rows, task.tool_axes, np.arange(7))], 7)
+    layout = layout_of([(task.rows, task.tool_axes, np.arange(7))], 7)
     for cycle in range(cycles):
         # Of full rank, of less, and of none.
         jacobian = rng.standard_normal((6, 7)) * (rng.random((6, 1)) < rng.choice([0.0, 0.7, 1.0]))

@@ -22,7 +22,7 @@ def free(panda: sm.RobotModel) -> sm.Plan:
 def test_rates_are_derivatives_of_the_pose(panda: sm.RobotModel, free: sm.Plan) -> None:
     motion, h = free.trajectory, 1e-5
     t = np.linspace(0.1, 2.9, 23)
-    velocity, acceleration = ToolRates(panda)(motion(t), motion(t, 1), motion(t, 2))
+    velocity, acceleration = ToolRates(panda.chain)(motion(t), motion(t, 1), motion(t, 2))
 
     def world_twist(at: float) -> np.ndarray:
         step = 1e-5

@@ -206,9 +206,8 @@ def test_optimum_stops_where_coefficients_run_away(joint_space: sm.Problem) -> N
 
 
 def test_missing_matplotlib_is_said_before_any_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    from shell import complaint
-
     from selfmotion import study
+    from support.shell import complaint
 
     def work(*_: object) -> Study:
         raise AssertionError("it began")

@@ -68,7 +68,7 @@ def objective_of(
     constraints: Sequence[sm.BoundConstraint] = (),
 ) -> Objective:
     """Return an objective of parts, for laws that hold whatever problem they come from."""
-    grid, path = rollout.grid, rollout.follows.path
+    grid, path = rollout.grid, rollout.follows.items[0].path
     return Objective(
         rollout,
         table,

@@ -14,7 +14,8 @@ LEFT, RIGHT = "left_gripper", "right_gripper"
 @cache
 def baxter_with_both_arms(reference: str | None = None) -> sm.RobotModel:
     """Return Baxter with both hands as tools: 14 joints."""
-    return sm.load_robot("baxter", tool=(LEFT, RIGHT), reference=reference)
+    tools = LEFT if reference else (LEFT, RIGHT)
+    return sm.load_robot("baxter", tool=tools, reference=reference)
 
 
 def both_arms(left: str, right: str) -> tuple[Follows, Array]:

@@ -212,7 +212,7 @@ class EmptyRequirement(SlowElbow, kind="empty"):
 
 
 def test_a_constraint_that_nothing_judges_is_refused(problem: sm.Problem) -> None:
-    with pytest.raises(sm.ProblemError, match=r"expected a Constraint"):
+    with pytest.raises(sm.ProblemError, match=r"is no Constraint; derive a class"):
         dataclasses.replace(problem, constraints=[NoRequirement()])
     half = type("Half", (sm.Constraint,), {"bind": NoRequirement.bind})()
     with pytest.raises(sm.ProblemError, match=r"Half does not say what it asks for: give it quant"):

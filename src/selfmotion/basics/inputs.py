@@ -1,6 +1,6 @@
 """What users give, made into numbers, or refused in one sentence that says what was given."""
 
-from inspect import isabstract
+from abc import ABCMeta
 from typing import Any, TypeVar
 
 import numpy as np
@@ -128,10 +128,10 @@ def as_several(items: Any, name: str, kind: type[_Kind]) -> tuple[_Kind, ...]:
             remedy = (
                 f"is no {kind.__name__}; derive a class of your own from "
                 f"selfmotion.{kind.__name__}, which says what it has to give"
-                if isabstract(kind)
+                if isinstance(kind, ABCMeta)
                 else f"expected a {kind.__name__}"
             )
-            parted = " " if isabstract(kind) else ", "
+            parted = " " if isinstance(kind, ABCMeta) else ", "
             raise ProblemError(f"{name}: {shown(item)}{parted}{remedy}")
     return tuple(listed)
 

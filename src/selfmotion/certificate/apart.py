@@ -44,6 +44,11 @@ class KeepsApart(Requirement):
 
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: the closest pair, to a fiftieth of its distance."""
+        stuck = self.model.stuck
+        if stuck is not None:
+            names, time = f"{stuck.first} - {stuck.second}", float(motion.trajectory.t[0])
+            text = f"joints that are held put {names} {-stuck.value * 1e3:.2f} mm into each other"
+            return Finding(self.name, names, time, stuck.value, self.distance, False, text)
         found = closest_at_all_times(self.model, motion.trajectory, self.distance)
         text = self._told(found)
         if found.open_until is not None:
@@ -63,7 +68,7 @@ class KeepsApart(Requirement):
     def covers(self) -> tuple[str, ...]:
         """See `Requirement.covers`."""
         links = ("self-collision",) if self.model.checks_links else ()
-        return (*links, "obstacles") if self.obstacles else links
+        return (*links, "obstacles") if self.model.checks_obstacles else links
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -73,10 +78,17 @@ class KeepsApart(Requirement):
     @property
     def remarks(self) -> tuple[str, ...]:
         """See `Requirement.remarks`: pairs that are left out and why, and open meshes."""
-        left_out = [f"{x.first} - {x.second}" for x in self.model.overlapping if not x.is_checked]
+        left_out = [
+            f"{x.first} - {x.second} (in {100 * x.share:.0f} % of all configurations)"
+            for x in self.model.overlapping
+            if not x.is_checked
+        ]
         said = []
         if left_out:
             said.append(f"touching as they are made, left out: {', '.join(left_out)}")
+        if not self.model.pairs:
+            said.append("no pair of bodies that can meet: nothing was measured")
+        said += [item.hint for item in self.obstacles if item.hint]
         if self.model.disabled:
             disabled = ", ".join(" - ".join(pair) for pair in self.model.disabled)
             said.append(f"left out as asked: {disabled}")

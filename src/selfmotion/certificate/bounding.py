@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints, series
+from selfmotion.basics import Array, Ints, Progress, series, silent
 from selfmotion.motion import Trajectory
 from selfmotion.robot import ChainSeries, RobotModel
 
@@ -144,12 +144,22 @@ class _Found(NamedTuple):
     samples: int
 
 
-def bounded(function: Bounded, robot: RobotModel, trajectory: Trajectory, edges: Array) -> Bounds:
-    """Bound a function of a motion between all edges (E,) [s], which contain the samples."""
+def bounded(
+    function: Bounded,
+    robot: RobotModel,
+    trajectory: Trajectory,
+    edges: Array,
+    progress: Progress = silent,
+) -> Bounds:
+    """Bound a function of a motion between all edges (E,) [s], which contain the samples.
+
+    A long motion is looked at by lots, so that memory does not grow with it; `progress` is called
+    with ``("checking", lot, lots)``.
+    """
     values, times = np.zeros(len(function.of)), np.full(len(function.of), edges[0])
     undecided: list[tuple[float, float]] = []
     proved, samples = True, 0
-    for left, found in _settled(function, robot, trajectory, edges):
+    for left, found in _settled(function, robot, trajectory, edges, progress):
         proved, samples = proved and found.proved, samples + found.samples
         for size in range(len(values)) if len(found.values) else ():
             # Written so that NaN is worse than any.
@@ -162,10 +172,17 @@ def bounded(function: Bounded, robot: RobotModel, trajectory: Trajectory, edges:
 
 
 def _settled(
-    function: Bounded, robot: RobotModel, trajectory: Trajectory, edges: Array
+    function: Bounded,
+    robot: RobotModel,
+    trajectory: Trajectory,
+    edges: Array,
+    progress: Progress,
 ) -> Iterator[tuple[Array, _Found]]:
     """Yield by lots the intervals (I, 2) that never settle, and what was found of all that did."""
-    for first in range(0, len(edges) - 1, _LOT):
+    lots = range(0, len(edges) - 1, _LOT)
+    for number, first in enumerate(lots, 1):
+        if len(lots) > 1:
+            progress("checking", number, len(lots))
         part = edges[first : first + _LOT + 1]
         pending = np.stack([part[:-1], part[1:]], axis=1)
         for depth in range(_DEPTH + 1):

@@ -4,18 +4,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, shown
+from selfmotion.basics import Array, ProblemError, Progress, shown, silent
 from selfmotion.certificate.deviation import smallest_singular_values
+from selfmotion.certificate.feed import FeedReached
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import arm_limits
-from selfmotion.certificate.path_error import bound_errors
+from selfmotion.certificate.path_error import PathCheck, bound_errors
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.certificate.verdict import Certificate
+from selfmotion.follow import Follow, Follows
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path, check_oriented
 from selfmotion.robot import RobotModel
 from selfmotion.task import DampingLaw, Relaxation, Task
 
+# Of a long motion the distance from singular poses, which proves nothing, is looked at so often.
+_MOST_POSES = 50_000
 # What is said of paths without bounds of their derivatives.
 _MEASURED = "the path is judged as measured between its marks: it gives no bounds (Path.series)"
 
@@ -28,9 +32,11 @@ def certify(
     tolerance: Tolerance | None = None,
     requirements: Sequence[Requirement] = (),
     *,
+    also: Sequence[Follow] = (),
     relaxations: Sequence[Relaxation] = (),
     damping: DampingLaw | None = None,
     ending: str = "",
+    progress: Progress = silent,
 ) -> Certificate:
     """Check a motion against its path, the arm's limits and what else is required.
 
@@ -44,13 +50,17 @@ def certify(
     requirements : sequence of Requirement
         What it must keep besides. The arm's own limits of position and velocity are always judged,
         unless these contain `JointLimits` of the same order.
+    also : sequence of Follow
+        What else of the arm has to follow a path.
     relaxations : sequence of Relaxation
-        Rows in which the tool may leave the path: only what is beyond them counts as an error.
+        Rows in which the tool may leave its path: only what is beyond them counts as an error.
     damping : DampingLaw, optional
         No requirement: how the motion was damped near singular poses, to tell where and what for.
     ending : str
         Why the motion ends before its path does, where it is known to; such a motion is never
         verified.
+    progress : callable, optional
+        Called with ``("checking", lot, lots)`` while a long motion is looked at.
 
     Returns
     -------
@@ -67,35 +77,43 @@ def certify(
     """
     _check_arguments(robot, path, trajectory)
     tolerance, task = Tolerance.of(tolerance), Task.of(task)
-    check_oriented(path, task)
+    follows = Follows.of(robot, path, task, also)
+    for item in follows.items:
+        check_oriented(item.path, item.task)
     trajectory = trajectory.of_joints(robot.joint_names)
     motion = FinishedMotion(robot, trajectory)
-    path_check = bound_errors(robot, path, task, trajectory, tolerance, relaxations)
-    position, rotation = path_check.position, path_check.rotation
-    singular = smallest_singular_values(robot, task, motion.q)
-    damped = () if damping is None else _damped_stretches(damping, motion.t, singular)
+    checks = [
+        bound_errors(robot, item, trajectory, tolerance, () if k else relaxations, progress)
+        for k, item in enumerate(follows.items)
+    ]
+    path_check = checks[0]
+    t = motion.t[:: -(-len(motion.t) // _MOST_POSES)] if damping is None else motion.t
+    singular = smallest_singular_values(follows, trajectory(t))
+    damped = () if damping is None else _damped_stretches(damping, t, singular)
     _check(requirements)
-    wanted = (*arm_limits(robot, requirements), *requirements)
+    feeds = tuple(FeedReached(item) for item in path.feeds)
+    wanted = (*arm_limits(robot, requirements), *requirements, *feeds)
     findings = tuple(_judged(item, motion) for item in wanted)
     return Certificate(
-        position,
-        rotation,
-        smallest_singular_value=_least(singular, motion.t, robot.tool),
+        path_check.position,
+        path_check.rotation,
+        smallest_singular_value=_least(singular, t, robot.tool),
         closure=float(np.abs(trajectory.q[-1] - trajectory.q[0]).max()),
-        samples=path_check.samples,
+        samples=sum(check.samples for check in checks),
         tolerance=tolerance,
         findings=findings,
         failures=(
             *_cut_short(ending, path, trajectory),
-            *_off_path(position, rotation, tolerance, damped),
-            *_undecided(path_check.undecided),
+            *(text for check in checks for text in _off_path(check, tolerance, damped)),
+            *(text for check in checks for text in _undecided(check)),
             *(item.text for item in findings if not item.kept),
         ),
         covers=tuple(dict.fromkeys(["path", *(what for item in wanted for what in item.covers)])),
         remarks=tuple(remark for item in wanted for remark in item.remarks),
         deviations=path_check.deviations,
         damped=damped,
-        notes=() if path_check.proved else (_MEASURED,),
+        notes=() if all(check.proved for check in checks) else (_MEASURED,),
+        others=tuple((check.position, check.rotation) for check in checks[1:]),
     )
 
 
@@ -158,15 +176,16 @@ def _least(values: Array, t: Array, name: str) -> Extreme:
     return Extreme(float(values[worst]), float(t[worst]), name)
 
 
-def _undecided(intervals: tuple[tuple[float, float], ...]) -> tuple[str, ...]:
+def _undecided(check: PathCheck) -> tuple[str, ...]:
+    intervals = check.undecided
     if not intervals:
         return ()
     first, last = intervals[0]
     more = len(intervals) - 1
     others = f", and on {more} other interval{'s' if more > 1 else ''}" if more else ""
     return (
-        f"whether the tool is on the path from t = {first:.6g} to {last:.6g} s is not "
-        f"decided{others}: the path or the motion is not smooth there",
+        f"whether '{check.position.name}' is on its path from t = {first:.6g} to {last:.6g} s is "
+        f"not decided{others}: the path or the motion is not smooth there",
     )
 
 
@@ -179,9 +198,9 @@ def _cut_short(ending: str, path: Path, trajectory: Trajectory) -> tuple[str, ..
 
 
 def _off_path(
-    position: Extreme, rotation: Extreme, tolerance: Tolerance, damped: tuple[DampedStretch, ...]
+    check: PathCheck, tolerance: Tolerance, damped: tuple[DampedStretch, ...]
 ) -> tuple[str, ...]:
-    failures = []
+    position, rotation, failures = check.position, check.rotation, []
     # Written so that NaN fails.
     if not position.value <= tolerance.position:
         failures.append(

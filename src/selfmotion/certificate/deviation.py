@@ -6,23 +6,22 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array
-from selfmotion.path import Path
-from selfmotion.robot import RobotModel
+from selfmotion.follow import BoundFollow, Follows
+from selfmotion.robot import WORLD, Chain
 from selfmotion.task import Relaxation, Task
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
-def deviation_from(
-    robot: RobotModel, path: Path, task: Task, t: Array, q: Array, in_tool_axes: bool
-) -> Array:
+def deviation_from(follow: BoundFollow, t: Array, q: Array, in_tool_axes: bool) -> Array:
     """Return how the tool deviates from the path, (K, 6).
 
     Rows x, y, z [m] and rx, ry, rz [rad] as `Relaxation` has them; zero where the task leaves them
     free.
     """
-    rotation, translation = poses(robot, q)
-    target = path.samples(t)
+    task = follow.task
+    rotation, translation = poses(follow.chain, q)
+    target = follow.path.samples(t)
     linear = task.rows[task.rows < 3]
     miss = np.zeros((len(t), 6))
     miss[:, linear] = (translation - target.translation)[:, linear]
@@ -32,31 +31,54 @@ def deviation_from(
     return miss
 
 
-def smallest_singular_values(robot: RobotModel, task: Task, q: Array) -> Array:
-    """Return the smallest singular value of the task Jacobian at q (K, n), (K,)."""
-    model, data, tool = robot.model, robot.model.createData(), robot.chain.tip
-    jacobian, rotation = np.empty((len(q), 6, robot.dof)), np.empty((len(q), 3, 3))
-    for k, configuration in enumerate(q):
-        pin.computeJointJacobians(model, data, configuration)
-        rotation[k] = pin.updateFramePlacement(model, data, tool).rotation
-        jacobian[k] = pin.getFrameJacobian(model, data, tool, _AXES).reshape(6, -1)
-    values = np.linalg.svd(task.select_along(jacobian, rotation), compute_uv=False)
+def smallest_singular_values(follows: Follows, q: Array) -> Array:
+    """Return the smallest singular value of all prescribed rows at q (K, n), (K,)."""
+    rows = []
+    for item in follows.items:
+        jacobian, rotation = _jacobians(item.chain, q)
+        rows.append(item.task.select_along(jacobian, rotation))
+    values = np.linalg.svd(np.concatenate(rows, axis=1), compute_uv=False)
     return values[:, -1].astype(np.float64)
 
 
-def poses(robot: RobotModel, q: Array) -> tuple[Array, Array]:
-    """Return rotations and translations of the tool at q (K, n).
+def _jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
+    """Return Jacobians (K, 6, n) of the tip and its orientations, in the base's axes."""
+    model, data, tip, base = chain.model, chain.model.createData(), chain.tip, chain.base
+    jacobian, rotation = np.empty((len(q), 6, model.nv)), np.empty((len(q), 3, 3))
+    for k, configuration in enumerate(q):
+        pin.computeJointJacobians(model, data, configuration)
+        pose = pin.updateFramePlacement(model, data, tip)
+        own = pin.getFrameJacobian(model, data, tip, _AXES).reshape(6, -1)
+        if base == WORLD:
+            jacobian[k], rotation[k] = own, pose.rotation
+            continue
+        frame = pin.updateFramePlacement(model, data, base)
+        other = pin.getFrameJacobian(model, data, base, _AXES).reshape(6, -1)
+        apart, turn = pose.translation - frame.translation, frame.rotation.T
+        moving = other[:3] + np.cross(other[3:].T, apart).T
+        jacobian[k, :3] = turn @ (own[:3] - moving)
+        jacobian[k, 3:] = turn @ (own[3:] - other[3:])
+        rotation[k] = turn @ pose.rotation
+    return jacobian, rotation
+
+
+def poses(chain: Chain, q: Array) -> tuple[Array, Array]:
+    """Return rotations and translations of a chain's tip in its base frame at q (K, n).
 
     By calls of its own: what checks a motion must not share a fault with what made it.
     """
-    model, data, tool = robot.model, robot.model.createData(), robot.chain.tip
+    model, data, tip, base = chain.model, chain.model.createData(), chain.tip, chain.base
     rotation, translation = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
-    pose = data.oMf[tool]
+    pose = data.oMf[tip]
     seen_rotation, seen_translation = pose.rotation, pose.translation
     for k, configuration in enumerate(q):
         pin.forwardKinematics(model, data, configuration)
-        pin.updateFramePlacement(model, data, tool)
+        pin.updateFramePlacement(model, data, tip)
         rotation[k], translation[k] = seen_rotation, seen_translation
+        if base != WORLD:
+            frame = pin.updateFramePlacement(model, data, base)
+            relative = frame.actInv(pose)
+            rotation[k], translation[k] = relative.rotation, relative.translation
     return rotation, translation
 
 

@@ -60,10 +60,17 @@ class JointLimits(Requirement):
     @property
     def covers(self) -> tuple[str, ...]:
         """See `Requirement.covers`."""
-        # Of the arm's makers nobody may have said.
-        if self.order > 1 and not np.all(np.isfinite(self.upper)):
+        limited = np.isfinite(self.upper) | np.isfinite(self.lower)
+        # Of the arm's makers nobody may have said; joints that turn for ever have no end.
+        if not (limited.all() if self.order else limited.any()):
             return ()
         return (("joint limits", "speeds", "accelerations", "jerks")[self.order],)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """See `Requirement.remarks`."""
+        count = int(np.sum(~(np.isfinite(self.upper) | np.isfinite(self.lower))))
+        return (f"{self.name}: {count} joints are not limited",) if count else ()
 
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: a margin (order 0), or the share of the limit that is used."""

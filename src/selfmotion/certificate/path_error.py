@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, series
+from selfmotion.basics import Array, ProblemError, Progress, series, silent
 from selfmotion.certificate.bounding import Bounded, Stretch, bounded
 from selfmotion.certificate.deviation import (
     deviation_from,
@@ -24,10 +24,11 @@ from selfmotion.certificate.deviation import (
     rotation_vectors,
 )
 from selfmotion.certificate.findings import Extreme, Tolerance
+from selfmotion.follow import BoundFollow
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path, path_series
 from selfmotion.robot import RobotModel
-from selfmotion.task import Relaxation, Task
+from selfmotion.task import Relaxation
 
 # Marks nearer to each other than this share of the duration are one.
 _SAME = 1e-12
@@ -66,18 +67,19 @@ class PathCheck:
 
 def bound_errors(
     robot: RobotModel,
-    path: Path,
-    task: Task,
+    follow: BoundFollow,
     trajectory: Trajectory,
     tolerance: Tolerance,
     relaxations: Sequence[Relaxation],
+    progress: Progress = silent,
 ) -> PathCheck:
-    """Bound the errors of a motion; parameters as in `certify`."""
+    """Bound the errors of a motion on one of its paths; parameters as in `certify`."""
+    path, tip = follow.path, follow.chain.tip_name
     _check_times(path, trajectory)
-    errors = _PathErrors(path, task, tolerance, relaxations)
-    found = bounded(errors, robot, trajectory, _edges(path, trajectory, relaxations))
+    errors = _PathErrors(follow, tolerance, relaxations)
+    found = bounded(errors, robot, trajectory, _edges(path, trajectory, relaxations), progress)
     values = errors.angles(found.values)
-    names = (robot.tool, robot.tool, *(item.name for item in relaxations))
+    names = (tip, tip, *(item.name for item in relaxations))
     extremes = tuple(
         Extreme(float(value), float(time), name)
         for value, time, name in zip(values, found.times, names, strict=True)
@@ -88,17 +90,13 @@ def bound_errors(
 
 
 def errors_between(
-    robot: RobotModel,
-    path: Path,
-    task: Task,
-    trajectory: Trajectory,
-    relaxations: Sequence[Relaxation],
+    follow: BoundFollow, trajectory: Trajectory, relaxations: Sequence[Relaxation]
 ) -> Array:
     """Return the errors in the middle between samples, (N, 2) [m, rad]: for planners, no proof."""
     t = 0.5 * (trajectory.t[:-1] + trajectory.t[1:])
     in_tool_axes = any(item.in_tool_axes for item in relaxations)
-    miss = deviation_from(robot, path, task, t, trajectory(t), in_tool_axes)
-    beyond = excess(relaxations, path.duration, t, miss)
+    miss = deviation_from(follow, t, trajectory(t), in_tool_axes)
+    beyond = excess(relaxations, follow.path.duration, t, miss)
     return np.stack([_length(beyond[:, :3]), _length(beyond[:, 3:])], axis=1)
 
 
@@ -132,9 +130,10 @@ class _PathErrors(Bounded):
     """
 
     def __init__(
-        self, path: Path, task: Task, tolerance: Tolerance, relaxations: Sequence[Relaxation]
+        self, follow: BoundFollow, tolerance: Tolerance, relaxations: Sequence[Relaxation]
     ) -> None:
-        self._path, self._task, self._relaxations = path, task, relaxations
+        self._chain, self._relaxations = follow.chain, relaxations
+        self._path, self._task = follow.path, follow.task
         self._as_vectors = any(item.angular for item in relaxations)
         self._in_tool_axes = any(item.in_tool_axes for item in relaxations)
         self.blocks = np.array([0, 3])
@@ -156,9 +155,9 @@ class _PathErrors(Bounded):
         path = path_series(self._path, stretch.middle, stretch.half)
         if path is None:
             return None
-        chain, tip = stretch.chain(), stretch.robot.chain.tip
-        apart = chain.place(tip) + path.translation
-        turned = series.product(path.rotation, chain.orientation(tip))
+        place, turn = stretch.chain().relative(self._chain)
+        apart = place + path.translation
+        turned = series.product(path.rotation, turn)
         if self._in_tool_axes or self._as_vectors:
             miss, relative = self._looked_at(stretch, np.zeros(1))
             apart[0] = _length(miss[:, 0]) + series.after_first(apart)
@@ -204,7 +203,7 @@ class _PathErrors(Bounded):
     def _looked_at(self, stretch: Stretch, u: Array) -> tuple[Array, Array]:
         """Return the position's deviation (I, P, 3) and R_dᵀR (I, P, 3, 3) at places u (P,)."""
         target = self._path.samples(stretch.times(u).ravel())
-        rotation, translation = poses(stretch.robot, stretch.motion(u))
+        rotation, translation = poses(self._chain, stretch.motion(u))
         rows = self._task.rows[self._task.rows < 3]
         miss = np.zeros((len(translation), 3))
         miss[:, rows] = (translation - target.translation)[:, rows]

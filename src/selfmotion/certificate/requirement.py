@@ -14,6 +14,8 @@ from selfmotion.robot import RobotModel
 
 # Points per interval of the trajectory's samples: odd, so that none but the samples are symmetric.
 _REFINEMENT = 5
+# Of more samples than this, nothing is put between.
+_MANY = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +34,10 @@ class FinishedMotion:
 
     @cached_property
     def t(self) -> Array:
-        """Times [s] on a grid finer than the trajectory's samples, (K,)."""
+        """Times [s] on a grid finer than the trajectory's samples, unless these are many, (K,)."""
         samples = self.trajectory.t
-        fractions = np.arange(_REFINEMENT) / _REFINEMENT
+        refinement = _REFINEMENT if len(samples) <= _MANY else 1
+        fractions = np.arange(refinement) / refinement
         inner = samples[:-1, None] + np.diff(samples)[:, None] * fractions
         return np.append(inner.ravel(), samples[-1])
 

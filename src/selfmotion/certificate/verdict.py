@@ -12,7 +12,7 @@ _EXPECTED = ("path", "joint limits", "speeds", "accelerations", "self-collision"
 
 @dataclass(frozen=True)
 class Certificate:
-    """What forward kinematics says about a finished motion, on a grid finer than its samples.
+    """What forward kinematics says about a finished motion, at all times.
 
     Attributes
     ----------
@@ -44,6 +44,8 @@ class Certificate:
         Where the inverse was damped, in order of time.
     notes : tuple of str
         What a reader should know, though it speaks neither for nor against the motion.
+    others : tuple of (Extreme, Extreme)
+        Errors of position and rotation of what else follows a path, as those of the tool.
     """
 
     position_error: Extreme
@@ -59,6 +61,7 @@ class Certificate:
     deviations: tuple[Extreme, ...] = ()
     damped: tuple[DampedStretch, ...] = ()
     notes: tuple[str, ...] = ()
+    others: tuple[tuple[Extreme, Extreme], ...] = ()
 
     @property
     def limit_margin(self) -> Extreme:
@@ -88,9 +91,12 @@ class Certificate:
     @property
     def on_path(self) -> bool:
         """Whether the tool follows the path within the tolerance, beyond what is relaxed."""
+        allowed = self.tolerance
         # Written so that NaN fails.
-        position = self.position_error.value <= self.tolerance.position
-        return position and self.rotation_error.value <= self.tolerance.rotation
+        return all(
+            position.value <= allowed.position and rotation.value <= allowed.rotation
+            for position, rotation in ((self.position_error, self.rotation_error), *self.others)
+        )
 
     def __repr__(self) -> str:
         return f"Certificate({self.verdict})"
@@ -109,9 +115,17 @@ class Certificate:
                 f"verified at all times ({', '.join(self.covers)}): at most "
                 f"{self.position_error.value:.1e} m and {self.rotation_error.value:.1e} rad off "
                 f"the path{', beyond what is relaxed' if self.deviations else ''}"
+                f"{self._others_text}"
                 f"{self._damping_text}{left_out}{''.join(f'; {note}' for note in self.notes)}"
             )
         return "; ".join(("not verified: " + "; ".join(self.failures), *self.notes))
+
+    @property
+    def _others_text(self) -> str:
+        return "".join(
+            f", '{position.name}' {position.value:.1e} m and {rotation.value:.1e} rad off its own"
+            for position, rotation in self.others
+        )
 
     @property
     def _damping_text(self) -> str:

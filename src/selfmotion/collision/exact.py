@@ -15,7 +15,7 @@ from selfmotion.collision.found import Closest, Overlap
 from selfmotion.collision.meshes import MeshDistances
 from selfmotion.collision.obstacles import Obstacle
 from selfmotion.collision.overlaps import SAMPLES, count_overlaps, links_of
-from selfmotion.collision.pairs import candidate_pairs
+from selfmotion.collision.pairs import are_neighbours, candidate_pairs, held_pairs
 from selfmotion.robot import RobotModel
 
 # The share of sampled configurations from which on an overlap of links is worth telling.
@@ -62,8 +62,8 @@ class CollisionModel:
 
     Notes
     -----
-    Links joined by a movable joint are not checked against each other. Without collision geometry
-    in the URDF (`has_bodies` is False) there is no pair at all.
+    The two links that a movable joint joins are not checked against each other. Without collision
+    geometry in the URDF (`has_bodies` is False) there is no pair at all.
 
     Boxes around the hulls, then the hulls (GJK) bound the distances of the meshes from below, so
     the meshes are visited only for the few pairs that may hold the minimum.
@@ -75,15 +75,16 @@ class CollisionModel:
         obstacles: Sequence[Obstacle] = (),
         disabled: Sequence[tuple[str, str]] = (),
     ) -> None:
-        self.robot, self.obstacles = robot, tuple(obstacles)
+        self.robot, self.obstacles, self._disabled = robot, tuple(obstacles), tuple(disabled)
         links = links_of(robot)
         self.has_bodies = len(links.bodies) > 0
         self._bodies = (*links.bodies, *obstacle_bodies(self.obstacles, robot.urdf.links))
         self.bodies = tuple(body.name for body in self._bodies)
         pairs: list[tuple[int, int]] = []
         often: dict[tuple[str, str, bool], int] = {}
-        as_made = {frozenset(pair) for pair in robot.touching}
         candidates = candidate_pairs(self._bodies, robot.urdf, disabled)
+        as_made = {frozenset(pair) for pair in robot.touching}
+        as_made |= self._touching_neighbours(links.counts)
         for first, second in candidates:
             met, _ = links.counts.get((first, second), (0, 0))
             names = self.bodies[first], self.bodies[second]
@@ -107,12 +108,46 @@ class CollisionModel:
         solids = [body.solid for body in self._bodies]
         self._meshes = MeshDistances(solids, self.bodies, self._index)
 
+    def _touching_neighbours(
+        self, counts: dict[tuple[int, int], tuple[int, int]]
+    ) -> set[frozenset[str]]:
+        """Return the links next to a joint of which some pieces always overlap: as made."""
+        always = {
+            (self.bodies[i], self.bodies[j])
+            for (i, j), (met, _) in counts.items()
+            if met == SAMPLES
+        }
+        urdf = self.robot.urdf
+        return {frozenset(pair) for pair in always if are_neighbours(*pair, urdf)}
+
+    @cached_property
+    def stuck(self) -> Closest | None:
+        """The links that held joints put deepest into each other, if there are any."""
+        pairs = held_pairs(self._bodies, self.robot.urdf, self.robot.locked, self._disabled)
+        if not pairs:
+            return None
+        index = np.array(pairs, dtype=np.int64)
+        hulls = HullDistances(self.robot, self._bodies, index)
+        solids = [body.solid for body in self._bodies]
+        meshes = MeshDistances(solids, self.bodies, index)
+        q = np.zeros(self.robot.dof)
+        places, bounds = hulls.place(q), hulls.lower_bounds(q[None])[0]
+        worst = _NO_PAIR
+        for pair in np.flatnonzero(bounds < 0.0).tolist():
+            value = meshes.refine(places, pair, hulls.distance(pair, bounds[pair]))
+            if value < min(worst.value, 0.0):
+                worst = Closest(value, self.bodies[pairs[pair][0]], self.bodies[pairs[pair][1]])
+        return worst if worst.first else None
+
     @property
     def checks_links(self) -> bool:
-        """Whether some pair of links is checked, unless there is none that can meet."""
-        left_out = self.disabled or any(not pair.is_checked for pair in self.overlapping)
-        checked = any(not self._bodies[second].is_obstacle for _, second in self._index)
-        return checked or not left_out
+        """Whether some pair of links is checked."""
+        return any(not self._bodies[second].is_obstacle for _, second in self._index)
+
+    @property
+    def checks_obstacles(self) -> bool:
+        """Whether some link is checked against an obstacle."""
+        return any(self._bodies[second].is_obstacle for _, second in self._index)
 
     @cached_property
     def open_meshes(self) -> tuple[str, ...]:
@@ -131,7 +166,7 @@ class CollisionModel:
     @cached_property
     def moved(self) -> npt.NDArray[np.bool_]:
         """Which bodies each joint moves, (B, n): those on its link and on all beyond."""
-        return levers.moved_by(self._bodies, self.robot.dof)
+        return levers.moved_by(self._bodies, self.robot)
 
     @cached_property
     def lever_arms(self) -> Array:

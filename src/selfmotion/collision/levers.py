@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array
 from selfmotion.collision.bodies import Body
@@ -18,28 +17,30 @@ def axis_distances(robot: RobotModel, bodies: Sequence[Body]) -> Array:
 
     They hold at all configurations within the joint limits. Of a body and an axis that one joint
     parts, it is the largest distance of the body's outline from the axis. Beyond, the distances
-    from one joint's origin to the next add to it, and the travel of prismatic joints between
-    them. Bodies on either side of the joint are measured; those beyond it are moved by it, the
-    others stand still.
+    from one joint's origin to the next on the way through the tree add to it, and the travel of
+    prismatic joints between them. Bodies on either side of the joint are measured; those beyond it
+    are moved by it, the others stand still.
 
     For a prismatic joint it is 1 [m/m]: there every point moves as far as the joint.
     """
-    chain = _Chain(robot)
+    tree = _Tree(robot)
     distances = np.ones((len(bodies), robot.dof))
     for b, body in enumerate(bodies):
         points, radius = body.solid.outline
         points = points @ body.place.rotation.T + body.place.translation
         for joint in range(1, robot.dof + 1):
-            if chain.is_revolute[joint]:
-                beyond = chain.outwards if joint <= body.joint else chain.inwards
-                distances[b, joint - 1] = beyond(points, body.joint, joint) + radius
+            if tree.is_revolute[joint]:
+                distances[b, joint - 1] = tree.distance(points, body.joint, joint) + radius
     return distances
 
 
-def moved_by(bodies: Sequence[Body], dof: int) -> npt.NDArray[np.bool_]:
-    """Return which bodies each joint moves, (B, n): all that it or a later one carries."""
-    carriers = np.array([body.joint for body in bodies], dtype=np.int64).reshape(-1, 1)
-    return np.asarray(carriers > np.arange(dof))
+def moved_by(bodies: Sequence[Body], robot: RobotModel) -> npt.NDArray[np.bool_]:
+    """Return which bodies each joint moves, (B, n): all that it carries, however far off."""
+    tree = _Tree(robot)
+    found = np.zeros((len(bodies), robot.dof), dtype=bool)
+    for b, body in enumerate(bodies):
+        found[b, [joint - 1 for joint in tree.supports(body.joint)]] = True
+    return found
 
 
 def pair_levers(distances: Array, moved: npt.NDArray[np.bool_], pairs: Ints) -> Array:
@@ -70,41 +71,60 @@ def _travel(robot: RobotModel) -> Array:
     return np.where(is_turned(robot), 0.0, np.maximum(np.abs(lower), np.abs(upper)))
 
 
-class _Chain:
-    """The joints of an arm, one after the other; index 0 is the world, as in Pinocchio."""
+class _Tree:
+    """The joints of an arm and their places; index 0 is the world, as in Pinocchio."""
 
     def __init__(self, robot: RobotModel) -> None:
-        model = robot.model
-        self._places = [pin.SE3(place) for place in model.jointPlacements]
-        axes, is_revolute = robot.tree.axes, robot.tree.is_revolute
-        self.is_revolute = [False, *is_revolute.tolist()]
-        self._axes = [np.zeros(3), *axes]
+        tree = robot.tree
+        self._parents = [0, *tree.parents.tolist()]
+        self._places = [np.zeros(3), *tree.positions]
+        self._turns = [np.eye(3), *tree.rotations]
+        self.is_revolute = [False, *tree.is_revolute.tolist()]
+        self._axes = [np.zeros(3), *tree.axes]
         self._travel = [0.0, *_travel(robot).tolist()]
 
-    def outwards(self, points: Array, carrier: int, joint: int) -> float:
-        """Return how far points (V, 3) of a body that the joint moves are from its axis at most."""
-        if carrier == joint:
-            return _from_line(points, np.zeros(3), self._axes[joint])
-        reach = _farthest(points) + sum(self._travel[joint + 1 : carrier + 1])
-        reach += sum(
-            float(np.linalg.norm(self._places[k].translation))
-            for k in range(joint + 2, carrier + 1)
-        )
-        following = self._places[joint + 1].translation
-        return float(reach + _from_line(following[None], np.zeros(3), self._axes[joint]))
+    def supports(self, joint: int) -> list[int]:
+        """Return the joints from the world to a joint, the world left out."""
+        found = []
+        while joint:
+            found.append(joint)
+            joint = self._parents[joint]
+        return found[::-1]
 
-    def inwards(self, points: Array, carrier: int, joint: int) -> float:
-        """Return how far points (V, 3) of a body before the joint are from its axis at most."""
-        place = self._places[joint]
-        axis = place.rotation @ self._axes[joint]
-        if carrier == joint - 1:
-            return _from_line(points, place.translation, axis)
-        reach = _farthest(points - self._places[carrier + 1].translation)
-        reach += sum(
-            float(np.linalg.norm(self._places[k].translation)) for k in range(carrier + 2, joint)
+    def distance(self, points: Array, carrier: int, joint: int) -> float:
+        """Return how far points (V, 3) of a body are from a joint's axis at most [m]."""
+        way = self.supports(carrier)
+        if joint in way:
+            down = way[way.index(joint) + 1 :]
+            return self._beyond(points, down, np.zeros(3), self._axes[joint])
+        origin, axis = self._places[joint], self._turns[joint] @ self._axes[joint]
+        up = self.supports(self._parents[joint])
+        shared = sum(1 for a, b in zip(way, up, strict=False) if a == b)
+        up, down = up[shared:], way[shared:]
+        if not up:
+            return self._beyond(points, down, origin, axis)
+        # From the axis to the origin of the frame it is in, and from there on.
+        first = self._places[up[0]]
+        apart = (
+            _farthest(self._places[down[0]][None] - first) if down else _farthest(points - first)
         )
-        reach += sum(self._travel[carrier + 1 : joint])
-        return float(reach + _from_line(np.zeros((1, 3)), place.translation, axis))
+        rest = [*up[1:], *down[1:]]
+        reach = apart + self._lengths(rest) + self._far([*up, *down])
+        reach += _farthest(points) if down else 0.0
+        return float(reach + _from_line(np.zeros((1, 3)), origin, axis))
+
+    def _beyond(self, points: Array, down: list[int], origin: Array, axis: Array) -> float:
+        """Return the same where only the joints `down` are between the axis' frame and the body."""
+        if not down:
+            return _from_line(points, origin, axis)
+        reach = _farthest(points) + self._lengths(down[1:]) + self._far(down)
+        return float(reach + _from_line(self._places[down[0]][None], origin, axis))
+
+    def _lengths(self, joints: list[int]) -> float:
+        return sum(float(np.linalg.norm(self._places[joint])) for joint in joints)
+
+    def _far(self, joints: list[int]) -> float:
+        return float(sum(self._travel[joint] for joint in joints))
 
 
 def _farthest(points: Array) -> float:

@@ -14,6 +14,8 @@ import pinocchio as pin
 from selfmotion.basics import Array, CollisionError, as_number, as_numbers, read_only, shown
 from selfmotion.task import as_pose
 
+# An obstacle so large, or so far away [m], may be one in millimetres.
+_HUGE = 100.0
 # Shape → class, filled as the classes are made.
 _shapes: dict[str, type["Obstacle"]] = {}
 
@@ -74,6 +76,17 @@ class Obstacle(ABC):
     def label(self) -> str:
         """Shape and name, as messages say it."""
         return f"{self.shape} '{self.name}'"
+
+    @property
+    def hint(self) -> str:
+        """What looks like a slip of units, in words; "" where nothing does."""
+        geometry = self.geometry()
+        geometry.computeLocalAABB()
+        size = 2.0 * float(geometry.aabb_radius)
+        far = float(np.linalg.norm(self.pose.act(np.array(geometry.aabb_center))))
+        if max(size, far) < _HUGE:
+            return ""
+        return f"{self.label} is {size:.3g} m large and {far:.3g} m away: millimetres?"
 
     @abstractmethod
     def geometry(self) -> Any:

@@ -2,13 +2,13 @@
 
 import itertools
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
 from selfmotion.basics import CollisionError
 from selfmotion.collision.bodies import Body
-from selfmotion.robot import Urdf
+from selfmotion.robot import Urdf, UrdfJoint
 
 
 def candidate_pairs(
@@ -17,15 +17,16 @@ def candidate_pairs(
     """Return the index pairs of `bodies` that can meet and are not meant to.
 
     Left out are pairs whose distance no joint changes (so also the robot's base against the
-    world: an arm bolted to a table touches it), links that a movable joint joins, where links
-    joined by fixed joints count as one, and pairs of links that are `disabled`.
+    world: an arm bolted to a table touches it; see `held_pairs`), the two links that a movable
+    joint joins, and pairs of links that are `disabled`. What is fixed to joined links, a tool to
+    the one and a bracket to the other, can meet.
 
     Raises
     ------
     CollisionError
         A link that is disabled is not the arm's.
     """
-    joined, left_out = _joined_links(urdf), set()
+    left_out = {frozenset((x.parent, x.child)) for x in _movable(urdf)}
     for pair in disabled:
         for link in pair:
             if link not in urdf.links:
@@ -35,7 +36,6 @@ def candidate_pairs(
                     f"the URDF has no link '{link}'" + (f"; it has {near}" if near else "")
                 )
         left_out.add(frozenset(pair))
-    part = _rigid_parts(urdf)
 
     def can_meet(first: Body, second: Body) -> bool:
         if first.joint == second.joint:
@@ -43,16 +43,58 @@ def candidate_pairs(
         if first.is_obstacle or second.is_obstacle:
             return True
         # A pair that is left out is that of two links alone, not of all that is fixed to them.
-        named = frozenset((first.name, second.name))
-        return (
-            named not in left_out and frozenset((part[first.name], part[second.name])) not in joined
-        )
+        return frozenset((first.name, second.name)) not in left_out
 
     return [
         (i, j)
         for i, j in itertools.combinations(range(len(bodies)), 2)
         if can_meet(bodies[i], bodies[j])
     ]
+
+
+def held_pairs(
+    bodies: Sequence[Body],
+    urdf: Urdf,
+    locked: Mapping[str, float],
+    disabled: Iterable[tuple[str, str]] = (),
+) -> list[tuple[int, int]]:
+    """Return the index pairs of `bodies` that joints, held elsewhere than at 0, put where they are.
+
+    No joint changes their distance any more; links that such a joint joins are left out.
+    """
+    up = {joint.child: joint for joint in urdf.joints.values()}
+    left_out = {frozenset(pair) for pair in disabled}
+
+    def held(link: str) -> dict[str, str]:
+        """Return the joints from the root to a link that were put somewhere, with their ends."""
+        found = {}
+        while link in up:
+            joint = up[link]
+            if locked.get(joint.name, 0.0) != 0.0:
+                found[joint.name] = joint.child
+            link = joint.parent
+        return found
+
+    joined = {frozenset((joint.parent, joint.child)) for joint in _movable(urdf)}
+    above = {body.name: held(body.name) for body in bodies}
+    return [
+        (i, j)
+        for i, j in itertools.combinations(range(len(bodies)), 2)
+        if bodies[i].joint == bodies[j].joint
+        and above[bodies[i].name].keys() ^ above[bodies[j].name].keys()
+        and frozenset((bodies[i].name, bodies[j].name)) not in joined | left_out
+    ]
+
+
+def are_neighbours(first: str, second: str, urdf: Urdf) -> bool:
+    """Return whether a movable joint joins two links, or what is fixed to them."""
+    part = _rigid_parts(urdf)
+    parts = frozenset((part[first], part[second]))
+    return any(frozenset((part[x.parent], part[x.child])) == parts for x in _movable(urdf))
+
+
+def _movable(urdf: Urdf) -> Iterator[UrdfJoint]:
+    return (joint for joint in urdf.joints.values() if joint.kind != "fixed")
 
 
 def _rigid_parts(urdf: Urdf) -> dict[str, str]:
@@ -65,15 +107,6 @@ def _rigid_parts(urdf: Urdf) -> dict[str, str]:
         return link
 
     return {link: first(link) for link in urdf.links}
-
-
-def _joined_links(urdf: Urdf) -> set[frozenset[str]]:
-    part = _rigid_parts(urdf)
-    return {
-        frozenset((part[joint.parent], part[joint.child]))
-        for joint in urdf.joints.values()
-        if joint.kind != "fixed"
-    }
 
 
 def disabled_links(srdf: str | Path) -> tuple[tuple[str, str], ...]:

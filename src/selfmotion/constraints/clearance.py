@@ -144,6 +144,11 @@ class _Models:
                 f"{robot.name}: a clearance is asked for, but its URDF has no collision geometry "
                 f"to measure from; add <collision> to its links, or leave the clearance out"
             )
+        if wanted.obstacles and not self.exact.checks_obstacles:
+            raise ProblemError(
+                f"{robot.name}: a clearance from obstacles is asked for, but no link that moves "
+                f"has collision geometry; add <collision> to those, or leave the obstacles out"
+            )
 
     @cached_property
     def smooth(self) -> ClearanceModel:

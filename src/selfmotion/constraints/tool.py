@@ -67,7 +67,7 @@ class ToolLimits(Constraint):
 
     def quantity(self, robot: RobotModel) -> Quantity:
         """See `Constraint.quantity`."""
-        rates, tool = ToolRates(robot), robot.tool
+        rates, tool = ToolRates(robot.chain), robot.tool
         limited = np.isfinite(self.limit)
 
         def values(q: Array, qd: Array, qdd: Array) -> Array:

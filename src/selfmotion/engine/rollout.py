@@ -8,7 +8,6 @@ from selfmotion.costs import Samples, TipSamples
 from selfmotion.follow import Follows
 from selfmotion.motion import Grid
 from selfmotion.path import PathSamples
-from selfmotion.robot import march
 from selfmotion.task import DampingLaw, feedback_rate
 
 # A tool this near to the path [m, rad] is on it; Newton's method needs few steps to that.
@@ -93,9 +92,9 @@ class Rollout:
 
         `q` (S, n) is the table's own: each stage writes that of the next.
         """
-        return march(
-            self._kinematics, q, kernels.advance, table, self.follows.layout, gain, self._law
-        )
+        first, *others = self._kinematics
+        given = table, self.follows.layout, gain, self._law
+        return first.march(q, kernels.advance, *given, beside=others)
 
     def polished(self) -> tuple[Array, Array, Array]:
         """Return the nodes of the last run, put exactly onto the path; the run stays as it is.

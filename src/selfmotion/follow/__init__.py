@@ -1,4 +1,4 @@
 """What the arm follows: chains, their paths, and the rows of them that are prescribed."""
 
-from selfmotion.follow.follow import Follow as Follow
+from selfmotion.follow.follow import BoundFollow as BoundFollow, Follow as Follow
 from selfmotion.follow.follows import Follows as Follows

@@ -1,17 +1,83 @@
-"""A chain's tip that follows a path, in the rows that are prescribed."""
+"""A tip that follows a path, in the rows that are prescribed: as asked for, and on an arm."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
+import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array
-from selfmotion.path import Path, PathSamples
-from selfmotion.robot import Chain
-from selfmotion.task import Task
+from selfmotion.basics import Array, ProblemError, shown
+from selfmotion.path import Dwell, Path, PathSamples
+from selfmotion.robot import Chain, RobotModel
+from selfmotion.task import Task, as_pose
 
 
 @dataclass(frozen=True, eq=False)
 class Follow:
+    """A frame of the arm follows a path, in the rows of a task.
+
+    Parameters
+    ----------
+    path : Path, SE3 or (4, 4)
+        The motion of the tool in the frame of the reference; a pose is held all the time.
+    task : Task or str
+        The rows of it that are prescribed; ``"pose"`` by default.
+    tool : str, optional
+        The link that follows; by default the arm's tool.
+    reference : str, optional
+        The link in whose frame the path is given; by default the arm's reference where the tool is
+        its own, else the world.
+
+    Examples
+    --------
+    Two hands that hold one bar: ``Follow(grasp, tool="right/hand", reference="left/hand")``.
+    """
+
+    path: Path | pin.SE3 | npt.ArrayLike
+    task: Task | str = Task.POSE
+    tool: str | None = None
+    reference: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "task", Task.of(self.task))
+        if not isinstance(self.path, Path):
+            object.__setattr__(self, "path", as_pose(self.path, "follow: the path"))
+        for name in ("tool", "reference"):
+            given = getattr(self, name)
+            if not isinstance(given, str | None):
+                raise ProblemError(f"follow: {name} is {shown(given)}, expected the name of a link")
+
+    def on(self, robot: RobotModel, duration: float) -> "BoundFollow":
+        """Return the same of an arm, for so many seconds.
+
+        Raises
+        ------
+        RobotError
+            There is no such link.
+        ProblemError
+            The path lasts longer or shorter.
+        """
+        path: Any = self.path
+        if not isinstance(path, Path):
+            path = Dwell(path, duration)
+        if abs(path.duration - duration) > 1e-9 * duration:
+            raise ProblemError(
+                f"{robot.name}: the path of '{self.tool or robot.tool}' lasts {path.duration:.6g} "
+                f"s, expected {duration:.6g} s as that of '{robot.tool}'"
+            )
+        reference = self.reference
+        if self.tool is None and reference is None:
+            reference = robot.reference
+        chain = robot.chain_to(self.tool or robot.tool, reference)
+        return BoundFollow(chain, path, Task.of(self.task))
+
+    def along(self, path: Path) -> "Follow":
+        """Return the same on another path."""
+        return replace(self, path=path)
+
+
+@dataclass(frozen=True, eq=False)
+class BoundFollow:
     """The tip of a chain on a path, in the rows of a task.
 
     Poses, twists and errors are those of the tip in the chain's base frame, in its axes.

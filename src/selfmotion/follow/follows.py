@@ -1,5 +1,6 @@
 """All that an arm follows at once: rows of several tips, stacked."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -7,9 +8,9 @@ from typing import Self
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
-from selfmotion.follow.follow import Follow
+from selfmotion.basics.layout import Layout, layout_of
+from selfmotion.follow.follow import BoundFollow, Follow
 from selfmotion.follow.kinematics import TipKinematics
-from selfmotion.kernels import Layout, layout_of
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel, null_space
 from selfmotion.task import Task
@@ -22,17 +23,20 @@ class Follows:
     Attributes
     ----------
     robot : RobotModel
-    items : tuple of Follow
+    items : tuple of BoundFollow
         Each a tip on its path; their rows are stacked in this order. They last equally long.
     """
 
     robot: RobotModel
-    items: tuple[Follow, ...]
+    items: tuple[BoundFollow, ...]
 
     @classmethod
-    def of(cls, robot: RobotModel, path: Path, task: Task | str) -> Self:
-        """Return that an arm's tool follows a path."""
-        return cls(robot, (Follow(robot.chain, path, Task.of(task)),))
+    def of(
+        cls, robot: RobotModel, path: Path, task: Task | str, also: Sequence[Follow] = ()
+    ) -> Self:
+        """Return that an arm's tool follows a path, and other frames theirs."""
+        first = BoundFollow(robot.chain, path, Task.of(task))
+        return cls(robot, (first, *(item.on(robot, path.duration) for item in also)))
 
     @property
     def dimension(self) -> int:
@@ -45,7 +49,7 @@ class Follows:
         return self.items[0].path.duration
 
     @property
-    def only(self) -> Follow:
+    def only(self) -> BoundFollow:
         """The one tip that is followed.
 
         Raises

@@ -41,9 +41,6 @@ from selfmotion.kernels.table import (
     view as view,
 )
 from selfmotion.kernels.tool import (
-    KIND as KIND,
-    Layout as Layout,
-    layout_of as layout_of,
     pose_error as pose_error,
     rows_of as rows_of,
     select as select,

@@ -3,19 +3,12 @@
 from typing import NamedTuple
 
 from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics.layout import KIND, NO_ANGLE, POINTING, Layout
 from selfmotion.kernels.algebra import add_angular, angular, angular_part, cross, plus, respond
 from selfmotion.kernels.contraction import contract
 from selfmotion.kernels.damping import Law, damping_slope, pull_damping
 from selfmotion.kernels.table import Stage, Tip, stage_of, tip_of, view
-from selfmotion.kernels.tool import (
-    KIND,
-    NO_ANGLE,
-    POINTING,
-    Layout,
-    pull_error,
-    rows_of,
-    unselect,
-)
+from selfmotion.kernels.tool import pull_error, rows_of, unselect
 
 
 class Space(NamedTuple):

@@ -8,6 +8,7 @@ Column k of J6 is [v_k; ω_k]. On a chain, with ω = 0 for prismatic joints,
 import numpy as np
 
 from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics.layout import KIND, ORDER, POINTING, Layout
 from selfmotion.kernels.algebra import (
     add_angular,
     angular,
@@ -17,7 +18,7 @@ from selfmotion.kernels.algebra import (
     linear,
     plus,
 )
-from selfmotion.kernels.tool import KIND, ORDER, POINTING, Layout, unselect
+from selfmotion.kernels.tool import unselect
 
 
 @inlined

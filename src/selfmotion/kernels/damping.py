@@ -5,6 +5,7 @@ from math import isfinite
 import numpy as np
 
 from selfmotion.basics import Array, inlined
+from selfmotion.basics.layout import KIND, POINTING, Layout
 from selfmotion.kernels.algebra import (
     add_angular,
     angular,
@@ -15,7 +16,7 @@ from selfmotion.kernels.algebra import (
     smallest_eigenvector,
 )
 from selfmotion.kernels.table import Stage, Tip, stage_of, tip_of, view
-from selfmotion.kernels.tool import KIND, POINTING, Layout, rows_of, unselect
+from selfmotion.kernels.tool import rows_of, unselect
 
 # The threshold σ0 and the strength λ0 [m, rad].
 Law = tuple[float, float]

@@ -3,6 +3,7 @@
 from math import isfinite
 
 from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics.layout import KIND, Layout
 from selfmotion.kernels.algebra import (
     add_scaled,
     angular,
@@ -15,7 +16,7 @@ from selfmotion.kernels.algebra import (
 )
 from selfmotion.kernels.damping import Law, damp
 from selfmotion.kernels.table import Tip, q_of, qd_of, stage_of, tip_of
-from selfmotion.kernels.tool import KIND, Layout, pose_error, rows_of, select, task_rows
+from selfmotion.kernels.tool import pose_error, rows_of, select, task_rows
 
 
 @kernel

@@ -3,9 +3,10 @@
 import numpy as np
 
 from selfmotion.basics import Array, kernel
+from selfmotion.basics.layout import KIND, Layout
 from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
 from selfmotion.kernels.table import view
-from selfmotion.kernels.tool import KIND, Layout, pose_error, rows_of, select, task_rows
+from selfmotion.kernels.tool import pose_error, rows_of, select, task_rows
 
 
 @kernel

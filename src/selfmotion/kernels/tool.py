@@ -1,16 +1,17 @@
-"""Tips, compiled: their pose errors and the rows of their tasks, both ways.
+"""Tips, compiled: their pose errors and the rows of their tasks, both ways."""
 
-A layout (F, 9 + n) tells of each of F tips that are followed how its angles are measured, its first
-row among all, how many it has, these rows of [v, ω], and the joints in the order of its chain.
-"""
-
-from collections.abc import Sequence
 from math import atan2, sqrt, tan
 
-import numpy as np
-import numpy.typing as npt
-
-from selfmotion.basics import Array, Ints, inlined
+from selfmotion.basics import Array, inlined
+from selfmotion.basics.layout import (
+    COUNT,
+    FIRST,
+    KIND,
+    LOGARITHM,
+    POINTING,
+    ROWS,
+    Layout,
+)
 from selfmotion.kernels.algebra import (
     Vector,
     add_angular,
@@ -22,37 +23,8 @@ from selfmotion.kernels.algebra import (
     plus,
 )
 
-Layout = npt.NDArray[np.int64]
-
-# How a task measures its angular error.
-NO_ANGLE, LOGARITHM, POINTING = 0, 1, 2
-
 # Below this angle the closed forms in sin θ lose digits and their series serve: to 1e-15 there.
 _SMALL = 0.05
-
-
-# Columns of a layout.
-KIND, FIRST, COUNT, ROWS, ORDER = 0, 1, 2, 3, 9
-
-
-def layout_of(tasks: Sequence[tuple[Ints, bool, Ints]], dof: int) -> Layout:
-    """Return the layout of tips with rows of [v, ω], axes of the tool, and joints of a chain."""
-    layout = np.zeros((len(tasks), ORDER + dof), dtype=np.int64)
-    first = 0
-    for line, (rows, tool_axes, joints) in zip(layout, tasks, strict=True):
-        line[KIND] = _angle_kind(rows, tool_axes)
-        line[FIRST], line[COUNT] = first, len(rows)
-        line[ROWS : ROWS + len(rows)] = rows
-        # Joints off the chain have columns of zeros, wherever they stand.
-        line[ORDER:] = [*joints, *np.setdiff1d(np.arange(dof), joints)]
-        first += len(rows)
-    return layout
-
-
-def _angle_kind(rows: Ints, tool_axes: bool) -> int:
-    if tool_axes:
-        return POINTING
-    return LOGARITHM if np.any(rows >= 3) else NO_ANGLE
 
 
 @inlined

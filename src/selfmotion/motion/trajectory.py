@@ -1,6 +1,6 @@
 """A joint motion over time."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +30,8 @@ from selfmotion.motion.polynomials import (
 
 # A last sample as near to its end as this [s] is at its end.
 _MOMENT = 0.5e-9
+# Intervals that are looked at together.
+_LOT = 16_384
 # More samples than this do not fit into memory, and no controller wants them.
 _MOST_SAMPLES = 1e7
 
@@ -177,23 +179,29 @@ class Trajectory:
         t, values : (2, n)
             When, and what: the least in the first row, the largest in the second.
         """
-        pieces = self._pieces(order)
-        ends = np.stack([pieces[0], pieces.sum(axis=0)])
-        least, largest = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
-        steps, n = np.diff(self.t), len(self.joint_names)
-        # Only where the polynomials may go beyond all their ends, they are looked at inside.
-        some, joints = np.nonzero(may_pass(pieces, least, largest))
-        chosen = pieces[:, some, joints]
-        roots = inner_roots(differentiated(chosen))
-        inner = evaluated(chosen, roots)
-        t, values = np.empty((2, n)), np.empty((2, n))
-        for joint in range(n):
-            here = joints == joint
-            when = [self.t[:-1], self.t[1:], (self.t[some] + steps[some] * roots)[:, here].ravel()]
-            each = [ends[0, :, joint], ends[1, :, joint], inner[:, here].ravel()]
-            times, found = np.concatenate(when), np.concatenate(each)
-            both = [int(np.argmin(found)), int(np.argmax(found))]
-            t[:, joint], values[:, joint] = times[both], found[both]
+        self._check_order(order)
+        n = len(self.joint_names)
+        t = np.full((2, n), self.t[0])
+        values = np.tile(self._pieces(np.zeros(1, dtype=np.intp), order)[0], (2, 1))
+        for k in self._lots():
+            pieces = self._pieces(k, order)
+            ends = np.stack([pieces[0], pieces.sum(axis=0)])
+            least = np.minimum(ends.min(axis=(0, 1)), values[0])
+            largest = np.maximum(ends.max(axis=(0, 1)), values[1])
+            # Only where the polynomials may go beyond all their ends, they are looked at inside.
+            some, joints = np.nonzero(may_pass(pieces, least, largest))
+            chosen = pieces[:, some, joints]
+            roots = inner_roots(differentiated(chosen))
+            inner = evaluated(chosen, roots)
+            steps = self.t[k + 1] - self.t[k]
+            within = self.t[k][some] + steps[some] * roots
+            for joint in range(n):
+                here = joints == joint
+                when = [t[:, joint], self.t[k], self.t[k + 1], within[:, here].ravel()]
+                each = [values[:, joint], *ends[:, :, joint], inner[:, here].ravel()]
+                times, found = np.concatenate(when), np.concatenate(each)
+                both = [int(np.argmin(found)), int(np.argmax(found))]
+                t[:, joint], values[:, joint] = times[both], found[both]
         return t, values
 
     def acceleration_jumps(self) -> tuple[Array, Array]:
@@ -201,10 +209,10 @@ class Trajectory:
 
         Quintics do not jump, cubics do at their samples.
         """
-        pieces = self._pieces(2)
-        jumps = np.abs(pieces[0, 1:] - pieces[:, :-1].sum(axis=0))
-        if self.qdd is not None or not len(jumps):
+        if self.qdd is not None or len(self.t) < 3:
             return np.full(self.q.shape[1], self.t[0]), np.zeros(self.q.shape[1])
+        pieces = self._pieces(np.arange(len(self.t) - 1), 2)
+        jumps = np.abs(pieces[0, 1:] - pieces[:, :-1].sum(axis=0))
         worst = np.argmax(jumps, axis=0)
         return self.t[1 + worst], jumps[worst, np.arange(jumps.shape[1])]
 
@@ -219,21 +227,19 @@ class Trajectory:
     @cached_property
     def _before(self) -> Array:
         """The way made by the beginning of each interval, and in all, (N, n)."""
-        every = np.arange(len(self.t) - 1)
-        whole = self._way(every, np.ones(len(every)))
+        whole = np.concatenate([self._way(k, np.ones(len(k))) for k in self._lots()])
         return np.vstack([np.zeros(whole.shape[1]), np.cumsum(whole, axis=0)])
 
-    def _way(self, k: npt.NDArray[np.intp], s: Array) -> Array:
+    def _way(self, k: Ints, s: Array) -> Array:
         """Return the ways from the beginning of intervals k (K,) up to s (K,), (K, n)."""
         edge = np.broadcast_to(s[:, None, None], (len(k), 1, len(self.joint_names)))
-        stops = [np.zeros_like(edge), np.minimum(self._turns[k], edge), edge]
-        passed = evaluated(self._pieces(0)[:, k, None], np.concatenate(stops, axis=1))
+        stops = [np.zeros_like(edge), np.minimum(self._turns(k), edge), edge]
+        passed = evaluated(self._pieces(k)[:, :, None], np.concatenate(stops, axis=1))
         return np.asarray(np.abs(np.diff(passed, axis=1)).sum(axis=1))
 
-    @cached_property
-    def _turns(self) -> Array:
-        """Where in each interval joints turn round, sorted, (N - 1, m, n); 0 for nowhere."""
-        pieces = self._pieces(1)
+    def _turns(self, k: Ints) -> Array:
+        """Where joints turn round in intervals k (K,), sorted, (K, m, n); 0 for nowhere."""
+        pieces = self._pieces(k, 1)
         turns = np.zeros((len(pieces) - 1, *pieces.shape[1:]))
         some, joints = np.nonzero(may_vanish(pieces))
         turns[:, some, joints] = inner_roots(pieces[:, some, joints])
@@ -262,14 +268,15 @@ class Trajectory:
         given = plain_numbers(t)
         if given is None:
             raise ValueError(f"t is {shown(t)}, expected times [s]")
-        times, pieces = given, self._pieces(order)
+        self._check_order(order)
+        times = given
         if not (np.all(times >= self.t[0]) and np.all(times <= self.t[-1])):
             raise ValueError(
                 f"time {times.min()}..{times.max()} s is outside the motion, "
                 f"{self.t[0]}..{self.t[-1]} s"
             )
         k, s = self._place(times)
-        return evaluated(pieces[:, k], s[..., None])
+        return evaluated(self._pieces(k, order), s[..., None])
 
     def polynomials(self, middle: Array, half: Array) -> Array:
         """Return the motion on intervals without samples, as polynomials of u, (m, I, n).
@@ -279,7 +286,7 @@ class Trajectory:
         """
         k, s = self._place(middle)
         share = half / (self.t[k + 1] - self.t[k])
-        return series.recentred(self._pieces_of(k), s[:, None], share[:, None])
+        return series.recentred(self._pieces(k), s[:, None], share[:, None])
 
     def sample_times(self, rate: float) -> Array:
         """Return the times from the start [s] of `rate` samples per second, and of the end, (K,).
@@ -316,25 +323,38 @@ class Trajectory:
         k = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
         return k, (t - self.t[k]) / (self.t[k + 1] - self.t[k])
 
-    def _pieces(self, order: int) -> Array:
-        """Return the coefficients of 1, s, s² … of a derivative in each interval, (m, N - 1, n).
+    def _check_order(self, order: int) -> None:
+        if order not in (0, 1, 2, 3):
+            raise ValueError(f"order is {shown(order)}, expected 0, 1, 2 or 3")
+
+    def _lots(self) -> Iterator[Ints]:
+        """Yield the numbers of all intervals in lots that fit into memory."""
+        for first in range(0, len(self.t) - 1, _LOT):
+            yield np.arange(first, min(first + _LOT, len(self.t) - 1))
+
+    def _pieces(self, k: Ints, order: int = 0) -> Array:
+        """Return the coefficients of 1, s, s² … of a derivative in intervals k (…), (m, …, n).
 
         s goes from 0 to 1 in each.
         """
-        if order not in (0, 1, 2, 3):
-            raise ValueError(f"order is {shown(order)}, expected 0, 1, 2 or 3")
-        while len(self._derivatives) <= order:
-            steps = np.diff(self.t)[:, None]
-            self._derivatives.append(differentiated(self._derivatives[-1]) / steps)
-        return self._derivatives[order]
+        if len(self.t) <= _LOT:
+            return self._derivatives[order][:, k]
+        return self._differentiated(k, order)
 
     @cached_property
     def _derivatives(self) -> list[Array]:
-        """The pieces of q, and of its derivatives as far as they were asked for."""
-        return [self._pieces_of(np.arange(len(self.t) - 1))]
+        """The pieces of all orders, of a motion with few samples."""
+        every = np.arange(len(self.t) - 1)
+        return [self._differentiated(every, order) for order in range(4)]
+
+    def _differentiated(self, k: Ints, order: int) -> Array:
+        pieces = self._pieces_of(k)
+        for _ in range(order):
+            pieces = differentiated(pieces) / (self.t[k + 1] - self.t[k])[..., None]
+        return pieces
 
     def _pieces_of(self, k: Ints) -> Array:
         """Return the coefficients of q in some of the intervals (I,), (m, I, n)."""
         h, ends = self.t[k + 1] - self.t[k], (k, k + 1)
         given = (self.q, self.qd) if self.qdd is None else (self.q, self.qd, self.qdd)
-        return hermite(h[:, None], *((table[ends[0]], table[ends[1]]) for table in given))
+        return hermite(h[..., None], *((table[ends[0]], table[ends[1]]) for table in given))

@@ -21,6 +21,7 @@ from selfmotion.basics import (
     series,
     shown,
 )
+from selfmotion.path.feed_kept import FeedKept
 from selfmotion.task import Task, as_pose
 
 # Rounding of a last time such as 50 * 0.02 must not count as outside the motion.
@@ -101,6 +102,16 @@ class Path(Saved, ABC, family="path"):
         Where waypoints are given, theirs: a certificate looks there, whatever lies between.
         """
         return self.knots
+
+    @property
+    def rounded(self) -> Array:
+        """Where corners are rounded: first and last times [s], (C, 2)."""
+        return np.zeros((0, 2))
+
+    @property
+    def feeds(self) -> tuple[FeedKept, ...]:
+        """How well the feeds that were asked for are kept; a certificate judges that."""
+        return ()
 
     @abstractmethod
     def evaluate(self, t: Array) -> PathSamples:

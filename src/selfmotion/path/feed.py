@@ -6,16 +6,24 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from selfmotion.basics import Array, PathError, as_number, read_only, series
+from selfmotion.basics import Array, Ints, PathError, as_number, read_only, series
 from selfmotion.path.base import STILL, Path, PathSamples, PathSeries, _Derived, check_path
+from selfmotion.path.feed_kept import FeedKept
 from selfmotion.path.pace import Pace, times_along, times_when
 
+Flags = npt.NDArray[np.bool_]
+
+# What holds a tool that is slower than its feed.
+_CAUSES = "the turn rate", "the acceleration in a bend", "the turn acceleration in a bend"
 # Nodes of the pace between two knots of the original, at least, and in all, about.
 _FEWEST, _ABOUT = 16, 1000
 # How far from a node, by the distance of knots, the original's accelerations are measured, and how
 # far from a knot whether its twist jumps there.
 _BESIDE, _AT = 1e-4, 1e-8
+# Faster feeds [m/s] are slips of units.
+_FASTEST = 3.0
 # A tool that is slower than this share of what it may be rests.
 _RESTS = 1e-6
 # The twist before and after a knot may differ by this share of it: by rounding.
@@ -48,6 +56,9 @@ class Feed(_Derived, kind="feed"):
         [rad/s²].
     smoothing : float
         How long an acceleration takes to build up [s].
+    within : float
+        What may be missing of the feed, as a share, but in run-up, run-down and rounded corners:
+        a certificate judges that.
 
     Raises
     ------
@@ -64,6 +75,7 @@ class Feed(_Derived, kind="feed"):
         acceleration: float = 1.0,
         turn_acceleration: float = 10.0,
         smoothing: float = 0.05,
+        within: float = 0.02,
     ) -> None:
         self._path = check_path(path, "feed: path").at_constant_speed()
         given = {
@@ -77,6 +89,12 @@ class Feed(_Derived, kind="feed"):
             name: as_number(value, f"feed: {name}", above=0.0, error=PathError)
             for name, value in given.items()
         }
+        if self.feed > _FASTEST:
+            raise PathError(
+                f"feed: {self.feed:g} m/s is faster than any arm, expected at most {_FASTEST:g}: "
+                f"feeds are in m/s, not mm/s (feed_mm in files)"
+            )
+        self._within = as_number(within, "feed: within", above=0.0, most=1.0, error=PathError)
         self.duration = float(self._paces[-1][1])
 
     @property
@@ -148,7 +166,7 @@ class Feed(_Derived, kind="feed"):
         for first, last in pairwise(np.searchsorted(sigma, self._stops)):
             part = slice(first, last + 1)
             most, gain = self._most[part], self._gain[part]
-            pace = _ramped(lengths[part], most, gain).smoothed(self._limits["smoothing"])
+            pace = _ramped(lengths[part], most, gain)[0].smoothed(self._limits["smoothing"])
             end = start + float(pace.t[-1])
             stretches.append((start, end, pace))
             start = end
@@ -240,13 +258,66 @@ class Feed(_Derived, kind="feed"):
         speeds = _sizes(self._path.samples(self._sigma).twist) / self._shares[:, None]
         return np.asarray(2.0 / np.maximum((speeds / self._half).max(axis=1), 1e-300))
 
+    @cached_property
+    def feeds(self) -> tuple[FeedKept, ...]:
+        """See `Path.feeds`: how well its own feed is kept."""
+        t, counts, causes = self._counted
+        speeds = _sizes(self.samples(t).twist)[:, 0]
+        fastest = int(np.argmax(speeds))
+        if not counts.any():
+            # Too short to run up and down.
+            found = float(speeds[fastest]), float(t[fastest]), 0.0, "run-up and run-down"
+            return (FeedKept(self.feed, self._within, float(speeds[fastest]), *found),)
+        slow = (speeds < (1.0 - self._within) * self.feed) & counts
+        worst = int(np.argmin(np.where(counts, speeds, np.inf)))
+        lasts = np.gradient(t) @ slow
+        found = float(speeds[worst]), float(t[worst]), float(lasts), causes[worst]
+        return (FeedKept(self.feed, self._within, float(speeds[fastest]), *found),)
+
+    @property
+    def _counted(self) -> tuple[Array, Flags, list[str]]:
+        """Return when nodes are passed (K,), whether the feed counts there, and what holds it."""
+        sigma, window = self._sigma, self._limits["smoothing"]
+        speeds = _sizes(self._path.samples(sigma).twist) / self._shares[:, None]
+        caps = np.hstack(
+            [np.ones((len(sigma), 1)), 1.0 / np.maximum(self._bends / self._half, 1e-300)]
+        )
+        causes = [_CAUSES[k] for k in np.argmin(caps, axis=1)]
+        turning = speeds[:, 0] < (1.0 - 0.5 * self._within) * self.feed
+        corners = self._path.rounded
+        inside = (sigma[:, None] >= corners[:, 0]) & (sigma[:, None] <= corners[:, 1])
+        free = inside.any(axis=1) | (speeds[:, 0] <= _RESTS * self.feed)
+        times, exempt, held = [], [], []
+        stops = np.searchsorted(sigma, self._stops)
+        for (first, last), (start, _, _) in zip(pairwise(stops), self._paces, strict=True):
+            part = slice(first, last + 1)
+            pace, anchors = _ramped(self._lengths[part], self._most[part], self._gain[part])
+            own = free[part].copy()
+            own[[0, -1]] = True
+            times.append(start + pace.t + 0.5 * window)
+            exempt.append(own[anchors])
+            held += [causes[first + k] for k in anchors]
+        t, rests = np.concatenate(times), np.concatenate(exempt)
+        # From there to the next node the pace changes, and near that its mean does.
+        rests = np.convolve(rests, np.ones(3), mode="same") > 0.0
+        before = np.append(0, np.cumsum(rests))
+        near = [np.searchsorted(t, t + side * 1.5 * window) for side in (-1, 1)]
+        counts = before[near[1]] == before[near[0]]
+        every = np.concatenate([turning[a : b + 1] for a, b in pairwise(stops)])
+        named = [
+            "the turn rate" if x and y == _CAUSES[0] else y
+            for x, y in zip(every, held, strict=True)
+        ]
+        return np.clip(t, 0.0, self.duration), counts, named
+
     @property
     def _half(self) -> Array:
         return 0.5 * np.array([self._limits["acceleration"], self._limits["turn_acceleration"]])
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""
-        return {"kind": self.kind, "path": self._path.to_dict(), **self._limits}
+        described = {**self._limits, "within": self._within}
+        return {"kind": self.kind, "path": self._path.to_dict(), **described}
 
 
 def _sizes(twists: Array) -> Array:
@@ -255,17 +326,23 @@ def _sizes(twists: Array) -> Array:
     return np.stack([np.sqrt(np.sum(part**2, axis=1)) for part in parts], axis=1)
 
 
-def _ramped(lengths: Array, most: Array, gain: Array) -> Pace:
-    """Return the largest pace from rest to rest, its square ≤ `most`, changing by ≤ `gain`."""
+def _ramped(lengths: Array, most: Array, gain: Array) -> tuple[Pace, Ints]:
+    """Return the largest pace from rest to rest, its square ≤ `most`, changing by ≤ `gain`.
+
+    And for each node which one limits its pace: itself, or one that it is run up from or down to.
+    """
+    limiting = np.arange(len(lengths))
     squared = most.copy()
     squared[0] = squared[-1] = 0.0
     steps = np.diff(lengths) * np.minimum(gain[:-1], gain[1:])
     for k in range(len(steps)):
-        squared[k + 1] = min(squared[k + 1], squared[k] + steps[k])
+        if squared[k] + steps[k] < squared[k + 1]:
+            squared[k + 1], limiting[k + 1] = squared[k] + steps[k], limiting[k]
     for k in reversed(range(len(steps))):
-        squared[k] = min(squared[k], squared[k + 1] + steps[k])
+        if squared[k + 1] + steps[k] < squared[k]:
+            squared[k], limiting[k] = squared[k + 1] + steps[k], limiting[k + 1]
     rates = np.sqrt(squared)
-    return Pace(times_along(lengths, rates), lengths, rates)
+    return Pace(times_along(lengths, rates), lengths, rates), limiting
 
 
 def _apart(times: Array, duration: float) -> Array:

@@ -22,6 +22,7 @@ from selfmotion.path.base import (
     path_series,
     turning,
 )
+from selfmotion.path.feed_kept import FeedKept
 from selfmotion.path.shapes import Line
 
 # Pieces may end this far from where the next one begins [m, rad].
@@ -143,6 +144,13 @@ class Joined(Path, kind="joined"):
         starts = self._ends - [piece.duration for piece in self.pieces]
         inner = [part[:-1] + start for part, start in zip(times, starts, strict=True)]
         return read_only([*np.concatenate(inner), self.duration])
+
+    @property
+    def feeds(self) -> tuple[FeedKept, ...]:
+        """See `Path.feeds`: those of all pieces."""
+        starts = self._ends - [piece.duration for piece in self.pieces]
+        pairs = zip(self.pieces, starts.tolist(), strict=True)
+        return tuple(item.later(start) for piece, start in pairs for item in piece.feeds)
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""

@@ -16,6 +16,7 @@ from selfmotion.path.base import (
     path_pose,
     path_series,
 )
+from selfmotion.path.feed_kept import FeedKept
 
 
 class Placed(_Derived, kind="placed"):
@@ -43,6 +44,16 @@ class Placed(_Derived, kind="placed"):
     def marks(self) -> Array:
         """See `Path.marks`."""
         return self._path.marks
+
+    @property
+    def rounded(self) -> Array:
+        """See `Path.rounded`."""
+        return self._path.rounded
+
+    @property
+    def feeds(self) -> tuple[FeedKept, ...]:
+        """See `Path.feeds`."""
+        return self._path.feeds
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""

@@ -15,6 +15,8 @@ from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotve
 _SPEED, _TURN_RATE = 1.0, 10.0
 # Poses nearer than this [s of the pace above] are the same.
 _SAME = 1e-9
+# Two corners that are apart by this share of either meet.
+_HARDLY = 1e-2
 # The corner is passed at this share of d |Δv|, where the velocity changes by Δv within ± d.
 _MISS = 5.0 / 32.0
 # m(x) / d over u = x / d in the corner, coefficients of 1, u, u² …: ∫∫ 15/16 (1 - u²)² du du.
@@ -105,8 +107,27 @@ class Polyline(Path, kind="polyline"):
 
     @property
     def knots(self) -> Array:
-        """See `Path.knots`: where corners begin and end, so that steps end there."""
+        """See `Path.knots`: where corners begin and end, so that steps end there.
+
+        Where hardly anything is straight between two corners, the second begins where the first
+        ends: steps of next to no time would turn rounding into accelerations.
+        """
+        half = self._corners.half
+        ends, starts = self._times[:-1] + half[:-1], self._times[1:] - half[1:]
+        hardly = starts - ends <= _HARDLY * np.minimum(half[:-1], half[1:])
+        dropped = np.isin(self._edges, starts[1:-1][hardly[1:-1]])
+        return read_only(self._edges[~dropped])
+
+    @property
+    def marks(self) -> Array:
+        """See `Path.marks`: where corners begin and end, all of them."""
         return read_only(self._edges)
+
+    @property
+    def rounded(self) -> Array:
+        """See `Path.rounded`."""
+        half, at = self._corners.half[1:-1], self.corner_times
+        return np.stack([at - half, at + half], axis=1)
 
     @property
     def corner_times(self) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 
 from selfmotion.basics import Array, PathError, as_number, read_only
 from selfmotion.path.base import Path, PathSamples, PathSeries, _Derived, check_path, path_series
+from selfmotion.path.feed_kept import FeedKept
 from selfmotion.path.retimed import Retimed
 
 # Knots this near to an end, as a share of the duration, are the end.
@@ -69,6 +70,11 @@ class Section(_Derived, kind="section"):
         near = _CLOSE * self.duration
         inner = times[(times > self._first + near) & (times < self._last - near)]
         return read_only([0.0, *(inner - self._first), self.duration])
+
+    @property
+    def feeds(self) -> tuple[FeedKept, ...]:
+        """See `Path.feeds`: those of the whole."""
+        return tuple(item.later(-self._first) for item in self._path.feeds)
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""

@@ -66,6 +66,8 @@ def finish(
             misses.append(check.position_error.value + check.rotation_error.value)
             if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
                 break
+            if session.steps >= session.most_steps:
+                break
             session.refine()
             if rough and not session.cut_short:
                 session.minimize()

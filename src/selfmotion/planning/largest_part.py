@@ -173,8 +173,8 @@ def _until(problem: Problem, time: float) -> Problem:
         for first, last in [item.window(problem.path.duration)]
         if first < time
     ]
-    path = Section(problem.path, 0.0, time, crowding=True)
-    return replace(problem, path=path, constraints=kept, relaxations=relaxations)
+    shorter = problem.along(lambda path: Section(path, 0.0, time, crowding=True))
+    return replace(problem, **shorter, constraints=kept, relaxations=relaxations)
 
 
 def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attempt:

@@ -37,11 +37,14 @@ def check_fit(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
     RedundancyError
         There are as many rows as joints, and none is relaxed.
     """
-    check_oriented(follows.path, follows.task)
-    check_relaxations(relaxations, follows.path, follows.task)
+    first = follows.items[0]
+    for item in follows.items:
+        check_oriented(item.path, item.task)
+    check_relaxations(relaxations, first.path, first.task)
     _check_redundancy(follows, bool(relaxations))
-    _check_units(follows.robot, follows.path)
-    _check_pace(follows.robot, follows.path)
+    for item in follows.items:
+        _check_units(follows.robot, item.path)
+        _check_pace(follows.robot, item.path)
 
 
 def check_relaxations(relaxations: Sequence[Relaxation], path: Path, task: Task) -> None:
@@ -92,7 +95,10 @@ def _prescribed(path: Path, task: Task) -> list[str]:
 
 
 def _check_redundancy(follows: Follows, is_relaxed: bool) -> None:
-    robot, task = follows.robot, follows.task
+    robot, task = follows.robot, follows.items[0].task
+    if len(follows.items) > 1:
+        _check_several(follows)
+        return
     if not robot.can_follow(task):
         others = _redundant_tasks(robot)
         choice = (
@@ -114,6 +120,24 @@ def _check_redundancy(follows: Follows, is_relaxed: bool) -> None:
             f"or take an arm with more joints",
             dof=robot.dof,
             rows=task.dimension,
+        )
+
+
+def _check_several(follows: Follows) -> None:
+    robot, rows, left = follows.robot, follows.dimension, follows.redundancy
+    what = " and ".join(f"'{item.chain.tip_name}'" for item in follows.items)
+    if robot.dof - left < rows:
+        raise ProblemError(
+            f"{robot.name}: {what} have {rows} rows prescribed ({', '.join(follows.row_names)}), "
+            f"but {robot.dof} joints cannot move them freely in all of these; prescribe fewer "
+            f"(Follow(task=))"
+        )
+    if left == 0:
+        raise RedundancyError(
+            f"{robot.name}: {robot.dof} joints and {rows} rows of {what} leave no self-motion; "
+            f"prescribe fewer (Follow(task=)), or take arms with more joints",
+            dof=robot.dof,
+            rows=rows,
         )
 
 

@@ -1,7 +1,7 @@
 """What to plan: an arm, a tool motion, the rows that count, and what to minimise."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import and_
 from typing import Any
@@ -38,7 +38,7 @@ from selfmotion.constraints import (
     JointVelocityLimits,
 )
 from selfmotion.costs import Cost, JointVelocity, OffPath
-from selfmotion.follow import Follows
+from selfmotion.follow import Follow, Follows
 from selfmotion.motion import NullMotion, RefinedNullMotion, Trajectory, resting_window
 from selfmotion.path import Path
 from selfmotion.problem.fit import check_fit, rest_orders
@@ -103,6 +103,9 @@ class Problem:
         Whether the arm is at rest where the path begins or ends at rest, which a controller asks
         for, unless a constraint says how fast it is there: the null motion then vanishes, and its
         derivative too where the tool does not accelerate either. The paper's does not.
+    also : sequence of Follow
+        What else of the arm follows a path at the same time: their rows are prescribed besides. A
+        list of `Follow` in place of the path is the same; its first one is then the tool.
     damping : Damping, optional
         Go through singular poses, and past the edge of the workspace, at the price of the path: by
         default the tool stays on the path, and there is no motion through such poses. Adds the
@@ -135,8 +138,11 @@ class Problem:
     damping: Damping | None = None
     collision: Clearance | None = NO_OVERLAP
     rest: bool = True
+    also: Sequence[Follow] = ()
 
     def __post_init__(self) -> None:
+        if isinstance(self.path, list | tuple):
+            self._take_first(as_several(self.path, "path", Follow))
         for name, kind in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 raise ProblemError(
@@ -147,6 +153,11 @@ class Problem:
         for name, each in _SEQUENCES.items():
             object.__setattr__(self, name, as_several(getattr(self, name), name, each))
         check_fit(self.follows, self.relaxations)
+        if self.also and self.relaxations:
+            raise ProblemError(
+                "relaxations: rows of several paths cannot be relaxed; leave them out, or "
+                "prescribe fewer rows (Follow(task=))"
+            )
         if isinstance(self.start, str):
             if self.start != "free":
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
@@ -167,7 +178,32 @@ class Problem:
     @cached_property
     def follows(self) -> Follows:
         """What the arm follows: the one thing that planners are told."""
-        return Follows.of(self.robot, self.path, self.task)
+        return Follows.of(self.robot, self.path, self.task, self.also)
+
+    def _take_first(self, several: Sequence[Follow]) -> None:
+        """Make the first of several that follow a path the arm's tool."""
+        if not several:
+            raise ProblemError("path is an empty list, expected a Path, or what follows one")
+        first, robot = several[0], self.robot
+        if isinstance(robot, RobotModel) and (first.tool or first.reference):
+            tool = first.tool or robot.tool
+            tools = (tool, *(name for name in robot.tools if name != tool))
+            robot = replace(robot, tools=tools, reference=first.reference)
+            robot.chain_to(tool, first.reference)
+        object.__setattr__(self, "robot", robot)
+        object.__setattr__(self, "path", first.path)
+        object.__setattr__(self, "task", first.task)
+        object.__setattr__(self, "also", (*several[1:], *self.also))
+
+    def along(self, other: Callable[[Path], Path]) -> dict[str, Any]:
+        """Return, for `dataclasses.replace`, other paths in place of all that are followed."""
+        return {
+            "path": other(self.path),
+            "also": tuple(
+                item.along(other(bound.path))
+                for item, bound in zip(self.also, self.follows.items[1:], strict=True)
+            ),
+        }
 
     @property
     def given_start(self) -> Array | None:
@@ -181,7 +217,7 @@ class Problem:
             return tuple(self.costs)
         rate = feedback_rate(self.path.duration)
         weight = self.damping.path_weight * (rate / self.damping_law.threshold) ** 2
-        return (*self.costs, OffPath(float(weight), self.task.dimension))
+        return (*self.costs, OffPath(float(weight), self.follows.dimension))
 
     @cached_property
     def own_collision(self) -> Clearance | None:
@@ -220,7 +256,8 @@ class Problem:
         """How smoothly the arm comes to rest at the start and at the end; see `rest_orders`."""
         if not self.rest:
             return 0, 0
-        start, end = rest_orders(self.path, self.task)
+        orders = [rest_orders(item.path, item.task) for item in self.follows.items]
+        start, end = (min(order[k] for order in orders) for k in (0, 1))
         return self._rest_order(0, start), self._rest_order(1, end)
 
     def _rest_order(self, end: int, order: int) -> int:
@@ -251,7 +288,7 @@ class Problem:
         """The damping in numbers [m, rad] for this arm and task."""
         if self.damping is None:
             return None
-        best = self.robot.task_jacobian(self.robot.dexterous_configuration(self.task), self.task)
+        best = self.follows.jacobian(self.robot.dexterous_configuration(self.task))
         return self.damping.law(float(np.linalg.svd(best, compute_uv=False)[-1]))
 
     @cached_property
@@ -294,6 +331,7 @@ class Problem:
             trajectory,
             tolerance,
             (*rests, *self._asked),
+            also=self.also,
             relaxations=self.relaxations,
             damping=self.damping_law,
             ending=ending,
@@ -301,17 +339,21 @@ class Problem:
 
     def errors_between(self, trajectory: Trajectory) -> Array:
         """Return the errors of a motion in the middle between samples, (N, 2) [m, rad]."""
-        return errors_between(self.robot, self.path, self.task, trajectory, self.relaxations)
+        found = [
+            errors_between(item, trajectory, () if k else self.relaxations)
+            for k, item in enumerate(self.follows.items)
+        ]
+        return np.asarray(np.max(found, axis=0))
 
     @cached_property
     def knots(self) -> Array:
         """Times [s] between which path and deviations are smooth; see `Path.knots`."""
         duration, knots = self.path.duration, list(self.path.knots)
+        for other in self.follows.items[1:]:
+            knots = _with_times(knots, other.path.knots, duration)
         for item in self.relaxations:
-            for time in np.linspace(*item.window(duration), item.intervals + 1):
-                # Nearer to each other than rounding, two knots are one.
-                if np.abs(np.array(knots) - time).min() > 1e-9 * duration:
-                    knots.append(time)
+            times = np.linspace(*item.window(duration), item.intervals + 1)
+            knots = _with_times(knots, times, duration)
         return read_only(sorted(knots))
 
     @property
@@ -342,16 +384,16 @@ class Problem:
                 )
 
     def _check_start(self, start: Array) -> None:
-        pose = self.path.pose(0.0)
-        position, rotation = self.task.miss(pose, self.robot.pose(start))
-        if max(position, rotation) > _ON_PATH:
-            raise StartError(
-                f"{self.robot.name}: the start configuration puts '{self.robot.tool}' "
-                f"{position:.3g} m and {rotation:.3g} rad off the start of the path; "
-                f"leave it out, or take robot.inverse_kinematics(path.pose(0.0), task, seed=start)",
-                position_miss=position,
-                rotation_miss=rotation,
-            )
+        for item in self.follows.items:
+            position, rotation = item.miss(item.path.pose(0.0), start)
+            if max(position, rotation) > _ON_PATH:
+                raise StartError(
+                    f"{self.robot.name}: the start configuration puts '{item.chain.tip_name}' "
+                    f"{position:.3g} m and {rotation:.3g} rad off the start of the path; leave it "
+                    f"out, or take robot.inverse_kinematics(path.pose(0.0), task, seed=start)",
+                    position_miss=position,
+                    rotation_miss=rotation,
+                )
 
 
 # What help() shows of a field that is a descriptor.
@@ -371,7 +413,21 @@ _EXAMPLES = {
     "damping": "Damping or None",
     "collision": "Clearance or None",
 }
-_SEQUENCES = {"costs": Cost, "constraints": Constraint, "relaxations": Relaxation}
+_SEQUENCES = {
+    "costs": Cost,
+    "constraints": Constraint,
+    "relaxations": Relaxation,
+    "also": Follow,
+}
+
+
+def _with_times(knots: list[float], times: Iterable[float], duration: float) -> list[float]:
+    """Return knots and times; nearer to each other than rounding, two are one."""
+    found = list(knots)
+    for time in times:
+        if np.abs(np.array(found) - time).min() > 1e-9 * duration:
+            found.append(float(time))
+    return found
 
 
 def _fade(s: Array) -> Array:

@@ -9,11 +9,12 @@ from typing import Any
 from selfmotion.basics import Saved, restore
 from selfmotion.constraints import Constraint
 from selfmotion.costs import cost_from_dict
+from selfmotion.follow import Follow
 from selfmotion.motion import NullMotion
 from selfmotion.path import Path
 from selfmotion.problem.problem import NO_OVERLAP, Problem
 from selfmotion.robot import RobotModel, rebuild_robot
-from selfmotion.task import Damping, Relaxation
+from selfmotion.task import Damping, Relaxation, Task
 
 
 def problem_to_dict(
@@ -48,7 +49,29 @@ def problem_to_dict(
         document["collision"] = False if collision is None else describe(collision)
     if not problem.rest:
         document["rest"] = False
+    if problem.also:
+        document["also"] = [_follow_to_dict(item, describe) for item in problem.also]
     return document
+
+
+def _follow_to_dict(item: Follow, describe: Callable[[Saved], dict[str, Any]]) -> dict[str, Any]:
+    path: Any = item.path
+    where = {"tool": item.tool, "reference": item.reference}
+    return {
+        "task": Task.of(item.task).value,
+        **(
+            {"path": describe(path)}
+            if isinstance(path, Path)
+            else {"pose": path.homogeneous.tolist()}
+        ),
+        **{key: value for key, value in where.items() if value is not None},
+    }
+
+
+def follow_from_dict(values: Mapping[str, Any]) -> Follow:
+    """Return what a problem's document says of a frame that follows a path, or a pose."""
+    path = restore(Path, values["path"]) if "path" in values else values["pose"]
+    return Follow(path, values["task"], values.get("tool"), values.get("reference"))
 
 
 def _robot_to_dict(robot: RobotModel) -> dict[str, Any]:
@@ -99,4 +122,5 @@ def problem_from_dict(
         None if damping is None else Damping(**damping),
         collision or None,
         values.get("rest", True),
+        tuple(follow_from_dict(item) for item in values.get("also", ())),
     )

@@ -3,12 +3,12 @@
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
-from selfmotion.kernels import Layout
+from selfmotion.basics.layout import Layout
 from selfmotion.realtime import law
 from selfmotion.realtime.limits import stoppable
 from selfmotion.realtime.segment import Flag, Segment
 from selfmotion.realtime.viable import tightened
-from selfmotion.robot import Kinematics, RobotModel, march
+from selfmotion.robot import Kinematics, RobotModel
 
 # The pose feedback between two steps [1/s].
 _GAIN = 20.0
@@ -124,7 +124,7 @@ class Commands:
             )
             return True
 
-        march([kinematics], table[:, :n], step)
+        kinematics.march(table[:, :n], step)
         return follows
 
     def segment(

@@ -13,9 +13,8 @@ from math import sqrt
 import numpy as np
 
 from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics.layout import KIND, Layout
 from selfmotion.kernels import (
-    KIND,
-    Layout,
     at_tip,
     factor_damped,
     pose_error,

@@ -147,6 +147,9 @@ def _certificate_from_dict(values: Mapping[str, Any]) -> Certificate:
     }
     for key, kind in several.items():
         restored[key] = tuple(kind(**item) for item in restored[key])
+    restored["others"] = tuple(
+        (Extreme(**position), Extreme(**rotation)) for position, rotation in restored["others"]
+    )
     restored["tolerance"] = Tolerance(**values["tolerance"])
     for key in ("failures", "covers", "remarks", "notes"):
         restored[key] = tuple(restored[key])

@@ -1,11 +1,11 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
 from selfmotion.robot.chain import (
+    WORLD as WORLD,
     Chain as Chain,
     ChainArrays as ChainArrays,
     Kinematics as Kinematics,
     TreeArrays as TreeArrays,
-    march as march,
     null_space as null_space,
 )
 from selfmotion.robot.chain_series import ChainSeries as ChainSeries

@@ -122,6 +122,37 @@ class Kinematics:
                 self.translation,
             )
 
+    def march(
+        self,
+        q: Array,
+        step: Callable[..., bool],
+        *arguments: Any,
+        beside: Sequence["Kinematics"] = (),
+    ) -> int | None:
+        """Place tips at each of q (S, n), call ``step(s, f, jacobian, rotation, translation, …)``.
+
+        For this tip and those `beside` it, f = 0, 1, …, which share its data; the last step may set
+        the next row of q. Returns the first s at which a step returned False.
+        """
+        chain, data, others = self.chain, self.data, list(enumerate(beside, 1))
+        jacobian, rotation, translation = self.jacobian, self.rotation, self.translation
+        # Written out: in this loop the engine spends its time.
+        model, tip, is_rooted = chain.model, chain.tip, chain.is_rooted
+        jacobians, place = pin.computeJointJacobians, pin.updateFramePlacement
+        for s, configuration in enumerate(q):
+            jacobians(model, data, configuration)
+            if is_rooted:
+                place(model, data, tip)
+            else:
+                self.place_frames()
+            if not step(s, 0, jacobian, rotation, translation, *arguments):
+                return s
+            for f, own in others:
+                own.place_frames()
+                if not step(s, f, own.jacobian, own.rotation, own.translation, *arguments):
+                    return s
+        return None
+
     def at(self, q: Array) -> Array:
         """Return the Jacobian at q (n,), (6, n): rows [v, ω] of the tip in the base's axes."""
         pin.computeJointJacobians(self.chain.model, self.data, q)
@@ -148,35 +179,6 @@ class Kinematics:
             return pin.SE3(tip)
         base = pin.updateFramePlacement(chain.model, self.data, chain.base)
         return base.actInv(tip)
-
-
-def march(
-    tips: Sequence[Kinematics], q: Array, step: Callable[..., bool], *arguments: Any
-) -> int | None:
-    """Place tips at each of q (S, n), and call ``step(s, f, jacobian, rotation, translation, …)``.
-
-    For each tip f in turn; the last step may set the next row of q. Returns the first s at which a
-    step returned False. The tips are of one tree and share their data.
-    """
-    first, others = tips[0], list(enumerate(tips))[1:]
-    chain, data = first.chain, first.data
-    jacobian, rotation, translation = first.jacobian, first.rotation, first.translation
-    # Written out: in this loop the engine spends its time.
-    model, tip, is_rooted = chain.model, chain.tip, chain.is_rooted
-    jacobians, place = pin.computeJointJacobians, pin.updateFramePlacement
-    for s, configuration in enumerate(q):
-        jacobians(model, data, configuration)
-        if is_rooted:
-            place(model, data, tip)
-        else:
-            first.place_frames()
-        if not step(s, 0, jacobian, rotation, translation, *arguments):
-            return s
-        for f, own in others:
-            own.place_frames()
-            if not step(s, f, own.jacobian, own.rotation, own.translation, *arguments):
-                return s
-    return None
 
 
 class Chain:
@@ -249,6 +251,26 @@ class Chain:
             jacobians[k] = own.at(configuration)
             rotations[k], translations[k] = own.rotation, own.translation
         return jacobians, rotations, translations
+
+    def rooted(self) -> tuple[Any, int]:
+        """Return a model in which the base is the world, and the tip's frame there.
+
+        Its joints are those of `joints`, in this order.
+        """
+        if self.base == WORLD and len(self.joints) == self.dof:
+            return self.model, self.tip
+        model, (tree, rotation, position) = pin.Model(), self.arrays
+        parent = 0
+        for j in range(len(tree.joints)):
+            kind = (
+                pin.JointModelRevoluteUnaligned
+                if tree.is_revolute[j]
+                else (pin.JointModelPrismaticUnaligned)
+            )
+            place = pin.SE3(tree.rotations[j], tree.positions[j])
+            parent = model.addJoint(parent, kind(tree.axes[j]), place, str(j))
+        place = pin.SE3(rotation, position)
+        return model, model.addFrame(pin.Frame("tip", parent, 0, place, pin.FrameType.OP_FRAME))
 
     @cached_property
     def joints(self) -> Ints:

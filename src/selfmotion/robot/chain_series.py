@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, series
+from selfmotion.robot.chain import WORLD, Chain
 from selfmotion.robot.model import RobotModel
 
 
@@ -92,6 +93,34 @@ class ChainSeries:
     def spin(self, frame: int) -> Array:
         """Return how fast a frame turns [rad/s]."""
         return self.spins[int(self.robot.model.frames[frame].parentJoint)]
+
+    def relative(self, chain: Chain) -> tuple[Array, Array]:
+        """Return where the tip of a chain is in its base frame [m], and how it is turned there."""
+        if chain.base == WORLD:
+            return self.place(chain.tip), self.orientation(chain.tip)
+        tree, _, last = chain.arrays
+        total = np.zeros_like(self.joints[0])
+        place = np.zeros_like(total)
+        for joint, position in zip(tree.joints.tolist(), tree.positions, strict=True):
+            turned = series.exponential(total)
+            place += float(np.linalg.norm(position)) * turned
+            if self._is_revolute[joint]:
+                total = total + self.joints[joint]
+            else:
+                place += series.product(self.joints[joint], turned)
+        turned = series.exponential(total)
+        return place + float(np.linalg.norm(last)) * turned, turned
+
+    def relative_spin(self, chain: Chain) -> Array:
+        """Return how fast the tip of a chain turns in its base frame [rad/s]."""
+        if chain.base == WORLD:
+            return self.spin(chain.tip)
+        total, spin = np.zeros_like(self.joints[0]), np.zeros_like(self.joints[0][1:])
+        for joint in chain.joints.tolist():
+            if self._is_revolute[joint]:
+                spin = spin + series.product(self.rate(joint), series.exponential(total))
+                total = total + self.joints[joint]
+        return np.asarray(spin)
 
     def _links(self) -> Iterator[tuple[int, int, float]]:
         """Return each joint with its parent and how far it is from there [m]."""

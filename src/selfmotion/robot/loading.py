@@ -354,7 +354,7 @@ def _published(name: str) -> Mapping[str, Any]:
 
     known = tomllib.loads((Path(__file__).parent / "limits.toml").read_text("utf-8"))
     limits: Mapping[str, Any] = known.get(name, {})
-    return limits
+    return {kind: limits[kind] for kind in ("acceleration", "jerk") if kind in limits}
 
 
 def _read_file(path: Path, arguments: Mapping[str, str], given: str) -> Urdf:

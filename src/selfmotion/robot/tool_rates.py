@@ -4,30 +4,31 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, series
+from selfmotion.robot.chain import Chain
 from selfmotion.robot.chain_series import ChainSeries
-from selfmotion.robot.model import RobotModel
 
 _AXES = pin.ReferenceFrame.LOCAL
 
 
 class ToolRates:
-    """[v, ω] of the tool frame and [dv/dt, dω/dt], in tool axes.
+    """[v, ω] of a chain's tip relative to its base and [dv/dt, dω/dt], in tip axes.
 
     v is the velocity of the frame's origin, dv/dt the acceleration that a sensor there has but for
     gravity: of Pinocchio's spatial acceleration a, dv/dt = a + ω × v.
 
     Parameters
     ----------
-    robot : RobotModel
+    chain : Chain
     """
 
-    def __init__(self, robot: RobotModel) -> None:
-        self._model, self._frame = robot.model, robot.chain.tip
-        self._data = robot.model.createData()
+    def __init__(self, chain: Chain) -> None:
+        self._chain, (self._model, self._frame) = chain, chain.rooted()
+        self._data = self._model.createData()
 
     def __call__(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
         """Return velocities and accelerations of motions (K, n) each, (K, 6) [m, rad, s]."""
         velocity, acceleration = np.empty((len(q), 6)), np.empty((len(q), 6))
+        q, qd, qdd = (x[:, self._chain.joints] for x in (q, qd, qdd))
         model, data, frame = self._model, self._data, self._frame
         for k in range(len(q)):
             pin.forwardKinematics(model, data, q[k], qd[k], qdd[k])
@@ -38,8 +39,8 @@ class ToolRates:
 
     def series(self, chain: ChainSeries) -> tuple[Array, Array, Array, Array]:
         """Return the majorants of v, ω, dv/dt and dω/dt, (K + 1, I) each."""
-        turned, spin = chain.orientation(self._frame), chain.spin(self._frame)
-        speed = series.derivative(chain.place(self._frame), chain.half)
+        place, turned = chain.relative(self._chain)
+        spin, speed = chain.relative_spin(self._chain), series.derivative(place, chain.half)
         rates = speed, spin, *(series.derivative(x, chain.half) for x in (speed, spin))
         v, w, dv, dw = (series.product(rate, turned) for rate in rates)
         return v, w, dv, dw
@@ -48,8 +49,11 @@ class ToolRates:
         self, q: Array, qd: Array, qdd: Array
     ) -> tuple[tuple[Array, Array], tuple[Array, Array, Array]]:
         """Return ∂/∂q and ∂/∂q̇ of velocities, ∂/∂q, ∂/∂q̇ and ∂/∂q̈ of accelerations, (K, 6, n)."""
-        shape = (*q.shape[:1], 6, q.shape[1])
+        joints = self._chain.joints
+        shape = (*q.shape[:1], 6, len(joints))
         v_by_q, a_by_q, a_by_qd, jacobians = (np.empty(shape) for _ in range(4))
+        dof = q.shape[1]
+        q, qd, qdd = (x[:, joints] for x in (q, qd, qdd))
         model, data, frame = self._model, self._data, self._frame
         for k in range(len(q)):
             pin.computeForwardKinematicsDerivatives(model, data, q[k], qd[k], qdd[k])
@@ -62,4 +66,13 @@ class ToolRates:
             turning, moving = pin.skew(velocity[3:]), pin.skew(velocity[:3])
             for by, of in ((a_by_q, v_by_q), (a_by_qd, jacobians)):
                 by[k, :3] += turning @ of[k, :3] - moving @ of[k, 3:]
+        v_by_q, a_by_q, a_by_qd, jacobians = (
+            self._spread(part, dof) for part in (v_by_q, a_by_q, a_by_qd, jacobians)
+        )
         return (v_by_q, jacobians), (a_by_q, a_by_qd, jacobians)
+
+    def _spread(self, columns: Array, dof: int) -> Array:
+        """Return columns (K, 6, c) of the chain's joints as those of all joints, (K, 6, n)."""
+        found = np.zeros((*columns.shape[:2], dof))
+        found[:, :, self._chain.joints] = columns
+        return found

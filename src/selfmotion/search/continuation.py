@@ -3,9 +3,7 @@
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, inlined, kernel
-from selfmotion.kernels import (
-    Layout,
-)
+from selfmotion.basics.layout import Layout
 from selfmotion.robot import ChainArrays
 from selfmotion.search.edges import wrapped
 from selfmotion.search.projection import CONVERGED, correct, place_tips

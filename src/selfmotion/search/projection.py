@@ -3,9 +3,8 @@
 import numpy as np
 
 from selfmotion.basics import Array, Flags, inlined, kernel
+from selfmotion.basics.layout import KIND, Layout
 from selfmotion.kernels import (
-    KIND,
-    Layout,
     cholesky,
     gram,
     pose_error,

@@ -5,14 +5,37 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import ProblemError, as_numbers
+from selfmotion.basics import Array, ProblemError, as_numbers, read_only
 
 # How far a rotation matrix that was written down may be from orthonormal.
 _ROTATION_TOLERANCE = 1e-6
 
 
+class FixedPose(pin.SE3):  # type: ignore[misc]  # Pinocchio has no types
+    """A pose that nobody moves: paths and obstacles are values."""
+
+    @property
+    def translation(self) -> Array:
+        """The position, read-only, (3,) [m]."""
+        return read_only(pin.SE3.translation.fget(self))
+
+    @property
+    def rotation(self) -> Array:
+        """The orientation, read-only, (3, 3)."""
+        return read_only(pin.SE3.rotation.fget(self))
+
+    def setIdentity(self) -> None:
+        """Refuse."""
+        raise AttributeError("a pose of a path or an obstacle cannot be changed")
+
+    setRandom = setIdentity
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return FixedPose, (np.array(self.rotation), np.array(self.translation))
+
+
 def as_pose(pose: Any, what: str = "pose", error: type[Exception] = ProblemError) -> pin.SE3:
-    """Return `pose` (an SE3 or a (4, 4) homogeneous matrix) as an SE3 of its own.
+    """Return `pose` (an SE3 or a (4, 4) homogeneous matrix) as an SE3 of its own that stays.
 
     Raises
     ------
@@ -28,4 +51,4 @@ def as_pose(pose: Any, what: str = "pose", error: type[Exception] = ProblemError
         raise error(f"{what}: its rotation is not orthonormal and right-handed (by {skew:.2g})")
     if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
         raise error(f"{what}: its last row is {matrix[3].tolist()}, expected [0, 0, 0, 1]")
-    return pin.SE3(np.array(rotation), np.array(matrix[:3, 3]))
+    return FixedPose(np.array(rotation), np.array(matrix[:3, 3]))
