@@ -23,12 +23,9 @@ from selfmotion.kernels import (
     solve_cholesky,
     task_rows,
 )
+from selfmotion.realtime.settings import FOLLOWED, PIVOT
 from selfmotion.realtime.viable import viable_accelerations
 
-# Below this pivot of JJᵀ [m², rad²] the inverse is damped, by up to λ² = the same.
-PIVOT = 1e-3
-# What the tool may lack of the rate that was asked for, and count as following [m/s, rad/s].
-_FOLLOWED = 1e-3
 # Entries of a cycle's row besides its n-vectors: the reference's position, rotation and twist.
 REFERENCE = 18
 
@@ -92,7 +89,7 @@ def saturate(
         miss = wanted[i]
         for k in range(n):
             miss -= jacobian[i, k] * rates[k]
-        if not abs(miss) <= _FOLLOWED:
+        if not abs(miss) <= FOLLOWED:
             return False
     return True
 

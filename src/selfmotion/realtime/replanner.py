@@ -26,12 +26,9 @@ from selfmotion.realtime.horizon import Horizon
 from selfmotion.realtime.limits import joint_limits, planned_limits
 from selfmotion.realtime.reference import Approach, Reference, resting
 from selfmotion.realtime.segment import Flag, Segment
+from selfmotion.realtime.settings import AHEAD, SOON
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
-
-# A motion that breaks down within this time [s] is not followed: the arm can stop in less; nor
-# within the second, where limits already hold it up.
-_SOON, _AHEAD = 0.5, 2.0
 
 
 class Replanner:
@@ -301,9 +298,9 @@ class Replanner:
         else:
             flag = Flag.KEPT if np.any(kept) else Flag.TRACKING
         # On the way into a singular pose an arm may end up on its other side.
-        soon = horizon.breakdown < _SOON
+        soon = horizon.breakdown < SOON
         self._without_way = self._without_way + max(passed, self.cycle) if soon else 0.0
-        held_up = horizon.breakdown < _AHEAD and not self._follows
+        held_up = horizon.breakdown < AHEAD and not self._follows
         if held_up or self._without_way > self._patience:
             flag = Flag.STOPPING
         self._table[:, n : 2 * n] = kept

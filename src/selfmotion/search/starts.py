@@ -10,14 +10,7 @@ from selfmotion.robot import RobotModel
 from selfmotion.search.curves import SelfMotion
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.nodes import Admissible
-
-# Solutions nearer than this [rad or m, Euclidean] lead to the same plan once the start may move.
-_SAME = 0.3
-# Where all self-motions of the first pose can be traced: from so many seeds, in steps of this
-# [rad or m].
-_SEEDS, _SPACING = 60, 0.1
-# Where they cannot: so many seeds for each configuration that is asked for.
-_TRIES = 2
+from selfmotion.search.settings import SAME_START, SPACING, TRACING_SEEDS, TRIES
 
 
 def start_candidates(follows: Follows, count: int, rng: np.random.Generator) -> list[Array]:
@@ -59,9 +52,11 @@ def start_candidates(follows: Follows, count: int, rng: np.random.Generator) -> 
 
 def _along_curves(follows: Follows, count: int, rng: np.random.Generator) -> list[Array]:
     """Return up to `count` configurations within the limits, evenly over all curves."""
-    robot, motion = follows.robot, SelfMotion(follows, _SPACING)
+    robot, motion = follows.robot, SelfMotion(follows, SPACING)
     bounds = Admissible(robot.lower, robot.upper, motion.revolute, ())
-    curves = motion.curves(follows.targets(np.zeros(1))[0], spread(robot, _SEEDS, rng)).curves
+    curves = motion.curves(
+        follows.targets(np.zeros(1))[0], spread(robot, TRACING_SEEDS, rng)
+    ).curves
     # The last sample of a closed curve is its first one.
     samples = [curve.q[: len(curve.q) - curve.closed] for curve in curves]
     inside = [q[bounds.free(q)] for q in samples]
@@ -75,11 +70,11 @@ def _scattered(follows: Follows, count: int, rng: np.random.Generator) -> list[A
     """Return up to `count` configurations that Newton's method finds, none near another."""
     robot = follows.robot
     manifold = Manifold(follows, robot.lower, robot.upper)
-    seeds = np.array(list(spread(robot, _TRIES * count, rng)))
+    seeds = np.array(list(spread(robot, TRIES * count, rng)))
     q, arrived = manifold.project(seeds, follows.targets(np.zeros(1))[0], far=True)
     found: list[Array] = []
     for one in q[arrived]:
-        if len(found) < count and all(np.linalg.norm(one - other) > _SAME for other in found):
+        if len(found) < count and all(np.linalg.norm(one - other) > SAME_START for other in found):
             found.append(one)
     return found
 
