@@ -6,7 +6,7 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.follow import Follow, Follows
+from selfmotion.follow import BoundFollow, Follows
 
 LEFT, RIGHT = "left_gripper", "right_gripper"
 
@@ -25,5 +25,5 @@ def both_arms(left: str, right: str) -> tuple[Follows, Array]:
     items = []
     for tool, reference, task in ((LEFT, None, left), (RIGHT, LEFT, right)):
         chain = robot.chain_to(tool, reference)
-        items.append(Follow(chain, sm.Dwell(chain.place(start), 1.0), sm.Task.of(task)))
+        items.append(BoundFollow(chain, sm.Dwell(chain.place(start), 1.0), sm.Task.of(task)))
     return Follows(robot, tuple(items)), np.array(start)
