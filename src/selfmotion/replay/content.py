@@ -4,6 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array
+from selfmotion.follow import BoundFollow
 from selfmotion.replay import links, scene, shapes
 from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
 from selfmotion.replay.facts import describe, table
@@ -26,6 +27,26 @@ _TRIAD_LENGTH = 0.09
 _ELLIPSOID_LENGTH = 0.3
 
 
+class _Tip:
+    """What follows a path, sampled: where it is and was to be, where the path is carried."""
+
+    def __init__(self, plan: Plan, follow: BoundFollow) -> None:
+        self.carrier = follow.chain.carrier
+        self.shown = curves(plan, plan.trajectory, follow)
+        self.start = curves(plan, plan.initial_trajectory, follow)
+        # The whole path, also where the motion ends before it.
+        times = np.linspace(0.0, follow.path.duration, len(self.shown.t))
+        base = follow.chain.base_placement
+        prescribed = follow.path.samples(times).translation
+        self.target: Array = prescribed @ base.rotation.T + base.translation
+
+    @property
+    def outline(self) -> list[Array]:
+        """Points of it in world axes; a path that is carried is where the tool is."""
+        still = [self.target] if self.carrier < 0 else []
+        return [self.shown.tool_in_world, *still]
+
+
 class _Motion:
     """A plan, sampled: the motion itself and x = 0."""
 
@@ -34,11 +55,8 @@ class _Motion:
         self.plan = plan
         self.frames = key_frames(robot, plan.trajectory)
         self.ghost = key_frames(robot, plan.initial_trajectory)
-        self.shown = curves(plan, plan.trajectory)
-        self.start = curves(plan, plan.initial_trajectory)
-        # The whole path, also where the motion ends before it.
-        times = np.linspace(0.0, plan.path.duration, len(self.shown.t))
-        self.target: Array = plan.path.samples(times).translation
+        self.tips = [_Tip(plan, item) for item in plan.problem.follows.items]
+        self.shown, self.start = self.tips[0].shown, self.tips[0].start
         self.obstacles = plan.obstacles
         models = [model for model, _ in plan.problem.envelope.bodies]
         self.clearance = clearance_curve(plan.trajectory, models)
@@ -58,13 +76,13 @@ def page_content(
     hull = scene.outline(
         arm,
         [frames for motion in motions for frames in (motion.frames, motion.ghost)],
-        [points for motion in motions for points in (motion.shown.tool, motion.target)],
+        [points for motion in motions for tip in motion.tips for points in tip.outline],
     )
     box = scene.Extent(hull.min(axis=0), hull.max(axis=0))
     scale = _scale(motions)
     longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
     return {
-        "camera": scene.camera(hull, motions[0].shown.tool),
+        "camera": scene.camera(hull, motions[0].shown.tool_in_world),
         "commands": [
             *scene.stage_commands(box),
             *links.arm_commands(robot, arm),
@@ -122,6 +140,9 @@ def _plan(
         "label": name,
         "description": describe(motion.plan),
         "root": root,
+        "tips": [
+            {"root": f"{root}/tip{f}", "carrier": tip.carrier} for f, tip in enumerate(motion.tips)
+        ],
         "duration": motion.plan.trajectory.duration,
         "verdict": motion.plan.certificate.verdict,
         "verified": bool(motion.plan.certificate.verified),
@@ -132,18 +153,30 @@ def _plan(
         "ellipsoid": {
             "t": payload.array(shown.t),
             "matrix": payload.array(shown.ellipsoid),
-            "tool": payload.array(shown.tool),
+            "tool": payload.array(shown.tool_in_world),
         },
         "clearance": None if motion.clearance is None else _clearance(motion.clearance, payload),
         "obstacles": {item.name: scene.obstacle_node(root, item) for item in motion.obstacles},
         "commands": [
             *scene.obstacle_commands(root, motion.obstacles, payload),
-            *scene.trace_commands(
-                root, payload, shown, motion.start, motion.target, scale, _TRACE_RADIUS * size
+            *(
+                command
+                for f, tip in enumerate(motion.tips)
+                for command in _traces(f"{root}/tip{f}", payload, tip, scale, times, size)
             ),
-            scene.triad_command(root, payload, shown, times, _TRIAD_LENGTH * size),
         ],
     }
+
+
+def _traces(
+    root: str, payload: Payload, tip: _Tip, scale: Json, times: Array, size: float
+) -> list[Json]:
+    """Return the commands for the traces of a tip, below the node `root` of what carries them."""
+    look = (scale, _TRACE_RADIUS * size)
+    return [
+        *scene.trace_commands(root, payload, tip.shown, tip.start, tip.target, *look),
+        scene.triad_command(root, payload, tip.shown, times, _TRIAD_LENGTH * size),
+    ]
 
 
 def _packed(frames: KeyFrames, payload: Payload) -> Json:

@@ -8,9 +8,10 @@ import pinocchio as pin
 from scipy.ndimage import maximum_filter1d
 
 from selfmotion.basics import Array
+from selfmotion.follow import BoundFollow
 from selfmotion.motion import Trajectory
 from selfmotion.result import Plan
-from selfmotion.robot import RobotModel
+from selfmotion.robot import Chain, RobotModel
 from selfmotion.task import Task
 
 # Between key frames a page interpolates; it may be off by this much at most [m, and per entry of
@@ -136,12 +137,14 @@ class Curves:
         Distance from the prescribed tool motion in the task's rows [m], [rad]: the largest within
         1 % of the duration, because at the trajectory's samples it is next to nothing.
     tool : (M, 3)
-        Position of the tool in world axes [m].
+        Position of the tool in the frame that carries its path [m]: that of a joint, or the world.
     rotation : (M, 3, 3)
-        Orientation of the tool.
+        Orientation of the tool there.
+    carrier : (M, 4, 4)
+        Where this frame is in the world.
     ellipsoid : (M, 3, 3)
-        (J_v J_vᵀ)^½ of the prescribed linear rows: maps the unit sphere of joint speeds to the
-        ellipsoid of tool speeds [m/s]. No axis is thinner than a fiftieth of the longest.
+        (J_v J_vᵀ)^½ of the prescribed linear rows, world axes: maps the unit sphere of joint speeds
+        to the ellipsoid of tool speeds [m/s]. No axis is thinner than a fiftieth of the longest.
     """
 
     t: Array
@@ -152,26 +155,43 @@ class Curves:
     rotation_error: Array
     tool: Array
     rotation: Array
+    carrier: Array
     ellipsoid: Array
 
+    @property
+    def tool_in_world(self) -> Array:
+        """Position of the tool in world axes [m], (M, 3)."""
+        turned = np.einsum("kij,kj->ki", self.carrier[:, :3, :3], self.tool)
+        return np.asarray(turned + self.carrier[:, :3, 3])
 
-def curves(plan: Plan, trajectory: Trajectory, points: int = _CURVE_POINTS) -> Curves:
-    """Evaluate `trajectory` (the plan's, or its x = 0 motion) for the plots."""
-    robot, task = plan.robot, plan.task
+
+def curves(
+    plan: Plan,
+    trajectory: Trajectory,
+    follow: BoundFollow | None = None,
+    points: int = _CURVE_POINTS,
+) -> Curves:
+    """Evaluate `trajectory` (the plan's, or its x = 0 motion) for the plots of what is followed."""
+    follow = plan.problem.follows.items[0] if follow is None else follow
+    chain, task = follow.chain, follow.task
+    base, world = chain.base_placement, Chain(chain.model, chain.base)
     times = np.linspace(0.0, trajectory.duration, points)
     clock = _clock(trajectory, times)
     q = trajectory(clock)
-    target = plan.path.samples(clock)
+    target, carrier = follow.path.samples(clock), np.empty((points, 4, 4))
     manipulability, ellipsoid = np.empty(points), np.empty((points, 3, 3))
     errors, tool, rotation = np.empty((points, 2)), np.empty((points, 3)), np.empty((points, 3, 3))
     for k in range(points):
-        jacobian = robot.jacobian(q[k])
-        pose = robot.pose(q[k])
-        rows = task.select(jacobian, pose.rotation)
+        jacobian, turn, place = chain.at(q[k])
+        pose, reference = pin.SE3(turn, place), world.place(q[k])
+        rows = plan.problem.follows.jacobian(q[k])
         manipulability[k] = np.prod(np.linalg.svd(rows, compute_uv=False))
-        ellipsoid[k] = _velocity_ellipsoid(jacobian, task)
+        shape = _velocity_ellipsoid(jacobian, task)
+        ellipsoid[k] = reference.rotation @ shape @ reference.rotation.T
         errors[k] = task.miss(pin.SE3(target.rotation[k], target.translation[k]), pose)
-        tool[k], rotation[k] = pose.translation, pose.rotation
+        carried = base * pose
+        tool[k], rotation[k] = carried.translation, carried.rotation
+        carrier[k] = (reference * base.inverse()).homogeneous
     window = 2 * (points // 100) + 1
     return Curves(
         t=times,
@@ -182,6 +202,7 @@ def curves(plan: Plan, trajectory: Trajectory, points: int = _CURVE_POINTS) -> C
         rotation_error=maximum_filter1d(errors[:, 1], window),
         tool=tool,
         rotation=rotation,
+        carrier=carrier,
         ellipsoid=ellipsoid,
     )
 

@@ -217,6 +217,16 @@ class Chain:
         return self.base == WORLD and len(self.joints) == self.dof
 
     @property
+    def carrier(self) -> int:
+        """The joint that carries the base frame, by its coordinate; -1 for the world."""
+        return int(self.model.frames[self.base].parentJoint) - 1
+
+    @property
+    def base_placement(self) -> pin.SE3:
+        """The base frame in that of the joint that carries it."""
+        return pin.SE3(self.model.frames[self.base].placement)
+
+    @property
     def tip_name(self) -> str:
         """Name of the tip's frame."""
         return str(self.model.frames[self.tip].name)

@@ -195,10 +195,12 @@ class Page {
     this.content.plans.forEach((plan, k) => {
       const shown = k === this.number;
       this.stage.show(`${plan.root}/obstacles`, shown);
-      this.stage.show(`${plan.root}/prescribed`, shown && trace);
-      this.stage.show(`${plan.root}/trace`, shown && trace);
-      this.stage.show(`${plan.root}/start`, shown && trace && ghost);
-      this.stage.show(`${plan.root}/triads`, shown && triads);
+      for (const { root } of plan.tips) {
+        this.stage.show(`${root}/prescribed`, shown && trace);
+        this.stage.show(`${root}/trace`, shown && trace);
+        this.stage.show(`${root}/start`, shown && trace && ghost);
+        this.stage.show(`${root}/triads`, shown && triads);
+      }
     });
   }
 

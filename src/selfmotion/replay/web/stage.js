@@ -86,6 +86,11 @@ class Stage {
       path: `${root}/${joint.node}`,
       clip: { fps: 1, name: joint.name, tracks: tracks(frames, k, this.content.joints.length) },
     }));
+    // What rides on a part moves as the joint that carries it.
+    for (const { root, carrier } of plan.tips.filter((tip) => tip.carrier >= 0)) {
+      clips.push({ path: root, clip: {
+        fps: 1, name: root, tracks: tracks(plan.frames, carrier, this.content.joints.length) } });
+    }
     add(`${ROOT}/robot`, plan.frames);
     add(`${ROOT}/ghost`, plan.ghost);
     this.viewer.handle_command({
