@@ -1,7 +1,6 @@
 """A path that no motion follows as a whole, in the fewest parts."""
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -21,12 +20,12 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.constraints import Constraint
 from selfmotion.path import Retimed, Section, section_at_rest
 from selfmotion.planning.moves import Mover, Retreat, between_parts
+from selfmotion.planning.part_problem import asked_of_part, relaxed_along
 from selfmotion.planning.run import plan, plan_along
 from selfmotion.planning.search import Search
-from selfmotion.planning.settings import ATTEMPTS, ELSEWHERE, GUIDE_SAMPLES, SHORTEST_WINDOW
+from selfmotion.planning.settings import ATTEMPTS, ELSEWHERE, GUIDE_SAMPLES
 from selfmotion.problem import Problem, check_problem, rest_orders
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.search import (
@@ -37,7 +36,6 @@ from selfmotion.search import (
     has_curves,
     turned_towards,
 )
-from selfmotion.task import Relaxation
 
 # How smoothly a tool motion has to rest that needs no ramp; see `rest_orders`.
 _AT_REST = 2
@@ -272,34 +270,7 @@ class _Planner:
             whole,
             path=path,
             start=whole.start if stretch.first == 0 else None,
-            constraints=list(_asked_of_part(whole, stretch.first == 0, stretch.last == last)),
+            constraints=list(asked_of_part(whole, stretch.first == 0, stretch.last == last)),
             relaxations=list(relaxed_along(whole, path, ends)),
             rest=True,
         )
-
-
-def _asked_of_part(problem: Problem, is_first: bool, is_last: bool) -> Iterator[Constraint]:
-    for item in problem.constraints:
-        kept: Constraint | None = None if item.closes else item
-        if kept is not None and not is_last:
-            kept = kept.on_part()
-        if kept is not None and not is_first:
-            kept = kept.on_last_part()
-        if kept is not None:
-            yield kept
-
-
-def relaxed_along(
-    problem: Problem, path: Retimed, ends: tuple[float, float]
-) -> Iterator[Relaxation]:
-    """Return what is relaxed along a stretch of the path, windows by its own time."""
-    for item in problem.relaxations:
-        if item.during is None:
-            yield item
-            continue
-        first, last = path.when(np.clip(item.during, *ends) - ends[0]).tolist()
-        # A ramp hardly moves at its end: when it gets there is known to some digits only.
-        first = 0.0 if item.during[0] <= ends[0] else first
-        last = path.duration if item.during[1] >= ends[1] else last
-        if last - first > SHORTEST_WINDOW * path.duration:
-            yield replace(item, during=(first, last))
