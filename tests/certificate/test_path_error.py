@@ -10,6 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate.path_error import bound_errors
+from selfmotion.follow import BoundFollow
 from support.arms import robot_named
 
 ROUNDING = 1e-12
@@ -37,7 +38,9 @@ def test_the_error_is_bounded_at_all_times_and_hardly_more() -> None:
 
     def check(tolerance: float, *relaxed: sm.Relaxation) -> Any:
         given = sm.Tolerance(tolerance, 1e-6)
-        return bound_errors(robot, Swinging(), sm.Task.PLANAR, trajectory, given, relaxed)
+        return bound_errors(
+            robot, BoundFollow(robot.chain, Swinging(), sm.Task.PLANAR), trajectory, given, relaxed
+        )
 
     for tolerance in (1.001e-4, 1e-4 / 1.001):
         found = check(tolerance)
@@ -85,7 +88,9 @@ def test_no_peak_between_the_points_looked_at_is_missed(angular: bool) -> None:
         for allowed in (1.0, most * (1.0 - 1e-5)):
             given = sm.Tolerance(allowed, allowed)
             path = Arched(float(top))
-            found = bound_errors(robot, path, sm.Task.POSE, trajectory, given, ())
+            found = bound_errors(
+                robot, BoundFollow(robot.chain, path, sm.Task.POSE), trajectory, given, ()
+            )
             value = (found.rotation if angular else found.position).value
             assert most - ROUNDING <= value <= 1.01 * most
 
@@ -98,7 +103,9 @@ def test_errors_of_every_row_count(row: int) -> None:
     beside = robot.pose(q) * pin.exp6(pin.Motion(size * np.eye(6)[row]))
     path = sm.Waypoints.from_poses([0.0, 1.0], [beside, beside])
     trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
-    found = bound_errors(robot, path, sm.Task.POSE, trajectory, sm.Tolerance(1.0, 1.0), ())
+    found = bound_errors(
+        robot, BoundFollow(robot.chain, path, sm.Task.POSE), trajectory, sm.Tolerance(1.0, 1.0), ()
+    )
     expected = [size, 0.0] if row < 3 else [0.0, size]
     errors = [found.position.value, found.rotation.value]
     np.testing.assert_allclose(errors, expected, atol=1e-3 * size)
@@ -121,7 +128,9 @@ def test_where_a_path_bends_sharply_a_short_interval_stays_undecided() -> None:
 
     trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 3)), robot.joint_names)
     allowed = sm.Tolerance(1e-4 * (1.0 + 1e-9), 1.0)
-    found = bound_errors(robot, Bent(), sm.Task.PLANAR, trajectory, allowed, ())
+    found = bound_errors(
+        robot, BoundFollow(robot.chain, Bent(), sm.Task.PLANAR), trajectory, allowed, ()
+    )
     ((start, end),) = found.undecided
     assert start <= 1.0 / 3.0 <= end
     assert end - start == pytest.approx(2.0**-16)
