@@ -11,16 +11,14 @@ from selfmotion.robot import RobotModel
 from selfmotion.search.curves import SelfMotion
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.nodes import Admissible
-
-# Solutions nearer than this [rad or m, Euclidean] lead to the same plan once the start may move.
-_SAME = 0.3
-# Where all self-motions of the first pose can be traced: from so many seeds, in steps of this
-# [rad or m].
-_SEEDS, _SPACING = 60, 0.1
-# Where they cannot: so many seeds for each configuration that is asked for.
-_TRIES = 2
-# Where most of them keep not what else is asked: so many rounds at most, until there is this share.
-_ROUNDS, _ENOUGH = 12, 0.5
+from selfmotion.search.settings import (
+    ENOUGH_STARTS,
+    SAME_START,
+    SPACING,
+    START_ROUNDS,
+    TRACING_SEEDS,
+    TRIES,
+)
 
 Admits = Callable[[Array], npt.NDArray[np.bool_]]
 
@@ -85,9 +83,11 @@ def _along_curves(
     follows: Follows, count: int, rng: np.random.Generator, admits: Admits
 ) -> list[Array]:
     """Return up to `count` configurations within the limits, evenly over all curves."""
-    robot, motion = follows.robot, SelfMotion(follows, _SPACING)
+    robot, motion = follows.robot, SelfMotion(follows, SPACING)
     bounds = Admissible(robot.lower, robot.upper, motion.revolute, ())
-    curves = motion.curves(follows.targets(np.zeros(1))[0], spread(robot, _SEEDS, rng)).curves
+    curves = motion.curves(
+        follows.targets(np.zeros(1))[0], spread(robot, TRACING_SEEDS, rng)
+    ).curves
     # The last sample of a closed curve is its first one.
     samples = [curve.q[: len(curve.q) - curve.closed] for curve in curves]
     inside = [q[bounds.free(q) & admits(q)] for q in samples]
@@ -104,14 +104,16 @@ def _scattered(
     robot = follows.robot
     manifold = Manifold(follows, robot.lower, robot.upper)
     target, found = follows.targets(np.zeros(1))[0], list[Array]()
-    for _ in range(_ROUNDS):
-        seeds = np.array(list(spread(robot, _TRIES * count, rng)))
+    for _ in range(START_ROUNDS):
+        seeds = np.array(list(spread(robot, TRIES * count, rng)))
         q, arrived = manifold.project(seeds, target, far=True)
         for one in q[arrived][admits(q[arrived])]:
-            if len(found) < count and all(np.linalg.norm(one - other) > _SAME for other in found):
+            if len(found) < count and all(
+                np.linalg.norm(one - other) > SAME_START for other in found
+            ):
                 found.append(one)
         # Without anything else to keep, one round tells what there is.
-        if admits is _all or len(found) >= _ENOUGH * count:
+        if admits is _all or len(found) >= ENOUGH_STARTS * count:
             break
     return found
 
