@@ -78,6 +78,11 @@ class Obstacle(ABC):
         return f"{self.shape} '{self.name}'"
 
     @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that its geometry is read from."""
+        return ()
+
+    @property
     def hint(self) -> str:
         """What looks like a slip of units, in words; "" where nothing does."""
         geometry = self.geometry()
@@ -239,6 +244,11 @@ class Mesh(Obstacle):
             raise CollisionError(f"{self.label}: file is {shown(self.file)}, expected a path")
         object.__setattr__(self, "file", Path(self.file))
         self._set_length("scale")
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """See `Obstacle.files`."""
+        return (self.file,)
 
     def geometry(self) -> Any:
         """See `Obstacle.geometry`."""
