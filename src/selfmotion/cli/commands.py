@@ -41,6 +41,7 @@ def plan(
     start: options.StartOption = None,
     warm: options.FromOption = None,
     tool: options.ToolOption = None,
+    reference: options.ReferenceOption = None,
     lock: options.LockOption = None,
     degree: options.DegreeOption = 3,
     mu: options.MuOption = 0.0,
@@ -117,6 +118,7 @@ def check(
     corners: options.CheckedCornersOption = None,
     task: options.CheckedTaskOption = None,
     tool: options.ToolOption = None,
+    reference: options.ReferenceOption = None,
     lock: options.LockOption = None,
     degrees: options.DegreesOption = False,
     velocity: options.VelocityOption = None,
@@ -146,7 +148,7 @@ def check(
             raise sm.ProblemError(
                 f"{file}: a motion is checked against a robot and a path: give --robot and --path"
             )
-        arm = sm.load_robot(robot, tool=tool, lock=options.locks(lock or []))
+        arm = sm.load_robot(robot, tool=tool, lock=options.locks(lock or []), reference=reference)
         certificate = sm.certify(
             arm,
             formats.read_path(path, feed=feed, corners=corners or "blend"),

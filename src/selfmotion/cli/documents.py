@@ -32,6 +32,7 @@ class Shell:
     task: str | None
     start: str | None
     tool: str | None
+    reference: str | None
     lock: list[str]
     degree: int
     mu: float
@@ -58,7 +59,9 @@ class Shell:
         """Return the table."""
         held = options.locks(self.lock)
         # Loaded only where it decides what is meant.
-        planar = self.task is None and _is_planar(sm.load_robot(robot, self.tool, held))
+        planar = self.task is None and _is_planar(
+            sm.load_robot(robot, self.tool, held, reference=self.reference)
+        )
         task = self.task or ("planar" if planar else "pose")
         normal = self.normal or ("z" if task.startswith("planar") else "x")
         table: dict[str, Any] = {
@@ -78,8 +81,9 @@ class Shell:
         }
         if self.joint_limits is not None:
             table["joint_limits"] = str(self.joint_limits)
-        if self.tool is not None:
-            table["robot"]["tool"] = self.tool
+        for name in ("tool", "reference"):
+            if getattr(self, name) is not None:
+                table["robot"][name] = getattr(self, name)
         return table
 
     def _start(self, warm_start: sm.Plan | None) -> Any:

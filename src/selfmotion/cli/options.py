@@ -99,6 +99,10 @@ FromOption = Annotated[
     typer.Option("--from", help="Begin with the start and the null motion of this plan (.npz)."),
 ]
 ToolOption = Annotated[str | None, typer.Option(help="Tool frame (a link).")]
+ReferenceOption = Annotated[
+    str | None,
+    typer.Option(help="Link in whose frame the path is given, where it moves: a part on a table."),
+]
 DegreeOption = Annotated[int, typer.Option(help="Degree of the null motion's polynomial.")]
 MuOption = Annotated[
     float, typer.Option(help="Weight of 1/det(JJᵀ), the distance from singular poses.")

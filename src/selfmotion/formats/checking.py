@@ -41,6 +41,8 @@ def _given(value: Any) -> Any:
         return {name: _given(getattr(value, name)) for name in value.model_fields_set}
     if isinstance(value, list):
         return [_given(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _given(item) for key, item in value.items()}
     return value
 
 

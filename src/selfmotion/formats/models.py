@@ -71,12 +71,22 @@ _OWN: Mapping[str, _Fields] = {
 _WHOLLY_OWN = {"twist"}
 
 
-# The arm: one known by name, or a URDF or xacro file.
+# The arm: one known by name, or a URDF or xacro file; or a cell of several of these.
 _ROBOT: _Fields = {
-    **dict.fromkeys(("name", "file", "tool"), (Text, None)),
+    **dict.fromkeys(("name", "file", "reference"), (Text, None)),
     **dict.fromkeys(("base", "tool_offset"), (Pose, None)),
+    "tool": (Names, None),
     "arguments": (Table, None),
     "lock": (Coordinates, None),
+}
+_PART: _Fields = {
+    **dict.fromkeys(("name", "file", "on"), (Text, None)),
+    "base": (Pose, None),
+}
+# What else follows a path, or is held at a pose.
+_FOLLOW: _Fields = {
+    **dict.fromkeys(("tool", "reference"), (Text, None)),
+    "pose": (Pose, None),
 }
 # A tool motion from a file of poses.
 _PATH_FILE: _Fields = {
@@ -109,11 +119,16 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
     constraints = {**_kinds(Constraint), "Clearance": _clearance_model()}
     paths = {**_kinds(Path), "file": _model("file", _PATH_FILE)}
     costs = {**_kinds(Cost), FUNCTION: _model(FUNCTION, _FUNCTION)}
+    parts: Any = dict[str, _model("RobotPart", _PART)]  # type: ignore[misc]
+    tasks: Any = Literal[tuple(task.value for task in Task)]
+    tool_motion = _one_of(paths.values(), "kind")
+    follow = _model("Follow", {**_FOLLOW, "task": (tasks, "pose"), "path": (tool_motion, None)})
     fields: dict[str, Any] = {
-        "robot": (_model("Robot", _ROBOT), ...),
-        "task": (Literal[tuple(task.value for task in Task)], "pose"),
+        "robot": (_model("Robot", {**_ROBOT, "parts": (parts, None)}), ...),
+        "task": (tasks, "pose"),
         "start": (Start, "free"),
-        "path": (_one_of(paths.values(), "kind"), ...),
+        "path": (tool_motion, ...),
+        "also": (list[follow], None),  # type: ignore[valid-type]
         "null_motion": (_one_of(_kinds(NullMotion).values(), "kind"), None),
         "costs": (list[_one_of(costs.values(), "kind")], None),  # type: ignore[misc]
         "constraints": (list[_one_of(constraints.values(), "kind")], None),  # type: ignore[misc]

@@ -8,6 +8,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from selfmotion.basics import (
+    Array,
     FileFormatError,
     ProblemError,
     RobotError,
@@ -18,6 +19,7 @@ from selfmotion.basics import (
 from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost, FunctionCost
+from selfmotion.follow import Follow
 from selfmotion.formats.code import FUNCTION, name_kinds
 from selfmotion.formats.documents import PER_JOINT, in_si, read_document
 from selfmotion.formats.joint_limits import read_joint_limits
@@ -174,6 +176,8 @@ class _Reader:
         with _named(file, "path"):
             path = path_of(table["path"], robot, start, self._beside)
         options: dict[str, Any] = {"rest": table.get("rest", True)}
+        if "also" in table:
+            options["also"] = self._each("also", lambda item: self._follow(item, robot, start))
         if "null_motion" in table:
             with _named(file, "null_motion"):
                 options["null_motion"] = restore(NullMotion, table["null_motion"])
@@ -214,16 +218,40 @@ class _Reader:
 
     def _robot(self, given: Mapping[str, Any]) -> RobotModel:
         values = dict(given)
+        arguments = {key: str(value) for key, value in values.pop("arguments", {}).items()}
+        parts = values.pop("parts", None)
+        if parts is None:
+            return load_robot(self._source(values), **values, arguments=arguments)
+        for key in ("name", "file", "base"):
+            if key in values:
+                raise RobotError(f"{key}: is given in each of parts, where there are some")
+        base, on = (
+            {part: item[key] for part, item in parts.items() if key in item}
+            for key in ("base", "on")
+        )
+        robots = {part: self._source(item, f"parts.{part}: ") for part, item in parts.items()}
+        return load_robot(robots, **values, base=base, on=on, arguments=arguments)
+
+    def _source(self, values: dict[str, Any], where: str = "") -> str | FilePath:
+        """Take the name of a robot, or its file, from a table."""
         name, file = values.pop("name", None), values.pop("file", None)
         if (name is None) == (file is None):
             raise RobotError(
-                f"expected either name (one of {', '.join(NAMED_ARMS)}) or file (.urdf, .xacro)"
+                f"{where}expected either name (one of {', '.join(NAMED_ARMS)}) or file (.urdf, "
+                f".xacro)"
             )
         if name is not None and name not in NAMED_ARMS:
-            raise RobotError(f"name: unknown robot '{name}', known: {', '.join(NAMED_ARMS)}")
-        arguments = {key: str(value) for key, value in values.pop("arguments", {}).items()}
-        chosen = name if file is None else self._beside(file)
-        return load_robot(chosen, **values, arguments=arguments)
+            raise RobotError(f"{where}name: unknown robot '{name}', known: {', '.join(NAMED_ARMS)}")
+        return name if file is None else self._beside(file)
+
+    def _follow(self, given: Mapping[str, Any], robot: RobotModel, start: Array | None) -> Follow:
+        if ("pose" in given) == ("path" in given):
+            raise ProblemError("expected either path, or the pose that is held")
+        values = dict(given)
+        path = values.pop("pose", None)
+        if path is None:
+            path = path_of(values.pop("path"), robot, start, self._beside)
+        return Follow(path, **values)
 
     def _cost(self, values: Mapping[str, Any], robot: RobotModel) -> Cost:
         if values["kind"] == FUNCTION:

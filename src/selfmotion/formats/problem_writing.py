@@ -6,7 +6,7 @@ from typing import Any
 from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path
 from selfmotion.formats.documents import write_document
 from selfmotion.problem import Problem, check_problem, problem_to_dict
-from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot, mounting_of
+from selfmotion.robot import NAMED_ARMS, RobotModel, UrdfPart, load_robot, mounting_of
 
 
 def write_problem(problem: Problem, file: str | FilePath) -> None:
@@ -33,7 +33,14 @@ def problem_table(problem: Problem) -> dict[str, Any]:
 
 def _robot(robot: RobotModel) -> dict[str, Any]:
     mounting, source = mounting_of(robot.urdf, robot.tool), FilePath(robot.urdf.source)
-    table: dict[str, Any] = {"tool": mounting.tool}
+    tools = [mounting.tool, *robot.tools[1:]]
+    table: dict[str, Any] = {"tool": tools[0] if len(tools) == 1 else tools}
+    if robot.reference is not None:
+        table["reference"] = robot.reference
+    if robot.urdf.parts:
+        table["parts"] = {part.name: _part(part) for part in robot.urdf.parts}
+        table["lock"] = dict(robot.locked)
+        return table
     names = [name for name, arm in NAMED_ARMS.items() if str(source).endswith(arm.urdf)]
     named = next((name for name in names if _is_named(robot, name)), None)
     if named is not None:
@@ -49,6 +56,20 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
         if placed is not None:
             table[key] = {"position": placed[0], "rpy": placed[1]}
     table["lock"] = dict(robot.locked)
+    return table
+
+
+def _part(part: UrdfPart) -> dict[str, Any]:
+    known = part.source in NAMED_ARMS
+    source = part.source if known else str(FilePath(part.source).resolve())
+    table: dict[str, Any] = {"name" if known else "file": source}
+    if part.base is not None:
+        table["base"] = {
+            "position": part.base.translation.tolist(),
+            "rotation": part.base.rotation.tolist(),
+        }
+    if part.on is not None:
+        table["on"] = part.on
     return table
 
 

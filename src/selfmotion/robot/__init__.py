@@ -32,7 +32,4 @@ from selfmotion.robot.placements import (
     placements as placements,
 )
 from selfmotion.robot.tool_rates import ToolRates as ToolRates
-from selfmotion.robot.urdf import (
-    Urdf as Urdf,
-    UrdfJoint as UrdfJoint,
-)
+from selfmotion.robot.urdf import Urdf as Urdf, UrdfJoint as UrdfJoint, UrdfPart as UrdfPart

@@ -18,7 +18,14 @@ from selfmotion.robot.full_model import full_model, name_links
 from selfmotion.robot.held import locked_configuration
 from selfmotion.robot.model import RobotModel
 from selfmotion.robot.mounting import with_base, with_tool_offset
-from selfmotion.robot.urdf import Urdf, UrdfJoint, package_folders, parse_urdf, read_urdf
+from selfmotion.robot.urdf import (
+    Urdf,
+    UrdfJoint,
+    UrdfPart,
+    package_folders,
+    parse_urdf,
+    read_urdf,
+)
 from selfmotion.task import as_pose
 
 
@@ -232,6 +239,11 @@ def _parts(
         name: as_pose(at, f"base of '{name}'", RobotError) for name, at in (base or {}).items()
     }
     urdf = composed({name: source.urdf for name, source in sources.items()}, poses, on or {})
+    on = on or {}
+    parts = tuple(
+        UrdfPart(name, str(robot), poses.get(name), on.get(name)) for name, robot in robots.items()
+    )
+    urdf = dataclasses.replace(urdf, parts=parts)
     first, source = next(iter(sources.items()))
     own = source.tool
     limits: dict[str, dict[str, float]] = {}

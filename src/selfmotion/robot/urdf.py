@@ -48,6 +48,28 @@ class UrdfJoint:
 
 
 @dataclass(frozen=True)
+class UrdfPart:
+    """A robot that is part of a cell.
+
+    Attributes
+    ----------
+    name : str
+        What its links and joints are called after.
+    source : str
+        The name of an arm, or a file.
+    base : pinocchio.SE3 or None
+        Where its root stands: in the world, or on `on`.
+    on : str or None
+        The link of another part that carries it.
+    """
+
+    name: str
+    source: str
+    base: Any = None
+    on: str | None = None
+
+
+@dataclass(frozen=True)
 class Urdf:
     """A validated URDF, ready for Pinocchio.
 
@@ -64,6 +86,8 @@ class Urdf:
         Joint name → `UrdfJoint`.
     links : tuple of str
         Names of all links, in file order.
+    parts : tuple of UrdfPart
+        What it was composed of; none of a robot of its own, or read from a saved plan.
     """
 
     source: str
@@ -71,6 +95,7 @@ class Urdf:
     package_dirs: tuple[str, ...]
     joints: dict[str, UrdfJoint]
     links: tuple[str, ...]
+    parts: tuple[UrdfPart, ...] = ()
 
     @property
     def sha256(self) -> str:
