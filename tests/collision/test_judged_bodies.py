@@ -162,7 +162,7 @@ def test_a_mesh_in_millimetres_gets_a_hint(tmp_path: Path) -> None:
 
 def test_links_that_mostly_overlap_are_told_before_planning(tmp_path: Path) -> None:
     """A camera so long that it meets the torch in most configurations, but not in all."""
-    text = torch_urdf(set(BOXES)).replace("0.04 0.04 0.2", "0.6 0.16 0.2")
+    text = torch_urdf(set(BOXES)).replace("0.04 0.04 0.2", "0.5 0.36 0.2")
     (tmp_path / "long.urdf").write_text(text)
     robot = sm.load_robot(tmp_path / "long.urdf", "tcp")
     q = np.array([0.3, 0.6, -0.9, 1.0])
