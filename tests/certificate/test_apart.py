@@ -15,7 +15,7 @@ from selfmotion.certificate import (
     KeepsApart,
 )
 from selfmotion.certificate.apart import Approach, _nearer, closest_at_all_times
-from selfmotion.collision import Closest
+from selfmotion.collision import Closest, Overlap
 from support.arms import PANDA_HOME, robot_named, short_line, start_of
 from support.motions import motion_of
 
@@ -133,7 +133,7 @@ def test_how_near_bodies_come_is_told_in_millimetres() -> None:
 def test_links_that_overlap_as_they_are_made_are_told_with_how_often() -> None:
     motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))
     bodies = Bodies(lambda q: np.full(len(q), -0.05))
-    bodies.overlapping = (SimpleNamespace(first="first0", second="second0", share=0.3),)
+    bodies.overlapping = (Overlap("first0", "second0", 0.3, True),)
     text = KeepsApart(bodies, 0.1).judge(motion).text  # type: ignore[arg-type]
     assert "overlap in 30 % of all configurations" in text
 

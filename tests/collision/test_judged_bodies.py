@@ -158,3 +158,25 @@ def test_a_mesh_in_millimetres_gets_a_hint(tmp_path: Path) -> None:
         mesh = sm.Mesh("post", [0.0] * 3, str(tmp_path / "post.stl"), scale=scale)
         remarks = sm.Clearance([mesh]).requirement(panda).remarks
         assert any("millimetres?" in text for text in remarks) is said
+
+
+def test_links_that_mostly_overlap_are_told_before_planning(tmp_path: Path) -> None:
+    """A camera so long that it meets the torch in most configurations, but not in all."""
+    text = torch_urdf(set(BOXES)).replace("0.04 0.04 0.2", "0.5 0.36 0.2")
+    (tmp_path / "long.urdf").write_text(text)
+    robot = sm.load_robot(tmp_path / "long.urdf", "tcp")
+    q = np.array([0.3, 0.6, -0.9, 1.0])
+    problem = sm.Problem(robot, sm.Dwell(robot.pose(q), 1.0), task="planar", start=q)
+    model = sm.CollisionModel(robot)
+    mostly = {frozenset((x.first, x.second)) for x in model.overlapping if x.is_checked}
+    assert mostly
+    for pair in mostly:
+        first, second = pair
+        assert any(
+            f"{a} - {b}: these links overlap in " in text and "<disable_collisions" in text
+            for text in problem.remarks
+            for a, b in ((first, second), (second, first))
+        )
+    panda = robot_named("panda")
+    home = panda.dexterous_configuration()
+    assert sm.Problem(panda, sm.Dwell(panda.pose(home), 1.0), start=home).remarks == ()

@@ -1,12 +1,15 @@
 """Obstacles that move are avoided, or the arm stops."""
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 
 import selfmotion as sm
 from selfmotion.realtime import Flag, Replanner
-from support.arms import PANDA_HOME
+from support.arms import PANDA_HOME, robot_named
 from support.loops import Array, closed_loop
 
 # What the tool is off its path without noise or lag: the middle rule's error over cycles of 1 ms.
@@ -75,3 +78,43 @@ def test_an_obstacle_that_is_not_known_is_refused(
     replanner = Replanner(panda, constraints=[clearance])
     with pytest.raises(sm.ProblemError, match="'bal'"):
         replanner.step(0.0, PANDA_HOME, np.zeros(7), slow_circle, {"bal": pin.SE3.Identity()})
+
+
+LIMITS = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits())
+
+
+def test_all_clearances_are_kept() -> None:
+    """With the ball in the second one the arm is stopped as with the ball in the only one."""
+    panda, q = robot_named("panda"), np.array(sm.NAMED_ARMS["panda"].home)
+    first = panda.pose(q)
+    last = pin.SE3(first.rotation, first.translation + np.array([0.0, 0.25, 0.0]))
+    path = sm.Line(first, last, 3.0)
+    place = first.translation + np.array([0.0, 0.225, 0.0])
+    ball, far = sm.Sphere("ball", place, 0.05), sm.Sphere("far", [3.0] * 3, 0.05)
+    bodies = [sm.Clearance([far], 0.02), sm.Clearance([ball], 0.02)]
+    replanner = sm.Replanner(panda, "position", constraints=[*LIMITS, *bodies], horizon=2.0)
+    model = sm.CollisionModel(panda, [ball])
+    with_ball = [k for k, pair in enumerate(model.pairs) if "ball" in pair]
+    t, state, least = 0.0, (q, 0.0 * q), np.inf
+    for _ in range(250):
+        segment = replanner.step(t, *state, path)
+        t += replanner.period
+        now = segment.index(t)
+        state = segment.q[now], segment.qd[now]
+        least = min(least, float(model.distances(state[0][None])[0, with_ball].min()))
+    assert least > 0.0
+    # Either may be moved by its name.
+    replanner.step(t, *state, path, {"ball": pin.SE3.Identity(), "far": pin.SE3.Identity()})
+
+
+def test_a_cell_as_one_mesh_is_refused(tmp_path: Path) -> None:
+    """Its hull holds the arm, so that a hook in it would be none."""
+    panda = robot_named("panda")
+    parts = [trimesh.creation.icosphere(radius=0.005).apply_translation([0.3, 0.3, 0.6])]
+    for x, y in ((1.5, -1.5), (-1.5, 1.5), (-1.5, -1.5), (1.5, 1.5)):
+        post = trimesh.creation.box((0.02, 0.02, 4.0))
+        parts.append(post.apply_translation([x, y, 0.5]))
+    trimesh.util.concatenate(parts).export(tmp_path / "cell.stl")
+    cell = sm.Clearance([sm.Mesh("cell", [0.0] * 3, tmp_path / "cell.stl")], 0.01)
+    with pytest.raises(sm.ProblemError, match=r"convex hulls, and that of 'cell' always contains"):
+        sm.Replanner(panda, "position", constraints=[*LIMITS, cell])

@@ -13,7 +13,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.certificate.findings import Finding
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
-from selfmotion.collision import Closest, CollisionModel, Obstacle, srdf_line
+from selfmotion.collision import Closest, CollisionModel, Obstacle
 from selfmotion.motion import Trajectory
 
 # Intervals to begin with; each is halved so often before it counts as undecided.
@@ -115,11 +115,7 @@ class KeepsApart(Requirement):
         )
         for pair in self.model.overlapping:
             if {pair.first, pair.second} == {found.closest.first, found.closest.second}:
-                return (
-                    f"{text}; these links overlap in {100 * pair.share:.0f} % of all "
-                    f"configurations: if that is how they are made, give srdf= a file with "
-                    f"{srdf_line(pair.first, pair.second)}"
-                )
+                return f"{text}; {pair.remedy}"
         return text
 
 

@@ -14,6 +14,7 @@ from selfmotion.cli.app import (
     VERIFIED,
     app,
     plan_with_progress,
+    stages,
     terminal,
 )
 
@@ -70,6 +71,8 @@ def plan(
     outputs.check_suffixes([*job.outputs, *(out or [])])
     asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
     given = {key: value for key, value in asked.items() if value is not None}
+    for remark in job.problem.remarks:
+        stages.print(f"note: {remark}", markup=False, soft_wrap=True)
     result = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
     if as_json:
         terminal.print_json(data=json_tables.plan_json(result))

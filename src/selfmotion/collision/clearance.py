@@ -135,6 +135,12 @@ class ClearanceModel:
         """
         self._exact.hulls.move(obstacle, pose)
 
+    @property
+    def left_out(self) -> tuple[tuple[str, str], ...]:
+        """The pairs that only the exact model knows."""
+        kept = set(self._kept.tolist())
+        return tuple(pair for k, pair in enumerate(self._exact.pairs) if k not in kept)
+
     def _useful(self) -> Ints:
         """Return the indices of pairs whose hulls overlap hardly more often than the bodies."""
         exact = self._exact

@@ -43,6 +43,14 @@ class Overlap:
     share: float
     is_checked: bool
 
+    @property
+    def remedy(self) -> str:
+        """In how many configurations, and what to do where that is how they are made."""
+        return (
+            f"these links overlap in {100 * self.share:.0f} % of all configurations: if that is "
+            f"how they are made, give srdf= a file with {srdf_line(self.first, self.second)}"
+        )
+
 
 def srdf_line(first: str, second: str) -> str:
     """Return the line of an SRDF that leaves a pair of links out."""

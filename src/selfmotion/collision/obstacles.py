@@ -77,6 +77,11 @@ class Obstacle(ABC):
         return f"{self.shape} '{self.name}'"
 
     @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that its geometry is read from."""
+        return ()
+
+    @property
     def hint(self) -> str:
         """What looks like a slip of units, in words; "" where nothing does."""
         geometry = self.geometry()

@@ -135,6 +135,11 @@ class Mesh(Obstacle):
         object.__setattr__(self, "file", Path(self.file))
         self._set_length("scale")
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """See `Obstacle.files`."""
+        return (self.file,)
+
     def geometry(self) -> Any:
         """See `Obstacle.geometry`."""
         if not self.file.is_file():

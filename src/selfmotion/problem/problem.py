@@ -316,6 +316,14 @@ class Problem:
         own = (Envelope.of_limits(item) for item in arm_limits(self.robot, self.requirements))
         return reduce(and_, own, self.asked_envelope)
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What to know before planning: links that overlap in most configurations."""
+        bodies = (model for model, _ in self.envelope.bodies)
+        found = (pair for model in bodies for pair in model.overlapping if pair.is_checked)
+        told = (f"{pair.first} - {pair.second}: {pair.remedy}" for pair in found)
+        return tuple(dict.fromkeys(told))
+
     def certify(
         self,
         trajectory: Trajectory,

@@ -39,6 +39,14 @@ class Surroundings:
             for own, far in bodies
         ]
         self._names = [{item.name for item in own.obstacles} for own, _ in bodies]
+        for (model, _), names in zip(self._models, self._names, strict=True):
+            for link, obstacle in model.left_out:
+                if obstacle in names:
+                    raise ProblemError(
+                        f"{robot.name}: while the arm moves obstacles are their convex hulls, and "
+                        f"that of '{obstacle}' always contains '{link}': give its parts as "
+                        f"obstacles of their own"
+                    )
         self.blocked, self.message = False, ""
 
     def move(self, obstacles: Mapping[str, pin.SE3]) -> None:

@@ -11,7 +11,9 @@ import numpy as np
 
 from selfmotion.basics import (
     Array,
+    CollisionError,
     FileFormatError,
+    RobotError,
     SelfmotionError,
     read_archive,
     restore,
@@ -24,6 +26,7 @@ from selfmotion.optimise import Iteration, Status
 from selfmotion.problem.problem import Problem
 from selfmotion.problem.saved_problem import problem_from_dict, problem_to_dict
 from selfmotion.result.report import Gap, Report
+from selfmotion.robot import mesh_digests
 
 # Raised with every change that older versions cannot read.
 FORMAT = 3
@@ -39,6 +42,7 @@ class Archive(NamedTuple):
     report: Report
     certificate: Certificate
     altered: str = ""
+    changed: tuple[str, ...] = ()
 
     def write(self, file: FilePath) -> None:
         """Write the file, atomically."""
@@ -46,6 +50,7 @@ class Archive(NamedTuple):
         description = {
             "format": FORMAT,
             "problem": problem_to_dict(self.problem),
+            "meshes": _meshes(self.problem),
             "joint_names": list(self.trajectory.joint_names),
             "report": _report_to_dict(self.report),
             "history": [_without(iteration, "x") for iteration in history],
@@ -74,12 +79,27 @@ class Archive(NamedTuple):
         if written != _digest(description, arrays):
             altered = f"{file.name} was changed after the plan was written: its digest differs"
         try:
-            return _restore(description, arrays)._replace(altered=altered)
+            found = _restore(description, arrays)
+            known = description.get("meshes", {})
+            now = _meshes(found.problem)
+            changed = tuple(name for name in known if now.get(name, "") != known[name])
+            return found._replace(altered=altered, changed=changed)
+        except (CollisionError, RobotError) as error:
+            raise FileFormatError(f"{file}: cannot be measured anew: {error}") from error
         except SelfmotionError as error:
             raise FileFormatError(f"{file}: is a damaged plan: {error}") from error
         # Any number or key of a damaged plan may be any other, and fail anywhere.
         except Exception as error:
             raise FileFormatError(f"{file}: is no plan, or a damaged one: {error!r}") from error
+
+
+def _meshes(problem: Problem) -> dict[str, str]:
+    """Return the digests of all mesh files that bodies are made of."""
+    found = mesh_digests(problem.robot.urdf, "collision")
+    bodies = (body for item in problem.requirements for body in item.obstacles)
+    for file in (file for body in bodies for file in body.files):
+        found[str(file)] = hashlib.sha256(file.read_bytes()).hexdigest()
+    return found
 
 
 def _digest(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:

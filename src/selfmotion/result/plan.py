@@ -188,7 +188,8 @@ def load_plan(file: str | FilePath) -> Plan:
     FileFormatError
         The file is missing, is no plan, lacks something, or was written by a newer version.
     """
-    plan = Plan(*Archive.read(as_path(file)))
+    archive = Archive.read(as_path(file))
+    plan = Plan(*archive[:-1])
     try:
         certificate = plan.check()
     except (CollisionError, RobotError) as error:
@@ -196,7 +197,8 @@ def load_plan(file: str | FilePath) -> Plan:
         certificate = replace(plan.certificate, failures=(unknown, *plan.certificate.failures))
     except (SelfmotionError, ArithmeticError, ValueError) as error:
         raise FileFormatError(f"{file}: is a damaged plan: {error}") from error
-    if plan.robot.urdf.has_changed():
-        note = f"{plan.robot.urdf.source} has changed since the plan was made"
+    source = (plan.robot.urdf.source,) if plan.robot.urdf.has_changed() else ()
+    for name in (*source, *archive.changed):
+        note = f"{name} has changed since the plan was made"
         certificate = replace(certificate, notes=(*certificate.notes, note))
     return replace(plan, certificate=certificate)

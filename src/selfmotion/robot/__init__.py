@@ -22,6 +22,7 @@ from selfmotion.robot.loading import (
     load_robot as load_robot,
     rebuild_robot as rebuild_robot,
 )
+from selfmotion.robot.mesh_files import mesh_digests as mesh_digests
 from selfmotion.robot.model import RobotModel as RobotModel
 from selfmotion.robot.mounting import (
     Mounting as Mounting,

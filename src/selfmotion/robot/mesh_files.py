@@ -1,5 +1,6 @@
 """Mesh files of a URDF that are missing or cannot be read."""
 
+import hashlib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection
 from pathlib import Path
@@ -47,6 +48,23 @@ def bad_meshes(urdf: Urdf, tag: str) -> tuple[BadMesh, ...]:
     return tuple(found)
 
 
+def mesh_digests(urdf: Urdf, tag: str) -> dict[str, str]:
+    """Return the SHA-256 of the mesh files of all ``<visual>`` or ``<collision>`` elements."""
+    root, found = ElementTree.fromstring(urdf.text), {}
+    for mesh in root.iterfind(f"link/{tag}/geometry/mesh"):
+        place = _place(urdf, mesh.get("filename", ""))
+        if place is not None:
+            found[str(place)] = hashlib.sha256(place.read_bytes()).hexdigest()
+    return found
+
+
+def _place(urdf: Urdf, file: str) -> Path | None:
+    """Return where a mesh is on this machine, if it is there."""
+    scheme, _, rest = file.rpartition("://")
+    folders = urdf.package_dirs if scheme in ("package", "model") else ("",)
+    return next((Path(folder, rest) for folder in folders if Path(folder, rest).is_file()), None)
+
+
 def without_meshes(text: str, tag: str, files: Collection[str]) -> str:
     """Return a URDF's text without the elements (`tag`) whose meshes are in these `files`."""
     root = ElementTree.fromstring(text)
@@ -59,11 +77,9 @@ def without_meshes(text: str, tag: str, files: Collection[str]) -> str:
 
 def _fault(urdf: Urdf, file: str) -> str:
     """Return why a mesh cannot be read, "" where it can."""
-    scheme, _, rest = file.rpartition("://")
-    if scheme in ("http", "https", "ftp"):
+    if file.rpartition("://")[0] in ("http", "https", "ftp"):
         return "the mesh is not on this machine, download it"
-    folders = urdf.package_dirs if scheme in ("package", "model") else ("",)
-    found = next((Path(folder, rest) for folder in folders if Path(folder, rest).is_file()), None)
+    found = _place(urdf, file)
     if found is None:
         return "no such mesh file"
     try:

@@ -1,0 +1,88 @@
+"""`check` answers each of its options for plans, too, or refuses it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import selfmotion as sm
+from selfmotion.cli import app
+from support.arms import robot_named
+from support.shell import complaint
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    panda = robot_named("panda")
+    start = panda.dexterous_configuration()
+    circle = sm.Circle.around(panda.pose(start), radius=0.05, duration=4.0)
+    file = tmp_path_factory.mktemp("check") / "seam.npz"
+    sm.plan(sm.Problem(panda, circle, task="position", start=start)).save(file)
+    return file
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--robot", "ur5"],
+        ["--path", "nosuch.csv"],
+        ["--feed", "0.1"],
+        ["--task", "pose"],
+        ["--corners", "stop"],
+        ["--tool", "x"],
+        ["--lock", "a=1"],
+        ["--degrees"],
+    ],
+)
+def test_what_is_the_plans_own_is_refused(plan: Path, options: list[str]) -> None:
+    said = complaint("check", plan, *options)
+    assert f"{options[0]} is the plan's own" in said
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([], ""),
+        (["--velocity", "0.001"], "times its limit"),
+        (["--acceleration", "0.001"], "accelerates at"),
+        (["--clearance", "0.5"], "apart"),
+        (["--tolerance", "1e-15"], "off the path"),
+    ],
+)
+def test_what_is_asked_is_judged(plan: Path, options: list[str], words: str) -> None:
+    found = CliRunner().invoke(app, ["check", str(plan), *options])
+    assert found.exit_code == (1 if words else 0), found.output
+    assert words in found.output.replace("\n", " ")
+
+
+def test_obstacles_are_judged_with_a_plan(plan: Path, tmp_path: Path) -> None:
+    at = robot_named("panda").pose(robot_named("panda").dexterous_configuration()).translation
+    wall = [{"shape": "box", "name": "wall", "position": at.tolist(), "size": [0.2] * 3}]
+    (tmp_path / "wall.json").write_text(json.dumps(wall))
+    options = ["--obstacles", str(tmp_path / "wall.json")]
+    assert CliRunner().invoke(app, ["check", str(plan), *options]).exit_code == 1
+
+
+@pytest.mark.parametrize("distance", ["nan", "-1"])
+def test_clearances_that_make_no_sense_are_refused(plan: Path, distance: str) -> None:
+    complaint("check", plan, "--clearance", distance)
+    complaint("plan", "panda", "--circle", "0.1", "--clearance", distance)
+
+
+def test_a_windowed_relaxation_is_taken_from_the_shell() -> None:
+    found = sm.Relaxation("rz", during=(1.0, 2.5)).to_dict()
+    assert sm.Relaxation(**json.loads(json.dumps(found))).during == (1.0, 2.5)
+    assert isinstance(found["during"], list)
+
+
+def test_six_joints_with_a_window_and_a_free_start_are_planned() -> None:
+    """No self-motion is left outside the window, so that no null motion can be taken over."""
+    robot = robot_named("ur5")
+    pose = robot.pose(robot.dexterous_configuration())
+    end = pose.copy()
+    end.translation = pose.translation + np.array([0.05, 0.03, 0.02])
+    relaxed = sm.Relaxation("rz", 0.2, during=(0.5, 1.5))
+    plan = sm.plan(sm.Problem(robot, sm.Line(pose, end, 2.0), task="pose", relaxations=[relaxed]))
+    assert plan.certificate.on_path
