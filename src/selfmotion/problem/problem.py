@@ -188,8 +188,10 @@ class Problem:
         if isinstance(robot, RobotModel) and (first.tool or first.reference):
             tool = first.tool or robot.tool
             tools = (tool, *(name for name in robot.tools if name != tool))
-            robot = replace(robot, tools=tools, reference=first.reference)
-            robot.chain_to(tool, first.reference)
+            own = robot.reference if tool == robot.tool else None
+            reference = own if first.reference is None else first.reference
+            robot = replace(robot, tools=tools, reference=reference)
+            robot.chain_to(tool, reference)
         object.__setattr__(self, "robot", robot)
         object.__setattr__(self, "path", first.path)
         object.__setattr__(self, "task", first.task)

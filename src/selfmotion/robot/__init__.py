@@ -20,6 +20,7 @@ from selfmotion.robot.loading import (
     NAMED_ARMS as NAMED_ARMS,
     NAMED_PARTS as NAMED_PARTS,
     load_robot as load_robot,
+    moving_joints as moving_joints,
     rebuild_robot as rebuild_robot,
 )
 from selfmotion.robot.mesh_files import mesh_digests as mesh_digests
@@ -33,4 +34,9 @@ from selfmotion.robot.placements import (
     placements as placements,
 )
 from selfmotion.robot.tool_rates import ToolRates as ToolRates
-from selfmotion.robot.urdf import Urdf as Urdf, UrdfJoint as UrdfJoint, UrdfPart as UrdfPart
+from selfmotion.robot.urdf import (
+    TOOL_JOINT as TOOL_JOINT,
+    Urdf as Urdf,
+    UrdfJoint as UrdfJoint,
+    UrdfPart as UrdfPart,
+)

@@ -60,7 +60,7 @@ def composed(
     links = {f"{name}/{link}" for name, urdf in parts.items() for link in urdf.links}
     for name, urdf in parts.items():
         carrier = on.get(name, WORLD_LINK)
-        if carrier not in links and carrier != WORLD_LINK:
+        if not isinstance(carrier, str) or carrier not in {*links, WORLD_LINK}:
             raise RobotError(
                 f"on: part '{name}' stands on '{carrier}', which is no link"
                 f"{nearest(carrier, sorted(links))}; links are called PART/LINK"

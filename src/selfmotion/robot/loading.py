@@ -233,6 +233,11 @@ def _parts(
             raise RobotError(
                 f"robot: a part is called {shown(name)}, expected a name of letters, digits and _"
             )
+        if not isinstance(robots[name], str | Path):
+            raise RobotError(
+                f"robot: part '{name}' is {shown(robots[name])}, expected a name or the path of a "
+                f"file"
+            )
     if not robots:
         raise RobotError("robot: there is no part, expected names with robots")
     if not isinstance(base, Mapping | None):
@@ -261,14 +266,21 @@ def _parts(
 
 
 def build_robot(
-    urdf: Urdf, tools: Sequence[str], lock: Mapping[str, float], reference: str | None = None
+    urdf: Urdf,
+    tools: Sequence[str],
+    lock: Mapping[str, float],
+    reference: str | None = None,
+    chain: Sequence[UrdfJoint] | None = None,
 ) -> RobotModel:
-    """Build the tree of all joints that move `tools` of a validated URDF; see `load_robot`."""
+    """Build the tree of a `chain` of joints of a validated URDF; see `load_robot`.
+
+    By default of all that move `tools` relative to the reference.
+    """
     for frame in (*tools, *([] if reference is None else [reference])):
         urdf.check_tool(frame)
     full = full_model(urdf)
     _check_lock(urdf, full, lock)
-    chain = _moving(urdf, tools, reference)
+    chain = moving_joints(urdf, tools, reference) if chain is None else chain
     for joint in chain:
         if joint.kind in ("floating", "planar"):
             raise RobotError(
@@ -324,7 +336,7 @@ def build_robot(
     )
 
 
-def _moving(urdf: Urdf, tools: Sequence[str], reference: str | None) -> list[UrdfJoint]:
+def moving_joints(urdf: Urdf, tools: Sequence[str], reference: str | None) -> list[UrdfJoint]:
     """Return the joints that move one of the tools relative to the reference."""
     on_the_way = [] if reference is None else urdf.chain(reference)
     chains = [urdf.chain(tool) for tool in tools]
@@ -355,8 +367,14 @@ def rebuild_robot(
     urdf = urdf.with_continuous(continuous)
     tools = [tool] if isinstance(tool, str) else tool
     pairs = tuple((first, second) for first, second in touching)
+    # All that is not held: a problem may follow other frames than those the arm was loaded for.
+    free = [
+        joint
+        for joint in urdf.joints.values()
+        if joint.kind in ("revolute", "continuous", "prismatic") and joint.name not in locked
+    ]
     return dataclasses.replace(
-        build_robot(urdf, tools, locked, reference),
+        build_robot(urdf, tools, locked, reference, free),
         touching=pairs,
         acceleration_limit=read_only(acceleration_limit),
         jerk_limit=read_only(jerk_limit),
@@ -422,7 +440,7 @@ def _only_leaf(urdf: Urdf) -> str:
 
 def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:
     for name, value in lock.items():
-        if not model.existJointName(name):
+        if not isinstance(name, str) or not model.existJointName(name):
             raise RobotError(
                 f"{urdf.source}: lock names joint '{name}', which is not movable here"
                 f"{nearest(name, model.names[1:])}"
