@@ -20,6 +20,8 @@ from selfmotion.robot import RobotModel
 
 # The share of sampled configurations from which on an overlap of links is worth telling.
 _OFTEN = 0.5
+# Bodies that are put in touch may overlap by this much [m]: rounding.
+_TOUCHING = 1e-6
 _NO_PAIR = Closest(math.inf, "", "")
 
 
@@ -122,7 +124,7 @@ class CollisionModel:
 
     @cached_property
     def stuck(self) -> Closest | None:
-        """The links that held joints put deepest into each other, if there are any."""
+        """The links that held joints or placed parts put deepest into each other, if any."""
         pairs = held_pairs(self._bodies, self.robot.urdf, self.robot.locked, self._disabled)
         if not pairs:
             return None
@@ -135,7 +137,7 @@ class CollisionModel:
         worst = _NO_PAIR
         for pair in np.flatnonzero(bounds < 0.0).tolist():
             value = meshes.refine(places, pair, hulls.distance(pair, bounds[pair]))
-            if value < min(worst.value, 0.0):
+            if value < min(worst.value, -_TOUCHING):
                 worst = Closest(value, self.bodies[pairs[pair][0]], self.bodies[pairs[pair][1]])
         return worst if worst.first else None
 

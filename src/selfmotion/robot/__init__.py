@@ -9,6 +9,7 @@ from selfmotion.robot.chain import (
     null_space as null_space,
 )
 from selfmotion.robot.chain_series import ChainSeries as ChainSeries
+from selfmotion.robot.composing import is_placement as is_placement
 from selfmotion.robot.coordinates import (
     Coordinate as Coordinate,
     FrameCoordinate as FrameCoordinate,
