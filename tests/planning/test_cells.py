@@ -269,3 +269,14 @@ def test_what_cannot_follow_several_paths_says_so(carried: sm.Plan) -> None:
         sm.plan_in_parts(carried.problem)
     with pytest.raises(sm.ProblemError, match="other works' methods follow one path"):
         sm.plan_by(carried.problem, sm.PseudoInverse())
+
+
+def test_links_of_parts_that_always_overlap_are_judged() -> None:
+    """Within an arm they are made so; of two arms in one place they are placed so."""
+    pair = sm.load_robot({"left": "panda", "right": "panda"}, tool=HANDS)
+    judged = {frozenset(names) for names in CollisionModel(pair).pairs}
+    links = [f"panda_link{k}" for k in range(8)]
+    for k, one in enumerate(links):
+        for other in links[max(k, 1) :]:
+            assert frozenset((f"left/{one}", f"right/{other}")) in judged
+    assert CollisionModel(pair).stuck is not None

@@ -64,7 +64,7 @@ def held_pairs(
     joint joins are left out, and parts of which one carries the other: they may touch.
     """
     up = {joint.child: joint for joint in urdf.joints.values()}
-    placements = {joint.name: joint for joint in urdf.joints.values() if is_placement(joint)}
+    placements = {joint.name for joint in urdf.joints.values() if is_placement(joint)}
 
     def put(link: str) -> frozenset[str]:
         """Return the joints from the root to a link that were put somewhere."""
@@ -78,23 +78,32 @@ def held_pairs(
 
     left_out = {frozenset(pair) for pair in disabled}
     left_out |= {frozenset((joint.parent, joint.child)) for joint in _movable(urdf)}
-    carried = {frozenset(map(_part, (x.parent, x.child))) for x in placements.values()}
     above = {body.name: put(body.name) for body in bodies}
 
     def is_put(first: str, second: str) -> bool:
         if frozenset((first, second)) in left_out:
             return False
         ways = above[first] ^ above[second]
-        # What was placed alone, on what carries it, may touch that.
-        return bool(ways) and not (
-            ways <= placements.keys() and frozenset((_part(first), _part(second))) in carried
-        )
+        # What only a placement puts there may touch what carries it.
+        return bool(ways - placements) or (bool(ways) and are_placed_apart(first, second, urdf))
 
     return [
         (i, j)
         for i, j in itertools.combinations(range(len(bodies)), 2)
         if bodies[i].joint == bodies[j].joint and is_put(bodies[i].name, bodies[j].name)
     ]
+
+
+def are_placed_apart(first: str, second: str, urdf: Urdf) -> bool:
+    """Return whether two links are of parts of a cell of which none carries the other.
+
+    What overlaps there does not so as it is made, but as it is placed.
+    """
+    carriers = {_part(x.child): _part(x.parent) for x in urdf.joints.values() if is_placement(x)}
+    one, other = _part(first), _part(second)
+    if one == other or not {one, other} <= carriers.keys():
+        return False
+    return carriers[one] != other and carriers[other] != one
 
 
 def are_neighbours(first: str, second: str, urdf: Urdf) -> bool:

@@ -290,7 +290,7 @@ def build_robot(
         if joint.mimics is not None and joint.name not in lock:
             raise RobotError(
                 f"{urdf.source}: joint '{joint.name}' on the way to '{tools[0]}' mimics "
-                f"'{joint.mimics}'; choose a tool before it, or hold it with lock="
+                f"'{joint.mimics}'; choose a tool or a reference before it, or hold it with lock="
             )
     free = [joint.name for joint in chain if joint.name not in lock]
     where = "the root" if reference is None else f"'{reference}'"
