@@ -21,7 +21,10 @@ BESIDE = (
     "replay.png",
     *(f"arms/{f.name}" for f in DOCS.glob("arms/*")),
 )
-GALLERY = ("weld_seam", "painting", "own_obstacle", "rail", "closed_loop", "ur5_pointing")
+GALLERY = (
+    "weld_seam", "two_arms", "weld_positioner", "part_in_hand", "painting", "own_obstacle", "rail",
+    "closed_loop", "ur5_pointing",
+)  # fmt: skip
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:

@@ -71,6 +71,7 @@ from selfmotion.constraints import (
     NodeTangents as NodeTangents,
     StartAcceleration as StartAcceleration,
     StartVelocity as StartVelocity,
+    Tilt as Tilt,
     ToolLimits as ToolLimits,
 )
 from selfmotion.costs import (

@@ -76,19 +76,8 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
         Without coefficients. `initial_trajectory` and `initial_cost` are those of the
         pseudo-inverse, as for every plan.
     """
-    check_problem(problem)
-    if isinstance(method, type) or not callable(getattr(method, "solve", None)):
-        raise ProblemError(f"method is {shown(method)}, expected one such as PseudoInverse()")
     tolerance = Tolerance.of(tolerance)
-    if problem.damping is not None:
-        raise ProblemError(
-            "the problem's damping is for the optimised motion; leave it out, or take "
-            "plan_by(problem, DampedLeastSquares(…))"
-        )
-    if problem.relaxations:
-        raise ProblemError(
-            "other works' methods follow the path exactly; leave the relaxations out"
-        )
+    _check(problem, method)
     began = time.perf_counter()
     found = method.solve(problem)
     seconds = time.perf_counter() - began
@@ -111,14 +100,23 @@ def plan_by(problem: Problem, method: Method, tolerance: Tolerance | None = None
         message=found.message,
         seconds=seconds,
     )
-    return Plan(
-        problem=problem,
-        trajectory=trajectory,
-        initial_trajectory=_smooth(problem, still, grid),
-        coefficients=read_only([]),
-        report=report,
-        certificate=certificate,
-    )
+    initial = _smooth(problem, still, grid)
+    return Plan(problem, trajectory, initial, read_only([]), report, certificate)
+
+
+def _check(problem: Problem, method: Method) -> None:
+    check_problem(problem)
+    if isinstance(method, type) or not callable(getattr(method, "solve", None)):
+        raise ProblemError(f"method is {shown(method)}, expected one such as PseudoInverse()")
+    if problem.damping is not None:
+        raise ProblemError(
+            "the problem's damping is for the optimised motion; leave it out, or take "
+            "plan_by(problem, DampedLeastSquares(…))"
+        )
+    if problem.relaxations:
+        raise ProblemError(
+            "other works' methods follow the path exactly; leave the relaxations out"
+        )
 
 
 def costs(problem: Problem, motion: Motion, grid: Grid) -> dict[str, float]:

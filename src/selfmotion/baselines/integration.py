@@ -116,18 +116,7 @@ def integrate(problem: Problem, rate: Rate) -> Integrated:
     pieces: list[tuple[float, OdeSolution]] = []
     rates = 0
     q = start_of(problem)
-    fastest = _RUNAWAY / problem.path.duration
-
-    def guarded(t: float, configuration: Array) -> Array:
-        velocity = rate(t, configuration)
-        if not np.all(np.abs(velocity) < fastest):
-            raise BreakdownError(
-                f"{problem.robot.name}: joint speeds grow without bound near t = {t:.4g} s; the "
-                f"method is singular there",
-                time=t,
-            )
-        return velocity
-
+    guarded = _guarded(problem, rate)
     for start, end in pairwise(problem.path.knots):
         solution = solve_ivp(
             guarded,
@@ -158,3 +147,20 @@ def integrate(problem: Problem, rate: Rate) -> Integrated:
         return configurations, np.array([rate(float(time), row) for time, row in rows])
 
     return Integrated(at, rates)
+
+
+def _guarded(problem: Problem, rate: Rate) -> Rate:
+    """Return a rate that breaks down where it grows without bound."""
+    fastest = _RUNAWAY / problem.path.duration
+
+    def guarded(t: float, configuration: Array) -> Array:
+        velocity = rate(t, configuration)
+        if not np.all(np.abs(velocity) < fastest):
+            raise BreakdownError(
+                f"{problem.robot.name}: joint speeds grow without bound near t = {t:.4g} s; the "
+                f"method is singular there",
+                time=t,
+            )
+        return velocity
+
+    return guarded

@@ -11,14 +11,16 @@ from selfmotion.collision.found import (
     srdf_line as srdf_line,
 )
 from selfmotion.collision.obstacles import (
-    Box as Box,
-    Capsule as Capsule,
-    Cylinder as Cylinder,
-    Mesh as Mesh,
     Obstacle as Obstacle,
-    Sphere as Sphere,
     obstacle_from_dict as obstacle_from_dict,
     obstacle_shapes as obstacle_shapes,
 )
 from selfmotion.collision.pairs import disabled_links as disabled_links
+from selfmotion.collision.shapes import (
+    Box as Box,
+    Capsule as Capsule,
+    Cylinder as Cylinder,
+    Mesh as Mesh,
+    Sphere as Sphere,
+)
 from selfmotion.collision.solids import Solid as Solid

@@ -6,12 +6,11 @@ from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar
 
-import coal
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, CollisionError, as_number, as_numbers, read_only, shown
+from selfmotion.basics import Array, CollisionError, as_number, as_numbers
 from selfmotion.task import as_pose
 
 # An obstacle so large, or so far away [m], may be one in millimetres.
@@ -119,147 +118,6 @@ class Obstacle(ABC):
         what = f"{self.label}: {key}"
         length = as_number(getattr(self, key), what, above=0.0, most=1e6, error=CollisionError)
         object.__setattr__(self, key, length)
-
-
-@dataclass(frozen=True, eq=False)
-class Box(Obstacle):
-    """A solid box, its centre at the pose.
-
-    Attributes
-    ----------
-    size : (3,)
-        Full lengths along the pose's axes [m].
-    """
-
-    shape: ClassVar[str] = "box"
-
-    size: Array
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        expected = "three numbers above 0"
-        size = as_numbers(self.size, f"{self.label}: size", expected, (3,), CollisionError)
-        if not np.all((size > 0.0) & (size <= 1e6)):
-            raise CollisionError(f"{self.label}: size is {size.tolist()}, expected {expected}")
-        object.__setattr__(self, "size", read_only(size))
-
-    def geometry(self) -> Any:
-        """See `Obstacle.geometry`."""
-        return coal.Box(*self.size.tolist())
-
-
-@dataclass(frozen=True, eq=False)
-class Sphere(Obstacle):
-    """A solid sphere.
-
-    Attributes
-    ----------
-    radius : float
-        [m]
-    """
-
-    shape: ClassVar[str] = "sphere"
-
-    radius: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._set_length("radius")
-
-    def geometry(self) -> Any:
-        """See `Obstacle.geometry`."""
-        return coal.Sphere(self.radius)
-
-
-@dataclass(frozen=True, eq=False)
-class Cylinder(Obstacle):
-    """A solid cylinder, its centre at the pose and its axis along the pose's z.
-
-    Attributes
-    ----------
-    radius, length : float
-        [m]
-    """
-
-    shape: ClassVar[str] = "cylinder"
-
-    radius: float
-    length: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._set_length("radius")
-        self._set_length("length")
-
-    def geometry(self) -> Any:
-        """See `Obstacle.geometry`."""
-        return coal.Cylinder(self.radius, self.length)
-
-
-@dataclass(frozen=True, eq=False)
-class Capsule(Obstacle):
-    """All points within `radius` of a segment along the pose's z axis, centred at the pose.
-
-    Attributes
-    ----------
-    radius, length : float
-        Radius, and length of the segment (the caps come on top) [m].
-    """
-
-    shape: ClassVar[str] = "capsule"
-
-    radius: float
-    length: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._set_length("radius")
-        self._set_length("length")
-
-    def geometry(self) -> Any:
-        """See `Obstacle.geometry`."""
-        return coal.Capsule(self.radius, self.length)
-
-
-@dataclass(frozen=True, eq=False)
-class Mesh(Obstacle):
-    """The solid bounded by a triangle mesh; the file is read when a model is built from it.
-
-    Attributes
-    ----------
-    file : Path
-        STL, OBJ, DAE or PLY.
-    scale : float
-        Metres per unit of the file.
-    """
-
-    shape: ClassVar[str] = "mesh"
-
-    file: Path
-    scale: float = 1.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not isinstance(self.file, str | Path):
-            raise CollisionError(f"{self.label}: file is {shown(self.file)}, expected a path")
-        object.__setattr__(self, "file", Path(self.file))
-        self._set_length("scale")
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """See `Obstacle.files`."""
-        return (self.file,)
-
-    def geometry(self) -> Any:
-        """See `Obstacle.geometry`."""
-        if not self.file.is_file():
-            raise CollisionError(f"{self.label}: no such file: {self.file}")
-        try:
-            return coal.MeshLoader().load(str(self.file), np.full(3, self.scale))
-        except (RuntimeError, ValueError) as error:
-            # What comes before is where in the source of coal it was found.
-            reason = " ".join(str(error).rpartition("message:")[2].split())
-            raise CollisionError(f"{self.label}: {self.file} cannot be read: {reason}") from error
 
 
 def obstacle_shapes() -> list[tuple[str, type[Obstacle]]]:

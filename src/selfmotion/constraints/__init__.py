@@ -26,5 +26,6 @@ from selfmotion.constraints.limits import (
     JointPositionLimits as JointPositionLimits,
     JointVelocityLimits as JointVelocityLimits,
 )
+from selfmotion.constraints.tilt import Tilt as Tilt
 from selfmotion.constraints.tool import ToolLimits as ToolLimits
 from selfmotion.constraints.torque import JointTorqueLimits as JointTorqueLimits

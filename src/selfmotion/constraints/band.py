@@ -9,6 +9,7 @@ import numpy as np
 from selfmotion.basics import Array, ProblemError, as_number, restore, series, shown
 from selfmotion.certificate import Column, Quantity, Stretch
 from selfmotion.constraints.base import Constraint
+from selfmotion.constraints.envelope import Envelope
 from selfmotion.robot import Coordinate, RobotModel, SwivelAngle
 
 # Centre of the swivel angle from upwards, about the direction from shoulder to wrist [rad].
@@ -65,6 +66,10 @@ class Band(Constraint):
                 f"elbow: unknown argument '{unknown[0]}', expected shoulder, elbow or wrist"
             )
         return cls(SwivelAngle(**names), _SIDES[side], half)
+
+    def envelope(self, robot: RobotModel) -> Envelope:
+        """See `Constraint.envelope`."""
+        return Envelope.of_quantity(self.quantity(robot), robot.dof)
 
     def quantity(self, robot: RobotModel) -> Quantity:
         """See `Constraint.quantity`."""

@@ -3,9 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from selfmotion.basics import Array, read_only
-from selfmotion.certificate import JointLimits
+from selfmotion.certificate import JointLimits, Quantity
 from selfmotion.collision import CollisionModel
 from selfmotion.robot import RobotModel
 
@@ -22,6 +23,8 @@ class Envelope:
         Limits of |q̇|, |q̈| and of the jerk; inf where there is none.
     bodies : tuple of (CollisionModel, float)
         Bodies to keep apart, and the distance [m].
+    quantities : tuple of Quantity
+        Of q alone, with limits.
     """
 
     lower: Array
@@ -30,6 +33,7 @@ class Envelope:
     acceleration: Array
     jerk: Array
     bodies: tuple[tuple[CollisionModel, float], ...] = ()
+    quantities: tuple[Quantity, ...] = ()
 
     @classmethod
     def unbounded(cls, dof: int) -> "Envelope":
@@ -49,6 +53,11 @@ class Envelope:
             return replace(own, acceleration=limits.upper)
         return replace(own, jerk=limits.upper)
 
+    @classmethod
+    def of_quantity(cls, quantity: Quantity, dof: int) -> "Envelope":
+        """Return the envelope of a quantity of q alone, of n joints."""
+        return replace(cls.unbounded(dof), quantities=(quantity,))
+
     def __and__(self, other: "Envelope") -> "Envelope":
         """Return the envelope of what both allow."""
         return Envelope(
@@ -58,7 +67,17 @@ class Envelope:
             read_only(np.minimum(self.acceleration, other.acceleration)),
             read_only(np.minimum(self.jerk, other.jerk)),
             (*self.bodies, *other.bodies),
+            (*self.quantities, *other.quantities),
         )
+
+    def admits(self, q: Array) -> npt.NDArray[np.bool_]:
+        """Return which configurations (K, n) keep the quantities, (K,)."""
+        kept, still = np.ones(len(q), dtype=bool), np.zeros_like(q)
+        for item in self.quantities:
+            away = item.away(q, still, still)
+            sizes = np.linalg.norm(away, axis=2) if away.ndim == 3 else np.abs(away)
+            kept &= (sizes <= item.bounds).all(axis=1)
+        return kept
 
     def arm(self, robot: RobotModel) -> RobotModel:
         """Return the arm with these position limits instead of its own."""

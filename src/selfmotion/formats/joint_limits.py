@@ -77,18 +77,8 @@ def read_joint_limits(
     path = as_path(file)
     if not isinstance(robot, RobotModel):
         raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel (load_robot)")
-    document: Any = read_document(path)
-    # As a parameter file of a node, it lies in tables of nothing else.
-    while len(document) == 1 and _JOINTS not in document:
-        (document,) = document.values()
-        if not isinstance(document, Mapping):
-            break
-    table = document.get(_JOINTS) if isinstance(document, Mapping) else None
-    if not isinstance(table, Mapping):
-        raise FileFormatError(f"{path}: has no table '{_JOINTS}', expected one of MoveIt's")
-    unknown = [key for key in document if key not in (_JOINTS, *_SCALINGS.values())]
-    if unknown:
-        _refuse(path, str(unknown[0]), (_JOINTS, *_SCALINGS.values()))
+    document = _document(path)
+    table = document[_JOINTS]
     if not set(table) & set(robot.joint_names):
         raise FileFormatError(
             f"{path}: knows none of the joints of {robot.name}: {', '.join(robot.joint_names)}"
@@ -105,6 +95,22 @@ def read_joint_limits(
         if np.isfinite(limit).any():
             found.append(constraint(limit))
     return tuple(found)
+
+
+def _document(path: Path) -> Mapping[str, Any]:
+    """Return the table of a file that has the joints' one in it."""
+    document: Any = read_document(path)
+    # As a parameter file of a node, it lies in tables of nothing else.
+    while len(document) == 1 and _JOINTS not in document:
+        (document,) = document.values()
+        if not isinstance(document, Mapping):
+            break
+    if not (isinstance(document, Mapping) and isinstance(document.get(_JOINTS), Mapping)):
+        raise FileFormatError(f"{path}: has no table '{_JOINTS}', expected one of MoveIt's")
+    unknown = [key for key in document if key not in (_JOINTS, *_SCALINGS.values())]
+    if unknown:
+        _refuse(path, str(unknown[0]), (_JOINTS, *_SCALINGS.values()))
+    return document
 
 
 def _each(

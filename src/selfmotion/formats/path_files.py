@@ -16,11 +16,14 @@ from selfmotion.formats.path_rows import READERS, PoseRows
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints
 
-# A coordinate beyond this [m] can only be meant in millimetres; an angle beyond that in degrees.
-_FAR, _ROUND = 50.0, 2.0 * np.pi + 1e-6
-# Poses farther from their predecessor than this [m] are a jump, unless another length is given;
-# so are rotations by more than this [rad], whose direction would be a guess.
-_JUMP, _FLIP = 0.5, 2.6
+# A coordinate beyond this [m] can only be meant in millimetres.
+_FAR = 50.0
+# An angle beyond this [rad] can only be meant in degrees.
+_ROUND = 2.0 * np.pi + 1e-6
+# Poses farther from their predecessor than this [m] are a jump, unless another length is given.
+_JUMP = 0.5
+# Rotations by more than this [rad] are a jump, too: their direction would be a guess.
+_FLIP = 2.6
 # Legs that bend by more than this [rad] make a corner, unless another angle is given.
 _BEND = np.pi / 6
 

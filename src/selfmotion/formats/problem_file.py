@@ -29,7 +29,7 @@ from selfmotion.optimise import LineSearch, Optimizer, QuasiNewton
 from selfmotion.planning import Search, plan
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
-from selfmotion.robot import NAMED_ARMS, RobotModel, load_robot
+from selfmotion.robot import NAMED_ARMS, NAMED_PARTS, RobotModel, load_robot
 from selfmotion.task import Damping, Relaxation, Task
 
 if TYPE_CHECKING:
@@ -240,7 +240,7 @@ class _Reader:
                 f"{where}expected either name (one of {', '.join(NAMED_ARMS)}) or file (.urdf, "
                 f".xacro)"
             )
-        if name is not None and name not in NAMED_ARMS:
+        if name is not None and name not in {**NAMED_ARMS, **NAMED_PARTS}:
             raise RobotError(f"{where}name: unknown robot '{name}', known: {', '.join(NAMED_ARMS)}")
         return name if file is None else self._beside(file)
 

@@ -6,7 +6,7 @@ from typing import Any
 from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path
 from selfmotion.formats.documents import write_document
 from selfmotion.problem import Problem, check_problem, problem_to_dict
-from selfmotion.robot import NAMED_ARMS, RobotModel, UrdfPart, load_robot, mounting_of
+from selfmotion.robot import NAMED_ARMS, NAMED_PARTS, RobotModel, UrdfPart, load_robot, mounting_of
 
 
 def write_problem(problem: Problem, file: str | FilePath) -> None:
@@ -60,7 +60,7 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
 
 
 def _part(part: UrdfPart) -> dict[str, Any]:
-    known = part.source in NAMED_ARMS
+    known = part.source in {**NAMED_ARMS, **NAMED_PARTS}
     source = part.source if known else str(FilePath(part.source).resolve())
     table: dict[str, Any] = {"name" if known else "file": source}
     if part.base is not None:

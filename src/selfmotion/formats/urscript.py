@@ -3,8 +3,10 @@
 from selfmotion.basics import Array, ProblemError
 from selfmotion.robot import RobotModel
 
-# servoj smooths by looking ahead [s], and follows with this gain: the defaults of the manual.
-_LOOK_AHEAD, _GAIN = 0.1, 300
+# servoj smooths by looking ahead [s]: the default of the manual.
+_LOOK_AHEAD = 0.1
+# It follows with this gain: the default of the manual.
+_GAIN = 300
 _JOINTS = 6
 
 

@@ -162,8 +162,7 @@ def pullback(
 
     A stage's slope acts on the later stages of its step and on the step's end.
     """
-    count, n = q_cotangent.shape
-    m = rows_of(layout)
+    (count, n), m = q_cotangent.shape, rows_of(layout)
     space = divide(work, n, m, layout.shape[0])
     by_slope = space.by_slope
     for s in range(count - 1, -1, -1):
@@ -177,17 +176,8 @@ def pullback(
                     w += by_slope[i + 1, k] * (h if i == 2 else 0.5 * h)
             space.w[k] = w
             space.by_q[k] = q_cotangent[s, k]
-        pull_stage(
-            table[s],
-            n,
-            layout,
-            gain,
-            law,
-            space,
-            error_cotangent[s],
-            epsilon_bar[s],
-            target_bar[s],
-        )
+        cotangents = error_cotangent[s], epsilon_bar[s], target_bar[s]
+        pull_stage(table[s], n, layout, gain, law, space, *cotangents)
         for k in range(n):
             by_slope[i, k] = space.by_q[k]
             if last:

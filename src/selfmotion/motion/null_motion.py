@@ -9,12 +9,14 @@ from numpy.polynomial import legendre
 
 from selfmotion.basics import Array, ProblemError, Saved, as_choice, as_number, as_whole, shown
 
-# Intervals of a spline that is worth its while, and coefficients beyond which quadratic programmes
-# take seconds.
-_FEWEST, _MOST_COEFFICIENTS = 8, 110
-# Polynomials of higher degree than this, and splines of more intervals, resolve nothing more and
-# take minutes.
-_HIGHEST, _MOST_INTERVALS = 100, 2000
+# Intervals of a spline that is worth its while.
+_FEWEST = 8
+# With more coefficients than this quadratic programmes take seconds.
+_MOST_COEFFICIENTS = 110
+# Polynomials of higher degree than this resolve nothing more and take minutes.
+_HIGHEST = 100
+# So do splines of more intervals.
+_MOST_INTERVALS = 2000
 
 
 class NullMotion(Saved, ABC, family="null motion"):

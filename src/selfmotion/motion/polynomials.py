@@ -12,8 +12,10 @@ from selfmotion.basics import Array
 _NOTHING = 1e-13
 # Roots with a smaller imaginary part are real ones, or two that rounding keeps apart.
 _REAL = 1e-6
-# How far outside a root is still looked at, and Newton's steps that it gets.
-_NEAR, _STEPS = 1e-3, 3
+# How far outside a root is still looked at.
+_NEAR = 1e-3
+# Newton's steps that a root gets.
+_STEPS = 3
 
 
 def evaluated(coefficients: Array, s: Array) -> Array:

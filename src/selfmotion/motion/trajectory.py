@@ -1,6 +1,6 @@
 """A joint motion over time."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +11,6 @@ import numpy.typing as npt
 from selfmotion.basics import (
     Array,
     FileFormatError,
-    Ints,
     as_number,
     plain_numbers,
     read_only,
@@ -19,19 +18,11 @@ from selfmotion.basics import (
     shown,
 )
 from selfmotion.motion.columns import read_columns
-from selfmotion.motion.polynomials import (
-    differentiated,
-    evaluated,
-    hermite,
-    inner_roots,
-    may_pass,
-    may_vanish,
-)
+from selfmotion.motion.polynomials import differentiated, evaluated, inner_roots, may_pass
+from selfmotion.motion.spline import Spline
 
 # A last sample as near to its end as this [s] is at its end.
 _MOMENT = 0.5e-9
-# Intervals that are looked at together.
-_LOT = 16_384
 # More samples than this do not fit into memory, and no controller wants them.
 MOST_SAMPLES = 1e7
 
@@ -182,9 +173,9 @@ class Trajectory:
         self._check_order(order)
         n = len(self.joint_names)
         t = np.full((2, n), self.t[0])
-        values = np.tile(self._pieces(np.zeros(1, dtype=np.intp), order)[0], (2, 1))
-        for k in self._lots():
-            pieces = self._pieces(k, order)
+        values = np.tile(self._spline.pieces(np.zeros(1, dtype=np.intp), order)[0], (2, 1))
+        for k in self._spline.lots():
+            pieces = self._spline.pieces(k, order)
             ends = np.stack([pieces[0], pieces.sum(axis=0)])
             least = np.minimum(ends.min(axis=(0, 1)), values[0])
             largest = np.maximum(ends.max(axis=(0, 1)), values[1])
@@ -211,7 +202,7 @@ class Trajectory:
         """
         if self.qdd is not None or len(self.t) < 3:
             return np.full(self.q.shape[1], self.t[0]), np.zeros(self.q.shape[1])
-        pieces = self._pieces(np.arange(len(self.t) - 1), 2)
+        pieces = self._spline.pieces(np.arange(len(self.t) - 1), 2)
         jumps = np.abs(pieces[0, 1:] - pieces[:, :-1].sum(axis=0))
         worst = np.argmax(jumps, axis=0)
         return self.t[1 + worst], jumps[worst, np.arange(jumps.shape[1])]
@@ -221,29 +212,8 @@ class Trajectory:
 
         Exact: from one turn, where q̇ = 0, to the next.
         """
-        k, s = self._place(t)
-        return self._before[k] + self._way(k, s)
-
-    @cached_property
-    def _before(self) -> Array:
-        """The way made by the beginning of each interval, and in all, (N, n)."""
-        whole = np.concatenate([self._way(k, np.ones(len(k))) for k in self._lots()])
-        return np.vstack([np.zeros(whole.shape[1]), np.cumsum(whole, axis=0)])
-
-    def _way(self, k: Ints, s: Array) -> Array:
-        """Return the ways from the beginning of intervals k (K,) up to s (K,), (K, n)."""
-        edge = np.broadcast_to(s[:, None, None], (len(k), 1, len(self.joint_names)))
-        stops = [np.zeros_like(edge), np.minimum(self._turns(k), edge), edge]
-        passed = evaluated(self._pieces(k)[:, :, None], np.concatenate(stops, axis=1))
-        return np.asarray(np.abs(np.diff(passed, axis=1)).sum(axis=1))
-
-    def _turns(self, k: Ints) -> Array:
-        """Where joints turn round in intervals k (K,), sorted, (K, m, n); 0 for nowhere."""
-        pieces = self._pieces(k, 1)
-        turns = np.zeros((len(pieces) - 1, *pieces.shape[1:]))
-        some, joints = np.nonzero(may_vanish(pieces))
-        turns[:, some, joints] = inner_roots(pieces[:, some, joints])
-        return np.sort(turns.transpose(1, 0, 2), axis=1)
+        k, s = self._spline.place(t)
+        return self._spline.before[k] + self._spline.way(k, s)
 
     def __call__(self, t: npt.ArrayLike, order: int = 0) -> Array:
         """Return q (`order` 0), q̇ (1), q̈ (2) or the jerk (3) at `t`.
@@ -265,18 +235,17 @@ class Trajectory:
         ValueError
             A time is outside the motion, or `order` is not 0, 1, 2 or 3.
         """
-        given = plain_numbers(t)
-        if given is None:
+        times = plain_numbers(t)
+        if times is None:
             raise ValueError(f"t is {shown(t)}, expected times [s]")
         self._check_order(order)
-        times = given
         if not (np.all(times >= self.t[0]) and np.all(times <= self.t[-1])):
             raise ValueError(
                 f"time {times.min()}..{times.max()} s is outside the motion, "
                 f"{self.t[0]}..{self.t[-1]} s"
             )
-        k, s = self._place(times)
-        return evaluated(self._pieces(k, order), s[..., None])
+        k, s = self._spline.place(times)
+        return evaluated(self._spline.pieces(k, order), s[..., None])
 
     def polynomials(self, middle: Array, half: Array) -> Array:
         """Return the motion on intervals without samples, as polynomials of u, (m, I, n).
@@ -284,9 +253,9 @@ class Trajectory:
         Coefficients of 1, u, u² … with u from -1 to 1 over the interval of this middle and half
         width (I,) [s].
         """
-        k, s = self._place(middle)
-        share = half / (self.t[k + 1] - self.t[k])
-        return series.recentred(self._pieces(k), s[:, None], share[:, None])
+        k, s = self._spline.place(middle)
+        share = (half / (self.t[k + 1] - self.t[k]))[:, None]
+        return series.recentred(self._spline.pieces(k), s[:, None], share)
 
     def sample_times(self, rate: float) -> Array:
         """Return the times from the start [s] of `rate` samples per second, and of the end, (K,).
@@ -318,39 +287,10 @@ class Trajectory:
         t[-1] = self.t[-1]
         return Trajectory(t, self(t), self(t, 1), self.joint_names, self(t, 2))
 
-    def _place(self, t: Array) -> tuple[npt.NDArray[np.intp], Array]:
-        """Return the interval of each time, and how far into it the time is, 0 to 1."""
-        k = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
-        return k, (t - self.t[k]) / (self.t[k + 1] - self.t[k])
-
     def _check_order(self, order: int) -> None:
         if order not in (0, 1, 2, 3):
             raise ValueError(f"order is {shown(order)}, expected 0, 1, 2 or 3")
 
-    def _lots(self) -> Iterator[Ints]:
-        """Yield the numbers of all intervals in lots that fit into memory."""
-        for first in range(0, len(self.t) - 1, _LOT):
-            yield np.arange(first, min(first + _LOT, len(self.t) - 1))
-
-    def _pieces(self, k: Ints, order: int = 0) -> Array:
-        """Return the coefficients of 1, s, s² … of a derivative in intervals k (…), (m, …, n).
-
-        s goes from 0 to 1 in each.
-        """
-        if len(self.t) <= _LOT:
-            return self._derivatives[order][:, k]
-        return self._differentiated(k, order)
-
     @cached_property
-    def _derivatives(self) -> list[Array]:
-        """The pieces of all orders, of a motion with few samples."""
-        every = np.arange(len(self.t) - 1)
-        return [self._differentiated(every, order) for order in range(4)]
-
-    def _differentiated(self, k: Ints, order: int) -> Array:
-        h, ends = (self.t[k + 1] - self.t[k])[..., None], (k, k + 1)
-        given = (self.q, self.qd) if self.qdd is None else (self.q, self.qd, self.qdd)
-        pieces = hermite(h, *((table[ends[0]], table[ends[1]]) for table in given))
-        for _ in range(order):
-            pieces = differentiated(pieces) / h
-        return pieces
+    def _spline(self) -> Spline:
+        return Spline(self.t, self.q, self.qd, self.qdd)

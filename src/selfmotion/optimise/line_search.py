@@ -62,10 +62,8 @@ class LineSearch:
             φ and φ'; `slope` is only asked at the point that `value` was asked last.
         value0, slope0 : float
             φ(0) and φ'(0) < 0.
-        first : float
-            The first step to try.
-        longest : float
-            A step that is accepted when φ still falls there.
+        first, longest : float
+            The first step to try, and one that is accepted when φ still falls there.
         more : callable
             Whether another evaluation is allowed.
 
@@ -83,14 +81,12 @@ class LineSearch:
             if self._too_high(here, start) or here.value >= before.value:
                 return self._section(value, slope, start, before, here, more)
             here = _Point(alpha, here.value, slope(alpha))
-            if not np.isfinite(_slope(here)):
-                beyond = _Point(alpha, np.inf)
-                return self._section(value, slope, start, before, beyond, more)
-            if abs(_slope(here)) <= -self.sigma * slope0 or (
-                alpha >= longest and _slope(here) < 0.0
-            ):
+            rise = _slope(here)
+            if not np.isfinite(rise):
+                return self._section(value, slope, start, before, _Point(alpha, np.inf), more)
+            if abs(rise) <= -self.sigma * slope0 or (alpha >= longest and rise < 0.0):
                 return here.alpha, here.value
-            if _slope(here) >= 0.0:
+            if rise >= 0.0:
                 return self._section(value, slope, start, here, before, more)
             advance = alpha - before.alpha
             nearest = min(alpha + advance, longest)

@@ -61,11 +61,7 @@ def _excess(at: Residuals) -> Array:
 
 
 def restored(
-    function: ConstrainedFunction,
-    x: Array,
-    weight: float,
-    limit: float,
-    note: Callback,
+    function: ConstrainedFunction, x: Array, weight: float, limit: float, note: Callback
 ) -> tuple[Array, Status | None]:
     """Return where the Levenberg-Marquardt method takes F and a penalty on what is violated.
 

@@ -17,11 +17,14 @@ Flags = npt.NDArray[np.bool_]
 
 # What holds a tool that is slower than its feed.
 _CAUSES = "the turn rate", "the acceleration in a bend", "the turn acceleration in a bend"
-# Nodes of the pace between two knots of the original, at least, and in all, about.
-_FEWEST, _ABOUT = 16, 1000
-# How far from a node, by the distance of knots, the original's accelerations are measured, and how
-# far from a knot whether its twist jumps there.
-_BESIDE, _AT = 1e-4, 1e-8
+# Nodes of the pace between two knots of the original, at least.
+_FEWEST = 16
+# Nodes of the pace in all, about: a feed is kept between them as far as splines through them do.
+_ABOUT = 1000
+# How far from a node, by the distance of knots, the original's accelerations are measured.
+_BESIDE = 1e-4
+# How far from a knot it is measured whether the twist jumps there.
+_AT = 1e-8
 # Faster feeds [m/s] are slips of units.
 _FASTEST = 3.0
 # A tool that is slower than this share of what it may be rests.

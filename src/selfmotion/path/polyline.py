@@ -11,8 +11,10 @@ import pinocchio as pin
 from selfmotion.basics import Array, PathError, as_number, as_numbers, read_only, series, shown
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
 
-# The pace of a polyline itself, to be replaced by `Feed`: [m/s], and [rad/s] where it only turns.
-_SPEED, _TURN_RATE = 1.0, 10.0
+# The pace of a polyline itself, to be replaced by `Feed` [m/s].
+_SPEED = 1.0
+# The same where it only turns [rad/s].
+_TURN_RATE = 10.0
 # Poses nearer than this [s of the pace above] are the same.
 _SAME = 1e-9
 # Two corners that are apart by this share of either meet.

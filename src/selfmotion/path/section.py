@@ -11,9 +11,10 @@ from selfmotion.path.retimed import Retimed
 
 # Knots this near to an end, as a share of the duration, are the end.
 _CLOSE = 1e-9
-# Crowding knots: as often the time left is halved, and of two this close, as a share of the time
-# left, one is enough.
-_HALVED, _ENOUGH = 14, 1e-3
+# Crowding knots: the time left is halved as often, down to 6e-5 of it.
+_HALVED = 14
+# Of two knots this close, as a share of the time left, one is enough.
+_ENOUGH = 1e-3
 
 
 class Section(_Derived, kind="section"):

@@ -17,7 +17,6 @@ from selfmotion.basics import (
     PathError,
     as_choice,
     as_number,
-    as_numbers,
     as_path,
     read_only,
     read_table,
@@ -25,6 +24,7 @@ from selfmotion.basics import (
     shown,
 )
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
+from selfmotion.path.waypoint_arguments import as_table, bends, check_waypoints
 
 _COLUMNS = ("t", "x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
@@ -72,12 +72,12 @@ class Waypoints(Path, kind="waypoints"):
         corners: str = "blend",
         corner_angle: float = np.pi / 6,
     ) -> None:
-        times, points = _numbers(t, "t"), _numbers(positions, "positions")
+        times, points = as_table(t, "t"), as_table(positions, "positions")
         self._oriented = quaternions is not None
         if quaternions is None:
             quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(np.atleast_1d(points)), 1))
-        turns = _numbers(quaternions, "quaternions")
-        _check(times, points, turns)
+        turns = as_table(quaternions, "quaternions")
+        check_waypoints(times, points, turns)
         as_choice(corners, "waypoints: corners", ("blend", "stop"), PathError)
         what = "waypoints: corner_angle"
         corner_angle = as_number(corner_angle, what, above=0.0, error=PathError)
@@ -166,8 +166,8 @@ class Waypoints(Path, kind="waypoints"):
         lengths = np.linalg.norm(legs, axis=1)
         stops = np.zeros(len(self._t), dtype=bool)
         if self._corners == "stop":
-            stops[1:-1] = _bends(legs, self._corner_angle, 0.0)
-            stops[1:-1] |= _bends(rotvecs(self._turns), self._corner_angle, _TURNED)
+            stops[1:-1] = bends(legs, self._corner_angle, 0.0)
+            stops[1:-1] |= bends(rotvecs(self._turns), self._corner_angle, _TURNED)
             stops[[0, -1]] = True
         # Two equal poses in a row are a pause: the tool comes to rest, and stays.
         alike = np.abs(np.einsum("ki,ki->k", self._turns[:-1], self._turns[1:]))
@@ -273,35 +273,3 @@ class Waypoints(Path, kind="waypoints"):
             "corners": self._corners,
             "corner_angle": self._corner_angle,
         }
-
-
-def _bends(legs: Array, angle: float, least: float) -> npt.NDArray[np.bool_]:
-    """Return where legs (N - 1, 3) change their direction by more than `angle`, (N - 2,)."""
-    lengths = np.linalg.norm(legs, axis=1)
-    cosine = np.einsum("ki,ki->k", legs[:-1], legs[1:])
-    # What hardly moves on one side has no direction there, hence no kink.
-    moves = (lengths[:-1] > least) & (lengths[1:] > least)
-    return np.asarray((cosine < np.cos(angle) * lengths[:-1] * lengths[1:]) & moves)
-
-
-def _numbers(values: npt.ArrayLike, name: str) -> Array:
-    return as_numbers(values, f"waypoints: {name}", error=PathError)
-
-
-def _check(t: Array, points: Array, turns: Array) -> None:
-    if t.ndim != 1 or len(t) < 2:
-        raise PathError(f"waypoints: t has shape {t.shape}, expected (N,) with N ≥ 2")
-    for name, array, width in (("positions", points, 3), ("quaternions", turns, 4)):
-        if array.shape != (len(t), width):
-            raise PathError(
-                f"waypoints: {name} has shape {array.shape}, expected ({len(t)}, {width})"
-            )
-    late = np.flatnonzero(np.diff(t) <= 0)
-    if late.size:
-        row = int(late[0]) + 1
-        raise PathError(
-            f"waypoints: t[{row}] = {t[row]} does not come after t[{row - 1}] = {t[row - 1]}"
-        )
-    zero = np.flatnonzero(np.linalg.norm(turns, axis=1) < 1e-9)
-    if zero.size:
-        raise PathError(f"waypoints: quaternions[{zero[0]}] is zero")

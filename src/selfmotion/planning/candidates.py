@@ -19,19 +19,13 @@ from selfmotion.motion import Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.heats import Heats
+from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
-from selfmotion.planning.settings import Search
+from selfmotion.planning.settings import DEARER, FIRST_EVALUATIONS, SECOND_EFFORT
 from selfmotion.planning.warm_start import start_of
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
-from selfmotion.search import Reach, SequenceGuide, guides, start_candidates
-
-# Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
-_SECOND_EFFORT = 4
-# Evaluations of the cost with which each sequence is optimised at first; only the best goes on.
-_FIRST = 16
-# Sequences are not worth refining when dearer by this factor than one that keeps all constraints.
-_DEARER = 1.25
+from selfmotion.search import Admits, Reach, SequenceGuide, guides, start_candidates
 
 
 class _CutShortError(Exception):
@@ -145,7 +139,7 @@ class Candidates:
             self._try_sequences(chosen)
         # Where the search knows that nothing follows the path, more starts do not help.
         if starts and self._fell_short and not self.notes:
-            more = _SECOND_EFFORT
+            more = SECOND_EFFORT
             self._try_candidates(more * search.starts, more * search.finalists, rng)
 
     def _try_again(self, plan: Plan) -> None:
@@ -182,7 +176,7 @@ class Candidates:
     def _try_candidates(self, starts: int, finalists: int, rng: np.random.Generator) -> None:
         problem = self._problem
         arm = problem.envelope.arm(problem.robot)
-        candidates = start_candidates(problem.follows.for_robot(arm), starts, rng)
+        candidates = start_candidates(problem.follows.for_robot(arm), starts, rng, self._admits)
         rough = self._best_of(candidates, finalists) if len(candidates) > finalists else []
         self._waiting = sessions = self._resumed(rough) if rough else self._sessions(candidates)
         for number, session in enumerate(sessions, 1):
@@ -192,6 +186,11 @@ class Candidates:
             if self._is_out_of_reach():
                 break
         self._waiting = ()
+
+    @property
+    def _admits(self) -> Admits | None:
+        asked = self._problem.envelope
+        return asked.admits if asked.quantities else None
 
     def _best_of(self, candidates: list[Array], finalists: int) -> list[Trajectory]:
         """Return the best rough motions; none where these all break down."""
@@ -235,7 +234,7 @@ class Candidates:
             if begun and self._hopeless(guide, session, begun[0]):
                 continue
             # What happens to it first tells which one is worth the rest.
-            self._try(session, chosen=chosen, evaluations=_FIRST)
+            self._try(session, chosen=chosen, evaluations=FIRST_EVALUATIONS)
             begun = sorted([*begun, session], key=Session.score)
         if begun:
             self.rival = begun[0]
@@ -250,7 +249,7 @@ class Candidates:
         if best.violations:
             return False
         least = self.sequences[0].sequence.cost
-        dearer = guide.sequence.cost > least + (_DEARER - 1.0) * abs(least)
+        dearer = guide.sequence.cost > least + (DEARER - 1.0) * abs(least)
         return dearer and session.merit() > best.score()[1]
 
     def _try(

@@ -11,15 +11,9 @@ from selfmotion.constraints import Constraint
 from selfmotion.costs import LimitUse
 from selfmotion.path import Path, Retimed
 from selfmotion.planning.run import plan
+from selfmotion.planning.settings import COARSE, DEGREE, POWER, ROUND_GAIN, ROUNDS
 from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Plan, retime
-
-# Rounds end when one gains less than this share, or after so many.
-_GAIN, _ROUNDS = 2e-3, 8
-# The power of the cost: the larger, the nearer to the largest share, and the harder to minimise.
-_POWER = 16.0
-# Intervals of the pace at which a round plans, and its degree.
-_COARSE, _DEGREE = 32, 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,11 +77,11 @@ def fastest(
     check_problem(problem)
     v, a = _limits(problem, acceleration, velocity)
     geometric = tuple(item for item in problem.constraints if not item.of_pace)
-    free = replace(problem, constraints=geometric, costs=(LimitUse(v, a, _POWER),))
+    free = replace(problem, constraints=geometric, costs=(LimitUse(v, a, POWER),))
     best: Plan | None = None
     path, times, verdict, still = problem.path, [], "", np.inf
-    for number in range(_ROUNDS):
-        progress("fastest", number, _ROUNDS)
+    for number in range(ROUNDS):
+        progress("fastest", number, ROUNDS)
         planned = plan(replace(free, path=path))
         if planned.report.ending or not planned.certificate.on_path:
             # At no pace can it be followed to its end.
@@ -105,7 +99,7 @@ def fastest(
         verdict = found.certificate.verdict
         if best is not None:
             times.append(best.path.duration)
-            if times[-1] > (1.0 - _GAIN) * before:
+            if times[-1] > (1.0 - ROUND_GAIN) * before:
                 break
         path = _stand_in(problem.path, path, found.path)
     if best is None:
@@ -146,12 +140,12 @@ def _stand_in(original: Path, current: Path, found: Path) -> Path:
 
     if not isinstance(found, Retimed):
         raise TypeError(f"a retimed motion has a {type(found).__name__}")
-    t = np.linspace(0.0, found.duration, _COARSE + 1)
+    t = np.linspace(0.0, found.duration, COARSE + 1)
     sigma = np.clip(found.pace(t), 0.0, current.duration)
     if isinstance(current, Retimed) and current is not original:
         sigma = current.pace(sigma)
     sigma = np.maximum.accumulate(sigma)
     sigma[0], sigma[-1] = 0.0, original.duration
     still: Any = [(1, 0.0), (2, 0.0)]
-    spline = make_interp_spline(t, sigma, _DEGREE, bc_type=(still, still))
+    spline = make_interp_spline(t, sigma, DEGREE, bc_type=(still, still))
     return Retimed(original, t, sigma, np.maximum(spline(t, 1), 0.0), spline(t, 2))

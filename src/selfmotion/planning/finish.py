@@ -11,14 +11,8 @@ from selfmotion.motion import Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.largest_part import LargestPart
 from selfmotion.planning.session import Session
+from selfmotion.planning.settings import FALLS, FINER, RESOLVED, ROUGH_GRIDS
 from selfmotion.problem import Problem
-
-# Between its nodes a motion may be off the path by this share of the tolerance where that is looked
-# at, in the middle; and by this share of what it was before steps were halved.
-_RESOLVED, _FALLS = 0.5, 0.7
-# Limits that are exceeded between the nodes on more grids than this are so on any; and nothing is
-# optimised again on grids with more than so many times the steps.
-_ROUGH, _FINER = 3, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +47,7 @@ def finish(
             roughs += rough
             # Where no evaluations are left, finer grids change nothing.
             out = session.status is Status.MAX_EVALUATIONS
-            spent = out or roughs > _ROUGH or session.steps > _FINER * first
+            spent = out or roughs > ROUGH_GRIDS or session.steps > FINER * first
             if finished.certificate.on_path and (spent or not rough):
                 break
             trajectory = finished.motion.trajectory
@@ -86,11 +80,11 @@ def _resolved(problem: Problem, session: Session, tolerance: Tolerance) -> Evalu
         errors = problem.errors_between(motion.trajectory) / allowed
         worst = float(errors.max())
         # Written so that NaN is no progress. Damping's error is not that of the steps.
-        stuck = not worst < _FALLS * before or len(errors) > session.most_steps
-        if motion.damped or worst <= _RESOLVED or stuck:
+        stuck = not worst < FALLS * before or len(errors) > session.most_steps
+        if motion.damped or worst <= RESOLVED or stuck:
             break
         before = worst
-        session.refine((errors > _RESOLVED).any(axis=1))
+        session.refine((errors > RESOLVED).any(axis=1))
         motion = session.motion()
     return motion
 

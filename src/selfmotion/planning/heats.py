@@ -15,17 +15,8 @@ from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.session import Session
+from selfmotion.planning.settings import HEATS, HOPELESS, ONE_VALLEY, ROUGH_STEPS, SAME_OPTIMUM
 from selfmotion.problem import Problem
-
-# Steps of the rough motions.
-_STEPS = 12
-# Heats: so many starts at most, optimised with so many evaluations of the cost more.
-_HEATS = ((16, 8), (6, 8))
-# Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
-# rule; rough optima this near are the same.
-_NEAR, _SAME = 0.6, 0.1
-# A rough optimum that costs more than this many times the best is not worth the rest.
-_HOPELESS = 2.0
 
 
 class Heats:
@@ -54,7 +45,7 @@ class Heats:
     def run(self, starts: Sequence[Array], finalists: int) -> None:
         """Leave the best `finalists` of the starts (n,), or fewer where they became the same."""
         problem = replace(self._problem, null_motion=self._problem.null_motion.rough)
-        steps = max(_STEPS, problem.null_motion.fewest_steps)
+        steps = max(ROUGH_STEPS, problem.null_motion.fewest_steps)
         # A path of many waypoints is crossed in strides: what is rough needs not stop at each.
         knots = problem.knots if len(problem.knots) <= steps else problem.knots[[0, -1]]
         grid = Grid.aligned(knots, steps)
@@ -66,7 +57,7 @@ class Heats:
                 continue
             self._note(session)
         self._put_valleys_first()
-        for heat, (most, evaluations) in enumerate(_HEATS, 1):
+        for heat, (most, evaluations) in enumerate(HEATS, 1):
             del self._merits[max(most, finalists) :]
             running = [session for _, session in self._merits]
             optima: list[Array] = []
@@ -74,7 +65,7 @@ class Heats:
                 self._progress(f"heat {heat}", number, len(running))
                 # What lies where another one has arrived would arrive there, too.
                 here, first = session.nodes, heat == 1
-                if first and any(self._apart(here, other) <= _NEAR for other in optima):
+                if first and any(self._apart(here, other) <= ONE_VALLEY for other in optima):
                     self._forget(session)
                     continue
                 session.minimize(evaluations)
@@ -105,7 +96,7 @@ class Heats:
         motions: list[Array] = []
         for pair in self._merits:
             motion = pair[1].nodes
-            alone = all(self._apart(motion, other) > _NEAR for other in motions)
+            alone = all(self._apart(motion, other) > ONE_VALLEY for other in motions)
             (valleys if alone else slopes).append(pair)
             motions.append(motion)
         self._merits = valleys + slopes
@@ -116,10 +107,10 @@ class Heats:
         motions: list[Array] = []
         for merit, session in self._merits:
             best = self._merits[0][0]
-            if merit > best + (_HOPELESS - 1.0) * abs(best):
+            if merit > best + (HOPELESS - 1.0) * abs(best):
                 break
             motion = session.nodes
-            if all(self._apart(motion, other) > _SAME for other in motions):
+            if all(self._apart(motion, other) > SAME_OPTIMUM for other in motions):
                 kept.append((merit, session))
                 motions.append(motion)
         self._merits = kept

@@ -11,23 +11,20 @@ from selfmotion.optimise import Status
 from selfmotion.path import Section
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.session import Session
+from selfmotion.planning.settings import (
+    EDGE_MARGIN,
+    END_AGREEMENT,
+    FOLLOWED_STEPS,
+    LEAST_PART,
+    OFF_PATH,
+    PART_FINALISTS,
+    PROBES,
+    PUSHES,
+)
 from selfmotion.problem import Problem
 from selfmotion.search import Reach
 
 _Candidate = tuple[Array, Guide | None]
-
-# Share of the time to the edge of the workspace that is given up, since joint speeds grow without
-# bound towards it.
-_MARGIN = 1e-4
-# The end of the part is found to this share of it, and a part below this share of the path is none.
-_AGREEMENT, _LEAST = 1e-3, 1e-2
-# Ends that are tried, at most.
-_PROBES = 16
-# Motions that are optimised, of all that are followed; these with so many steps, until they are off
-# the path by this share of its extent.
-_FINALISTS, _STEPS, _OFF = 3, 256, 1e-2
-# Constant null motions that stand for x = 0 where that breaks down: joint angles over the path.
-_PUSHES = (0.5, 2.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,13 +102,13 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> LargestPart 
     LargestPart or None
         None where nothing worth the name is left.
     """
-    goal = reach.time * (1.0 - _MARGIN) if reach.reason else reach.time
-    if goal < _LEAST * problem.path.duration:
+    goal = reach.time * (1.0 - EDGE_MARGIN) if reach.reason else reach.time
+    if goal < LEAST_PART * problem.path.duration:
         return None
     first = _until(problem, goal)
     attempts = []
     starts = _apart(first, reach.starts) if effort.apart else reach.starts
-    for candidate in _candidates(first, starts)[:_FINALISTS]:
+    for candidate in _candidates(first, starts)[:PART_FINALISTS]:
         attempts.append(_attempt(first, candidate, effort))
         if attempts[-1].cut_short:
             return _part(problem, attempts[-1], reach, "")
@@ -127,15 +124,15 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
     arrived: _Attempt | None = None
     edge: _Attempt | None = None
     low, high = 0.0, failed.problem.path.duration
-    back = _AGREEMENT
-    for _ in range(_PROBES):
+    back = END_AGREEMENT
+    for _ in range(PROBES):
         if arrived is None:
             # What was kept until then is a good guess; where it is not, further and further back.
             probe = max(min(failed.kept_until, high * (1.0 - back)), 0.5 * high)
             back *= 2.0
         else:
             probe = 0.5 * (low + high)
-        if probe < _LEAST * problem.path.duration or high - low < _AGREEMENT * high:
+        if probe < LEAST_PART * problem.path.duration or high - low < END_AGREEMENT * high:
             break
         attempt = _attempt(_until(problem, probe), failed.candidate, effort)
         if attempt.arrived_with_room or attempt.cut_short:
@@ -229,7 +226,7 @@ class _Push:
 def _pushes(problem: Problem, start: Array) -> list[Guide]:
     """Return null motions to either side: x = 0 may keep to a plane that has no way on."""
     basis = problem.follows.null_basis(start) / problem.path.duration
-    angles = [sign * angle for angle in _PUSHES for sign in (1.0, -1.0)]
+    angles = [sign * angle for angle in PUSHES for sign in (1.0, -1.0)]
     return [_Push(angle * direction) for direction in basis.T for angle in angles]
 
 
@@ -239,8 +236,8 @@ def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, f
     The smaller, the better.
     """
     path = problem.path
-    still = StillMotion.on(problem, start, Grid.aligned(path.knots, _STEPS), guide)
-    trouble = still.off_path(_OFF)
+    still = StillMotion.on(problem, start, Grid.aligned(path.knots, FOLLOWED_STEPS), guide)
+    trouble = still.off_path(OFF_PATH)
     far = path.duration if trouble is None else trouble
     kept = _kept_until(problem, still.grid.nodes, still.q, still.qd)
     # Beyond the place where it broke down, speeds may be anything.

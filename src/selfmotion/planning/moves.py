@@ -13,21 +13,21 @@ from selfmotion.motion import Trajectory, joined_motions, reversed_motion
 from selfmotion.path import Line
 from selfmotion.planning.roadmap import Roadmap
 from selfmotion.planning.run import plan
+from selfmotion.planning.settings import (
+    BRIEFEST_RETREAT,
+    MOVE_MARGIN,
+    RETREAT_SPEED,
+    SHORTEST_LEG,
+    SLOWER_FACTOR,
+    SLOWER_TRIES,
+    USED,
+    WAYS,
+)
 from selfmotion.problem import Problem
 from selfmotion.result import Move
 
 # Largest velocity, acceleration and jerk of 10τ³ - 15τ⁴ + 6τ⁵ for 0 ≤ τ ≤ 1.
 _SPEED, _ACCELERATION, _JERK = 1.875, 10.0 / np.sqrt(3.0), 60.0
-# Shares of the limits that are used, and the shortest leg [s].
-_USED, _SHORTEST = 0.95, 0.1
-# Requirements that depend on the pace may be kept by a slower one, tried so often.
-_FACTOR, _SLOWER = 1.2, 12
-# Bodies are looked at a bit farther apart than asked for [m], since only at some times.
-_MARGIN = 5e-4
-# Ways that seem free and turn out not to be, at most.
-_WAYS = 20
-# A retreat goes at this speed on average [m/s], and takes no less than this [s].
-_RETREAT, _BRIEFEST = 0.1, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class Mover:
         """Return the motion of the tool away from where q has it; SelfmotionError for none."""
         pose = self._problem.robot.pose(q)
         away = pose * pin.SE3(np.eye(3), retreat.length * retreat.axis)
-        duration = max(retreat.length / _RETREAT, _BRIEFEST)
+        duration = max(retreat.length / RETREAT_SPEED, BRIEFEST_RETREAT)
         line = Line(pose, away, duration)
         return plan(replace(self._problem, path=line, start=q)).require().trajectory
 
@@ -102,7 +102,7 @@ class Mover:
             first, last, arm.finite_limits(), robot.joint_weights, self._is_free, self._rng
         )
         worst: tuple[Finding, ...] = ()
-        for _ in range(_WAYS):
+        for _ in range(WAYS):
             way = ways.way()
             if way is None:
                 break
@@ -119,30 +119,30 @@ class Mover:
     def _is_free(self, q: Array) -> bool:
         if np.any(q < self._asked.lower) or np.any(q > self._asked.upper):
             return False
-        return not any(model.collides(q, far + _MARGIN) for model, far in self._asked.bodies)
+        return not any(model.collides(q, far + MOVE_MARGIN) for model, far in self._asked.bodies)
 
     def _at_its_pace(self, way: Array) -> tuple[Trajectory, tuple[Finding, ...]]:
         """Return the motion that stops at each configuration of a way (m, n), and its findings."""
         durations = np.array([self._time(step) for step in np.diff(way, axis=0)])
         still = np.zeros_like(way)
-        for _ in range(_SLOWER):
+        for _ in range(SLOWER_TRIES):
             t = np.concatenate([[0.0], np.cumsum(durations)])
             motion = Trajectory(t, way, still, self._problem.robot.joint_names, still)
             findings = self._judge(motion)
             if not any(not item.kept and item.of_pace for item in findings):
                 break
-            durations = _FACTOR * durations
+            durations = SLOWER_FACTOR * durations
         return motion, findings
 
     def _time(self, step: Array) -> float:
         """Return the shortest time [s] of a straight leg from rest to rest within the limits."""
         far, asked = np.abs(step), self._asked
         times = (
-            _SPEED * far / (_USED * asked.speed),
-            np.sqrt(_ACCELERATION * far / (_USED * asked.acceleration)),
-            np.cbrt(_JERK * far / (_USED * asked.jerk)),
+            _SPEED * far / (USED * asked.speed),
+            np.sqrt(_ACCELERATION * far / (USED * asked.acceleration)),
+            np.cbrt(_JERK * far / (USED * asked.jerk)),
         )
-        return max(_SHORTEST, *(float(each.max()) for each in times))
+        return max(SHORTEST_LEG, *(float(each.max()) for each in times))
 
     def _judge(self, motion: Trajectory) -> tuple[Finding, ...]:
         finished = FinishedMotion(self._problem.robot, motion)

@@ -1,7 +1,6 @@
 """A path that no motion follows as a whole, in the fewest parts."""
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -21,11 +20,12 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.certificate import Tolerance
-from selfmotion.constraints import Constraint
 from selfmotion.path import Retimed, Section, section_at_rest
 from selfmotion.planning.moves import Mover, Retreat, between_parts
+from selfmotion.planning.part_problem import asked_of_part, relaxed_along
 from selfmotion.planning.run import plan, plan_along
-from selfmotion.planning.settings import Search
+from selfmotion.planning.search import Search
+from selfmotion.planning.settings import ATTEMPTS, ELSEWHERE, GUIDE_SAMPLES
 from selfmotion.problem import Problem, check_problem, rest_orders
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.search import (
@@ -36,17 +36,9 @@ from selfmotion.search import (
     has_curves,
     turned_towards,
 )
-from selfmotion.task import Relaxation
 
-# Other cuts are tried where parts could not be planned, so often; they are so far away at least, as
-# a share of the path's waypoints.
-_ATTEMPTS, _ELSEWHERE = 4, 0.03
-# A guide has at least so many samples.
-_SAMPLES = 13
 # How smoothly a tool motion has to rest that needs no ramp; see `rest_orders`.
 _AT_REST = 2
-# A window shorter than this share of a part is none.
-_SHORTEST = 1e-2
 
 
 def plan_in_parts(
@@ -131,7 +123,7 @@ def _best_of(planner: "_Planner", stretches: Stretches, chains: list[Stretch]) -
     """Return the parts along chains, or along others where some of these fail."""
     best: Parts | None = None
     forbidden: set[int] = set()
-    for _ in range(_ATTEMPTS):
+    for _ in range(ATTEMPTS):
         found, failed = planner.plan(chains)
         if found is not None and (best is None or _standing(found) < _standing(best)):
             best = found
@@ -246,7 +238,7 @@ class _Planner:
     def _around(self, stretch: Stretch) -> set[int]:
         """Return the waypoints at which the parts to both sides of a stretch's ends are not cut."""
         last = len(self._stretches.t) - 1
-        width = max(1, round(_ELSEWHERE * last))
+        width = max(1, round(ELSEWHERE * last))
         cuts = {stretch.first, stretch.last} - {0, last}
         return {i for cut in cuts for i in range(cut - width, cut + width + 1)}
 
@@ -258,8 +250,8 @@ class _Planner:
             t = problem.path.when(t - t[0])
         if before is not None:
             q = turned_towards(q, before.trajectory.q[-1], self._turning)
-        if len(t) < _SAMPLES:
-            t, few = np.linspace(0.0, problem.path.duration, _SAMPLES), t
+        if len(t) < GUIDE_SAMPLES:
+            t, few = np.linspace(0.0, problem.path.duration, GUIDE_SAMPLES), t
             q = np.stack([np.interp(t, few, joint) for joint in q.T], axis=1)
         guide = SequenceGuide(Sequence(t, q, 0.0))
         return plan_along(problem, guide, self._tolerance, self._progress)
@@ -278,34 +270,7 @@ class _Planner:
             whole,
             path=path,
             start=whole.start if stretch.first == 0 else None,
-            constraints=list(_asked_of_part(whole, stretch.first == 0, stretch.last == last)),
+            constraints=list(asked_of_part(whole, stretch.first == 0, stretch.last == last)),
             relaxations=list(relaxed_along(whole, path, ends)),
             rest=True,
         )
-
-
-def _asked_of_part(problem: Problem, is_first: bool, is_last: bool) -> Iterator[Constraint]:
-    for item in problem.constraints:
-        kept: Constraint | None = None if item.closes else item
-        if kept is not None and not is_last:
-            kept = kept.on_part()
-        if kept is not None and not is_first:
-            kept = kept.on_last_part()
-        if kept is not None:
-            yield kept
-
-
-def relaxed_along(
-    problem: Problem, path: Retimed, ends: tuple[float, float]
-) -> Iterator[Relaxation]:
-    """Return what is relaxed along a stretch of the path, windows by its own time."""
-    for item in problem.relaxations:
-        if item.during is None:
-            yield item
-            continue
-        first, last = path.when(np.clip(item.during, *ends) - ends[0]).tolist()
-        # A ramp hardly moves at its end: when it gets there is known to some digits only.
-        first = 0.0 if item.during[0] <= ends[0] else first
-        last = path.duration if item.during[1] >= ends[1] else last
-        if last - first > _SHORTEST * path.duration:
-            yield replace(item, during=(first, last))

@@ -10,13 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from selfmotion.basics import Array
-
-# Samples around the middle, and all over the limits; and how far around, in shares of the distance.
-_AROUND, _ANYWHERE, _SPREAD = 40, 40, 0.5
-# What each stop counts [rad]: a way of few legs is worth a detour.
-_STOP = 0.5
-# Legs are looked at in steps of this [rad].
-_STEP = 0.03
+from selfmotion.planning.settings import ANYWHERE, AROUND, LEG_STEP, SPREAD, STOP
 
 
 class Roadmap:
@@ -45,13 +39,13 @@ class Roadmap:
         rng: np.random.Generator,
     ) -> None:
         self._free, self._weights = free, weights
-        spread = _SPREAD * float((weights * np.abs(last - first)).max()) / weights
-        around = rng.normal(0.5 * (first + last), spread, (_AROUND, len(first)))
-        anywhere = rng.uniform(*limits, (_ANYWHERE, len(first)))
+        spread = SPREAD * float((weights * np.abs(last - first)).max()) / weights
+        around = rng.normal(0.5 * (first + last), spread, (AROUND, len(first)))
+        anywhere = rng.uniform(*limits, (ANYWHERE, len(first)))
         samples = np.clip(np.concatenate([around, anywhere]), *limits)
         self._points = np.concatenate([[first, last], samples])
         apart = np.abs(self._points[:, None] - self._points) @ weights
-        self._lengths = apart + _STOP
+        self._lengths = apart + STOP
         self._known: set[tuple[int, int]] = set()
         self._way = [0, 1]
 
@@ -85,7 +79,7 @@ class Roadmap:
                 self._lengths[point, :] = self._lengths[:, point] = np.inf
                 return False
         first, last = self._points[i], self._points[j]
-        count = int(np.ceil((self._weights * np.abs(last - first)).max() / _STEP)) + 1
+        count = int(np.ceil((self._weights * np.abs(last - first)).max() / LEG_STEP)) + 1
         # In an order in which what is in the way shows early.
         shares = np.linspace(0.0, 1.0, count + 1)[_spread_out(count + 1)]
         if all(self._free(first + share * (last - first)) for share in shares):

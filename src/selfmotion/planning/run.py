@@ -28,8 +28,9 @@ from selfmotion.planning.deadline import Deadline, TimedCounts
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import Finished, finish
 from selfmotion.planning.largest_part import LargestPart, largest_part
+from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
-from selfmotion.planning.settings import Search
+from selfmotion.planning.settings import DAMPED_EVALUATIONS, PART_EVALUATIONS
 from selfmotion.planning.warm_start import check_warm_start
 from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Gap, Plan, Report
@@ -37,8 +38,6 @@ from selfmotion.search import SPACING, Reach, SequenceGuide, reachable
 
 # After these no other way is tried.
 _ENDED = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
-# Evaluations of the cost that a damped motion may take, and each of many on parts of the path.
-_PATIENCE, _PART_PATIENCE = 400, 150
 
 
 def plan(
@@ -117,7 +116,7 @@ def plan(
     if deadline is not None:
         clock = Deadline.after(as_number(deadline, "deadline", above=0.0))
     if problem.damping is not None and max_evaluations is None:
-        max_evaluations = _PATIENCE
+        max_evaluations = DAMPED_EVALUATIONS
     counts = TimedCounts(deadline=clock)
     effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, counts)
     settings = _Settings(Tolerance.of(tolerance), clock.telling(progress), warm_start, clock)
@@ -324,7 +323,7 @@ class _Planning:
         """Return the plan of the largest part, looking closely at a time [s]; None for none."""
         effort = self._effort
         if effort.max_evaluations is None:
-            effort = replace(effort, max_evaluations=_PART_PATIENCE)
+            effort = replace(effort, max_evaluations=PART_EVALUATIONS)
         known = self._reach(suspect)
         self._progress("largest part", 1, 1)
         found = largest_part(self._problem, known, effort)

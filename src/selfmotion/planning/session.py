@@ -24,21 +24,19 @@ from selfmotion.optimise import Iteration, Minimum, Status
 from selfmotion.planning.closing import closed
 from selfmotion.planning.descent import Descent, breaks
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.settings import (
+    ALIKE,
+    COST_AGREEMENT,
+    LEAST_SAVING,
+    RISE,
+    RISES,
+    ROUGH_AGREEMENT,
+    THINNER,
+)
 from selfmotion.planning.warm_start import coefficients_of
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
 
-# Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands; and at
-# which it tells what null motion is wanted.
-_COST_AGREEMENT, _ROUGH_AGREEMENT = 1e-4, 1e-2
-# A grid on which the motion at x = 0 costs this much more or less will do for a rough null motion.
-_ALIKE = 0.05
-# While a null motion is chosen, this share of the steps that it should have will do.
-_THINNER = 2
-# A cost that rises this much on two grids in turn has no limit.
-_RISE, _RISES = 1.5, 2
-# What would save less than this share of the cost does not bind.
-_LEAST_SAVING = 1e-6
 # After these there is nothing to go on from.
 _ADRIFT = (Status.UNBOUNDED, Status.GRADIENT)
 # After these the user has no more time to give.
@@ -285,7 +283,7 @@ class Session:
         grid = Grid.aligned(self._still.problem.knots, wanted.rough.fewest_steps)
         rough = self._on(grid, wanted.rough)
         # Written so that NaN asks for more steps, too.
-        while not _relative_change(cost, rough.value(np.zeros(rough.size))) <= _ALIKE:
+        while not _relative_change(cost, rough.value(np.zeros(rough.size))) <= ALIKE:
             if rough.grid.steps >= objective.grid.steps:
                 return False
             rough = self._on(rough.grid.halved(), wanted.rough)
@@ -312,7 +310,7 @@ class Session:
             # For good, whatever is minimised later.
             self.end(Status.INTERRUPTED)
         if self._descent.bound and minimum.status is Status.CONVERGED:
-            least = _LEAST_SAVING * abs(minimum.cost)
+            least = LEAST_SAVING * abs(minimum.cost)
             samples = objective.samples(minimum.x)
             self.active = objective.constraints.active(samples, minimum.multipliers, least)
 
@@ -340,14 +338,14 @@ class Session:
 
         What freedom is wanted is found on a coarse grid, where it costs little.
         """
-        error = self._refine_until(_ROUGH_AGREEMENT)
+        error = self._refine_until(ROUGH_AGREEMENT)
         coarse = self._cost()
         enriched = self._enriched()
-        if enriched or error > _COST_AGREEMENT:
-            self._refine_until(_COST_AGREEMENT)
-        if enriched or abs(self._cost() - coarse) > _ROUGH_AGREEMENT * abs(coarse):
+        if enriched or error > COST_AGREEMENT:
+            self._refine_until(COST_AGREEMENT)
+        if enriched or abs(self._cost() - coarse) > ROUGH_AGREEMENT * abs(coarse):
             while self._enriched():
-                self._refine_until(_COST_AGREEMENT)
+                self._refine_until(COST_AGREEMENT)
 
     def _refine_until(self, agreement: float) -> float:
         """Optimise on halved grids until the cost agrees with that of the one before.
@@ -364,8 +362,8 @@ class Session:
             error = _relative_change(before, after)
             # A cost that grows and grows, and what two grids in turn could not meet: the path runs
             # past the edge of the workspace between their nodes, or limits are too tight.
-            rises = rises + 1 if after > _RISE * abs(before) else 0
-            if rises == _RISES:
+            rises = rises + 1 if after > RISE * abs(before) else 0
+            if rises == RISES:
                 return 0.0
             self.minimize()
             if unmet and self.violations:
@@ -418,7 +416,7 @@ class Session:
         """Go on with another null motion that can be what the present one is."""
         before = self._objective
         z, x, c = before.parts(self._x)
-        grid = before.grid.with_steps(motion.fewest_steps // _THINNER)
+        grid = before.grid.with_steps(motion.fewest_steps // THINNER)
         t, duration = grid.stage_times, self._still.problem.path.duration
         own, new = (kind.functions(t, duration) for kind in (self.null_motion, motion))
         same = np.linalg.lstsq(new, own)[0]

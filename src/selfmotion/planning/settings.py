@@ -1,51 +1,107 @@
-"""How to search where the start is free."""
+"""What planning tries, in what order of effort, and when it has enough.
 
-from dataclasses import dataclass
+What these do shows in `make bench` and `make bench-constrained` (single starts), `make
+bench-starts` (free starts against the best of everything tried) and `make suite-made`.
+"""
 
-import numpy as np
+# --- grids: how fine a motion is computed (session, finish)
+# Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands; and at
+# which it tells what null motion is wanted.
+COST_AGREEMENT = 1e-4
+ROUGH_AGREEMENT = 1e-2
+# A grid on which the motion at x = 0 costs this much more or less will do for a rough null motion.
+ALIKE = 0.05
+# While a null motion is chosen, this share of the steps that it should have will do.
+THINNER = 2
+# A cost that rises this much on so many grids in turn has no limit.
+RISE = 1.5
+RISES = 2
+# What would save less than this share of the cost does not bind.
+LEAST_SAVING = 1e-6
+# Between its nodes a motion may be off the path by this share of the tolerance where that is looked
+# at, in the middle; and by this share of what it was before steps were halved.
+RESOLVED = 0.5
+FALLS = 0.7
+# Limits that are exceeded between the nodes on more grids than this are so on any; and nothing is
+# optimised again on grids with more than so many times the steps.
+ROUGH_GRIDS = 3
+FINER = 4
 
-from selfmotion.basics import as_choice, as_whole, random_numbers
+# --- starts and sequences (candidates, heats)
+# Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
+SECOND_EFFORT = 4
+# Evaluations of the cost with which each sequence is optimised at first; only the best goes on.
+FIRST_EVALUATIONS = 16
+# Sequences are not worth refining when dearer by this factor than one that keeps all constraints.
+DEARER = 1.25
+# Steps of the rough motions.
+ROUGH_STEPS = 12
+# Heats: so many starts at most, optimised with so many evaluations of the cost more.
+HEATS = ((16, 8), (6, 8))
+# Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
+# rule; rough optima this near are the same.
+ONE_VALLEY = 0.6
+SAME_OPTIMUM = 0.1
+# A rough optimum that costs more than this many times the best is not worth the rest.
+HOPELESS = 2.0
+# Evaluations of the cost that a damped motion may take, and each of many on parts of the path.
+DAMPED_EVALUATIONS = 400
+PART_EVALUATIONS = 150
 
-_MODES = ("auto", "local", "global")
+# --- the largest part of a path
+# Share of the time to the edge of the workspace that is given up, since joint speeds grow without
+# bound towards it.
+EDGE_MARGIN = 1e-4
+# The end of the part is found to this share of it, and a part below this share of the path is none.
+END_AGREEMENT = 1e-3
+LEAST_PART = 1e-2
+# Ends that are tried, at most.
+PROBES = 16
+# Motions that are optimised, of all that are followed; these with so many steps, until they are off
+# the path by this share of its extent.
+PART_FINALISTS = 3
+FOLLOWED_STEPS = 256
+OFF_PATH = 1e-2
+# Constant null motions that stand for x = 0 where that breaks down: joint angles over the path.
+PUSHES = (0.5, 2.0)
 
+# --- parts, and moves between them (parts, moves, roadmap)
+# Other cuts are tried where parts could not be planned, so often; they are so far away at least, as
+# a share of the path's waypoints.
+ATTEMPTS = 4
+ELSEWHERE = 0.03
+# A guide has at least so many samples.
+GUIDE_SAMPLES = 13
+# A window shorter than this share of a part is none.
+SHORTEST_WINDOW = 1e-2
+# Shares of the limits that are used by moves, and the shortest leg [s].
+USED = 0.95
+SHORTEST_LEG = 0.1
+# Requirements that depend on the pace may be kept by a slower one, tried so often.
+SLOWER_FACTOR = 1.2
+SLOWER_TRIES = 12
+# Bodies are looked at a bit farther apart than asked for [m], since only at some times.
+MOVE_MARGIN = 5e-4
+# Ways that seem free and turn out not to be, at most.
+WAYS = 20
+# A retreat goes at this speed on average [m/s], and takes no less than this [s].
+RETREAT_SPEED = 0.1
+BRIEFEST_RETREAT = 0.5
+# Samples around the middle, and all over the limits; and how far around, in shares of the distance.
+AROUND = 40
+ANYWHERE = 40
+SPREAD = 0.5
+# What each stop counts [rad]: a way of few legs is worth a detour.
+STOP = 0.5
+# Legs are looked at in steps of this [rad].
+LEG_STEP = 0.03
 
-@dataclass(frozen=True)
-class Search:
-    """Where motions begin, when the start is free.
-
-    Parameters
-    ----------
-    starts : int
-        So many at most: for redundancy 1 along all self-motions of the first pose, else what
-        Newton's method finds from twice as many seeds.
-    finalists : int
-        How many starts are optimised to the end: those of the best motions among rough ones, which
-        are optimised a little (`Heats`). As many as `starts` leave the rough ones out.
-    mode : {"auto", "local", "global"}
-        Optimise from many starts (local), or from the best sequences over all self-motions: sampled
-        evenly where the redundancy is 1 (`best_sequences`), at random where it is more
-        (`sampled_sequences`). ``"auto"``: from many starts first, and from
-        sequences where none of them leads to a motion that keeps the constraints.
-    compare : bool
-        Search globally whatever the other search finds, also where the start is given, so that
-        `Report.gap` tells how far the plan is from the best motion of all. Needs redundancy 1.
-    rng : Generator or int
-        Shifts the seeds; the same one gives the same plan.
-
-    Raises
-    ------
-    ProblemError
-        A number is below 1, or the mode unknown.
-    """
-
-    starts: int = 48
-    finalists: int = 3
-    mode: str = "auto"
-    compare: bool = False
-    rng: np.random.Generator | int = 0
-
-    def __post_init__(self) -> None:
-        for name in ("starts", "finalists"):
-            as_whole(getattr(self, name), f"search: {name}", 1, 10**6)
-        as_choice(self.mode, "search: mode", _MODES)
-        random_numbers(self.rng)
+# --- the fastest motion
+# Rounds end when one gains less than this share, or after so many.
+ROUND_GAIN = 2e-3
+ROUNDS = 8
+# The power of the cost: the larger, the nearer to the largest share, and the harder to minimise.
+POWER = 16.0
+# Intervals of the pace at which a round plans, and its degree.
+COARSE = 32
+DEGREE = 5

@@ -8,19 +8,9 @@ import pinocchio as pin
 from selfmotion.basics import Array, ProblemError, nearest
 from selfmotion.collision import ClearanceModel, CollisionModel
 from selfmotion.costs import Samples
+from selfmotion.realtime.settings import CLEAR_FOR, CLEARANCE_MARGIN, LEAVING, LEVEL, NEARER
 from selfmotion.robot import RobotModel
 from selfmotion.task import as_pose
-
-# Plans aim at this much more than the distance that is asked for [m]: nodes are apart.
-_MARGIN = 5e-3
-# From so much beyond on, distances level off [m].
-_NEAR = 0.01
-# A plan that comes too near within this time [s] is not begun: the arm can stop in less.
-_SOON = 0.5
-# How fast what came too near is to be left [m/s].
-_LEAVING = 0.05
-# What is no more than this nearer than now comes no nearer [m].
-_NEARER = 1e-4
 
 
 class Surroundings:
@@ -45,7 +35,7 @@ class Surroundings:
     def __init__(self, robot: RobotModel, bodies: Sequence[tuple[CollisionModel, float]]) -> None:
         # Models of its own: those of the certificate have obstacles that stand still.
         self._models = [
-            (ClearanceModel(CollisionModel(robot, own.obstacles, own.disabled), far + _NEAR), far)
+            (ClearanceModel(CollisionModel(robot, own.obstacles, own.disabled), far + LEVEL), far)
             for own, far in bodies
         ]
         self._names = [{item.name for item in own.obstacles} for own, _ in bodies]
@@ -103,8 +93,8 @@ class Surroundings:
         found = model.clearances(samples.q[nodes])
         values = found.values
         times = samples.sampling.node_times
-        soon = values[times <= _SOON]
-        allowed = np.minimum(distance, soon[0] - _NEARER) if soon.size else soon
+        soon = values[times <= CLEAR_FOR]
+        allowed = np.minimum(distance, soon[0] - NEARER) if soon.size else soon
         if (soon[1:] < allowed).any():
             row, pair = np.argwhere(soon[1:] < allowed)[0]
             first, second = model.pairs[pair]
@@ -116,8 +106,8 @@ class Surroundings:
         rows = -(found.slopes[:, None] @ by_q[nodes[found.rows]])[:, 0]
         # From where the arm is, no more can be asked for than to come no nearer. Obstacles that
         # came too near are to be left again, at this speed; links need not.
-        leaving = np.array([_LEAVING * (pair[1] in names) for pair in model.pairs])
+        leaving = np.array([LEAVING * (pair[1] in names) for pair in model.pairs])
         reached = values[0] + times[:, None] * leaving
-        room = values - np.minimum(distance + _MARGIN, reached)
+        room = values - np.minimum(distance + CLEARANCE_MARGIN, reached)
         later = found.rows > 0
         return rows[later], room[found.rows, found.columns][later]

@@ -7,13 +7,9 @@ from selfmotion.basics.layout import Layout
 from selfmotion.realtime import law
 from selfmotion.realtime.limits import stoppable
 from selfmotion.realtime.segment import Flag, Segment
+from selfmotion.realtime.settings import FARTHEST, GAIN
 from selfmotion.realtime.viable import tightened
 from selfmotion.robot import Kinematics, RobotModel
-
-# The pose feedback between two steps [1/s].
-_GAIN = 20.0
-# A command so far from the arm [rad or m] is not what it does.
-_FARTHEST = 0.5
 
 
 class Commands:
@@ -100,7 +96,7 @@ class Commands:
         """Take in a measured position (n,); return why the arm may not go on moving, or ""."""
         off = q - self._sent[0]
         worst = int(np.argmax(np.abs(off)))
-        if abs(off[worst]) > _FARTHEST:
+        if abs(off[worst]) > FARTHEST:
             return f"joint '{self._robot.joint_names[worst]}' is {off[worst]:.3g} from its command"
         share = 1.0 - np.exp(-passed / self._settling)
         self._limits[4] += share * (off - self._limits[4])
@@ -120,7 +116,7 @@ class Commands:
         ) -> bool:
             nonlocal follows
             follows &= law.command(
-                cycle, jacobian, rotation, translation, table, states, limits, layout, _GAIN, h
+                cycle, jacobian, rotation, translation, table, states, limits, layout, GAIN, h
             )
             return True
 

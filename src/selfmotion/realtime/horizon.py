@@ -18,21 +18,20 @@ from selfmotion.kernels import transport
 from selfmotion.motion import Grid, NullMotion
 from selfmotion.path import PathSamples
 from selfmotion.realtime.clear import Surroundings
-from selfmotion.realtime.law import PIVOT
 from selfmotion.realtime.programme import elastic_step, graded, model_of
+from selfmotion.realtime.settings import (
+    BADLY,
+    BROKEN,
+    GUESS_LESS,
+    GUESS_MORE,
+    LEAST_GUESS,
+    MOST_GUESS,
+    PIVOT,
+    REGULAR,
+    WELL,
+    WILD,
+)
 from selfmotion.robot import null_space
-
-# Added to the Gauss-Newton matrix, relative to its trace: directions that do not act stay put.
-_REGULAR = 1e-8
-# Where a cost does not tell its curvature, that of the joints' speed is added, so many times: less
-# where the cost falls as predicted, more where it does not, from the least to the most.
-_LESS, _MORE, _LEAST, _MOST = 0.3, 4.0, 1e-3, 1e6
-# Of the predicted fall, what counts as well predicted, and as badly.
-_WELL, _BADLY = 0.75, 0.25
-# A joint that moves so many times as fast as it may has been thrown out of a singular pose.
-_WILD = 20.0
-# What rows may be broken by, relative to their range.
-_BROKEN = 1e-6
 
 
 class Horizon:
@@ -96,7 +95,7 @@ class Horizon:
         speeds, hardest = pace[:, : robot.dof], pace[:, robot.dof :]
         self._low = np.stack([places[:, 0], -speeds, -hardest]).ravel()
         self._high = np.stack([places[:, 1], speeds, hardest]).ravel()
-        self._wild = _WILD * limits[2]
+        self._wild = WILD * limits[2]
         self._range = np.where(np.isfinite(self._high - self._low), self._high - self._low, 1.0)
         # The stages' places among the nodes, for frames between them.
         self._node, self._share = self._between(t)
@@ -217,10 +216,10 @@ class Horizon:
         # What is not taken does not break down.
         self.breakdown = np.inf
         ratio = fall / predicted if np.isfinite(fall) else -np.inf
-        if not ratio >= _BADLY:
-            self._damping = min(_MORE * self._damping, _MOST)
-        elif ratio > _WELL:
-            self._damping = max(_LESS * self._damping, _LEAST)
+        if not ratio >= BADLY:
+            self._damping = min(GUESS_MORE * self._damping, MOST_GUESS)
+        elif ratio > WELL:
+            self._damping = max(GUESS_LESS * self._damping, LEAST_GUESS)
         return bool(ratio > 0.0)
 
     def _begin(self, q: Array) -> bool:
@@ -263,7 +262,7 @@ class Horizon:
         if not (np.all(np.isfinite(gradient)) and np.all(np.isfinite(metric))):
             return None
         d = self.size
-        metric[np.diag_indices(d)] += _REGULAR * (np.trace(metric) + 1e-12)
+        metric[np.diag_indices(d)] += REGULAR * (np.trace(metric) + 1e-12)
         limits = self._conditions(samples, by_q, by_qd)
         try:
             step, self.relaxed = elastic_step(metric, gradient, *limits)
@@ -290,5 +289,5 @@ class Horizon:
         value = np.stack([samples.q[nodes[1:]], qd[1:], np.diff(qd, axis=0) / pause]).ravel()
         harder = np.diff(moves, axis=0) / pause[:, :, None]
         rows = np.stack([by_q[nodes[1:]], moves[1:], harder]).reshape(-1, d)
-        slack = _BROKEN * self._range
+        slack = BROKEN * self._range
         return rows, self._low - value - slack, self._high - value + slack

@@ -23,12 +23,9 @@ from selfmotion.kernels import (
     solve_cholesky,
     task_rows,
 )
+from selfmotion.realtime.settings import FOLLOWED, PIVOT
 from selfmotion.realtime.viable import viable_accelerations
 
-# Below this pivot of JJᵀ [m², rad²] the inverse is damped, by up to λ² = the same.
-PIVOT = 1e-3
-# What the tool may lack of the rate that was asked for, and count as following [m/s, rad/s].
-_FOLLOWED = 1e-3
 # Entries of a cycle's row besides its n-vectors: the reference's position, rotation and twist.
 REFERENCE = 18
 
@@ -92,7 +89,7 @@ def saturate(
         miss = wanted[i]
         for k in range(n):
             miss -= jacobian[i, k] * rates[k]
-        if not abs(miss) <= _FOLLOWED:
+        if not abs(miss) <= FOLLOWED:
             return False
     return True
 
@@ -137,13 +134,9 @@ def command(
         twist[i] = row[2 * n + 12 + i] + gain * error[i]
     task_rows(layout, 0, rotation, jacobian, task)
     select(layout, 0, rotation, twist, wanted)
-    c, w = states[cycle, 0], states[cycle, 1]
+    w = states[cycle, 1]
     low, high, rates = np.empty(n), np.empty(n), np.empty(n)
-    for k in range(n):
-        low[k], high[k] = viable_accelerations(
-            c[k], w[k], limits[0, k], limits[1, k], limits[2, k], limits[3, k], h
-        )
-        low[k], high[k] = w[k] + h * low[k], w[k] + h * high[k]
+    viable_rates(states[cycle], limits, h, low, high)
     follows = saturated_rates(task, wanted, row[n : 2 * n], low, high, rates)
     for k in range(n):
         rate = min(max(rates[k], low[k]), high[k])
@@ -152,6 +145,17 @@ def command(
             ahead = states[cycle + 1, 0, k] + 0.5 * h * states[cycle + 1, 1, k]
             table[cycle + 1, k] = ahead + limits[4, k]
     return follows
+
+
+@inlined
+def viable_rates(state: Array, limits: Array, h: float, low: Array, high: Array) -> None:
+    """Set what the rates (n,) of the next cycle may be, from c, w and a now (3, n)."""
+    for k in range(state.shape[1]):
+        c, w = state[0, k], state[1, k]
+        low[k], high[k] = viable_accelerations(
+            c, w, limits[0, k], limits[1, k], limits[2, k], limits[3, k], h
+        )
+        low[k], high[k] = w + h * low[k], w + h * high[k]
 
 
 @inlined
@@ -222,6 +226,15 @@ def approach(offset: Array, rate: Array, law: Array, step: float, table: Array) 
                 now[i] += 0.5 * step * (before + speed[i])
 
 
+@inlined
+def _turning(angle: float) -> tuple[float, float, float]:
+    """Return a, b and c of exp(φ) = I + a [φ] + b [φ]² and Jl(φ) = I + b [φ] + c [φ]²."""
+    if not angle > 1e-4:
+        return 1.0, 0.5, 1.0 / 6.0
+    first = np.sin(angle) / angle
+    return first, (1.0 - np.cos(angle)) / (angle * angle), (1.0 - first) / (angle * angle)
+
+
 @kernel
 def shift_reference(
     times: Array,
@@ -251,11 +264,7 @@ def shift_reference(
             phi[i] = (1.0 - share) * table[g, 3 + i] + share * table[g + 1, 3 + i]
             slope[i] = (1.0 - share) * table[g, 9 + i] + share * table[g + 1, 9 + i]
         angle = sqrt(phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
-        if angle > 1e-4:
-            first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / (angle * angle)
-            third = (1.0 - first) / (angle * angle)
-        else:
-            first, second, third = 1.0, 0.5, 1.0 / 6.0
+        first, second, third = _turning(angle)
         square = np.empty((3, 3))
         skew = np.zeros((3, 3))
         skew[0, 1], skew[0, 2], skew[1, 2] = -phi[2], phi[1], -phi[0]

@@ -13,12 +13,10 @@ from selfmotion.constraints import (
     JointPositionLimits,
     JointVelocityLimits,
 )
+from selfmotion.realtime.settings import ACCELERATION, ENDS, SPEED
 from selfmotion.realtime.viable import braking_distance
 from selfmotion.robot import RobotModel
 
-# What a plan leaves of the limits to the command: distance from the ends [rad or m], and share of
-# speed and acceleration. The tool's feedback and the time between nodes need some.
-_ENDS, _SPEED, _ACCELERATION = 5e-3, 0.98, 0.9
 _USUAL = (JointPositionLimits, JointVelocityLimits, JointAccelerationLimits)
 
 
@@ -57,8 +55,8 @@ def joint_limits(robot: RobotModel, constraints: Sequence[Constraint]) -> Array:
 def planned_limits(limits: Array) -> Array:
     """Return what plans aim at, within the limits (4, n) of commands."""
     lower, upper = limits[:2]
-    margin = np.minimum(_ENDS, 0.1 * (upper - lower))
-    return np.stack([lower + margin, upper - margin, _SPEED * limits[2], _ACCELERATION * limits[3]])
+    margin = np.minimum(ENDS, 0.1 * (upper - lower))
+    return np.stack([lower + margin, upper - margin, SPEED * limits[2], ACCELERATION * limits[3]])
 
 
 def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: float) -> Array:

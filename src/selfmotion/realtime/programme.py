@@ -7,15 +7,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.costs import Cost, Samples
 from selfmotion.optimise import minimize_quadratic
-
-# How far coefficients may go in one cycle [rad/s √s].
-_REACH = 1.0
-# The first nodes are so far apart [s], unless there are enough for less.
-_NEAR = 0.1
-# Programmes of a cycle: each has the rows that the one before broke.
-_ROUNDS = 4
-# What breaking a row by all of its range costs, next to a step's cost; the range of distances [m].
-_BREAKING, _DISTANCES = 1e3, 0.1
+from selfmotion.realtime.settings import BREAKING, DISTANCES, NODES_APART, REACH, ROUNDS
 
 
 def elastic_step(
@@ -31,11 +23,11 @@ def elastic_step(
     numpy.linalg.LinAlgError
         The numbers are beyond what can be solved with.
     """
-    reach = np.full(len(gradient), _REACH)
+    reach = np.full(len(gradient), REACH)
     chosen = np.zeros(len(rows), dtype=bool)
     step = np.asarray(np.linalg.solve(metric, -gradient), dtype=np.float64)
     bounded = bool(np.all(np.abs(step) <= reach))
-    for _ in range(_ROUNDS):
+    for _ in range(ROUNDS):
         if not bounded or chosen.any():
             some = rows[chosen], low[chosen], high[chosen]
             found = minimize_quadratic(metric, gradient, *some, reach)
@@ -56,10 +48,10 @@ def _elastic(metric: Array, gradient: Array, rows: Array, low: Array, high: Arra
     Limits are the command's to keep: what counts here is that the motion gets better.
     """
     width = high - low
-    scale = np.where(np.isfinite(width) & (width > 0.0), width, _DISTANCES)[:, None]
-    weight = _BREAKING * np.trace(metric) / len(metric)
+    scale = np.where(np.isfinite(width) & (width > 0.0), width, DISTANCES)[:, None]
+    weight = BREAKING * np.trace(metric) / len(metric)
     step = np.zeros(len(metric))
-    for _ in range(_ROUNDS):
+    for _ in range(ROUNDS):
         value = rows @ step
         broken = (value < low) | (value > high)
         near = np.clip(value, low, high)[broken]
@@ -67,7 +59,7 @@ def _elastic(metric: Array, gradient: Array, rows: Array, low: Array, high: Arra
         wanted = scaled.T @ (near / scale[broken, 0])
         stiff = metric + weight * (scaled.T @ scaled)
         step = np.linalg.solve(stiff, weight * wanted - gradient)
-    return np.asarray(step * min(1.0, _REACH / max(float(np.abs(step).max()), 1e-12)))
+    return np.asarray(step * min(1.0, REACH / max(float(np.abs(step).max()), 1e-12)))
 
 
 def model_of(
@@ -108,11 +100,11 @@ def model_of(
 
 
 def graded(duration: float, steps: int) -> Array:
-    """Return nodes from 0 to `duration` [s]: the first ones `_NEAR` apart, later ones farther.
+    """Return nodes from 0 to `duration` [s]: the first ones near each other, later ones farther.
 
     Even ones where there are enough for that. What comes next is commanded, what comes later is
     what it is to be good for.
     """
     s = np.linspace(0.0, 1.0, steps + 1)
-    even = np.clip((_NEAR / duration * steps**2 - 1.0) / (steps - 1.0), 0.0, 1.0)
+    even = np.clip((NODES_APART / duration * steps**2 - 1.0) / (steps - 1.0), 0.0, 1.0)
     return np.asarray(duration * (even * s + (1.0 - even) * s * s))

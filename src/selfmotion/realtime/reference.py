@@ -9,9 +9,7 @@ from selfmotion.basics import Array, as_number
 from selfmotion.follow import Follows
 from selfmotion.path import Path, PathSamples
 from selfmotion.realtime import law
-
-# An offset of the tool is known every so many seconds.
-_OFFSET_STEP = 2e-3
+from selfmotion.realtime.settings import OFFSET_STEP
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ class Reference:
         self._task, self._times = task, times
         self._kinematics = follows.only.chain.kinematics()
         self._approach = approach.numbers
-        self._offsets = np.zeros((int(np.ceil(times.max() / _OFFSET_STEP)) + 2, 12))
+        self._offsets = np.zeros((int(np.ceil(times.max() / OFFSET_STEP)) + 2, 12))
         self.table = np.zeros((len(times), law.REFERENCE))
         self.jacobian = np.zeros((task.dimension, follows.robot.dof))
         # What the task does not prescribe is left where it is; of an axis all three rows turn.
@@ -96,14 +94,14 @@ class Reference:
         slope[3:] = np.linalg.solve(_left_jacobian(offset[3:]), relative)
         offset[self._free] = slope[self._free] = 0.0
         self.jacobian = self._task.select(jacobian, rotation)
-        law.approach(offset, slope, self._approach, _OFFSET_STEP, self._offsets)
+        law.approach(offset, slope, self._approach, OFFSET_STEP, self._offsets)
         law.shift_reference(
             self._times,
             target.translation,
             target.rotation,
             target.twist,
             self._offsets,
-            _OFFSET_STEP,
+            OFFSET_STEP,
             self.table,
         )
         return np.array([np.linalg.norm(offset[:3]), np.linalg.norm(offset[3:])])

@@ -26,12 +26,9 @@ from selfmotion.realtime.horizon import Horizon
 from selfmotion.realtime.limits import joint_limits, planned_limits
 from selfmotion.realtime.reference import Approach, Reference, resting
 from selfmotion.realtime.segment import Flag, Segment
+from selfmotion.realtime.settings import AHEAD, SOON
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
-
-# A motion that breaks down within this time [s] is not followed: the arm can stop in less; nor
-# within the second, where limits already hold it up.
-_SOON, _AHEAD = 0.5, 2.0
 
 
 class Replanner:
@@ -116,8 +113,7 @@ class Replanner:
         somewhere = Dwell(robot.pose(robot.dexterous_configuration()), self.horizon)
         follows = Follows.of(robot, somewhere, self.task)
         costs, constraints = as_asked(follows, costs, constraints)
-        limits = joint_limits(robot, constraints)
-        self.limits = limits
+        self.limits = limits = joint_limits(robot, constraints)
         null_motion = in_null_space(null_motion or PolynomialNullMotion())
         steps = as_whole(steps, "steps", null_motion.fewest_steps, 1000)
         bodies = [pair for item in constraints for pair in item.envelope(robot).bodies]
@@ -131,8 +127,7 @@ class Replanner:
             steps,
             self._around,
         )
-        self._kinematics = follows.only.chain.kinematics()
-        self._layout = follows.layout
+        self._kinematics, self._layout = follows.only.chain.kinematics(), follows.layout
         self._cycles = round(self.period / self.cycle) + round(reserve / self.cycle)
         self._commands = Commands(robot, limits, self.cycle, self._cycles, latency, settling)
         self._prepare()
@@ -303,9 +298,9 @@ class Replanner:
         else:
             flag = Flag.KEPT if np.any(kept) else Flag.TRACKING
         # On the way into a singular pose an arm may end up on its other side.
-        soon = horizon.breakdown < _SOON
+        soon = horizon.breakdown < SOON
         self._without_way = self._without_way + max(passed, self.cycle) if soon else 0.0
-        held_up = horizon.breakdown < _AHEAD and not self._follows
+        held_up = horizon.breakdown < AHEAD and not self._follows
         if held_up or self._without_way > self._patience:
             flag = Flag.STOPPING
         self._table[:, n : 2 * n] = kept

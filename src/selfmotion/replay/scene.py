@@ -191,12 +191,6 @@ def trace_commands(
     radius : float
         Of the plan's trace [m].
     """
-
-    def painted(curve: Curves, kept: Indices, surface: Surface) -> Json:
-        colors = shapes.colors_of(curve.manipulability[kept], scale["low"], scale["high"])
-        copies = len(surface[0]) // len(kept)
-        return _surface(payload, *surface, np.repeat(colors, copies, axis=0))
-
     commands = []
     kept = shapes.distinct(target, 0.5 * radius)
     if len(kept) > 1:
@@ -205,12 +199,21 @@ def trace_commands(
         commands.append(three.set_object(f"{root}/prescribed", drawn, look))
     kept = shapes.distinct(shown.tool, 0.5 * radius)
     if len(kept) > 1:
-        drawn = painted(shown, kept, shapes.tube(shown.tool[kept], radius))
+        drawn = _coloured(payload, scale, shown, kept, shapes.tube(shown.tool[kept], radius))
         commands.append(three.set_object(f"{root}/trace", drawn, _painted()))
     kept = shapes.distinct(start.tool, 9.0 * radius)
-    drawn = painted(start, kept, shapes.beads(start.tool[kept], 2.6 * radius))
+    drawn = _coloured(payload, scale, start, kept, shapes.beads(start.tool[kept], 2.6 * radius))
     commands.append(three.set_object(f"{root}/start", drawn, _painted()))
     return commands
+
+
+def _coloured(
+    payload: Payload, scale: Json, curve: Curves, kept: Indices, surface: Surface
+) -> Json:
+    """Return a surface along a curve, coloured by manipulability."""
+    colors = shapes.colors_of(curve.manipulability[kept], scale["low"], scale["high"])
+    copies = len(surface[0]) // len(kept)
+    return _surface(payload, *surface, np.repeat(colors, copies, axis=0))
 
 
 def triad_command(root: str, payload: Payload, shown: Curves, times: Array, length: float) -> Json:

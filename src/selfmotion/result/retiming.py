@@ -53,16 +53,12 @@ def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
     return factor
 
 
-def retime(
-    plan: Plan,
-    acceleration: npt.ArrayLike,
-    velocity: npt.ArrayLike | None = None,
-) -> Plan:
+def retime(plan: Plan, acceleration: npt.ArrayLike, velocity: npt.ArrayLike | None = None) -> Plan:
     """Return the plan's joint path in the shortest time within the limits, from rest to rest.
 
     Time-optimal path parametrisation by reachability analysis (H. Pham and Q.-C. Pham, IEEE
     Trans. Robotics 34(3), 2018), by the package toppra. The geometric path of joints and tool
-    stays; the tool motion becomes a `Retimed` one, and the certificate is made anew.
+    stays; the tool motion becomes a `Retimed` one, the certificate is made anew, the report stays.
 
     Parameters
     ----------
@@ -71,11 +67,6 @@ def retime(
         Limits [rad/s² or m/s²].
     velocity : (n,) or float, optional
         Limits [rad/s or m/s]; by default those that the plan was asked to keep, or the URDF's.
-
-    Returns
-    -------
-    Plan
-        With the old report.
 
     Raises
     ------

@@ -18,6 +18,7 @@ from selfmotion.robot.coordinates import (
 from selfmotion.robot.dynamics import Dynamics as Dynamics
 from selfmotion.robot.loading import (
     NAMED_ARMS as NAMED_ARMS,
+    NAMED_PARTS as NAMED_PARTS,
     load_robot as load_robot,
     rebuild_robot as rebuild_robot,
 )

@@ -80,6 +80,8 @@ NAMED_ARMS: Mapping[str, NamedArm] = {
     "z1": NamedArm("z1_description/urdf/z1.urdf", "gripperStator"),
 }
 
+# What arms work with, known by name like these.
+NAMED_PARTS: Mapping[str, NamedArm] = {"positioner": NamedArm("positioner.urdf", "plate")}
 
 # A joint that is held may be this far beyond its limits [rad or m]: rounding of a file.
 _BESIDE = 1e-9
@@ -103,8 +105,8 @@ def load_robot(
     Parameters
     ----------
     robot : str, Path or dict
-        A name from `NAMED_ARMS` (``"panda"``, ``"planar_3r"``, …) or the path of a ``.urdf`` or
-        ``.xacro`` file; or several of these by name, as one tree: links and joints of part
+        A name from `NAMED_ARMS` (``"panda"``, ``"planar_3r"``, …), ``"positioner"``, or the path of
+        a ``.urdf`` or ``.xacro`` file; or several of these by name, as one tree: links and joints of part
         ``"arm"`` are called ``arm/NAME`` then.
     tool : str or sequence of str, optional
         Tool frame (a link), or several: the first is the one that paths are for where nothing else
@@ -198,8 +200,9 @@ class _Source:
 
 
 def _read(robot: str | Path, arguments: Mapping[str, str]) -> _Source:
-    if isinstance(robot, str) and robot in NAMED_ARMS:
-        arm = NAMED_ARMS[robot]
+    known = {**NAMED_ARMS, **NAMED_PARTS}
+    if isinstance(robot, str) and robot in known:
+        arm = known[robot]
         return _Source(_read_named(arm), arm.tool, arm.touching, _published(robot))
     urdf = _read_file(Path(robot), arguments, str(robot))
     return _Source(urdf, None)

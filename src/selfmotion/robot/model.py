@@ -14,7 +14,9 @@ from selfmotion.basics import (
     Flags,
     InverseKinematicsError,
     RobotError,
+    as_number,
     as_whole,
+    nearest,
     plain_numbers,
     random_numbers,
     shown,
@@ -152,6 +154,27 @@ class RobotModel:
         levers = beyond[arrays.tree.is_revolute]
         mean = float(levers.mean()) if levers.size and levers.max() > 0.0 else 1.0
         return np.where(self.is_revolute, 1.0, 1.0 / mean)
+
+    def part_weights(self, weights: Mapping[str, float]) -> Array:
+        """Return `joint_weights`, those of some parts or joints times a number, (n,).
+
+        For costs that weigh joints: ``JointVelocity(robot.part_weights({"table": 0.1}))``.
+
+        Raises
+        ------
+        RobotError
+            No joint belongs to a part of that name, nor has the name.
+        """
+        found = self.joint_weights.copy()
+        for name, weight in weights.items():
+            mine = np.array([j == name or j.startswith(f"{name}/") for j in self.joint_names])
+            if not mine.any():
+                raise RobotError(
+                    f"{self.name}: no part or joint '{name}' to weigh"
+                    f"{nearest(name, self.joint_names)}; joints: {', '.join(self.joint_names)}"
+                )
+            found[mine] *= as_number(weight, f"weight of '{name}'", least=0.0, error=RobotError)
+        return found
 
     def configuration(self, q: npt.ArrayLike) -> Array:
         """Return `q` as a float64 vector of n finite numbers.

@@ -12,11 +12,15 @@ from selfmotion.search.guides import (
 )
 from selfmotion.search.reach import Reach as Reach, reachable as reachable
 from selfmotion.search.sequences import (
-    SPACING as SPACING,
     Sequence as Sequence,
     best_sequences as best_sequences,
 )
-from selfmotion.search.starts import spread as spread, start_candidates as start_candidates
+from selfmotion.search.settings import SPACING as SPACING
+from selfmotion.search.starts import (
+    Admits as Admits,
+    spread as spread,
+    start_candidates as start_candidates,
+)
 from selfmotion.search.stretches import (
     Stretch as Stretch,
     Stretches as Stretches,

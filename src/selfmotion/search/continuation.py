@@ -7,15 +7,10 @@ from selfmotion.basics.layout import Layout
 from selfmotion.robot import ChainArrays
 from selfmotion.search.edges import wrapped
 from selfmotion.search.projection import CONVERGED, correct, place_tips
+from selfmotion.search.settings import ALIGNED, CORRECTIONS, SMALLEST_STEP
 
 # What is known of a curve on the way.
 GOING, CLOSED, ENDED = 0, 1, 2
-_CORRECTIONS = 6
-# Neighbours whose tangents differ by more than acos of this are too far apart to be trusted to
-# lie on the same branch.
-_ALIGNED = 0.93
-# Steps are halved no further than this share of the largest.
-_SMALLEST_STEP = 1.0 / 64.0
 
 
 @kernel
@@ -83,7 +78,7 @@ def _advance(
     last = samples[count - 1]
     length = correct(q, jacobians, rotations, translations, target, layout, tangents[1], state[3])
     state[1] += 1
-    if length > CONVERGED and state[1] < _CORRECTIONS:
+    if length > CONVERGED and state[1] < CORRECTIONS:
         return GOING
     moved, cosine = 0.0, 0.0
     for k in range(n):
@@ -91,25 +86,22 @@ def _advance(
         cosine += tangents[0, k] * tangents[1, k]
     moved = np.sqrt(moved)
     # NaN fails these comparisons, too.
-    sound = 0.0 <= length <= CONVERGED and cosine > _ALIGNED
+    sound = 0.0 <= length <= CONVERGED and cosine > ALIGNED
     if sound and 0.3 * state[0] < moved < 1.2 * state[0]:
-        for k in range(n):
-            samples[count, k] = q[k]
+        samples[count, :] = q
         state[2] = count + 1
         if count >= 3 and _passes_start(samples, count, revolute, tangents):
             return CLOSED
         if count + 1 == samples.shape[0]:
             return ENDED
-        for k in range(n):
-            tangents[0, k] = tangents[1, k]
+        tangents[0, :] = tangents[1]
         state[0] = min(state[3], 1.5 * state[0])
         last = samples[count]
     else:
         state[0] *= 0.5
-        if state[0] < _SMALLEST_STEP * state[3]:
+        if state[0] < SMALLEST_STEP * state[3]:
             return ENDED
-        for k in range(n):
-            tangents[1, k] = tangents[0, k]
+        tangents[1, :] = tangents[0]
     state[1] = 0
     for k in range(n):
         q[k] = last[k] + state[0] * tangents[0, k]

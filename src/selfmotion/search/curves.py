@@ -11,14 +11,7 @@ from selfmotion.follow import Follows
 from selfmotion.search import continuation
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.projection import correct
-
-# Longest single correction [rad or m]: a far start wanders where J is nearly singular.
-_LONGEST = 0.5
-# A configuration this near [rad or m] to a curve's polyline is on the curve.
-ON_CURVE = 0.02
-_MOST_SAMPLES = 5000
-# Of the samples of a curve, every so manieth looks for the curve at the next waypoint.
-_STRIDE = 6
+from selfmotion.search.settings import CARRIED, LONGEST_CORRECTION, MOST_SAMPLES, ON_CURVE
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +87,7 @@ class CurveSet:
     def seeds(self) -> Iterable[Array]:
         """Yield configurations from which to find these curves at a pose nearby."""
         for curve in self.curves:
-            yield from curve.q[::_STRIDE]
+            yield from curve.q[::CARRIED]
 
 
 class SelfMotion:
@@ -149,7 +142,7 @@ class SelfMotion:
     def tangent(self, q: Array, target: Array) -> Array | None:
         """Return a unit null vector of J at q, a solution; None where q is singular."""
         tangent, layout = self._direction.copy(), self._manifold.layout
-        length = correct(q.copy(), *self._tips.at(q), target, layout, tangent, _LONGEST)
+        length = correct(q.copy(), *self._tips.at(q), target, layout, tangent, LONGEST_CORRECTION)
         return tangent if length >= 0.0 and np.all(np.isfinite(tangent)) else None
 
     def trace(self, q: Array, target: Array) -> Curve | None:
@@ -186,7 +179,7 @@ class SelfMotion:
 
     def _walk(self, start: Array, tangent: Array, target: Array) -> tuple[Array, bool]:
         """Return the samples (K, n) from `start` on, and whether they lead back to it."""
-        samples, on = np.empty((_MOST_SAMPLES, self.robot.dof)), self._manifold
+        samples, on = np.empty((MOST_SAMPLES, self.robot.dof)), self._manifold
         count, closed = continuation.walk(
             start, tangent, target, on.chains, on.revolute, on.layout, self.spacing, samples
         )

@@ -13,21 +13,17 @@ from selfmotion.problem import Problem
 from selfmotion.search.measures import measure_of
 from selfmotion.search.sampled import sampled_sequences
 from selfmotion.search.sequences import Sequence, best_sequences
-
-# Sequences refined; the best among the samples is not always that of the best motion.
-_COUNT = 3
-# From one of the search's times to the next the tool moves by so much [m, rad], whatever the path's
-# own waypoints: more times would take longer, and what comes of them is smoothed anyway.
-_STRIDE, _TURN = 0.02, 0.1
-# At fewer times than these a search would miss obstacles: self-motion curves allow for more than
-# samples of larger spaces do in the same time. More would take too long.
-_FEWEST_OF_CURVES, _FEWEST, _MOST = 150, 60, 400
-# The path is looked at so often to see how far the tool moves.
-_LOOKS = 2000
-# What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
-MARGIN = 2.5e-4
-# The jagged chain of samples is smoothed by a spline with this many of them per interval.
-_SMOOTHING = 3
+from selfmotion.search.settings import (
+    FEWEST,
+    FEWEST_OF_CURVES,
+    MARGIN,
+    MOST,
+    PATH_LOOKS,
+    REFINED,
+    SMOOTHING,
+    STRIDE,
+    TURN,
+)
 
 
 class SequenceGuide:
@@ -45,7 +41,7 @@ class SequenceGuide:
 
         t, q = sequence.t, sequence.q
         # Where samples are dense in time, so are knots.
-        inner = np.append(t[:-_SMOOTHING:_SMOOTHING], t[-1])
+        inner = np.append(t[:-SMOOTHING:SMOOTHING], t[-1])
         knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
         self._rate = make_lsq_spline(t, q, knots).derivative()
         self.sequence = sequence
@@ -74,7 +70,7 @@ def guides(
         "upper": asked.upper,
         "largest_step": step,
         "bodies": [(model, distance + MARGIN) for model, distance in asked.bodies],
-        "count": _COUNT,
+        "count": REFINED,
         "measure": measure_of(problem.follows, problem.costs, t, _weights(problem)),
         "rng": 0 if rng is None else rng,
         "progress": progress,
@@ -94,20 +90,20 @@ def has_curves(problem: Problem) -> bool:
 
 def waypoint_times(problem: Problem) -> Array:
     """Return times (W,) [s] at which to search for a problem's configurations."""
-    return search_times(problem.path, _FEWEST_OF_CURVES if has_curves(problem) else _FEWEST)
+    return search_times(problem.path, FEWEST_OF_CURVES if has_curves(problem) else FEWEST)
 
 
 def search_times(path: Path, fewest: int) -> Array:
     """Return times (W,) [s] at which to search for configurations, as the tool moves on."""
-    t = np.linspace(0.0, path.duration, _LOOKS)
+    t = np.linspace(0.0, path.duration, PATH_LOOKS)
     tool = path.samples(t)
-    moved = np.linalg.norm(np.diff(tool.translation, axis=0), axis=1) / _STRIDE
+    moved = np.linalg.norm(np.diff(tool.translation, axis=0), axis=1) / STRIDE
     turned = np.array(
         [np.linalg.norm(pin.log3(a.T @ b)) for a, b in itertools.pairwise(tool.rotation)]
     )
-    travel = np.concatenate([[0.0], np.cumsum(moved + turned / _TURN)])
+    travel = np.concatenate([[0.0], np.cumsum(moved + turned / TURN)])
     # Where the tool stands still, time counts, so that there is always one time after another.
-    count = int(np.clip(np.ceil(travel[-1]), fewest, _MOST))
+    count = int(np.clip(np.ceil(travel[-1]), fewest, MOST))
     travel += t * (1e-3 * count / path.duration)
     times = np.interp(np.linspace(0.0, travel[-1], count + 1), travel, t)
     times[-1] = path.duration

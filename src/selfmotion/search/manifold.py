@@ -7,10 +7,8 @@ from selfmotion.basics import Array, RobotError
 from selfmotion.engine import transport
 from selfmotion.follow import Follows
 from selfmotion.search import projection
+from selfmotion.search.settings import FAR_STEPS, LONGEST_CORRECTION, NEAR_STEPS
 
-_NEAR_STEPS, _FAR_STEPS = 10, 60
-# Longest single correction [rad or m].
-_LONGEST = 0.5
 # Compiled kinematics and Pinocchio's differ by rounding alone [m, or rows of a rotation].
 _AGREE = 1e-9
 
@@ -62,9 +60,16 @@ class Manifold:
         """
         found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
         wanted = np.array(np.broadcast_to(target, (len(q), np.shape(target)[-1])), order="C")
-        steps = _FAR_STEPS if far else _NEAR_STEPS
+        steps = FAR_STEPS if far else NEAR_STEPS
         projection.project_all(
-            found, wanted, self.chains, self.layout, *self._limits, _LONGEST, steps, arrived
+            found,
+            wanted,
+            self.chains,
+            self.layout,
+            *self._limits,
+            LONGEST_CORRECTION,
+            steps,
+            arrived,
         )
         return found, arrived
 

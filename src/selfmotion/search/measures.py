@@ -12,10 +12,7 @@ from selfmotion.costs import Cost, PathLength, Samples
 from selfmotion.follow import Follows
 from selfmotion.motion import Sampling
 from selfmotion.search import edges
-
-# Steps faster than this many times the mean speed of the shortest chain are changes from sample to
-# sample, which the finished motion spreads over more time.
-_FAST = 2.0
+from selfmotion.search.settings import FAST, LAYERS_KEPT
 
 
 class Measure(ABC):
@@ -156,7 +153,7 @@ class RunningCost(Measure):
             first, second = edges.near_pairs(before, after, longest, turning)
             price = self._prices(k, before, after, first, second, turning)
             known = _Steps(before, after, first, second, price)
-            _note(self._steps, (id(before), id(after)), known, _MANY * len(self.t))
+            _note(self._steps, (id(before), id(after)), known, LAYERS_KEPT * len(self.t))
         return known
 
     def of(self, q: Array) -> float:
@@ -176,7 +173,7 @@ class RunningCost(Measure):
         """See `Measure.at_pace_of`."""
         moved = np.linalg.norm(self.weights * np.diff(q, axis=0), axis=1).sum()
         mean = float(moved) / (self.t[-1] - self.t[0])
-        return replace(self, speed=_FAST * mean if mean > 0.0 else np.inf, _steps={})
+        return replace(self, speed=FAST * mean if mean > 0.0 else np.inf, _steps={})
 
     def _prices(
         self, k: int, before: Array, after: Array, first: Ints, second: Ints, turning: Flags
@@ -214,7 +211,7 @@ class RunningCost(Measure):
             samples = Samples.along(self.follows, sampling, q, np.zeros_like(q))
             cost = sum((cost.value(samples) for cost in self.placed), np.zeros(len(q)))
             known = _Places(q, samples, cost)
-            _note(self._places, id(q), known, _MANY * len(self.t))
+            _note(self._places, id(q), known, LAYERS_KEPT * len(self.t))
         return known
 
 
@@ -274,10 +271,6 @@ class Backwards(Measure):
     def backwards(self) -> RunningCost:
         """See `Measure.backwards`."""
         return self.measure
-
-
-# Layers whose kinematics are kept, per waypoint.
-_MANY = 3
 
 
 def measure_of(follows: Follows, costs: Sequence[Cost], t: Array, weights: Array) -> Measure:

@@ -10,14 +10,9 @@ import numpy.typing as npt
 from selfmotion.basics import Array
 from selfmotion.collision import CollisionModel
 from selfmotion.search.curves import Curve, CurveSet, SelfMotion
+from selfmotion.search.settings import BORDER, MERGED, SURELY_OUTSIDE
 
 _TURN = 2.0 * np.pi
-# Where samples are free or not by turns, the border is enclosed to this share of the spacing.
-_BORDER = 0.25
-# Carried samples nearer to each other than this share of the spacing are merged.
-_MERGE = 0.4
-# Samples outside the limits by more than this [rad or m] before Newton's correction stay outside.
-_SURELY_OUTSIDE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,12 +170,12 @@ class _CurveSampler:
         """Return the free samples in pieces (K, n); `carried` is sorted by arc length."""
         kept: list[tuple[float, Array]] = []
         for arc, q in carried:
-            if not kept or arc - kept[-1][0] > _MERGE * self.spacing:
+            if not kept or arc - kept[-1][0] > MERGED * self.spacing:
                 kept.append((arc, q))
         gaps = _between([arc for arc, _ in kept], self.curve.length, self.spacing)
         arcs = np.concatenate([[arc for arc, _ in kept], gaps])
         q = np.vstack([*[q for _, q in kept], self.curve.at(gaps)])
-        near = np.all(self.bounds.excess(q) < _SURELY_OUTSIDE, axis=1)
+        near = np.all(self.bounds.excess(q) < SURELY_OUTSIDE, axis=1)
         fresh = np.flatnonzero(near[len(kept) :]) + len(kept)
         q[fresh], near[fresh] = self.motion.project_all(q[fresh], self.target)
         free = near.copy()
@@ -195,7 +190,7 @@ class _CurveSampler:
             arcs, free = np.append(arcs, arcs[0] + self.curve.length), np.append(free, free[0])
         for i in np.flatnonzero(free[1:] != free[:-1]):
             inside, outside = (arcs[i], arcs[i + 1]) if free[i] else (arcs[i + 1], arcs[i])
-            while abs(outside - inside) > _BORDER * self.spacing:
+            while abs(outside - inside) > BORDER * self.spacing:
                 middle = 0.5 * (inside + outside)
                 guess = self.curve.at(np.array([middle % self.curve.length]))[0]
                 q = self.motion.project(guess, self.target)
@@ -210,7 +205,7 @@ class _CurveSampler:
 def _between(arcs: Sequence[float], length: float, spacing: float) -> Array:
     """Return arc lengths that fill the gaps between sorted `arcs`, the start included."""
     fill: list[float] = []
-    if not arcs or arcs[0] > _MERGE * spacing:
+    if not arcs or arcs[0] > MERGED * spacing:
         fill.append(0.0)
     stops = [0.0, *arcs, length]
     for first, last in itertools.pairwise(stops):

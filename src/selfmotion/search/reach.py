@@ -8,21 +8,20 @@ from selfmotion.basics import Array, InverseKinematicsError
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
 from selfmotion.search.manifold import Manifold
+from selfmotion.search.settings import (
+    ABOUT,
+    AT_LIMIT,
+    BISECTIONS,
+    BRANCHES,
+    LOOKS,
+    MORE_SEEDS,
+    NEARLY,
+    POSES,
+    RESTARTS,
+    SEEDS,
+    STRETCHED,
+)
 from selfmotion.search.starts import spread, start_candidates
-
-# Poses along the path that are looked at, branches of solutions that are followed from one to the
-# next, seeds where none of them goes on, and bisections of the time at which that happens.
-_POSES, _BRANCHES, _SEEDS, _BISECTIONS = 64, 12, 24, 16
-# Before a pose counts as out of reach, so many seeds more are tried, and a slower method from some;
-# how far poses are out of reach is looked at for so many of them.
-_MORE, _RESTARTS, _LOOKS = 600, 12, 12
-# Who gets so near [m + rad] counts as there.
-_NEARLY = 1e-5
-# Poses about a time of trouble, in shares of the path's duration.
-_ABOUT = np.array([-1e-3, 0.0, 1e-3, 4e-3])
-# A singular value below this share of the dexterous configuration's counts as stretched or folded,
-# a joint this near to its limit [rad or m] as at it.
-_STRETCHED, _AT_LIMIT = 0.1, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +59,8 @@ def reachable(
         if given is None
         else [given]
     )
-    about = np.clip(suspect / path.duration + _ABOUT, 0.0, 1.0)
-    times = path.duration * np.union1d(np.linspace(0.0, 1.0, _POSES + 1), about)
+    about = np.clip(suspect / path.duration + np.array(ABOUT), 0.0, 1.0)
+    times = path.duration * np.union1d(np.linspace(0.0, 1.0, POSES + 1), about)
     poses = _Poses(robot, problem, rng)
     known, last = np.array(first), 0.0
     for t in times[1:]:
@@ -84,28 +83,28 @@ class _Poses:
         self._robot, self._path, self._task, self._rng = robot, problem.path, problem.task, rng
         self._follows = problem.follows.for_robot(robot)
         self._manifold = Manifold(self._follows, robot.lower, robot.upper)
-        self._seeds = np.array(list(spread(robot, _SEEDS, rng)))
+        self._seeds = np.array(list(spread(robot, SEEDS, rng)))
 
     def solutions(self, t: float, known: Array) -> Array:
         """Return configurations for the pose at t from those of a pose nearby, or any, (K, n)."""
-        found = self._reached(t, known[:_BRANCHES])
+        found = self._reached(t, known[:BRANCHES])
         return found if len(found) else self._reached(t, self._seeds, far=True)
 
     def sure_solutions(self, t: float, known: Array) -> Array:
         """Return configurations for the pose at t, also where Newton's method finds none."""
         found = self.solutions(t, known)
         if not len(found):
-            seeds = np.array(list(spread(self._robot, _MORE, self._rng)))
+            seeds = np.array(list(spread(self._robot, MORE_SEEDS, self._rng)))
             found = self._reached(t, seeds, far=True)
         if len(found):
             return found
         try:
             q = self._robot.inverse_kinematics(
-                self._path.pose(t), self._task, seed=known[0], rng=self._rng, attempts=_RESTARTS
+                self._path.pose(t), self._task, seed=known[0], rng=self._rng, attempts=RESTARTS
             )
         except InverseKinematicsError as error:
             # Where the arm is all but stretched, the last digits are not worth the search.
-            nearly = error.position_miss + error.rotation_miss < _NEARLY
+            nearly = error.position_miss + error.rotation_miss < NEARLY
             return known if nearly else np.empty((0, self._robot.dof))
         return q[None]
 
@@ -118,7 +117,7 @@ class _Poses:
     def edge(self, interval: tuple[float, float], known: Array) -> tuple[Array, float]:
         """Return solutions at the last time of an interval that there are any, and this time."""
         last, beyond = interval
-        for _ in range(_BISECTIONS):
+        for _ in range(BISECTIONS):
             middle = 0.5 * (last + beyond)
             found = self.solutions(middle, known)
             if len(found):
@@ -134,7 +133,7 @@ def _out_of_reach(problem: Problem, robot: RobotModel, time: float, q: Array, be
     q (n,) is its configuration at `time`, the last one; `beyond` are later times.
     """
     misses = []
-    for t in beyond[np.unique(np.linspace(0, len(beyond) - 1, _LOOKS).round().astype(int))]:
+    for t in beyond[np.unique(np.linspace(0, len(beyond) - 1, LOOKS).round().astype(int))]:
         try:
             robot.inverse_kinematics(problem.path.pose(t), problem.task, seed=q, attempts=1)
         except InverseKinematicsError as error:
@@ -151,7 +150,7 @@ def _out_of_reach(problem: Problem, robot: RobotModel, time: float, q: Array, be
 def _cause(problem: Problem, robot: RobotModel, q: Array) -> str:
     """Return what keeps the arm from reaching further at q; "" where nothing shows."""
     task, causes = problem.task, []
-    near = np.minimum(q - robot.lower, robot.upper - q) < _AT_LIMIT
+    near = np.minimum(q - robot.lower, robot.upper - q) < AT_LIMIT
     if np.any(near):
         names = ", ".join(f"'{robot.joint_names[k]}'" for k in np.flatnonzero(near))
         causes.append(f"at its limit: joint {names}")
@@ -159,6 +158,6 @@ def _cause(problem: Problem, robot: RobotModel, q: Array) -> str:
         float(np.linalg.svd(robot.task_jacobian(x, task), compute_uv=False)[-1])
         for x in (q, robot.dexterous_configuration(task))
     )
-    if here < _STRETCHED * best:
+    if here < STRETCHED * best:
         causes.append(f"arm stretched or folded, smallest singular value {here:.2g}")
     return f" ({'; '.join(causes)})" if causes else ""

@@ -14,22 +14,20 @@ from selfmotion.search.manifold import Manifold
 from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sequences import Sequence, connected, ranked
+from selfmotion.search.settings import (
+    BEGINNING_SEEDS,
+    BEGINNINGS,
+    BEGUN,
+    DRIFT,
+    PARENTS,
+    PARENTS_APART,
+    RING_GAIN,
+    RING_ROUNDS,
+    RINGS,
+    STRAYED,
+    STRAYS,
+)
 from selfmotion.search.starts import spread
-
-# Motions begin at so many times, evenly, from so many configurations each: of those that inverse
-# kinematics finds from so many seeds.
-_STATIONS, _STARTS, _SEEDS = 7, 30, 200
-# Constant null motions drift so far over the whole path [rad or m], one standard deviation; every
-# other motion has none.
-_DRIFT = 1.0
-# Of the samples that a chain reaches, so many are followed to the next waypoint, those that are so
-# far from each other [rad or m] first, and so many tries around each, about this far off [rad].
-_PARENTS, _APART = 80, (1.6, 0.8, 0.4, 0.2, 0.1)
-_STRAYS, _STRAY = 2, 0.15
-# Around a chain, samples at these distances [rad or m], one after the other, so often each at most.
-_RINGS, _ROUNDS = (0.3, 0.1, 0.03, 0.01), 5
-# A round that shortens the chain by less than this share is the last one of its ring.
-_WORTHWHILE = 5e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,9 +178,9 @@ def _layers(
         progress("search: what is free at waypoint", i + 1, len(x))
         before = layers[-1]
         cost = np.zeros(len(before)) if i == 1 else cost
-        parents = _spread_out(before[np.isfinite(cost)], cost[np.isfinite(cost)], _PARENTS)
-        strays = np.repeat(parents, _STRAYS, axis=0)
-        away = rng.normal(scale=_STRAY, size=strays.shape) / weights
+        parents = _spread_out(before[np.isfinite(cost)], cost[np.isfinite(cost)], PARENTS)
+        strays = np.repeat(parents, STRAYS, axis=0)
+        away = rng.normal(scale=STRAYED, size=strays.shape) / weights
         step = 0.5 * largest_step[i - 1]
         guesses = np.concatenate([parents, strays + np.clip(away, -step, step)])
         q, arrived = manifold.project(guesses, x[i])
@@ -203,11 +201,11 @@ def _smooth_motions(
     """Return at all waypoints where motions with constant null motions are, each (K, n)."""
     dof, last = manifold.robot.dof, len(x) - 1
     nodes = [[np.empty((0, dof))] for _ in x]
-    stations = np.unique(np.linspace(0, last, _STATIONS).round().astype(int))
+    stations = np.unique(np.linspace(0, last, BEGINNINGS).round().astype(int))
     for number, station in enumerate(stations.tolist(), 1):
         progress("search: motions from waypoint", number, len(stations))
         begun = _starts(manifold, bounds, x[station], rng)
-        drift = rng.normal(scale=_DRIFT / max(last, 1), size=begun.shape)
+        drift = rng.normal(scale=DRIFT / max(last, 1), size=begun.shape)
         drift[::2] = 0.0
         nodes[station].append(begun)
         for direction in (1, -1):
@@ -222,7 +220,7 @@ def _smooth_motions(
 def _spread_out(q: Array, cost: Array, count: int) -> Array:
     """Return up to `count` of q (K, n), far from each other first, the cheaper of near ones."""
     ranked = np.ascontiguousarray(q[np.argsort(cost, kind="stable")])
-    return np.asarray(ranked[edges.spread_out(ranked, np.array(_APART), count)])
+    return np.asarray(ranked[edges.spread_out(ranked, np.array(PARENTS_APART), count)])
 
 
 def _sorted(q: Array) -> Array:
@@ -233,11 +231,11 @@ def _starts(
     manifold: Manifold, bounds: Admissible, target: Array, rng: np.random.Generator
 ) -> Array:
     """Return configurations within the limits, free where there are such, (K, n)."""
-    seeds = np.array(list(spread(manifold.robot, _SEEDS, rng)))
+    seeds = np.array(list(spread(manifold.robot, BEGINNING_SEEDS, rng)))
     q, arrived = manifold.project(seeds, target, far=True)
     q = q[arrived]
     free = bounds.keep(q)
-    return np.concatenate([q[free], q[~free]])[:_STARTS]
+    return np.concatenate([q[free], q[~free]])[:BEGUN]
 
 
 def _shortened(
@@ -251,14 +249,14 @@ def _shortened(
     """Return a better chain near q (W, n), never a worse one."""
     fixed = np.zeros(q.shape[1], dtype=bool)
     cost = measure.of(q)
-    for ring in _RINGS:
-        for _ in range(_ROUNDS):
+    for ring in RINGS:
+        for _ in range(RING_ROUNDS):
             layers = _around(manifold, bounds, x, q, ring)
             chains = best_chains(layers, largest_step, fixed, measure)
             before, cost = cost, float(chains.cost[-1].min())
             chain = chains.back(len(q) - 1, int(np.argmin(chains.cost[-1])))
             q = connected(layers, chain, fixed)
-            if cost > before - _WORTHWHILE * abs(before):
+            if cost > before - RING_GAIN * abs(before):
                 break
     return q
 

@@ -22,13 +22,9 @@ from selfmotion.search.curves import CurveSet, SelfMotion, curves_along
 from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible, place_nodes
 from selfmotion.search.reasons import why_blocked
+from selfmotion.search.settings import ANEW_EVERY, ANEW_SEEDS, FINELY, ROUGHLY, SPACING
 from selfmotion.search.starts import spread
-from selfmotion.search.tighten import FINELY, ROUGHLY, tighten
-
-# Largest distance of samples along a curve [rad or m], configuration norm.
-SPACING = 0.1
-# Inverse kinematics starts anew at every so manieth waypoint, from so many seeds.
-_EVERY, _SEEDS = 10, 100
+from selfmotion.search.tighten import tighten
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +88,8 @@ class CurveLayers:
         motion = SelfMotion(follows, SPACING)
         bounds = Admissible(*limits, motion.revolute, bodies)
         x = follows.targets(t)
-        seeds = list(spread(follows.robot, _SEEDS, np.random.default_rng(rng)))
-        curves = curves_along(motion, x, seeds, _EVERY, progress)
+        seeds = list(spread(follows.robot, ANEW_SEEDS, np.random.default_rng(rng)))
+        curves = curves_along(motion, x, seeds, ANEW_EVERY, progress)
         samples = _free_samples(motion, x, curves, bounds, progress)
         return cls(motion, x, curves, bounds, samples)
 

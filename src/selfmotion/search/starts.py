@@ -1,26 +1,31 @@
 """Start configurations worth trying."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
+import numpy.typing as npt
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, InverseKinematicsError
 from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
 from selfmotion.search.curves import SelfMotion
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.nodes import Admissible
+from selfmotion.search.settings import (
+    ENOUGH_STARTS,
+    SAME_START,
+    SPACING,
+    START_ROUNDS,
+    TRACING_SEEDS,
+    TRIES,
+)
 
-# Solutions nearer than this [rad or m, Euclidean] lead to the same plan once the start may move.
-_SAME = 0.3
-# Where all self-motions of the first pose can be traced: from so many seeds, in steps of this
-# [rad or m].
-_SEEDS, _SPACING = 60, 0.1
-# Where they cannot: so many seeds for each configuration that is asked for.
-_TRIES = 2
+Admits = Callable[[Array], npt.NDArray[np.bool_]]
 
 
-def start_candidates(follows: Follows, count: int, rng: np.random.Generator) -> list[Array]:
+def start_candidates(
+    follows: Follows, count: int, rng: np.random.Generator, admits: Admits | None = None
+) -> list[Array]:
     """Return distinct configurations that put the tool on the start of the path.
 
     For one degree of redundancy they are spread evenly over all self-motion curves of the first
@@ -35,6 +40,9 @@ def start_candidates(follows: Follows, count: int, rng: np.random.Generator) -> 
         How many at most.
     rng : Generator
         Shifts the sequence.
+    admits : callable, optional
+        Which configurations (K, n) keep what else is asked of them, (K,). Where none is found that
+        does, others are returned.
 
     Returns
     -------
@@ -48,39 +56,65 @@ def start_candidates(follows: Follows, count: int, rng: np.random.Generator) -> 
     """
     found: list[Array] = []
     if follows.redundancy == 1:
-        found = _along_curves(follows, count, rng)
+        found = _along_curves(follows, count, rng, admits or _all)
     if not found:
-        found = _scattered(follows, count, rng)
+        found = _scattered(follows, count, rng, admits or _all)
+    if not found and admits is not None:
+        return start_candidates(follows, count, rng)
+    if not found and len(follows.items) > 1:
+        names = " and ".join(f"'{item.chain.tip_name}'" for item in follows.items)
+        raise InverseKinematicsError(
+            f"{follows.robot.name}: no configuration within the limits was found that puts {names} "
+            f"on the start of their paths; move these into the workspace, or give one (start=)",
+            position_miss=np.inf,
+            rotation_miss=np.inf,
+        )
     if not found:
         # Many more attempts, and an error that names the miss.
         found = [follows.robot.inverse_kinematics(follows.path.pose(0.0), follows.task, rng=rng)]
     return found
 
 
-def _along_curves(follows: Follows, count: int, rng: np.random.Generator) -> list[Array]:
+def _all(q: Array) -> npt.NDArray[np.bool_]:
+    return np.ones(len(q), dtype=bool)
+
+
+def _along_curves(
+    follows: Follows, count: int, rng: np.random.Generator, admits: Admits
+) -> list[Array]:
     """Return up to `count` configurations within the limits, evenly over all curves."""
-    robot, motion = follows.robot, SelfMotion(follows, _SPACING)
+    robot, motion = follows.robot, SelfMotion(follows, SPACING)
     bounds = Admissible(robot.lower, robot.upper, motion.revolute, ())
-    curves = motion.curves(follows.targets(np.zeros(1))[0], spread(robot, _SEEDS, rng)).curves
+    curves = motion.curves(
+        follows.targets(np.zeros(1))[0], spread(robot, TRACING_SEEDS, rng)
+    ).curves
     # The last sample of a closed curve is its first one.
     samples = [curve.q[: len(curve.q) - curve.closed] for curve in curves]
-    inside = [q[bounds.free(q)] for q in samples]
+    inside = [q[bounds.free(q) & admits(q)] for q in samples]
     total = sum(map(len, inside))
     stride = max(1, -(-total // count))
     every = np.concatenate([np.empty((0, robot.dof)), *inside])[::stride]
     return [bounds.turned_inside(q[None])[0] for q in bounds.representative(every)]
 
 
-def _scattered(follows: Follows, count: int, rng: np.random.Generator) -> list[Array]:
+def _scattered(
+    follows: Follows, count: int, rng: np.random.Generator, admits: Admits
+) -> list[Array]:
     """Return up to `count` configurations that Newton's method finds, none near another."""
     robot = follows.robot
     manifold = Manifold(follows, robot.lower, robot.upper)
-    seeds = np.array(list(spread(robot, _TRIES * count, rng)))
-    q, arrived = manifold.project(seeds, follows.targets(np.zeros(1))[0], far=True)
-    found: list[Array] = []
-    for one in q[arrived]:
-        if len(found) < count and all(np.linalg.norm(one - other) > _SAME for other in found):
-            found.append(one)
+    target, found = follows.targets(np.zeros(1))[0], list[Array]()
+    for _ in range(START_ROUNDS):
+        seeds = np.array(list(spread(robot, TRIES * count, rng)))
+        q, arrived = manifold.project(seeds, target, far=True)
+        for one in q[arrived][admits(q[arrived])]:
+            if len(found) < count and all(
+                np.linalg.norm(one - other) > SAME_START for other in found
+            ):
+                found.append(one)
+        # Without anything else to keep, one round tells what there is.
+        if admits is _all or len(found) >= ENOUGH_STARTS * count:
+            break
     return found
 
 

@@ -8,14 +8,12 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints, NoSequenceError, Progress, silent
 from selfmotion.problem import Problem
 from selfmotion.search.chains import best_chains, unturned
-from selfmotion.search.guides import MARGIN, has_curves, waypoint_times
+from selfmotion.search.guides import has_curves, waypoint_times
 from selfmotion.search.measures import Length
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sampled import SampledLayers
 from selfmotion.search.sequences import CurveLayers, connected
-
-# What a change to another configuration counts: more than any motion in between.
-_BREAK = 1e6
+from selfmotion.search.settings import BREAK, MARGIN
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,9 +173,9 @@ class Stretches:
             change = np.arange(len(cost))
             if i < len(layers) - 1 and i not in forbidden:
                 changed, source = length.extended(i, after, cost, after, anywhere, turning)
-                better = changed + _BREAK < cost
+                better = changed + BREAK < cost
                 change = np.where(better, source, change)
-                cost = np.where(better, changed + _BREAK, cost)
+                cost = np.where(better, changed + BREAK, cost)
             changes.append(change)
         return _traced_back(parents, changes, int(np.argmin(cost)))
 

@@ -9,15 +9,7 @@ from selfmotion.search.chains import best_chains
 from selfmotion.search.curves import SelfMotion
 from selfmotion.search.measures import Measure
 from selfmotion.search.nodes import Admissible
-
-# Distances of neighbouring samples [rad or m], each a third of the last, from half of that of the
-# search on. A chain's excess length is about in proportion to the finest: 3 to 6 % at 0.01, 1 % at
-# 0.003, and at 0.001 less than what smoothing the motion changes.
-ROUGHLY, FINELY = (0.03, 0.01), (0.003, 0.001)
-# So many samples to each side are looked at in one round.
-_SIDE, _ROUNDS = 6, 40
-# A round that improves the chain by less than this share is the last one of its spacing.
-_WORTHWHILE = 2e-4
+from selfmotion.search.settings import FINELY, ROUGHLY, SIDE, TIGHTENING_GAIN, TIGHTENING_ROUNDS
 
 
 def tighten(
@@ -53,7 +45,7 @@ def tighten(
     for spacing in spacings:
         tangents = (motion.tangent(here, target) for target, here in zip(x, q, strict=True))
         strips = [_Strip(here, tangent, spacing) for here, tangent in zip(q, tangents, strict=True)]
-        for _ in range(_ROUNDS):
+        for _ in range(TIGHTENING_ROUNDS):
             _grow(motion, x, strips, bounds, spacing)
             layers = [strip.layer() for strip in strips]
             chains = best_chains(layers, largest_step, fixed, measure)
@@ -61,7 +53,7 @@ def tighten(
             before, cost = cost, float(chains.cost[-1].min())
             for strip, node in zip(strips, chain, strict=True):
                 strip.choose(node)
-            if cost > before - _WORTHWHILE * abs(before):
+            if cost > before - TIGHTENING_GAIN * abs(before):
                 break
         q = np.array([strip.chosen for strip in strips])
     return q
@@ -120,7 +112,7 @@ class _Strip:
         """Yield the index of the next sample to each side that is needed, and about where it is."""
         for toward, far in self._reach.items():
             last = self._samples[toward * far]
-            if last is None or self._tangent is None or far >= _SIDE + toward * self._centre:
+            if last is None or self._tangent is None or far >= SIDE + toward * self._centre:
                 continue
             if far == 0:
                 yield toward, last + toward * self._spacing * self._tangent
@@ -138,7 +130,7 @@ class _Strip:
     def layer(self) -> Array:
         """Return the free samples about the centre, (K, n), sorted by the first joint."""
         nodes = []
-        for index in range(self._centre - _SIDE, self._centre + _SIDE + 1):
+        for index in range(self._centre - SIDE, self._centre + SIDE + 1):
             q = self._samples.get(index)
             if q is not None and self._free[index]:
                 nodes.append((q[0], index, q))

@@ -65,6 +65,18 @@ def _flops(run: PublishedRun) -> Claim:
     )
 
 
+# Of the table of chains.
+_COLUMNS = (
+    "joints",
+    "evaluations of F",
+    "Jacobians",
+    "Mflop a gradient",
+    "F, published",
+    "our evaluations",
+    "F, ours",
+)
+
+
 def _growth(context: Context) -> tuple[Table, Plot, Claim]:
     rows: list[tuple[str | float | int, ...]] = []
     for joints in context.scale.chains:
@@ -88,15 +100,6 @@ def _growth(context: Context) -> tuple[Table, Plot, Claim]:
     n = np.array([float(row[0]) for row in rows])
     mflop = np.array([float(row[3]) for row in rows])
     power = float(np.polyfit(np.log(n), np.log(mflop), 1)[0])
-    columns = (
-        "joints",
-        "evaluations of F",
-        "Jacobians",
-        "Mflop a gradient",
-        "F, published",
-        "our evaluations",
-        "F, ours",
-    )
     note = f"Planar chains of unit reach on a line of 0.18 m, {_ITERATIONS} published iterations."
     plot = Plot(
         "growth",
@@ -115,7 +118,7 @@ def _growth(context: Context) -> tuple[Table, Plot, Claim]:
         "n(p + 1) + 1 evaluations a gradient, times operations of eq. 4 in which n² begins to "
         "outweigh the rest: n² for short chains, towards n³ for long ones.",
     )
-    return Table("Planar chains", columns, tuple(rows), note), plot, claim
+    return Table("Planar chains", _COLUMNS, tuple(rows), note), plot, claim
 
 
 def _growth_verdict(power: float) -> Verdict:

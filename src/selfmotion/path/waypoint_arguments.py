@@ -1,0 +1,44 @@
+"""What waypoints are given, checked; and where they bend."""
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    Array,
+    PathError,
+    as_numbers,
+)
+
+
+def bends(legs: Array, angle: float, least: float) -> npt.NDArray[np.bool_]:
+    """Return where legs (N - 1, 3) change their direction by more than `angle`, (N - 2,)."""
+    lengths = np.linalg.norm(legs, axis=1)
+    cosine = np.einsum("ki,ki->k", legs[:-1], legs[1:])
+    # What hardly moves on one side has no direction there, hence no kink.
+    moves = (lengths[:-1] > least) & (lengths[1:] > least)
+    return np.asarray((cosine < np.cos(angle) * lengths[:-1] * lengths[1:]) & moves)
+
+
+def as_table(values: npt.ArrayLike, name: str) -> Array:
+    """Return numbers of waypoints; PathError names what is none."""
+    return as_numbers(values, f"waypoints: {name}", error=PathError)
+
+
+def check_waypoints(t: Array, points: Array, turns: Array) -> None:
+    """Raise PathError unless times (N,) increase, with positions and quaternions for each."""
+    if t.ndim != 1 or len(t) < 2:
+        raise PathError(f"waypoints: t has shape {t.shape}, expected (N,) with N ≥ 2")
+    for name, array, width in (("positions", points, 3), ("quaternions", turns, 4)):
+        if array.shape != (len(t), width):
+            raise PathError(
+                f"waypoints: {name} has shape {array.shape}, expected ({len(t)}, {width})"
+            )
+    late = np.flatnonzero(np.diff(t) <= 0)
+    if late.size:
+        row = int(late[0]) + 1
+        raise PathError(
+            f"waypoints: t[{row}] = {t[row]} does not come after t[{row - 1}] = {t[row - 1]}"
+        )
+    zero = np.flatnonzero(np.linalg.norm(turns, axis=1) < 1e-9)
+    if zero.size:
+        raise PathError(f"waypoints: quaternions[{zero[0]}] is zero")

@@ -1,0 +1,40 @@
+"""What of a problem is asked along a part of its path."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from selfmotion.constraints import Constraint
+from selfmotion.path import Retimed
+from selfmotion.planning.settings import SHORTEST_WINDOW
+from selfmotion.problem import Problem
+from selfmotion.task import Relaxation
+
+
+def asked_of_part(problem: Problem, is_first: bool, is_last: bool) -> Iterator[Constraint]:
+    """Yield what the constraints ask of a part that is the first or the last one, or neither."""
+    for item in problem.constraints:
+        kept: Constraint | None = None if item.closes else item
+        if kept is not None and not is_last:
+            kept = kept.on_part()
+        if kept is not None and not is_first:
+            kept = kept.on_last_part()
+        if kept is not None:
+            yield kept
+
+
+def relaxed_along(
+    problem: Problem, path: Retimed, ends: tuple[float, float]
+) -> Iterator[Relaxation]:
+    """Return what is relaxed along a stretch of the path, windows by its own time."""
+    for item in problem.relaxations:
+        if item.during is None:
+            yield item
+            continue
+        first, last = path.when(np.clip(item.during, *ends) - ends[0]).tolist()
+        # A ramp hardly moves at its end: when it gets there is known to some digits only.
+        first = 0.0 if item.during[0] <= ends[0] else first
+        last = path.duration if item.during[1] >= ends[1] else last
+        if last - first > SHORTEST_WINDOW * path.duration:
+            yield replace(item, during=(first, last))

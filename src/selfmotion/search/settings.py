@@ -1,0 +1,143 @@
+"""What the search looks at, and when it has enough: every number that decides what is found.
+
+Rounding has its numbers where it occurs. What these do shows in `make suite` and `make suite-made`
+(narrow passages, chains of many waypoints), `make bench-starts` (free starts against the best of
+everything tried) and `make arms`. Where a figure was measured it stands here; the others were
+chosen, and hold up in those.
+"""
+
+# --- curves: self-motions of one pose
+# Largest distance of samples along a curve [rad or m], configuration norm.
+SPACING = 0.1
+# Longest single correction [rad or m]: a far start wanders where J is nearly singular.
+LONGEST_CORRECTION = 0.5
+# Corrections of a sample before its step is halved, and the share of the largest step below which
+# a curve ends.
+CORRECTIONS = 6
+SMALLEST_STEP = 1.0 / 64.0
+# Neighbours whose tangents differ by more than acos of this are too far apart to be trusted to
+# lie on the same branch.
+ALIGNED = 0.93
+# A configuration this near [rad or m] to a curve's polyline is on the curve.
+ON_CURVE = 0.02
+# Samples after which a curve is given up.
+MOST_SAMPLES = 5000
+# Of the samples of a curve, every so manieth looks for the curve at the next waypoint.
+CARRIED = 6
+# Inverse kinematics starts anew at every so manieth waypoint, from so many seeds.
+ANEW_EVERY = 10
+ANEW_SEEDS = 100
+
+# --- nodes: samples of curves that are inside the limits and free
+# Where samples are free or not by turns, the border is enclosed to this share of the spacing.
+BORDER = 0.25
+# Carried samples nearer to each other than this share of the spacing are merged.
+MERGED = 0.4
+# Samples outside the limits by more than this [rad or m] before Newton's correction stay outside.
+SURELY_OUTSIDE = 0.02
+
+# --- samples: redundancy two and more
+# Newton's steps onto the path, from near it and from anywhere.
+NEAR_STEPS = 10
+FAR_STEPS = 60
+# Motions begin at so many times, evenly, from so many configurations each: of those that inverse
+# kinematics finds from so many seeds.
+BEGINNINGS = 7
+BEGUN = 30
+BEGINNING_SEEDS = 200
+# Constant null motions drift so far over the whole path [rad or m], one standard deviation; every
+# other motion has none.
+DRIFT = 1.0
+# Of the samples that a chain reaches, so many are followed to the next waypoint, those that are so
+# far from each other [rad or m] first.
+PARENTS = 80
+PARENTS_APART = (1.6, 0.8, 0.4, 0.2, 0.1)
+# So many tries around each of them, about this far off [rad].
+STRAYS = 2
+STRAYED = 0.15
+# Around a chain, samples at these distances [rad or m], one after the other, so often each at most;
+# a round that shortens the chain by less than this share is the last one of its ring.
+RINGS = (0.3, 0.1, 0.03, 0.01)
+RING_ROUNDS = 5
+RING_GAIN = 5e-3
+
+# --- chains: dynamic programming over the nodes
+# Steps faster than this many times the mean speed of the shortest chain are changes from sample to
+# sample, which the finished motion spreads over more time.
+FAST = 2.0
+# Layers whose kinematics are kept, per waypoint: memory, not what is found.
+LAYERS_KEPT = 3
+# Chains are unlike when some joint differs by this [rad or m] at this share of the waypoints.
+UNLIKE = 0.3
+UNLIKE_FOR = 0.1
+# Mirror images have moved each joint by the same amount, up to this [rad or m].
+SAME_TRAVEL = 0.2
+# Chains looked at, mirror images included, before these have to do.
+MOST_CHAINS = 60
+# Nodes through which other chains are looked for: at so many waypoints, evenly.
+STATIONS = 7
+# What a change to another configuration counts: more than any motion in between.
+BREAK = 1e6
+
+# --- tightening: samples moved along their curves
+# Distances of neighbouring samples [rad or m], each a third of the last, from half of that of the
+# search on. A chain's excess length is about in proportion to the finest: 3 to 6 % at 0.01, 1 % at
+# 0.003, and at 0.001 less than what smoothing the motion changes.
+ROUGHLY = (0.03, 0.01)
+FINELY = (0.003, 0.001)
+# So many samples to each side are looked at in one round, in so many rounds at most; one that
+# improves the chain by less than this share is the last one of its spacing.
+SIDE = 6
+TIGHTENING_ROUNDS = 40
+TIGHTENING_GAIN = 2e-4
+
+# --- guides: chains that motions start from
+# Sequences refined; the best among the samples is not always that of the best motion.
+REFINED = 3
+# From one of the search's times to the next the tool moves by so much [m, rad], whatever the path's
+# own waypoints: more times would take longer, and what comes of them is smoothed anyway.
+STRIDE = 0.02
+TURN = 0.1
+# At fewer times than these a search would miss obstacles: self-motion curves allow for more than
+# samples of larger spaces do in the same time. More would take too long.
+FEWEST_OF_CURVES = 150
+FEWEST = 60
+MOST = 400
+# The path is looked at so often to see how far the tool moves.
+PATH_LOOKS = 2000
+# What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
+MARGIN = 2.5e-4
+# The jagged chain of samples is smoothed by a spline with this many of them per interval.
+SMOOTHING = 3
+
+# --- starts: configurations worth trying
+# Solutions nearer than this [rad or m, Euclidean] lead to the same plan once the start may move.
+SAME_START = 0.3
+# Where all self-motions of the first pose can be traced: from so many seeds.
+TRACING_SEEDS = 60
+# Where they cannot: so many seeds for each configuration that is asked for.
+TRIES = 2
+# Where most of them do not keep what else is asked of a configuration: so many rounds of these at
+# most, until there is this share of the starts.
+START_ROUNDS, ENOUGH_STARTS = 12, 0.5
+
+# --- reach: whether the arm can be there at all
+# Poses along the path that are looked at, branches of solutions that are followed from one to the
+# next, seeds where none of them goes on, and bisections of the time at which that happens.
+POSES = 64
+BRANCHES = 12
+SEEDS = 24
+BISECTIONS = 16
+# Before a pose counts as out of reach, so many seeds more are tried, and a slower method from some:
+# poses at joint limits are missed from 24. How far poses are out of reach is looked at for so many.
+MORE_SEEDS = 600
+RESTARTS = 12
+LOOKS = 12
+# Who gets so near [m + rad] counts as there.
+NEARLY = 1e-5
+# Poses about a time of trouble, in shares of the path's duration.
+ABOUT = (-1e-3, 0.0, 1e-3, 4e-3)
+# A singular value below this share of the dexterous configuration's counts as stretched or folded,
+# a joint this near to its limit [rad or m] as at it.
+STRETCHED = 0.1
+AT_LIMIT = 1e-3
