@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.certificate import check as check_module
+from selfmotion.basics import Array
+from selfmotion.certificate import bounding, check as check_module
 from support.arms import PANDA_HOME, robot_named
 from support.oracle import Judge
 from support.own_kinematics import Arm, along
