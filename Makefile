@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-certificate fuzz-generated fuzz-realtime fuzz-files arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-generated fuzz-realtime fuzz-files arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -74,6 +74,9 @@ fuzz: $(READY)  ## 200 random paths, judged by an independent checker
 
 fuzz-tasks: $(READY)  ## 200 position and pointing tasks among boxes, judged by the suite's judge
 	$(BIN)/python benchmarks/fuzz_tasks.py
+
+fuzz-cells: $(READY)  ## 200 random cells of two chains, judged by kinematics of the tree
+	$(BIN)/python benchmarks/fuzz_cells.py
 
 fuzz-certificate: $(READY)  ## 900 motions made to deceive, judged independently; the price of proof
 	$(BIN)/python benchmarks/certificate.py

@@ -102,7 +102,7 @@ def test_gradient_with_several_tips_and_moving_frames(seed: int, tmp_path: Path)
     """Cells made at random: to seven digits, differences extrapolated."""
     rng = np.random.default_rng(seed)
     robot = sm.load_robot(random_cell(rng, tmp_path), tool=(LEFT, RIGHT))
-    follows, start = random_follows(rng, robot)
+    _, follows, start = random_follows(rng, robot)
     rollout = Rollout(follows, Grid.aligned(follows.items[0].path.knots, 10))
     functions = PolynomialNullMotion(2, "joint").functions(rollout.grid.stage_times, 2.0)
     table = NullMotionTable(functions, None, robot.dof)

@@ -61,8 +61,10 @@ def _joint(name: str, kind: str, parent: str, child: str, rng: np.random.Generat
     )
 
 
-def random_follows(rng: np.random.Generator, robot: sm.RobotModel) -> tuple[sm.Follows, Array]:
-    """Return what two tips of a cell follow where that leaves self-motion, and a start on it.
+def random_follows(
+    rng: np.random.Generator, robot: sm.RobotModel
+) -> tuple[list[sm.Follow], sm.Follows, Array]:
+    """Return what tips of a cell follow where that leaves self-motion, and a start on it.
 
     The left one a line in the world, or one in the frame of the right one; or both, the right one
     in the frame of the left.
@@ -79,7 +81,7 @@ def random_follows(rng: np.random.Generator, robot: sm.RobotModel) -> tuple[sm.F
         jacobian = follows.jacobian(start)
         smallest = np.linalg.svd(jacobian, compute_uv=False)[-1]
         if follows.dimension < robot.dof and smallest > 0.05:
-            return follows, start
+            return items, follows, start
     return random_follows(rng, robot)
 
 

@@ -15,7 +15,11 @@ from selfmotion.robot.coordinates import (
     JointCoordinate as JointCoordinate,
     SwivelAngle as SwivelAngle,
 )
-from selfmotion.robot.dynamics import Dynamics as Dynamics
+from selfmotion.robot.dynamics import (
+    Dynamics as Dynamics,
+    Energy as Energy,
+    has_masses as has_masses,
+)
 from selfmotion.robot.loading import (
     NAMED_ARMS as NAMED_ARMS,
     NAMED_PARTS as NAMED_PARTS,

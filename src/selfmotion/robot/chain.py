@@ -216,6 +216,10 @@ class Chain:
         """Whether the base is the world, and all joints are on the way to the tip."""
         return self.base == WORLD and len(self.joints) == self.dof
 
+    def to_base(self) -> "Chain":
+        """Return the chain from the world to the base frame."""
+        return Chain(self.model, self.base)
+
     @property
     def carrier(self) -> int:
         """The joint that carries the base frame, by its coordinate; -1 for the world."""

@@ -106,8 +106,8 @@ def load_robot(
     ----------
     robot : str, Path or dict
         A name from `NAMED_ARMS` (``"panda"``, ``"planar_3r"``, …), ``"positioner"``, or the path of
-        a ``.urdf`` or ``.xacro`` file; or several of these by name, as one tree: links and joints of part
-        ``"arm"`` are called ``arm/NAME`` then.
+        a ``.urdf`` or ``.xacro`` file; or several of these by name, as one tree: links and joints
+        of part ``"arm"`` are called ``arm/NAME`` then.
     tool : str or sequence of str, optional
         Tool frame (a link), or several: the first is the one that paths are for where nothing else
         is said. Default: the named arm's usual one; for a file, its only leaf link; of several

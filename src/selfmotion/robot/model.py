@@ -347,6 +347,21 @@ class RobotModel:
                     break
         return q, task.miss(pose, self.pose(q))
 
+    def link_of(self, frame: int) -> str:
+        """Return the link that a piece of `geometry` belongs to, by its frame."""
+        return str(self.model.frames[frame].name)
+
+    def joint_poses(self, q: Array) -> Array:
+        """Return the joints' frames in the world at configurations (K, n): (K, n, 7).
+
+        Positions [m] and quaternions (x, y, z, w).
+        """
+        data, found = self.model.createData(), np.empty((len(q), self.dof, 7))
+        for k, configuration in enumerate(q):
+            pin.forwardKinematics(self.model, data, configuration)
+            found[k] = [pin.SE3ToXYZQUAT(data.oMi[joint + 1]) for joint in range(self.dof)]
+        return found
+
     def geometry(self, kind: pin.GeometryType) -> Any:
         """Return the visual or collision geometry, all links, locked joints where they are held.
 

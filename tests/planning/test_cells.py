@@ -1,0 +1,160 @@
+"""Cells: paths in frames that move, several tips at once, as planned, saved and written."""
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from support.own_kinematics import Arm, along
+from support.random_cells import LEFT, RIGHT, random_cell, random_follows
+
+# What a verified motion may be off its path [m, rad].
+TOLERANCE = 1e-6
+HANDS = "left/panda_hand_tcp", "right/panda_hand_tcp"
+
+
+def stand(y: float) -> pin.SE3:
+    return pin.SE3(np.eye(3), np.array([0.0, y, 0.0]))
+
+
+@pytest.fixture(scope="module")
+def carried() -> sm.Plan:
+    """Two Pandas that carry a bar round a circle."""
+    cell = sm.load_robot(
+        {"left": "panda", "right": "panda"},
+        base={"left": stand(0.45), "right": stand(-0.45)},
+        tool=HANDS,
+    )
+    first = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.45, 0.2, 0.3]))
+    circle = sm.Circle.around(first, radius=0.15, duration=6.0, normal=(0, 1, 0))
+    grasp = sm.Follow(stand(0.4), tool=HANDS[1], reference=HANDS[0])
+    return sm.plan(sm.Problem(cell, [sm.Follow(circle, tool=HANDS[0]), grasp]))
+
+
+def apart(plan: sm.Plan) -> tuple[np.ndarray, np.ndarray]:
+    """Return where the right hand is in the left one at many times, by yourdfpy's tree."""
+    arm, motion = Arm(plan.robot), plan.trajectory
+    q = along(motion, np.linspace(motion.t[0], motion.t[-1], 5001), 0)
+    (base, origin), (turn, at) = (arm.place(hand, q) for hand in HANDS)
+    return np.einsum("kji,kj->ki", base, at - origin), np.einsum("kji,kjl->kil", base, turn)
+
+
+def test_both_hands_hold_the_bar_at_all_times(carried: sm.Plan) -> None:
+    place, turn = apart(carried.require())
+    assert np.abs(place - [0.0, 0.4, 0.0]).max() < TOLERANCE
+    assert np.abs(turn - np.eye(3)).max() < TOLERANCE
+    assert f"'{HANDS[1]}'" in carried.certificate.verdict
+    assert "self-collision" in carried.certificate.covers
+    assert carried.report.cost < carried.report.initial_cost
+
+
+def test_a_hand_that_lets_go_is_not_verified(carried: sm.Plan) -> None:
+    """The right arm's last joint turns by a tenth of a degree, which the left path does not see."""
+    motion = carried.trajectory
+    q = motion.q.copy()
+    q[:, -1] += 2e-3
+    wrong = sm.Trajectory(motion.t, q, motion.qd, motion.joint_names, motion.qdd)
+    found = carried.problem.certify(wrong)
+    assert not found.verified
+    assert f"'{HANDS[1]}' is 2.00e-03 rad off the path" in found.verdict
+    assert found.position_error.value < TOLERANCE
+
+
+def test_plans_of_cells_are_saved_and_their_problems_written(
+    carried: sm.Plan, tmp_path: Path
+) -> None:
+    carried.save(tmp_path / "plan.npz")
+    loaded = sm.load_plan(tmp_path / "plan.npz")
+    assert loaded.certificate == carried.certificate
+    sm.write_problem(carried.problem, tmp_path / "cell.toml")
+    again = sm.read_problem(tmp_path / "cell.toml")
+    assert sm.problem.problem_to_dict(again) == sm.problem.problem_to_dict(carried.problem)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_verified_is_on_its_paths(seed: int, tmp_path: Path) -> None:
+    """Cells made at random, against the tree as it stands."""
+    rng = np.random.default_rng(1000 + seed)
+    robot = sm.load_robot(random_cell(rng, tmp_path), tool=(LEFT, RIGHT))
+    items, follows, start = random_follows(rng, robot)
+    plan = sm.plan(sm.Problem(robot, items, start=start)).require()
+    arm, motion = Arm(robot), plan.trajectory
+    t = np.linspace(0.0, 2.0, 2001)
+    q = along(motion, t, 0)
+    for item in follows.items:
+        target = item.path.samples(t)
+        _, at = arm.place(item.chain.tip_name, q)
+        if item.chain.base:
+            base, origin = arm.place(robot.model.frames[item.chain.base].name, q)
+            at = np.einsum("kji,kj->ki", base, at - origin)
+        assert np.abs(at - target.translation).max() < TOLERANCE
+
+
+def test_torques_are_those_of_the_tree(tmp_path: Path) -> None:
+    """Whatever the reference is: gravity knows the world."""
+    rng = np.random.default_rng(3)
+    file = random_cell(rng, tmp_path)
+    world = sm.load_robot(file, tool=(LEFT, RIGHT))
+    seen = sm.load_robot(file, tool=LEFT, reference=RIGHT, lock=None)
+    q, qd, qdd = rng.normal(size=(3, 5, seen.dof)) * 0.3
+    columns = [world.joint_names.index(name) for name in seen.joint_names]
+
+    def torques(robot: sm.RobotModel, parts: list[np.ndarray]) -> np.ndarray:
+        return sm.JointTorqueLimits().quantity(robot).values(*parts)
+
+    full = [np.zeros((5, world.dof)) for _ in range(3)]
+    for table, part in zip(full, (q, qd, qdd), strict=True):
+        table[:, columns] = part
+    expected = torques(world, full)[:, columns]
+    np.testing.assert_allclose(torques(seen, [q, qd, qdd]), expected, atol=1e-9)
+
+
+BAD = {
+    "no part 'tabel'": lambda: sm.load_robot({"arm": "panda"}, base={"tabel": np.eye(4)}),
+    "stands on 'rail/x', which is no link": lambda: sm.load_robot(
+        {"arm": "panda"}, on={"arm": "rail/x"}
+    ),
+    "a part is called 'a b'": lambda: sm.load_robot({"a b": "panda"}),
+    "there is no part": lambda: sm.load_robot({}),
+    "base is a dict of parts, but there is one robot": lambda: sm.load_robot(
+        "panda", base={"arm": np.eye(4)}
+    ),
+    "no link 'plate'": lambda: sm.load_robot("panda", reference="plate"),
+    "no joint moves the tool 'panda_hand_tcp' relative to 'panda_hand'": lambda: sm.load_robot(
+        "panda", reference="panda_hand"
+    ),
+}
+
+
+@pytest.mark.parametrize("message", BAD)
+def test_cells_that_make_no_sense_are_refused_by_name(message: str) -> None:
+    with pytest.raises(sm.RobotError, match=message.replace("no part 'tabel'", "part 'tabel'")):
+        BAD[message]()
+
+
+def test_follows_that_do_not_fit_are_refused(carried: sm.Plan) -> None:
+    robot, path = carried.robot, carried.problem.path
+    left = sm.Follow(path, tool=HANDS[0])
+    longer = sm.Line(path.pose(0.0), path.pose(1.0), 7.0)
+    with pytest.raises(sm.ProblemError, match="lasts 7 s, expected 6 s"):
+        sm.Problem(robot, [left, sm.Follow(longer, tool=HANDS[1])])
+    with pytest.raises(sm.ProblemError, match="cannot move them freely"):
+        sm.Problem(robot, [left, sm.Follow(path, tool=HANDS[0])])
+    with pytest.raises(sm.ProblemError, match="cannot be relaxed"):
+        sm.Problem(
+            robot,
+            [left, sm.Follow(stand(0.4), tool=HANDS[1], reference=HANDS[0])],
+            relaxations=[sm.Relaxation("rz", 0.1)],
+        )
+    with pytest.raises(sm.ProblemError, match="path is an empty list"):
+        sm.Problem(robot, [])
+
+
+def test_part_weights_are_by_part_and_by_joint(carried: sm.Plan) -> None:
+    robot = carried.robot
+    found = robot.part_weights({"right": 0.5, "left/panda_joint2": 3.0})
+    np.testing.assert_array_equal(found, [1, 3, 1, 1, 1, 1, 1, *[0.5] * 7])
+    with pytest.raises(sm.RobotError, match="no part or joint 'middle'"):
+        robot.part_weights({"middle": 1.0})
