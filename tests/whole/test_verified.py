@@ -6,12 +6,14 @@ are broken on purpose.
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.certificate import check as check_module, path_error
+from selfmotion.basics import Array
+from selfmotion.certificate import bounding, check as check_module
 from support.arms import PANDA_HOME, robot_named
 from support.oracle import Judge
 from support.own_kinematics import Arm, along
@@ -111,12 +113,11 @@ def refuted(scenes: list[Scene]) -> list[tuple[str, ...]]:
 def test_a_certificate_that_looks_at_the_samples_alone_is_refuted(
     panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def at_ends(robot, path, task, motion, relaxations, intervals, count):
-        q = motion(intervals.ravel())
-        miss = path_error.deviation_from(robot, path, task, intervals.ravel(), q, False)
-        miss = miss.reshape(len(intervals), 2, 6)
-        values = path_error._quantities(miss, intervals, path.duration, relaxations).max(axis=1)
-        return path_error._Bounds(values, intervals[:, :1] + 0.0 * values, values[:, :2])
+    def at_ends(function: Any, stretch: Any, count: int, rest: Array) -> tuple[Array, ...]:
+        """Bounds of what is measured at both ends of each interval, and no more."""
+        values = function.sizes(function.values(stretch, np.array([-1.0, 1.0])), stretch)
+        largest = values.max(axis=1)
+        return largest, stretch.intervals[:, :1] + 0.0 * largest, largest
 
     path = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
     motion = sm.plan(sm.Problem(panda, path, start=PANDA_HOME), max_evaluations=3).trajectory
@@ -124,7 +125,7 @@ def test_a_certificate_that_looks_at_the_samples_alone_is_refuted(
     motion = sm.Trajectory(motion.t[keep], motion.q[keep], motion.qd[keep], motion.joint_names)
     scene = Scene(Judge(panda, path), motion)
     assert not refuted([scene])
-    monkeypatch.setattr(path_error, "_bounds", at_ends)
+    monkeypatch.setattr(bounding, "_interpolated", at_ends)
     assert "position" in refuted([scene])[0][0]
 
 

@@ -62,10 +62,10 @@ class PoseFeedback:
         target = self._path.samples(t)
         angular = np.zeros(3)
         if np.any(task.rows >= 3):
-            import pinocchio as pin
+            from selfmotion.task import SE3
 
-            pose = pin.SE3(target.rotation[0], target.translation[0])
-            angular = task.twist_error(pose, pin.SE3(rotation, translation))[3:]
+            pose = SE3(target.rotation[0], target.translation[0])
+            angular = task.twist_error(pose, SE3(rotation, translation))[3:]
         error = np.concatenate([target.translation[0] - translation, angular])
         wanted = target.twist[0] + self._gain * error
         jacobian = task.select(full, rotation)

@@ -170,7 +170,7 @@ class _Flow:
 
     def _command(self, samples: Samples) -> tuple[Array, Array]:
         """Return ẋ + K e (K, m), and the path's angular velocity (K, 3)."""
-        import pinocchio as pin
+        from selfmotion.task import SE3
 
         task = self._problem.task
         target = self._problem.path.samples(samples.t)
@@ -181,8 +181,8 @@ class _Flow:
             wanted = twist.copy()
             wanted[:3] += self._gain * error
             if np.any(task.rows >= 3):
-                pose = pin.SE3(target.rotation[k], target.translation[k])
-                actual = pin.SE3(rotation, samples.translation[k])
+                pose = SE3(target.rotation[k], target.translation[k])
+                actual = SE3(rotation, samples.translation[k])
                 wanted[3:] += self._gain * task.twist_error(pose, actual)[3:]
             command[k] = task.select(wanted[:, None], rotation)[:, 0]
         return command, target.twist[:, 3:]

@@ -32,8 +32,9 @@ from selfmotion.robot import ChainSeries, RobotModel
 _FEWEST, _MEASURED = 3, 9
 # The polynomials are looked at in so many places of an interval.
 _PLACES = 33
-# Intervals that are looked at together; how often one is halved; how many of one lot are then left.
-_LOT, _DEPTH, _MOST = 2048, 16, 16_384
+# Intervals that are looked at together, and how often one is halved; of a lot so many times as many
+# are looked at then, or so many.
+_LOT, _DEPTH, _TIMES, _MOST = 2048, 16, 32, 4096
 
 
 class Stretch:
@@ -185,6 +186,7 @@ def _settled(
             progress("checking", number, len(lots))
         part = edges[first : first + _LOT + 1]
         pending = np.stack([part[:-1], part[1:]], axis=1)
+        most = max(_MOST, _TIMES * len(pending))
         for depth in range(_DEPTH + 1):
             found = _measured(function, Stretch(robot, trajectory, pending))
             # Written so that NaN settles nothing and is no small error either.
@@ -192,7 +194,7 @@ def _settled(
             broken = ~np.asarray(found.measured <= function.allowed).all(axis=1)
             settled = kept | broken
             left = np.flatnonzero(~settled)
-            last = depth == _DEPTH or len(left) > _MOST
+            last = depth == _DEPTH or len(left) > most
             told = np.arange(len(pending)) if last else np.flatnonzero(settled)
             # Where there is no bound, what was measured: it is broken, or undecided.
             values = np.where(np.isfinite(found.values), found.values, found.measured)

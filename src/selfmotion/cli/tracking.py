@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 from rich.console import Console
 from rich.table import Table
 
 import selfmotion as sm
 from selfmotion import realtime
 from selfmotion.basics import Array
+from selfmotion.task import SE3
 
 # What the conveyor carries the path by at most [m], and how long it takes there and back [s].
 _REACH, _TURN = 0.12, 12.0
@@ -21,7 +21,7 @@ PUSHED, _FAR, _RISE = (3.0, 4.5), 0.03, 0.2
 # When the ball appears [s], how large it is [m], and the distance that is kept from it [m].
 APPEARS, _BALL, _DISTANCE = 6.0, 0.06, 0.005
 # Where it is before [m].
-_AWAY = pin.SE3(np.eye(3), np.array([0.0, 0.0, 50.0]))
+_AWAY = SE3(np.eye(3), np.array([0.0, 0.0, 50.0]))
 
 
 class Conveyor:
@@ -47,7 +47,7 @@ class Conveyor:
             turns=(seconds + 10.0) / _ROUND,
         )
         self._push = _FAR * np.where(np.arange(robot.dof) % 2, 1.0, -1.0)
-        self._ball = pin.SE3(np.eye(3), np.asarray(ball))
+        self._ball = SE3(np.eye(3), np.asarray(ball))
 
     def path(self, t: float) -> sm.Path:
         """Return the circle where the conveyor is, going on as fast as it is now."""
@@ -57,7 +57,7 @@ class Conveyor:
         velocity = np.array([0.0, _REACH * 2.0 * np.pi / _TURN * np.cos(phase), 0.0])
         return realtime.Conveyed(self._circle, velocity, place - t * velocity)
 
-    def obstacles(self, t: float) -> Mapping[str, pin.SE3]:
+    def obstacles(self, t: float) -> Mapping[str, SE3]:
         """Return where the ball is."""
         return {"ball": self._ball if t >= APPEARS else _AWAY}
 
@@ -74,10 +74,8 @@ def conveyor_run(
     """Let a simulated Panda keep up with the conveyor; return the loop, the record and the plan."""
     robot = sm.load_robot("panda")
     start = np.array(sm.NAMED_ARMS["panda"].home)
-    elbow = robot.model, robot.model.createData()
-    pin.forwardKinematics(*elbow, start)
     # In the way of the elbow, not of the tool.
-    ball = elbow[1].oMi[4].translation + np.array([0.0, 0.19, 0.0])
+    ball = robot.chain_to("panda_link4").place(start).translation + np.array([0.0, 0.19, 0.0])
     limits = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits())
     clearance = sm.Clearance((sm.Sphere("ball", ball, _BALL),), distance=_DISTANCE)
     replanner = realtime.Replanner(robot, task, constraints=(*limits, clearance), horizon=horizon)

@@ -48,7 +48,7 @@ def link_bodies(robot: RobotModel) -> list[Body]:
         An element is no body, or is missing among what Pinocchio made of them.
     """
     pieces = robot.geometry(pin.GeometryType.COLLISION).geometryObjects
-    links = [robot.model.frames[piece.parentFrame].name for piece in pieces]
+    links = [robot.link_of(piece.parentFrame) for piece in pieces]
     _check_count(robot.urdf, links)
     bodies = []
     for link, piece in zip(links, pieces, strict=True):

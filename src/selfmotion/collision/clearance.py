@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array
 from selfmotion.collision.distances import Ints
 from selfmotion.collision.exact import CollisionModel
 from selfmotion.collision.overlaps import SAMPLES
+from selfmotion.task import SE3
 
 # The share of sampled configurations in which hulls of links that meet elsewhere may overlap alone.
 _FALSE_ALARMS = 0.1
@@ -128,7 +128,7 @@ class ClearanceModel:
         values.setflags(write=False)
         return Clearances(values, rows, columns, slopes)
 
-    def move(self, obstacle: str, pose: pin.SE3) -> None:
+    def move(self, obstacle: str, pose: SE3) -> None:
         """Put an obstacle somewhere else, for this model and the hulls of its `exact` one.
 
         The meshes of `exact` stay where they are: it is not for measuring any more.

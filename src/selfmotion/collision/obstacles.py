@@ -8,10 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array, CollisionError, as_number, as_numbers
-from selfmotion.task import as_pose
+from selfmotion.task import SE3, as_pose
 
 # An obstacle so large, or so far away [m], may be one in millimetres.
 _HUGE = 100.0
@@ -54,7 +53,7 @@ class Obstacle(ABC):
     shape: ClassVar[str] = ""
 
     name: str
-    pose: pin.SE3
+    pose: SE3
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
@@ -166,7 +165,7 @@ def obstacle_from_dict(values: Mapping[str, Any]) -> Obstacle:
     missing = sorted(needed - set(rest))
     if missing:
         raise CollisionError(f"{label}: '{missing[0]}' is missing")
-    return cls(name, pin.SE3(rotation, position), **rest)
+    return cls(name, SE3(rotation, position), **rest)
 
 
 def _plain(value: Any) -> Any:
@@ -183,10 +182,10 @@ def _numbers(values: npt.ArrayLike) -> Array:
         return np.array(np.nan)
 
 
-def _pose(label: str, pose: Any) -> pin.SE3:
-    if not isinstance(pose, pin.SE3):
+def _pose(label: str, pose: Any) -> SE3:
+    if not isinstance(pose, SE3):
         position = _numbers(pose)
         if position.shape != (4, 4):
             what, expected = f"{label}: pose", "an SE3, a (4, 4) matrix or a position (3,), finite"
-            pose = pin.SE3(np.eye(3), as_numbers(pose, what, expected, (3,), CollisionError))
+            pose = SE3(np.eye(3), as_numbers(pose, what, expected, (3,), CollisionError))
     return as_pose(pose, f"{label}: pose", CollisionError)

@@ -1,11 +1,10 @@
-"""Costs of the arm's dynamics, by Pinocchio's mass matrix and gravity torques."""
+"""Costs of the arm's dynamics: kinetic energy, and torques against gravity."""
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array, ProblemError, shown
 from selfmotion.costs.base import (
@@ -19,7 +18,7 @@ from selfmotion.costs.base import (
 )
 from selfmotion.costs.samples import Samples
 from selfmotion.follow import Follows
-from selfmotion.robot import RobotModel
+from selfmotion.robot import Energy, RobotModel, has_masses
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,42 +41,25 @@ class KineticEnergy(Cost):
     robot: RobotModel
     mu: float = 1.0
     name: str = "kinetic energy"
-    _model: Any = field(init=False, repr=False)
+    _energy: Energy = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         _check_arm(self.robot, self.name)
-        model = self.robot.model.copy()
-        model.gravity.setZero()
-        object.__setattr__(self, "_model", model)
+        object.__setattr__(self, "_energy", Energy(self.robot))
 
     def value(self, samples: Samples) -> Array:
         """See `Cost.value`."""
-        data = self._model.createData()
-        energies = [
-            pin.computeKineticEnergy(self._model, data, q, qd)
-            for q, qd in zip(samples.q, samples.qd, strict=True)
-        ]
-        return self.mu * np.array(energies)
+        return self.mu * self._energy.kinetic(samples.q, samples.qd)
 
     def gradient(self, samples: Samples) -> Partials:
-        """See `Cost.gradient`: ∂G/∂q̇ = μMq̇ and ∂G/∂q = μ ½ q̇ᵀ ∂(Mq̇)/∂q.
-
-        At rest and without gravity the inverse dynamics are τ = Mq̈, so that both come from its
-        derivatives with q̇ in place of q̈.
-        """
-        data, rest = self._model.createData(), np.zeros(self.robot.dof)
-        by_q, by_qd = np.empty_like(samples.q), np.empty_like(samples.qd)
-        for s, (q, qd) in enumerate(zip(samples.q, samples.qd, strict=True)):
-            torque_by_q, _, mass = pin.computeRNEADerivatives(self._model, data, q, rest, qd)
-            by_q[s] = 0.5 * self.mu * (qd @ torque_by_q)
-            by_qd[s] = self.mu * (mass @ qd)
-        return Partials(q=by_q, qd=by_qd)
+        """See `Cost.gradient`: ∂G/∂q̇ = μMq̇ and ∂G/∂q = μ ½ q̇ᵀ ∂(Mq̇)/∂q."""
+        by_q, by_qd = self._energy.kinetic_slopes(samples.q, samples.qd)
+        return Partials(q=self.mu * by_q, qd=self.mu * by_qd)
 
     def curvature(self, dof: int) -> dict[int, Array]:
         """See `Cost.curvature`: M in the middle of the joint limits."""
         lower, upper = self.robot.finite_limits()
-        mass = np.triu(pin.crba(self._model, self._model.createData(), 0.5 * (lower + upper)))
-        return {1: self.mu * (mass + np.triu(mass, 1).T)}
+        return {1: self.mu * self._energy.mass(0.5 * (lower + upper))}
 
     def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
@@ -110,21 +92,13 @@ class GravityTorque(Cost):
 
     def value(self, samples: Samples) -> Array:
         """See `Cost.value`."""
-        model = self.robot.model
-        data = model.createData()
-        torques = np.array([pin.computeGeneralizedGravity(model, data, q) for q in samples.q])
-        return half_square(np.asarray(self.weight), torques)
+        return half_square(np.asarray(self.weight), Energy(self.robot).gravity(samples.q))
 
     def gradient(self, samples: Samples) -> Partials:
         """See `Cost.gradient`: (∂g/∂q)ᵀWg."""
-        model = self.robot.model
-        data = model.createData()
-        by_q = np.empty_like(samples.q)
-        for s, q in enumerate(samples.q):
-            derivative = pin.computeGeneralizedGravityDerivatives(model, data, q)
-            torque = pin.computeGeneralizedGravity(model, data, q)
-            by_q[s] = weighted(np.asarray(self.weight), torque[None])[0] @ derivative
-        return Partials(q=by_q)
+        energy = Energy(self.robot)
+        torques = weighted(np.asarray(self.weight), energy.gravity(samples.q))
+        return Partials(q=np.einsum("si,sij->sj", torques, energy.gravity_slopes(samples.q)))
 
     def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
@@ -145,5 +119,5 @@ def _check_robot(made_for: RobotModel, robot: RobotModel, name: str) -> None:
             f"{', '.join(made_for.joint_names)}, but the problem's arm is {robot.name} with "
             f"{', '.join(robot.joint_names)}"
         )
-    if not any(inertia.mass > 0 for inertia in robot.model.inertias):
+    if not has_masses(robot):
         raise ProblemError(f"cost '{name}': the URDF of {robot.name} gives no inertias")

@@ -4,12 +4,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array, ProblemError, shown
 from selfmotion.path import Dwell, Path, PathSamples
 from selfmotion.robot import Chain, RobotModel
-from selfmotion.task import Task, as_pose
+from selfmotion.task import SE3, Task, as_pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,7 @@ class Follow:
     Two hands that hold one bar: ``Follow(grasp, tool="right/hand", reference="left/hand")``.
     """
 
-    path: Path | pin.SE3 | npt.ArrayLike
+    path: Path | SE3 | npt.ArrayLike
     task: Task | str = Task.POSE
     tool: str | None = None
     reference: str | None = None
@@ -113,6 +112,6 @@ class BoundFollow:
         twist = self.task.twist_error(self.path.pose(t), actual)
         return self.task.select(twist[:, None], actual.rotation)[:, 0]
 
-    def miss(self, pose: pin.SE3, q: Array) -> tuple[float, float]:
+    def miss(self, pose: SE3, q: Array) -> tuple[float, float]:
         """Return how far the tip at q (n,) is from a pose in the rows, (m, rad)."""
         return self.task.miss(pose, self.chain.place(q))

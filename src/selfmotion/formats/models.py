@@ -13,7 +13,6 @@ from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy.typing as npt
-import pinocchio as pin
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from selfmotion.basics import Array, Saved
@@ -40,13 +39,13 @@ from selfmotion.motion import NullMotion
 from selfmotion.optimise import QuasiNewton
 from selfmotion.path import Path, TimeLaw
 from selfmotion.planning import Search
-from selfmotion.task import Damping, Relaxation, Task
+from selfmotion.task import SE3, Damping, Relaxation, Task
 
 # Kinds that no file names: what is missing of a plan, a cost that damping adds, functions (which
 # are named by module:attribute).
 _NOT_IN_FILES = {"LostCost", "OffPath", "FunctionCost"}
 _STRICT = ConfigDict(extra="forbid", protected_namespaces=())
-_PLAIN = {bool: Flag, int: Whole, float: Number, str: Text, pin.SE3: Pose}
+_PLAIN = {bool: Flag, int: Whole, float: Number, str: Text, SE3: Pose}
 
 _Fields = dict[str, tuple[Any, Any]]
 # Where a file says more, or says it otherwise, than the class's own signature.

@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from selfmotion.basics import Array
 from selfmotion.path import path_pose
+from selfmotion.task import SE3, Quaternion, exp3, rpy
 
 # A quaternion shorter than this has no direction.
 _ZERO = 1e-9
@@ -21,7 +21,7 @@ def from_quaternion(values: Array) -> Array:
     if length < _ZERO:
         raise ValueError("the quaternion is zero, expected [w, x, y, z] of length 1")
     w, x, y, z = (values / length).tolist()
-    return np.asarray(pin.Quaternion(w, x, y, z).toRotationMatrix())
+    return np.asarray(Quaternion(w, x, y, z).toRotationMatrix())
 
 
 def from_normal(normal: Array) -> Array:
@@ -49,13 +49,13 @@ def _from_matrix(values: Array) -> Array:
 ORIENTATIONS: Mapping[str, tuple[tuple[int, ...], Callable[[Array], Array]]] = {
     "rotation": ((3, 3), _from_matrix),
     "quaternion": ((4,), from_quaternion),
-    "rpy": ((3,), lambda values: np.asarray(pin.rpy.rpyToMatrix(values))),
-    "rotation_vector": ((3,), lambda values: np.asarray(pin.exp3(values))),
+    "rpy": ((3,), lambda values: np.asarray(rpy.rpyToMatrix(values))),
+    "rotation_vector": ((3,), lambda values: np.asarray(exp3(values))),
     "normal": ((3,), from_normal),
 }
 
 
-def pose_of(value: Any) -> pin.SE3:
+def pose_of(value: Any) -> SE3:
     """Return the pose that a file gives.
 
     Either a 4 × 4 matrix, or a table with ``position`` [m] and at most one of ``quaternion``
@@ -79,7 +79,7 @@ def pose_of(value: Any) -> pin.SE3:
     given = [key for key in ORIENTATIONS if key in value]
     if len(given) > 1:
         raise ValueError(f"has both {given[0]} and {given[1]}; give one orientation")
-    pose = pin.SE3.Identity()
+    pose = SE3.Identity()
     pose.translation = numbers(value.get("position", [0.0, 0.0, 0.0]), (3,), "position")
     for key in given:
         shape, rotation = ORIENTATIONS[key]

@@ -21,7 +21,7 @@ from selfmotion.robot import NAMED_ARMS, RobotModel
 from selfmotion.task import Task
 
 if TYPE_CHECKING:
-    import pinocchio as pin
+    from selfmotion.task import SE3
 
 
 def path_of(
@@ -120,7 +120,7 @@ def _circle(values: dict[str, Any]) -> Path:
 def _line(values: dict[str, Any]) -> Path:
     del values["kind"]
     _exactly_one(values, "end", "by")
-    start: pin.SE3 = values["start"]
+    start: SE3 = values["start"]
     if "by" in values:
         by = np.asarray(values.pop("by"), dtype=np.float64)
         if by.shape != (3,):

@@ -12,6 +12,7 @@ from selfmotion.motion.null_motion import (
     NullMotionTable as NullMotionTable,
     PolynomialNullMotion as PolynomialNullMotion,
     RefinedNullMotion as RefinedNullMotion,
+    fading_window as fading_window,
     resting_window as resting_window,
 )
 from selfmotion.motion.sampling import Sampling as Sampling

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import (
     Array,
@@ -22,7 +21,7 @@ from selfmotion.basics import (
     shown,
 )
 from selfmotion.path.feed_kept import FeedKept
-from selfmotion.task import Task, as_pose
+from selfmotion.task import SE3, Task, as_pose, skew
 
 # Rounding of a last time such as 50 * 0.02 must not count as outside the motion.
 _TIME_SLACK = 1e-9
@@ -157,10 +156,10 @@ class Path(Saved, ABC, family="path"):
 
         return Joined([self, other]) if isinstance(other, Path) else NotImplemented
 
-    def pose(self, t: float) -> pin.SE3:
+    def pose(self, t: float) -> SE3:
         """Return the tool's pose at time `t` [s]."""
         samples = self.samples(t)
-        return pin.SE3(samples.rotation[0], samples.translation[0])
+        return SE3(samples.rotation[0], samples.translation[0])
 
     def twist(self, t: float) -> Array:
         """Return [v, ω] at time `t` [s], (6,) in [m/s, rad/s]."""
@@ -213,7 +212,7 @@ def turning(bounds: Array) -> PathSeries:
 STILL = 1e-7
 
 
-def path_pose(pose: pin.SE3 | npt.ArrayLike, name: str) -> pin.SE3:
+def path_pose(pose: SE3 | npt.ArrayLike, name: str) -> SE3:
     """Return `pose` (an SE3 or a (4, 4) matrix) as an SE3 of its own; PathError otherwise."""
     return as_pose(pose, name, PathError)
 
@@ -252,7 +251,7 @@ def unit(vectors: Array) -> Array:
 
 def rotations_about(axis: Array, angles: Array) -> Array:
     """Return exp([axis]× angle) for each of K angles about a unit axis, (K, 3, 3) (Rodrigues)."""
-    cross = pin.skew(axis)
+    cross = skew(axis)
     return np.asarray(
         np.eye(3)
         + np.sin(angles)[:, None, None] * cross

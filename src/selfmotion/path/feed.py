@@ -95,7 +95,7 @@ class Feed(_Derived, kind="feed"):
         if self.feed > _FASTEST:
             raise PathError(
                 f"feed: {self.feed:g} m/s is faster than any arm, expected at most {_FASTEST:g}: "
-                f"feeds are in m/s, not mm/s (feed_mm in files)"
+                f"feeds are in m/s, not mm/s"
             )
         self._within = as_number(within, "feed: within", above=0.0, most=1.0, error=PathError)
         self.duration = float(self._paces[-1][1])

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array, Ints, PathError, as_number, read_only, restore, series, shown
 from selfmotion.path.base import (
@@ -24,6 +23,7 @@ from selfmotion.path.base import (
 )
 from selfmotion.path.feed_kept import FeedKept
 from selfmotion.path.shapes import Line
+from selfmotion.task import SE3, log3
 
 # Pieces may end this far from where the next one begins [m, rad].
 _GAP = 1e-6
@@ -41,7 +41,7 @@ class Dwell(Path, kind="dwell"):
         How long [s].
     """
 
-    at: pin.SE3
+    at: SE3
     duration: float
 
     def __post_init__(self) -> None:
@@ -90,7 +90,7 @@ def with_leads(
     away = check_vector(axis, "lead: axis")
     if not np.any(away):
         raise PathError("lead: axis is zero, expected a direction")
-    back = pin.SE3(np.eye(3), length * away / np.linalg.norm(away))
+    back = SE3(np.eye(3), length * away / np.linalg.norm(away))
     first, last = path.pose(0.0), path.pose(path.duration)
     lead_in, lead_out = Line(first * back, first, duration), Line(last, last * back, duration)
     return Joined([lead_in, path, lead_out])
@@ -199,7 +199,7 @@ class Joined(Path, kind="joined"):
 def _check_joint(one: Path, other: Path, number: int) -> None:
     end, start = one.pose(one.duration), other.pose(0.0)
     apart = float(np.linalg.norm(start.translation - end.translation))
-    turned = float(np.linalg.norm(pin.log3(end.rotation.T @ start.rotation)))
+    turned = float(np.linalg.norm(log3(end.rotation.T @ start.rotation)))
     where = f"joined path: piece {number + 1} begins"
     if apart > _GAP or turned > _GAP:
         raise PathError(

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array
 from selfmotion.path.base import (
@@ -17,6 +16,7 @@ from selfmotion.path.base import (
     path_series,
 )
 from selfmotion.path.feed_kept import FeedKept
+from selfmotion.task import SE3
 
 
 class Placed(_Derived, kind="placed"):
@@ -30,7 +30,7 @@ class Placed(_Derived, kind="placed"):
         Pose of the frame in the world [m].
     """
 
-    def __init__(self, path: Path, frame: pin.SE3 | npt.ArrayLike) -> None:
+    def __init__(self, path: Path, frame: SE3 | npt.ArrayLike) -> None:
         self._path = check_path(path, "placed path")
         self._frame = path_pose(frame, "placed path: frame")
         self.duration = path.duration

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array, PathError, as_number, as_numbers, read_only, series, shown
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
+from selfmotion.task import SE3, Quaternion
 
 # The pace of a polyline itself, to be replaced by `Feed` [m/s].
 _SPEED = 1.0
@@ -94,12 +94,12 @@ class Polyline(Path, kind="polyline"):
         self._check_reversals()
 
     @classmethod
-    def from_poses(cls, poses: list[pin.SE3], **options: Any) -> "Polyline":
+    def from_poses(cls, poses: list[SE3], **options: Any) -> "Polyline":
         """Return the path through `poses` (SE3 or (4, 4)); options as in the class."""
         if not isinstance(poses, Sequence | np.ndarray):
             raise PathError(f"polyline: poses is {shown(poses)}, expected a list of poses")
         frames = [path_pose(pose, f"polyline: poses[{k}]") for k, pose in enumerate(poses)]
-        turns = [np.roll(pin.Quaternion(frame.rotation).coeffs(), 1) for frame in frames]
+        turns = [np.roll(Quaternion(frame.rotation).coeffs(), 1) for frame in frames]
         return cls([frame.translation for frame in frames], turns, **options)
 
     @property

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array, PathError, as_flag, as_number, read_only, series
 from selfmotion.path.base import (
@@ -19,6 +18,7 @@ from selfmotion.path.base import (
     unit,
 )
 from selfmotion.path.time_law import TimeLaw
+from selfmotion.task import SE3, log3
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +35,8 @@ class Line(Path, kind="line"):
         Speed along the line.
     """
 
-    start: pin.SE3
-    end: pin.SE3
+    start: SE3
+    end: SE3
     duration: float
     time_law: TimeLaw | str = TimeLaw.MINIMUM_JERK
 
@@ -54,7 +54,7 @@ class Line(Path, kind="line"):
         """See `Path.evaluate`."""
         s, speed = TimeLaw.of(self.time_law)(t / self.duration)
         offset = self.end.translation - self.start.translation
-        turn = pin.log3(self.end.rotation @ self.start.rotation.T)
+        turn = log3(self.end.rotation @ self.start.rotation.T)
         angle = float(np.linalg.norm(turn))
         axis = turn / angle if angle > 0.0 else np.array([0.0, 0.0, 1.0])
         return PathSamples(
@@ -69,7 +69,7 @@ class Line(Path, kind="line"):
         law, last = TimeLaw.of(self.time_law), self.duration
         way = law.series(middle / last, half / last)
         length = float(np.linalg.norm(self.end.translation - self.start.translation))
-        angle = float(np.linalg.norm(pin.log3(self.end.rotation @ self.start.rotation.T)))
+        angle = float(np.linalg.norm(log3(self.end.rotation @ self.start.rotation.T)))
         return PathSeries(length * way, series.exponential(angle * way))
 
 
@@ -95,7 +95,7 @@ class Circle(Path, kind="circle"):
         Speed along the circle.
     """
 
-    start: pin.SE3
+    start: SE3
     center: Array
     normal: Array
     duration: float
@@ -121,7 +121,7 @@ class Circle(Path, kind="circle"):
     @classmethod
     def around(
         cls,
-        start: pin.SE3 | npt.ArrayLike,
+        start: SE3 | npt.ArrayLike,
         radius: float,
         duration: float,
         *,

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 from numpy.polynomial import chebyshev
 
 from selfmotion.basics import Array, PathError, as_numbers, series, shown
 from selfmotion.path.base import Path, PathSamples, PathSeries, check_duration, path_pose
+from selfmotion.task import SE3, Quaternion
 
 _DEGREE = 24
 # Chebyshev tail, relative to the largest velocity, at which a piece counts as resolved.
@@ -53,7 +53,7 @@ class TwistPath(Path, kind="twist"):
 
     def __init__(
         self,
-        start: pin.SE3 | npt.ArrayLike,
+        start: SE3 | npt.ArrayLike,
         velocity: Callable[[float], npt.ArrayLike],
         duration: float,
     ) -> None:
@@ -73,7 +73,7 @@ class TwistPath(Path, kind="twist"):
         )
         return path
 
-    def _set(self, start: pin.SE3, breaks: npt.ArrayLike, coefficients: npt.ArrayLike) -> None:
+    def _set(self, start: SE3, breaks: npt.ArrayLike, coefficients: npt.ArrayLike) -> None:
         self._start = start
         self._breaks = as_numbers(breaks, "twist path: breaks", error=PathError)
         what = "twist path: coefficients"
@@ -89,9 +89,9 @@ class TwistPath(Path, kind="twist"):
             )
 
     @property
-    def start(self) -> pin.SE3:
+    def start(self) -> SE3:
         """Pose of the tool at t = 0."""
-        return pin.SE3(self._start)
+        return SE3(self._start)
 
     @property
     def knots(self) -> Array:
@@ -124,7 +124,7 @@ class TwistPath(Path, kind="twist"):
             return 0.5 * np.append(w * omega + np.cross(omega, x), -omega @ x)
 
         # Piece by piece: what a piece resolves, steps from afar would pass over.
-        at, solutions = pin.Quaternion(self._start.rotation).coeffs(), []
+        at, solutions = Quaternion(self._start.rotation).coeffs(), []
         for left, right in pairwise(self._breaks.tolist()):
             # Of errors too small for numbers the solver divides nothing by nothing.
             with np.errstate(invalid="ignore"):

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import (
     Array,
@@ -25,6 +24,7 @@ from selfmotion.basics import (
 )
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
 from selfmotion.path.waypoint_arguments import as_table, bends, check_waypoints
+from selfmotion.task import SE3, Quaternion
 
 _COLUMNS = ("t", "x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
@@ -89,12 +89,12 @@ class Waypoints(Path, kind="waypoints"):
         self._corner_angle = float(corner_angle)
 
     @classmethod
-    def from_poses(cls, t: npt.ArrayLike, poses: list[pin.SE3], **options: Any) -> "Waypoints":
+    def from_poses(cls, t: npt.ArrayLike, poses: list[SE3], **options: Any) -> "Waypoints":
         """Return the path through `poses` (SE3 or (4, 4)) at times `t`; options as in the class."""
         if not isinstance(poses, Sequence | np.ndarray):
             raise PathError(f"waypoints: poses is {shown(poses)}, expected a list of poses")
         frames = [path_pose(pose, f"waypoints: poses[{k}]") for k, pose in enumerate(poses)]
-        turns = [np.roll(pin.Quaternion(frame.rotation).coeffs(), 1) for frame in frames]
+        turns = [np.roll(Quaternion(frame.rotation).coeffs(), 1) for frame in frames]
         return cls(t, [frame.translation for frame in frames], turns, **options)
 
     @classmethod

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 
 from selfmotion.basics import Array, Progress, SelfmotionError
 from selfmotion.certificate import Finding, FinishedMotion, Requirement, arm_limits
@@ -25,6 +24,7 @@ from selfmotion.planning.settings import (
 )
 from selfmotion.problem import Problem
 from selfmotion.result import Move
+from selfmotion.task import SE3
 
 # Largest velocity, acceleration and jerk of 10τ³ - 15τ⁴ + 6τ⁵ for 0 ≤ τ ≤ 1.
 _SPEED, _ACCELERATION, _JERK = 1.875, 10.0 / np.sqrt(3.0), 60.0
@@ -90,7 +90,7 @@ class Mover:
     def _lead(self, q: Array, retreat: Retreat) -> Trajectory:
         """Return the motion of the tool away from where q has it; SelfmotionError for none."""
         pose = self._problem.robot.pose(q)
-        away = pose * pin.SE3(np.eye(3), retreat.length * retreat.axis)
+        away = pose * SE3(np.eye(3), retreat.length * retreat.axis)
         duration = max(retreat.length / RETREAT_SPEED, BRIEFEST_RETREAT)
         line = Line(pose, away, duration)
         return plan(replace(self._problem, path=line, start=q)).require().trajectory

@@ -12,7 +12,6 @@ import numpy.typing as npt
 from selfmotion.basics import (
     Array,
     ProblemError,
-    StartError,
     as_flag,
     as_several,
     read_only,
@@ -39,9 +38,22 @@ from selfmotion.constraints import (
 )
 from selfmotion.costs import Cost, JointVelocity, OffPath
 from selfmotion.follow import Follow, Follows
-from selfmotion.motion import NullMotion, RefinedNullMotion, Trajectory, resting_window
+from selfmotion.motion import (
+    NullMotion,
+    RefinedNullMotion,
+    Trajectory,
+    fading_window,
+    resting_window,
+)
 from selfmotion.path import Path
 from selfmotion.problem.fit import check_fit, rest_orders
+from selfmotion.problem.given import (
+    SEQUENCES,
+    check_costs,
+    check_judged,
+    check_kinds,
+    check_start,
+)
 from selfmotion.robot import RobotModel
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 
@@ -52,10 +64,6 @@ _REFINED = RefinedNullMotion()
 _KEPT = (JointPositionLimits(), JointVelocityLimits(), JointAccelerationLimits(), JointJerkLimits())
 # Stands for the usual cost of whatever arm it is.
 _USUAL: tuple[Cost, ...] = (JointVelocity(),)
-# A start nearer to the path than this is on it: far above rounding, far below any tolerance.
-_ON_PATH = 1e-7
-# A null motion that was found by a search fades in this share of the duration.
-_FADE = 0.05
 
 
 class _TaskField:
@@ -143,14 +151,10 @@ class Problem:
     def __post_init__(self) -> None:
         if isinstance(self.path, list | tuple):
             self._take_first(as_several(self.path, "path", Follow))
-        for name, kind in _KINDS.items():
-            if not isinstance(getattr(self, name), kind):
-                raise ProblemError(
-                    f"{name} is {shown(getattr(self, name))}, expected a {_EXAMPLES[name]}"
-                )
+        check_kinds(self)
         if self.costs is _USUAL:
             object.__setattr__(self, "costs", (JointVelocity.usual(self.robot),))
-        for name, each in _SEQUENCES.items():
+        for name, each in SEQUENCES.items():
             object.__setattr__(self, name, as_several(getattr(self, name), name, each))
         check_fit(self.follows, self.relaxations)
         if self.also and self.relaxations:
@@ -163,12 +167,15 @@ class Problem:
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")
             object.__setattr__(self, "start", None)
         object.__setattr__(self, "rest", as_flag(self.rest, "rest"))
-        self._check_costs()
-        self._check_constraints()
+        check_costs(self.follows, self.costs, self.all_costs)
+        for item in self.constraints:
+            item.check(self.follows)
+        # Now, not when the motion is finished: without a requirement nothing judges it.
+        check_judged(self.all_constraints, self._asked)
         if self.start is not None:
             start = read_only(self.robot.configuration(self.start))
             object.__setattr__(self, "start", start)
-            self._check_start(start)
+            check_start(self.follows, start)
         for item in self.constraints:
             item.check_start(self.follows, self.given_start)
 
@@ -281,9 +288,7 @@ class Problem:
 
     def brought_to_rest(self, t: Array, epsilon: Array) -> Array:
         """Return a null motion (S, n) that fades to nothing where the arm has to be at rest."""
-        (start, end), s = self.rests, t / self.path.duration
-        fade = _fade(s) if start else np.ones(len(t))
-        return epsilon * (fade * (_fade(1.0 - s) if end else 1.0))[:, None]
+        return epsilon * fading_window(t, self.path.duration, self.rests)[:, None]
 
     @cached_property
     def damping_law(self) -> DampingLaw | None:
@@ -377,63 +382,9 @@ class Problem:
         pins = [(self.start is not None, False), *(item.pins for item in self.constraints)]
         return any(start for start, _ in pins), any(end for _, end in pins)
 
-    def _check_costs(self) -> None:
-        if not self.costs:
-            raise ProblemError("no cost is given, so that nothing tells one motion from another")
-        names = [cost.name for cost in self.all_costs]
-        twice = [name for name in names if names.count(name) > 1]
-        if twice:
-            raise ProblemError(f"two costs are called '{twice[0]}'; give one another name=")
-        for cost in self.costs:
-            cost.check(self.follows)
-
-    def _check_constraints(self) -> None:
-        for item in self.constraints:
-            item.check(self.follows)
-        # Now, not when the motion is finished: without a requirement nothing judges it.
-        for item, found in zip(self.all_constraints, self._asked, strict=True):
-            if not isinstance(found, Requirement):
-                raise ProblemError(
-                    f"constraint {type(item).__name__}: requirement() returned {found!r}, expected "
-                    f"a Requirement; without one nothing judges whether a motion keeps it"
-                )
-
-    def _check_start(self, start: Array) -> None:
-        for item in self.follows.items:
-            position, rotation = item.miss(item.path.pose(0.0), start)
-            if max(position, rotation) > _ON_PATH:
-                raise StartError(
-                    f"{self.robot.name}: the start configuration puts '{item.chain.tip_name}' "
-                    f"{position:.3g} m and {rotation:.3g} rad off the start of the path; leave it "
-                    f"out, or take robot.inverse_kinematics(path.pose(0.0), task, seed=start)",
-                    position_miss=position,
-                    rotation_miss=rotation,
-                )
-
 
 # What help() shows of a field that is a descriptor.
 Problem.__init__.__annotations__["task"] = Task | str
-_KINDS: dict[str, Any] = {
-    "robot": RobotModel,
-    "path": Path,
-    "null_motion": NullMotion,
-    "damping": Damping | None,
-    "collision": Clearance | None,
-}
-_EXAMPLES = {
-    "robot": "RobotModel (load_robot)",
-    "path": "Path (Line, Circle, Waypoints, TwistPath, …, or a class derived from Path)",
-    "null_motion": "NullMotion (PolynomialNullMotion, BSplineNullMotion, or a class derived "
-    "from NullMotion)",
-    "damping": "Damping or None",
-    "collision": "Clearance or None",
-}
-_SEQUENCES = {
-    "costs": Cost,
-    "constraints": Constraint,
-    "relaxations": Relaxation,
-    "also": Follow,
-}
 
 
 def _with_times(knots: list[float], times: Iterable[float], duration: float) -> list[float]:
@@ -443,12 +394,6 @@ def _with_times(knots: list[float], times: Iterable[float], duration: float) -> 
         if np.abs(np.array(found) - time).min() > 1e-9 * duration:
             found.append(float(time))
     return found
-
-
-def _fade(s: Array) -> Array:
-    """Return a function of s (S,) that rises smoothly from 0 to 1 and stays there."""
-    u = np.minimum(s / _FADE, 1.0)
-    return np.asarray(u * u * (3.0 - 2.0 * u))
 
 
 def check_problem(problem: object) -> None:

@@ -3,14 +3,13 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import pinocchio as pin
 
 from selfmotion.basics import Array, ProblemError, nearest
 from selfmotion.collision import ClearanceModel, CollisionModel
 from selfmotion.costs import Samples
 from selfmotion.realtime.settings import CLEAR_FOR, CLEARANCE_MARGIN, LEAVING, LEVEL, NEARER
 from selfmotion.robot import RobotModel
-from selfmotion.task import as_pose
+from selfmotion.task import SE3, as_pose
 
 
 class Surroundings:
@@ -49,7 +48,7 @@ class Surroundings:
                     )
         self.blocked, self.message = False, ""
 
-    def move(self, obstacles: Mapping[str, pin.SE3]) -> None:
+    def move(self, obstacles: Mapping[str, SE3]) -> None:
         """Put obstacles somewhere else: name → pose in world axes."""
         known = sorted(set().union(*self._names))
         for name, pose in obstacles.items():

@@ -4,12 +4,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import ProblemError
 from selfmotion.path import Path
 from selfmotion.realtime.replanner import Replanner
 from selfmotion.realtime.segment import Segment
+from selfmotion.task import SE3
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class State:
     q: npt.ArrayLike
     qd: npt.ArrayLike
     path: Path
-    obstacles: Mapping[str, pin.SE3] = field(default_factory=dict)
+    obstacles: Mapping[str, SE3] = field(default_factory=dict)
 
 
 def follow(

@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from selfmotion.basics import Array, as_number
 from selfmotion.follow import Follows
 from selfmotion.path import Path, PathSamples
 from selfmotion.realtime import law
 from selfmotion.realtime.settings import OFFSET_STEP
+from selfmotion.task import SE3, Jexp3, exp3
 
 
 @dataclass(frozen=True)
@@ -83,10 +83,10 @@ class Reference:
         jacobian = self._kinematics.at(q)
         rotation, translation = self._kinematics.rotation, self._kinematics.translation
         twist = jacobian @ rate if twist is None else twist
-        goal = pin.SE3(target.rotation[0], target.translation[0])
+        goal = SE3(target.rotation[0], target.translation[0])
         # The twist that takes the target to the tool.
-        offset = -self._task.twist_error(goal, pin.SE3(rotation, translation))
-        relative = twist[3:] - pin.exp3(offset[3:]) @ target.twist[0, 3:]
+        offset = -self._task.twist_error(goal, SE3(rotation, translation))
+        relative = twist[3:] - exp3(offset[3:]) @ target.twist[0, 3:]
         if self._task.tool_axes:
             relative -= rotation[:, 2] * (rotation[:, 2] @ relative)
         slope = np.empty(6)
@@ -125,4 +125,4 @@ def resting(path: Path, t: Array) -> PathSamples:
 
 def _left_jacobian(phi: Array) -> Array:
     """Return Jl(φ), which takes φ̇ to the angular velocity of exp(φ), world axes."""
-    return np.asarray(pin.Jexp3(-phi))
+    return np.asarray(Jexp3(-phi))

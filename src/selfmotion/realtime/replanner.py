@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from selfmotion.basics import Array, as_number, as_whole, one_blas_thread
 from selfmotion.constraints import Constraint
@@ -28,7 +27,7 @@ from selfmotion.realtime.reference import Approach, Reference, resting
 from selfmotion.realtime.segment import Flag, Segment
 from selfmotion.realtime.settings import AHEAD, SOON
 from selfmotion.robot import RobotModel
-from selfmotion.task import Task
+from selfmotion.task import SE3, Task
 
 
 class Replanner:
@@ -160,7 +159,7 @@ class Replanner:
         q: npt.ArrayLike,
         qd: npt.ArrayLike,
         path: Path,
-        obstacles: Mapping[str, pin.SE3] | None = None,
+        obstacles: Mapping[str, SE3] | None = None,
     ) -> Segment:
         """Return the motion to command from `t` on.
 
@@ -199,7 +198,7 @@ class Replanner:
         q: npt.ArrayLike,
         qd: npt.ArrayLike,
         path: Path,
-        obstacles: Mapping[str, pin.SE3],
+        obstacles: Mapping[str, SE3],
     ) -> Segment:
         dof = self.robot.dof
         if not self._begun:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import pinocchio as pin
 
 from selfmotion.basics import Array, read_only
 from selfmotion.certificate import Tolerance
@@ -22,6 +21,7 @@ from selfmotion.realtime.replanner import Replanner
 from selfmotion.realtime.segment import Segment
 from selfmotion.realtime.simulation import SimulatedArm
 from selfmotion.result import Plan, Report
+from selfmotion.task import SE3
 
 # What counts as on the path for an arm that is measured [m, rad].
 _BACK = 1e-3, 1e-2
@@ -33,7 +33,7 @@ class Scene(Protocol):
     def path(self, t: float) -> Path:
         """Return the tool's motion, as it is known at a time."""
 
-    def obstacles(self, t: float) -> Mapping[str, pin.SE3]:
+    def obstacles(self, t: float) -> Mapping[str, SE3]:
         """Return where obstacles are by then."""
 
     def pushed(self, t: float) -> Array:
@@ -66,7 +66,7 @@ class Record:
 
     t: Array
     q: Array
-    targets: tuple[pin.SE3, ...]
+    targets: tuple[SE3, ...]
     error: Array
     seconds: Array
     flags: Counter[str]

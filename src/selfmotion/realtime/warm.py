@@ -1,10 +1,10 @@
 """Everything compiled and allocated before the arm moves."""
 
 import numpy as np
-import pinocchio as pin
 
 from selfmotion.path import Line
 from selfmotion.realtime.replanner import Replanner
+from selfmotion.task import SE3
 
 # Steps until what a step needs is made: the first ones begin a plan, the others shift it.
 _STEPS = 5
@@ -24,8 +24,8 @@ def warm_up(replanner: Replanner) -> None:
     robot = replanner.robot
     q = robot.dexterous_configuration(replanner.task)
     pose = robot.pose(q)
-    later = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.0, 0.01]))
-    far = pin.SE3(pose.rotation, pose.translation + 10.0 * robot.reach)
+    later = SE3(pose.rotation, pose.translation + np.array([0.0, 0.0, 0.01]))
+    far = SE3(pose.rotation, pose.translation + 10.0 * robot.reach)
     still = np.zeros(robot.dof)
     # On the path, then without a state, then towards what is out of reach.
     for goal, measured in ((later, q), (later, np.full(robot.dof, np.nan)), (far, q)):

@@ -21,6 +21,11 @@ def facts(plan: Plan) -> dict[str, Cell]:
         rows[f"cost term: {name}"] = _compared(value, report.initial_terms.get(name))
     rows["position error, worst"] = _extreme(certificate.position_error, "m")
     rows["rotation error, worst"] = _extreme(certificate.rotation_error, "rad")
+    follows = plan.problem.follows
+    for bound, (position, rotation) in zip(follows.items[1:], certificate.others, strict=True):
+        tip = bound.chain.tip_name
+        rows[f"position error of {tip}, worst"] = _extreme(position, "m")
+        rows[f"rotation error of {tip}, worst"] = _extreme(rotation, "rad")
     rows["margin to a joint limit, least"] = _extreme(certificate.limit_margin, "rad or m")
     fastest = certificate.velocity_ratio
     rows["speed, most"] = _extreme(replace(fastest, value=100.0 * fastest.value), "% of its limit")
@@ -28,7 +33,8 @@ def facts(plan: Plan) -> dict[str, Cell]:
     rows["from end to start"] = (f"{certificate.closure:.3g} rad or m", "")
     rows["checked at"] = (f"{certificate.samples} times", "by forward kinematics")
     rows["duration"] = (f"{plan.trajectory.duration:.4g} s", "")
-    rows["task"] = (plan.task.value, f"{plan.task.dimension} rows, {plan.robot.dof} joints")
+    tasks = " and ".join(item.task.value for item in follows.items)
+    rows["task"] = (tasks, f"{follows.dimension} rows, {plan.robot.dof} joints")
     rows["outcome"] = (str(report.status.value), report.message)
     rows["iterations"] = (str(report.iterations), f"in {report.seconds:.3g} s")
     rows["evaluations"] = (
@@ -56,9 +62,12 @@ def describe(plan: Plan) -> str:
         change = report.cost / report.initial_cost - 1.0
         side = "below" if change <= 0 else "above"
         saved = f", {abs(100 * change):.1f} % {side} the motion x = 0"
+    items = plan.problem.follows.items
+    what = "a tool motion" if len(items) == 1 else f"{len(items)} tool motions"
+    tasks = " and ".join(f"'{item.task.value}'" for item in items)
     return (
-        f"{plan.robot.name}: {plan.robot.dof} joints follow a tool motion of "
-        f"{plan.trajectory.duration:.3g} s (task '{plan.task.value}') at cost {report.cost:.4g}"
+        f"{plan.robot.name}: {plan.robot.dof} joints follow {what} of "
+        f"{plan.trajectory.duration:.3g} s (task {tasks}) at cost {report.cost:.4g}"
         f"{saved}. {plan.certificate.verdict}"
     )
 

@@ -102,7 +102,7 @@ def bake(robot: RobotModel, payload: Payload) -> Arm:
         for item in objects
         for visual in _visuals(
             item,
-            robot.model.frames[item.parentFrame].name,
+            robot.link_of(item.parentFrame),
             files.get(item.meshPath, []),
             numbers.get(item.meshPath, []),
         )

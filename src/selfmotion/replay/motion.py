@@ -4,15 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 from scipy.ndimage import maximum_filter1d
 
 from selfmotion.basics import Array
 from selfmotion.follow import BoundFollow
 from selfmotion.motion import Trajectory
 from selfmotion.result import Plan
-from selfmotion.robot import Chain, RobotModel
-from selfmotion.task import Task
+from selfmotion.robot import RobotModel
+from selfmotion.task import SE3, Task
 
 # Between key frames a page interpolates; it may be off by this much at most [m, and per entry of
 # the rotation matrix]. Below what a screen resolves and half of what our tests ask for.
@@ -83,13 +82,7 @@ def _joined(a: KeyFrames, b: KeyFrames) -> KeyFrames:
 
 
 def _poses(robot: RobotModel, trajectory: Trajectory, times: Array) -> KeyFrames:
-    model, data = robot.model, robot.model.createData()
-    count = robot.dof
-    poses = np.empty((len(times), count, 7))
-    for k, q in enumerate(trajectory(_clock(trajectory, times))):
-        pin.forwardKinematics(model, data, q)
-        for joint in range(count):
-            poses[k, joint] = pin.SE3ToXYZQUAT(data.oMi[joint + 1])
+    poses = robot.joint_poses(trajectory(_clock(trajectory, times)))
     return KeyFrames(times, poses[..., :3], poses[..., 3:])
 
 
@@ -174,7 +167,7 @@ def curves(
     """Evaluate `trajectory` (the plan's, or its x = 0 motion) for the plots of what is followed."""
     follow = plan.problem.follows.items[0] if follow is None else follow
     chain, task = follow.chain, follow.task
-    base, world = chain.base_placement, Chain(chain.model, chain.base)
+    base, world = chain.base_placement, chain.to_base()
     times = np.linspace(0.0, trajectory.duration, points)
     clock = _clock(trajectory, times)
     q = trajectory(clock)
@@ -183,12 +176,12 @@ def curves(
     errors, tool, rotation = np.empty((points, 2)), np.empty((points, 3)), np.empty((points, 3, 3))
     for k in range(points):
         jacobian, turn, place = chain.at(q[k])
-        pose, reference = pin.SE3(turn, place), world.place(q[k])
+        pose, reference = SE3(turn, place), world.place(q[k])
         rows = plan.problem.follows.jacobian(q[k])
         manipulability[k] = np.prod(np.linalg.svd(rows, compute_uv=False))
         shape = _velocity_ellipsoid(jacobian, task)
         ellipsoid[k] = reference.rotation @ shape @ reference.rotation.T
-        errors[k] = task.miss(pin.SE3(target.rotation[k], target.translation[k]), pose)
+        errors[k] = task.miss(SE3(target.rotation[k], target.translation[k]), pose)
         carried = base * pose
         tool[k], rotation[k] = carried.translation, carried.rotation
         carrier[k] = (reference * base.inverse()).homogeneous

@@ -1,11 +1,13 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
+from selfmotion.robot.building import (
+    moving_joints as moving_joints,
+    rebuild_robot as rebuild_robot,
+)
 from selfmotion.robot.chain import (
     WORLD as WORLD,
     Chain as Chain,
-    ChainArrays as ChainArrays,
     Kinematics as Kinematics,
-    TreeArrays as TreeArrays,
     null_space as null_space,
 )
 from selfmotion.robot.chain_series import ChainSeries as ChainSeries
@@ -16,25 +18,25 @@ from selfmotion.robot.coordinates import (
     JointCoordinate as JointCoordinate,
     SwivelAngle as SwivelAngle,
 )
-from selfmotion.robot.dynamics import Dynamics as Dynamics
-from selfmotion.robot.loading import (
-    NAMED_ARMS as NAMED_ARMS,
-    NAMED_PARTS as NAMED_PARTS,
-    load_robot as load_robot,
-    moving_joints as moving_joints,
-    rebuild_robot as rebuild_robot,
+from selfmotion.robot.dynamics import (
+    Dynamics as Dynamics,
+    Energy as Energy,
+    has_masses as has_masses,
 )
+from selfmotion.robot.loading import load_robot as load_robot
 from selfmotion.robot.mesh_files import mesh_digests as mesh_digests
 from selfmotion.robot.model import RobotModel as RobotModel
 from selfmotion.robot.mounting import (
     Mounting as Mounting,
     mounting_of as mounting_of,
 )
+from selfmotion.robot.named import NAMED_ARMS as NAMED_ARMS, NAMED_PARTS as NAMED_PARTS
 from selfmotion.robot.placements import (
     compose as compose,
     placements as placements,
 )
 from selfmotion.robot.tool_rates import ToolRates as ToolRates
+from selfmotion.robot.tree_arrays import ChainArrays as ChainArrays, TreeArrays as TreeArrays
 from selfmotion.robot.urdf import (
     TOOL_JOINT as TOOL_JOINT,
     Urdf as Urdf,

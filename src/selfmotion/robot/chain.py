@@ -12,58 +12,18 @@ with R the base frame's orientation, p the tip's position, and s_j = 1 where joi
 import threading
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, Flags, Ints
+from selfmotion.basics import Array, Ints
 from selfmotion.robot.placements import rebase
+from selfmotion.robot.tree_arrays import ChainArrays, serial_arrays
 
 # The frame that does not move.
 WORLD = 0
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-
-
-class TreeArrays(NamedTuple):
-    """What compiled kinematics need of c joints; see `placements`.
-
-    Attributes
-    ----------
-    joints : (c,)
-        Their coordinates.
-    parents : (c,)
-        The row that each is placed in: 0 the base, j + 1 that of joint j.
-    rotations, positions : (c, 3, 3), (c, 3)
-        Of each joint at q = 0 in the frame of the row before [m].
-    axes : (c, 3)
-        In the joints' own frames; turned round where a joint is passed from its far side.
-    is_revolute : (c,)
-    """
-
-    joints: Ints
-    parents: Ints
-    rotations: Array
-    positions: Array
-    axes: Array
-    is_revolute: Flags
-
-
-class ChainArrays(NamedTuple):
-    """What compiled kinematics need of a chain.
-
-    Attributes
-    ----------
-    tree : TreeArrays
-        Its joints from base to tip, each placed in the one before.
-    tip_rotation, tip_position : (3, 3), (3,)
-        Of the tip in the frame of the last joint [m].
-    """
-
-    tree: TreeArrays
-    tip_rotation: Array
-    tip_position: Array
 
 
 class Kinematics:
@@ -217,6 +177,10 @@ class Chain:
         """Whether the base is the world, and all joints are on the way to the tip."""
         return self.base == WORLD and len(self.joints) == self.dof
 
+    def to_base(self) -> "Chain":
+        """Return the chain from the world to the base frame."""
+        return Chain(self.model, self.base)
+
     @property
     def carrier(self) -> int:
         """The joint that carries the base frame, by its coordinate; -1 for the world."""
@@ -317,39 +281,10 @@ class Chain:
             place = pin.SE3.Identity() if sign > 0 else model.jointPlacements[joint].inverse()
         place = place * frames[self.tip].placement
         return ChainArrays(
-            _arrays(model, self.joints, np.arange(len(self.joints)), places, self.signs),
+            serial_arrays(model, self.joints, np.arange(len(self.joints)), places, self.signs),
             np.array(place.rotation),
             np.array(place.translation),
         )
-
-
-def tree_arrays(model: Any) -> TreeArrays:
-    """Return what compiled kinematics need of all joints of a model, placed in the world."""
-    joints = np.arange(model.nv, dtype=np.int64)
-    places = list(model.jointPlacements)[1:]
-    return _arrays(model, joints, list(model.parents)[1:], places, np.ones(model.nv))
-
-
-def _arrays(
-    model: Any, joints: Ints, parents: npt.ArrayLike, places: Sequence[pin.SE3], signs: Array
-) -> TreeArrays:
-    data = model.createData()
-    # Columns [v, ω] at the world's origin; of one joint Pinocchio returns a vector.
-    columns = pin.computeJointJacobians(model, data, pin.neutral(model)).reshape(6, -1).T
-    twists = [data.oMi[int(j) + 1].actInv(pin.Motion(columns[j])) for j in joints]
-    is_revolute = [bool(np.any(twist.angular)) for twist in twists]
-    axes = [
-        signs[j] * np.array(twist.angular if turns else twist.linear)
-        for j, twist, turns in zip(joints, twists, is_revolute, strict=True)
-    ]
-    return TreeArrays(
-        np.array(joints, dtype=np.int64),
-        np.array(parents, dtype=np.int64),
-        np.array([place.rotation for place in places]).reshape(-1, 3, 3),
-        np.array([place.translation for place in places]).reshape(-1, 3),
-        np.array(axes).reshape(-1, 3),
-        np.array(is_revolute, dtype=np.bool_),
-    )
 
 
 def null_space(jacobians: Array) -> Array:

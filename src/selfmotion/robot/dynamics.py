@@ -37,7 +37,7 @@ class Dynamics:
         inertia: npt.ArrayLike | None = None,
     ) -> None:
         model = robot.model.copy()
-        if not any(item.mass > 0.0 for item in list(model.inertias)[1:]):
+        if not has_masses(robot):
             raise ProblemError(
                 f"{robot.name}: joint torques are asked for, but its URDF gives no masses; add "
                 f"<inertial> to its links"
@@ -105,3 +105,56 @@ class Dynamics:
             found = pin.computeRNEADerivatives(self._model, self._data, q[k], qd[k], qdd[k])
             by_q[k], by_qd[k], by_qdd[k] = found
         return by_q, by_qd, by_qdd
+
+
+class Energy:
+    """Kinetic energy ½ q̇ᵀM(q)q̇ and gravity torques g(q) of an arm as its URDF has it.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    """
+
+    def __init__(self, robot: RobotModel) -> None:
+        self._model, self._still = robot.model, robot.model.copy()
+        self._still.gravity.setZero()
+
+    def kinetic(self, q: Array, qd: Array) -> Array:
+        """Return the energies of a motion (K, n) each, (K,) [J]."""
+        data, rows = self._still.createData(), zip(q, qd, strict=True)
+        return np.array([pin.computeKineticEnergy(self._still, data, *row) for row in rows])
+
+    def kinetic_slopes(self, q: Array, qd: Array) -> tuple[Array, Array]:
+        """Return their derivatives ½ q̇ᵀ ∂(Mq̇)/∂q and Mq̇, (K, n) each.
+
+        At rest and without gravity the inverse dynamics are τ = Mq̈, so that both come from its
+        derivatives with q̇ in place of q̈.
+        """
+        data, rest = self._still.createData(), np.zeros(q.shape[1])
+        by_q, by_qd = np.empty_like(q), np.empty_like(qd)
+        for k in range(len(q)):
+            found = pin.computeRNEADerivatives(self._still, data, q[k], rest, qd[k])
+            by_q[k], by_qd[k] = 0.5 * (qd[k] @ found[0]), found[2] @ qd[k]
+        return by_q, by_qd
+
+    def mass(self, q: Array) -> Array:
+        """Return M at q (n,), (n, n)."""
+        upper = np.triu(pin.crba(self._still, self._still.createData(), q))
+        return np.asarray(upper + np.triu(upper, 1).T)
+
+    def gravity(self, q: Array) -> Array:
+        """Return g at configurations (K, n), (K, n) [Nm, or N]."""
+        data = self._model.createData()
+        return np.array([pin.computeGeneralizedGravity(self._model, data, x).copy() for x in q])
+
+    def gravity_slopes(self, q: Array) -> Array:
+        """Return ∂g/∂q at configurations (K, n), (K, n, n)."""
+        data = self._model.createData()
+        return np.array(
+            [pin.computeGeneralizedGravityDerivatives(self._model, data, x).copy() for x in q]
+        )
+
+
+def has_masses(robot: RobotModel) -> bool:
+    """Whether the URDF gives any."""
+    return any(item.mass > 0.0 for item in list(robot.model.inertias)[1:])

@@ -1,7 +1,6 @@
 """Arms from URDF files, or by name."""
 
 import dataclasses
-import importlib.metadata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,82 +10,21 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import RobotError, as_number, nearest, read_only, shown
+from selfmotion.basics import RobotError, nearest, read_only, shown
+from selfmotion.robot.building import build_robot
 from selfmotion.robot.composing import composed
 from selfmotion.robot.expansion import expand
-from selfmotion.robot.full_model import full_model, name_links
-from selfmotion.robot.held import locked_configuration
 from selfmotion.robot.model import RobotModel
 from selfmotion.robot.mounting import with_base, with_tool_offset
+from selfmotion.robot.named import NAMED_ARMS, NAMED_PARTS, published, read_named
 from selfmotion.robot.urdf import (
     Urdf,
-    UrdfJoint,
     UrdfPart,
     package_folders,
     parse_urdf,
     read_urdf,
 )
 from selfmotion.task import as_pose
-
-
-@dataclass(frozen=True)
-class NamedArm:
-    """An arm that `load_robot` knows by name.
-
-    Attributes
-    ----------
-    urdf : str
-        File below the folder of example-robot-data, or of this package for our own arms.
-    tool : str
-        The usual tool frame.
-    home : tuple of float or None
-        The configuration that its maker calls ready [rad], where there is one.
-    touching : tuple of (str, str)
-        Pairs of links whose meshes overlap in more than half of all configurations, as they are
-        made; no joint between them can keep them apart.
-    """
-
-    urdf: str
-    tool: str
-    home: tuple[float, ...] | None = None
-    touching: tuple[tuple[str, str], ...] = ()
-
-
-NAMED_ARMS: Mapping[str, NamedArm] = {
-    "planar_3r": NamedArm("planar_3r.urdf", "tool"),
-    "panda": NamedArm(
-        "panda_description/urdf/panda.urdf",
-        "panda_hand_tcp",
-        home=(0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4),
-    ),
-    "xarm7": NamedArm("xarm_description/urdf/xarm7.urdf", "link_eef"),
-    "baxter": NamedArm(
-        "baxter_description/urdf/baxter.urdf",
-        "left_gripper",
-        touching=(
-            ("left_upper_shoulder", "left_upper_elbow"),
-            ("left_wrist", "left_upper_forearm_visual"),
-        ),
-    ),
-    "tiago": NamedArm("tiago_description/robots/tiago.urdf", "arm_tool_link"),
-    "pr2": NamedArm(
-        "pr2_description/urdf/pr2.urdf",
-        "r_gripper_tool_frame",
-        touching=(("r_shoulder_pan_link", "r_upper_arm_link"),),
-    ),
-    "ur5": NamedArm("ur_description/urdf/ur5_robot.urdf", "tool0"),
-    "ur10": NamedArm("ur_description/urdf/ur10_robot.urdf", "tool0"),
-    "kinova": NamedArm("kinova_description/robots/kinova.urdf", "j2s6s200_end_effector"),
-    "z1": NamedArm("z1_description/urdf/z1.urdf", "gripperStator"),
-}
-
-# What arms work with, known by name like these.
-NAMED_PARTS: Mapping[str, NamedArm] = {"positioner": NamedArm("positioner.urdf", "plate")}
-
-# A joint that is held may be this far beyond its limits [rad or m]: rounding of a file.
-_BESIDE = 1e-9
-# Beside this module in an installed package, at the top of the repository in a checkout.
-_OWN_ARMS = (Path(__file__).parent / "arms", Path(__file__).parents[3] / "robots")
 
 
 def load_robot(
@@ -203,7 +141,7 @@ def _read(robot: str | Path, arguments: Mapping[str, str]) -> _Source:
     known = {**NAMED_ARMS, **NAMED_PARTS}
     if isinstance(robot, str) and robot in known:
         arm = known[robot]
-        return _Source(_read_named(arm), arm.tool, arm.touching, _published(robot))
+        return _Source(read_named(arm), arm.tool, arm.touching, published(robot))
     urdf = _read_file(Path(robot), arguments, str(robot))
     return _Source(urdf, None)
 
@@ -265,131 +203,6 @@ def _parts(
     return _Source(urdf, None if own is None else f"{first}/{own}", touching, limits)
 
 
-def build_robot(
-    urdf: Urdf,
-    tools: Sequence[str],
-    lock: Mapping[str, float],
-    reference: str | None = None,
-    chain: Sequence[UrdfJoint] | None = None,
-) -> RobotModel:
-    """Build the tree of a `chain` of joints of a validated URDF; see `load_robot`.
-
-    By default of all that move `tools` relative to the reference.
-    """
-    for frame in (*tools, *([] if reference is None else [reference])):
-        urdf.check_tool(frame)
-    full = full_model(urdf)
-    _check_lock(urdf, full, lock)
-    chain = moving_joints(urdf, tools, reference) if chain is None else chain
-    for joint in chain:
-        if joint.kind in ("floating", "planar"):
-            raise RobotError(
-                f"{urdf.source}: joint '{joint.name}' is {joint.kind}; an arm's joints are "
-                f"revolute, continuous or prismatic"
-            )
-        if joint.mimics is not None and joint.name not in lock:
-            raise RobotError(
-                f"{urdf.source}: joint '{joint.name}' on the way to '{tools[0]}' mimics "
-                f"'{joint.mimics}'; choose a tool or a reference before it, or hold it with lock="
-            )
-    free = [joint.name for joint in chain if joint.name not in lock]
-    where = "the root" if reference is None else f"'{reference}'"
-    if not chain:
-        moved = [link for link in urdf.links if any(j.kind != "fixed" for j in urdf.chain(link))]
-        which = f"one that does, of: {', '.join(moved)}" if moved else "another arm"
-        relative = "" if reference is None else f" relative to '{reference}'"
-        raise RobotError(
-            f"{urdf.source}: no joint moves the tool '{tools[0]}'{relative}; choose {which}"
-        )
-    if not free:
-        raise RobotError(
-            f"{urdf.source}: no joint is left free between {where} and '{tools[0]}': lock holds "
-            f"all of {', '.join(joint.name for joint in chain)}"
-        )
-    locked = _locked_joints(urdf, full, free, lock)
-    configuration, locked_ids = locked_configuration(full, locked)
-    model = pin.buildReducedModel(full, locked_ids, configuration)
-    name_links(urdf, model)
-    names = tuple(model.names[1:])
-    if model.nq != len(free) or set(names) != set(free):
-        raise RobotError(
-            f"{urdf.source}: the chain to '{tools[0]}' has joints {free}, but Pinocchio built "
-            f"{list(names)}"
-        )
-    continuous = np.array([name in urdf.continuous() for name in names])
-    velocity = np.array(model.velocityLimit, dtype=np.float64)
-    effort = np.array(model.upperEffortLimit, dtype=np.float64)
-    return RobotModel(
-        name=model.name,
-        tools=tuple(tools),
-        reference=reference,
-        joint_names=names,
-        lower=read_only(np.where(continuous, -np.inf, model.lowerPositionLimit)),
-        upper=read_only(np.where(continuous, np.inf, model.upperPositionLimit)),
-        velocity_limit=read_only(np.where(velocity > 0, velocity, np.inf)),
-        locked=locked,
-        model=model,
-        urdf=urdf,
-        effort_limit=read_only(np.where(effort > 0.0, effort, np.inf)),
-        acceleration_limit=read_only(np.full(len(names), np.inf)),
-        jerk_limit=read_only(np.full(len(names), np.inf)),
-    )
-
-
-def moving_joints(urdf: Urdf, tools: Sequence[str], reference: str | None) -> list[UrdfJoint]:
-    """Return the joints that move one of the tools relative to the reference."""
-    on_the_way = [] if reference is None else urdf.chain(reference)
-    chains = [urdf.chain(tool) for tool in tools]
-    found: dict[str, UrdfJoint] = {}
-    for chain in chains:
-        both = {joint.name for joint in chain} & {joint.name for joint in on_the_way}
-        for joint in (*chain, *on_the_way):
-            if joint.kind != "fixed" and joint.name not in both:
-                found[joint.name] = joint
-    return list(found.values())
-
-
-def rebuild_robot(
-    text: str,
-    package_dirs: Sequence[str],
-    source: str,
-    continuous: Sequence[str],
-    tool: str | Sequence[str],
-    locked: Mapping[str, float],
-    touching: Sequence[Sequence[str]],
-    acceleration_limit: Sequence[float],
-    jerk_limit: Sequence[float],
-    reference: str | None = None,
-) -> RobotModel:
-    """Build an arm from what a saved plan carries of it."""
-    urdf = parse_urdf(text, source=source, package_dirs=tuple(package_dirs))
-    # The text has the continuous joints as revolute ones already.
-    urdf = urdf.with_continuous(continuous)
-    tools = [tool] if isinstance(tool, str) else tool
-    pairs = tuple((first, second) for first, second in touching)
-    # All that is not held: a problem may follow other frames than those the arm was loaded for.
-    free = [
-        joint
-        for joint in urdf.joints.values()
-        if joint.kind in ("revolute", "continuous", "prismatic") and joint.name not in locked
-    ]
-    return dataclasses.replace(
-        build_robot(urdf, tools, locked, reference, free),
-        touching=pairs,
-        acceleration_limit=read_only(acceleration_limit),
-        jerk_limit=read_only(jerk_limit),
-    )
-
-
-def _published(name: str) -> Mapping[str, Any]:
-    """Return what the maker of a named arm publishes: limits by kind and joint."""
-    import tomllib
-
-    known = tomllib.loads((Path(__file__).parent / "limits.toml").read_text("utf-8"))
-    limits: Mapping[str, Any] = known.get(name, {})
-    return {kind: limits[kind] for kind in ("acceleration", "jerk") if kind in limits}
-
-
 def _read_file(path: Path, arguments: Mapping[str, str], given: str) -> Urdf:
     if "://" in given:
         raise RobotError(f"{given}: is an address, expected a file: download it first")
@@ -410,23 +223,6 @@ def _read_file(path: Path, arguments: Mapping[str, str], given: str) -> Urdf:
     return read_urdf(path)
 
 
-def _read_named(arm: NamedArm) -> Urdf:
-    for folder in _OWN_ARMS:
-        if (folder / arm.urdf).is_file():
-            return read_urdf(folder / arm.urdf)
-    share = _example_robot_data()
-    urdf = read_urdf(share / "robots" / arm.urdf)
-    return dataclasses.replace(urdf, package_dirs=(str(share.parent), str(share)))
-
-
-def _example_robot_data() -> Path:
-    """Return the data folder of example-robot-data, which installs no importable module."""
-    for file in importlib.metadata.files("example-robot-data") or []:
-        if file.name == "panda.urdf":
-            return Path(str(file.locate())).resolve().parents[3]
-    raise RobotError("example-robot-data is installed without its robots; reinstall the package")
-
-
 def _only_leaf(urdf: Urdf) -> str:
     parents = {joint.parent for joint in urdf.joints.values()}
     leaves = [link for link in urdf.links if link not in parents]
@@ -436,63 +232,3 @@ def _only_leaf(urdf: Urdf) -> str:
             f"name the tool frame with tool="
         )
     return leaves[0]
-
-
-def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:
-    for name, value in lock.items():
-        if not isinstance(name, str) or not model.existJointName(name):
-            raise RobotError(
-                f"{urdf.source}: lock names joint '{name}', which is not movable here"
-                f"{nearest(name, model.names[1:])}"
-            )
-        as_number(value, f"{urdf.source}: lock['{name}']", error=RobotError)
-        joint = model.joints[model.getJointId(name)]
-        if joint.nq != 1:
-            raise RobotError(
-                f"{urdf.source}: lock holds joint '{name}', which has {joint.nq} coordinates; "
-                f"only joints with one can be held"
-            )
-        lower = model.lowerPositionLimit[joint.idx_q] - _BESIDE
-        upper = model.upperPositionLimit[joint.idx_q] + _BESIDE
-        if not lower <= value <= upper:
-            raise RobotError(
-                f"{urdf.source}: lock holds joint '{name}' at {value:.6g} rad or m, beyond its "
-                f"limits {lower:.6g} to {upper:.6g}"
-            )
-
-
-def _locked_joints(
-    urdf: Urdf, model: Any, free: list[str], lock: Mapping[str, float]
-) -> dict[str, float]:
-    """Return where the joints off the chain are held; those that mimic one follow it."""
-    locked: dict[str, float] = {}
-
-    def hold(name: str) -> float:
-        if name in locked:
-            return locked[name]
-        joint, source = model.joints[model.getJointId(name)], urdf.joints[name]
-        lower = model.lowerPositionLimit[joint.idx_q]
-        upper = model.upperPositionLimit[joint.idx_q]
-        value = lock.get(name, np.clip(0.0, lower, upper))
-        if source.mimics in free and name not in lock:
-            raise RobotError(
-                f"{urdf.source}: joint '{name}' mimics '{source.mimics}', which moves on the way "
-                f"to the tool; a joint beside the chain cannot follow it: hold it with lock= if "
-                f"its links do not matter"
-            )
-        if source.mimics is not None and source.mimics not in free:
-            followed = source.multiplier * hold(source.mimics) + source.offset
-            if name in lock and abs(followed - lock[name]) > _BESIDE:
-                raise RobotError(
-                    f"{urdf.source}: lock holds joint '{name}' at {lock[name]:.6g}, but it mimics "
-                    f"'{source.mimics}' and stands at {followed:.6g}; hold that one"
-                )
-            value = followed
-        locked[name] = float(value)
-        return locked[name]
-
-    for index in range(1, model.njoints):
-        name = model.names[index]
-        if name not in free and model.joints[index].nq == 1:
-            hold(name)
-    return locked

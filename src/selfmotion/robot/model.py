@@ -12,21 +12,21 @@ import pinocchio as pin
 from selfmotion.basics import (
     Array,
     Flags,
-    InverseKinematicsError,
     RobotError,
     as_number,
-    as_whole,
     nearest,
     plain_numbers,
     random_numbers,
     shown,
 )
-from selfmotion.robot.chain import WORLD, Chain, TreeArrays, tree_arrays
+from selfmotion.robot.chain import WORLD, Chain
 from selfmotion.robot.full_model import full_model, link_geometry
 from selfmotion.robot.held import locked_configuration
+from selfmotion.robot.inverse import solved
 from selfmotion.robot.mesh_files import bad_meshes, without_meshes
+from selfmotion.robot.tree_arrays import TreeArrays, tree_arrays
 from selfmotion.robot.urdf import Urdf
-from selfmotion.task import Task, as_pose
+from selfmotion.task import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,53 +305,22 @@ class RobotModel:
         RobotError
             The pose is none.
         """
-        task = Task.of(task)
-        pose = as_pose(pose, f"{self.name}: the pose", RobotError)
-        attempts = as_whole(attempts, "attempts", 1, 10**6, RobotError)
-        rng = random_numbers(rng)
-        lower, upper = self.finite_limits()
-        start = 0.5 * (lower + upper) if seed is None else self.configuration(seed)
-        best = (np.inf, np.inf)
-        for _ in range(attempts):
-            q, miss = self._levenberg_marquardt(pose, task, start)
-            if max(miss) < _IK_TOLERANCE:
-                return q
-            best = min(best, miss, key=sum)
-            start = rng.uniform(lower, upper)
-        raise InverseKinematicsError(
-            f"{self.name}: no configuration within the limits puts '{self.tool}' at "
-            f"{np.round(pose.translation, 4).tolist()} m for task '{task.value}': the best of "
-            f"{attempts} attempts misses by {best[0]:.3g} m and {best[1]:.3g} rad; "
-            f"move the pose into the workspace",
-            position_miss=best[0],
-            rotation_miss=best[1],
-        )
+        return solved(self, pose, Task.of(task), seed, random_numbers(rng), attempts)
 
-    def _levenberg_marquardt(
-        self, pose: pin.SE3, task: Task, start: Array, iterations: int = 100
-    ) -> tuple[Array, tuple[float, float]]:
-        q, damping = np.clip(start, self.lower, self.upper), 1e-3
-        actual = self.pose(q)
-        error = task.select(task.twist_error(pose, actual)[:, None], actual.rotation)[:, 0]
-        for _ in range(iterations):
-            if np.linalg.norm(error) < 0.01 * _IK_TOLERANCE:
-                break
-            jacobian = self.task_jacobian(q, task)
-            gradient = jacobian.T @ error
-            # Joints held at a limit that the step would leave take no part in it.
-            free = ~((q <= self.lower) & (gradient < 0) | (q >= self.upper) & (gradient > 0))
-            jacobian = jacobian * free
-            normal = jacobian @ jacobian.T + damping * np.eye(task.dimension)
-            trial = np.clip(q + jacobian.T @ np.linalg.solve(normal, error), self.lower, self.upper)
-            actual = self.pose(trial)
-            new = task.select(task.twist_error(pose, actual)[:, None], actual.rotation)[:, 0]
-            if np.linalg.norm(new) < np.linalg.norm(error):
-                q, error, damping = trial, new, max(0.1 * damping, 1e-14)
-            else:
-                damping *= 10.0
-                if damping > 1e6:
-                    break
-        return q, task.miss(pose, self.pose(q))
+    def link_of(self, frame: int) -> str:
+        """Return the link that a piece of `geometry` belongs to, by its frame."""
+        return str(self.model.frames[frame].name)
+
+    def joint_poses(self, q: Array) -> Array:
+        """Return the joints' frames in the world at configurations (K, n): (K, n, 7).
+
+        Positions [m] and quaternions (x, y, z, w).
+        """
+        data, found = self.model.createData(), np.empty((len(q), self.dof, 7))
+        for k, configuration in enumerate(q):
+            pin.forwardKinematics(self.model, data, configuration)
+            found[k] = [pin.SE3ToXYZQUAT(data.oMi[joint + 1]) for joint in range(self.dof)]
+        return found
 
     def geometry(self, kind: pin.GeometryType) -> Any:
         """Return the visual or collision geometry, all links, locked joints where they are held.

@@ -4,7 +4,6 @@ import itertools
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from selfmotion.basics import Array, Progress
 from selfmotion.costs import PathLength
@@ -24,6 +23,7 @@ from selfmotion.search.settings import (
     STRIDE,
     TURN,
 )
+from selfmotion.task import log3
 
 
 class SequenceGuide:
@@ -98,9 +98,7 @@ def search_times(path: Path, fewest: int) -> Array:
     t = np.linspace(0.0, path.duration, PATH_LOOKS)
     tool = path.samples(t)
     moved = np.linalg.norm(np.diff(tool.translation, axis=0), axis=1) / STRIDE
-    turned = np.array(
-        [np.linalg.norm(pin.log3(a.T @ b)) for a, b in itertools.pairwise(tool.rotation)]
-    )
+    turned = np.array([np.linalg.norm(log3(a.T @ b)) for a, b in itertools.pairwise(tool.rotation)])
     travel = np.concatenate([[0.0], np.cumsum(moved + turned / TURN)])
     # Where the tool stands still, time counts, so that there is always one time after another.
     count = int(np.clip(np.ceil(travel[-1]), fewest, MOST))

@@ -9,3 +9,12 @@ from selfmotion.task.relaxation import (
     Relaxation as Relaxation,
 )
 from selfmotion.task.rows import Task as Task
+from selfmotion.task.se3 import (
+    SE3 as SE3,
+    Jexp3 as Jexp3,
+    Quaternion as Quaternion,
+    exp3 as exp3,
+    log3 as log3,
+    rpy as rpy,
+    skew as skew,
+)

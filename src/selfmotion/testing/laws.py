@@ -7,7 +7,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from selfmotion.basics import Array, Saved, restore
 from selfmotion.certificate import Finding, FinishedMotion, Requirement
@@ -19,7 +18,7 @@ from selfmotion.optimise import Iteration, Minimum, Optimizer
 from selfmotion.path import Line, Path
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel, load_robot
-from selfmotion.task import Task
+from selfmotion.task import Task, exp3, log3
 from selfmotion.testing.functions import Bowl, Valley
 
 # Exact gradients against central differences of F, relative to the largest entry.
@@ -56,7 +55,7 @@ def check_path(path: Path) -> None:
     _near(gram, np.broadcast_to(np.eye(3), gram.shape), 1e-9, "rotations are not orthonormal", t)
     linear = (after.translation - before.translation) / (2.0 * step)
     turns = after.rotation @ before.rotation.transpose(0, 2, 1)
-    angular = np.array([pin.log3(turn) for turn in turns]) / (2.0 * step)
+    angular = np.array([log3(turn) for turn in turns]) / (2.0 * step)
     scale = max(1.0, float(np.abs(here.twist).max()))
     _near(here.twist[:, :3], linear, TWIST * scale, "velocity is not that of the position", t)
     _near(here.twist[:, 3:], angular, TWIST * scale, "ω is not that of the orientation", t)
@@ -238,7 +237,7 @@ def _problem(robot: RobotModel, task: Task, **options: Any) -> Problem:
     pose = robot.pose(start)
     end = pose.copy()
     end.translation = pose.translation + np.array([-0.04, 0.03, -0.03])
-    end.rotation = pin.exp3(np.array([0.0, 0.0, 0.1])) @ pose.rotation
+    end.rotation = exp3(np.array([0.0, 0.0, 0.1])) @ pose.rotation
     motion = PolynomialNullMotion(2, "joint")
     return Problem(robot, Line(pose, end, 1.5), task, start, motion, **options)
 

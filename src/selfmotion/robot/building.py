@@ -1,0 +1,193 @@
+"""From a validated URDF to the tree of joints that move its tools."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from selfmotion.basics import RobotError, as_number, nearest, read_only
+from selfmotion.robot.full_model import full_model, name_links
+from selfmotion.robot.held import locked_configuration
+from selfmotion.robot.model import RobotModel
+from selfmotion.robot.urdf import Urdf, UrdfJoint, parse_urdf
+
+# A joint that is held may be this far beyond its limits [rad or m]: rounding of a file.
+_BESIDE = 1e-9
+
+
+def build_robot(
+    urdf: Urdf,
+    tools: Sequence[str],
+    lock: Mapping[str, float],
+    reference: str | None = None,
+    chain: Sequence[UrdfJoint] | None = None,
+) -> RobotModel:
+    """Build the tree of a `chain` of joints of a validated URDF; see `load_robot`.
+
+    By default of all that move `tools` relative to the reference.
+    """
+    for frame in (*tools, *([] if reference is None else [reference])):
+        urdf.check_tool(frame)
+    full = full_model(urdf)
+    _check_lock(urdf, full, lock)
+    chain = moving_joints(urdf, tools, reference) if chain is None else chain
+    for joint in chain:
+        if joint.kind in ("floating", "planar"):
+            raise RobotError(
+                f"{urdf.source}: joint '{joint.name}' is {joint.kind}; an arm's joints are "
+                f"revolute, continuous or prismatic"
+            )
+        if joint.mimics is not None and joint.name not in lock:
+            raise RobotError(
+                f"{urdf.source}: joint '{joint.name}' on the way to '{tools[0]}' mimics "
+                f"'{joint.mimics}'; choose a tool or a reference before it, or hold it with lock="
+            )
+    free = [joint.name for joint in chain if joint.name not in lock]
+    where = "the root" if reference is None else f"'{reference}'"
+    if not chain:
+        moved = [link for link in urdf.links if any(j.kind != "fixed" for j in urdf.chain(link))]
+        which = f"one that does, of: {', '.join(moved)}" if moved else "another arm"
+        relative = "" if reference is None else f" relative to '{reference}'"
+        raise RobotError(
+            f"{urdf.source}: no joint moves the tool '{tools[0]}'{relative}; choose {which}"
+        )
+    if not free:
+        raise RobotError(
+            f"{urdf.source}: no joint is left free between {where} and '{tools[0]}': lock holds "
+            f"all of {', '.join(joint.name for joint in chain)}"
+        )
+    locked = _locked_joints(urdf, full, free, lock)
+    configuration, locked_ids = locked_configuration(full, locked)
+    model = pin.buildReducedModel(full, locked_ids, configuration)
+    name_links(urdf, model)
+    names = tuple(model.names[1:])
+    if model.nq != len(free) or set(names) != set(free):
+        raise RobotError(
+            f"{urdf.source}: the chain to '{tools[0]}' has joints {free}, but Pinocchio built "
+            f"{list(names)}"
+        )
+    continuous = np.array([name in urdf.continuous() for name in names])
+    velocity = np.array(model.velocityLimit, dtype=np.float64)
+    effort = np.array(model.upperEffortLimit, dtype=np.float64)
+    return RobotModel(
+        name=model.name,
+        tools=tuple(tools),
+        reference=reference,
+        joint_names=names,
+        lower=read_only(np.where(continuous, -np.inf, model.lowerPositionLimit)),
+        upper=read_only(np.where(continuous, np.inf, model.upperPositionLimit)),
+        velocity_limit=read_only(np.where(velocity > 0, velocity, np.inf)),
+        locked=locked,
+        model=model,
+        urdf=urdf,
+        effort_limit=read_only(np.where(effort > 0.0, effort, np.inf)),
+        acceleration_limit=read_only(np.full(len(names), np.inf)),
+        jerk_limit=read_only(np.full(len(names), np.inf)),
+    )
+
+
+def moving_joints(urdf: Urdf, tools: Sequence[str], reference: str | None) -> list[UrdfJoint]:
+    """Return the joints that move one of the tools relative to the reference."""
+    on_the_way = [] if reference is None else urdf.chain(reference)
+    chains = [urdf.chain(tool) for tool in tools]
+    found: dict[str, UrdfJoint] = {}
+    for chain in chains:
+        both = {joint.name for joint in chain} & {joint.name for joint in on_the_way}
+        for joint in (*chain, *on_the_way):
+            if joint.kind != "fixed" and joint.name not in both:
+                found[joint.name] = joint
+    return list(found.values())
+
+
+def rebuild_robot(
+    text: str,
+    package_dirs: Sequence[str],
+    source: str,
+    continuous: Sequence[str],
+    tool: str | Sequence[str],
+    locked: Mapping[str, float],
+    touching: Sequence[Sequence[str]],
+    acceleration_limit: Sequence[float],
+    jerk_limit: Sequence[float],
+    reference: str | None = None,
+) -> RobotModel:
+    """Build an arm from what a saved plan carries of it."""
+    urdf = parse_urdf(text, source=source, package_dirs=tuple(package_dirs))
+    # The text has the continuous joints as revolute ones already.
+    urdf = urdf.with_continuous(continuous)
+    tools = [tool] if isinstance(tool, str) else tool
+    pairs = tuple((first, second) for first, second in touching)
+    # All that is not held: a problem may follow other frames than those the arm was loaded for.
+    free = [
+        joint
+        for joint in urdf.joints.values()
+        if joint.kind in ("revolute", "continuous", "prismatic") and joint.name not in locked
+    ]
+    return dataclasses.replace(
+        build_robot(urdf, tools, locked, reference, free),
+        touching=pairs,
+        acceleration_limit=read_only(acceleration_limit),
+        jerk_limit=read_only(jerk_limit),
+    )
+
+
+def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:
+    for name, value in lock.items():
+        if not isinstance(name, str) or not model.existJointName(name):
+            raise RobotError(
+                f"{urdf.source}: lock names joint '{name}', which is not movable here"
+                f"{nearest(name, model.names[1:])}"
+            )
+        as_number(value, f"{urdf.source}: lock['{name}']", error=RobotError)
+        joint = model.joints[model.getJointId(name)]
+        if joint.nq != 1:
+            raise RobotError(
+                f"{urdf.source}: lock holds joint '{name}', which has {joint.nq} coordinates; "
+                f"only joints with one can be held"
+            )
+        lower = model.lowerPositionLimit[joint.idx_q] - _BESIDE
+        upper = model.upperPositionLimit[joint.idx_q] + _BESIDE
+        if not lower <= value <= upper:
+            raise RobotError(
+                f"{urdf.source}: lock holds joint '{name}' at {value:.6g} rad or m, beyond its "
+                f"limits {lower:.6g} to {upper:.6g}"
+            )
+
+
+def _locked_joints(
+    urdf: Urdf, model: Any, free: list[str], lock: Mapping[str, float]
+) -> dict[str, float]:
+    """Return where the joints off the chain are held; those that mimic one follow it."""
+    locked: dict[str, float] = {}
+
+    def hold(name: str) -> float:
+        if name in locked:
+            return locked[name]
+        joint, source = model.joints[model.getJointId(name)], urdf.joints[name]
+        lower = model.lowerPositionLimit[joint.idx_q]
+        upper = model.upperPositionLimit[joint.idx_q]
+        value = lock.get(name, np.clip(0.0, lower, upper))
+        if source.mimics in free and name not in lock:
+            raise RobotError(
+                f"{urdf.source}: joint '{name}' mimics '{source.mimics}', which moves on the way "
+                f"to the tool; a joint beside the chain cannot follow it: hold it with lock= if "
+                f"its links do not matter"
+            )
+        if source.mimics is not None and source.mimics not in free:
+            followed = source.multiplier * hold(source.mimics) + source.offset
+            if name in lock and abs(followed - lock[name]) > _BESIDE:
+                raise RobotError(
+                    f"{urdf.source}: lock holds joint '{name}' at {lock[name]:.6g}, but it mimics "
+                    f"'{source.mimics}' and stands at {followed:.6g}; hold that one"
+                )
+            value = followed
+        locked[name] = float(value)
+        return locked[name]
+
+    for index in range(1, model.njoints):
+        name = model.names[index]
+        if name not in free and model.joints[index].nq == 1:
+            hold(name)
+    return locked

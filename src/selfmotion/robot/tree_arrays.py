@@ -1,0 +1,80 @@
+"""Trees and chains as arrays, for compiled kinematics."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from selfmotion.basics import Array, Flags, Ints
+
+
+class TreeArrays(NamedTuple):
+    """What compiled kinematics need of c joints; see `placements`.
+
+    Attributes
+    ----------
+    joints : (c,)
+        Their coordinates.
+    parents : (c,)
+        The row that each is placed in: 0 the base, j + 1 that of joint j.
+    rotations, positions : (c, 3, 3), (c, 3)
+        Of each joint at q = 0 in the frame of the row before [m].
+    axes : (c, 3)
+        In the joints' own frames; turned round where a joint is passed from its far side.
+    is_revolute : (c,)
+    """
+
+    joints: Ints
+    parents: Ints
+    rotations: Array
+    positions: Array
+    axes: Array
+    is_revolute: Flags
+
+
+class ChainArrays(NamedTuple):
+    """What compiled kinematics need of a chain.
+
+    Attributes
+    ----------
+    tree : TreeArrays
+        Its joints from base to tip, each placed in the one before.
+    tip_rotation, tip_position : (3, 3), (3,)
+        Of the tip in the frame of the last joint [m].
+    """
+
+    tree: TreeArrays
+    tip_rotation: Array
+    tip_position: Array
+
+
+def tree_arrays(model: Any) -> TreeArrays:
+    """Return what compiled kinematics need of all joints of a model, placed in the world."""
+    joints = np.arange(model.nv, dtype=np.int64)
+    places = list(model.jointPlacements)[1:]
+    return serial_arrays(model, joints, list(model.parents)[1:], places, np.ones(model.nv))
+
+
+def serial_arrays(
+    model: Any, joints: Ints, parents: npt.ArrayLike, places: Sequence[pin.SE3], signs: Array
+) -> TreeArrays:
+    """Return the arrays of some joints with their parents and places; -1 turns an axis round."""
+    data = model.createData()
+    # Columns [v, ω] at the world's origin; of one joint Pinocchio returns a vector.
+    columns = pin.computeJointJacobians(model, data, pin.neutral(model)).reshape(6, -1).T
+    twists = [data.oMi[int(j) + 1].actInv(pin.Motion(columns[j])) for j in joints]
+    is_revolute = [bool(np.any(twist.angular)) for twist in twists]
+    axes = [
+        signs[j] * np.array(twist.angular if turns else twist.linear)
+        for j, twist, turns in zip(joints, twists, is_revolute, strict=True)
+    ]
+    return TreeArrays(
+        np.array(joints, dtype=np.int64),
+        np.array(parents, dtype=np.int64),
+        np.array([place.rotation for place in places]).reshape(-1, 3, 3),
+        np.array([place.translation for place in places]).reshape(-1, 3),
+        np.array(axes).reshape(-1, 3),
+        np.array(is_revolute, dtype=np.bool_),
+    )
