@@ -145,6 +145,12 @@ def test_follows_that_do_not_fit_are_refused(carried: sm.Plan) -> None:
         sm.Problem(robot, [left, sm.Follow(longer, tool=HANDS[1])])
     with pytest.raises(sm.ProblemError, match="cannot move them freely"):
         sm.Problem(robot, [left, sm.Follow(path, tool=HANDS[0])])
+    with pytest.raises(sm.ProblemError, match="'planar_pose' is for frames that move in the x-y"):
+        sm.Problem(robot, [left, sm.Follow(path, "planar_pose", tool=HANDS[1])])
+    with pytest.raises(sm.ProblemError, match="does not tell how long the motion lasts"):
+        sm.Problem(robot, [sm.Follow(stand(0.4), tool=HANDS[1]), left])
+    with pytest.raises(sm.ProblemError, match="also: 3, expected a Follow"):
+        sm.certify(robot, path, "pose", carried.trajectory, also=[3])  # type: ignore[list-item]
     with pytest.raises(sm.ProblemError, match="cannot be relaxed"):
         sm.Problem(
             robot,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, Progress, shown, silent
+from selfmotion.basics import Array, ProblemError, Progress, as_several, shown, silent
 from selfmotion.certificate.deviation import smallest_singular_values
 from selfmotion.certificate.feed import FeedReached
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
@@ -77,7 +77,7 @@ def certify(
     """
     _check_arguments(robot, path, trajectory)
     tolerance, task = Tolerance.of(tolerance), Task.of(task)
-    follows = Follows.of(robot, path, task, also)
+    follows = Follows.of(robot, path, task, as_several(also, "also", Follow))
     for item in follows.items:
         check_oriented(item.path, item.task)
     trajectory = trajectory.of_joints(robot.joint_names)

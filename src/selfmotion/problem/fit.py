@@ -8,9 +8,11 @@ import numpy as np
 from selfmotion.basics import ProblemError, RedundancyError
 from selfmotion.follow import Follows
 from selfmotion.path import STILL, Path, check_oriented
-from selfmotion.robot import RobotModel
+from selfmotion.robot import Chain, RobotModel
 from selfmotion.task import POSITION_ROWS, ROW_NAMES, Relaxation, Task
 
+# Columns of Jacobians below this [m, rad] are zero.
+_NO_RATE = 1e-6
 # Speeds are compared this share of the duration from an end, and twice as far from it.
 _NEAR_END = 1e-4
 # Speed that grows with at least this power of the time has no acceleration at the end.
@@ -127,6 +129,12 @@ def _check_redundancy(follows: Follows, is_relaxed: bool) -> None:
 def _check_several(follows: Follows) -> None:
     robot, rows, left = follows.robot, follows.dimension, follows.redundancy
     what = " and ".join(f"'{item.chain.tip_name}'" for item in follows.items)
+    for item in follows.items:
+        if item.task is Task.PLANAR_POSE and not _moves_in_plane(robot, item.chain):
+            raise ProblemError(
+                f"{robot.name}: task 'planar_pose' is for frames that move in the x-y plane only, "
+                f"which '{item.chain.tip_name}' does not; choose another one (Follow(task=))"
+            )
     if robot.dof - left < rows:
         raise ProblemError(
             f"{robot.name}: {what} have {rows} rows prescribed ({', '.join(follows.row_names)}), "
@@ -140,6 +148,12 @@ def _check_several(follows: Follows) -> None:
             dof=robot.dof,
             rows=rows,
         )
+
+
+def _moves_in_plane(robot: RobotModel, chain: Chain) -> bool:
+    """Return whether a chain's tip moves in the x-y plane of its base: else, no angle is its ωz."""
+    jacobians, _, _ = chain.along(robot.generic_configurations())
+    return bool(np.abs(jacobians[:, 2:5]).max() <= _NO_RATE)
 
 
 def _redundant_tasks(robot: RobotModel) -> list[str]:

@@ -192,6 +192,11 @@ class Problem:
         if not several:
             raise ProblemError("path is an empty list, expected a Path, or what follows one")
         first, robot = several[0], self.robot
+        if not isinstance(first.path, Path):
+            raise ProblemError(
+                "the first Follow is at a pose, which does not tell how long the motion lasts; "
+                "begin with one that has a path, or take Dwell(pose, seconds)"
+            )
         if isinstance(robot, RobotModel) and (first.tool or first.reference):
             tool = first.tool or robot.tool
             tools = (tool, *(name for name in robot.tools if name != tool))
