@@ -286,3 +286,24 @@ def test_links_of_parts_that_always_overlap_are_judged() -> None:
         for other in links[max(k, 1) :]:
             assert frozenset((f"left/{one}", f"right/{other}")) in judged
     assert CollisionModel(pair).stuck is not None
+
+
+def test_each_part_has_its_own_meshes(tmp_path: Path) -> None:
+    """Also where two have packages of one name."""
+    text = """<robot name="block"><link name="floor"/><link name="body"><collision><geometry>
+        <mesh filename="package://block/body.obj"/></geometry></collision></link>
+        <joint name="turn" type="revolute"><parent link="floor"/><child link="body"/>
+        <axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+    for name, size in (("one", 1.0), ("other", 2.0)):
+        folder = tmp_path / name / "block"
+        folder.mkdir(parents=True)
+        (folder / "block.urdf").write_text(text)
+        corners = size * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+        lines = [f"v {x} {y} {z}" for x, y, z in corners]
+        faces = ["f 1 3 2", "f 1 2 4", "f 1 4 3", "f 2 3 4"]
+        (folder / "body.obj").write_text("\n".join([*lines, *faces]))
+    files = {name: tmp_path / name / "block" / "block.urdf" for name in ("one", "other")}
+    cell = sm.load_robot(files, tool=("one/body", "other/body"))
+    pieces = cell.geometry(pin.GeometryType.COLLISION).geometryObjects
+    sizes = [float(np.max(piece.geometry.vertices())) for piece in pieces]
+    assert sizes == [1.0, 2.0]

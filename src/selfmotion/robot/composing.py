@@ -5,7 +5,8 @@ without a word.
 """
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 
 import pinocchio as pin
 
@@ -64,6 +65,7 @@ def composed(
                 )
     cell = ElementTree.Element("robot", name="+".join(parts))
     ElementTree.SubElement(cell, "link", name=WORLD_LINK)
+    folders = dict.fromkeys(folder for urdf in parts.values() for folder in urdf.package_dirs)
     links = {f"{name}/{link}" for name, urdf in parts.items() for link in urdf.links}
     for name, urdf in parts.items():
         carrier = on.get(name, WORLD_LINK)
@@ -77,12 +79,28 @@ def composed(
             for element in root.findall(path):
                 if element.get(attribute):
                     element.set(attribute, f"{name}/{element.get(attribute)}")
+        _settle_meshes(root, urdf.package_dirs, folders)
         cell.extend(root.findall("material") + root.findall("link") + root.findall("joint"))
         pose = base.get(name, pin.SE3.Identity())
         cell.append(placed(f"{name}/{_PLACEMENT}", carrier, f"{name}/{urdf.root}", pose))
     text = ElementTree.tostring(cell, encoding="unicode")
-    folders = dict.fromkeys(folder for urdf in parts.values() for folder in urdf.package_dirs)
     found = parse_urdf(text, source=" + ".join(parts), package_dirs=tuple(folders))
     return found.with_continuous(
         f"{name}/{joint}" for name, urdf in parts.items() for joint in urdf.continuous()
     )
+
+
+def _settle_meshes(root: ElementTree.Element, own: Iterable[str], all_parts: Iterable[str]) -> None:
+    """Give meshes that another part's package would be taken for the address of the file."""
+    for mesh in root.iter("mesh"):
+        address = mesh.get("filename", "")
+        file = _found(address, own)
+        if file is not None and file != _found(address, all_parts):
+            mesh.set("filename", str(file))
+
+
+def _found(address: str, folders: Iterable[str]) -> Path | None:
+    """Return the file of a ``package://`` address in the first folder that has it."""
+    scheme, _, place = address.partition("://")
+    files = (Path(folder) / place for folder in folders if scheme == "package")
+    return next((file for file in files if file.is_file()), None)
