@@ -18,6 +18,7 @@ from selfmotion.optimise import Iteration, Minimum, Optimizer
 from selfmotion.path import Line, Path
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel, load_robot
+from selfmotion.search import start_candidates
 from selfmotion.task import Task, exp3, log3
 from selfmotion.testing.functions import Bowl, Valley
 
@@ -27,6 +28,8 @@ GRADIENT = 1e-6
 TWIST = 1e-6
 # Of an optimiser on functions without noise, relative to their scale.
 MINIMUM = 1e-4
+# So many starts are looked for where none is given.
+_STARTS = 8
 _STEPS = 10
 
 
@@ -132,7 +135,7 @@ def check_constraint(constraint: Constraint, problem: Problem) -> None:
     constraint.check(problem.follows)
     start = problem.given_start
     if start is None:
-        start = robot.inverse_kinematics(problem.path.pose(0.0), problem.task)
+        start = start_candidates(problem.follows, _STARTS, np.random.default_rng(0))[0]
     grid = Grid.aligned(problem.knots, _STEPS * max(1, problem.null_motion.fewest_steps // 4))
     still = StillMotion.on(problem, start, grid)
     bound = constraint.bind(problem.follows, still.start, still.end)
