@@ -1,5 +1,6 @@
 """Cells: paths in frames that move, several tips at once, as planned, saved and written."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,8 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.certificate import FinishedMotion
+from selfmotion.collision import CollisionModel
 from support.own_kinematics import Arm, along
 from support.random_cells import LEFT, RIGHT, random_cell, random_follows
 
@@ -158,3 +161,122 @@ def test_part_weights_are_by_part_and_by_joint(carried: sm.Plan) -> None:
     np.testing.assert_array_equal(found, [1, 3, 1, 1, 1, 1, 1, *[0.5] * 7])
     with pytest.raises(sm.RobotError, match="no part or joint 'middle'"):
         robot.part_weights({"middle": 1.0})
+
+
+def test_follows_of_other_frames_than_the_arm_was_loaded_for_are_saved(tmp_path: Path) -> None:
+    """The joints stay those that were loaded, though the reference now hides some of them."""
+    file = random_cell(np.random.default_rng(0), tmp_path)
+    robot = sm.load_robot(file, tool=(LEFT, RIGHT))
+    first = robot.chain_to(LEFT, RIGHT).place(robot.generic_configurations()[0])
+    circle = sm.Circle.around(first, 0.05, 3.0, normal=(0, 0, 1))
+    left = sm.Follow(circle, "position", tool=LEFT, reference=RIGHT)
+    problem = sm.Problem(robot, [left], collision=None)
+    loaded = sm.problem.problem_from_dict(sm.problem.problem_to_dict(problem))
+    assert loaded.robot.joint_names == robot.joint_names
+    assert len(sm.load_robot(file, tool=LEFT, reference=RIGHT).joint_names) < robot.dof
+    with pytest.raises(sm.ProblemError, match="was loaded for other frames"):
+        sm.write_problem(problem, tmp_path / "cell.toml")
+
+
+def positioned(**options: object) -> sm.RobotModel:
+    """Return a Panda beside a table, its tool seen from the plate."""
+    base = {"table": pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.0]))}
+    where = {"base": base, "tool": "arm/panda_hand_tcp", "reference": "table/plate", **options}
+    return sm.load_robot({"arm": "panda", "table": "positioner"}, **where)
+
+
+RING = sm.Circle.around(
+    pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.1, 0.0, 0.03])), 0.05, 4.0, normal=(0, 0, 1)
+)
+
+
+def test_what_the_arm_of_a_cell_holds_is_written(tmp_path: Path) -> None:
+    robot = positioned(tool_offset=pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.1])))
+    sm.write_problem(sm.Problem(robot, RING, "pointing"), tmp_path / "cell.toml")
+    again = sm.read_problem(tmp_path / "cell.toml").robot
+    assert again.tools == robot.tools
+    q = np.full(robot.dof, 0.3)
+    np.testing.assert_allclose(again.pose(q).homogeneous, robot.pose(q).homogeneous, atol=1e-12)
+
+
+def test_the_arms_own_tool_by_its_name_is_seen_from_the_arms_reference() -> None:
+    robot = positioned()
+    named = sm.Follow(RING, "pointing", tool="arm/panda_hand_tcp")
+    for item in (named, sm.Follow(RING, "pointing")):
+        problem = sm.Problem(robot, [item], collision=None)
+        assert problem.robot.reference == "table/plate"
+        assert item.on(robot, RING.duration).chain.base == problem.robot.chain.base
+
+
+@pytest.mark.parametrize("at", [0.1, 0.5])
+def test_parts_that_stand_in_each_other_are_not_verified(at: float) -> None:
+    """No joint changes their distance, so only the places of the parts can be wrong."""
+    robot = positioned(base={"table": pin.SE3(np.eye(3), np.array([at, 0.0, 0.0]))})
+    still = sm.Trajectory(
+        np.array([0.0, 1.0]), np.zeros((2, robot.dof)), np.zeros((2, robot.dof)), robot.joint_names
+    )
+    finding = sm.Clearance(distance=0.0).requirement(robot).judge(FinishedMotion(robot, still))
+    stands = {"arm/panda_link0 - table/stand", "table/stand - arm/panda_link0"}
+    assert (finding.subject in stands and "into each other" in finding.text) is (at < 0.2)
+
+
+def test_parts_on_parts_may_touch_what_carries_them() -> None:
+    robot = positioned(base={"arm": stand(0.0)}, on={"arm": "table/stand"})
+    assert CollisionModel(robot).stuck is None
+
+
+def test_every_feed_of_a_cell_is_judged(carried: sm.Plan) -> None:
+    """Also that of a frame that is not the first."""
+    robot, first = carried.robot, carried.problem.path.pose(0.0)
+    away = first * pin.SE3(np.eye(3), np.array([0.05, 0.0, 0.0]))
+    held = sm.Feed(sm.Line(first, away, 1.0), 0.01, within=0.1)
+    slower = sm.Dwell(first, held.duration)
+    items = [sm.Follow(slower, tool=HANDS[0]), sm.Follow(held, tool=HANDS[1])]
+    q = np.zeros((2, robot.dof))
+    motion = sm.Trajectory(np.array([0.0, held.duration]), q, q, robot.joint_names)
+    found = sm.certify(robot, items[0].path, "pose", motion, also=[items[1]])
+    assert "feed" in [finding.requirement for finding in found.findings]
+
+
+def test_several_paths_are_retimed_together(carried: sm.Plan) -> None:
+    """A path of the second hand's own, too."""
+    robot, circle = carried.robot, carried.problem.path
+    grasp = stand(0.4)
+    second = sm.Dwell(grasp, circle.duration)
+    items = [sm.Follow(circle, tool=HANDS[0]), sm.Follow(second, "pose", HANDS[1], HANDS[0])]
+    problem = sm.Problem(robot, items, start=carried.trajectory.q[0])
+    again = dataclasses.replace(carried, problem=problem)
+    retimed = sm.retime(again, acceleration=2.0).require()
+    assert retimed.problem.follows.items[1].path.duration == retimed.path.duration
+
+
+REFUSED = {
+    "part 'arm' is 3, expected a name": lambda: sm.load_robot({"arm": 3}),
+    r"stands on '\['x'\]', which is no link": lambda: positioned(on={"arm": ["x"]}),
+    "lock names joint '3'": lambda: positioned(lock={3: 0.1}),
+    r"weights are \['table'\], expected a dict": lambda: positioned().part_weights(["table"]),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_bad_arguments_of_cells_are_refused_by_name(message: str) -> None:
+    with pytest.raises(sm.RobotError, match=message):
+        REFUSED[message]()
+
+
+def test_what_cannot_follow_several_paths_says_so(carried: sm.Plan) -> None:
+    with pytest.raises(sm.ProblemError, match="the moves between parts would not keep"):
+        sm.plan_in_parts(carried.problem)
+    with pytest.raises(sm.ProblemError, match="other works' methods follow one path"):
+        sm.plan_by(carried.problem, sm.PseudoInverse())
+
+
+def test_links_of_parts_that_always_overlap_are_judged() -> None:
+    """Within an arm they are made so; of two arms in one place they are placed so."""
+    pair = sm.load_robot({"left": "panda", "right": "panda"}, tool=HANDS)
+    judged = {frozenset(names) for names in CollisionModel(pair).pairs}
+    links = [f"panda_link{k}" for k in range(8)]
+    for k, one in enumerate(links):
+        for other in links[max(k, 1) :]:
+            assert frozenset((f"left/{one}", f"right/{other}")) in judged
+    assert CollisionModel(pair).stuck is not None

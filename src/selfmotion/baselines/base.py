@@ -113,6 +113,11 @@ def _check(problem: Problem, method: Method) -> None:
             "the problem's damping is for the optimised motion; leave it out, or take "
             "plan_by(problem, DampedLeastSquares(…))"
         )
+    if problem.also:
+        raise ProblemError(
+            f"other works' methods follow one path, but {len(problem.follows.items)} are asked "
+            f"for; call plan"
+        )
     if problem.relaxations:
         raise ProblemError(
             "other works' methods follow the path exactly; leave the relaxations out"

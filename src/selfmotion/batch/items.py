@@ -49,7 +49,8 @@ class Item:
                 f"a class from selfmotion.Cost"
             )
         problem = problem_to_dict(job.problem)
-        parts = (job.problem.path, job.problem.null_motion, *job.problem.costs)
+        paths = [item.path for item in job.problem.follows.items]
+        parts = (*paths, job.problem.null_motion, *job.problem.costs)
         own = {type(part).__module__ for part in (*parts, *job.problem.constraints)}
         modules = sorted(name for name in own if not name.startswith(("selfmotion.", "__main__")))
         return {"problem": problem, "options": job.settings, "modules": modules}

@@ -47,7 +47,10 @@ class KeepsApart(Requirement):
         stuck = self.model.stuck
         if stuck is not None:
             names, time = f"{stuck.first} - {stuck.second}", float(motion.trajectory.t[0])
-            text = f"joints that are held put {names} {-stuck.value * 1e3:.2f} mm into each other"
+            text = (
+                f"joints that are held, or places of parts, put {names} "
+                f"{-stuck.value * 1e3:.2f} mm into each other"
+            )
             return Finding(self.name, names, time, stuck.value, self.distance, False, text)
         found = closest_at_all_times(self.model, motion.trajectory, self.distance)
         text = self._told(found)

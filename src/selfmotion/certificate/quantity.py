@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, Ints, ProblemError, read_only
+from selfmotion.basics import Array, Ints, ProblemError, as_number, read_only
 from selfmotion.certificate.bounding import Bounded, Bounds, Stretch, bounded
 from selfmotion.certificate.findings import Finding
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
@@ -105,8 +105,11 @@ class Quantity:
     ) -> "Quantity":
         """Return one number that is to stay within a band.
 
-        Its `values` are (K,), its `derivatives` (K, n) each, its `series` (K + 1, I).
+        Its `values` are (K,), its `derivatives` (K, n) each, its `series` (K + 1, I). Where one
+        side is free, its end is a number that is never reached.
         """
+        ends = (("lower", lower), ("upper", upper))
+        lower, upper = (as_number(end, f"quantity '{name}': {which}") for which, end in ends)
         return cls(
             name,
             (Column(name, name, unit),),

@@ -15,11 +15,18 @@ from selfmotion.collision.found import Closest, Overlap
 from selfmotion.collision.meshes import MeshDistances
 from selfmotion.collision.obstacles import Obstacle
 from selfmotion.collision.overlaps import SAMPLES, count_overlaps, links_of
-from selfmotion.collision.pairs import are_neighbours, candidate_pairs, held_pairs
+from selfmotion.collision.pairs import (
+    are_neighbours,
+    are_placed_apart,
+    candidate_pairs,
+    held_pairs,
+)
 from selfmotion.robot import RobotModel
 
 # The share of sampled configurations from which on an overlap of links is worth telling.
 _OFTEN = 0.5
+# Bodies that are put in touch may overlap by this much [m]: rounding.
+_TOUCHING = 1e-6
 _NO_PAIR = Closest(math.inf, "", "")
 
 
@@ -48,7 +55,8 @@ class CollisionModel:
         Names of the B bodies, likewise.
     overlapping : tuple of Overlap
         Pairs of links that overlap in half or more of 500 sampled configurations. Those that do
-        in each, or are known to touch as they are made (`RobotModel.touching`), are not checked.
+        in each, or are known to touch as they are made (`RobotModel.touching`), are not checked,
+        but for those of parts of a cell that were placed in each other.
     disabled : tuple of (str, str)
         Pairs of links that are left out only because that was asked for.
 
@@ -88,7 +96,8 @@ class CollisionModel:
         for first, second in candidates:
             met, _ = links.counts.get((first, second), (0, 0))
             names = self.bodies[first], self.bodies[second]
-            is_checked = met < SAMPLES and frozenset(names) not in as_made
+            always = met == SAMPLES and not are_placed_apart(*names, robot.urdf)
+            is_checked = not always and frozenset(names) not in as_made
             if is_checked:
                 pairs.append((first, second))
             if met >= _OFTEN * SAMPLES or (met and not is_checked):
@@ -118,11 +127,15 @@ class CollisionModel:
             if met == SAMPLES
         }
         urdf = self.robot.urdf
-        return {frozenset(pair) for pair in always if are_neighbours(*pair, urdf)}
+        return {
+            frozenset(pair)
+            for pair in always
+            if are_neighbours(*pair, urdf) and not are_placed_apart(*pair, urdf)
+        }
 
     @cached_property
     def stuck(self) -> Closest | None:
-        """The links that held joints put deepest into each other, if there are any."""
+        """The links that held joints or placed parts put deepest into each other, if any."""
         pairs = held_pairs(self._bodies, self.robot.urdf, self.robot.locked, self._disabled)
         if not pairs:
             return None
@@ -135,7 +148,7 @@ class CollisionModel:
         worst = _NO_PAIR
         for pair in np.flatnonzero(bounds < 0.0).tolist():
             value = meshes.refine(places, pair, hulls.distance(pair, bounds[pair]))
-            if value < min(worst.value, 0.0):
+            if value < min(worst.value, -_TOUCHING):
                 worst = Closest(value, self.bodies[pairs[pair][0]], self.bodies[pairs[pair][1]])
         return worst if worst.first else None
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from selfmotion.basics import CollisionError
 from selfmotion.collision.bodies import Body
-from selfmotion.robot import Urdf, UrdfJoint
+from selfmotion.robot import Urdf, UrdfJoint, is_placement
 
 
 def candidate_pairs(
@@ -58,32 +58,52 @@ def held_pairs(
     locked: Mapping[str, float],
     disabled: Iterable[tuple[str, str]] = (),
 ) -> list[tuple[int, int]]:
-    """Return the index pairs of `bodies` that joints, held elsewhere than at 0, put where they are.
+    """Return the index pairs of `bodies` that someone put where they are, and no joint moves.
 
-    No joint changes their distance any more; links that such a joint joins are left out.
+    By joints that are held elsewhere than at 0, or by placing parts of a cell. Links that such a
+    joint joins are left out, and parts of which one carries the other: they may touch.
     """
     up = {joint.child: joint for joint in urdf.joints.values()}
-    left_out = {frozenset(pair) for pair in disabled}
+    placements = {joint.name for joint in urdf.joints.values() if is_placement(joint)}
 
-    def held(link: str) -> dict[str, str]:
-        """Return the joints from the root to a link that were put somewhere, with their ends."""
-        found = {}
+    def put(link: str) -> frozenset[str]:
+        """Return the joints from the root to a link that were put somewhere."""
+        found = set()
         while link in up:
             joint = up[link]
-            if locked.get(joint.name, 0.0) != 0.0:
-                found[joint.name] = joint.child
+            if joint.name in placements or locked.get(joint.name, 0.0) != 0.0:
+                found.add(joint.name)
             link = joint.parent
-        return found
+        return frozenset(found)
 
-    joined = {frozenset((joint.parent, joint.child)) for joint in _movable(urdf)}
-    above = {body.name: held(body.name) for body in bodies}
+    left_out = {frozenset(pair) for pair in disabled}
+    left_out |= {frozenset((joint.parent, joint.child)) for joint in _movable(urdf)}
+    above = {body.name: put(body.name) for body in bodies}
+
+    def is_put(first: str, second: str) -> bool:
+        if frozenset((first, second)) in left_out:
+            return False
+        ways = above[first] ^ above[second]
+        # What only a placement puts there may touch what carries it.
+        return bool(ways - placements) or (bool(ways) and are_placed_apart(first, second, urdf))
+
     return [
         (i, j)
         for i, j in itertools.combinations(range(len(bodies)), 2)
-        if bodies[i].joint == bodies[j].joint
-        and above[bodies[i].name].keys() ^ above[bodies[j].name].keys()
-        and frozenset((bodies[i].name, bodies[j].name)) not in joined | left_out
+        if bodies[i].joint == bodies[j].joint and is_put(bodies[i].name, bodies[j].name)
     ]
+
+
+def are_placed_apart(first: str, second: str, urdf: Urdf) -> bool:
+    """Return whether two links are of parts of a cell of which none carries the other.
+
+    What overlaps there does not so as it is made, but as it is placed.
+    """
+    carriers = {_part(x.child): _part(x.parent) for x in urdf.joints.values() if is_placement(x)}
+    one, other = _part(first), _part(second)
+    if one == other or not {one, other} <= carriers.keys():
+        return False
+    return carriers[one] != other and carriers[other] != one
 
 
 def are_neighbours(first: str, second: str, urdf: Urdf) -> bool:
@@ -91,6 +111,10 @@ def are_neighbours(first: str, second: str, urdf: Urdf) -> bool:
     part = _rigid_parts(urdf)
     parts = frozenset((part[first], part[second]))
     return any(frozenset((part[x.parent], part[x.child])) == parts for x in _movable(urdf))
+
+
+def _part(link: str) -> str:
+    return link.partition("/")[0]
 
 
 def _movable(urdf: Urdf) -> Iterator[UrdfJoint]:

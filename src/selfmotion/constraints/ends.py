@@ -62,8 +62,8 @@ class EndConfiguration(Constraint):
             position, rotation = item.miss(item.path.pose(item.path.duration), q)
             if max(position, rotation) > _NEAR_END:
                 raise ProblemError(
-                    f"{robot.name}: the end configuration puts '{robot.tool}' {position:.3g} m and "
-                    f"{rotation:.3g} rad off the end of the path; take "
+                    f"{robot.name}: the end configuration puts '{item.chain.tip_name}' "
+                    f"{position:.3g} m and {rotation:.3g} rad off the end of the path; take "
                     f"robot.inverse_kinematics(path.pose(path.duration), task, seed=q)"
                 )
 

@@ -65,7 +65,7 @@ class Follow:
                 f"s, expected {duration:.6g} s as that of '{robot.tool}'"
             )
         reference = self.reference
-        if self.tool is None and reference is None:
+        if reference is None and self.tool in (None, robot.tool):
             reference = robot.reference
         chain = robot.chain_to(self.tool or robot.tool, reference)
         return BoundFollow(chain, path, Task.of(self.task))

@@ -71,7 +71,7 @@ def _place(location: tuple[int | str, ...]) -> str:
 
 def _is_plain_list(location: tuple[int | str, ...], k: int) -> bool:
     """Whether what stands at k is a key of a list's item, rather than its kind."""
-    return k == 2 and location[0] == "relaxations"
+    return k == 2 and location[0] in ("relaxations", "also")
 
 
 def _what(error: Any, document: Mapping[str, Any]) -> str:
@@ -116,6 +116,8 @@ def _known_keys(location: tuple[int | str, ...]) -> list[str]:
             node = node["properties"][part]
         elif part in node.get("discriminator", {}).get("mapping", {}):
             node = {"$ref": node["discriminator"]["mapping"][part]}
+        elif isinstance(node.get("additionalProperties"), dict):
+            node = node["additionalProperties"]
     return list(_resolved(node, definitions).get("properties", {}))
 
 

@@ -3,10 +3,19 @@
 from pathlib import Path as FilePath
 from typing import Any
 
-from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path
+from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path, shown
 from selfmotion.formats.documents import write_document
 from selfmotion.problem import Problem, check_problem, problem_to_dict
-from selfmotion.robot import NAMED_ARMS, NAMED_PARTS, RobotModel, UrdfPart, load_robot, mounting_of
+from selfmotion.robot import (
+    NAMED_ARMS,
+    NAMED_PARTS,
+    TOOL_JOINT,
+    RobotModel,
+    UrdfPart,
+    load_robot,
+    mounting_of,
+    moving_joints,
+)
 
 
 def write_problem(problem: Problem, file: str | FilePath) -> None:
@@ -37,6 +46,10 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
     table: dict[str, Any] = {"tool": tools[0] if len(tools) == 1 else tools}
     if robot.reference is not None:
         table["reference"] = robot.reference
+    if mounting.tool_offset is not None:
+        position, rpy = mounting.tool_offset
+        table["tool_offset"] = {"position": position, "rpy": rpy}
+    _check_frames(robot)
     if robot.urdf.parts:
         table["parts"] = {part.name: _part(part) for part in robot.urdf.parts}
         table["lock"] = dict(robot.locked)
@@ -52,11 +65,23 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
             f"{robot.name}: its URDF is not (or no longer) in the file '{source}', which a problem "
             f"file could name; write `robot.urdf.text` to a .urdf file and load it from there"
         )
-    for key, placed in (("base", mounting.base), ("tool_offset", mounting.tool_offset)):
-        if placed is not None:
-            table[key] = {"position": placed[0], "rpy": placed[1]}
+    if mounting.base is not None:
+        table["base"] = {"position": mounting.base[0], "rpy": mounting.base[1]}
     table["lock"] = dict(robot.locked)
     return table
+
+
+def _check_frames(robot: RobotModel) -> None:
+    """Refuse an arm that was loaded for other frames than those it follows paths with."""
+    offset = robot.urdf.joints.get(TOOL_JOINT)
+    moving = moving_joints(robot.urdf, robot.tools, robot.reference)
+    free = {joint.name for joint in moving} - set(robot.locked)
+    if free != set(robot.joint_names) or (offset is not None and offset.child != robot.tool):
+        raise ProblemError(
+            f"{robot.name}: was loaded for other frames, so that its joints or its tool_offset "
+            f"would be others in a file; load it with tool={shown(list(robot.tools))}, "
+            f"reference={robot.reference!r}, as its paths are followed"
+        )
 
 
 def _part(part: UrdfPart) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """The fastest motion along a path: pace and null motion, each in its turn."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +15,9 @@ from selfmotion.planning.run import plan
 from selfmotion.planning.settings import COARSE, DEGREE, POWER, ROUND_GAIN, ROUNDS
 from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Plan, retime
+
+# What brings a path to another pace.
+Pace = Callable[[Path], Path]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,10 +83,11 @@ def fastest(
     geometric = tuple(item for item in problem.constraints if not item.of_pace)
     free = replace(problem, constraints=geometric, costs=(LimitUse(v, a, POWER),))
     best: Plan | None = None
-    path, times, verdict, still = problem.path, [], "", np.inf
+    pace: Pace = _own
+    times, verdict, still = [], "", np.inf
     for number in range(ROUNDS):
         progress("fastest", number, ROUNDS)
-        planned = plan(replace(free, path=path))
+        planned = plan(replace(free, **free.along(pace)))
         if planned.report.ending or not planned.certificate.on_path:
             # At no pace can it be followed to its end.
             verdict = planned.certificate.verdict
@@ -101,7 +106,7 @@ def fastest(
             times.append(best.path.duration)
             if times[-1] > (1.0 - ROUND_GAIN) * before:
                 break
-        path = _stand_in(problem.path, path, found.path)
+        pace = _stand_in(problem.path, planned.path, found.path)
     if best is None:
         raise PlanError(f"no motion keeps all limits at any pace: {verdict}")
     return Fastest(best, still, tuple(times))
@@ -131,10 +136,14 @@ def _at_its_fastest(planned: Plan, problem: Problem, v: Array, a: Array) -> Plan
     return retime(whole, a, v)
 
 
-def _stand_in(original: Path, current: Path, found: Path) -> Path:
-    """Return the original path at about the pace of `found`, which is a pace of `current`.
+def _own(path: Path) -> Path:
+    return path
 
-    As smooth as the original: its accelerations do not jump from limit to limit.
+
+def _stand_in(original: Path, current: Path, found: Path) -> Pace:
+    """Return what brings a path to about the pace of `found`, which is a pace of `current`.
+
+    As smooth as the path: its accelerations do not jump from limit to limit.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -148,4 +157,5 @@ def _stand_in(original: Path, current: Path, found: Path) -> Path:
     sigma[0], sigma[-1] = 0.0, original.duration
     still: Any = [(1, 0.0), (2, 0.0)]
     spline = make_interp_spline(t, sigma, DEGREE, bc_type=(still, still))
-    return Retimed(original, t, sigma, np.maximum(spline(t, 1), 0.0), spline(t, 2))
+    rate, bend = np.maximum(spline(t, 1), 0.0), spline(t, 2)
+    return lambda path: Retimed(path, t, sigma, rate, bend)

@@ -108,10 +108,15 @@ def _rough(problem: Problem, finished: Finished, session: Session) -> bool:
 
 
 def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tolerance) -> bool:
-    """Whether two motions put the tool in the same place in the prescribed rows."""
-    robot, task = problem.robot, problem.task
-    pairs = zip(coarse(fine.t), fine.q, strict=True)
-    misses = np.array([task.miss(robot.pose(first), robot.pose(second)) for first, second in pairs])
+    """Whether two motions put all that is followed in the same place in the prescribed rows."""
+    pairs = list(zip(coarse(fine.t), fine.q, strict=True))
+    misses = np.array(
+        [
+            item.miss(item.chain.place(first), second)
+            for item in problem.follows.items
+            for first, second in pairs
+        ]
+    )
     position, rotation = misses.max(axis=0)
     return bool(position <= tolerance.position and rotation <= tolerance.rotation)
 

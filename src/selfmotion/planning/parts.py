@@ -146,6 +146,11 @@ def _checked(problem: Problem, retreat: float, axis: npt.ArrayLike) -> Retreat |
             "damping= leads through what cannot be followed by leaving the path, parts by another "
             "configuration; leave the damping out, or call plan"
         )
+    if problem.also:
+        raise ProblemError(
+            f"{len(problem.follows.items)} frames follow paths at once, which the moves between "
+            f"parts would not keep; call plan"
+        )
     if problem.follows.redundancy == 0:
         raise ProblemError(
             f"{problem.robot.name}: task '{problem.task.value}' leaves no self-motion to search "

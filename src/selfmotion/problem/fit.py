@@ -43,8 +43,9 @@ def check_fit(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
     check_relaxations(relaxations, first.path, first.task)
     _check_redundancy(follows, bool(relaxations))
     for item in follows.items:
-        _check_units(follows.robot, item.path)
-        _check_pace(follows.robot, item.path)
+        reach = follows.robot.reach_of(item.chain)
+        _check_units(follows.robot, item.path, reach)
+        _check_pace(follows.robot, item.path, reach)
 
 
 def check_relaxations(relaxations: Sequence[Relaxation], path: Path, task: Task) -> None:
@@ -146,11 +147,10 @@ def _redundant_tasks(robot: RobotModel) -> list[str]:
     return [x.value for x in Task if x.dimension < robot.dof and robot.can_follow(x)]
 
 
-def _check_units(robot: RobotModel, path: Path) -> None:
+def _check_units(robot: RobotModel, path: Path, reach: float) -> None:
     """Raise ProblemError for a path that can only be meant in millimetres."""
     times = np.linspace(0.0, path.duration, 9)
     distances = np.linalg.norm(path.samples(times).translation, axis=1)
-    reach = robot.reach
     if np.isfinite(reach) and distances.min() > _FAR * reach:
         raise ProblemError(
             f"{robot.name}: the path is {distances.min():.4g} m away from the arm's root "
@@ -158,11 +158,11 @@ def _check_units(robot: RobotModel, path: Path) -> None:
         )
 
 
-def _check_pace(robot: RobotModel, path: Path) -> None:
+def _check_pace(robot: RobotModel, path: Path, reach: float) -> None:
     """Raise ProblemError for a path that no arm could follow at a hundred times its speed."""
     fastest = np.minimum(robot.velocity_limit, _FAST)
     slides = np.array([robot.is_prismatic(name) for name in robot.joint_names])
-    bound = float(np.sum(np.where(slides, fastest, fastest * min(robot.reach, _LONG))))
+    bound = float(np.sum(np.where(slides, fastest, fastest * min(reach, _LONG))))
     times = np.linspace(0.0, path.duration, 9)
     speeds = np.linalg.norm(path.samples(times).twist[:, :3], axis=1)
     k = int(np.argmax(speeds))

@@ -47,13 +47,7 @@ from selfmotion.motion import (
 )
 from selfmotion.path import Path
 from selfmotion.problem.fit import check_fit, rest_orders
-from selfmotion.problem.given import (
-    SEQUENCES,
-    check_costs,
-    check_judged,
-    check_kinds,
-    check_start,
-)
+from selfmotion.problem.given import SEQUENCES, check_costs, check_judged, check_kinds, check_start
 from selfmotion.robot import RobotModel
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 
@@ -195,8 +189,10 @@ class Problem:
         if isinstance(robot, RobotModel) and (first.tool or first.reference):
             tool = first.tool or robot.tool
             tools = (tool, *(name for name in robot.tools if name != tool))
-            robot = replace(robot, tools=tools, reference=first.reference)
-            robot.chain_to(tool, first.reference)
+            own = robot.reference if tool == robot.tool else None
+            reference = own if first.reference is None else first.reference
+            robot = replace(robot, tools=tools, reference=reference)
+            robot.chain_to(tool, reference)
         object.__setattr__(self, "robot", robot)
         object.__setattr__(self, "path", first.path)
         object.__setattr__(self, "task", first.task)

@@ -123,7 +123,7 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
     asked = (item.on_part() if plan.report.ending else item for item in old.constraints)
     problem = replace(
         old,
-        path=Retimed(plan.path, pace.t, pace.sigma, pace.rate, pace.bend),
+        **old.along(lambda path: Retimed(path, pace.t, pace.sigma, pace.rate, pace.bend)),
         constraints=(*(item for item in asked if item is not None), *wanted),
         relaxations=[_moved(item, pace.t, pace.sigma) for item in old.relaxations],
     )

@@ -1,6 +1,9 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
-from selfmotion.robot.building import rebuild_robot as rebuild_robot
+from selfmotion.robot.building import (
+    moving_joints as moving_joints,
+    rebuild_robot as rebuild_robot,
+)
 from selfmotion.robot.chain import (
     WORLD as WORLD,
     Chain as Chain,
@@ -8,6 +11,7 @@ from selfmotion.robot.chain import (
     null_space as null_space,
 )
 from selfmotion.robot.chain_series import ChainSeries as ChainSeries
+from selfmotion.robot.composing import is_placement as is_placement
 from selfmotion.robot.coordinates import (
     Coordinate as Coordinate,
     FrameCoordinate as FrameCoordinate,
@@ -33,4 +37,9 @@ from selfmotion.robot.placements import (
 )
 from selfmotion.robot.tool_rates import ToolRates as ToolRates
 from selfmotion.robot.tree_arrays import ChainArrays as ChainArrays, TreeArrays as TreeArrays
-from selfmotion.robot.urdf import Urdf as Urdf, UrdfJoint as UrdfJoint, UrdfPart as UrdfPart
+from selfmotion.robot.urdf import (
+    TOOL_JOINT as TOOL_JOINT,
+    Urdf as Urdf,
+    UrdfJoint as UrdfJoint,
+    UrdfPart as UrdfPart,
+)

@@ -18,14 +18,21 @@ _BESIDE = 1e-9
 
 
 def build_robot(
-    urdf: Urdf, tools: Sequence[str], lock: Mapping[str, float], reference: str | None = None
+    urdf: Urdf,
+    tools: Sequence[str],
+    lock: Mapping[str, float],
+    reference: str | None = None,
+    chain: Sequence[UrdfJoint] | None = None,
 ) -> RobotModel:
-    """Build the tree of all joints that move `tools` of a validated URDF; see `load_robot`."""
+    """Build the tree of a `chain` of joints of a validated URDF; see `load_robot`.
+
+    By default of all that move `tools` relative to the reference.
+    """
     for frame in (*tools, *([] if reference is None else [reference])):
         urdf.check_tool(frame)
     full = full_model(urdf)
     _check_lock(urdf, full, lock)
-    chain = _moving(urdf, tools, reference)
+    chain = moving_joints(urdf, tools, reference) if chain is None else chain
     for joint in chain:
         if joint.kind in ("floating", "planar"):
             raise RobotError(
@@ -35,7 +42,7 @@ def build_robot(
         if joint.mimics is not None and joint.name not in lock:
             raise RobotError(
                 f"{urdf.source}: joint '{joint.name}' on the way to '{tools[0]}' mimics "
-                f"'{joint.mimics}'; choose a tool before it, or hold it with lock="
+                f"'{joint.mimics}'; choose a tool or a reference before it, or hold it with lock="
             )
     free = [joint.name for joint in chain if joint.name not in lock]
     where = "the root" if reference is None else f"'{reference}'"
@@ -81,7 +88,7 @@ def build_robot(
     )
 
 
-def _moving(urdf: Urdf, tools: Sequence[str], reference: str | None) -> list[UrdfJoint]:
+def moving_joints(urdf: Urdf, tools: Sequence[str], reference: str | None) -> list[UrdfJoint]:
     """Return the joints that move one of the tools relative to the reference."""
     on_the_way = [] if reference is None else urdf.chain(reference)
     chains = [urdf.chain(tool) for tool in tools]
@@ -112,8 +119,14 @@ def rebuild_robot(
     urdf = urdf.with_continuous(continuous)
     tools = [tool] if isinstance(tool, str) else tool
     pairs = tuple((first, second) for first, second in touching)
+    # All that is not held: a problem may follow other frames than those the arm was loaded for.
+    free = [
+        joint
+        for joint in urdf.joints.values()
+        if joint.kind in ("revolute", "continuous", "prismatic") and joint.name not in locked
+    ]
     return dataclasses.replace(
-        build_robot(urdf, tools, locked, reference),
+        build_robot(urdf, tools, locked, reference, free),
         touching=pairs,
         acceleration_limit=read_only(acceleration_limit),
         jerk_limit=read_only(jerk_limit),
@@ -122,7 +135,7 @@ def rebuild_robot(
 
 def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:
     for name, value in lock.items():
-        if not model.existJointName(name):
+        if not isinstance(name, str) or not model.existJointName(name):
             raise RobotError(
                 f"{urdf.source}: lock names joint '{name}', which is not movable here"
                 f"{nearest(name, model.names[1:])}"

@@ -47,15 +47,16 @@ class Kinematics:
         of `at` refreshes.
     """
 
-    __slots__ = ("_base", "_tip", "chain", "data", "jacobian", "rotation", "translation")
+    __slots__ = ("_base", "_tip", "_world", "chain", "data", "jacobian", "rotation", "translation")
 
     def __init__(self, chain: "Chain", data: Any = None) -> None:
         self.chain, self.data = chain, data or chain.model.createData()
         tip, base = self.data.oMf[chain.tip], self.data.oMf[chain.base]
         self._tip, self._base = (tip.rotation, tip.translation), (base.rotation, base.translation)
+        # Views of Pinocchio's own memory; of a single joint it comes as a vector.
+        self._world: Array = self.data.J.reshape(6, -1)
         if chain.is_rooted:
-            # Views of Pinocchio's own memory.
-            self.jacobian: Array = self.data.J
+            self.jacobian: Array = self._world
             self.rotation, self.translation = self._tip
         else:
             self.jacobian = np.zeros((6, chain.dof), order="F")
@@ -73,7 +74,7 @@ class Kinematics:
         if not chain.is_rooted:
             pin.updateFramePlacement(chain.model, self.data, chain.base)
             rebase(
-                self.data.J,
+                self._world,
                 *self._base,
                 *self._tip,
                 chain.signs,

@@ -11,9 +11,11 @@ import pinocchio as pin
 
 from selfmotion.basics import RobotError, nearest
 from selfmotion.robot.mounting import placed
-from selfmotion.robot.urdf import Urdf, parse_urdf
+from selfmotion.robot.urdf import Urdf, UrdfJoint, parse_urdf
 
 WORLD_LINK = "world"
+# The joint that puts a part where it stands is called PART/placement.
+_PLACEMENT = "placement"
 # What of a URDF carries the name of a link, a joint or a material, by element and attribute.
 _NAMES = (
     ("link", "name"),
@@ -24,6 +26,11 @@ _NAMES = (
     ("material", "name"),
     ("link/visual/material", "name"),
 )
+
+
+def is_placement(joint: UrdfJoint) -> bool:
+    """Return whether a joint puts a part of a cell where it stands."""
+    return joint.kind == "fixed" and joint.name == f"{joint.child.partition('/')[0]}/{_PLACEMENT}"
 
 
 def composed(
@@ -60,7 +67,7 @@ def composed(
     links = {f"{name}/{link}" for name, urdf in parts.items() for link in urdf.links}
     for name, urdf in parts.items():
         carrier = on.get(name, WORLD_LINK)
-        if carrier not in links and carrier != WORLD_LINK:
+        if not isinstance(carrier, str) or carrier not in {*links, WORLD_LINK}:
             raise RobotError(
                 f"on: part '{name}' stands on '{carrier}', which is no link"
                 f"{nearest(carrier, sorted(links))}; links are called PART/LINK"
@@ -72,7 +79,7 @@ def composed(
                     element.set(attribute, f"{name}/{element.get(attribute)}")
         cell.extend(root.findall("material") + root.findall("link") + root.findall("joint"))
         pose = base.get(name, pin.SE3.Identity())
-        cell.append(placed(f"{name}/placement", carrier, f"{name}/{urdf.root}", pose))
+        cell.append(placed(f"{name}/{_PLACEMENT}", carrier, f"{name}/{urdf.root}", pose))
     text = ElementTree.tostring(cell, encoding="unicode")
     folders = dict.fromkeys(folder for urdf in parts.values() for folder in urdf.package_dirs)
     found = parse_urdf(text, source=" + ".join(parts), package_dirs=tuple(folders))

@@ -171,6 +171,11 @@ def _parts(
             raise RobotError(
                 f"robot: a part is called {shown(name)}, expected a name of letters, digits and _"
             )
+        if not isinstance(robots[name], str | Path):
+            raise RobotError(
+                f"robot: part '{name}' is {shown(robots[name])}, expected a name or the path of a "
+                f"file"
+            )
     if not robots:
         raise RobotError("robot: there is no part, expected names with robots")
     if not isinstance(base, Mapping | None):

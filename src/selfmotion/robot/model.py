@@ -131,7 +131,11 @@ class RobotModel:
     @property
     def reach(self) -> float:
         """How far from its root the tool can be at most [m]: an upper bound, link by link."""
-        arrays = self.chain.arrays
+        return self.reach_of(self.chain)
+
+    def reach_of(self, chain: Chain) -> float:
+        """Return how far from its base the tip of a chain can be at most [m]."""
+        arrays = chain.arrays
         links = np.vstack([arrays.tree.positions, arrays.tip_position])
         slides = [
             float(max(abs(low), abs(high)))
@@ -165,6 +169,8 @@ class RobotModel:
         RobotError
             No joint belongs to a part of that name, nor has the name.
         """
+        if not isinstance(weights, Mapping):
+            raise RobotError(f"weights are {shown(weights)}, expected a dict of parts or joints")
         found = self.joint_weights.copy()
         for name, weight in weights.items():
             mine = np.array([j == name or j.startswith(f"{name}/") for j in self.joint_names])

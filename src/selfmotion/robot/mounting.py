@@ -55,8 +55,10 @@ def mounting_of(urdf: Urdf, tool: str) -> Mounting:
         if joint.get("name") in MOUNTING_JOINTS and origin is not None:
             xyz, rpy = ([float(x) for x in origin.get(k, "").split()] for k in ("xyz", "rpy"))
             found[joint.get("name")] = (xyz, rpy)
-    own = urdf.joints[TOOL_JOINT].parent if TOOL_JOINT in urdf.joints else tool
-    return Mounting(own, found.get(BASE_JOINT), found.get(TOOL_JOINT))
+    offset = urdf.joints.get(TOOL_JOINT)
+    if offset is None or offset.child != tool:
+        return Mounting(tool, found.get(BASE_JOINT), None)
+    return Mounting(offset.parent, found.get(BASE_JOINT), found.get(TOOL_JOINT))
 
 
 def _joined(urdf: Urdf, joint: str, parent: str, child: str, new: str, pose: pin.SE3) -> Urdf:

@@ -96,7 +96,7 @@ class _Poses:
         if not len(found):
             seeds = np.array(list(spread(self._robot, MORE_SEEDS, self._rng)))
             found = self._reached(t, seeds, far=True)
-        if len(found):
+        if len(found) or len(self._follows.items) > 1:
             return found
         try:
             q = self._robot.inverse_kinematics(
@@ -138,12 +138,17 @@ def _out_of_reach(problem: Problem, robot: RobotModel, time: float, q: Array, be
             robot.inverse_kinematics(problem.path.pose(t), problem.task, seed=q, attempts=1)
         except InverseKinematicsError as error:
             misses.append((error.position_miss, error.rotation_miss, float(t)))
+    begin = f"from t = {time:.6g} s on the pose is out of reach{_cause(problem, robot, q)}"
+    if len(problem.follows.items) > 1:
+        names = " and ".join(f"'{item.chain.tip_name}'" for item in problem.follows.items)
+        return f"{begin}: no configuration was found that puts {names} on their paths"
+    if not misses:
+        return begin
     position, rotation, when = max(misses, key=lambda miss: miss[0] + miss[1])
     turned = f" and {rotation:.2g} rad" if np.any(problem.task.rows >= 3) else ""
     return (
-        f"from t = {time:.6g} s on the pose is out of reach{_cause(problem, robot, q)}: the "
-        f"nearest configuration found misses it by up to {1e3 * position:.3g} mm{turned}, at "
-        f"t = {when:.4g} s"
+        f"{begin}: the nearest configuration found misses it by up to "
+        f"{1e3 * position:.3g} mm{turned}, at t = {when:.4g} s"
     )
 
 
@@ -155,7 +160,7 @@ def _cause(problem: Problem, robot: RobotModel, q: Array) -> str:
         names = ", ".join(f"'{robot.joint_names[k]}'" for k in np.flatnonzero(near))
         causes.append(f"at its limit: joint {names}")
     here, best = (
-        float(np.linalg.svd(robot.task_jacobian(x, task), compute_uv=False)[-1])
+        float(np.linalg.svd(problem.follows.jacobian(x), compute_uv=False)[-1])
         for x in (q, robot.dexterous_configuration(task))
     )
     if here < STRETCHED * best:
