@@ -10,6 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.certificate import FinishedMotion
 from selfmotion.collision import CollisionModel
+from selfmotion.replay.facts import describe, facts
 from support.own_kinematics import Arm, along
 from support.random_cells import LEFT, RIGHT, random_cell, random_follows
 
@@ -63,6 +64,15 @@ def test_a_hand_that_lets_go_is_not_verified(carried: sm.Plan) -> None:
     assert not found.verified
     assert f"'{HANDS[1]}' is 2.00e-03 rad off the path" in found.verdict
     assert found.position_error.value < TOLERANCE
+
+
+def test_a_table_of_facts_has_the_rows_of_every_hand(carried: sm.Plan) -> None:
+    rows = facts(carried)
+    assert rows["task"][0] == "pose and pose"
+    assert rows["task"][1].startswith("12 rows, 14 joints")
+    assert f"position error of {HANDS[1]}, worst" in rows
+    assert f"rotation error of {HANDS[1]}, worst" in rows
+    assert "2 tool motions" in describe(carried)
 
 
 def test_plans_of_cells_are_saved_and_their_problems_written(

@@ -47,13 +47,7 @@ from selfmotion.motion import (
 )
 from selfmotion.path import Path
 from selfmotion.problem.fit import check_fit, rest_orders
-from selfmotion.problem.given import (
-    SEQUENCES,
-    check_costs,
-    check_judged,
-    check_kinds,
-    check_start,
-)
+from selfmotion.problem.given import SEQUENCES, check_costs, check_judged, check_kinds, check_start
 from selfmotion.robot import RobotModel
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 
