@@ -94,16 +94,17 @@ def load(folder: Path) -> PathProblem:
     disabled = tuple((first, second) for first, second in description.get("disabled_pairs", ()))
     left_out = {frozenset(pair) for pair in (*disabled, *robot.touching)}
     criteria = description["criteria"]
+    judge = SuiteJudge(robot, boxes, left_out, criteria, free_axis)
     return PathProblem(
         description["name"],
         robot,
         sm.Waypoints.from_csv(folder / "path.csv"),
         "pose" if free_axis is None else "pointing",
         tuple(sm.Box(f"box{k}", pose, size) for k, (size, pose) in enumerate(boxes)),
-        disabled,
+        (*disabled, *judge.neighbours),
         criteria,
         tuple(description.get(f"reference_path_length_{unit}") for unit in ("rad", "m")),
-        SuiteJudge(robot, boxes, left_out, criteria, free_axis),
+        judge,
     )
 
 

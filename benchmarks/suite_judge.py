@@ -88,10 +88,13 @@ class SuiteJudge:
         for k, (size, pose) in enumerate(boxes):
             box = pin.GeometryObject(f"box {k}", 0, 0, pose, coal.Box(*np.asarray(size)))
             self._bodies.addGeometryObject(box)
+        # Pairs that at most one joint moves: not judged, so that planners need not ask it.
+        self.neighbours: list[tuple[str, str]] = []
         for i, (name, joint) in enumerate(links):
             for j, (other, above) in enumerate(links[:i]):
-                judged = frozenset((name, other)) not in disabled
-                if judged and self._joints_between(joint, above) > 1:
+                if self._joints_between(joint, above) <= 1:
+                    self.neighbours.append((other, name))
+                elif frozenset((name, other)) not in disabled:
                     self._bodies.addCollisionPair(pin.CollisionPair(j, i))
             # What no joint moves is where it is.
             for k in range(len(boxes)) if joint else ():
