@@ -5,27 +5,17 @@ import pytest
 
 import selfmotion as sm
 from selfmotion import testing
-from selfmotion.basics import Array
 from selfmotion.certificate import FinishedMotion
 from support.arms import PANDA_HOME
+from support.circles import coordinate_along, small_circle
 from support.coordinates import COORDINATES
-
-
-def circle(robot: sm.RobotModel, **options) -> sm.Problem:
-    path = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 3.0)
-    return sm.Problem(robot, path, start=PANDA_HOME, **options)
-
-
-def along(plan: sm.Plan, coordinate: sm.Coordinate) -> Array:
-    t = np.linspace(0.0, plan.path.duration, 4001)
-    return coordinate(plan.robot, plan.trajectory(t))[0]
 
 
 @pytest.mark.parametrize("name", COORDINATES)
 def test_bands_and_pulls_keep_the_laws(panda: sm.RobotModel, name: str) -> None:
     coordinate = COORDINATES[name]
     value = float(coordinate(panda, PANDA_HOME[None])[0][0])
-    problem = circle(panda, task="position")
+    problem = small_circle(panda, task="position")
     testing.check_constraint(sm.Band(coordinate, value + 0.05, 0.1), problem)
     testing.check_cost(sm.Towards(panda, coordinate, value + 0.3), panda)
 
@@ -33,17 +23,17 @@ def test_bands_and_pulls_keep_the_laws(panda: sm.RobotModel, name: str) -> None:
 @pytest.mark.parametrize("name", ["joint", "height", "swivel"])
 def test_a_band_is_kept_and_judged_at_all_times(panda: sm.RobotModel, name: str, tmp_path) -> None:
     coordinate = COORDINATES[name]
-    free = sm.plan(circle(panda, task="position"))
-    values = along(free, coordinate)
+    free = sm.plan(small_circle(panda, task="position"))
+    values = coordinate_along(free, coordinate)
     center, reach = float(values[0]), float(np.abs(values - values[0]).max())
     judged = sm.Band(coordinate, center, 2.0 * reach).requirement(panda)
     found = judged.judge(FinishedMotion(panda, free.trajectory))
     assert 0.5 <= found.amount <= 0.5 * (1.0 + 1e-4)
     band = sm.Band(coordinate, center, 0.5 * reach)
     constraints = [sm.JointPositionLimits(), sm.JointVelocityLimits(), band]
-    plan = sm.plan(circle(panda, task="position", constraints=constraints))
+    plan = sm.plan(small_circle(panda, task="position", constraints=constraints))
     assert plan.certificate.verified, plan.certificate.verdict
-    assert np.abs(along(plan, coordinate) - center).max() <= 0.5 * reach
+    assert np.abs(coordinate_along(plan, coordinate) - center).max() <= 0.5 * reach
     assert plan.report.cost > free.report.cost
     refused = dict.fromkeys([band.requirement(panda)])
     wrong = sm.certify(panda, free.path, "position", free.trajectory, None, tuple(refused))

@@ -7,20 +7,15 @@ import selfmotion as sm
 from selfmotion import testing
 from selfmotion.certificate import FinishedMotion
 from selfmotion.robot import ToolRates
-from support.arms import PANDA_HOME
+from support.circles import small_circle
 
 # Central differences of poses and of rates.
 DIFFERENCE = 1e-6
 
 
-def circle(robot: sm.RobotModel, **options) -> sm.Problem:
-    path = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 3.0)
-    return sm.Problem(robot, path, start=PANDA_HOME, **options)
-
-
 @pytest.fixture
 def free(panda: sm.RobotModel) -> sm.Plan:
-    return sm.plan(circle(panda, task="position"))
+    return sm.plan(small_circle(panda, task="position"))
 
 
 def test_derivatives_equal_central_differences(panda: sm.RobotModel) -> None:
@@ -45,7 +40,7 @@ def test_derivatives_equal_central_differences(panda: sm.RobotModel) -> None:
 @pytest.mark.parametrize("task", ["pose", "position", "pointing"])
 def test_the_constraint_keeps_the_laws(panda: sm.RobotModel, task: str) -> None:
     limits = sm.ToolLimits(0.3, 0.5, 1.0, 2.0)
-    testing.check_constraint(limits, circle(panda, task=task))
+    testing.check_constraint(limits, small_circle(panda, task=task))
 
 
 def test_what_the_task_leaves_free_keeps_its_limit(
@@ -63,7 +58,9 @@ def test_what_the_task_leaves_free_keeps_its_limit(
     found = wide.judge(FinishedMotion(panda, free.trajectory))
     assert 0.5 <= found.amount <= 0.5 * (1.0 + 1e-4)
     asked = sm.ToolLimits(turn_rate=0.5 * fastest)
-    plan = sm.plan(circle(panda, task="position", constraints=[sm.JointVelocityLimits(), asked]))
+    plan = sm.plan(
+        small_circle(panda, task="position", constraints=[sm.JointVelocityLimits(), asked])
+    )
     assert plan.certificate.verified, plan.certificate.verdict
     assert "tool turn rate" in plan.certificate.covers
     assert turn_rate(plan) <= 0.5 * fastest
@@ -73,11 +70,11 @@ def test_what_the_task_leaves_free_keeps_its_limit(
 
 
 def test_a_path_that_is_too_fast_is_refused_with_the_amount(panda: sm.RobotModel) -> None:
-    path = circle(panda).path
+    path = small_circle(panda).path
     t = np.linspace(0.0, path.duration, 4001)
     fastest = np.linalg.norm(path.samples(t).twist[:, :3], axis=1).max()
     limits = sm.ToolLimits(speed=0.5 * fastest)
-    plan = sm.plan(circle(panda, constraints=[limits]), max_evaluations=20)
+    plan = sm.plan(small_circle(panda, constraints=[limits]), max_evaluations=20)
     assert not plan.certificate.verified
     assert "give it 2 times the duration" in plan.certificate.verdict
 

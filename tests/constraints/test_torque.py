@@ -9,20 +9,17 @@ import selfmotion as sm
 from selfmotion import testing
 from selfmotion.certificate import FinishedMotion
 from selfmotion.robot import Dynamics
-from support.arms import PANDA_HOME
-
-
-def circle(panda: sm.RobotModel, **options) -> sm.Problem:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    return sm.Problem(panda, path, start=PANDA_HOME, **options)
+from support.circles import upright_circle
 
 
 def test_the_constraint_keeps_the_laws(panda: sm.RobotModel) -> None:
-    testing.check_constraint(sm.JointTorqueLimits(limit=20.0), circle(panda, task="position"))
+    testing.check_constraint(
+        sm.JointTorqueLimits(limit=20.0), upright_circle(panda, task="position")
+    )
 
 
 def test_torques_are_kept_and_judged_at_all_times(panda: sm.RobotModel, tmp_path) -> None:
-    free = sm.plan(circle(panda, task="position"))
+    free = sm.plan(upright_circle(panda, task="position"))
     dynamics, t = Dynamics(panda, 3.0), np.linspace(0.0, 4.0, 20_001)
     motion = free.trajectory
     needed = np.abs(dynamics.torques(motion(t), motion(t, 1), motion(t, 2)))
@@ -36,7 +33,7 @@ def test_torques_are_kept_and_judged_at_all_times(panda: sm.RobotModel, tmp_path
     limit[joint] = 0.985 * needed[:, joint].max()
     asked = sm.JointTorqueLimits(limit, payload=3.0)
     constraints = [sm.JointPositionLimits(), sm.JointVelocityLimits(), asked]
-    plan = sm.plan(circle(panda, task="position", constraints=constraints))
+    plan = sm.plan(upright_circle(panda, task="position", constraints=constraints))
     assert plan.certificate.verified, plan.certificate.verdict
     assert "torques" in plan.certificate.covers
     motion = plan.trajectory
@@ -74,7 +71,7 @@ def test_whole_turns_between_samples_hide_nothing(panda: sm.RobotModel) -> None:
 
 def test_a_payload_that_is_too_heavy_is_refused(panda: sm.RobotModel) -> None:
     heavy = sm.JointTorqueLimits(payload=30.0)
-    plan = sm.plan(circle(panda, constraints=[heavy]), max_evaluations=30)
+    plan = sm.plan(upright_circle(panda, constraints=[heavy]), max_evaluations=30)
     assert not plan.certificate.verified
     assert re.search(
         r"torque of joint 'panda_joint\d' is \S+ Nm at t = \S+ s, \S+ times its limit of (12|87)",

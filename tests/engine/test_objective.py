@@ -23,7 +23,7 @@ from support.arms import (
     start_of,
 )
 from support.random_cells import LEFT, RIGHT, random_cell, random_follows
-from support.rollouts import rollout_of
+from support.rollouts import assert_sensitivities, rollout_of
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -139,15 +139,4 @@ def test_sensitivities_equal_central_differences(case: Case) -> None:
     functions = PolynomialNullMotion(1, "joint").functions(rollout.grid.stage_times, path.duration)
     table = NullMotionTable(functions, None, robot.dof)
     x = 0.1 * np.random.default_rng(9).normal(size=table.size)
-    assert rollout.run(start, table.epsilon(x)) is None
-    _, exact = rollout.sensitivities(table.matrix(), np.zeros((robot.dof, table.size)))
-    for i in range(table.size):
-        shift = np.zeros_like(x)
-        shift[i] = 1e-6
-        ends = []
-        for sign in (1.0, -1.0):
-            assert rollout.run(start, table.epsilon(x + sign * shift)) is None
-            ends.append(rollout.samples().qd.copy())
-        differences = (ends[0] - ends[1]) / 2e-6
-        scale = max(1.0, np.abs(differences).max())
-        np.testing.assert_allclose(exact[:, :, i], differences, atol=GRADIENT * scale)
+    assert_sensitivities(rollout, table, start, x, GRADIENT)

@@ -7,7 +7,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.engine.remaining import _within, finest
-from support.arms import PANDA_HOME
+from support.circles import upright_circle
 
 # The quadratic model against what a spline of 64 intervals truly saves.
 AGREEMENT = 0.25
@@ -19,20 +19,17 @@ CUBIC = sm.PolynomialNullMotion()
 FINE = sm.BSplineNullMotion(64)
 
 
-def circle(panda: sm.RobotModel, **options) -> sm.Problem:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    return sm.Problem(panda, path, start=PANDA_HOME, **options)
-
-
 @pytest.mark.parametrize("case", ["sample", "pose", "speed binds", "relaxed"])
 def test_the_estimate_is_near_what_a_fine_spline_saves(panda: sm.RobotModel, case: str) -> None:
     # Of redundancy 4, where 64 intervals would take long: 16 are near enough.
     slow, fewer = sm.JointVelocityLimits(0.527), sm.BSplineNullMotion(16)
     problem = {
         "sample": lambda: sm.sample_problem(),
-        "pose": lambda: circle(panda, costs=[sm.JointVelocity(), sm.InverseManipulability(0.02)]),
-        "speed binds": lambda: circle(panda, task="position", constraints=[slow]),
-        "relaxed": lambda: circle(panda, relaxations=[sm.Relaxation("z", 5e-3)]),
+        "pose": lambda: upright_circle(
+            panda, costs=[sm.JointVelocity(), sm.InverseManipulability(0.02)]
+        ),
+        "speed binds": lambda: upright_circle(panda, task="position", constraints=[slow]),
+        "relaxed": lambda: upright_circle(panda, relaxations=[sm.Relaxation("z", 5e-3)]),
     }[case]()
     cubic, fine = (
         sm.plan(dataclasses.replace(problem, null_motion=motion))
@@ -63,11 +60,11 @@ def test_the_default_refines_itself_until_little_is_left() -> None:
 
 
 def test_where_the_cubic_is_enough_it_stays(panda: sm.RobotModel) -> None:
-    plan = sm.plan(circle(panda))
+    plan = sm.plan(upright_circle(panda))
     assert plan.report.null_motion == sm.RefinedNullMotion()
     assert 0.0 < plan.report.remaining <= 1e-3 * plan.report.cost
     wanted = sm.RefinedNullMotion(gain=1e-6, most=16)
-    finer = sm.plan(circle(panda, null_motion=wanted))
+    finer = sm.plan(upright_circle(panda, null_motion=wanted))
     assert finer.report.null_motion in (sm.BSplineNullMotion(8), sm.BSplineNullMotion(16))
     assert finer.report.cost < plan.report.cost
 
@@ -84,7 +81,7 @@ def test_a_plan_keeps_what_its_coefficients_are_of(tmp_path) -> None:
 
 def test_without_a_motion_that_keeps_its_constraints_nothing_is_estimated(panda) -> None:
     tight = sm.JointVelocityLimits(np.full(7, 0.1))
-    plan = sm.plan(circle(panda, constraints=[tight]), max_evaluations=20)
+    plan = sm.plan(upright_circle(panda, constraints=[tight]), max_evaluations=20)
     assert not plan.certificate.verified
     assert plan.report.remaining is None
 

@@ -4,16 +4,12 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from support.arms import PANDA_HOME, robot_named
+from support.arms import robot_named
+from support.circles import small_circle
 from support.coordinates import COORDINATES
 
 # Central differences of coordinates.
 DIFFERENCE = 1e-7
-
-
-def circle(robot: sm.RobotModel, **options) -> sm.Problem:
-    path = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 3.0)
-    return sm.Problem(robot, path, start=PANDA_HOME, **options)
 
 
 @pytest.mark.parametrize("name", COORDINATES)
@@ -85,7 +81,7 @@ def test_sides_are_those_of_who_looks_along_the_arm() -> None:
 )
 def test_what_cannot_be_a_coordinate(panda: sm.RobotModel, make, message: str) -> None:
     with pytest.raises(sm.ProblemError, match=message):
-        circle(panda, constraints=[make(panda)])
+        small_circle(panda, constraints=[make(panda)])
 
 
 def test_an_arm_of_other_joints_has_to_be_told_its_elbow() -> None:

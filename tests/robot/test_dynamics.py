@@ -10,7 +10,8 @@ import yourdfpy
 
 import selfmotion as sm
 from selfmotion.robot import Dynamics
-from support.arms import PANDA_HOME, robot_named
+from support.arms import robot_named
+from support.circles import upright_circle
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
@@ -124,11 +125,6 @@ def test_torques_equal_those_of_another_recursion(name: str, loaded: bool) -> No
         )
 
 
-def circle(panda: sm.RobotModel, **options) -> sm.Problem:
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    return sm.Problem(panda, path, start=PANDA_HOME, **options)
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -140,7 +136,7 @@ def circle(panda: sm.RobotModel, **options) -> sm.Problem:
 )
 def test_payloads_that_make_no_sense(panda: sm.RobotModel, options: dict, message: str) -> None:
     with pytest.raises(sm.ProblemError, match=message):
-        circle(panda, constraints=[sm.JointTorqueLimits(**options)])
+        upright_circle(panda, constraints=[sm.JointTorqueLimits(**options)])
 
 
 def test_an_arm_without_masses_is_refused(panda: sm.RobotModel, tmp_path: Path) -> None:
@@ -149,4 +145,4 @@ def test_an_arm_without_masses_is_refused(panda: sm.RobotModel, tmp_path: Path) 
     (tmp_path / "bare.urdf").write_text(bare)
     robot = sm.load_robot(tmp_path / "bare.urdf", tool=panda.tool)
     with pytest.raises(sm.ProblemError, match="gives no masses"):
-        circle(robot, constraints=[sm.JointTorqueLimits()])
+        upright_circle(robot, constraints=[sm.JointTorqueLimits()])

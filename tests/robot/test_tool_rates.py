@@ -6,17 +6,12 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.robot import ToolRates
-from support.arms import PANDA_HOME
-
-
-def circle(robot: sm.RobotModel, **options) -> sm.Problem:
-    path = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 3.0)
-    return sm.Problem(robot, path, start=PANDA_HOME, **options)
+from support.circles import small_circle
 
 
 @pytest.fixture
 def free(panda: sm.RobotModel) -> sm.Plan:
-    return sm.plan(circle(panda, task="position"))
+    return sm.plan(small_circle(panda, task="position"))
 
 
 def test_rates_are_derivatives_of_the_pose(panda: sm.RobotModel, free: sm.Plan) -> None:

@@ -17,6 +17,7 @@ from selfmotion.motion.grid import Grid
 from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.task.damping import DampingLaw
 from support.arms import Case, central_difference, objective_of
+from support.rollouts import assert_sensitivities
 
 # Exact gradients against central differences, relative to the largest entry.
 GRADIENT = 1e-6
@@ -135,23 +136,13 @@ def test_damped_pullback_to_the_start_equals_central_differences(case: Case) -> 
 
 
 def test_damped_sensitivities_equal_central_differences(case: Case) -> None:
-    robot, _, start, _ = case
+    _, _, start, _ = case
     rollout = partly_damped(case, steps=20)
     table = table_of(rollout, 1)
     x = 0.1 * np.random.default_rng(9).normal(size=table.size)
     assert rollout.run(start, table.epsilon(x)) is None
     assert rollout.damped
-    _, exact = rollout.sensitivities(table.matrix(), np.zeros((robot.dof, table.size)))
-    for i in range(table.size):
-        shift = np.zeros_like(x)
-        shift[i] = 1e-6
-        ends = []
-        for sign in (1.0, -1.0):
-            assert rollout.run(start, table.epsilon(x + sign * shift)) is None
-            ends.append(rollout.samples().qd.copy())
-        differences = (ends[0] - ends[1]) / 2e-6
-        scale = max(1.0, np.abs(differences).max())
-        np.testing.assert_allclose(exact[:, :, i], differences, atol=GRADIENT * scale)
+    assert_sensitivities(rollout, table, start, x, GRADIENT)
 
 
 def test_damping_fades_in_continuously_differentiable() -> None:

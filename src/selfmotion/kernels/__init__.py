@@ -9,9 +9,8 @@ one solve:
     q̇ = Jᵀy + ε = J⁺u + (I - J⁺J) ε.
 
 Python calls `advance`, `approach_start`, `pullback`, `sensitivities`, `contract_task` and
-`transport`. Each is
-made of small kernels, which LLVM inlines, and is compiled for what it is given: who has no damping,
-or a path that does not move, does not wait for theirs.
+`transport`. Each is made of small kernels, which LLVM inlines, and is compiled for what it is
+given: who has no damping, or a path that does not move, does not wait for theirs.
 """
 
 from selfmotion.kernels.algebra import (
@@ -41,6 +40,7 @@ from selfmotion.kernels.table import (
     view as view,
 )
 from selfmotion.kernels.tool import (
+    errors_and_rows as errors_and_rows,
     pose_error as pose_error,
     rows_of as rows_of,
     select as select,

@@ -3,10 +3,9 @@
 import numpy as np
 
 from selfmotion.basics import Array, kernel
-from selfmotion.basics.layout import KIND, Layout
+from selfmotion.basics.layout import Layout
 from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
-from selfmotion.kernels.table import view
-from selfmotion.kernels.tool import pose_error, rows_of, select, task_rows
+from selfmotion.kernels.tool import errors_and_rows, rows_of
 
 
 @kernel
@@ -28,13 +27,9 @@ def approach_start(
     singular, NaN where q is not finite.
     """
     m, r, n = rows_of(layout), null.shape[1], q.shape[0]
-    error, b = np.zeros(6), np.empty(m + r)
+    b = np.empty(m + r)
     system, factor = np.empty((m + r, n)), np.empty((m + r, m + r))
-    for f in range(layout.shape[0]):
-        place, turn = view(target, 12 * f, (3,)), view(target, 12 * f + 3, (3, 3))
-        pose_error(layout[f, KIND], place, turn, translations[f], rotations[f], error)
-        select(layout, f, rotations[f], error, b)
-        task_rows(layout, f, rotations[f], jacobians[f], system)
+    errors_and_rows(layout, target, jacobians, rotations, translations, b, system)
     for i in range(r):
         b[m + i] = z[i]
         for k in range(n):

@@ -2,6 +2,8 @@
 
 from math import atan2, sqrt, tan
 
+import numpy as np
+
 from selfmotion.basics import Array, inlined
 from selfmotion.basics.layout import (
     COUNT,
@@ -22,6 +24,7 @@ from selfmotion.kernels.algebra import (
     linear,
     plus,
 )
+from selfmotion.kernels.table import view
 
 # Below this angle the closed forms in sin θ lose digits and their series serve: to 1e-15 there.
 _SMALL = 0.05
@@ -136,6 +139,29 @@ def pointing_coefficients(sine: float, cosine: float) -> tuple[float, float]:
         slope = 1.0 / 3.0 + square * (2.0 / 15.0 + square * (2.0 / 63.0 + square * 4.0 / 675.0))
         return f, -slope
     return angle / sine, (angle * cosine - sine) / (sine * sine * sine)
+
+
+@inlined
+def errors_and_rows(
+    layout: Layout,
+    target: Array,
+    jacobians: Array,
+    rotations: Array,
+    translations: Array,
+    values: Array,
+    out: Array,
+) -> None:
+    """Set the first m `values` to all tips' errors S e, and the first m rows of `out` to J = S J6.
+
+    Tips are where the last evaluation had them, (F, 6, n), (F, 3, 3) and (F, 3); `target` (12 F,)
+    is as `Follows.targets` has it.
+    """
+    error = np.zeros(6)
+    for f in range(layout.shape[0]):
+        place, turn = view(target, 12 * f, (3,)), view(target, 12 * f + 3, (3, 3))
+        pose_error(layout[f, KIND], place, turn, translations[f], rotations[f], error)
+        select(layout, f, rotations[f], error, values)
+        task_rows(layout, f, rotations[f], jacobians[f], out)
 
 
 @inlined

@@ -3,16 +3,13 @@
 import numpy as np
 
 from selfmotion.basics import Array, Flags, inlined, kernel
-from selfmotion.basics.layout import KIND, Layout
+from selfmotion.basics.layout import Layout
 from selfmotion.kernels import (
     cholesky,
+    errors_and_rows,
     gram,
-    pose_error,
     rows_of,
-    select,
     solve_cholesky,
-    task_rows,
-    view,
 )
 from selfmotion.robot import ChainArrays, TreeArrays, compose, placements
 
@@ -34,17 +31,12 @@ def correct(
     """Add J⁺e to q, no longer than `longest`, and project `tangent` onto the null space of J.
 
     Of all tips, (F, 6, n), (F, 3, 3) and (F, 3); `target` (12 F,) is as `Follows.targets` has it.
-    Returns the norm of the correction
-    before it was shortened; -1 where J has no full rank.
+    Returns the norm of the correction before it was shortened; -1 where J has no full rank.
     """
     n, m = jacobians.shape[2], rows_of(layout)
-    error, z, along = np.zeros(6), np.empty(m), np.zeros(m)
+    z, along = np.empty(m), np.zeros(m)
     jacobian, factor = np.empty((m, n)), np.empty((m, m))
-    for f in range(layout.shape[0]):
-        place, turn = view(target, 12 * f, (3,)), view(target, 12 * f + 3, (3, 3))
-        pose_error(layout[f, KIND], place, turn, translations[f], rotations[f], error)
-        select(layout, f, rotations[f], error, z)
-        task_rows(layout, f, rotations[f], jacobians[f], jacobian)
+    errors_and_rows(layout, target, jacobians, rotations, translations, z, jacobian)
     for i in range(m):
         for k in range(n):
             along[i] += jacobian[i, k] * tangent[k]
