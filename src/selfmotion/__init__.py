@@ -107,6 +107,8 @@ from selfmotion.formats import (
 )
 from selfmotion.motion import (
     BSplineNullMotion as BSplineNullMotion,
+    FreeNullMotion as FreeNullMotion,
+    NodeNullMotion as NodeNullMotion,
     NullMotion as NullMotion,
     PolynomialNullMotion as PolynomialNullMotion,
     RefinedNullMotion as RefinedNullMotion,

@@ -60,7 +60,7 @@ def test_the_default_refines_itself_until_little_is_left() -> None:
 
 
 def test_where_the_cubic_is_enough_it_stays(panda: sm.RobotModel) -> None:
-    plan = sm.plan(upright_circle(panda))
+    plan = sm.plan(upright_circle(panda, null_motion=sm.RefinedNullMotion()))
     assert plan.report.null_motion == sm.RefinedNullMotion()
     assert 0.0 < plan.report.remaining <= 1e-3 * plan.report.cost
     wanted = sm.RefinedNullMotion(gain=1e-6, most=16)

@@ -142,6 +142,6 @@ def test_accelerations_of_a_plan_are_those_of_its_velocities(panda, task: str) -
     start = panda.dexterous_configuration(task)
     path = sm.Circle.around(panda.pose(start), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
     motion = sm.plan(sm.Problem(panda, path, task, start)).trajectory
-    t, h = np.linspace(0.1, 3.9, 77), 1e-5
+    t, h = np.linspace(0.1, 3.9, 77), 1e-6
     difference = (motion(t + h, 1) - motion(t - h, 1)) / (2 * h)
     np.testing.assert_allclose(motion(t, 2), difference, atol=1e-6)

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -42,9 +43,13 @@ class Cost(Saved, ABC, family="cost"):
     ----------
     name : str
         What to call the cost in reports.
+    is_quadratic : bool
+        Whether G is of second degree in q and its derivatives, with `curvature` for all that bends:
+        Newton's method needs that.
     """
 
     name: str
+    is_quadratic: ClassVar[bool] = False
 
     @abstractmethod
     def value(self, samples: Samples) -> Array:

@@ -34,6 +34,8 @@ from selfmotion.robot import RobotModel
 class _Quadratic(Cost):
     """What the quadratic costs share: the weight W."""
 
+    is_quadratic: ClassVar[bool] = True
+
     weight: float | npt.ArrayLike = 1.0
     name: str = ""
 

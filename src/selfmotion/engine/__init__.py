@@ -1,5 +1,6 @@
 """From a decision vector to the motion, its cost, and the gradient."""
 
+from selfmotion.engine.conditions import Conditions as Conditions
 from selfmotion.engine.counts import Counts as Counts
 from selfmotion.engine.deviation import Deviation as Deviation
 from selfmotion.engine.frame import transport as transport

@@ -19,8 +19,10 @@ from selfmotion.kernels.algebra import (
     solve_cholesky as solve_cholesky,
 )
 from selfmotion.kernels.backward import (
+    pull_stage as pull_stage,
     pullback as pullback,
     sensitivities as sensitivities,
+    space_of as space_of,
     space_size as space_size,
 )
 from selfmotion.kernels.contraction import contract_task as contract_task
@@ -28,6 +30,7 @@ from selfmotion.kernels.damping import Law as Law
 from selfmotion.kernels.forward import (
     advance as advance,
     at_tip as at_tip,
+    evaluate as evaluate,
 )
 from selfmotion.kernels.null_space import factor_damped as factor_damped, transport as transport
 from selfmotion.kernels.start import approach_start as approach_start

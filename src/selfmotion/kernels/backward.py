@@ -48,7 +48,7 @@ class Space(NamedTuple):
 
 
 @inlined
-def divide(space: Array, n: int, m: int, tips: int) -> Space:
+def space_of(space: Array, n: int, m: int, tips: int) -> Space:
     """Return the parts of the array to work in, for n joints and m rows of so many tips."""
     return Space(
         w=view(space, 0, (n,)),
@@ -163,7 +163,7 @@ def pullback(
     A stage's slope acts on the later stages of its step and on the step's end.
     """
     (count, n), m = q_cotangent.shape, rows_of(layout)
-    space = divide(work, n, m, layout.shape[0])
+    space = space_of(work, n, m, layout.shape[0])
     by_slope = space.by_slope
     for s in range(count - 1, -1, -1):
         at = stage_of(table[s], n, m)
@@ -210,7 +210,7 @@ def sensitivities(
     """
     count, n, d = epsilon_matrix.shape
     m = rows_of(layout)
-    space = divide(work, n, m, layout.shape[0])
+    space = space_of(work, n, m, layout.shape[0])
     for j in range(n):
         for x in range(d):
             q_matrix[0, j, x] = start_matrix[j, x]

@@ -8,6 +8,8 @@ from selfmotion.motion.joining import (
 )
 from selfmotion.motion.null_motion import (
     BSplineNullMotion as BSplineNullMotion,
+    FreeNullMotion as FreeNullMotion,
+    NodeNullMotion as NodeNullMotion,
     NullMotion as NullMotion,
     NullMotionTable as NullMotionTable,
     PolynomialNullMotion as PolynomialNullMotion,

@@ -7,7 +7,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial import legendre
 
-from selfmotion.basics import Array, ProblemError, Saved, as_choice, as_number, as_whole, shown
+from selfmotion.basics import (
+    Array,
+    ProblemError,
+    Saved,
+    as_choice,
+    as_number,
+    as_numbers,
+    as_whole,
+    shown,
+)
 
 # Intervals of a spline that is worth its while.
 _FEWEST = 8
@@ -32,10 +41,13 @@ class NullMotion(Saved, ABC, family="null motion"):
         ``"null"``: E is (r, K) in a null-space basis; ``"joint"``: E is (n, K), R = I.
     gain : float
         Share of the cost that `finer` functions have to save to be worth their while.
+    comes_to_rest : bool
+        Whether it rests by itself where the arm has to; others are multiplied by what does.
     """
 
     space: str = "null"
     gain: ClassVar[float] = np.inf
+    comes_to_rest: ClassVar[bool] = False
 
     def finer(self, intervals: int, rows: int, rests: bool = False) -> "NullMotion":
         """Return what to go on with where so many `intervals` pay: by default the same.
@@ -202,6 +214,53 @@ class RefinedNullMotion(NullMotion):
         while fewer > _FEWEST and rows * (fewer + 3) > _MOST_COEFFICIENTS:
             fewer //= 2
         return BSplineNullMotion(fewer)
+
+
+@dataclass(frozen=True)
+class FreeNullMotion(RefinedNullMotion):
+    """Any ε(t): the motion is optimised at nodes, as many as its cost asks for.
+
+    Newton's method finds where each node lies on its self-motion. Where that does not apply (the
+    tool may leave the path, joint jerks have a cost, the end is given), or leads nowhere, it is
+    what `RefinedNullMotion` is. `Report.null_motion` tells what became of it.
+    """
+
+
+@dataclass(frozen=True)
+class NodeNullMotion(NullMotion):
+    """ε(t) by its values at nodes, joint by joint, with a cubic spline between: a finished plan's.
+
+    Parameters
+    ----------
+    times : sequence of float
+        Of the nodes, as shares of the duration, from 0 to 1.
+    """
+
+    times: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
+    space: str = "joint"
+    comes_to_rest: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        times = as_numbers(self.times, "null motion: times", "shares of the duration")
+        rising = times.ndim == 1 and len(times) > 3 and bool((np.diff(times) > 0.0).all())
+        if not rising or times[0] != 0.0 or times[-1] != 1.0:
+            raise ProblemError(
+                f"null motion: times are {shown(self.times)}, expected at least four, rising from "
+                f"0 to 1"
+            )
+        as_choice(self.space, "null motion: space", ("joint",))
+        object.__setattr__(self, "times", tuple(float(time) for time in times))
+
+    @property
+    def fewest_steps(self) -> int:
+        """See `NullMotion.fewest_steps`: one for each interval."""
+        return len(self.times) - 1
+
+    def functions(self, t: Array, duration: float) -> Array:
+        """See `NullMotion.functions`: each is 1 at one node and 0 at the others."""
+        from scipy.interpolate import CubicSpline
+
+        return np.asarray(CubicSpline(self.times, np.eye(len(self.times)))(t / duration))
 
 
 def resting_window(t: Array, duration: float, orders: tuple[int, int]) -> Array:

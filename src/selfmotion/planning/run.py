@@ -259,6 +259,13 @@ class _Planning:
         rival_cost = self._settle(best, candidates.rival)
         whole = LargestPart(self._problem, best, "")
         finished = finish(self._problem, whole, self._tolerance, self._progress)
+        if best.has_nodes and not finished.certificate.verified and best.status not in _ENDED:
+            # Between nodes a limit may be passed that smooth functions keep.
+            best.leave_nodes()
+            best = self._met(best)
+            rival_cost = self._settle(best, candidates.rival)
+            whole = LargestPart(self._problem, best, "")
+            finished = finish(self._problem, whole, self._tolerance, self._progress)
         result = self._gather(whole, finished, self._gap(rival_cost, finished))
         if self._stands(best, finished):
             return result

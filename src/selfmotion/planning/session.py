@@ -1,6 +1,6 @@
 """One start of one problem, optimised on a grid that becomes finer."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -19,11 +19,12 @@ from selfmotion.engine import (
     rough_still_motion,
     settled_still_motion,
 )
-from selfmotion.motion import Grid, NullMotion, Trajectory
+from selfmotion.motion import Grid, NodeNullMotion, NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Minimum, Status
 from selfmotion.planning.closing import closed
 from selfmotion.planning.descent import Descent, breaks
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.nodes import NodeDescent, Standing, takes
 from selfmotion.planning.settings import (
     ALIKE,
     COST_AGREEMENT,
@@ -33,7 +34,7 @@ from selfmotion.planning.settings import (
     ROUGH_AGREEMENT,
     THINNER,
 )
-from selfmotion.planning.warm_start import coefficients_of
+from selfmotion.planning.warm_start import coefficients_of, slower
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
 
@@ -61,8 +62,6 @@ class Session:
         What is wrong for each constraint that the last minimisation could not meet.
     active : tuple of Binding
         What kept it from a lower cost.
-    null_motion : NullMotion
-        The parameterisation that the motion has by now.
     remaining : float or None
         What any other one could still save, as far as is known [cost].
     """
@@ -76,10 +75,13 @@ class Session:
         self._minimum: Minimum | None = None
         self._ended: Status | None = None
         self._x = np.zeros(objective.size)
-        self.null_motion: NullMotion = still.problem.null_motion
+        self._null_motion: NullMotion = still.problem.null_motion
         self.remaining: float | None = None
         self._evaluations: int | None = None
         self._tried: NullMotion | None = None
+        self._standing: Standing | None = None
+        self._tried_nodes = False
+        self._warm: Plan | None = None
         self.violations: tuple[str, ...] = ()
         self.active: tuple[Binding, ...] = ()
 
@@ -141,10 +143,17 @@ class Session:
         return self._descent.history
 
     @property
+    def null_motion(self) -> NullMotion:
+        """The parameterisation that the motion has by now."""
+        return self._null_motion if self._standing is None else self._standing.null_motion
+
+    @property
     def status(self) -> Status:
         """How the last minimisation ended, or what ended the session."""
         if self._ended is not None:
             return self._ended
+        if self._standing is not None:
+            return self._standing.status
         return Status.STOPPED if self._minimum is None else self._minimum.status
 
     @property
@@ -155,16 +164,21 @@ class Session:
     def end(self, status: Status) -> None:
         """Take the motion as it is; there is no time for another one."""
         self._ended = status
-        self.violations = self._objective.violations(self._x)
+        if self._standing is None:
+            self.violations = self._objective.violations(self._x)
 
     @property
     def coefficients(self) -> Array:
         """The null motion's coefficients."""
+        if self._standing is not None:
+            return self._standing.coefficients
         return self._objective.parts(self._x)[1].copy()
 
     @property
     def steps(self) -> int:
         """Steps of the present grid."""
+        if self._standing is not None:
+            return self._standing.steps
         return self._objective.grid.steps
 
     @property
@@ -175,11 +189,15 @@ class Session:
     @property
     def nodes(self) -> Array:
         """The motion as it is now, at the nodes of the grid, (N + 1, n)."""
+        if self._standing is not None:
+            return np.array(self._standing.motion.trajectory(self._objective.grid.nodes))
         samples = self._objective.samples(self._x)
         return np.array(samples.q[self._objective.grid.node_stages])
 
     def motion(self) -> Evaluation:
         """Return the motion as it is now."""
+        if self._standing is not None:
+            return self._standing.evaluation()
         return self._objective.at(self._x)
 
     def still_motion(self) -> Evaluation:
@@ -188,6 +206,8 @@ class Session:
 
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""
+        if self._standing is not None:
+            return self._standing.cost
         objective, x = self._objective, self._x
         cost = objective.value(x)
         if not np.isfinite(cost):
@@ -199,17 +219,24 @@ class Session:
         return bool(self.violations), self._cost()
 
     def adopt(self, plan: Plan) -> None:
+        """Begin at a plan's motion instead of x = 0, unless that would be worse."""
+        self._warm = plan
+
+    def _begin_at(self, plan: Plan) -> None:
         """Begin at a plan's null motion instead of x = 0, unless that would be worse."""
-        motion = self.null_motion
-        if plan.report.null_motion is not None and plan.problem.null_motion == motion:
-            motion = plan.report.null_motion
+        motion = self._null_motion
+        known = plan.report.null_motion
+        if plan.problem.null_motion == motion and not isinstance(known, NodeNullMotion | None):
+            motion = known
         grid = self._objective.grid.with_steps(max(motion.fewest_steps, plan.report.steps))
-        pace = plan.path.duration / self._still.problem.path.duration
-        self._begin_along(plan.trajectory, pace, self._on(grid, motion), motion)
+        self._begin_along(plan.trajectory, self._pace(plan), self._on(grid, motion), motion)
+
+    def _pace(self, plan: Plan) -> float:
+        return plan.path.duration / self._still.problem.path.duration
 
     def resume(self, trajectory: Trajectory) -> None:
         """Begin at the null motion of a motion along this path, unless that would be worse."""
-        self._begin_along(trajectory, 1.0, self._objective, self.null_motion)
+        self._begin_along(trajectory, 1.0, self._objective, self._null_motion)
 
     def _begin_along(
         self, trajectory: Trajectory, pace: float, objective: Objective, motion: NullMotion
@@ -217,11 +244,11 @@ class Session:
         problem, t, still = self._still.problem, objective.grid.stage_times, self.merit()
         x = coefficients_of(trajectory, pace, problem, t, objective.null_motion)
         z, _, c = objective.parts(np.zeros(objective.size))
-        before = self._x, self._objective, self.null_motion
+        before = self._x, self._objective, self._null_motion
         self._x, self._objective = np.concatenate([z, x, c]), objective
-        self.null_motion = motion
+        self._null_motion = motion
         if not self.merit() <= still:
-            self._x, self._objective, self.null_motion = before
+            self._x, self._objective, self._null_motion = before
 
     def minimize(self, evaluations: int | None = None) -> None:
         """Optimise on the present grid, from the motion that there is.
@@ -232,7 +259,12 @@ class Session:
             So many of the cost, for a rough optimum; by default what `Effort` allows.
         """
         self._evaluations = evaluations
-        objective, wanted = self._objective, self.null_motion
+        if evaluations is None and self._take_nodes():
+            return
+        if self._warm is not None:
+            warm, self._warm = self._warm, None
+            self._begin_at(warm)
+        objective, wanted = self._objective, self._null_motion
         if not np.isfinite(objective.value(self._x)):
             objective.require_finite(self._x)
         if self._approached():
@@ -245,11 +277,68 @@ class Session:
         self._close()
         self.violations = self._objective.violations(self._x)
 
+    def _take_nodes(self) -> bool:
+        """Go to the optimum on nodes near the motion; return whether that is what stands now."""
+        objective, problem = self._objective, self._still.problem
+        constraints = objective.constraints.constraints
+        led_nowhere = self._tried_nodes and self._standing is None
+        if self._ended is not None or led_nowhere or not takes(problem, self._effort, constraints):
+            return False
+        before = self._standing
+        # What led nowhere once would do so again.
+        self._tried_nodes = True
+
+        def optimum(descent: NodeDescent) -> Standing | None:
+            if before is not None:
+                return descent.again(before)
+            if not np.isfinite(objective.value(self._x)):
+                return None
+            here, t = self.motion().trajectory, objective.grid.nodes
+            warm = self._warm
+            if warm is None or warm.trajectory.t[-1] != warm.path.duration:
+                return descent.near([here], t)
+            return descent.near([slower(warm.trajectory, self._pace(warm)), here], t)
+
+        self._by_nodes(optimum)
+        return self._standing is not None
+
+    @property
+    def has_nodes(self) -> bool:
+        """Whether what stands was found by Newton's method on nodes."""
+        return self._standing is not None
+
+    def leave_nodes(self) -> None:
+        """Go on without nodes, from the motion that they began with."""
+        self._standing, self._tried_nodes = None, True
+        self.minimize()
+
+    def _settle_nodes(self) -> None:
+        """Go on until more nodes change the cost no more."""
+        standing = self._standing
+        if standing is not None and self._ended is None:
+            self._by_nodes(lambda descent: descent.settled(standing))
+
+    def _by_nodes(self, search: Callable[[NodeDescent], Standing | None]) -> None:
+        """Let what is found on nodes be what stands, if something is."""
+        constraints = self._objective.constraints.constraints
+        descent = NodeDescent(self._still.problem, self._effort, constraints, free=self._free)
+        try:
+            found = search(descent)
+        except KeyboardInterrupt:
+            if descent.latest is None and self._standing is None:
+                raise
+            found = descent.latest or self._standing
+            self._ended = Status.INTERRUPTED
+        self._descent.history += descent.history
+        if found is not None:
+            self._standing, self.active, self.violations = found, found.active, ()
+            self.remaining = found.remaining
+
     def _descend(self) -> None:
         """Minimise from where the motion is; by a finer null motion where this one gets stuck."""
         wanted, before = self._still.problem.null_motion, (self._x, self._objective)
         # Where more freedom is taken anyway if it pays, it is a shorter way than restoration.
-        refines = wanted.gain < np.inf and self.null_motion == wanted
+        refines = wanted.gain < np.inf and self._null_motion == wanted
         refines &= self._minimum is None and self._evaluations is None
         self._take_minimum(restores=not refines)
         if not refines or self.status is not Status.INFEASIBLE:
@@ -262,7 +351,7 @@ class Session:
         if not breaks(self._objective, self._x):
             return
         status = self.status
-        self._x, self._objective, self._minimum, self.null_motion = stuck
+        self._x, self._objective, self._minimum, self._null_motion = stuck
         if status in _CUT_SHORT:
             self.end(status)
         else:
@@ -274,7 +363,7 @@ class Session:
         That is sought where conditions are violated at x = 0: with many coefficients, steps would
         be small, and each would cost much.
         """
-        wanted, objective = self.null_motion, self._objective
+        wanted, objective = self._null_motion, self._objective
         z, x, c = objective.parts(self._x)
         first = self._minimum is None and self._evaluations is None and not x.any()
         if wanted.rough == wanted or not first or not breaks(objective, self._x):
@@ -288,10 +377,10 @@ class Session:
                 return False
             rough = self._on(rough.grid.halved(), wanted.rough)
         self._x = np.concatenate([z, np.zeros(rough.null_motion.size), c])
-        self._objective, self.null_motion = rough, wanted.rough
+        self._objective, self._null_motion = rough, wanted.rough
         self._take_minimum()
         if self.status is Status.INFEASIBLE:
-            self._x, self._objective, self.null_motion, self._minimum = *before, wanted, None
+            self._x, self._objective, self._null_motion, self._minimum = *before, wanted, None
             return False
         return True
 
@@ -325,7 +414,7 @@ class Session:
                 continue
             grid = self._still.grid.with_steps(motion.fewest_steps)
             session = Session(self._effort, self._still, self._on(grid, motion), free=self._free)
-            session.null_motion = motion
+            session._null_motion = motion
             session._descent.before, session._descent.history = self._descent.before, self.history
             session.minimize()
             if wanted.gain == np.inf and not (session.violations or session.cut_short):
@@ -338,6 +427,9 @@ class Session:
 
         What freedom is wanted is found on a coarse grid, where it costs little.
         """
+        if self._standing is not None or self._take_nodes():
+            self._settle_nodes()
+            return
         error = self._refine_until(ROUGH_AGREEMENT)
         coarse = self._cost()
         enriched = self._enriched()
@@ -376,6 +468,9 @@ class Session:
 
     def refine(self, where: npt.NDArray[np.bool_] | None = None) -> None:
         """Go on with half the step length, everywhere or for some of the steps (N,)."""
+        if self._standing is not None:
+            self._standing = self._standing.refined(where)
+            return
         self._objective = self._on(self._objective.grid.halved(where))
         self._close()
 
@@ -392,7 +487,7 @@ class Session:
         rows = self._objective.null_motion.rows
         rests = any(self._still.problem.rests)
         finer = wanted.finer(left.intervals(0.5 * enough), rows, rests)
-        if finer in (wanted, self.null_motion):
+        if finer in (wanted, self._null_motion):
             return False
         self._change(finer)
         self.minimize()
@@ -418,12 +513,12 @@ class Session:
         z, x, c = before.parts(self._x)
         grid = before.grid.with_steps(motion.fewest_steps // THINNER)
         t, duration = grid.stage_times, self._still.problem.path.duration
-        own, new = (kind.functions(t, duration) for kind in (self.null_motion, motion))
+        own, new = (kind.functions(t, duration) for kind in (self._null_motion, motion))
         same = np.linalg.lstsq(new, own)[0]
         rows = x.reshape(before.null_motion.rows, -1) @ same.T
         moved = np.concatenate([z, rows.ravel(), c]), self._on(grid, motion)
         # At once: an interruption finds what belongs together.
-        self._x, self._objective, self.null_motion, self._minimum = *moved, motion, None
+        self._x, self._objective, self._null_motion, self._minimum = *moved, motion, None
 
     def _on(
         self, grid: Grid, motion: NullMotion | None = None, around: Array | None = None
@@ -436,11 +531,13 @@ class Session:
             free=self._free,
             constraints=self._objective.constraints.constraints,
             counts=self._effort.counts,
-            null_motion=motion or self.null_motion,
+            null_motion=motion or self._null_motion,
             around=around,
         )
 
     def _cost(self) -> float:
+        if self._standing is not None:
+            return self._standing.cost
         return sum(self._objective.terms(self._x).values())
 
     def _close(self) -> None:

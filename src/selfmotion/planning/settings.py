@@ -16,11 +16,18 @@ THINNER = 2
 # A cost that rises this much on so many grids in turn has no limit.
 RISE = 1.5
 RISES = 2
+# Nodes of Newton's method: at most so many for each stretch of the path on which it is smooth.
+MOST_NODES = 1024
+# Conditions that are nearer than this to being broken [units of h] count with those that are.
+NEARLY = 0.02
+# Where the motion at x = 0 does not lead to what keeps the conditions: the self-motion goes towards
+# the middle of the limits in such shares of the duration.
+TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0)
 # What would save less than this share of the cost does not bind.
 LEAST_SAVING = 1e-6
 # Between its nodes a motion may be off the path by this share of the tolerance where that is looked
 # at, in the middle; and by this share of what it was before steps were halved.
-RESOLVED = 0.5
+RESOLVED = 0.05
 FALLS = 0.7
 # Limits that are exceeded between the nodes on more grids than this are so on any; and nothing is
 # optimised again on grids with more than so many times the steps.

@@ -33,6 +33,13 @@ def start_of(plan: Plan, problem: Problem) -> Array:
     return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task, seed)
 
 
+def slower(trajectory: Trajectory, pace: float) -> Trajectory:
+    """Return the same motion so many times as fast; `pace` is its duration over the new one."""
+    qdd = None if trajectory.qdd is None else pace**2 * trajectory.qdd
+    t, qd = trajectory.t / pace, pace * trajectory.qd
+    return Trajectory(t, trajectory.q, qd, trajectory.joint_names, qdd)
+
+
 def coefficients_of(
     trajectory: Trajectory, pace: float, problem: Problem, t: Array, table: NullMotionTable
 ) -> Array:

@@ -39,8 +39,8 @@ from selfmotion.constraints import (
 from selfmotion.costs import Cost, JointVelocity, OffPath
 from selfmotion.follow import Follow, Follows
 from selfmotion.motion import (
+    FreeNullMotion,
     NullMotion,
-    RefinedNullMotion,
     Trajectory,
     fading_window,
     resting_window,
@@ -54,7 +54,7 @@ from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 # Links must not overlap; one object, so that its bodies are made once for each arm.
 NO_OVERLAP = Clearance(distance=0.0)
 # Defaults of a problem; values, meant to be shared.
-_REFINED = RefinedNullMotion()
+_FREE = FreeNullMotion()
 _KEPT = (JointPositionLimits(), JointVelocityLimits(), JointAccelerationLimits(), JointJerkLimits())
 # Stands for the usual cost of whatever arm it is.
 _USUAL: tuple[Cost, ...] = (JointVelocity(),)
@@ -86,8 +86,7 @@ class Problem:
         q(0) [rad or m]; must put the tool on the start of the path. By default free: many starts
         are tried, and the best ones optimised along with the rest of the motion.
     null_motion : NullMotion
-        The parameterisation of the self-motion. By default the paper's cubic to begin with, and
-        a spline where more freedom pays.
+        The parameterisation of the self-motion. By default any, optimised at nodes.
     costs : sequence of Cost
         Their integrals are added up. By default ∫ ½ q̇ᵀq̇ dt; see `JointVelocity.usual`.
     constraints : sequence of Constraint
@@ -133,7 +132,7 @@ class Problem:
     path: Path
     task: _TaskField = _TaskField()  # a descriptor, meant to be shared
     start: npt.ArrayLike | str | None = None
-    null_motion: NullMotion = _REFINED
+    null_motion: NullMotion = _FREE
     costs: Sequence[Cost] = _USUAL
     constraints: Sequence[Constraint] = _KEPT
     relaxations: Sequence[Relaxation] = ()
@@ -282,6 +281,8 @@ class Problem:
 
     def null_functions(self, t: Array, motion: NullMotion) -> Array:
         """Return φ of a null motion at times `t` (S,), at rest where the arm has to be, (S, K)."""
+        if motion.comes_to_rest:
+            return motion.functions(t, self.path.duration)
         window = resting_window(t, self.path.duration, self.rest_orders)
         return motion.functions(t, self.path.duration) * window[:, None]
 

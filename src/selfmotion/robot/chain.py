@@ -19,6 +19,7 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, Ints
 from selfmotion.robot.placements import rebase
+from selfmotion.robot.tip_places import place_along
 from selfmotion.robot.tree_arrays import ChainArrays, serial_arrays
 
 # The frame that does not move.
@@ -219,12 +220,10 @@ class Chain:
 
     def along(self, q: Array) -> tuple[Array, Array, Array]:
         """Return the same at many configurations (K, n): (K, 6, n), (K, 3, 3) and (K, 3)."""
-        jacobians = np.empty((len(q), 6, self.dof))
+        jacobians = np.zeros((len(q), 6, self.dof))
         rotations, translations = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
-        own = self.own
-        for k, configuration in enumerate(q):
-            jacobians[k] = own.at(configuration)
-            rotations[k], translations[k] = own.rotation, own.translation
+        # A copy: kernels are compiled anew for what may not be written to.
+        place_along(np.array(q), self.arrays, jacobians, rotations, translations)
         return jacobians, rotations, translations
 
     def rooted(self) -> tuple[Any, int]:

@@ -4,9 +4,9 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, inlined, kernel
 from selfmotion.basics.layout import Layout
-from selfmotion.robot import ChainArrays
+from selfmotion.robot import ChainArrays, place_tips
 from selfmotion.search.edges import wrapped
-from selfmotion.search.projection import CONVERGED, correct, place_tips
+from selfmotion.search.projection import CONVERGED, correct
 from selfmotion.search.settings import ALIGNED, CORRECTIONS, SMALLEST_STEP
 
 # What is known of a curve on the way.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, inlined, kernel
+from selfmotion.basics import Array, Flags, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels import (
     cholesky,
@@ -11,7 +11,7 @@ from selfmotion.kernels import (
     rows_of,
     solve_cholesky,
 )
-from selfmotion.robot import ChainArrays, TreeArrays, compose, placements
+from selfmotion.robot import ChainArrays, place_tips
 
 # A Newton correction of this size [rad or m] leaves an error of its square.
 CONVERGED = 1e-6
@@ -110,54 +110,3 @@ def project_all(
             # Singular, or not a number.
             if not length >= 0.0:
                 break
-
-
-@inlined
-def place_tips(
-    q: Array,
-    chains: tuple[ChainArrays, ...],
-    r: Array,
-    p: Array,
-    rotations: Array,
-    positions: Array,
-    jacobians: Array,
-) -> None:
-    """Set the tips' places, and their Jacobians (F, 6, n), at q (n,)."""
-    for f in range(len(chains)):
-        tree, tip_rotation, tip_position = chains[f]
-        placements(
-            q,
-            tree.joints,
-            tree.parents,
-            tree.rotations,
-            tree.positions,
-            tree.axes,
-            tree.is_revolute,
-            r,
-            p,
-        )
-        last = len(tree.joints)
-        compose(r[last], p[last], tip_rotation, tip_position, rotations[f], positions[f])
-        _jacobian(r, p, tree, positions[f], jacobians[f])
-
-
-@inlined
-def _jacobian(r: Array, p: Array, tree: TreeArrays, tip: Array, jacobian: Array) -> None:
-    """Write the columns of a tip's Jacobian [v, ω] (6, n) at its origin, in the base's axes."""
-    axis = np.empty(3)
-    for j in range(len(tree.joints)):
-        column = tree.joints[j]
-        for a in range(3):
-            axis[a] = 0.0
-            for b in range(3):
-                axis[a] += r[j + 1, a, b] * tree.axes[j, b]
-        if tree.is_revolute[j]:
-            x, y, z = tip[0] - p[j + 1, 0], tip[1] - p[j + 1, 1], tip[2] - p[j + 1, 2]
-            jacobian[0, column] = axis[1] * z - axis[2] * y
-            jacobian[1, column] = axis[2] * x - axis[0] * z
-            jacobian[2, column] = axis[0] * y - axis[1] * x
-            for a in range(3):
-                jacobian[3 + a, column] = axis[a]
-        else:
-            for a in range(3):
-                jacobian[a, column], jacobian[3 + a, column] = axis[a], 0.0

@@ -1,0 +1,76 @@
+"""Symmetric block-banded systems, of nodes that know their neighbours."""
+
+import numpy as np
+
+from selfmotion.basics import Array, Ints
+
+
+class Banded:
+    """A symmetric matrix of K × K blocks (s, s), in LAPACK's upper banded storage.
+
+    Parameters
+    ----------
+    count, size : int
+        K and s.
+    reach : int
+        Blocks beside the diagonal.
+    """
+
+    def __init__(self, count: int, size: int, reach: int) -> None:
+        self._size, self._width = size, (reach + 1) * size - 1
+        self._table = np.zeros((self._width + 1, count * size))
+
+    def add(self, offset: int, first: int, blocks: Array) -> None:
+        """Add blocks (L, s, s) in rows `first`, first + 1, …, `offset` columns to the right."""
+        s, u = self._size, self._width
+        begin, end = (first + offset) * s, (first + offset + len(blocks)) * s
+        for i in range(s):
+            for j in range(i if offset == 0 else 0, s):
+                self._table[u + i - j - offset * s, begin + j : end : s] += blocks[:, i, j]
+
+    def add_pairs(self, first: int, blocks: Array) -> None:
+        """Add blocks (L, 2s, 2s) of neighbours, the first of which begins in row `first`."""
+        s = self._size
+        self.add(0, first, blocks[:, :s, :s])
+        self.add(0, first + 1, blocks[:, s:, s:])
+        self.add(1, first, blocks[:, :s, s:])
+
+    def add_triples(self, blocks: Array) -> None:
+        """Add blocks (K, 3s, 3s) of each row with the ones before and after it."""
+        s = self._size
+        self.add(0, 0, blocks[:, s : 2 * s, s : 2 * s])
+        self.add(0, 0, blocks[1:, :s, :s])
+        self.add(0, 1, blocks[:-1, 2 * s :, 2 * s :])
+        self.add(1, 0, blocks[1:, :s, s : 2 * s])
+        self.add(1, 0, blocks[:-1, s : 2 * s, 2 * s :])
+        self.add(2, 0, blocks[1:-1, :s, 2 * s :])
+
+    def add_diagonal(self, value: float) -> None:
+        """Add a multiple of the unit matrix."""
+        self._table[self._width] += value
+
+    def hold(self, which: Ints) -> None:
+        """Make rows and columns, by their numbers, those of the unit matrix."""
+        u, size = self._width, self._table.shape[1]
+        for row in which:
+            self._table[:, row] = 0.0
+            for j in range(1, min(u, size - 1 - row) + 1):
+                self._table[u - j, row + j] = 0.0
+            self._table[u, row] = 1.0
+
+    def dense(self) -> Array:
+        """Return the matrix, (K s, K s)."""
+        u, size = self._width, self._table.shape[1]
+        found = np.zeros((size, size))
+        for offset in range(min(u + 1, size)):
+            found += np.diag(self._table[u - offset, offset:], offset)
+        return np.asarray(found + np.triu(found, 1).T)
+
+    def solve(self, right: Array) -> Array | None:
+        """Return the solution for a right side (K s,); None where it is not positive definite."""
+        from scipy.linalg import LinAlgError, solveh_banded
+
+        try:
+            return np.asarray(solveh_banded(self._table, right, check_finite=False))
+        except LinAlgError:
+            return None

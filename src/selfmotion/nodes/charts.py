@@ -1,0 +1,151 @@
+"""All nodes of a motion at once: where they are on their self-motion manifolds, and eq. 4 there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion import kernels
+from selfmotion.basics import Array
+from selfmotion.follow import Follows
+from selfmotion.nodes.kernels import look, pull
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Nodes in the charts around a reference, and their motion by eq. 4.
+
+    Attributes
+    ----------
+    q, qd : (N + 1, n)
+    tangents : (N + 1, n, r)
+        T = ∂q/∂z.
+    table : (N + 1, columns)
+        What eq. 4 leaves for its derivatives.
+    """
+
+    q: Array
+    qd: Array
+    tangents: Array
+    table: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Charts:
+    """Charts of the self-motion manifolds of all nodes, around a motion on the path.
+
+    The coordinates of a node are z (r,), where it is on its manifold, and ν (r,), its null motion
+    in eq. 4, q̇ = J⁺ẋ + (I - J⁺J) N0 ν.
+
+    Attributes
+    ----------
+    manifolds : Manifolds
+    q : (N + 1, n)
+        The reference: z = 0.
+    bases : (N + 1, n, r)
+        N0, orthonormal bases of the null spaces there.
+    """
+
+    manifolds: "Manifolds"
+    q: Array
+    bases: Array
+
+    def at(self, z: Array, nu: Array, near: Array | None = None) -> Place | None:
+        """Return the nodes at z and ν, (N + 1, r) each; None where one is not to be had.
+
+        Newton's method begins at `near` (N + 1, n), by default at q + N0 z.
+        """
+        own, bases = self.manifolds, self.bases
+        q = np.array(near) if near is not None else self.q + (bases @ z[:, :, None])[:, :, 0]
+        table = own.targets.copy()
+        own.stages(table).epsilon[:] = (bases @ nu[:, :, None])[:, :, 0]
+        tangents = np.empty_like(bases)
+        z = np.ascontiguousarray(z)
+        failed = look(q, z, bases, self.q, own.chains, own.layout, table, tangents)
+        if failed >= 0:
+            return None
+        return Place(q, np.array(own.stages(table).qd), tangents, table)
+
+    def pulled(self, place: Place, by_q: Array, by_qd: Array) -> Array:
+        """Return the derivatives by (z, ν), (N + 1, 2r), of what has these by q and q̇."""
+        own = self.manifolds
+        out = np.empty((len(self.q), 2 * self.bases.shape[2]))
+        pull(
+            np.ascontiguousarray(by_q),
+            np.ascontiguousarray(by_qd),
+            place.table,
+            own.layout,
+            own.work,
+            own.no_error,
+            self.bases,
+            place.tangents,
+            out,
+        )
+        return out
+
+    def recentred(self, place: Place) -> tuple["Charts", Array]:
+        """Return the charts around a place, and its ν there."""
+        bases = _orthonormal(place.tangents)
+        epsilon = self.manifolds.stages(place.table).epsilon
+        nu = np.einsum("knr,kn->kr", bases, epsilon)
+        return Charts(self.manifolds, place.q, bases), nu
+
+
+class Manifolds:
+    """The self-motion manifolds of a path at given times.
+
+    Parameters
+    ----------
+    follows : Follows
+    t : (N + 1,)
+        Times [s].
+    """
+
+    def __init__(self, follows: Follows, t: Array) -> None:
+        self.follows, self.t = follows, t
+        self.chains = tuple(item.chain.arrays for item in follows.items)
+        self.layout = follows.layout
+        n, m, count = follows.robot.dof, follows.dimension, len(follows.items)
+        self._sizes = n, m
+        self.targets = np.zeros((len(t), kernels.columns(n, m, count)))
+        self.work = np.zeros(kernels.space_size(n, m, count))
+        self.no_error = np.zeros((count, 6))
+        for f, item in enumerate(follows.items):
+            tip, target = kernels.tip_of(self.targets, f, n, m), item.target(t)
+            tip.target_translation[:] = target.translation
+            tip.target_rotation[:] = target.rotation
+            tip.target_twist[:] = target.twist
+
+    def stages(self, table: Array) -> kernels.Stage:
+        """Return the parts of a table."""
+        return kernels.stage_of(table, *self._sizes)
+
+    def charts(self, q: Array, qd: Array) -> tuple[Charts, Array] | None:
+        """Return charts around a motion near the path, q and q̇ (N + 1, n), and its ν.
+
+        None where a node does not come onto its manifold.
+        """
+        bases = null_bases(self.follows, q)
+        charts, none = Charts(self, q, bases), np.zeros((len(q), bases.shape[2]))
+        place = charts.at(none, none)
+        if place is None:
+            return None
+        centred, _ = charts.recentred(place)
+        return centred, np.einsum("knr,kn->kr", centred.bases, qd)
+
+
+def null_bases(follows: Follows, q: Array) -> Array:
+    """Return null-space bases along a motion (K, n), (K, n, r)."""
+    from selfmotion.engine import transport
+
+    return transport(np.array([follows.jacobian(each) for each in q]))
+
+
+def _orthonormal(tangents: Array) -> Array:
+    """Return orthonormal bases of the spans of full-rank matrices (K, n, r): Gram-Schmidt."""
+    found = np.array(tangents)
+    for x in range(found.shape[2]):
+        for y in range(x):
+            share = np.einsum("kn,kn->k", found[:, :, y], found[:, :, x])
+            found[:, :, x] -= share[:, None] * found[:, :, y]
+        found[:, :, x] /= np.linalg.norm(found[:, :, x], axis=1)[:, None]
+    return found

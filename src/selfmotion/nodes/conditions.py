@@ -1,0 +1,203 @@
+"""The conditions on a motion given by its nodes: each depends on a node and its two neighbours.
+
+They are asked for at the nodes and in the middle of each interval: a limit of speed that only the
+nodes keep would let the motion be faster between them.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from selfmotion.basics import Array, Ints
+from selfmotion.constraints import BoundConstraint, NodeTangents, linearised
+from selfmotion.nodes.hermite import MIDDLE, Hermite, HermiteSamples
+
+# There is no interval after the last node: its conditions are kept by this much.
+_NONE = -1e3
+
+
+class NearTangents(NodeTangents):
+    """How the motion at each point changes with the coordinates of the nodes around it.
+
+    The d = 3 · 2r variables of a point, which are nodes and middles in turn, are those of the node
+    before the last one, w of the last one (or of the point itself), and of the next one.
+
+    Parameters
+    ----------
+    spline : Hermite
+    changes : (N + 1, 2, n, 2r)
+        ∂(q, q̇)/∂w of each node by its own.
+    """
+
+    _spline: Hermite
+    _changes: Array
+    _tables: dict[int, Array]
+
+    def __init__(self, spline: Hermite, changes: Array) -> None:
+        for name, value in (("_spline", spline), ("_changes", changes), ("_tables", {})):
+            object.__setattr__(self, name, value)
+        super().__init__(self.of_order(0), self.of_order(1), spline.sampling)
+
+    def of_order(self, order: int) -> Array:
+        """See `NodeTangents.of_order`."""
+        if order not in self._tables:
+            self._tables[order] = self._made(order)
+        return self._tables[order]
+
+    def _made(self, order: int) -> Array:
+        spline, changes = self._spline, self._changes
+        count, _, n, size = changes.shape
+        before, own, after = (slice(x * size, (x + 1) * size) for x in range(3))
+        table = np.zeros((2 * count - 1, n, 3 * size))
+        if order < 2:
+            table[::2, :, own] = changes[:, order]
+        else:
+            shares = spline.shares[order - 2]
+            table[::2, :, own] = _weighted(shares[:, 1], changes)
+            table[2::2, :, before] = _weighted(shares[1:, 0], changes[:-1])
+            table[:-2:2, :, after] = _weighted(shares[:-1, 2], changes[1:])
+        middle = spline.bases[order][:, MIDDLE]
+        table[1::2, :, own] = _weighted(middle[:, :2], changes[:-1])
+        table[1::2, :, after] = _weighted(middle[:, 2:], changes[1:])
+        return table
+
+    def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
+        """See `NodeTangents.picked`."""
+        return np.asarray(self.of_order(order)[nodes, joints])
+
+
+def _weighted(shares: Array, changes: Array) -> Array:
+    """Return Σ_a shares (K, 2) · changes (K, 2, n, d), (K, n, d)."""
+    return np.asarray(np.einsum("ka,kani->kni", shares, changes))
+
+
+class UnitTangents(NodeTangents):
+    """Tangents by q, q̇, q̈ and the jerk of each point themselves: d = 4 n."""
+
+    def __init__(self, spline: Hermite, dof: int) -> None:
+        ones = np.eye(4 * dof).reshape(4, dof, 4 * dof)
+        count = len(spline.sampling.nodes)
+        tables = [np.broadcast_to(one, (count, dof, 4 * dof)) for one in ones]
+        object.__setattr__(self, "_tables", tables)
+        super().__init__(tables[0], tables[1], spline.sampling)
+
+    def of_order(self, order: int) -> Array:
+        """See `NodeTangents.of_order`."""
+        table: Array = self._tables[order]  # type: ignore[attr-defined]
+        return table
+
+    def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
+        """See `NodeTangents.picked`."""
+        n = self.q.shape[1]
+        rows = np.zeros((len(nodes), 4 * n))
+        rows[np.arange(len(nodes)), order * n + joints] = 1.0
+        return rows
+
+
+class NodeConditions:
+    """All conditions h ≤ 0 at the nodes, then those in the middle after each, (N + 1, C).
+
+    Parameters
+    ----------
+    spline : Hermite
+    constraints : sequence of BoundConstraint
+        None that is an equality or a condition on the whole motion.
+    dof : int
+
+    Attributes
+    ----------
+    constraints : tuple of BoundConstraint
+    """
+
+    def __init__(self, spline: Hermite, constraints: Sequence[BoundConstraint], dof: int) -> None:
+        self.spline, self.constraints = spline, tuple(constraints)
+        self._units = UnitTangents(spline, dof)
+        self._counts: list[int] = []
+
+    def residuals(self, samples: HermiteSamples) -> Array:
+        """Return h, (N + 1, C)."""
+        tables = [item.residual(samples) for item in self.constraints]
+        self._counts = [table.shape[1] for table in tables]
+        none = np.zeros((2 * len(self.spline.t) - 1, 0))
+        return _by_node(np.concatenate([none, *tables], axis=1), _NONE)
+
+    @property
+    def tolerances(self) -> Array:
+        """What h may be and still count as kept, (C,)."""
+        each = [item.tolerance for item in self.constraints]
+        return np.tile(np.repeat(each, self._counts), 2)
+
+    def rows(self, samples: HermiteSamples, changes: Array, columns: Ints) -> Array:
+        """Return ∂h/∂w of c columns, by w of each node and its neighbours, (N + 1, c, 6r)."""
+        motion, count = NearTangents(self.spline, changes), len(self.spline.t)
+        found = np.zeros((count, len(columns), motion.size))
+        half = sum(self._counts)
+        first = 0
+        for item, own in zip(self.constraints, self._counts, strict=True):
+            known = None
+            for place, column in enumerate(columns):
+                of_nodes, which = column < half, column % half - first
+                if not 0 <= which < own:
+                    continue
+                known = known or linearised(item, samples, motion)
+                points = np.arange(0 if of_nodes else 1, 2 * count - 1, 2)
+                found[: len(points), place] = known.picked(motion, points * own + which)
+            first += own
+        return found
+
+    def orders(self, samples: HermiteSamples) -> Ints:
+        """Return the highest derivative of q that each condition depends on, (C,)."""
+        found = [np.zeros(0, dtype=np.int64)]
+        for item in self.constraints:
+            known = linearised(item, samples, self._units)
+            first = np.arange(known.count // (2 * len(self.spline.t) - 1))
+            rows = known.picked(self._units, first).reshape(len(first), 4, -1)
+            does = np.any(rows != 0.0, axis=(2,))
+            found.append(3 - np.argmax(np.flip(does, axis=1), axis=1))
+        return np.tile(np.concatenate(found), 2)
+
+    def by_constraint(self, table: Array) -> list[Array]:
+        """Return what is like h, (N + 1, C), for each constraint, (2 N + 1, c) each."""
+        half = table.shape[1] // 2
+        points = np.empty((2 * len(table) - 1, half))
+        points[::2], points[1::2] = table[:, :half], table[:-1, half:]
+        return np.split(points, np.cumsum(self._counts)[:-1], axis=1)
+
+    def pulled(self, samples: HermiteSamples, prices: Array) -> Array:
+        """Return Σ prices · ∂h/∂(q, q̇) of the nodes, (N + 1, 2, n); `prices` are (N + 1, C)."""
+        n = samples.q.shape[1]
+        by = np.zeros((2 * len(prices) - 1, 4 * n))
+        least = 1e-9 * prices.max(initial=0.0)
+        for item, own in zip(self.constraints, self.by_constraint(prices), strict=True):
+            which = np.flatnonzero(own.ravel() > least)
+            if which.size:
+                rows = linearised(item, samples, self._units).picked(self._units, which)
+                np.add.at(by, which // own.shape[1], own.ravel()[which, None] * rows)
+        found = np.stack([by[::2, :n], by[::2, n : 2 * n]], axis=1)
+        for order in range(4):
+            own = by[:, order * n : (order + 1) * n]
+            middle = self.spline.bases[order][:, MIDDLE, :, None] * own[1::2, None]
+            found[:-1] += middle[:, :2]
+            found[1:] += middle[:, 2:]
+            if order > 1:
+                shares, here = self.spline.shares[order - 2][:, :, :, None], own[::2]
+                found += shares[:, 1] * here[:, None]
+                found[:-1] += shares[1:, 0] * here[1:, None]
+                found[1:] += shares[:-1, 2] * here[:-1, None]
+        return found
+
+
+def _by_node(points: Array, last: float) -> Array:
+    """Return what nodes and middles have in turn, (2 N + 1, C, …), as (N + 1, 2 C, …)."""
+    middles = np.full_like(points[::2], last)
+    middles[:-1] = points[1::2]
+    return np.concatenate([points[::2], middles], axis=1)
+
+
+def spread(near: Array) -> Array:
+    """Return what each node's three (N + 1, 3 s) mean for the nodes' own, (N + 1, s)."""
+    size = near.shape[1] // 3
+    found = np.array(near[:, size : 2 * size])
+    found[:-1] += near[1:, :size]
+    found[1:] += near[:-1, 2 * size :]
+    return found

@@ -1,0 +1,217 @@
+"""What numba compiles: nodes put onto their self-motion manifolds, eq. 4 there, and both backward.
+
+Each node's chart is around a reference on the manifold, with an orthonormal basis N0 of the null
+space there: z are the coordinates N0ᵀ(q - q_ref) of q on the manifold {q : F(q) = x}, and ε = N0 ν
+is the null motion of eq. 4. With B = [J; N0ᵀ],
+
+    ∂q/∂z = T = B⁻¹ [0; I],    ∂q̇/∂ν = (I - J⁺J) N0,    ∂q̇/∂z = (∂q̇/∂q) T.
+"""
+
+import numpy as np
+
+from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics.layout import KIND, Layout
+from selfmotion.kernels import (
+    cholesky,
+    errors_and_rows,
+    evaluate,
+    gram,
+    pose_error,
+    pull_stage,
+    rows_of,
+    select,
+    solve_cholesky,
+    space_of,
+    stage_of,
+    task_rows,
+    tip_of,
+)
+from selfmotion.robot import ChainArrays, place_tips
+
+# A node this near to its place [m, rad] is there; Newton's method is quadratic from nearby.
+_THERE, _STEPS = 1e-12, 12
+# A guess need not be nearer; the step after that makes it a square of this.
+_NEAR = 1e-4
+
+
+@kernel
+def look(
+    q: Array,
+    coordinates: Array,
+    bases: Array,
+    references: Array,
+    chains: tuple[ChainArrays, ...],
+    layout: Layout,
+    table: Array,
+    tangents: Array,
+) -> int:
+    """Put each of q (K, n) onto its manifold at its coordinates z (K, r), and evaluate eq. 4 there.
+
+    For charts with `bases` (K, n, r) and `references` (K, n). Rows of the `table` hold paths and
+    null motions already; q, q̇ and all else is set, and T in `tangents` (K, n, r). Returns the
+    first node for which that is impossible, or -1.
+    """
+    (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
+    tips = layout.shape[0]
+    turns, places = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
+    jacobians = np.zeros((tips, 6, n))
+    system, factor, b = np.empty((n, n)), np.empty((n, n)), np.empty(n)
+    for k in range(count):
+        row = table[k]
+        at = stage_of(row, n, m)
+        arrived = False
+        for _ in range(_STEPS):
+            place_tips(q[k], chains, turns, places, rotations, positions, jacobians)
+            off = 0.0
+            for f in range(tips):
+                tip = tip_of(row, f, n, m)
+                _note(
+                    tip.rotation,
+                    tip.translation,
+                    tip.jacobian,
+                    rotations[f],
+                    positions[f],
+                    jacobians[f],
+                )
+                pose_error(
+                    layout[f, KIND],
+                    tip.target_translation,
+                    tip.target_rotation,
+                    tip.translation,
+                    tip.rotation,
+                    tip.error,
+                )
+                select(layout, f, tip.rotation, tip.error, b)
+                task_rows(layout, f, tip.rotation, tip.jacobian, system)
+            for i in range(r):
+                b[m + i] = coordinates[k, i]
+                for j in range(n):
+                    system[m + i, j] = bases[k, j, i]
+                    b[m + i] -= bases[k, j, i] * (q[k, j] - references[k, j])
+            for i in range(m + r):
+                # Written so that NaN stays.
+                if not abs(b[i]) <= off:
+                    off = abs(b[i])
+            if off < _THERE:
+                arrived = True
+                break
+            gram(system, factor)
+            if not off < np.inf or not cholesky(factor):
+                return k
+            solve_cholesky(factor, b)
+            for j in range(n):
+                for i in range(n):
+                    q[k, j] += system[i, j] * b[i]
+        if not arrived:
+            return k
+        gram(system, factor)
+        if not cholesky(factor):
+            return k
+        for x in range(r):
+            for i in range(n):
+                b[i] = 1.0 if i == m + x else 0.0
+            solve_cholesky(factor, b)
+            for j in range(n):
+                tangents[k, j, x] = 0.0
+                for i in range(n):
+                    tangents[k, j, x] += system[i, j] * b[i]
+        for j in range(n):
+            at.q[j] = q[k, j]
+        if not evaluate(row, n, layout, 0.0, None):
+            return k
+    return -1
+
+
+@inlined
+def _note(
+    rotation: Array, translation: Array, jacobian: Array, turn: Array, place: Array, six: Array
+) -> None:
+    for i in range(3):
+        translation[i] = place[i]
+        for j in range(3):
+            rotation[i, j] = turn[i, j]
+    for i in range(6):
+        for j in range(six.shape[1]):
+            jacobian[i, j] = six[i, j]
+
+
+@kernel
+def pull(
+    by_q: Array,
+    by_qd: Array,
+    table: Array,
+    layout: Layout,
+    work: Array,
+    no_error: Array,
+    bases: Array,
+    tangents: Array,
+    out: Array,
+) -> None:
+    """Set `out` (K, 2 r) to the derivatives by (z, ν) of what has these by q and q̇ (K, n) each."""
+    (count, n), m, r = by_q.shape, rows_of(layout), bases.shape[2]
+    space = space_of(work, n, m, layout.shape[0])
+    for k in range(count):
+        for j in range(n):
+            space.w[j], space.by_q[j] = by_qd[k, j], by_q[k, j]
+        pull_stage(
+            table[k], n, layout, 0.0, None, space, no_error, space.by_epsilon, space.by_target
+        )
+        for x in range(r):
+            along, free = 0.0, 0.0
+            for j in range(n):
+                along += tangents[k, j, x] * space.by_q[j]
+                free += bases[k, j, x] * space.by_epsilon[j]
+            out[k, x], out[k, r + x] = along, free
+
+
+@kernel
+def follow(
+    start: Array,
+    wanted: Array,
+    share: Array,
+    targets: Array,
+    chains: tuple[ChainArrays, ...],
+    layout: Layout,
+    q: Array,
+) -> int:
+    """Set q (K, n) to configurations on targets (K, 12 F), each near the one before it.
+
+    From one to the next, the self-motion goes a `share` (K,) of the way to `wanted` (n,). Returns
+    the first one that is not to be had, or -1.
+    """
+    (count, n), m, tips = q.shape, rows_of(layout), layout.shape[0]
+    turns, places = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
+    jacobians = np.zeros((tips, 6, n))
+    rows, factor, b = np.empty((m, n)), np.empty((m, m)), np.empty(m)
+    way, here = np.empty(n), start.copy()
+    for k in range(count):
+        off = np.inf
+        for i in range(_STEPS):
+            place_tips(here, chains, turns, places, rotations, positions, jacobians)
+            errors_and_rows(layout, targets[k], jacobians, rotations, positions, b, rows)
+            off = 0.0
+            for x in range(m):
+                if not abs(b[x]) <= off:
+                    off = abs(b[x])
+            # First Jᵀ(JJᵀ)⁻¹(e - J p) + p: towards what is wanted by p, then what is left of e.
+            for j in range(n):
+                way[j] = share[k] * (wanted[j] - here[j]) if i == 0 else 0.0
+            for x in range(m):
+                for j in range(n):
+                    b[x] -= rows[x, j] * way[j]
+            gram(rows, factor)
+            if not off < np.inf or not cholesky(factor):
+                return k
+            solve_cholesky(factor, b)
+            for j in range(n):
+                here[j] += way[j]
+                for x in range(m):
+                    here[j] += rows[x, j] * b[x]
+            if i > 0 and off < _NEAR:
+                break
+        if not off < _NEAR:
+            return k
+        q[k] = here
+    return -1

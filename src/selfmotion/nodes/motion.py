@@ -1,0 +1,241 @@
+"""A motion on its path, given by its nodes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from selfmotion.basics import Array, Ints, read_only
+from selfmotion.constraints import BoundConstraint
+from selfmotion.costs import JointVelocity
+from selfmotion.costs.base import weight_matrix
+from selfmotion.engine import Counts
+from selfmotion.motion import Sampling, Trajectory
+from selfmotion.nodes.charts import Charts, Manifolds, Place
+from selfmotion.nodes.conditions import NodeConditions
+from selfmotion.nodes.hermite import Hermite, HermiteSamples, QuinticSamples
+from selfmotion.nodes.kernels import follow
+from selfmotion.nodes.objective import NodeCost, Smoothing
+from selfmotion.problem import Problem
+
+# An arm that rests takes about this share of the duration to start and to stop its self-motion;
+# that is asked for over so many times as long.
+_STARTING, _NEAR_REST = 0.02, 4.0
+
+
+class NodeGrid:
+    """What all motions of a problem on the same nodes share.
+
+    Parameters
+    ----------
+    problem : Problem
+    t : (N + 1,)
+        Times of the nodes [s].
+    constraints : sequence of BoundConstraint
+        Conditions at each node, h ≤ 0.
+    free : bool
+        Whether the start may move along its self-motion.
+    counts : Counts
+        Where work is added up.
+
+    Attributes
+    ----------
+    spline : Hermite
+    manifolds : Manifolds
+    cost : NodeCost
+    conditions : NodeConditions
+    held : (k,)
+        Numbers of the coordinates w (N + 1, 2r), in one row, that stay as they are.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        t: Array,
+        constraints: Sequence[BoundConstraint],
+        *,
+        free: bool,
+        counts: Counts,
+    ) -> None:
+        self.problem, self.free, self.counts = problem, free, counts
+        follows = problem.follows
+        self.spline, self.manifolds = Hermite(t), Manifolds(follows, t)
+        smoothing = _smoothing(problem, self.spline)
+        self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
+        self.conditions = NodeConditions(self.spline, constraints, follows.robot.dof)
+        r = follows.robot.dof - follows.dimension
+        held: list[Ints] = [] if free else [np.arange(r)]
+        rests = problem.rests
+        for rest, node in zip(rests, (0, len(t) - 1), strict=True):
+            if rest:
+                held.append(2 * r * node + r + np.arange(r))
+        self.held = np.concatenate([np.zeros(0, dtype=np.int64), *held])
+
+    @property
+    def t(self) -> Array:
+        """Times of the nodes [s], (N + 1,)."""
+        return self.spline.t
+
+    def halved(self) -> "NodeGrid":
+        """Return the one with a node in the middle of each interval."""
+        t = np.sort(np.concatenate([self.t, 0.5 * (self.t[:-1] + self.t[1:])]))
+        return self.on(t)
+
+    def on(self, t: Array) -> "NodeGrid":
+        """Return the same on other nodes."""
+        constraints = self.conditions.constraints
+        return NodeGrid(self.problem, t, constraints, free=self.free, counts=self.counts)
+
+    def motion_near(self, trajectory: Trajectory) -> "NodeMotion | None":
+        """Return the motion whose nodes are those nearest to another one's.
+
+        None where a node does not come onto its manifold, or a given start is not that of it.
+        """
+        return self._near(trajectory(self.t), trajectory(self.t, 1))
+
+    def _near(self, q: Array, qd: Array) -> "NodeMotion | None":
+        found = self.manifolds.charts(q, qd)
+        if found is None:
+            return None
+        charts, nu = found
+        nu.reshape(-1)[self._rates] = 0.0
+        return self.motion(charts, nu)
+
+    def motion_towards(self, start: Array, wanted: Array, time: float) -> "NodeMotion | None":
+        """Return a motion from a start (n,) whose self-motion goes towards `wanted` (n,).
+
+        It is there, as far as the path lets it, after about so much time [s]. None where the path
+        cannot be followed like that.
+        """
+        own = self.manifolds
+        q = np.empty((len(self.t), len(start)))
+        share = np.minimum(np.append(0.0, np.diff(self.t)) / time, 1.0)
+        targets = own.follows.targets(self.t)
+        if follow(start, wanted, share, targets, own.chains, own.layout, q) >= 0:
+            return None
+        return self._near(q, np.asarray(np.gradient(q, self.t, axis=0)))
+
+    @property
+    def _rates(self) -> Ints:
+        """Numbers of the ν (N + 1, r), in one row, that are held at 0."""
+        r = self.manifolds.follows.robot.dof - self.manifolds.follows.dimension
+        node, which = np.divmod(self.held, 2 * r)
+        return np.asarray((node * r + which - r)[which >= r])
+
+    def motion(self, charts: Charts, nu: Array) -> "NodeMotion | None":
+        """Return the motion at the reference of charts; None where there is none."""
+        place = charts.at(np.zeros_like(nu), nu)
+        return None if place is None else self.at(charts, nu, place)
+
+    def at(self, charts: Charts, nu: Array, place: Place) -> "NodeMotion":
+        """Return the motion of a place."""
+        samples = HermiteSamples(self.manifolds.follows, self.spline, place.q, place.qd)
+        return NodeMotion(self, charts, nu, place, samples)
+
+
+@dataclass(frozen=True, eq=False)
+class NodeMotion:
+    """A motion given by its nodes.
+
+    Attributes
+    ----------
+    grid : NodeGrid
+    charts : Charts
+    nu : (N + 1, r)
+        Null motions there.
+    place : Place
+    samples : HermiteSamples
+    """
+
+    grid: NodeGrid
+    charts: Charts
+    nu: Array
+    place: Place
+    samples: HermiteSamples
+
+    @cached_property
+    def terms(self) -> dict[str, float]:
+        """What each cost contributes."""
+        self.grid.counts.evaluated()
+        return self.grid.cost.terms(self.samples)
+
+    @property
+    def cost(self) -> float:
+        """F."""
+        return sum(self.terms.values())
+
+    @cached_property
+    def exact_terms(self) -> dict[str, float]:
+        """What each cost contributes along `trajectory`, which is on its path between the nodes."""
+        grid = self.grid
+        sampling = grid.spline.sampling
+        return grid.cost.terms(QuinticSamples(grid.problem.follows, sampling, self.trajectory))
+
+    @property
+    def exact_cost(self) -> float:
+        """F along `trajectory`."""
+        return sum(self.exact_terms.values())
+
+    @cached_property
+    def aim(self) -> float:
+        """What is minimised: F and what keeps the motion smooth."""
+        return self.cost + self.grid.cost.roughness(self.samples)
+
+    @cached_property
+    def h(self) -> Array:
+        """The conditions, (N + 1, C)."""
+        return self.grid.conditions.residuals(self.samples)
+
+    @property
+    def epsilon(self) -> Array:
+        """The null motion ε at the nodes, (N + 1, n)."""
+        return np.asarray((self.charts.bases @ self.nu[:, :, None])[:, :, 0])
+
+    def recentred(self) -> "NodeMotion | None":
+        """Return the same motion, with charts around it; None where rounding forbids."""
+        charts, nu = self.charts.recentred(self.place)
+        # Anew: derivatives at fixed ε are others, since ε has lost what did not act.
+        found = self.grid.motion(charts, nu)
+        if found is not None:
+            # Costs and conditions are those of the same motion.
+            names = [name for name in ("terms", "aim", "h") if name in self.__dict__]
+            found.__dict__.update({name: self.__dict__[name] for name in names})
+        return found
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The quintic through the nodes, with q̈ by differences of q̇; 0 where the arm rests.
+
+        Five nodes tell what the path asks, which is smooth; three what the self-motion does, which
+        may have kinks at limits.
+        """
+        problem, t, qd = self.grid.problem, self.grid.t, self.place.qd
+        qdd = np.array(Sampling.trapezoidal(t).differentiation(1) @ qd)
+        near = np.gradient(qd, t, axis=0, edge_order=2) - qdd
+        bases = self.charts.bases
+        qdd += (bases @ (np.swapaxes(bases, 1, 2) @ near[:, :, None]))[:, :, 0]
+        for order, node in zip(problem.rest_orders, (0, -1), strict=True):
+            if order > 1:
+                qdd[node] = 0.0
+        names = problem.robot.joint_names
+        return Trajectory(t, read_only(self.place.q), read_only(qd), names, read_only(qdd))
+
+    def on(self, grid: NodeGrid) -> "NodeMotion | None":
+        """Return the motion on other nodes."""
+        return grid.motion_near(self.trajectory)
+
+
+def _smoothing(problem: Problem, spline: Hermite) -> Smoothing | None:
+    """Return what makes the self-motion start and stop as the arm does where it rests."""
+    orders = [order for cost in problem.all_costs for order in cost.curvature(problem.robot.dof)]
+    if not any(problem.rests) or max(orders, default=0) > 1:
+        return None
+    duration, t = problem.path.duration, spline.sampling.t[:-1].reshape(-1, 4)
+    starting = _STARTING * duration
+    near = np.zeros_like(t, dtype=bool)
+    for rest, end in zip(problem.rests, (0.0, duration), strict=True):
+        near |= rest & (np.abs(t - end) <= _NEAR_REST * starting)
+    usual = JointVelocity.usual(problem.robot)
+    weight = weight_matrix(np.asarray(usual.weight), problem.robot.dof)
+    return Smoothing(np.where(near, starting**2, 0.0), weight)

@@ -1,0 +1,267 @@
+"""Newton's method on the self-motion manifolds of all nodes at once.
+
+Where conditions h(w) ≤ 0 count, the primal-dual interior-point method: with slacks s > 0 and prices
+λ > 0, it goes towards h + s = 0, ∇F + λᵀ∂h = 0 and s λ = μ, for smaller and smaller μ (J. Nocedal,
+S. Wright, "Numerical Optimization", 2nd ed., chapter 19). Each condition knows three nodes, so that
+all matrices stay block-banded, and a step takes as much time as there are nodes.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from selfmotion.basics import Array, Ints
+from selfmotion.nodes.banded import Banded
+from selfmotion.nodes.conditions import spread
+from selfmotion.nodes.motion import NodeMotion
+from selfmotion.nodes.objective import Around, scattered
+from selfmotion.optimise import Status
+
+# The cost is right to this share of itself once a step promises no more.
+_AGREES = 1e-8
+# Slacks and prices go no further than this share towards 0 in one step.
+_INWARD = 0.995
+# A step is taken if it does at least this share of what it promises, and cut by half otherwise.
+_SHARE, _SHORTEST = 1e-4, 1e-6
+# A matrix that is not positive definite gets this share of its largest entry on the diagonal, or a
+# third of what the last one needed; then more by this factor, again and again.
+_SHIFT, _LESS, _MORE = 1e-6, 1.0 / 3.0, 8.0
+# Nodes go no further than this in one step [rad or m].
+_FARTHEST = 0.5
+# Barriers begin with this share of the cost for all conditions, and end with that; slacks begin
+# with at least so much [units of h]. Where prices are known, with these.
+_FIRST, _LAST, _SLACK = 1e-1, 1e-7, 1e-1
+_KNOWN_FIRST, _KNOWN_SLACK = 1e-4, 1e-3
+# A barrier is solved to this many times itself, before it falls to this share, or this power.
+_SOLVED, _FALL, _POWER = 10.0, 0.2, 1.5
+# Conditions are met to this [units of h].
+_MET = 1e-7
+# So many steps in turn, each this short a share of Newton's, lead nowhere.
+_STUCK, _TINY = 5, 0.02
+# Iterations after which the method is given up: it needs ten, thirty where limits bind.
+_MOST = 80
+
+
+class Step(NamedTuple):
+    """An iteration.
+
+    Attributes
+    ----------
+    motion : NodeMotion
+    slope : float
+        Norm of the gradient of what is minimised.
+    length : float
+        Share of Newton's step that was taken; 0 of the first.
+    """
+
+    motion: NodeMotion
+    slope: float
+    length: float
+
+
+Told = Callable[[Step], bool]
+"""Told of each iteration; True stops."""
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Where Newton's method ended.
+
+    Attributes
+    ----------
+    motion : NodeMotion
+    prices : (N + 1, C)
+        λ of the conditions.
+    status : Status
+    promised : float
+        By how much another step would lower the cost.
+    """
+
+    motion: NodeMotion
+    prices: Array
+    status: Status
+    promised: float
+
+
+def minimise(begin: NodeMotion, columns: Ints, told: Told, prices: Array | None = None) -> Optimum:
+    """Return the optimum near a motion, keeping some columns of the conditions.
+
+    Parameters
+    ----------
+    begin : NodeMotion
+    columns : (c,)
+        Of h, see `NodeConditions`; may be none.
+    told : callable
+    prices : (N + 1, C), optional
+        Of an optimum near by.
+    """
+    solver = _Solver(begin, columns, prices)
+    for _ in range(_MOST):
+        status = solver.advance(told)
+        if status is not None:
+            return solver.optimum(status)
+    return solver.optimum(Status.MAX_ITERATIONS)
+
+
+class _Solver:
+    """The state of Newton's method: a motion, slacks, prices and the barrier."""
+
+    def __init__(self, begin: NodeMotion, columns: Ints, prices: Array | None) -> None:
+        self.motion, self._columns = begin, columns
+        h = begin.h[:, columns]
+        each = max(abs(begin.aim), np.finfo(float).tiny) / max(h.size, 1)
+        self._least = _LAST * each
+        if prices is None:
+            self._barrier, self._slacks = _FIRST * each, np.maximum(-h, _SLACK)
+            self._prices = self._barrier / self._slacks
+        else:
+            self._barrier = _KNOWN_FIRST * each
+            usual = self._barrier / np.maximum(-h, _KNOWN_SLACK)
+            self._prices = np.maximum(prices[:, columns], usual)
+            self._slacks = np.maximum(-h, self._barrier / self._prices)
+        self._penalty, self._promised, self._length = 0.0, np.inf, 0.0
+        self._tiny, self._shift = 0, 0.0
+
+    def optimum(self, status: Status) -> Optimum:
+        """Return where it is now."""
+        prices = np.zeros_like(self.motion.h)
+        prices[:, self._columns] = self._prices
+        return Optimum(self.motion, prices, status, self._promised)
+
+    def advance(self, told: Told) -> Status | None:
+        """Take a step; return how the method ended, if it did."""
+        motion = self.motion
+        around = Around.of(motion.charts, motion.nu)
+        motion.grid.counts.gradients += 1
+        if around is None:
+            return Status.GRADIENT
+        slopes = scattered(motion.grid.cost.slopes(motion.samples))
+        gradient = motion.charts.pulled(motion.place, slopes[:, 0], slopes[:, 1])
+        gradient.reshape(-1)[motion.grid.held] = 0.0
+        if told(Step(motion, float(np.linalg.norm(gradient)), self._length)):
+            return Status.STOPPED
+        rows = self._rows(around)
+        by_prices = slopes
+        if self._columns.size:
+            prices = np.zeros_like(motion.h)
+            prices[:, self._columns] = self._prices
+            by_prices = slopes + motion.grid.conditions.pulled(motion.samples, prices)
+        curved = around.curvature(by_prices)
+        intervals = motion.grid.cost.curvature(around.changes)
+        gap = motion.h[:, self._columns] + self._slacks
+        while True:
+            step = self._step(gradient, curved, intervals, rows, gap)
+            if step is None:
+                return Status.GRADIENT
+            by_slack, by_price = self._others(rows, gap, step)
+            size = max(abs(motion.aim), np.finfo(float).tiny)
+            met = np.abs(gap).max(initial=0.0) <= _MET
+            last = not self._columns.size or self._barrier <= self._least
+            if self._promised <= _AGREES * size and met and last:
+                return Status.CONVERGED
+            if last or not self._solved(gap):
+                break
+            self._barrier = max(self._least, min(_FALL * self._barrier, self._barrier**_POWER))
+        return self._move(gradient, gap, step, by_slack, by_price)
+
+    def _rows(self, around: Around) -> Array:
+        """Return ∂h/∂w of the columns, (N + 1, c, 6r); nothing moves what is held."""
+        count, _, _, size = around.changes.shape
+        if not self._columns.size:
+            return np.zeros((count, 0, 3 * size))
+        motion = self.motion
+        return motion.grid.conditions.rows(motion.samples, around.changes, self._columns)
+
+    def _solved(self, gap: Array) -> bool:
+        """Whether the problem with the present barrier is solved well enough."""
+        off = np.abs(self._slacks * self._prices - self._barrier).max(initial=0.0)
+        allowed = _SOLVED * self._barrier
+        return bool(self._promised <= allowed and off <= allowed and np.abs(gap).max() <= 1e-2)
+
+    def _step(
+        self, gradient: Array, curved: Array, intervals: Array, rows: Array, gap: Array
+    ) -> Array | None:
+        """Return Newton's step of the coordinates, (N + 1, 2r)."""
+        count, size = gradient.shape
+        ratio = self._prices / self._slacks
+        turned = np.swapaxes(rows, 1, 2)
+        pressure = (self._barrier / self._slacks + ratio * gap)[:, :, None]
+        right = (gradient + spread((turned @ pressure)[:, :, 0])).ravel()
+        right[self.motion.grid.held] = 0.0
+        near = turned @ (ratio[:, :, None] * rows)
+        shift, largest = 0.0, float(np.abs(curved).max() + np.abs(intervals).max())
+        while shift <= 1e6 * largest:
+            matrix = Banded(count, size, 2 if rows.shape[1] else 1)
+            matrix.add(0, 0, curved)
+            matrix.add_pairs(0, intervals)
+            if rows.shape[1]:
+                matrix.add_triples(near)
+            matrix.add_diagonal(shift)
+            matrix.hold(self.motion.grid.held)
+            step = matrix.solve(-right)
+            if step is not None:
+                self._shift = shift
+                self._promised = float(-right @ step)
+                return step.reshape(count, size)
+            shift = max(_MORE * shift, _SHIFT * largest, _LESS * self._shift)
+        return None
+
+    def _others(self, rows: Array, gap: Array, step: Array) -> tuple[Array, Array]:
+        """Return the steps of slacks and prices that go with one of the coordinates."""
+        size = step.shape[1]
+        padded = np.pad(step, ((1, 1), (0, 0)))
+        near = np.concatenate([padded[:-2], step, padded[2:]], axis=1).reshape(-1, 3 * size, 1)
+        by_slack = -gap - (rows @ near)[:, :, 0]
+        by_price = (self._barrier - self._prices * by_slack) / self._slacks - self._prices
+        return by_slack, by_price
+
+    def _move(
+        self, gradient: Array, gap: Array, step: Array, by_slack: Array, by_price: Array
+    ) -> Status | None:
+        """Go along a step as far as it does what it promises."""
+        motion, r = self.motion, step.shape[1] // 2
+        off = float(np.abs(gap).sum())
+        slope = float((gradient * step).sum()) - self._barrier * float(
+            (by_slack / self._slacks).sum()
+        )
+        if off > 0.0:
+            # So that the step lowers the merit, whichever way the cost goes.
+            self._penalty = max(self._penalty, 2.0 * slope / off)
+        merit = self._merit(motion, self._slacks, gap)
+        promise = slope - self._penalty * off
+        farthest = float(np.abs(step[:, :r]).max())
+        length = min(_longest(self._slacks, by_slack), _FARTHEST / max(farthest, _FARTHEST))
+        while length >= _SHORTEST and self._tiny < _STUCK:
+            nu = motion.nu + length * step[:, r:]
+            place = motion.charts.at(length * step[:, :r], nu)
+            if place is not None:
+                new = motion.grid.at(motion.charts, nu, place)
+                h = new.h[:, self._columns]
+                slacks = np.maximum(self._slacks + length * by_slack, -h)
+                gained = merit - self._merit(new, slacks, h + slacks)
+                # Written so that NaN is no gain; what is below rounding is none to look for.
+                rounding = 1e-13 * abs(merit)
+                centred = None
+                if gained >= -_SHARE * length * min(promise, 0.0) - rounding:
+                    centred = new.recentred()
+                if centred is not None:
+                    self.motion, self._slacks = centred, slacks
+                    share = _longest(self._prices, by_price)
+                    self._prices = self._prices + share * by_price
+                    self._length = length
+                    self._tiny = self._tiny + 1 if length < _TINY else 0
+                    return None
+            length *= 0.5
+        return Status.PRECISION if not self._columns.size else Status.INFEASIBLE
+
+    def _merit(self, motion: NodeMotion, slacks: Array, gap: Array) -> float:
+        barrier = self._barrier * float(np.log(slacks).sum())
+        return motion.aim - barrier + self._penalty * float(np.abs(gap).sum())
+
+
+def _longest(values: Array, step: Array) -> float:
+    """Return the share of a step, at most 1, that keeps positive values well above 0."""
+    falling = step < 0.0
+    return float(np.min(_INWARD * -values[falling] / step[falling], initial=1.0))

@@ -1,0 +1,298 @@
+"""The best motion near others, by Newton's method on the nodes, and how fine it has to be."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, Ints
+from selfmotion.constraints import Binding, BoundConstraint
+from selfmotion.engine import Conditions, Evaluation
+from selfmotion.motion import FreeNullMotion, Grid, NodeNullMotion, NullMotion, Trajectory
+from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
+from selfmotion.optimise import Iteration, QuasiNewton, Status
+from selfmotion.planning.effort import Effort
+from selfmotion.planning.settings import (
+    COST_AGREEMENT,
+    LEAST_SAVING,
+    MOST_NODES,
+    NEARLY,
+    TOWARDS_MIDDLE,
+)
+from selfmotion.problem import Problem
+
+
+def takes(problem: Problem, effort: Effort, constraints: Sequence[BoundConstraint]) -> bool:
+    """Whether a problem is one for nodes.
+
+    Not where the user asks for another null motion or optimiser, the tool leaves the path, nothing
+    is free, a cost is no quadratic form or weighs jerks, which cubic splines do not have, or a
+    condition is on the whole motion.
+    """
+    dof = problem.robot.dof
+    orders = [order for cost in problem.all_costs for order in cost.curvature(dof)]
+    return (
+        isinstance(problem.null_motion, FreeNullMotion)
+        and effort.optimizer == QuasiNewton()
+        and problem.damping is None
+        and not problem.relaxations
+        and problem.follows.redundancy == dof - problem.follows.dimension > 0
+        and all(cost.is_quadratic for cost in problem.all_costs)
+        and max(orders) < 3
+        and not any(item.equality for item in constraints)
+    )
+
+
+_NO_COLUMNS: Ints = np.zeros(0, dtype=np.int64)
+_ARRIVED = (Status.CONVERGED, Status.PRECISION)
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A motion of nodes that stands: an optimum that keeps the conditions.
+
+    Attributes
+    ----------
+    motion : NodeMotion
+    status : Status
+    columns : (c,)
+        Of the conditions: those that counted.
+    prices : (N + 1, C)
+        Of the conditions, on the nodes of the optimum.
+    active : tuple of Binding
+    remaining : float
+        What a finer grid and another step might still save [cost].
+    """
+
+    motion: NodeMotion
+    status: Status
+    columns: Ints
+    prices: Array
+    active: tuple[Binding, ...]
+    remaining: float
+
+    @property
+    def steps(self) -> int:
+        """Intervals between the nodes."""
+        return len(self.motion.grid.t) - 1
+
+    @property
+    def null_motion(self) -> NullMotion:
+        """The null motion's functions: of its values at the nodes, for each joint."""
+        return NodeNullMotion(tuple(self.motion.grid.t / self.motion.grid.t[-1]))
+
+    @property
+    def coefficients(self) -> Array:
+        """The null motion at the nodes, joint by joint."""
+        return self.motion.epsilon.T.ravel()
+
+    @property
+    def cost(self) -> float:
+        """F."""
+        return self.motion.exact_cost
+
+    def evaluation(self) -> Evaluation:
+        """Return the motion as others are."""
+        motion = self.motion
+        return Evaluation(self.coefficients, motion.exact_terms, motion.trajectory, damped=False)
+
+    def refined(self, where: npt.NDArray[np.bool_] | None = None) -> "Standing":
+        """Return it with more nodes, in the middle of each interval or of some (N,)."""
+        t = self.motion.grid.t
+        middles = 0.5 * (t[:-1] + t[1:])
+        finer = np.sort(np.concatenate([t, middles if where is None else middles[where]]))
+        motion = self.motion.on(self.motion.grid.on(finer))
+        if motion is None:
+            return self
+        # Prices are of conditions at nodes: the more there are, the less each counts.
+        near = np.searchsorted(t, finer, side="right") - 1
+        prices = self.prices[near] * (len(t) / len(finer))
+        return replace(self, motion=motion, prices=prices)
+
+
+class NodeDescent:
+    """Looks for the best motion on nodes near the motions that it is given.
+
+    Parameters
+    ----------
+    problem : Problem
+    effort : Effort
+    constraints : sequence of BoundConstraint
+    free : bool
+        Whether the start may move along its self-motion.
+
+    Attributes
+    ----------
+    history : list of Iteration
+    latest : Standing or None
+        The last motion on the way that keeps the conditions: what an interruption leaves.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        effort: Effort,
+        constraints: Sequence[BoundConstraint],
+        *,
+        free: bool,
+    ) -> None:
+        self._problem, self._effort = problem, effort
+        self._constraints, self._free = constraints, free
+        self._first = effort.counts.evaluations
+        self.history: list[Iteration] = []
+        self.latest: Standing | None = None
+        self._ended: Status | None = None
+
+    def grid(self, t: Array) -> NodeGrid:
+        """Return nodes at some times."""
+        return NodeGrid(
+            self._problem, t, self._constraints, free=self._free, counts=self._effort.counts
+        )
+
+    def near(self, trajectories: Sequence[Trajectory], t: Array) -> Standing | None:
+        """Return the best motion near the cheapest of some, on nodes at some times.
+
+        Where what is best freely breaks conditions, also near motions from its start whose
+        self-motion goes towards the middle of the joints' limits. None where there is none that
+        keeps them.
+        """
+        grid = self.grid(t)
+        motions = [grid.motion_near(trajectory) for trajectory in trajectories]
+        motion = min((one for one in motions if one), key=_aim_of, default=None)
+        if motion is None:
+            return None
+        freely = self._minimise(motion, _NO_COLUMNS)
+        best = self._kept(freely)
+        if best is not None or self._ended is not None:
+            return best
+        broken = _broken(freely.motion)
+        orders = grid.conditions.orders(freely.motion.samples)
+        # Along a limit of speed or acceleration what is faster jumps: beyond quintics on few nodes.
+        if (orders[broken] > 0).any():
+            return None
+        if not self._free:
+            best = self._towards_middle(grid, motion.place.q[0])
+        dearest = np.inf if best is None else best.cost
+        found = None if self._ended else self._bound(freely, _NO_COLUMNS, dearest)
+        return min((one for one in (best, found) if one), key=_cost_of, default=None)
+
+    def again(self, standing: Standing) -> Standing | None:
+        """Return the optimum near a motion on its nodes."""
+        optimum = self._minimise(standing.motion, standing.columns, prices=standing.prices)
+        return self._kept(optimum, standing.columns) or self._bound(optimum, standing.columns)
+
+    def settled(self, standing: Standing) -> Standing:
+        """Return the optimum on nodes so near to each other that the cost is right.
+
+        With one more between each two, put onto the path.
+        """
+        while self._ended is None and 2 * standing.steps <= MOST_NODES * len(self._problem.knots):
+            motion, finer = standing.motion, standing.refined()
+            off = abs(motion.exact_cost - motion.cost)
+            kept = not _broken(finer.motion).any()
+            if kept and off <= COST_AGREEMENT * abs(motion.exact_cost):
+                # That is on the path and keeps the conditions: between the nodes it does so better.
+                return finer
+            found = self.again(finer)
+            if found is None:
+                break
+            standing = found
+        return standing
+
+    def _towards_middle(self, grid: NodeGrid, start: Array) -> Standing | None:
+        """Return what is best near motions whose self-motion goes towards the limits' middle."""
+        robot = self._problem.robot
+        limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
+        middle = np.where(limited, 0.5 * (robot.lower + robot.upper), start)
+        for share in TOWARDS_MIDDLE:
+            motion = grid.motion_towards(start, middle, share * self._problem.path.duration)
+            if motion is not None and self._ended is None:
+                best = self._kept(self._minimise(motion, _NO_COLUMNS))
+                if best is not None:
+                    return best
+        return None
+
+    def _kept(self, optimum: Optimum, columns: Ints = _NO_COLUMNS) -> Standing | None:
+        """Return the optimum if it keeps all conditions."""
+        return None if _broken(optimum.motion).any() else self._standing(optimum, columns)
+
+    def _bound(self, optimum: Optimum, columns: Ints, dearest: float = np.inf) -> Standing | None:
+        """Return the optimum that keeps all conditions, from one that keeps some columns of them.
+
+        None where none is found, or would be dearer than that.
+        """
+        while self._ended is None and optimum.status in _ARRIVED:
+            motion = optimum.motion
+            broken = _broken(motion)
+            if not broken.any():
+                return self._standing(optimum, columns)
+            if broken[columns].any():
+                return None
+            near = (motion.h > -NEARLY).any(axis=0)
+            columns = np.union1d(columns, np.flatnonzero(broken | near))
+            if (motion.grid.conditions.orders(motion.samples)[columns] > 0).any():
+                return None
+            optimum = self._minimise(motion, columns, dearest)
+        return None
+
+    def _minimise(
+        self,
+        motion: NodeMotion,
+        columns: Ints,
+        dearest: float = np.inf,
+        prices: Array | None = None,
+    ) -> Optimum:
+        def told(step: Step) -> bool:
+            return self._told(step) or step.motion.cost > dearest
+
+        return minimise(motion, columns, told, prices)
+
+    def _told(self, step: Step) -> bool:
+        """Note an iteration; return whether to stop."""
+        effort, motion = self._effort, step.motion
+        iteration = Iteration(
+            x=motion.nu.ravel(),
+            cost=motion.cost,
+            gradient_norm=step.slope,
+            update="newton",
+            step=step.length,
+            evaluations=effort.counts.evaluations,
+        )
+        self.history.append(iteration)
+        if (motion.h <= motion.grid.conditions.tolerances).all():
+            none = np.zeros_like(motion.h)
+            self.latest = Standing(motion, Status.STOPPED, _NO_COLUMNS, none, (), np.inf)
+        if effort.callback is not None and effort.callback(iteration):
+            self._ended = Status.STOPPED
+        most = effort.max_evaluations
+        if most is not None and effort.counts.evaluations >= self._first + most:
+            self._ended = Status.MAX_EVALUATIONS
+        return self._ended is not None
+
+    def _standing(self, optimum: Optimum, columns: Ints) -> Standing:
+        motion = optimum.motion
+        # What keeps the conditions, and leads no further, is as good as it gets.
+        arrived = optimum.status if optimum.status in _ARRIVED else Status.PRECISION
+        status = self._ended or arrived
+        least = LEAST_SAVING * abs(motion.cost)
+        conditions = Conditions(motion.grid.conditions.constraints, Grid(motion.grid.t))
+        each = [part.ravel() for part in motion.grid.conditions.by_constraint(optimum.prices)]
+        active = conditions.active(motion.samples, np.concatenate([np.zeros(0), *each]), least)
+        off = abs(motion.exact_cost - motion.cost)
+        promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
+        return Standing(motion, status, columns, optimum.prices, active, off + promised)
+
+
+def _broken(motion: NodeMotion) -> npt.NDArray[np.bool_]:
+    """Return which columns of the conditions are not kept, (C,)."""
+    # Written so that NaN is not.
+    return np.asarray(~(motion.h <= motion.grid.conditions.tolerances).all(axis=0))
+
+
+def _cost_of(standing: Standing) -> float:
+    return standing.cost
+
+
+def _aim_of(motion: NodeMotion) -> float:
+    return motion.aim

@@ -1,0 +1,156 @@
+"""Newton's method on nodes: quadratic, as quick on many nodes as on few, and right at limits."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.nodes import Step, minimise
+from selfmotion.nodes.banded import Banded
+from selfmotion.optimise import Status
+from support.arms import PANDA_HOME, Case
+from support.nodes import nodes_of, problem_of
+
+NONE = np.zeros(0, dtype=np.int64)
+
+
+def never(step: Step) -> bool:
+    return False
+
+
+def slopes_of(problem: sm.Problem, count: int, *, free: bool = False) -> list[float]:
+    slopes: list[float] = []
+
+    def told(step: Step) -> bool:
+        slopes.append(step.slope)
+        return False
+
+    optimum = minimise(nodes_of(problem, count, free=free), NONE, told)
+    assert optimum.status is Status.CONVERGED
+    return slopes
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_convergence_is_quadratic(case: Case, free: bool) -> None:
+    slopes = slopes_of(problem_of(case), 16, free=free)
+    # Where rounding does not show: the last two steps from there.
+    above = [slope for slope in slopes if slope > 1e-7 * slopes[0]]
+    below = [slope for slope in slopes if slope <= 1e-7 * slopes[0]]
+    if len(above) < 2 or not below:
+        return
+    first, second, third = above[-2], above[-1], below[0]
+    if second < 1e-2 * slopes[0] and third > 1e-10 * slopes[0]:
+        assert np.log(third / second) / np.log(second / first) > 1.8
+    else:
+        assert third / second <= 1e-2
+
+
+def test_many_nodes_take_as_many_iterations(panda: sm.RobotModel) -> None:
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    problem = sm.Problem(
+        panda, path, "pose", PANDA_HOME, constraints=(), rest=False, collision=None
+    )
+    counts = [len(slopes_of(problem, count)) for count in (50, 500, 5000)]
+    assert max(counts) - min(counts) <= 1
+    assert max(counts) <= 8
+
+
+def test_it_is_below_the_finest_spline(case: Case) -> None:
+    problem = problem_of(case)
+    optimum = minimise(nodes_of(problem, 64), NONE, never)
+    spline = sm.plan(
+        sm.Problem(
+            *(problem.robot, problem.path, problem.task, problem.given_start),
+            null_motion=sm.BSplineNullMotion(32),
+            constraints=(),
+            rest=False,
+            collision=None,
+        )
+    )
+    assert optimum.motion.exact_cost <= spline.report.cost * (1.0 + 1e-5)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_at_limits_prices_tell_what_the_limits_cost(panda: sm.RobotModel, share: float) -> None:
+    """The first-order conditions, and dF/dlimit by planning with another limit."""
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+
+    def optimum(upper: float):
+        limit = np.where(np.arange(7) == 2, upper, panda.upper)
+        constraints = (sm.JointPositionLimits(upper=limit),)
+        problem = sm.Problem(
+            panda, path, "pose", PANDA_HOME, constraints=constraints, rest=False, collision=None
+        )
+        begin = nodes_of(problem, 24)
+        return minimise(begin, np.arange(begin.h.shape[1]), never)
+
+    free = optimum(panda.upper[2])
+    farthest = free.motion.place.q[:, 2].max()
+    here = PANDA_HOME[2] + share * (farthest - PANDA_HOME[2])
+    bound, eased = optimum(here), optimum(here + 1e-4)
+    assert bound.status is Status.CONVERGED
+    assert (bound.prices >= 0.0).all()
+    assert bound.motion.h.max() <= 1e-6
+    # What does not bind costs nothing.
+    assert np.abs(bound.prices * bound.motion.h).sum() <= 1e-5 * bound.motion.cost
+    assert bound.motion.cost > free.motion.cost
+    saved = bound.motion.cost - eased.motion.cost
+    assert saved == pytest.approx(1e-4 * bound.prices.sum(), rel=0.05)
+
+
+def test_what_cannot_be_kept_is_said_to_be_so(panda: sm.RobotModel) -> None:
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    slow = (sm.JointVelocityLimits(0.05),)
+    problem = sm.Problem(
+        panda, path, "pose", PANDA_HOME, constraints=slow, rest=False, collision=None
+    )
+    begin = nodes_of(problem, 24)
+    optimum = minimise(begin, np.arange(begin.h.shape[1]), never)
+    assert optimum.status in (Status.INFEASIBLE, Status.MAX_ITERATIONS, Status.GRADIENT)
+
+
+def test_it_stops_where_it_is_told_to(panda: sm.RobotModel) -> None:
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    problem = sm.Problem(
+        panda, path, "pose", PANDA_HOME, constraints=(), rest=False, collision=None
+    )
+    begin = nodes_of(problem, 24)
+    optimum = minimise(begin, NONE, lambda step: step.length > 0.0)
+    assert optimum.status is Status.STOPPED
+    assert optimum.motion.cost < begin.cost
+
+
+@pytest.mark.parametrize("size", [1, 2, 4])
+def test_a_banded_system_is_the_dense_one(size: int) -> None:
+    rng, count = np.random.default_rng(size), 7
+    matrix = Banded(count, size, 2)
+    dense = np.zeros((count * size, count * size))
+    pairs, triples = rng.normal(size=(count - 1, 2 * size, 2 * size)), []
+    for k, block in enumerate(pairs):
+        pairs[k] = block @ block.T
+        dense[k * size : (k + 2) * size, k * size : (k + 2) * size] += pairs[k]
+    for k in range(count):
+        block = rng.normal(size=(3 * size, 3 * size))
+        block = block @ block.T
+        # There is nothing before the first one, or after the last.
+        before, after = (size if k == 0 else 0), (2 * size if k == count - 1 else 3 * size)
+        block[:before], block[:, :before], block[after:], block[:, after:] = 0.0, 0.0, 0.0, 0.0
+        first = (k - 1) * size
+        dense[max(first, 0) : first + after, max(first, 0) : first + after] += block[
+            before:after, before:after
+        ]
+        triples.append(block)
+    matrix.add_pairs(0, pairs)
+    matrix.add_triples(np.array(triples))
+    matrix.add_diagonal(0.5)
+    dense += 0.5 * np.eye(len(dense))
+    np.testing.assert_allclose(matrix.dense(), dense, atol=1e-12)
+    held = np.array([0, size, count * size - 1])
+    matrix.hold(held)
+    dense[held], dense[:, held] = 0.0, 0.0
+    dense[held, held] = 1.0
+    right = rng.normal(size=count * size)
+    solved = matrix.solve(right)
+    assert solved is not None
+    np.testing.assert_allclose(dense @ solved, right, atol=1e-9)
+    matrix.add_diagonal(-1e3)
+    assert matrix.solve(right) is None
