@@ -14,7 +14,7 @@ from selfmotion.collision.distances import HullDistances, Ints
 from selfmotion.collision.found import Closest, Overlap
 from selfmotion.collision.meshes import MeshDistances
 from selfmotion.collision.obstacles import Obstacle
-from selfmotion.collision.overlaps import SAMPLES, count_overlaps, links_of
+from selfmotion.collision.overlaps import SAMPLES, count_overlaps, counts_of, links_of
 from selfmotion.collision.pairs import (
     are_neighbours,
     are_placed_apart,
@@ -31,7 +31,7 @@ _NO_PAIR = Closest(math.inf, "", "")
 
 
 class CollisionModel:
-    """Exact clearance of an arm from itself and from obstacles that stand still.
+    """Exact clearance of an arm, and of what rides on it, from itself and from obstacles.
 
     Every body is a solid. While two bodies are apart their distance is that of the real meshes.
     When they overlap, the value is minus the depth by which their convex hulls do, an upper bound
@@ -43,9 +43,10 @@ class CollisionModel:
     robot : RobotModel
         The arm. All its links count, those on locked joints too, where they are held.
     obstacles : sequence of Obstacle
-        The world. The robot's immovable base is not checked against it.
+        The world, and what rides on links: those count as links that are fixed to theirs. The
+        robot's immovable base is not checked against the world.
     disabled : sequence of (str, str)
-        Pairs of links that are left out; see `disabled_links` for those of an SRDF.
+        Pairs of links or obstacles that are left out; see `disabled_links` for those of an SRDF.
 
     Attributes
     ----------
@@ -63,8 +64,9 @@ class CollisionModel:
     Raises
     ------
     CollisionError
-        Two obstacles, or an obstacle and a link, have the same name; a piece of geometry is no
-        body; a mesh cannot be read; a link that is disabled is not the arm's.
+        Two obstacles, or an obstacle and a link, have the same name; an obstacle's frame is no
+        link; a piece of geometry is no body; a mesh cannot be read; what is disabled is neither a
+        link of the arm nor an obstacle.
     RobotError
         A mesh of the robot is missing.
 
@@ -85,18 +87,23 @@ class CollisionModel:
     ) -> None:
         self.robot, self.obstacles, self._disabled = robot, tuple(obstacles), tuple(disabled)
         links = links_of(robot)
-        self.has_bodies = len(links.bodies) > 0
-        self._bodies = (*links.bodies, *obstacle_bodies(self.obstacles, robot.urdf.links))
+        self._bodies = (*links.bodies, *obstacle_bodies(self.obstacles, robot))
+        self.has_bodies = not all(body.is_obstacle for body in self._bodies)
         self.bodies = tuple(body.name for body in self._bodies)
         pairs: list[tuple[int, int]] = []
         often: dict[tuple[str, str, bool], int] = {}
         candidates = candidate_pairs(self._bodies, robot.urdf, disabled)
-        as_made = {frozenset(pair) for pair in robot.touching}
-        as_made |= self._touching_neighbours(links.counts)
+        riding = [
+            (i, j)
+            for i, j in candidates
+            if (i, j) not in links.counts and not self._bodies[j].is_obstacle
+        ]
+        self._counts = {**links.counts, **counts_of(robot, self._bodies, riding)}
+        as_made = {frozenset(pair) for pair in robot.touching} | self._touching_neighbours()
         for first, second in candidates:
-            met, _ = links.counts.get((first, second), (0, 0))
+            met, _ = self._counts.get((first, second), (0, 0))
             names = self.bodies[first], self.bodies[second]
-            always = met == SAMPLES and not are_placed_apart(*names, robot.urdf)
+            always = met == SAMPLES and not self._placed_apart(first, second)
             is_checked = not always and frozenset(names) not in as_made
             if is_checked:
                 pairs.append((first, second))
@@ -117,21 +124,19 @@ class CollisionModel:
         solids = [body.solid for body in self._bodies]
         self._meshes = MeshDistances(solids, self.bodies, self._index)
 
-    def _touching_neighbours(
-        self, counts: dict[tuple[int, int], tuple[int, int]]
-    ) -> set[frozenset[str]]:
-        """Return the links next to a joint of which some pieces always overlap: as made."""
-        always = {
-            (self.bodies[i], self.bodies[j])
-            for (i, j), (met, _) in counts.items()
-            if met == SAMPLES
-        }
-        urdf = self.robot.urdf
+    def _touching_neighbours(self) -> set[frozenset[str]]:
+        """Return what is next to a joint and of which some pieces always overlap: as made."""
         return {
-            frozenset(pair)
-            for pair in always
-            if are_neighbours(*pair, urdf) and not are_placed_apart(*pair, urdf)
+            frozenset((self.bodies[i], self.bodies[j]))
+            for (i, j), (met, _) in self._counts.items()
+            if met == SAMPLES
+            and are_neighbours(self._bodies[i].link, self._bodies[j].link, self.robot.urdf)
+            and not self._placed_apart(i, j)
         }
+
+    def _placed_apart(self, first: int, second: int) -> bool:
+        links = self._bodies[first].link, self._bodies[second].link
+        return are_placed_apart(*links, self.robot.urdf)
 
     @cached_property
     def stuck(self) -> Closest | None:
@@ -153,14 +158,25 @@ class CollisionModel:
         return worst if worst.first else None
 
     @property
+    def standing(self) -> frozenset[str]:
+        """Names of the obstacles that stand in the world."""
+        return frozenset(body.name for body in self._bodies if body.is_obstacle)
+
+    @cached_property
+    def to_world(self) -> npt.NDArray[np.bool_]:
+        """Which pairs are of what the robot carries along and an obstacle of the world, (P,)."""
+        second = self._index[:, 1].tolist()
+        return np.array([self._bodies[j].is_obstacle for j in second], dtype=np.bool_)
+
+    @property
     def checks_links(self) -> bool:
-        """Whether some pair of links is checked."""
-        return any(not self._bodies[second].is_obstacle for _, second in self._index)
+        """Whether some pair of links, or of what rides on them, is checked."""
+        return not self.to_world.all()
 
     @property
     def checks_obstacles(self) -> bool:
-        """Whether some link is checked against an obstacle."""
-        return any(self._bodies[second].is_obstacle for _, second in self._index)
+        """Whether some link is checked against an obstacle of the world."""
+        return bool(self.to_world.any())
 
     @cached_property
     def open_meshes(self) -> tuple[str, ...]:
@@ -371,7 +387,7 @@ class CollisionModel:
 
     def overlap_counts(self) -> tuple[Ints, Ints]:
         """Return in how many of 500 configurations bodies overlap, and their hulls alone, (P,)."""
-        known = [links_of(self.robot).counts.get((i, j)) for i, j in self._index.tolist()]
+        known = [self._counts.get((i, j)) for i, j in self._index.tolist()]
         unknown = np.flatnonzero([counts is None for counts in known])
         met, alone = count_overlaps(self.robot, self.hulls, self._meshes, unknown)
         for pair, counts in enumerate(known):

@@ -157,8 +157,9 @@ def _plan(
         },
         "clearance": None if motion.clearance is None else _clearance(motion.clearance, payload),
         "obstacles": {item.name: scene.obstacle_node(root, item) for item in motion.obstacles},
+        "riders": scene.riders(root, motion.plan.robot, motion.obstacles),
         "commands": [
-            *scene.obstacle_commands(root, motion.obstacles, payload),
+            *scene.obstacle_commands(root, motion.plan.robot, motion.obstacles, payload),
             *(
                 command
                 for f, tip in enumerate(motion.tips)

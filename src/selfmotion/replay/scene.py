@@ -7,13 +7,23 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from selfmotion.basics import Array
-from selfmotion.collision import Box, Capsule, Cylinder, Mesh, Obstacle, Solid, Sphere
+from selfmotion.collision import (
+    Box,
+    Capsule,
+    Cylinder,
+    Mesh,
+    Obstacle,
+    Solid,
+    Sphere,
+    place_of,
+)
 from selfmotion.replay import shapes, three
 from selfmotion.replay.links import Arm, safe
 from selfmotion.replay.meshes import read_meshes
 from selfmotion.replay.motion import Curves, KeyFrames
 from selfmotion.replay.payload import Json, Payload
 from selfmotion.replay.shapes import Indices, Surface
+from selfmotion.robot import RobotModel
 
 _ROOT = "/selfmotion"
 _OBSTACLE = (0.80, 0.62, 0.42)
@@ -249,8 +259,22 @@ def obstacle_node(root: str, obstacle: Obstacle) -> str:
     return f"{root}/obstacles/{safe(obstacle.name)}"
 
 
-def obstacle_commands(root: str, obstacles: Sequence[Obstacle], payload: Payload) -> list[Json]:
+def riders(root: str, robot: RobotModel, obstacles: Sequence[Obstacle]) -> list[Json]:
+    """Return the nodes of obstacles that ride on links, each with the joint that moves it."""
+    carriers = [(item, place_of(item, item.pose, robot)[0] - 1) for item in obstacles]
+    return [
+        {"root": obstacle_node(root, item), "carrier": carrier}
+        for item, carrier in carriers
+        if carrier >= 0
+    ]
+
+
+def obstacle_commands(
+    root: str, robot: RobotModel, obstacles: Sequence[Obstacle], payload: Payload
+) -> list[Json]:
     """Return the commands that draw the obstacles of the plan at `root`.
+
+    Those that ride on a link are placed in the frame of the joint that carries them.
 
     Raises
     ------
@@ -263,12 +287,12 @@ def obstacle_commands(root: str, obstacles: Sequence[Obstacle], payload: Payload
     return [
         three.set_object(f"{obstacle_node(root, item)}/{k}", geometry, look, matrix)
         for item in obstacles
-        for k, (geometry, matrix) in enumerate(_obstacle(item, payload))
+        for k, (geometry, matrix) in enumerate(_obstacle(item, robot, payload))
     ]
 
 
-def _obstacle(item: Obstacle, payload: Payload) -> list[tuple[Json, Array]]:
-    matrix: Array = item.pose.homogeneous
+def _obstacle(item: Obstacle, robot: RobotModel, payload: Payload) -> list[tuple[Json, Array]]:
+    matrix: Array = place_of(item, item.pose, robot)[1].homogeneous
     match item:
         case Box():
             return [(three.box(item.size), matrix)]
