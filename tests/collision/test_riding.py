@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 
 import selfmotion as sm
 from selfmotion.basics import Array, restore
@@ -18,6 +19,8 @@ from support.arms import robot_named, short_line, start_of
 
 # Rounding of placements that are multiplied in another order, through GJK's accuracy [m].
 SAME = 1e-7
+# What distances of unlike shapes are right to [m].
+DISTANCE = 1e-6
 
 POSE = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 0.4), np.array([0.02, 0.05, 0.12]))
 WORLD = (sm.Box("post", [0.5, 0.2, 0.4], [0.1, 0.1, 0.8]), sm.Sphere("ball", [-0.3, 0.4, 0.7], 0.1))
@@ -252,6 +255,85 @@ def test_a_plan_with_what_rides_is_that_of_the_arm_with_the_link(
     again = sm.load_plan(tmp_path / "plan.npz")
     assert again.certificate.findings == plans[0].certificate.findings
     assert [item.frame for item in again.obstacles] == [None, "panda_hand"]
+
+
+@pytest.mark.parametrize("name", FRAMES)
+def test_bodies_of_an_arm_are_what_rides_on_it(name: str) -> None:
+    robot, bodies = sm.load_robot(name), ridden(*FRAMES[name])
+    own = sm.CollisionModel(sm.load_robot(name, bodies=bodies), WORLD)
+    other = sm.CollisionModel(robot, [*WORLD, *bodies])
+    q = configurations(robot, 8)
+    assert unlike(own, other, q) == []
+    rest = sm.CollisionModel(sm.load_robot(name, bodies=bodies[1:]), WORLD)
+    assert unlike(rest, other, q) != []
+
+
+def test_a_capsule_is_a_cylinder_and_two_spheres_of_an_arm(panda: sm.RobotModel) -> None:
+    """As far from all else: of pieces that overlap something, each has a depth of its own."""
+    cable = sm.Capsule("cable", POSE, 0.02, 0.2, frame="panda_hand")
+    arm, q = sm.load_robot("panda", bodies=[cable]), configurations(panda, 8)
+    first, second = (
+        table(model, model.distances(q))
+        for model in (sm.CollisionModel(arm, WORLD), sm.CollisionModel(panda, [*WORLD, cable]))
+    )
+    assert first.keys() == second.keys()
+    for pair, values in first.items():
+        apart = np.maximum(values, 0.0) - np.maximum(second[pair], 0.0)
+        assert np.abs(apart).max() < DISTANCE
+
+
+def test_bodies_of_an_arm_are_placed_as_its_tool_is(panda: sm.RobotModel) -> None:
+    """In the frame of `tool`, the offset to the tool's point left aside."""
+    offset = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.5, 0.0), np.array([0.0, 0.0, 0.3]))
+    torch = sm.Box("torch", POSE, [0.06, 0.04, 0.3])
+    arm = sm.load_robot("panda", "panda_hand", tool_offset=offset, bodies=[torch])
+    ridden_on = dataclasses.replace(torch, frame="panda_hand")
+    model = sm.CollisionModel(arm, WORLD)
+    other = sm.CollisionModel(panda, [*WORLD, ridden_on])
+    assert unlike(model, other, configurations(panda, 4)) == []
+    assert arm.dof == panda.dof
+    q = configurations(arm, 1)[0]
+    assert arm.pose(q) == sm.load_robot("panda", "panda_hand", tool_offset=offset).pose(q)
+
+
+def test_bodies_of_an_arm_go_into_files_and_back(tmp_path: Path) -> None:
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "part.stl")
+    bodies = [
+        sm.Box("gun", POSE, [0.06, 0.04, 0.1]),
+        sm.Cylinder("nozzle", POSE, 0.02, 0.1, frame="gun"),
+        sm.Capsule("cable", POSE, 0.01, 0.1, frame="panda_link5"),
+        sm.Sphere("lamp", POSE, 0.03, frame="panda_hand"),
+        sm.Mesh("part", POSE, tmp_path / "part.stl", 0.5),
+    ]
+    for offset in (None, pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.2]))):
+        arm = sm.load_robot("panda", tool_offset=offset, bodies=bodies)
+        start = start_of(arm, "pose")
+        problem = sm.Problem(arm, short_line(arm, start), start=start)
+        file = tmp_path / "torch.toml"
+        sm.write_problem(problem, file)
+        again = sm.read_problem(file).robot
+        q = configurations(arm, 4)
+        assert unlike(sm.CollisionModel(arm, WORLD), sm.CollisionModel(again, WORLD), q) == []
+    plan = sm.plan(problem)
+    plan.save(tmp_path / "plan.npz")
+    loaded = sm.load_plan(tmp_path / "plan.npz")
+    assert loaded.certificate.findings == plan.certificate.findings
+    assert loaded.robot.urdf.text == arm.urdf.text
+
+
+@pytest.mark.parametrize(
+    ("bodies", "message"),
+    [
+        ([sm.Box("panda_hand", POSE, [1, 1, 1])], "has a link 'panda_hand', whose name is needed"),
+        ([sm.Box("a", POSE, [1, 1, 1], frame="hnad")], "box 'a': its frame 'hnad' is no link"),
+        (["torch"], "bodies has 'torch', expected Box, Sphere"),
+        ([sm.Box], "expected Box, Sphere"),
+        (3, "bodies has 3"),
+    ],
+)
+def test_what_is_no_body_of_an_arm_is_refused(bodies: Any, message: str) -> None:
+    with pytest.raises(sm.RobotError, match=message):
+        sm.load_robot("panda", bodies=bodies)
 
 
 def test_a_problem_file_carries_the_frame(panda: sm.RobotModel, tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ class Body:
     name : str
         The link it belongs to, or the obstacle.
     link : str
-        The link that carries it; "" for the world.
+        The link that it is of, or that carries it; "" for the world.
     joint : int
         Index of the joint that moves it; 0 for the world.
     place : pinocchio.SE3
@@ -59,7 +59,8 @@ def link_bodies(robot: RobotModel) -> list[Body]:
     for link, piece in zip(links, pieces, strict=True):
         file = f" ({piece.meshPath})" if piece.meshPath else ""
         solid = Solid(piece.geometry, f"{robot.urdf.source}: link '{link}'{file}")
-        bodies.append(Body(link, link, piece.parentJoint, piece.placement, solid))
+        carrier = robot.urdf.carrier(link)
+        bodies.append(Body(link, carrier, piece.parentJoint, piece.placement, solid))
     return bodies
 
 
@@ -87,7 +88,7 @@ def obstacle_bodies(obstacles: Sequence[Obstacle], robot: RobotModel) -> list[Bo
         joint, place = place_of(item, item.pose, robot)
         solid = Solid(item.geometry(), item.label)
         if joint:
-            riding.append(Body(item.name, str(item.frame), joint, place, solid))
+            riding.append(Body(item.name, robot.urdf.carrier(str(item.frame)), joint, place, solid))
         else:
             standing.append(Body(item.name, "", 0, place, solid))
     return [*riding, *standing]

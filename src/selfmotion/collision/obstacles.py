@@ -1,7 +1,7 @@
 """Obstacles: bodies of the world, or on a link. An own shape is a subclass of `Obstacle`."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any, ClassVar
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, CollisionError, as_number, as_numbers, shown
+from selfmotion.robot import UrdfShape
 from selfmotion.task import SE3, as_pose
 
 # An obstacle so large, or so far away [m], may be one in millimetres.
@@ -110,6 +111,19 @@ class Obstacle(ABC):
         CollisionError
             A file is missing or cannot be read.
         """
+
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """Return what it is in a URDF, where an arm carries it (`load_robot`, bodies).
+
+        Raises
+        ------
+        CollisionError
+            A URDF does not know the shape.
+        """
+        raise CollisionError(
+            f"{self.label}: a URDF knows no such shape, so that no arm can carry it as a body; "
+            f"give it to a Clearance, with frame="
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as JSON-safe values; `obstacle_from_dict` reverses this exactly."""
