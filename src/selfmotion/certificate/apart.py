@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.certificate.findings import Finding
+from selfmotion.certificate.findings import Extreme, Finding
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.collision import Closest, CollisionModel, Obstacle
 from selfmotion.motion import Trajectory
@@ -66,6 +66,16 @@ class KeepsApart(Requirement):
         return Finding(
             self.name, found.names, found.time, found.closest.value, self.distance, kept, text
         )
+
+    def approaches(self, motion: FinishedMotion) -> dict[str, Extreme]:
+        """See `Requirement.approaches`: each to a fiftieth of its distance."""
+        found = {
+            name: closest_at_all_times(model, motion.trajectory, 0.0)
+            for name, model in self.model.groups.items()
+        }
+        return {
+            name: Extreme(each.closest.value, each.time, each.names) for name, each in found.items()
+        }
 
     @property
     def covers(self) -> tuple[str, ...]:

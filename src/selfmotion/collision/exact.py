@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -27,6 +28,8 @@ from selfmotion.robot import RobotModel
 _OFTEN = 0.5
 # Bodies that are put in touch may overlap by this much [m]: rounding.
 _TOUCHING = 1e-6
+# What the links of an arm are called together.
+ITSELF = "the arm itself"
 _NO_PAIR = Closest(math.inf, "", "")
 
 
@@ -110,8 +113,6 @@ class CollisionModel:
             if met >= _OFTEN * SAMPLES or (met and not is_checked):
                 key = *names, is_checked
                 often[key] = max(met, often.get(key, 0))
-        self._index = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-        self.pairs = tuple((self.bodies[i], self.bodies[j]) for i, j in pairs)
         self.overlapping = tuple(
             Overlap(first, second, met / SAMPLES, is_checked)
             for (first, second, is_checked), met in often.items()
@@ -120,9 +121,33 @@ class CollisionModel:
         every = candidate_pairs(self._bodies, robot.urdf) if disabled else candidates
         named = dict.fromkeys((self.bodies[i], self.bodies[j]) for i, j in every)
         self.disabled = tuple(pair for pair in named if pair not in kept)
-        self.hulls = HullDistances(robot, self._bodies, self._index)
+        self._take(pairs)
+
+    def _take(self, pairs: Sequence[tuple[int, int]]) -> None:
+        """Check these pairs of bodies."""
+        self._index = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        self.pairs = tuple((self.bodies[i], self.bodies[j]) for i, j in pairs)
+        self.hulls = HullDistances(self.robot, self._bodies, self._index)
         solids = [body.solid for body in self._bodies]
         self._meshes = MeshDistances(solids, self.bodies, self._index)
+
+    def _with(self, pairs: Sequence[tuple[int, int]]) -> "CollisionModel":
+        other = copy(self)
+        other._take(pairs)
+        return other
+
+    @property
+    def groups(self) -> dict[str, "CollisionModel"]:
+        """The model of each obstacle and all that can meet it, by name, and of the links alone.
+
+        That one is called "the arm itself". What has no pair is left out.
+        """
+        names = [item.name for item in self.obstacles]
+        found: dict[str, list[tuple[int, int]]] = {}
+        for (i, j), pair in zip(self._index.tolist(), self.pairs, strict=True):
+            for name in [name for name in names if name in pair] or [ITSELF]:
+                found.setdefault(name, []).append((i, j))
+        return {name: self._with(found[name]) for name in (ITSELF, *names) if name in found}
 
     def _touching_neighbours(self) -> set[frozenset[str]]:
         """Return what is next to a joint and of which some pieces always overlap: as made."""
@@ -144,25 +169,15 @@ class CollisionModel:
         pairs = held_pairs(self._bodies, self.robot.urdf, self.robot.locked, self._disabled)
         if not pairs:
             return None
-        index = np.array(pairs, dtype=np.int64)
-        hulls = HullDistances(self.robot, self._bodies, index)
-        solids = [body.solid for body in self._bodies]
-        meshes = MeshDistances(solids, self.bodies, index)
-        q = np.zeros(self.robot.dof)
-        places, bounds = hulls.place(q), hulls.lower_bounds(q[None])[0]
-        worst = _NO_PAIR
-        for pair in np.flatnonzero(bounds < 0.0).tolist():
-            value = meshes.refine(places, pair, hulls.distance(pair, bounds[pair]))
-            if value < min(worst.value, -_TOUCHING):
-                worst = Closest(value, self.bodies[pairs[pair][0]], self.bodies[pairs[pair][1]])
-        return worst if worst.first else None
+        worst = self._with(pairs).worst(np.zeros((1, self.robot.dof)))
+        return worst if worst.value < -_TOUCHING else None
 
     @property
     def standing(self) -> frozenset[str]:
         """Names of the obstacles that stand in the world."""
         return frozenset(body.name for body in self._bodies if body.is_obstacle)
 
-    @cached_property
+    @property
     def to_world(self) -> npt.NDArray[np.bool_]:
         """Which pairs are of what the robot carries along and an obstacle of the world, (P,)."""
         second = self._index[:, 1].tolist()
@@ -207,7 +222,7 @@ class CollisionModel:
         """
         return np.where(self.moved, self._axis_distances, 0.0)
 
-    @cached_property
+    @property
     def pair_levers(self) -> Array:
         """How much the distance of each pair changes at most per unit of each joint, (P, n).
 
