@@ -16,6 +16,8 @@ from selfmotion.basics import RobotError, nearest, shown
 from selfmotion.robot.urdf import BASE_JOINT, BODY_JOINT, TOOL_JOINT, Urdf, UrdfJoint
 
 _BASE_LINK = "placed_base"
+# What carried bodies are drawn in.
+_COLOR = "0.32 0.36 0.42 1"
 
 
 class UrdfShape(NamedTuple):
@@ -115,6 +117,9 @@ def _element(kind: str, shape: str, item: UrdfShape) -> ElementTree.Element:
     ElementTree.SubElement(element, "origin", xyz=_text([0.0, 0.0, item.height]), rpy="0 0 0")
     geometry = ElementTree.SubElement(element, "geometry")
     ElementTree.SubElement(geometry, item.tag, dict(item.values))
+    if kind == "visual":
+        material = ElementTree.SubElement(element, "material", name="carried_body")
+        ElementTree.SubElement(material, "color", rgba=_COLOR)
     return element
 
 
