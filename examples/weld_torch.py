@@ -2,11 +2,11 @@
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
 
-# The torch, as its maker draws it, in the frame of the arm's flange: a gun, a neck that is bent by
-# 40 degrees, and where the wire meets the seam.
+# The torch in the frame of the flange: gun, bent neck, and where the wire meets the seam.
 bent = pin.rpy.rpyToMatrix(0.0, np.radians(40.0), 0.0)
 elbow = np.array([0.0, 0.0, 0.28])
 torch = [
@@ -14,13 +14,11 @@ torch = [
     sm.Cylinder("neck", [0.0, 0.0, 0.22], radius=0.015, length=0.12),
     sm.Cylinder("nozzle", pin.SE3(bent, elbow + 0.05 * bent[:, 2]), radius=0.012, length=0.1),
 ]
-wire = pin.SE3(bent, elbow + 0.115 * bent[:, 2])
-
 cell = sm.load_robot(
     {"arm": "ur10", "table": "positioner"},
     base={"table": pin.SE3(np.eye(3), np.array([0.8, 0.0, 0.0]))},
     tool="arm/tool0",
-    tool_offset=wire,
+    tool_offset=pin.SE3(bent, elbow + 0.115 * bent[:, 2]),
     bodies=torch,
     reference="table/plate",
 )
@@ -32,17 +30,10 @@ part = [
 ]
 
 # The seam goes round the foot of the tube; the torch points into the corner at 45 degrees.
-angle = np.linspace(0.0, 2.0 * np.pi, 25)
-outward = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
-up = np.array([0.0, 0.0, 1.0])
-z = -(outward + up) / np.sqrt(2.0)
-y = np.stack([-np.sin(angle), np.cos(angle), 0.0 * angle], axis=1)
-turns = [
-    np.roll(pin.Quaternion(np.stack([np.cross(b, c), b, c], axis=1)).coeffs(), 1)
-    for b, c in zip(y, z, strict=True)
-]
-seam = sm.Waypoints(angle, 0.081 * outward + 0.011 * up, np.array(turns))
-path = sm.Feed(seam, 0.04)
+angle, same = np.linspace(0.0, 2.0 * np.pi, 25), np.ones(25)
+seam = np.stack([0.081 * np.cos(angle), 0.081 * np.sin(angle), 0.011 * same], axis=1)
+turns = Rotation.from_euler("ZY", np.stack([angle, np.radians(-135.0) * same], axis=1))
+path = sm.Feed(sm.Waypoints(angle, seam, turns.as_quat(scalar_first=True)), 0.04)
 
 problem = sm.Problem(
     cell,
