@@ -184,22 +184,31 @@ def export(
         str | None,
         typer.Option("--format", help=f"Whatever the suffix: {', '.join(formats.FORMS)}."),
     ] = None,
+    parts: Annotated[
+        bool, typer.Option("--parts", help="Of a cell a file for each part as well, in step.")
+    ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Write a plan's motion for controllers and simulators, and check what was written."""
     saved = sm.load_plan(file)
     verified, verdicts = not saved.altered, dict[str, str]()
+
+    def judged(motion: sm.Trajectory, name: str) -> bool:
+        found = saved.problem.certify(motion, saved.tolerance, saved.report.ending)
+        verdicts[name] = f"read back: {found.verdict}"
+        return found.verified
+
     for target in out:
+        files = sm.write_parts(saved, target, rate=rate, form=form) if parts else {}
+        together = ", ".join(map(str, files.values()))
         sm.write_motion(saved, target, rate=rate, form=form)
         if form in formats.READABLE or (form is None and target.suffix not in (".xml", ".script")):
-            found = saved.problem.certify(
-                sm.read_motion(target), saved.tolerance, saved.report.ending
-            )
-            verified = verified and found.verified
-            verdicts[str(target)] = f"read back: {found.verdict}"
+            verified &= judged(sm.read_motion(target), str(target))
+            if files:
+                verified &= judged(sm.read_parts(files), together)
         else:
-            verified = verified and saved.certificate.verified
-            verdicts[str(target)] = ""
+            verified &= saved.certificate.verified
+            verdicts |= {str(target): "", **({together: ""} if files else {})}
     miss = formats.linear_miss(saved, rate)
     if as_json:
         terminal.print_json(
