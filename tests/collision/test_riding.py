@@ -148,6 +148,23 @@ def test_on_a_link_that_is_held_it_is_where_that_is_held() -> None:
     assert unlike(model, other, configurations(robot, 5)) == []
 
 
+def test_a_part_that_is_held_too_tight_is_told_with_the_remedy() -> None:
+    """The fingers, held 4 cm apart, and a part of 42 mm between them."""
+    robot = sm.load_robot("panda", lock={"panda_finger_joint1": 0.02})
+    part = sm.Box("part", [0.0, 0.0, 0.105], [0.02, 0.042, 0.02], frame="panda_hand")
+    fingers = ("panda_leftfinger", "panda_rightfinger")
+    q = configurations(robot, 1)
+    motion = sm.Trajectory([0.0, 1.0], [*q, *q], np.zeros((2, 7)), robot.joint_names)
+    judged = sm.FinishedMotion(robot, motion)
+    found = sm.Clearance([part], 0.0).requirement(robot).judge(judged)
+    assert "panda_leftfinger - part 1.02 mm into each other" in found.text
+    assert '<disable_collisions link1="panda_leftfinger" link2="part"' in found.text
+    pairs = [("part", finger) for finger in fingers]
+    assert sm.CollisionModel(robot, [part], pairs).stuck is None
+    free = dataclasses.replace(part, size=np.array([0.02, 0.0395, 0.02]))
+    assert sm.CollisionModel(robot, [free]).stuck is None
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -334,6 +351,25 @@ def test_bodies_of_an_arm_go_into_files_and_back(tmp_path: Path) -> None:
 def test_what_is_no_body_of_an_arm_is_refused(bodies: Any, message: str) -> None:
     with pytest.raises(sm.RobotError, match=message):
         sm.load_robot("panda", bodies=bodies)
+
+
+def test_a_free_start_keeps_what_rides_clear(panda: sm.RobotModel) -> None:
+    """A rod across the hand, and walls beside the path, which only a turned hand passes."""
+    start = start_of(panda, "pose")
+    pose = panda.pose(start)
+    rod = sm.Box("rod", [0.0, 0.0, 0.05], [0.02, 0.7, 0.02], frame="panda_hand")
+    along = pose.rotation[:, 1]
+    walls = [
+        sm.Sphere(f"wall{k}", pose.translation + sign * 0.3 * along, 0.06)
+        for k, sign in enumerate((1.0, -1.0))
+    ]
+    line = short_line(panda, start)
+    kept = sm.Clearance([rod, *walls], 0.005)
+    assert kept.model(panda).distance(start).value < 0.0
+    limits = sm.JointPositionLimits()
+    plan = sm.plan(sm.Problem(panda, line, "pointing", constraints=[limits, kept])).require()
+    assert {"rod", "wall0", "wall1"} <= plan.approaches.keys()
+    assert min(near.value for near in plan.approaches.values()) >= 0.005
 
 
 def test_a_problem_file_carries_the_frame(panda: sm.RobotModel, tmp_path: Path) -> None:

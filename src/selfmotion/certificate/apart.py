@@ -13,7 +13,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.certificate.findings import Extreme, Finding
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
-from selfmotion.collision import Closest, CollisionModel, Obstacle
+from selfmotion.collision import Closest, CollisionModel, Obstacle, srdf_line
 from selfmotion.motion import Trajectory
 
 # Intervals to begin with; each is halved so often before it counts as undecided.
@@ -49,7 +49,8 @@ class KeepsApart(Requirement):
             names, time = f"{stuck.first} - {stuck.second}", float(motion.trajectory.t[0])
             text = (
                 f"joints that are held, or places of parts, put {names} "
-                f"{-stuck.value * 1e3:.2f} mm into each other"
+                f"{-stuck.value * 1e3:.2f} mm into each other: if they are meant to be there, give "
+                f"disabled= the pair, or srdf= a file with {srdf_line(stuck.first, stuck.second)}"
             )
             return Finding(self.name, names, time, stuck.value, self.distance, False, text)
         found = closest_at_all_times(self.model, motion.trajectory, self.distance)
