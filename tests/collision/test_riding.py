@@ -196,6 +196,37 @@ def test_what_touches_as_it_is_mounted_is_left_out_and_told(panda: sm.RobotModel
     assert "bracket - flange (in 100 % of all configurations)" in " ".join(remarks)
 
 
+@pytest.mark.parametrize("name", FRAMES)
+def test_each_body_has_its_closest_approach(name: str) -> None:
+    """Whether it is the arm's own or the job's: the same groups, of the same pairs."""
+    robot, bodies = sm.load_robot(name), ridden(*FRAMES[name])
+    own = sm.CollisionModel(sm.load_robot(name, bodies=bodies), WORLD).groups
+    other = sm.CollisionModel(robot, [*WORLD, *bodies]).groups
+    assert own.keys() == other.keys()
+    assert own.keys() == {"the arm itself", *(body.name for body in (*WORLD, *bodies))}
+    for group, model in own.items():
+        assert {frozenset(x) for x in model.pairs} == {frozenset(x) for x in other[group].pairs}
+        assert group == "the arm itself" or all(group in pair for pair in model.pairs)
+
+
+def test_what_parts_of_a_cell_carry_is_not_made_to_touch() -> None:
+    """A ball on the table so large that the arm's shoulder is always in it: told, not left out."""
+    base = {"table": pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.0]))}
+    parts, tool = {"arm": "panda", "table": "positioner"}, "arm/panda_hand_tcp"
+    ball = sm.Sphere("ball", [0.0, 0.0, 0.0], 0.6, frame="table/plate")
+    ways = (
+        sm.CollisionModel(sm.load_robot(parts, tool, base=base, reference="table/plate"), [ball]),
+        sm.CollisionModel(
+            sm.load_robot(parts, tool, base=base, reference="table/plate", bodies=[ball])
+        ),
+    )
+    for model in ways:
+        pair = next(pair for pair in model.pairs if set(pair) == {"arm/panda_link1", "ball"})
+        (told,) = [x for x in model.overlapping if {x.first, x.second} == set(pair)]
+        assert (told.share, told.is_checked) == (1.0, True)
+        assert model.distance(np.zeros(model.robot.dof)).value < 0.0
+
+
 def test_pairs_of_what_rides_are_left_out_as_asked(panda: sm.RobotModel) -> None:
     bodies = ridden(*FRAMES["panda"])
     every = sm.CollisionModel(panda, [*WORLD, *bodies])

@@ -73,9 +73,10 @@ class Requirement(ABC):
         """Return what there is to say about a motion, on its worst place."""
 
     def approaches(self, motion: FinishedMotion) -> Mapping[str, Extreme]:
-        """Return how near bodies come at all times, in detail: each obstacle, and the arm itself.
+        """Return how near bodies come at all times, in detail.
 
-        The distance [m], when, and which two bodies. It takes about as long as to judge them.
+        Of each obstacle, each carried body and the arm itself: the distance [m], when, and which
+        two bodies. It takes about as long as to judge them.
         """
         return {}
 

@@ -138,11 +138,11 @@ class CollisionModel:
 
     @property
     def groups(self) -> dict[str, "CollisionModel"]:
-        """The model of each obstacle and all that can meet it, by name, and of the links alone.
+        """The models of "the arm itself", its links alone, and of each obstacle or carried body.
 
-        That one is called "the arm itself". What has no pair is left out.
+        With all that can meet it, by name. What has no pair is left out.
         """
-        names = [item.name for item in self.obstacles]
+        names = dict.fromkeys(body.name for body in self._bodies if body.link != body.name)
         found: dict[str, list[tuple[int, int]]] = {}
         for (i, j), pair in zip(self._index.tolist(), self.pairs, strict=True):
             for name in [name for name in names if name in pair] or [ITSELF]:
@@ -190,8 +190,9 @@ class CollisionModel:
 
     @property
     def checks_obstacles(self) -> bool:
-        """Whether some link is checked against an obstacle of the world."""
-        return bool(self.to_world.any())
+        """Whether something is checked against an obstacle, in the world or on a link."""
+        names = {item.name for item in self.obstacles}
+        return any(not names.isdisjoint(pair) for pair in self.pairs)
 
     @cached_property
     def open_meshes(self) -> tuple[str, ...]:

@@ -145,7 +145,7 @@ class _Models:
                 f"{robot.name}: a clearance is asked for, but its URDF has no collision geometry "
                 f"to measure from; add <collision> to its links, or leave the clearance out"
             )
-        if self.exact.standing and not self.exact.checks_obstacles:
+        if self.exact.standing and not self.exact.to_world.any():
             raise ProblemError(
                 f"{robot.name}: a clearance from obstacles is asked for, but no link that moves "
                 f"has collision geometry; add <collision> to those, or leave the obstacles out"

@@ -121,7 +121,7 @@ class Plan:
 
     @cached_property
     def approaches(self) -> Mapping[str, Extreme]:
-        """How near each obstacle comes, and the arm to itself, at all times.
+        """How near each obstacle and carried body comes, and the arm to itself, at all times.
 
         Name → the distance [m], when, and which two bodies; to a fiftieth of it or 0.1 mm. Found
         when it is asked for.
