@@ -11,21 +11,15 @@ import numpy.typing as npt
 from selfmotion.basics import Array, RobotError
 from selfmotion.collision import levers
 from selfmotion.collision.bodies import obstacle_bodies
+from selfmotion.collision.checked import checked_pairs
 from selfmotion.collision.distances import HullDistances, Ints
-from selfmotion.collision.found import Closest, Overlap
+from selfmotion.collision.found import Closest
 from selfmotion.collision.meshes import MeshDistances
 from selfmotion.collision.obstacles import Obstacle
-from selfmotion.collision.overlaps import SAMPLES, count_overlaps, counts_of, links_of
-from selfmotion.collision.pairs import (
-    are_neighbours,
-    are_placed_apart,
-    candidate_pairs,
-    held_pairs,
-)
+from selfmotion.collision.overlaps import count_overlaps, links_of
+from selfmotion.collision.pairs import held_pairs
 from selfmotion.robot import RobotModel
 
-# The share of sampled configurations from which on an overlap of links is worth telling.
-_OFTEN = 0.5
 # Bodies that are put in touch may overlap by this much [m]: rounding.
 _TOUCHING = 1e-6
 # What the links of an arm are called together.
@@ -57,6 +51,10 @@ class CollisionModel:
         Names of the P pairs that are checked; a link of several pieces appears repeatedly.
     bodies : tuple of str
         Names of the B bodies, likewise.
+    to_world : (P,)
+        Which pairs are of what the robot carries along and an obstacle of the world.
+    checks_links, checks_obstacles : bool
+        Whether some pair is of links or of what rides on them, and of an obstacle.
     overlapping : tuple of Overlap
         Pairs of links that overlap in half or more of 500 sampled configurations. Those that do
         in each, or are known to touch as they are made (`RobotModel.touching`), are not checked,
@@ -89,50 +87,29 @@ class CollisionModel:
         disabled: Sequence[tuple[str, str]] = (),
     ) -> None:
         self.robot, self.obstacles, self._disabled = robot, tuple(obstacles), tuple(disabled)
-        links = links_of(robot)
-        self._bodies = (*links.bodies, *obstacle_bodies(self.obstacles, robot))
+        self._bodies = (*links_of(robot).bodies, *obstacle_bodies(self.obstacles, robot))
         self.has_bodies = not all(body.is_obstacle for body in self._bodies)
         self.bodies = tuple(body.name for body in self._bodies)
-        pairs: list[tuple[int, int]] = []
-        often: dict[tuple[str, str, bool], int] = {}
-        candidates = candidate_pairs(self._bodies, robot.urdf, disabled)
-        riding = [
-            (i, j)
-            for i, j in candidates
-            if (i, j) not in links.counts and not self._bodies[j].is_obstacle
-        ]
-        self._counts = {**links.counts, **counts_of(robot, self._bodies, riding)}
-        as_made = {frozenset(pair) for pair in robot.touching} | self._touching_neighbours()
-        for first, second in candidates:
-            met, _ = self._counts.get((first, second), (0, 0))
-            names = self.bodies[first], self.bodies[second]
-            always = met == SAMPLES and not self._placed_apart(first, second)
-            is_checked = not always and frozenset(names) not in as_made
-            if is_checked:
-                pairs.append((first, second))
-            if met >= _OFTEN * SAMPLES or (met and not is_checked):
-                key = *names, is_checked
-                often[key] = max(met, often.get(key, 0))
-        self.overlapping = tuple(
-            Overlap(first, second, met / SAMPLES, is_checked)
-            for (first, second, is_checked), met in often.items()
-        )
-        kept = {(self.bodies[i], self.bodies[j]) for i, j in candidates}
-        every = candidate_pairs(self._bodies, robot.urdf) if disabled else candidates
-        named = dict.fromkeys((self.bodies[i], self.bodies[j]) for i, j in every)
-        self.disabled = tuple(pair for pair in named if pair not in kept)
-        self._take(pairs)
+        checked = checked_pairs(robot, self._bodies, self._disabled)
+        self._counts = checked.counts
+        self.overlapping, self.disabled = checked.overlapping, checked.disabled
+        self._take(checked.pairs)
 
     def _take(self, pairs: Sequence[tuple[int, int]]) -> None:
         """Check these pairs of bodies."""
         self._index = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         self.pairs = tuple((self.bodies[i], self.bodies[j]) for i, j in pairs)
+        self.to_world = np.array([self._bodies[j].is_obstacle for _, j in pairs], dtype=np.bool_)
+        obstacles = {item.name for item in self.obstacles}
+        self.checks_links = not self.to_world.all()
+        self.checks_obstacles = not all(obstacles.isdisjoint(pair) for pair in self.pairs)
         self.hulls = HullDistances(self.robot, self._bodies, self._index)
         solids = [body.solid for body in self._bodies]
         self._meshes = MeshDistances(solids, self.bodies, self._index)
 
     def _with(self, pairs: Sequence[tuple[int, int]]) -> "CollisionModel":
         other = copy(self)
+        other.__dict__.pop("pair_levers", None)
         other._take(pairs)
         return other
 
@@ -149,20 +126,6 @@ class CollisionModel:
                 found.setdefault(name, []).append((i, j))
         return {name: self._with(found[name]) for name in (ITSELF, *names) if name in found}
 
-    def _touching_neighbours(self) -> set[frozenset[str]]:
-        """Return what is next to a joint and of which some pieces always overlap: as made."""
-        return {
-            frozenset((self.bodies[i], self.bodies[j]))
-            for (i, j), (met, _) in self._counts.items()
-            if met == SAMPLES
-            and are_neighbours(self._bodies[i].link, self._bodies[j].link, self.robot.urdf)
-            and not self._placed_apart(i, j)
-        }
-
-    def _placed_apart(self, first: int, second: int) -> bool:
-        links = self._bodies[first].link, self._bodies[second].link
-        return are_placed_apart(*links, self.robot.urdf)
-
     @cached_property
     def stuck(self) -> Closest | None:
         """The links that held joints or placed parts put deepest into each other, if any."""
@@ -176,23 +139,6 @@ class CollisionModel:
     def standing(self) -> frozenset[str]:
         """Names of the obstacles that stand in the world."""
         return frozenset(body.name for body in self._bodies if body.is_obstacle)
-
-    @property
-    def to_world(self) -> npt.NDArray[np.bool_]:
-        """Which pairs are of what the robot carries along and an obstacle of the world, (P,)."""
-        second = self._index[:, 1].tolist()
-        return np.array([self._bodies[j].is_obstacle for j in second], dtype=np.bool_)
-
-    @property
-    def checks_links(self) -> bool:
-        """Whether some pair of links, or of what rides on them, is checked."""
-        return not self.to_world.all()
-
-    @property
-    def checks_obstacles(self) -> bool:
-        """Whether something is checked against an obstacle, in the world or on a link."""
-        names = {item.name for item in self.obstacles}
-        return any(not names.isdisjoint(pair) for pair in self.pairs)
 
     @cached_property
     def open_meshes(self) -> tuple[str, ...]:
@@ -223,7 +169,7 @@ class CollisionModel:
         """
         return np.where(self.moved, self._axis_distances, 0.0)
 
-    @property
+    @cached_property
     def pair_levers(self) -> Array:
         """How much the distance of each pair changes at most per unit of each joint, (P, n).
 
