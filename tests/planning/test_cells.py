@@ -211,6 +211,13 @@ def test_two_arms_of_six_joints_carry_a_bar_that_may_lean() -> None:
     plan = sm.plan(problem).require()
     (position, rotation) = plan.certificate.others[0]
     assert max(position.value, rotation.value) < TOLERANCE
+    # Out of reach, it goes as far as both hands do, without a null motion to refine.
+    end = pin.SE3(first.rotation, first.translation + np.array([1.5, 0.0, 0.0]))
+    away = sm.Follow(sm.Line(first, end, 6.0), tool=hands[0])
+    far = sm.plan(dataclasses.replace(problem, path=away.path, also=problem.also))
+    assert not far.certificate.verified
+    assert "out of reach" in far.certificate.verdict
+    assert 1.0 < far.trajectory.duration < 6.0
 
 
 def test_part_weights_are_by_part_and_by_joint(carried: sm.Plan) -> None:
