@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import selfmotion as sm
 from selfmotion.certificate.deviation import deviation_from, smallest_singular_values
-from support.scenes import Scene, among_plates, near_limits, seams
+from support.scenes import Scene, among_plates, carrying, near_limits, seams
 
 REPEATS = 9
 ARMS = ("panda", "xarm7", "kinova")
@@ -103,12 +103,13 @@ def _task(robot: sm.RobotModel) -> str:
 def main(
     count: Annotated[int, typer.Option(help="How many motions of each kind.")] = 300,
     seed: Annotated[int, typer.Option(help="Of the first one.")] = 0,
-    kinds: Annotated[str, typer.Option(help="Which of them.")] = "plates,limits,seams",
+    kinds: Annotated[str, typer.Option(help="Which of them.")] = "plates,carried,limits,seams",
 ) -> None:
     """Make motions, certify and judge, tell counts and prices."""
     console, wrong = Console(), False
     makers = {
         "plates": lambda: made(among_plates, count, seed),
+        "carried": lambda: made(carrying, count, seed),
         "limits": lambda: made(near_limits, count, seed),
         "seams": lambda: along_seams(count, seed),
     }

@@ -22,8 +22,8 @@ BESIDE = (
     *(f"arms/{f.name}" for f in DOCS.glob("arms/*")),
 )
 GALLERY = (
-    "weld_seam", "two_arms", "weld_positioner", "part_in_hand", "painting", "own_obstacle", "rail",
-    "closed_loop", "ur5_pointing",
+    "weld_seam", "two_arms", "weld_positioner", "weld_torch", "part_in_hand", "painting",
+    "own_obstacle", "rail", "closed_loop", "ur5_pointing",
 )  # fmt: skip
 
 

@@ -100,9 +100,11 @@ from selfmotion.formats import (
     read_job as read_job,
     read_joint_limits as read_joint_limits,
     read_motion as read_motion,
+    read_parts as read_parts,
     read_path as read_path,
     read_problem as read_problem,
     write_motion as write_motion,
+    write_parts as write_parts,
     write_problem as write_problem,
 )
 from selfmotion.motion import (

@@ -324,3 +324,55 @@ def test_links_that_overlap_from_the_start_are_named_with_the_remedy() -> None:
     assert (
         '<disable_collisions link1="r_shoulder_pan_link" link2="r_upper_arm_link"' in check.verdict
     )
+
+
+def near_bodies(panda: sm.RobotModel) -> sm.Plan:
+    """Return a plan past two obstacles, with a torch."""
+    start = start_of(panda, "pose")
+    at = panda.pose(start).translation
+    bodies = [
+        sm.Box("post", at + np.array([0.0, 0.4, 0.0]), [0.1, 0.1, 0.1]),
+        sm.Sphere("ball", at + np.array([0.0, -0.25, 0.1]), 0.05),
+        sm.Cylinder("torch", [0.0, 0.1, 0.05], 0.02, 0.1, frame="panda_hand"),
+    ]
+    line = short_line(panda, start)
+    return sm.plan(sm.Problem(panda, line, start=start, constraints=[sm.Clearance(bodies)]))
+
+
+def test_the_closest_approach_of_each_obstacle_is_that_of_dense_samples(
+    panda: sm.RobotModel,
+) -> None:
+    plan = near_bodies(panda)
+    model = plan.problem.constraints[-1].model(panda)
+    times = np.linspace(plan.trajectory.t[0], plan.trajectory.t[-1], 400)
+    values = model.distances(plan.trajectory(times))
+    groups = {
+        "the arm itself": [not {"post", "ball", "torch"} & set(pair) for pair in model.pairs],
+        **{name: [name in pair for pair in model.pairs] for name in ("post", "ball", "torch")},
+    }
+    assert plan.approaches.keys() == groups.keys()
+    for name, each in plan.approaches.items():
+        least = values[:, groups[name]].min()
+        # To a fiftieth, or 0.1 mm.
+        assert each.value <= least + max(0.02 * least, 1e-4)
+        assert each.value >= least - max(0.02 * least, 1e-4)
+        pair = tuple(each.name.split(" - "))
+        (there,) = model.distances(plan.trajectory(np.array([each.time])))
+        own = [value for key, value in zip(model.pairs, there, strict=True) if key == pair]
+        assert min(own) == pytest.approx(each.value, abs=1e-9)
+    found = list(plan.approaches.values())
+    assert found == sorted(found, key=lambda each: each.value)
+    assert plan.certificate.clearance is not None
+    assert found[0].value == pytest.approx(plan.certificate.clearance.value, rel=0.02)
+
+
+def test_a_certificate_does_not_ask_for_details(
+    panda: sm.RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = near_bodies(panda)
+    asked = []
+    monkeypatch.setattr(KeepsApart, "approaches", lambda *_: asked.append(1) or {})
+    plan.check()
+    assert not asked
+    assert plan.approaches == {}
+    assert asked

@@ -22,7 +22,7 @@ from selfmotion.collision import (
     obstacle_from_dict,
     obstacles as module,
 )
-from selfmotion.replay import scene
+from selfmotion.replay import obstacles as drawn_obstacles
 from selfmotion.replay.payload import Payload
 from selfmotion.robot import load_robot
 
@@ -35,6 +35,7 @@ ALL = [
     Cylinder("post", POSE, 0.1, 0.5),
     Capsule("rail", POSE, 0.1, 0.5),
     Mesh("part", POSE, Path("part.stl"), 0.001),
+    Box("camera", POSE, [0.1, 0.2, 0.3], frame="wrist"),
 ]
 
 
@@ -75,7 +76,7 @@ def test_values_are_copies_that_cannot_be_written() -> None:
         (lambda: Box("b", [1, 2], [1, 1, 1]), "box 'b': pose is"),
         (lambda: Box("b", [1, 2, np.nan], [1, 1, 1]), r"box 'b': pose\[2\] is nan"),
         (lambda: Box("b", pin.SE3(2 * np.eye(3), np.zeros(3)), [1, 1, 1]), "not orthonormal"),
-        (lambda: Box("b", pin.SE3(-np.eye(3), np.zeros(3)), [1, 1, 1]), "right-handed"),
+        (lambda: Box("b", pin.SE3(-np.eye(3), np.zeros(3)), [1, 1, 1]), "a mirror .determinant -1"),
         (lambda: Sphere("s", POSE, -1.0), "sphere 's': radius is -1.0"),
         (lambda: Cylinder("c", POSE, 1.0, np.nan), "cylinder 'c': length is nan"),
         (lambda: Capsule("c", POSE, "wide", 1.0), "capsule 'c': radius is 'wide'"),
@@ -92,7 +93,7 @@ def test_refuses_values_that_describe_nothing(make, message: str) -> None:
     [
         ({"shape": "torus"}, "shape is 'torus', expected one of box, sphere"),
         ({"size": None}, "size is None"),
-        ({"radius": 1.0}, "has 'radius', expected size"),
+        ({"radius": 1.0}, "has 'radius', expected frame, size"),
         ({"position": [1, 2]}, r"position has shape \(2,\)"),
         ({"rotation": "up"}, r"rotation \(\)"),
     ],
@@ -137,7 +138,7 @@ def test_an_own_shape_is_one_class(monkeypatch: pytest.MonkeyPatch) -> None:
     dot = np.array([ball.pairs.index(name) for name in names])
     # The cone's base is 0.25 m below its middle.
     assert first[hat].min() == pytest.approx(second[dot].min() - 0.25, abs=0.05)
-    drawn = scene.obstacle_commands("/plan", [cone], Payload())
+    drawn = drawn_obstacles.obstacle_commands("/plan", panda, [cone], Payload())
     assert [command["path"] for command in drawn] == ["/plan/obstacles/hat/0"]
 
 

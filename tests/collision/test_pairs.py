@@ -52,7 +52,7 @@ def test_links_that_touch_by_design_are_no_pair(panda: RobotModel) -> None:
 
 def test_the_base_is_not_checked_against_the_world(panda: RobotModel) -> None:
     here, solid = pin.SE3.Identity(), Solid(coal.Sphere(0.1), "ball")
-    table = Body("table", 0, True, here, solid)
-    base = Body("panda_link0", 0, False, here, solid)
-    arm = Body("panda_link1", 1, False, here, solid)
+    table = Body("table", "", 0, here, solid)
+    base = Body("panda_link0", "panda_link0", 0, here, solid)
+    arm = Body("panda_link1", "panda_link1", 1, here, solid)
     assert candidate_pairs([base, arm, table], panda.urdf) == [(1, 2)]

@@ -66,6 +66,8 @@ def test_derivatives_equal_differences() -> None:
         ({"frame": LINK, "towards": (0, 0, 0)}, "towards is zero"),
         ({"frame": LINK, "within": 4.0}, "within is 4"),
         ({"frame": 3}, "expected the name of a link"),
+        ({"frame": "panda_link0"}, "no joint changes the tilt of 'panda_link0'"),
+        ({"frame": "panda_link1", "axis": "z"}, "no joint changes the tilt of 'panda_link1'"),
     ],
 )
 def test_what_is_no_tilt_is_refused(

@@ -28,6 +28,7 @@ from support.arms import (
     start_of,
 )
 from support.followed import standing
+from support.random_cells import LEFT, RIGHT, random_cell, random_follows
 
 # Exact gradients against central differences, relative to the largest entry.
 GRADIENT = 1e-6
@@ -94,7 +95,38 @@ def objective_with(task: str, name: str, *, free: bool, damped: bool) -> Objecti
 def test_gradient_and_tangents_equal_central_differences(
     task: str, name: str, free: bool, damped: bool
 ) -> None:
-    objective = objective_with(task, name, free=free, damped=damped)
+    assert_derivatives(objective_with(task, name, free=free, damped=damped))
+
+
+@pytest.mark.parametrize("damped", [False, True])
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize("seed", range(2))
+def test_the_first_of_several_paths_may_be_relaxed(
+    seed: int, free: bool, damped: bool, tmp_path: Path
+) -> None:
+    """Cells made at random: a band in a row of each kind that the first path's task has."""
+    rng = np.random.default_rng(seed)
+    robot = sm.load_robot(random_cell(rng, tmp_path), tool=(LEFT, RIGHT))
+    items: list[sm.Follow] = []
+    while len(items) < 2:
+        items, follows, start = random_follows(rng, robot)
+    first = follows.items[0]
+    bands = {"position": [("x", "y")], "pointing": ["z", "rx"], "pose": ["y", ("rx", "rz")]}
+    relaxations = [sm.Relaxation(rows, 0.05) for rows in bands[first.task.value]]
+    grid = Grid.aligned(first.path.knots, 12)
+    functions = PolynomialNullMotion(1, "joint").functions(grid.stage_times, first.path.duration)
+    costs: list[sm.Cost] = [sm.JointVelocity(), sm.Posture(np.ones(robot.dof), posture=start)]
+    objective = objective_of(
+        Rollout(follows, grid, damping=DampingLaw(0.5, 0.25) if damped else None),
+        NullMotionTable(functions, None, robot.dof),
+        [*costs, OffPath(100.0, follows.dimension)] if damped else costs,
+        FreeStart(follows, start) if free else FixedStart(start),
+        deviation=Deviation(first.path, relaxations, grid.stage_times, (not free, False)),
+    )
+    assert_derivatives(objective)
+
+
+def assert_derivatives(objective: Objective) -> None:
     x = 0.02 * np.random.default_rng(5).normal(size=objective.size)
     exact = objective.gradient(x)
     approximate = central_difference(objective.value, x)

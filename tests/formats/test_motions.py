@@ -10,6 +10,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 import yaml
 
@@ -283,3 +284,102 @@ def test_what_straight_lines_between_samples_cost(plan: sm.Plan, rate: float | N
     slower = linear_miss(plan, 0.5 * miss.rate)
     limits = (plan.tolerance.position, plan.tolerance.rotation)
     assert max(np.divide(slower[:2], limits)) > 2.0
+
+
+@pytest.fixture(scope="module")
+def carried() -> sm.Plan:
+    """Two arms that carry a bar for a moment."""
+    left, right = "left/panda_hand_tcp", "right/panda_hand_tcp"
+    pair = sm.load_robot(
+        {"left": "panda", "right": "panda"},
+        base={
+            "left": pin.SE3(np.eye(3), np.array([0.0, 0.45, 0.0])),
+            "right": pin.SE3(np.eye(3), np.array([0.0, -0.45, 0.0])),
+        },
+        tool=(left, right),
+    )
+    first = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.45, 0.2, 0.3]))
+    grasp = pin.SE3(np.eye(3), np.array([0.0, 0.4, 0.0]))
+    circle = sm.Circle.around(first, radius=0.05, duration=3.0, normal=(0, 1, 0))
+    follows = [sm.Follow(circle, tool=left), sm.Follow(grasp, tool=right, reference=left)]
+    return sm.plan(sm.Problem(pair, follows, collision=None)).require()
+
+
+@pytest.mark.parametrize("name", ["m.csv", "m.npz", "m.json", "m.yaml"])
+def test_parts_are_written_in_step(carried: sm.Plan, tmp_path: Path, name: str) -> None:
+    files = sm.write_parts(carried, tmp_path / name, rate=200.0)
+    stem, suffix = name.split(".")
+    assert [file.name for file in files.values()] == [
+        f"{stem}.left.{suffix}",
+        f"{stem}.right.{suffix}",
+    ]
+    alone = robot_named("panda").joint_names
+    assert all(sm.read_motion(file).joint_names == alone for file in files.values())
+    together = sm.read_parts(files)
+    sm.write_motion(carried, tmp_path / name, rate=200.0)
+    whole = sm.read_motion(tmp_path / name)
+    assert together.joint_names == whole.joint_names
+    for order in (0, 1, 2):
+        np.testing.assert_array_equal(together(whole.t, order), whole(whole.t, order))
+    found = carried.problem.certify(together, carried.tolerance)
+    assert found.verified, found.verdict
+    # The hand that holds on, as the other one sees it.
+    assert found.others[0][0].value < carried.tolerance.position
+
+
+def test_parts_out_of_step_are_found(carried: sm.Plan, tmp_path: Path) -> None:
+    files = sm.write_parts(carried, tmp_path / "m.npz", rate=200.0)
+    slower = sm.write_parts(carried, tmp_path / "slower.npz", rate=150.0)
+    with pytest.raises(
+        sm.FileFormatError, match=r"m\.right\.npz: has 601 samples .* at other times"
+    ):
+        sm.read_parts({"left": slower["left"], "right": files["right"]})
+    # Two motions of the same times that do not belong together: the grasp slips.
+    late = sm.read_motion(files["right"])
+    moved = sm.Trajectory(late.t, np.roll(late.q, 1, axis=0), late.qd, late.joint_names, late.qdd)
+    arrays = {"t": moved.t, "q": moved.q, "qd": moved.qd, "qdd": moved.qdd}
+    np.savez(files["right"], joint_names=np.array(moved.joint_names), **arrays)
+    found = carried.problem.certify(sm.read_parts(files), carried.tolerance)
+    assert not found.verified
+    assert found.others[0][0].value > 100.0 * carried.tolerance.position
+
+
+def test_a_robot_of_its_own_has_no_parts(plan: sm.Plan, carried: sm.Plan, tmp_path: Path) -> None:
+    with pytest.raises(sm.ProblemError, match="'panda_joint1' is of no part"):
+        sm.write_parts(plan, tmp_path / "m.csv")
+    with pytest.raises(sm.ProblemError, match="keyframes are of all joints"):
+        sm.write_parts(carried, tmp_path / "m.xml")
+    with pytest.raises(sm.ProblemError, match="of 6 revolute joints, this one has 7"):
+        sm.write_parts(carried, tmp_path / "m.script")
+    with pytest.raises(sm.FileFormatError, match="no file of a part"):
+        sm.read_parts({})
+
+
+def test_export_writes_parts_and_judges_them_together(carried: sm.Plan, tmp_path: Path) -> None:
+    carried.save(tmp_path / "plan.npz")
+    out = tmp_path / "m.yaml"
+    options = ("--rate", 200, "--parts", "--json")
+    code, text = invoke("export", tmp_path / "plan.npz", "--out", out, *options)
+    assert code == 0
+    written = json.loads(text)["written"]
+    parts = ", ".join(str(tmp_path / f"m.{part}.yaml") for part in ("left", "right"))
+    assert list(written) == [str(out), parts]
+    assert all(verdict.startswith("read back: verified") for verdict in written.values())
+
+
+def test_straight_lines_are_judged_at_every_hand(carried: sm.Plan) -> None:
+    """The hand that only holds on is off as well, and may be the one that is off most."""
+    from selfmotion.formats import linear_miss
+    from selfmotion.formats.samples import MotionSamples
+
+    samples = MotionSamples.of(carried.trajectory, 10.0)
+    middles = 0.5 * (samples.t[1:] + samples.t[:-1])
+    lines = 0.5 * (samples.q[1:] + samples.q[:-1])
+    worst = [
+        max(
+            np.linalg.norm(chain.place(line).translation - chain.place(exact).translation)
+            for line, exact in zip(lines, carried.trajectory(middles), strict=True)
+        )
+        for chain in (item.chain for item in carried.problem.follows.items)
+    ]
+    assert linear_miss(carried, 10.0).position >= max(worst)

@@ -161,14 +161,63 @@ def test_follows_that_do_not_fit_are_refused(carried: sm.Plan) -> None:
         sm.Problem(robot, [sm.Follow(stand(0.4), tool=HANDS[1]), left])
     with pytest.raises(sm.ProblemError, match="also: 3, expected a Follow"):
         sm.certify(robot, path, "pose", carried.trajectory, also=[3])  # type: ignore[list-item]
-    with pytest.raises(sm.ProblemError, match="cannot be relaxed"):
-        sm.Problem(
-            robot,
-            [left, sm.Follow(stand(0.4), tool=HANDS[1], reference=HANDS[0])],
-            relaxations=[sm.Relaxation("rz", 0.1)],
-        )
     with pytest.raises(sm.ProblemError, match="path is an empty list"):
         sm.Problem(robot, [])
+
+
+def test_a_bar_that_may_lean_costs_less_and_is_held_as_tight(carried: sm.Plan) -> None:
+    """What is relaxed is the first path; the other hand stays where it is on the bar."""
+    bands = [sm.Relaxation(("rx", "ry"), 0.3), sm.Relaxation("z", 0.01)]
+    relaxed = sm.plan(dataclasses.replace(carried.problem, relaxations=bands)).require()
+    assert relaxed.report.cost < 0.8 * carried.report.cost
+    place, turn = apart(relaxed)
+    assert np.abs(place - [0.0, 0.4, 0.0]).max() < TOLERANCE
+    assert np.abs(turn - np.eye(3)).max() < TOLERANCE
+    left = relaxed.robot.chain_to(HANDS[0])
+    motion = relaxed.trajectory
+    t = np.linspace(motion.t[0], motion.t[-1], 500)
+    poses = [left.place(q) for q in motion(t)]
+    wanted = relaxed.path.samples(t)
+    leaning = [
+        pin.log3(there.T @ pose.rotation)
+        for pose, there in zip(poses, wanted.rotation, strict=True)
+    ]
+    off = np.array([pose.translation for pose in poses]) - wanted.translation
+    assert 0.1 < np.linalg.norm(np.array(leaning)[:, :2], axis=1).max() <= 0.3 + TOLERANCE
+    assert np.abs(off[:, :2]).max() < TOLERANCE
+    assert np.abs(off[:, 2]).max() <= 0.01 + TOLERANCE
+    # Judged without the bands it is off its path.
+    strict = dataclasses.replace(relaxed.problem, relaxations=())
+    assert not strict.certify(motion).verified
+
+
+def test_two_arms_of_six_joints_carry_a_bar_that_may_lean() -> None:
+    """Twelve joints, twelve rows: no self-motion but what is relaxed."""
+    hands = "left/tool0", "right/tool0"
+    pair = sm.load_robot(
+        {"left": "ur5", "right": "ur5"},
+        base={"left": stand(0.45), "right": stand(-0.45)},
+        tool=hands,
+    )
+    first = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.45, 0.2, 0.3]))
+    circle = sm.Circle.around(first, radius=0.1, duration=6.0, normal=(0, 1, 0))
+    follows = [
+        sm.Follow(circle, tool=hands[0]),
+        sm.Follow(stand(0.4), tool=hands[1], reference=hands[0]),
+    ]
+    with pytest.raises(sm.RedundancyError, match="relax some of the first"):
+        sm.Problem(pair, follows)
+    problem = sm.Problem(pair, follows, relaxations=[sm.Relaxation(("rx", "ry", "rz"), 0.4)])
+    plan = sm.plan(problem).require()
+    (position, rotation) = plan.certificate.others[0]
+    assert max(position.value, rotation.value) < TOLERANCE
+    # Out of reach, it goes as far as both hands do, without a null motion to refine.
+    end = pin.SE3(first.rotation, first.translation + np.array([1.5, 0.0, 0.0]))
+    away = sm.Follow(sm.Line(first, end, 6.0), tool=hands[0])
+    far = sm.plan(dataclasses.replace(problem, path=away.path, also=problem.also))
+    assert not far.certificate.verified
+    assert "out of reach" in far.certificate.verdict
+    assert 1.0 < far.trajectory.duration < 6.0
 
 
 def test_part_weights_are_by_part_and_by_joint(carried: sm.Plan) -> None:

@@ -71,6 +71,32 @@ def test_where_no_self_motion_helps_the_arm_stops_before_the_obstacle(
     assert sm.Task.POSE.miss(goal, panda.pose(q))[0] < 1e-4
 
 
+def test_the_arm_stops_before_what_it_carries_meets_something(panda: sm.RobotModel) -> None:
+    """A torch across the hand reaches the ball 0.2 m before the hand does."""
+    pose = panda.pose(PANDA_HOME)
+    across = pose.rotation.T @ np.array([0.0, 1.0, 0.0])
+    frame = pin.SE3(np.eye(3), 0.1 * across + np.array([0.0, 0.0, 0.02]))
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), across).toRotationMatrix()
+    torch = sm.Cylinder(
+        "torch", pin.SE3(turn, frame.translation), 0.01, 0.2, frame="panda_hand_tcp"
+    )
+    ahead = pose.translation + np.array([0.0, 0.4, 0.0])
+    bodies = [torch, sm.Sphere("ball", ahead, 0.05)]
+    replanner = Replanner(panda, constraints=[sm.Clearance(bodies, distance=0.01)])
+    goal = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.3, 0.0]))
+    path = sm.Line(pose, goal, 2.0, time_law="minimum_jerk")
+    segments, places = closed_loop(replanner, path, PANDA_HOME, 2.5)
+    exact = sm.CollisionModel(panda, bodies)
+    assert min(exact.distance(q).value for q in places[::10]) > 0.0
+    assert segments[-1].flag is Flag.STOPPING
+    assert "torch" in segments[-1].reasons[-1]
+    # The hand alone goes on.
+    alone = Replanner(panda, constraints=[sm.Clearance(bodies[1:], distance=0.01)])
+    _, farther = closed_loop(alone, path, PANDA_HOME, 2.5)
+    came, comes = (panda.pose(each[-1]).translation[1] for each in (places, farther))
+    assert comes > came + 0.05
+
+
 def test_an_obstacle_that_is_not_known_is_refused(
     panda: sm.RobotModel, slow_circle: sm.Circle
 ) -> None:

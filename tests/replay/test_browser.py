@@ -2,13 +2,15 @@
 
 import os
 import shutil
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from selfmotion.collision import CollisionModel
+from selfmotion.collision import Box, CollisionModel
+from selfmotion.constraints import Clearance
 from selfmotion.replay import notebook_html, write_replay
 from selfmotion.robot import NAMED_ARMS
 from support.replay_plans import arm_plan, planar_plan, shelf_plan
@@ -91,6 +93,19 @@ POSES = """() => {
   viewer.scene.updateMatrixWorld(true);
   viewer.scene_tree.find(["selfmotion", "robot"]).object.children.forEach((node) => {
     found[node.name] = inverse.clone().multiply(node.matrixWorld).toArray();
+  });
+  return found;
+}"""
+
+
+PLACES = """() => {
+  const found = {};
+  viewer.scene.updateMatrixWorld(true);
+  const inverse = viewer.scene.matrixWorld.clone().invert();
+  viewer.scene_tree.find(["selfmotion", "plan0", "obstacles"]).object.children.forEach((node) => {
+    node.traverse((object) => {
+      if (object.isMesh) found[node.name] = inverse.clone().multiply(object.matrixWorld).toArray();
+    });
   });
   return found;
 }"""
@@ -292,6 +307,29 @@ def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
     assert not page.evaluate(
         'viewer.scene_tree.find(["selfmotion", "plan0", "obstacles"]).object.visible'
     )
+    assert_quiet(page)
+
+
+def test_what_rides_is_drawn_on_its_link(open_page, tmp_path):
+    plan = arm_plan("panda")
+    pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, 0.0, 0.5), np.array([0.0, 0.05, 0.1]))
+    torch = Box("torch", pose, (0.04, 0.04, 0.2), frame="panda_hand")
+    shelf = Box("shelf", [0.9, 0.0, 0.2], (0.1, 0.1, 0.1), frame="panda_link0")
+    constraints = (*plan.problem.constraints, Clearance([torch, shelf]))
+    plan = replace(plan, problem=replace(plan.problem, constraints=constraints))
+    page = open_page(write_replay(plan, tmp_path / "torch.html"))
+    robot, data = plan.robot, plan.robot.model.createData()
+    hand = robot.model.getFrameId("panda_hand", pin.FrameType.BODY)
+    seen = []
+    for time in (0.0, 1.3, 4.0):
+        page.evaluate("t => viewer.animator.seek(t)", time)
+        pin.framesForwardKinematics(robot.model, data, plan.trajectory(time))
+        places = page.evaluate(PLACES)
+        expected = (data.oMf[hand] * pose).homogeneous
+        assert np.abs(np.reshape(places["torch"], (4, 4)).T - expected).max() < 1e-4
+        assert np.reshape(places["shelf"], (4, 4)).T[:3, 3] == pytest.approx([0.9, 0.0, 0.2])
+        seen.append(expected)
+    assert np.abs(seen[1] - seen[0]).max() > 1e-2
     assert_quiet(page)
 
 

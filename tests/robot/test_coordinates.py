@@ -70,6 +70,14 @@ def test_sides_are_those_of_who_looks_along_the_arm() -> None:
         ),
         (lambda r: sm.Band(sm.FrameCoordinate("hand"), 0.0, 1.0), "no link or joint 'hand'"),
         (lambda r: sm.Band(sm.FrameCoordinate("panda_hand", [0, 0, 0]), 0.0, 1.0), "is zero"),
+        (
+            lambda r: sm.Band(sm.FrameCoordinate("panda_link0"), 0.0, 1.0),
+            "no joint changes place of 'panda_link0'",
+        ),
+        (
+            lambda r: sm.Band(sm.FrameCoordinate("panda_link1"), 0.0, 1.0),
+            "no joint changes place of 'panda_link1'",
+        ),
         (lambda r: sm.Band("elbow", 0.0, 1.0), "coordinate is 'elbow'"),
         (lambda r: sm.Band(sm.SwivelAngle(), 0.0, 4.0), "half is 4.0"),
         (lambda r: sm.Band(sm.SwivelAngle(), 0.0, 0.0), "half is 0.0"),

@@ -163,7 +163,7 @@ def _coordinate_rows() -> list[Row]:
             area,
             "FrameCoordinate",
             lambda **g: banded(sm.FrameCoordinate(**{"frame": "panda_link4", **g})),
-            frame={**names, "'panda_link44'": "panda_link44"},
+            frame={**names, "'panda_link44'": "panda_link44", "'panda_link0'": "panda_link0"},
             direction=directions,
         ),
         *bad_values_of(

@@ -158,6 +158,7 @@ def _obstacle_rows() -> list[Row]:
                 "(1, 1, -1)": (1, 1, -1),
                 "(1, 1, 1e300)": (1, 1, 1e300),
             },
+            frame={"''": "", "3": 3, "['panda_hand']": ["panda_hand"]},
         ),
         *bad_values_of(
             area,

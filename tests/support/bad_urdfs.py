@@ -228,6 +228,10 @@ def loading_rows() -> list[Row]:
     """Return a row for each bad argument of `load_robot`."""
     skewed, nan = np.diag([1.0, 2.0, 1.0, 1.0]), np.eye(4)
     nan[0, 3] = np.nan
+
+    def box(name: str, frame: str | None = None) -> sm.Box:
+        return sm.Box(name, [0.0, 0.0, 0.0], [0.1, 0.1, 0.1], frame=frame)
+
     return [
         _named("load_robot('pandaa')", "pandaa"),
         _named("load_robot('Panda')", "Panda"),
@@ -261,6 +265,10 @@ def loading_rows() -> list[Row]:
         _sound("base= of shape (3, 4)", base=np.eye(4)[:3]),
         _sound("base= with a skewed rotation", base=skewed),
         _sound("base= with NaN", base=nan),
+        _sound("bodies='torch'", bodies="torch"),
+        _sound("bodies=[Box] (the class)", bodies=[sm.Box]),
+        _sound("bodies= on a link that is none", bodies=[box("gun", "uper")]),
+        _sound("bodies= with the name of a link", bodies=[box("base")]),
         _sound("tool_offset=0.1", tool_offset=0.1),
         _sound("tool_offset= of shape (4,)", tool_offset=np.zeros(4)),
         _sound("tool_offset= with a mirror", tool_offset=np.diag([1.0, 1.0, -1.0, 1.0])),

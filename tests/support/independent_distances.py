@@ -69,7 +69,7 @@ def mesh_of(points: np.ndarray, faces: np.ndarray) -> Any:
 
 def body(name: str, joint: int, place: pin.SE3, geometry: Any) -> Body:
     """Return a geometry as a body."""
-    return Body(name, joint, joint == 0, place, Solid(geometry, name))
+    return Body(name, name if joint else "", joint, place, Solid(geometry, name))
 
 
 @dataclass(frozen=True, eq=False)

@@ -269,19 +269,20 @@ class Judge:
         distance: float,
     ) -> Verdict:
         """Return how near named bodies come, looking closely only where their middles are near."""
-        at_rest = [(item.name, solid_of_obstacle(item)) for item in obstacles]
-        bodies = self.arm.solids + at_rest
+        bodies = self.arm.solids + [(item.name, solid_of_obstacle(item)) for item in obstacles]
+        carrier = {item.name: item.frame for item in obstacles}
         wanted = {frozenset(pair) for pair in pairs}
         # Farther than this they are clear, however far that is.
         nearest = distance + CLEAR * max(distance, 1e-3)
         for i, (first, one) in enumerate(bodies):
             for second, other in bodies[i + 1 :]:
                 if frozenset((first, second)) in wanted and first != second:
+                    links = [carrier.get(name, name) for name in (first, second)]
                     places = [
-                        self.arm.place(name, q, known)
-                        if name in self.arm._above
-                        else (np.eye(3)[None], np.zeros((1, 3)))
-                        for name in (first, second)
+                        (np.eye(3)[None], np.zeros((1, 3)))
+                        if link is None
+                        else self.arm.place(link, q, known)
+                        for link in links
                     ]
                     nearest = min(nearest, one.distance(other, *places, nearest))
         return Verdict({"apart": 1.0 + float((distance - nearest) / max(distance, 1e-3))})

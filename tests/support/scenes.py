@@ -14,6 +14,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from support.oracle import Judge
 from support.own_kinematics import Arm, along
+from support.solids import Solid, solid_of_obstacle
 
 # Half of what a critical quantity may lie beside its limit, as a share.
 NEAR = 0.03
@@ -115,22 +116,68 @@ def among_plates(number: int, folder: Path) -> Scene:
     robot = arm(folder, rng, int(rng.integers(2, 7)), shape)
     motion = coarse(rng, robot.dof, float(rng.uniform(0.2, 1.2)))
     known = Arm(robot)
-    plates = [_plate(f"plate{k}", known, motion, rng) for k in range(int(rng.integers(1, 3)))]
+    plates = [
+        _plate(f"plate{k}", known, known.solids, motion, rng)[0]
+        for k in range(int(rng.integers(1, 3)))
+    ]
+    return _among(robot, known, motion, plates, rng)
+
+
+def carrying(number: int, folder: Path) -> Scene:
+    """Return an arm that carries a body past plates, some of which its own links carry."""
+    rng = np.random.default_rng(number)
+    robot = arm(folder, rng, int(rng.integers(2, 7)), ("", "sphere")[number % 2])
+    motion = coarse(rng, robot.dof, float(rng.uniform(0.2, 1.2)))
+    known, links = Arm(robot), [f"l{k + 1}" for k in range(robot.dof)]
+    # On the last links, so that there are some before it.
+    last = int(rng.integers(robot.dof // 2, robot.dof))
+    place = pin.SE3(pin.rpy.rpyToMatrix(*rng.uniform(-3.0, 3.0, 3)), rng.uniform(-0.2, 0.2, 3))
+    size = rng.uniform(0.005, 0.03, 3)
+    carried = {
+        0: sm.Sphere("carried", place, float(size[0]), frame=links[last]),
+        1: sm.Capsule("carried", place, float(size[0]), float(5.0 * size[1]), frame=links[last]),
+        2: sm.Box("carried", place, size * [1.0, 1.0, 5.0], frame=links[last]),
+    }[number % 3]
+    solids = [(links[last], solid_of_obstacle(carried))]
+    plates = []
+    for k in range(int(rng.integers(1, 3))):
+        plate, t = _plate(f"plate{k}", known, solids, motion, rng)
+        if last and rng.uniform() < 0.5:
+            below = links[int(rng.integers(last))]
+            (turn, at) = (each[0] for each in known.place(below, along(motion, t[:1], 0)))
+            on_link = pin.SE3(turn, at).actInv(plate.pose)
+            plate = replace(plate, pose=on_link, frame=below)
+        plates.append(plate)
+    return _among(robot, known, motion, [carried, *plates], rng)
+
+
+def _among(
+    robot: sm.RobotModel,
+    known: Arm,
+    motion: sm.Trajectory,
+    bodies: Sequence[sm.Obstacle],
+    rng: np.random.Generator,
+) -> Scene:
     distance = float(rng.choice([2e-4, 1e-3, 5e-3]))
-    wanted = sm.Clearance(plates, distance)
-    pairs = wanted.model(robot).pairs
+    wanted = sm.Clearance(bodies, distance)
     judge = Judge(
         robot,
         Followed(known, motion, motion.duration),
         "position",
-        bodies=[(plates, pairs, distance)],
+        bodies=[(bodies, wanted.model(robot).pairs, distance)],
     )
     return Scene(judge, motion, [wanted.requirement(robot)])
 
 
-def _plate(name: str, known: Arm, motion: sm.Trajectory, rng: np.random.Generator) -> sm.Box:
-    """Return a plate across the way of a body at some time, which it meets, touches or clears."""
-    link, solid = known.solids[rng.integers(len(known.solids))]
+def _plate(
+    name: str,
+    known: Arm,
+    solids: Sequence[tuple[str, Solid]],
+    motion: sm.Trajectory,
+    rng: np.random.Generator,
+) -> tuple[sm.Box, Array]:
+    """Return a plate across the way of a body, and when: it meets, touches or clears it then."""
+    link, solid = solids[rng.integers(len(solids))]
     t = rng.uniform(0.0, motion.t[-1]) + np.array([0.0, 1e-4])
     t -= max(0.0, t[-1] - motion.t[-1])
     _, at = solid.placed(known.place(link, along(motion, t, 0)))
@@ -144,11 +191,8 @@ def _plate(name: str, known: Arm, motion: sm.Trajectory, rng: np.random.Generato
     rotation = np.stack([aside, np.cross(normal, aside), normal], axis=1)
     # Its edge along the body's side, from 1 cm within the body to 3 cm away.
     clear = solid.reach if solid.radius else float(solid.half.max())
-    return sm.Box(
-        name,
-        pin.SE3(rotation, at[0] + rotation[:, 0] * (half[0] + clear + rng.uniform(-0.01, 0.03))),
-        2.0 * half,
-    )
+    aside = rotation[:, 0] * (half[0] + clear + rng.uniform(-0.01, 0.03))
+    return sm.Box(name, pin.SE3(rotation, at[0] + aside), 2.0 * half), t
 
 
 def near_limits(number: int, folder: Path) -> Scene:

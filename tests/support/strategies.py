@@ -22,7 +22,7 @@ JOINTS = ("revolute", "revolute", "revolute", "prismatic", "continuous")
 AXES = ("0 0 1", "0 1 0", "1 0 0", "0 0 -1", "0.6 0 0.8", "0 0 2")
 BODIES = ("", "sphere", "box", "cylinder")
 PATHS = ("line", "constant", "circle", "twist", "spline", "noisy", "pause", "corners", "stop")
-OBSTACLES = ("box", "sphere", "cylinder", "capsule", "mesh", "plate")
+OBSTACLES = ("box", "sphere", "cylinder", "capsule", "mesh", "plate", "torch", "bracket")
 CONSTRAINTS = ("speed", "acceleration", "rest", "end", "closed", "position", "clearance", "self")
 TASKS = tuple(task.value for task in sm.Task)
 COSTS = ("velocity", "acceleration", "jerk", "manipulability", "posture", "limits", "length", "own")
@@ -230,7 +230,7 @@ def _constraint(
             lower + rng.uniform(0.0, 0.1), np.degrees(upper) if words.odd == "degrees" else upper
         ),
         "clearance": lambda: sm.Clearance(
-            [_obstacle(kind, robot.reach, folder, rng) for kind in words.obstacles],
+            [_obstacle(kind, robot, folder, rng) for kind in words.obstacles],
             float(rng.choice([0.0, 1e-3, 5e-3, 2e-2])),
         ),
         "self": lambda: sm.Clearance((), 1e-3),
@@ -238,13 +238,20 @@ def _constraint(
     return makers[name]()
 
 
-def _obstacle(kind: str, reach: float, folder: Path, rng: np.random.Generator) -> sm.Obstacle:
+def _obstacle(
+    kind: str, robot: sm.RobotModel, folder: Path, rng: np.random.Generator
+) -> sm.Obstacle:
     away = rng.normal(size=3)
-    pose = pin.SE3(
-        pin.exp3(rng.uniform(-2, 2, 3)), away / np.linalg.norm(away) * reach * rng.uniform(0.2, 1.0)
-    )
+    away *= robot.reach * rng.uniform(0.2, 1.0) / np.linalg.norm(away)
+    pose = pin.SE3(pin.exp3(rng.uniform(-2, 2, 3)), away)
     size = rng.uniform(0.02, 0.2, 3)
     match kind:
+        case "torch":
+            place = pin.SE3(pose.rotation, rng.uniform(-0.1, 0.1, 3))
+            return sm.Cylinder(kind, place, 0.1 * size[0], size[1], frame="tcp")
+        case "bracket":
+            place = pin.SE3(pose.rotation, rng.uniform(-0.15, 0.15, 3))
+            return sm.Box(kind, place, 0.3 * size, frame=str(rng.choice(robot.urdf.links)))
         case "box":
             return sm.Box(kind, pose, size)
         case "plate":

@@ -17,7 +17,7 @@ from selfmotion.certificate import bounding, check as check_module
 from support.arms import PANDA_HOME, robot_named
 from support.oracle import Judge
 from support.own_kinematics import Arm, along
-from support.scenes import Scene, among_plates, coarse, near_limits, seams
+from support.scenes import Scene, among_plates, carrying, coarse, near_limits, seams
 
 # Two programs that multiply a dozen rotations differ by this [m, rad].
 ROUNDING = 1e-12
@@ -101,6 +101,20 @@ def test_thin_plates_between_samples(tmp_path: Path) -> None:
     assert all(verified for verified, valid in outcomes if valid)
 
 
+def carrying_scenes(folder: Path, count: int) -> list[Scene]:
+    scenes = []
+    for number in range(count):
+        (folder / str(number)).mkdir()
+        scenes.append(carrying(number, folder / str(number)))
+    return scenes
+
+
+def test_what_rides_between_samples(tmp_path: Path) -> None:
+    outcomes = [assert_confirmed(scene) for scene in carrying_scenes(tmp_path, 30)]
+    assert {verified for verified, _ in outcomes} == {True, False}
+    assert all(verified for verified, valid in outcomes if valid)
+
+
 # --- certificates that are broken on purpose: the judge refutes them
 
 
@@ -149,6 +163,16 @@ def test_a_requirement_that_everything_keeps_is_refuted(tmp_path: Path) -> None:
     found = " ".join(text for item in refuted(scenes) for text in item)
     assert "order 2" in found
     assert "apart" in found
+
+
+def test_a_certificate_that_leaves_what_rides_in_the_world_is_refuted(tmp_path: Path) -> None:
+    scenes = []
+    for scene in carrying_scenes(tmp_path, 30):
+        (bodies, _, distance) = scene.judge.bodies[0]
+        standing = [bodies[0], *(replace(plate, frame=None) for plate in bodies[1:])]
+        wanted = sm.Clearance(standing, distance).requirement(scene.judge.robot)
+        scenes.append(replace(scene, requirements=[wanted]))
+    assert "apart" in " ".join(text for item in refuted(scenes) for text in item)
 
 
 def test_a_certificate_without_the_arms_limits_is_refuted(

@@ -29,5 +29,6 @@ from selfmotion.certificate.quantity import (
 from selfmotion.certificate.requirement import (
     FinishedMotion as FinishedMotion,
     Requirement as Requirement,
+    approaches as approaches,
 )
 from selfmotion.certificate.verdict import Certificate as Certificate

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.certificate.findings import Finding
+from selfmotion.certificate.findings import Extreme, Finding
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
-from selfmotion.collision import Closest, CollisionModel, Obstacle
+from selfmotion.collision import Closest, CollisionModel, Obstacle, srdf_line
 from selfmotion.motion import Trajectory
 
 # Intervals to begin with; each is halved so often before it counts as undecided.
@@ -49,7 +49,8 @@ class KeepsApart(Requirement):
             names, time = f"{stuck.first} - {stuck.second}", float(motion.trajectory.t[0])
             text = (
                 f"joints that are held, or places of parts, put {names} "
-                f"{-stuck.value * 1e3:.2f} mm into each other"
+                f"{-stuck.value * 1e3:.2f} mm into each other: if they are meant to be there, give "
+                f"disabled= the pair, or srdf= a file with {srdf_line(stuck.first, stuck.second)}"
             )
             return Finding(self.name, names, time, stuck.value, self.distance, False, text)
         found = closest_at_all_times(self.model, motion.trajectory, self.distance)
@@ -66,6 +67,16 @@ class KeepsApart(Requirement):
         return Finding(
             self.name, found.names, found.time, found.closest.value, self.distance, kept, text
         )
+
+    def approaches(self, motion: FinishedMotion) -> dict[str, Extreme]:
+        """See `Requirement.approaches`: each to a fiftieth of its distance."""
+        found = {
+            name: closest_at_all_times(model, motion.trajectory, 0.0)
+            for name, model in self.model.groups.items()
+        }
+        return {
+            name: Extreme(each.closest.value, each.time, each.names) for name, each in found.items()
+        }
 
     @property
     def covers(self) -> tuple[str, ...]:

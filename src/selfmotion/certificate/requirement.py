@@ -1,13 +1,14 @@
 """What a requirement is: something that a finished motion must keep, and that judges whether."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.certificate.findings import Finding
+from selfmotion.certificate.findings import Extreme, Finding
 from selfmotion.collision import Obstacle
 from selfmotion.motion import Trajectory
 from selfmotion.robot import RobotModel
@@ -71,9 +72,17 @@ class Requirement(ABC):
     def judge(self, motion: FinishedMotion) -> Finding:
         """Return what there is to say about a motion, on its worst place."""
 
+    def approaches(self, motion: FinishedMotion) -> Mapping[str, Extreme]:
+        """Return how near bodies come at all times, in detail.
+
+        Of each obstacle, each carried body and the arm itself: the distance [m], when, and which
+        two bodies. It takes about as long as to judge them.
+        """
+        return {}
+
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """The bodies of the world that it is about, for whoever draws them."""
+        """The obstacles that it is about, for whoever draws them."""
         return ()
 
     @property
@@ -85,3 +94,15 @@ class Requirement(ABC):
     def remarks(self) -> tuple[str, ...]:
         """What it leaves out or cannot know, for whoever reads the certificate."""
         return ()
+
+
+def approaches(
+    requirements: Sequence[Requirement], motion: FinishedMotion
+) -> Mapping[str, Extreme]:
+    """Return how near bodies come, in detail, the nearest first; see `Requirement.approaches`."""
+    found: dict[str, Extreme] = {}
+    for requirement in requirements:
+        for name, each in requirement.approaches(motion).items():
+            if name not in found or each.value < found[name].value:
+                found[name] = each
+    return dict(sorted(found.items(), key=lambda item: item[1].value))

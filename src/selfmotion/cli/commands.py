@@ -8,6 +8,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
+from selfmotion.certificate import approaches
 from selfmotion.cli import documents, json_tables, options, outputs, tables
 from selfmotion.cli.app import (
     NOT_VERIFIED,
@@ -143,27 +144,26 @@ def check(
             if value:
                 raise sm.ProblemError(f"{file}: --{name} is the plan's own: leave it out")
         plan = sm.load_plan(file)
-        certificate = plan.certificate
-        if within is not None or any(judged):
-            certificate = plan.check(within, options.requirements(plan.robot, *judged))
+        arm, motion, certificate = plan.robot, plan.trajectory, plan.certificate
+        asked = options.requirements(arm, *judged)
+        if within is not None or asked:
+            certificate = plan.check(within, asked)
+        asked = (*plan.requirements, *asked)
     else:
         if robot is None or path is None:
             raise sm.ProblemError(
                 f"{file}: a motion is checked against a robot and a path: give --robot and --path"
             )
         arm = sm.load_robot(robot, tool=tool, lock=options.locks(lock or []), reference=reference)
-        certificate = sm.certify(
-            arm,
-            formats.read_path(path, feed=feed, corners=corners or "blend"),
-            task or "pose",
-            sm.read_motion(file, degrees=degrees),
-            within,
-            options.requirements(arm, *judged),
-        )
+        followed = formats.read_path(path, feed=feed, corners=corners or "blend")
+        motion, asked = sm.read_motion(file, degrees=degrees), options.requirements(arm, *judged)
+        certificate = sm.certify(arm, followed, task or "pose", motion, within, asked)
+        motion = motion.of_joints(arm.joint_names)
+    near = approaches(asked, sm.FinishedMotion(arm, motion))
     if as_json:
-        terminal.print_json(data=json_tables.certificate_json(certificate))
+        terminal.print_json(data=json_tables.certificate_json(certificate, near))
     else:
-        tables.show_certificate(certificate, terminal)
+        tables.show_certificate(certificate, near, terminal)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
 
 
@@ -184,22 +184,31 @@ def export(
         str | None,
         typer.Option("--format", help=f"Whatever the suffix: {', '.join(formats.FORMS)}."),
     ] = None,
+    parts: Annotated[
+        bool, typer.Option("--parts", help="Of a cell a file for each part as well, in step.")
+    ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Write a plan's motion for controllers and simulators, and check what was written."""
     saved = sm.load_plan(file)
     verified, verdicts = not saved.altered, dict[str, str]()
+
+    def judged(motion: sm.Trajectory, name: str) -> bool:
+        found = saved.problem.certify(motion, saved.tolerance, saved.report.ending)
+        verdicts[name] = f"read back: {found.verdict}"
+        return found.verified
+
     for target in out:
+        files = sm.write_parts(saved, target, rate=rate, form=form) if parts else {}
+        together = ", ".join(map(str, files.values()))
         sm.write_motion(saved, target, rate=rate, form=form)
         if form in formats.READABLE or (form is None and target.suffix not in (".xml", ".script")):
-            found = saved.problem.certify(
-                sm.read_motion(target), saved.tolerance, saved.report.ending
-            )
-            verified = verified and found.verified
-            verdicts[str(target)] = f"read back: {found.verdict}"
+            verified &= judged(sm.read_motion(target), str(target))
+            if files:
+                verified &= judged(sm.read_parts(files), together)
         else:
-            verified = verified and saved.certificate.verified
-            verdicts[str(target)] = ""
+            verified &= saved.certificate.verified
+            verdicts |= {str(target): "", **({together: ""} if files else {})}
     miss = formats.linear_miss(saved, rate)
     if as_json:
         terminal.print_json(

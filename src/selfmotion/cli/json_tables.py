@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from selfmotion.certificate import Certificate
+from selfmotion.certificate import Certificate, Extreme
 from selfmotion.result import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -39,12 +39,13 @@ def robots_json(robots: Mapping[str, RobotModel]) -> dict[str, Any]:
     }
 
 
-def certificate_json(certificate: Certificate) -> dict[str, Any]:
-    """Return a certificate as JSON-safe values, the verdict first."""
+def certificate_json(certificate: Certificate, approaches: Mapping[str, Extreme]) -> dict[str, Any]:
+    """Return a certificate as JSON-safe values, the verdict first; with how near bodies come."""
     return {
         "verified": certificate.verified,
         "verdict": certificate.verdict,
         **dataclasses.asdict(certificate),
+        "approaches": {name: dataclasses.asdict(near) for name, near in approaches.items()},
     }
 
 
@@ -64,5 +65,5 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "status": report.status.value,
         "message": report.message,
         "duration": plan.trajectory.duration,
-        "certificate": certificate_json(plan.certificate),
+        "certificate": certificate_json(plan.certificate, plan.approaches),
     }

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from selfmotion.certificate import LIMIT_NAMES, Certificate
+from selfmotion.certificate import LIMIT_NAMES, Certificate, Extreme
 from selfmotion.result import Gap, Plan, Report
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -59,21 +59,24 @@ def show(plan: Plan, console: Console) -> None:
         console.print(_prices(report))
     if report.gap is not None:
         console.print(_distance(report.gap))
-    show_certificate(plan.certificate, console)
+    show_certificate(plan.certificate, plan.approaches, console)
 
 
 # How much of a limit is used.
 _SHARE = "{:.1%} of its limit"
 
 
-def show_certificate(certificate: Certificate, console: Console) -> None:
-    """Print what forward kinematics found, and the verdict."""
+def show_certificate(
+    certificate: Certificate, approaches: Mapping[str, Extreme], console: Console
+) -> None:
+    """Print what forward kinematics found, how near each body comes, and the verdict."""
     title = f"checked at all times, with {certificate.samples} poses"
     table = _table(title)
     table.add_column("worst")
     table.add_column("value", justify="right", no_wrap=True)
     table.add_column("at", justify="right", no_wrap=True)
     table.add_column("where", overflow="fold")
+    several = approaches if len(approaches) > 1 else {}
     rows = (
         ("position error", certificate.position_error, "{:.2e} m"),
         ("rotation error", certificate.rotation_error, "{:.2e} rad"),
@@ -82,12 +85,14 @@ def show_certificate(certificate: Certificate, console: Console) -> None:
         ("smallest singular value", certificate.smallest_singular_value, "{:.4g}"),
         ("acceleration", certificate.acceleration_ratio, _SHARE),
         ("clearance", certificate.clearance, "{:.4g} m"),
+        # Of one body alone the clearance says it.
+        *((f"closest to {name}", near, "{:.4g} m") for name, near in several.items()),
     )
     for name, worst, form in rows:
         if worst is None:
             continue
         value = form.format(worst.value)
-        table.add_row(name, value, f"{worst.time:.3f} s", escape(worst.name))
+        table.add_row(escape(name), value, f"{worst.time:.3f} s", escape(worst.name))
     shown = {"clearance", *LIMIT_NAMES}
     for finding in certificate.findings:
         if finding.requirement not in shown:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pinocchio as pin
 
-from selfmotion.basics import CollisionError
+from selfmotion.basics import CollisionError, nearest
 from selfmotion.collision.obstacles import Obstacle
 from selfmotion.collision.solids import Solid
 from selfmotion.robot import RobotModel, Urdf
@@ -21,20 +21,25 @@ class Body:
     ----------
     name : str
         The link it belongs to, or the obstacle.
+    link : str
+        The link that it is of, or that carries it; "" for the world.
     joint : int
         Index of the joint that moves it; 0 for the world.
-    is_obstacle : bool
-        Whether it belongs to the world rather than to the robot.
     place : pinocchio.SE3
         Its frame in that of the joint.
     solid : Solid
     """
 
     name: str
+    link: str
     joint: int
-    is_obstacle: bool
     place: pin.SE3
     solid: Solid
+
+    @property
+    def is_obstacle(self) -> bool:
+        """Whether it belongs to the world rather than to the robot."""
+        return not self.link
 
 
 def link_bodies(robot: RobotModel) -> list[Body]:
@@ -54,25 +59,47 @@ def link_bodies(robot: RobotModel) -> list[Body]:
     for link, piece in zip(links, pieces, strict=True):
         file = f" ({piece.meshPath})" if piece.meshPath else ""
         solid = Solid(piece.geometry, f"{robot.urdf.source}: link '{link}'{file}")
-        bodies.append(Body(link, piece.parentJoint, False, piece.placement, solid))
+        carrier = robot.urdf.carrier(link)
+        bodies.append(Body(link, carrier, piece.parentJoint, piece.placement, solid))
     return bodies
 
 
-def obstacle_bodies(obstacles: Sequence[Obstacle], links: Sequence[str]) -> list[Body]:
-    """Return the obstacles as bodies.
+def obstacle_bodies(obstacles: Sequence[Obstacle], robot: RobotModel) -> list[Body]:
+    """Return the obstacles as bodies, those that ride on links before those of the world.
+
+    What a link carries that no joint moves stands in the world.
 
     Raises
     ------
     CollisionError
-        A name is that of a link or taken twice, or the geometry is no body.
+        A name is that of a link or taken twice, a frame is no link, or the geometry is no body.
     """
-    taken, bodies = set(links), []
+    links, riding, standing = robot.urdf.links, [], []
+    taken = set(links)
     for item in obstacles:
         if item.name in taken:
             raise CollisionError(f"{item.label}: a link or another obstacle has this name too")
         taken.add(item.name)
-        bodies.append(Body(item.name, 0, True, item.pose, Solid(item.geometry(), item.label)))
-    return bodies
+        if item.frame is not None and item.frame not in links:
+            raise CollisionError(
+                f"{item.label}: its frame '{item.frame}' is no link of {robot.name}"
+                f"{nearest(item.frame, links)}; links: {', '.join(links)}"
+            )
+        joint, place = place_of(item, item.pose, robot)
+        solid = Solid(item.geometry(), item.label)
+        if joint:
+            riding.append(Body(item.name, robot.urdf.carrier(str(item.frame)), joint, place, solid))
+        else:
+            standing.append(Body(item.name, "", 0, place, solid))
+    return [*riding, *standing]
+
+
+def place_of(obstacle: Obstacle, pose: pin.SE3, robot: RobotModel) -> tuple[int, pin.SE3]:
+    """Return the joint that moves an obstacle, and where in its frame a pose of it is."""
+    if obstacle.frame is None:
+        return 0, pose
+    joint, link = robot.carrier_of(obstacle.frame)
+    return joint, link * pose
 
 
 def _check_count(urdf: Urdf, links: Sequence[str]) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array
+from selfmotion.collision.bodies import place_of
 from selfmotion.collision.distances import Ints
 from selfmotion.collision.exact import CollisionModel
 from selfmotion.collision.overlaps import SAMPLES
@@ -129,11 +130,12 @@ class ClearanceModel:
         return Clearances(values, rows, columns, slopes)
 
     def move(self, obstacle: str, pose: SE3) -> None:
-        """Put an obstacle somewhere else, for this model and the hulls of its `exact` one.
+        """Put an obstacle somewhere else in its frame, for this model and its `exact` one's hulls.
 
         The meshes of `exact` stay where they are: it is not for measuring any more.
         """
-        self._exact.hulls.move(obstacle, pose)
+        item = next(item for item in self._exact.obstacles if item.name == obstacle)
+        self._exact.hulls.move(obstacle, place_of(item, pose, self.robot)[1])
 
     @property
     def left_out(self) -> tuple[tuple[str, str], ...]:
@@ -145,7 +147,5 @@ class ClearanceModel:
         """Return the indices of pairs whose hulls overlap hardly more often than the bodies."""
         exact = self._exact
         met, alone = exact.overlap_counts()
-        world = {obstacle.name for obstacle in exact.obstacles}
-        to_world = np.array([pair[1] in world for pair in exact.pairs], dtype=bool)
         allowed = np.where(met > 0, _FALSE_ALARMS * SAMPLES, 0.0)
-        return np.flatnonzero(np.where(to_world, alone < SAMPLES, alone <= allowed))
+        return np.flatnonzero(np.where(exact.to_world, alone < SAMPLES, alone <= allowed))

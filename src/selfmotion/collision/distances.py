@@ -105,14 +105,12 @@ class HullDistances:
         """Return what the distances at q (K, n) are at least, (K, P); see `BoundingBoxes`."""
         return self._boxes.lower_bounds(q, self.pairs, limit)
 
-    def move(self, obstacle: str, pose: pin.SE3) -> None:
-        """Put an obstacle somewhere else."""
-        index = next(
-            i for i, body in enumerate(self._bodies) if body.is_obstacle and body.name == obstacle
-        )
-        body = replace(self._bodies[index], place=pose)
+    def move(self, obstacle: str, place: pin.SE3) -> None:
+        """Put an obstacle somewhere else in the frame of the joint that carries it."""
+        index = next(i for i, body in enumerate(self._bodies) if body.name == obstacle)
+        body = replace(self._bodies[index], place=place)
         self._bodies = (*self._bodies[:index], body, *self._bodies[index + 1 :])
-        self._model.geometryObjects[index].placement = pose
+        self._model.geometryObjects[index].placement = place
         self._boxes.move(index, body)
 
     def place(self, q: Array) -> Any:

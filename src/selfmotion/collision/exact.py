@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -10,28 +11,24 @@ import numpy.typing as npt
 from selfmotion.basics import Array, RobotError
 from selfmotion.collision import levers
 from selfmotion.collision.bodies import obstacle_bodies
+from selfmotion.collision.checked import checked_pairs
 from selfmotion.collision.distances import HullDistances, Ints
-from selfmotion.collision.found import Closest, Overlap
+from selfmotion.collision.found import Closest
 from selfmotion.collision.meshes import MeshDistances
 from selfmotion.collision.obstacles import Obstacle
-from selfmotion.collision.overlaps import SAMPLES, count_overlaps, links_of
-from selfmotion.collision.pairs import (
-    are_neighbours,
-    are_placed_apart,
-    candidate_pairs,
-    held_pairs,
-)
+from selfmotion.collision.overlaps import count_overlaps, links_of
+from selfmotion.collision.pairs import held_pairs
 from selfmotion.robot import RobotModel
 
-# The share of sampled configurations from which on an overlap of links is worth telling.
-_OFTEN = 0.5
 # Bodies that are put in touch may overlap by this much [m]: rounding.
 _TOUCHING = 1e-6
+# What the links of an arm are called together.
+ITSELF = "the arm itself"
 _NO_PAIR = Closest(math.inf, "", "")
 
 
 class CollisionModel:
-    """Exact clearance of an arm from itself and from obstacles that stand still.
+    """Exact clearance of an arm, and of what rides on it, from itself and from obstacles.
 
     Every body is a solid. While two bodies are apart their distance is that of the real meshes.
     When they overlap, the value is minus the depth by which their convex hulls do, an upper bound
@@ -43,9 +40,10 @@ class CollisionModel:
     robot : RobotModel
         The arm. All its links count, those on locked joints too, where they are held.
     obstacles : sequence of Obstacle
-        The world. The robot's immovable base is not checked against it.
+        The world, and what rides on links: those count as links that are fixed to theirs. The
+        robot's immovable base is not checked against the world.
     disabled : sequence of (str, str)
-        Pairs of links that are left out; see `disabled_links` for those of an SRDF.
+        Pairs of links or obstacles that are left out; see `disabled_links` for those of an SRDF.
 
     Attributes
     ----------
@@ -53,6 +51,10 @@ class CollisionModel:
         Names of the P pairs that are checked; a link of several pieces appears repeatedly.
     bodies : tuple of str
         Names of the B bodies, likewise.
+    to_world : (P,)
+        Which pairs are of what the robot carries along and an obstacle of the world.
+    checks_links, checks_obstacles : bool
+        Whether some pair is of links or of what rides on them, and of an obstacle.
     overlapping : tuple of Overlap
         Pairs of links that overlap in half or more of 500 sampled configurations. Those that do
         in each, or are known to touch as they are made (`RobotModel.touching`), are not checked,
@@ -63,8 +65,9 @@ class CollisionModel:
     Raises
     ------
     CollisionError
-        Two obstacles, or an obstacle and a link, have the same name; a piece of geometry is no
-        body; a mesh cannot be read; a link that is disabled is not the arm's.
+        Two obstacles, or an obstacle and a link, have the same name; an obstacle's frame is no
+        link; a piece of geometry is no body; a mesh cannot be read; what is disabled is neither a
+        link of the arm nor an obstacle.
     RobotError
         A mesh of the robot is missing.
 
@@ -84,54 +87,44 @@ class CollisionModel:
         disabled: Sequence[tuple[str, str]] = (),
     ) -> None:
         self.robot, self.obstacles, self._disabled = robot, tuple(obstacles), tuple(disabled)
-        links = links_of(robot)
-        self.has_bodies = len(links.bodies) > 0
-        self._bodies = (*links.bodies, *obstacle_bodies(self.obstacles, robot.urdf.links))
+        self._bodies = (*links_of(robot).bodies, *obstacle_bodies(self.obstacles, robot))
+        self.has_bodies = not all(body.is_obstacle for body in self._bodies)
         self.bodies = tuple(body.name for body in self._bodies)
-        pairs: list[tuple[int, int]] = []
-        often: dict[tuple[str, str, bool], int] = {}
-        candidates = candidate_pairs(self._bodies, robot.urdf, disabled)
-        as_made = {frozenset(pair) for pair in robot.touching}
-        as_made |= self._touching_neighbours(links.counts)
-        for first, second in candidates:
-            met, _ = links.counts.get((first, second), (0, 0))
-            names = self.bodies[first], self.bodies[second]
-            always = met == SAMPLES and not are_placed_apart(*names, robot.urdf)
-            is_checked = not always and frozenset(names) not in as_made
-            if is_checked:
-                pairs.append((first, second))
-            if met >= _OFTEN * SAMPLES or (met and not is_checked):
-                key = *names, is_checked
-                often[key] = max(met, often.get(key, 0))
+        checked = checked_pairs(robot, self._bodies, self._disabled)
+        self._counts = checked.counts
+        self.overlapping, self.disabled = checked.overlapping, checked.disabled
+        self._take(checked.pairs)
+
+    def _take(self, pairs: Sequence[tuple[int, int]]) -> None:
+        """Check these pairs of bodies."""
         self._index = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         self.pairs = tuple((self.bodies[i], self.bodies[j]) for i, j in pairs)
-        self.overlapping = tuple(
-            Overlap(first, second, met / SAMPLES, is_checked)
-            for (first, second, is_checked), met in often.items()
-        )
-        kept = {(self.bodies[i], self.bodies[j]) for i, j in candidates}
-        every = candidate_pairs(self._bodies, robot.urdf) if disabled else candidates
-        named = dict.fromkeys((self.bodies[i], self.bodies[j]) for i, j in every)
-        self.disabled = tuple(pair for pair in named if pair not in kept)
-        self.hulls = HullDistances(robot, self._bodies, self._index)
+        self.to_world = np.array([self._bodies[j].is_obstacle for _, j in pairs], dtype=np.bool_)
+        obstacles = {item.name for item in self.obstacles}
+        self.checks_links = not self.to_world.all()
+        self.checks_obstacles = not all(obstacles.isdisjoint(pair) for pair in self.pairs)
+        self.hulls = HullDistances(self.robot, self._bodies, self._index)
         solids = [body.solid for body in self._bodies]
         self._meshes = MeshDistances(solids, self.bodies, self._index)
 
-    def _touching_neighbours(
-        self, counts: dict[tuple[int, int], tuple[int, int]]
-    ) -> set[frozenset[str]]:
-        """Return the links next to a joint of which some pieces always overlap: as made."""
-        always = {
-            (self.bodies[i], self.bodies[j])
-            for (i, j), (met, _) in counts.items()
-            if met == SAMPLES
-        }
-        urdf = self.robot.urdf
-        return {
-            frozenset(pair)
-            for pair in always
-            if are_neighbours(*pair, urdf) and not are_placed_apart(*pair, urdf)
-        }
+    def _with(self, pairs: Sequence[tuple[int, int]]) -> "CollisionModel":
+        other = copy(self)
+        other.__dict__.pop("pair_levers", None)
+        other._take(pairs)
+        return other
+
+    @property
+    def groups(self) -> dict[str, "CollisionModel"]:
+        """The models of "the arm itself", its links alone, and of each obstacle or carried body.
+
+        With all that can meet it, by name. What has no pair is left out.
+        """
+        names = dict.fromkeys(body.name for body in self._bodies if body.link != body.name)
+        found: dict[str, list[tuple[int, int]]] = {}
+        for (i, j), pair in zip(self._index.tolist(), self.pairs, strict=True):
+            for name in [name for name in names if name in pair] or [ITSELF]:
+                found.setdefault(name, []).append((i, j))
+        return {name: self._with(found[name]) for name in (ITSELF, *names) if name in found}
 
     @cached_property
     def stuck(self) -> Closest | None:
@@ -139,28 +132,13 @@ class CollisionModel:
         pairs = held_pairs(self._bodies, self.robot.urdf, self.robot.locked, self._disabled)
         if not pairs:
             return None
-        index = np.array(pairs, dtype=np.int64)
-        hulls = HullDistances(self.robot, self._bodies, index)
-        solids = [body.solid for body in self._bodies]
-        meshes = MeshDistances(solids, self.bodies, index)
-        q = np.zeros(self.robot.dof)
-        places, bounds = hulls.place(q), hulls.lower_bounds(q[None])[0]
-        worst = _NO_PAIR
-        for pair in np.flatnonzero(bounds < 0.0).tolist():
-            value = meshes.refine(places, pair, hulls.distance(pair, bounds[pair]))
-            if value < min(worst.value, -_TOUCHING):
-                worst = Closest(value, self.bodies[pairs[pair][0]], self.bodies[pairs[pair][1]])
-        return worst if worst.first else None
+        worst = self._with(pairs).worst(np.zeros((1, self.robot.dof)))
+        return worst if worst.value < -_TOUCHING else None
 
     @property
-    def checks_links(self) -> bool:
-        """Whether some pair of links is checked."""
-        return any(not self._bodies[second].is_obstacle for _, second in self._index)
-
-    @property
-    def checks_obstacles(self) -> bool:
-        """Whether some link is checked against an obstacle."""
-        return any(self._bodies[second].is_obstacle for _, second in self._index)
+    def standing(self) -> frozenset[str]:
+        """Names of the obstacles that stand in the world."""
+        return frozenset(body.name for body in self._bodies if body.is_obstacle)
 
     @cached_property
     def open_meshes(self) -> tuple[str, ...]:
@@ -371,7 +349,7 @@ class CollisionModel:
 
     def overlap_counts(self) -> tuple[Ints, Ints]:
         """Return in how many of 500 configurations bodies overlap, and their hulls alone, (P,)."""
-        known = [links_of(self.robot).counts.get((i, j)) for i, j in self._index.tolist()]
+        known = [self._counts.get((i, j)) for i, j in self._index.tolist()]
         unknown = np.flatnonzero([counts is None for counts in known])
         met, alone = count_overlaps(self.robot, self.hulls, self._meshes, unknown)
         for pair, counts in enumerate(known):

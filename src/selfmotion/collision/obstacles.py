@@ -1,19 +1,22 @@
-"""Obstacles that stand still in the world. An own shape is a subclass of `Obstacle`."""
+"""Obstacles: bodies of the world, or on a link. An own shape is a subclass of `Obstacle`."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, CollisionError, as_number, as_numbers
+from selfmotion.basics import Array, CollisionError, as_number, as_numbers, shown
+from selfmotion.robot import UrdfShape
 from selfmotion.task import SE3, as_pose
 
 # An obstacle so large, or so far away [m], may be one in millimetres.
 _HUGE = 100.0
+# What every obstacle has besides the lengths of its shape.
+_PLACE = ("name", "pose", "frame")
 # Shape → class, filled as the classes are made.
 _shapes: dict[str, type["Obstacle"]] = {}
 
@@ -42,18 +45,22 @@ class Obstacle(ABC):
         What reports call it; unique among the obstacles and links of a model.
     pose : pinocchio.SE3
         The obstacle's frame in world axes; a position (3,) [m] is taken as a pose along them.
+    frame : str or None
+        The link of the robot that carries it, in whose frame `pose` is then: a torch, a camera, a
+        part in hand, a fixture on a table that turns. None for the world.
 
     Raises
     ------
     CollisionError
-        The name is empty, the pose is no rigid motion, or a length is not positive. When a class
-        is made: its shape is the name of another one.
+        The name is empty, the pose is no rigid motion, a length is not positive, or the frame is
+        no name. When a class is made: its shape is the name of another one.
     """
 
     shape: ClassVar[str] = ""
 
     name: str
     pose: SE3
+    frame: str | None = field(default=None, kw_only=True)
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
@@ -69,6 +76,10 @@ class Obstacle(ABC):
         if not (isinstance(self.name, str) and self.name):
             raise CollisionError(f"{self.shape}: has name {self.name!r}, expected a text")
         object.__setattr__(self, "pose", _pose(self.label, self.pose))
+        if self.frame is not None and not (isinstance(self.frame, str) and self.frame):
+            raise CollisionError(
+                f"{self.label}: frame is {shown(self.frame)}, expected the name of a link"
+            )
 
     @property
     def label(self) -> str:
@@ -101,14 +112,28 @@ class Obstacle(ABC):
             A file is missing or cannot be read.
         """
 
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """Return what it is in a URDF, where an arm carries it (`load_robot`, bodies).
+
+        Raises
+        ------
+        CollisionError
+            A URDF does not know the shape.
+        """
+        raise CollisionError(
+            f"{self.label}: a URDF knows no such shape, so that no arm can carry it as a body; "
+            f"give it to a Clearance, with frame="
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Return it as JSON-safe values; `obstacle_from_dict` reverses this exactly."""
-        rest = (f.name for f in fields(self) if f.name not in ("name", "pose"))
+        rest = (f.name for f in fields(self) if f.name not in _PLACE)
         return {
             "shape": self.shape,
             "name": self.name,
             "position": self.pose.translation.tolist(),
             "rotation": self.pose.rotation.tolist(),
+            **({} if self.frame is None else {"frame": self.frame}),
             **{key: _plain(getattr(self, key)) for key in rest},
         }
 
@@ -130,8 +155,8 @@ def obstacle_from_dict(values: Mapping[str, Any]) -> Obstacle:
     Parameters
     ----------
     values : dict
-        ``shape`` and ``name``; ``position`` (3,) [m] and optionally ``rotation`` (3, 3); and the
-        lengths of the shape.
+        ``shape`` and ``name``; ``position`` (3,) [m] and optionally ``rotation`` (3, 3) and
+        ``frame``; and the lengths of the shape.
 
     Raises
     ------
@@ -156,8 +181,8 @@ def obstacle_from_dict(values: Mapping[str, Any]) -> Obstacle:
             f"expected (3,) and (3, 3)"
         )
     cls = _shapes[shape]
-    own = [f for f in fields(cls) if f.name not in ("name", "pose")]
-    known = {f.name for f in own}
+    own = [f for f in fields(cls) if f.name not in _PLACE]
+    known = {"frame", *(f.name for f in own)}
     unknown = sorted(set(rest) - known)
     if unknown:
         raise CollisionError(f"{label}: has '{unknown[0]}', expected {', '.join(sorted(known))}")

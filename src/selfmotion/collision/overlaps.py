@@ -1,5 +1,6 @@
 """How often bodies overlap in sampled configurations, and how often their convex hulls alone do."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -46,14 +47,21 @@ def links_of(robot: RobotModel) -> Links:
     if robot not in _known:
         bodies = link_bodies(robot)
         pairs = candidate_pairs(bodies, robot.urdf)
-        index = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-        names = [body.name for body in bodies]
-        hulls = HullDistances(robot, bodies, index)
-        meshes = MeshDistances([body.solid for body in bodies], names, index)
-        met, alone = count_overlaps(robot, hulls, meshes, np.arange(len(pairs)))
-        counts = zip(met.tolist(), alone.tolist(), strict=True)
-        _known[robot] = Links(tuple(bodies), dict(zip(pairs, counts, strict=True)))
+        _known[robot] = Links(tuple(bodies), counts_of(robot, bodies, pairs))
     return _known[robot]
+
+
+def counts_of(
+    robot: RobotModel, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]
+) -> dict[tuple[int, int], tuple[int, int]]:
+    """Return `Links.counts` of some pairs of bodies."""
+    if not pairs:
+        return {}
+    index = np.array(pairs, dtype=np.int64)
+    hulls = HullDistances(robot, bodies, index)
+    meshes = MeshDistances([body.solid for body in bodies], [body.name for body in bodies], index)
+    met, alone = count_overlaps(robot, hulls, meshes, np.arange(len(pairs)))
+    return dict(zip(pairs, zip(met.tolist(), alone.tolist(), strict=True), strict=True))
 
 
 def count_overlaps(

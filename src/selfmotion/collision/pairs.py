@@ -18,19 +18,20 @@ def candidate_pairs(
 
     Left out are pairs whose distance no joint changes (so also the robot's base against the
     world: an arm bolted to a table touches it; see `held_pairs`), the two links that a movable
-    joint joins, and pairs of links that are `disabled`. What is fixed to joined links, a tool to
-    the one and a bracket to the other, can meet.
+    joint joins, and pairs that are `disabled`. What is fixed to joined links, a tool to the one
+    and a bracket to the other, can meet.
 
     Raises
     ------
     CollisionError
-        A link that is disabled is not the arm's.
+        What is disabled is neither a link of the arm nor an obstacle.
     """
     left_out = {frozenset((x.parent, x.child)) for x in _movable(urdf)}
+    known = dict.fromkeys((*urdf.links, *(body.name for body in bodies)))
     for pair in disabled:
         for link in pair:
-            if link not in urdf.links:
-                near = ", ".join(f"'{name}'" for name in get_close_matches(link, urdf.links))
+            if link not in known:
+                near = ", ".join(f"'{name}'" for name in get_close_matches(link, known))
                 raise CollisionError(
                     f"collisions of {' and '.join(repr(name) for name in pair)} are disabled, but "
                     f"the URDF has no link '{link}'" + (f"; it has {near}" if near else "")
@@ -38,12 +39,9 @@ def candidate_pairs(
         left_out.add(frozenset(pair))
 
     def can_meet(first: Body, second: Body) -> bool:
-        if first.joint == second.joint:
-            return False
-        if first.is_obstacle or second.is_obstacle:
-            return True
         # A pair that is left out is that of two links alone, not of all that is fixed to them.
-        return frozenset((first.name, second.name)) not in left_out
+        names = frozenset((first.name, second.name))
+        return first.joint != second.joint and names not in left_out
 
     return [
         (i, j)
@@ -67,7 +65,7 @@ def held_pairs(
     placements = {joint.name for joint in urdf.joints.values() if is_placement(joint)}
 
     def put(link: str) -> frozenset[str]:
-        """Return the joints from the root to a link that were put somewhere."""
+        """Return the joints from the root to a link that were put somewhere; "" for the world."""
         found = set()
         while link in up:
             joint = up[link]
@@ -78,19 +76,19 @@ def held_pairs(
 
     left_out = {frozenset(pair) for pair in disabled}
     left_out |= {frozenset((joint.parent, joint.child)) for joint in _movable(urdf)}
-    above = {body.name: put(body.name) for body in bodies}
+    above = {body.link: put(body.link) for body in bodies}
 
-    def is_put(first: str, second: str) -> bool:
-        if frozenset((first, second)) in left_out:
+    def is_put(first: Body, second: Body) -> bool:
+        if first.joint != second.joint or frozenset((first.name, second.name)) in left_out:
             return False
-        ways = above[first] ^ above[second]
+        ways, links = above[first.link] ^ above[second.link], (first.link, second.link)
         # What only a placement puts there may touch what carries it.
-        return bool(ways - placements) or (bool(ways) and are_placed_apart(first, second, urdf))
+        return bool(ways - placements) or (bool(ways) and are_placed_apart(*links, urdf))
 
     return [
         (i, j)
         for i, j in itertools.combinations(range(len(bodies)), 2)
-        if bodies[i].joint == bodies[j].joint and is_put(bodies[i].name, bodies[j].name)
+        if is_put(bodies[i], bodies[j])
     ]
 
 

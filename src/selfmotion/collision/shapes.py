@@ -1,5 +1,6 @@
 """The shapes of obstacles that come with the package."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -9,6 +10,7 @@ import numpy as np
 
 from selfmotion.basics import Array, CollisionError, as_numbers, read_only, shown
 from selfmotion.collision.obstacles import Obstacle
+from selfmotion.robot import UrdfShape
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +39,10 @@ class Box(Obstacle):
         """See `Obstacle.geometry`."""
         return coal.Box(*self.size.tolist())
 
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """See `Obstacle.urdf_shapes`."""
+        return [UrdfShape("box", {"size": " ".join(map(repr, self.size.tolist()))})]
+
 
 @dataclass(frozen=True, eq=False)
 class Sphere(Obstacle):
@@ -59,6 +65,10 @@ class Sphere(Obstacle):
     def geometry(self) -> Any:
         """See `Obstacle.geometry`."""
         return coal.Sphere(self.radius)
+
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """See `Obstacle.urdf_shapes`."""
+        return [UrdfShape("sphere", {"radius": repr(self.radius)})]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +95,10 @@ class Cylinder(Obstacle):
         """See `Obstacle.geometry`."""
         return coal.Cylinder(self.radius, self.length)
 
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """See `Obstacle.urdf_shapes`."""
+        return [_cylinder(self.radius, self.length)]
+
 
 @dataclass(frozen=True, eq=False)
 class Capsule(Obstacle):
@@ -109,6 +123,12 @@ class Capsule(Obstacle):
     def geometry(self) -> Any:
         """See `Obstacle.geometry`."""
         return coal.Capsule(self.radius, self.length)
+
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """See `Obstacle.urdf_shapes`: a cylinder and two spheres."""
+        ends = (0.5 * self.length, -0.5 * self.length)
+        caps = (UrdfShape("sphere", {"radius": repr(self.radius)}, height) for height in ends)
+        return [_cylinder(self.radius, self.length), *caps]
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,3 +170,12 @@ class Mesh(Obstacle):
             # What comes before is where in the source of coal it was found.
             reason = " ".join(str(error).rpartition("message:")[2].split())
             raise CollisionError(f"{self.label}: {self.file} cannot be read: {reason}") from error
+
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """See `Obstacle.urdf_shapes`."""
+        scale = " ".join([repr(self.scale)] * 3)
+        return [UrdfShape("mesh", {"filename": str(self.file.resolve()), "scale": scale})]
+
+
+def _cylinder(radius: float, length: float) -> UrdfShape:
+    return UrdfShape("cylinder", {"radius": repr(radius), "length": repr(length)})

@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError, as_number, restore, series, shown
 from selfmotion.certificate import Column, Quantity, Stretch
-from selfmotion.constraints.base import Constraint
+from selfmotion.constraints.base import Constraint, check_changes
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.robot import Coordinate, RobotModel, SwivelAngle
 
@@ -80,7 +80,7 @@ class Band(Constraint):
             found = coordinate.series(stretch.chain(), stretch.motion(np.zeros(1)))
             return None if found is None else found[None]
 
-        return Quantity(
+        found = Quantity(
             f"band of {coordinate.name}",
             (Column(coordinate.name, coordinate.name, coordinate.unit),),
             lambda q, *_: coordinate(robot, q)[0][:, None],
@@ -90,6 +90,8 @@ class Band(Constraint):
             series=known if series.holds_for(coordinate, "__call__") else None,
             period=coordinate.period,
         )
+        check_changes(found, robot)
+        return found
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], **context: Any) -> "Band":

@@ -6,6 +6,8 @@ It is bound to one when a plan is made (`selfmotion.constraints.conditions`).
 from abc import ABC
 from typing import ClassVar
 
+import numpy as np
+
 from selfmotion.basics import Array, ProblemError, Saved
 from selfmotion.certificate import Quantity, QuantityKept, Requirement
 from selfmotion.constraints.conditions import BoundConstraint, BoundQuantity
@@ -98,3 +100,19 @@ class Constraint(Saved, ABC, family="constraint"):
     def on_last_part(self) -> "Constraint | None":
         """Return what it asks of a motion along the last part of the path; None for nothing."""
         return self
+
+
+def check_changes(quantity: Quantity, robot: RobotModel) -> None:
+    """Raise ProblemError where no joint changes a quantity of q."""
+    q = robot.generic_configurations()
+    slopes = quantity.derivatives(q, np.zeros_like(q), np.zeros_like(q))[0]
+    # Written so that NaN, of what has no value somewhere, passes.
+    if np.all(np.abs(slopes) <= _NEVER):
+        raise ProblemError(
+            f"{robot.name}: {quantity.name}: no joint changes {quantity.columns[0].label}; leave "
+            f"it out, or name a link that joints move"
+        )
+
+
+# Derivatives up to here are rounding of zero [m or rad per rad or m].
+_NEVER = 1e-12

@@ -29,22 +29,23 @@ from selfmotion.robot import RobotModel
 
 @dataclass(frozen=True, eq=False)
 class Clearance(Constraint):
-    """The arm keeps a distance from obstacles and from itself.
+    """The arm, and what rides on it, keep a distance from obstacles and from each other.
 
-    While optimising, links are their convex hulls; the certificate measures the meshes
-    themselves. Obstacles are not checked against the immovable base: no motion changes that
+    An obstacle with a `frame` rides on that link, like another link that is fixed to it. While
+    optimising, bodies are their convex hulls; the certificate measures the meshes themselves.
+    Obstacles of the world are not checked against the immovable base: no motion changes that
     distance, and an arm bolted to a table touches it.
 
     Parameters
     ----------
     obstacles : Obstacle or sequence of Obstacle
-        The world.
+        The world, and what rides on links.
     distance : float
         Smallest distance [m].
     srdf : path, optional
         File whose ``disable_collisions`` are left out as well. It is read once, here.
     disabled : sequence of (str, str)
-        Pairs of links that are left out.
+        Pairs of links or obstacles that are left out.
 
     Raises
     ------
@@ -144,7 +145,7 @@ class _Models:
                 f"{robot.name}: a clearance is asked for, but its URDF has no collision geometry "
                 f"to measure from; add <collision> to its links, or leave the clearance out"
             )
-        if wanted.obstacles and not self.exact.checks_obstacles:
+        if self.exact.standing and not self.exact.to_world.any():
             raise ProblemError(
                 f"{robot.name}: a clearance from obstacles is asked for, but no link that moves "
                 f"has collision geometry; add <collision> to those, or leave the obstacles out"

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, as_number, as_numbers, nearest, shown
 from selfmotion.certificate import Column, Quantity, Stretch
-from selfmotion.constraints.base import Constraint
+from selfmotion.constraints.base import Constraint, check_changes
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.robot import RobotModel
 
@@ -77,7 +77,7 @@ class Tilt(Constraint):
         def known(stretch: Stretch) -> Array:
             return np.asarray(stretch.chain().orientation(chain.tip)[None])
 
-        return _Angle(
+        found = _Angle(
             f"tilt of '{self.frame}'",
             (Column(self.frame, f"the tilt of '{self.frame}'", "rad"),),
             values,
@@ -86,6 +86,8 @@ class Tilt(Constraint):
             series=known,
             components=3,
         )
+        check_changes(found, robot)
+        return found
 
 
 class _Angle(Quantity):

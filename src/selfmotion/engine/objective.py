@@ -187,9 +187,9 @@ class Objective:
         by_z, by_pose = self.start.tangent()
         parts = [by_start @ by_z, self.null_motion.pullback(by_epsilon)]
         if self._deviation.size:
-            target = self._deviation.matrix(self.parts(x)[2])
-            by_target[0, :6] += by_start @ by_pose
-            parts.append(np.tensordot(by_target, target, 2))
+            target, own = self._deviation.matrix(self.parts(x)[2]), by_target[:, :12]
+            own[0, :6] += by_start @ by_pose[:, :6]
+            parts.append(np.tensordot(own, target, 2))
         return np.concatenate(parts)
 
     def require_finite(self, x: Array) -> None:
@@ -303,7 +303,8 @@ class Objective:
         if self._deviation.size:
             c = self.parts(x)[2]
             moved = self._deviation.matrix(c)[:, :6]
-            tangent[:, :, -len(c) :] += samples.task.select_along(moved, samples.rotation)
+            rows = samples.task.dimension
+            tangent[:, :rows, -len(c) :] += samples.task.select_along(moved, samples.rotation)
         return np.asarray(tangent)
 
     def _at_nodes(self, by_q: Array, by_qd: Array) -> NodeTangents:
@@ -378,7 +379,8 @@ class Objective:
         start_matrix[:, :first], by_pose = self.start.tangent()
         if not self._deviation.size:
             return self.rollout.sensitivities(epsilon_matrix, start_matrix)
-        target_matrix = np.zeros((stages, 12, self.size))
-        target_matrix[:, :, last:] = self._deviation.matrix(x[last:])
-        start_matrix[:, last:] = by_pose @ target_matrix[0, :6, last:]
+        # The first tip's path is the one that is relaxed.
+        target_matrix = np.zeros((stages, 12 * len(self.rollout.follows.items), self.size))
+        target_matrix[:, :12, last:] = self._deviation.matrix(x[last:])
+        start_matrix[:, last:] = by_pose[:, :6] @ target_matrix[0, :6, last:]
         return self.rollout.sensitivities(epsilon_matrix, start_matrix, target_matrix)

@@ -16,7 +16,9 @@ from selfmotion.formats.motions import (
     READABLE as READABLE,
     SUFFIXES as SUFFIXES,
     read_motion as read_motion,
+    read_parts as read_parts,
     write_motion as write_motion,
+    write_parts as write_parts,
 )
 from selfmotion.formats.overrides import (
     grid_documents as grid_documents,

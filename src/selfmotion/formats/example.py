@@ -20,6 +20,13 @@ tool = "{tool}"        # the link that follows the path
 # tool_offset = {{ position_mm = [0, 0, 100] }}              # a tool in the gripper
 # base = {{ position = [0, 0, 0.5], rpy_deg = [0, 0, 90] }}  # where the arm stands
 # lock = {{ some_joint = 0.1 }}
+#
+# [[robot.bodies]]       # what the arm carries; shapes as those of obstacles
+# shape = "cylinder"
+# name = "torch"
+# position_mm = [0, 0, 50]
+# radius_mm = 10
+# length_mm = 80
 
 [path]                 # from the tool's pose at the start, unless start = {{ position = …, … }}
 kind = "circle"        # or "line" (by = [dx, dy, dz] or end), "waypoints", "file"
@@ -66,6 +73,7 @@ kind = "JointJerkLimits"
 # position = [0.0, -0.6, 0.6]
 # rpy_deg = [0, 0, 0]
 # size_mm = [100, 100, 1200]
+# frame = "{tool}"     # the link that carries it; without, it stands in the world
 
 # [[relaxations]]      # rows that may leave the path
 # rows = ["rx", "ry"]

@@ -119,11 +119,12 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
     paths = {**_kinds(Path), "file": _model("file", _PATH_FILE)}
     costs = {**_kinds(Cost), FUNCTION: _model(FUNCTION, _FUNCTION)}
     parts: Any = dict[str, _model("RobotPart", _PART)]  # type: ignore[misc]
+    of_robot: _Fields = {"parts": (parts, None), "bodies": (_shapes(), None)}
     tasks: Any = Literal[tuple(task.value for task in Task)]
     tool_motion = _one_of(paths.values(), "kind")
     follow = _model("Follow", {**_FOLLOW, "task": (tasks, "pose"), "path": (tool_motion, None)})
     fields: dict[str, Any] = {
-        "robot": (_model("Robot", {**_ROBOT, "parts": (parts, None)}), ...),
+        "robot": (_model("Robot", {**_ROBOT, **of_robot}), ...),
         "task": (tasks, "pose"),
         "start": (Start, "free"),
         "path": (tool_motion, ...),
@@ -188,10 +189,15 @@ def _kinds(family: type[Saved]) -> dict[str, type[BaseModel]]:
     return {kind: model_of(cls, ("kind", kind)) for kind, cls in known.items()}
 
 
-def _clearance_fields() -> _Fields:
+def _shapes() -> Any:
+    """Return the type of a list of obstacles."""
     shapes = [model_of(cls, ("shape", shape), _placed(cls)) for shape, cls in obstacle_shapes()]
+    return list[_one_of(shapes, "shape")]  # type: ignore[misc]
+
+
+def _clearance_fields() -> _Fields:
     return {
-        "obstacles": (list[_one_of(shapes, "shape")], None),  # type: ignore[misc]
+        "obstacles": (_shapes(), None),
         "disabled": (list[Names], None),
         "srdf": (Text, None),
     }

@@ -63,14 +63,82 @@ def write_motion(
     if not isinstance(plan, Plan):
         raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
     path = as_path(file)
+    write, rate = _writer(path, rate, form)
+    write(path, MotionSamples.of(plan.trajectory, rate), plan.robot, rate)
+
+
+def write_parts(
+    plan: Plan, file: str | Path, *, rate: float | None = None, form: str | None = None
+) -> dict[str, Path]:
+    """Write the motion of a cell in a file for each part: part → file.
+
+    Of ``motion.yaml`` they are called ``motion.PART.yaml``. All have the same times, and each the
+    names that its joints have in the part's own robot. Parameters as in `write_motion`, which
+    writes all joints into one file.
+
+    Raises
+    ------
+    FileFormatError
+        The form is unknown, or a file cannot be written.
+    ProblemError
+        The robot has no parts, the rate gives no samples, or a part has what the format cannot say.
+    """
+    if not isinstance(plan, Plan):
+        raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
+    names = plan.robot.joint_names
+    alone = [name for name in names if "/" not in name]
+    if alone:
+        raise ProblemError(
+            f"{plan.robot.name}: joint '{alone[0]}' is of no part; only a cell of several robots "
+            f"is written part by part"
+        )
+    path = as_path(file)
+    write, rate = _writer(path, rate, form)
+    samples, written = MotionSamples.of(plan.trajectory, rate), {}
+    for part in dict.fromkeys(name.partition("/")[0] for name in names):
+        written[part] = path.with_name(f"{path.stem}.{part}{path.suffix}")
+        write(written[part], samples.of_part(part), plan.robot, rate)
+    return written
+
+
+def read_parts(files: Mapping[str, str | Path]) -> Trajectory:
+    """Read the motion of a cell from a file for each part, as `write_parts` returns them.
+
+    Raises
+    ------
+    FileFormatError
+        A file cannot be read, is no motion, or has other times than the first.
+    """
+    motions = {part: read_motion(file) for part, file in files.items()}
+    if not motions:
+        raise FileFormatError("there is no file of a part, expected part → file")
+    first, one = next(iter(motions.items()))
+    for part, motion in motions.items():
+        if not np.array_equal(motion.t, one.t):
+            raise FileFormatError(
+                f"{files[part]}: has {len(motion.t)} samples over {motion.duration:.6g} s, at "
+                f"other times than {files[first]} with {len(one.t)} over {one.duration:.6g} s: "
+                f"parts that move together are written together"
+            )
+    several = list(motions.values())
+    known = [motion.qdd for motion in several if motion.qdd is not None]
+    return Trajectory(
+        one.t,
+        np.hstack([motion.q for motion in several]),
+        np.hstack([motion.qd for motion in several]),
+        tuple(f"{part}/{name}" for part, motion in motions.items() for name in motion.joint_names),
+        np.hstack(known) if len(known) == len(several) else None,
+    )
+
+
+def _writer(path: Path, rate: float | None, form: str | None) -> tuple["_Writer", float | None]:
+    """Return what writes a file, and at which rate."""
     name = SUFFIXES.get(path.suffix) if form is None else form
     if name is None or name not in _WRITERS:
         known = ", ".join(f"{form} ({suffix})" for suffix, form in SUFFIXES.items())
         found = f"suffix '{path.suffix}'" if form is None else f"form '{form}'"
         raise FileFormatError(f"{path}: {found} is no format of motions: {known}, moveit")
-    if name == "urscript" and rate is None:
-        rate = 125.0
-    _WRITERS[name](path, MotionSamples.of(plan.trajectory, rate), plan.robot, rate)
+    return _WRITERS[name], 125.0 if name == "urscript" and rate is None else rate
 
 
 def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
@@ -140,13 +208,15 @@ def _write_yaml(file: Path, message: Mapping[str, Any]) -> None:
 
 
 def _write_mujoco(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    if motion.robot_joints != robot.joint_names:
+        raise ProblemError(f"{file}: keyframes are of all joints of {robot.name} together")
     write_text(file, keyframes(robot, motion.t, motion.q, motion.qd))
 
 
 def _write_urscript(
     file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None
 ) -> None:
-    write_text(file, script(robot, motion.q, rate or 125.0))
+    write_text(file, script(robot, motion.robot_joints, motion.q, rate or 125.0))
 
 
 def _read_npz(file: Path) -> Trajectory:

@@ -220,6 +220,7 @@ class _Reader:
         values = dict(given)
         arguments = {key: str(value) for key, value in values.pop("arguments", {}).items()}
         parts = values.pop("parts", None)
+        values["bodies"] = [self._obstacle(item) for item in values.pop("bodies", [])]
         if parts is None:
             return load_robot(self._source(values), **values, arguments=arguments)
         for key in ("name", "file", "base"):

@@ -49,6 +49,8 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
     if mounting.tool_offset is not None:
         position, rpy = mounting.tool_offset
         table["tool_offset"] = {"position": position, "rpy": rpy}
+    if mounting.bodies:
+        table["bodies"] = mounting.bodies
     _check_frames(robot)
     if robot.urdf.parts:
         table["parts"] = {part.name: _part(part) for part in robot.urdf.parts}

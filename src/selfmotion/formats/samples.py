@@ -24,6 +24,9 @@ class MotionSamples:
     Attributes
     ----------
     joint_names : tuple of str
+        As files have them: a part of a cell has names of its own.
+    robot_joints : tuple of str
+        What the robot calls them.
     t : (K,)
         From 0 [s], in whole nanoseconds.
     q, qd, qdd : (K, n)
@@ -31,6 +34,7 @@ class MotionSamples:
     """
 
     joint_names: tuple[str, ...]
+    robot_joints: tuple[str, ...]
     t: Array
     q: Array
     qd: Array
@@ -57,7 +61,16 @@ class MotionSamples:
                 )
             t = np.round(motion.sample_times(rate), _DIGITS)
         times = np.clip(motion.t[0] + t, motion.t[0], motion.t[-1])
-        return cls(motion.joint_names, t, *(motion(times, order) for order in (0, 1, 2)))
+        names = motion.joint_names
+        return cls(names, names, t, *(motion(times, order) for order in (0, 1, 2)))
+
+    def of_part(self, part: str) -> "MotionSamples":
+        """Return those of a part of a cell, its joints called as in its own robot."""
+        mine = [k for k, name in enumerate(self.robot_joints) if name.startswith(f"{part}/")]
+        joints = tuple(self.robot_joints[k] for k in mine)
+        names = tuple(name.removeprefix(f"{part}/") for name in joints)
+        orders = (values[:, mine] for values in (self.q, self.qd, self.qdd))
+        return MotionSamples(names, joints, self.t, *orders)
 
 
 class LinearMiss(NamedTuple):
@@ -66,7 +79,8 @@ class LinearMiss(NamedTuple):
     Attributes
     ----------
     position, rotation : float
-        Of the tool, where it is farthest off [m, rad].
+        Of the tool in its reference, or of another frame that follows a path, where it is farthest
+        off [m, rad].
     rate : float
         Samples per second at which it would stay within the plan's tolerance.
     """
@@ -84,7 +98,7 @@ def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
     ProblemError
         The rate is not positive, or gives no two samples.
     """
-    motion, robot = plan.trajectory, plan.robot
+    motion, chains = plan.trajectory, [item.chain for item in plan.problem.follows.items]
     samples = MotionSamples.of(motion, rate)
     spans, tolerance = np.diff(samples.t), plan.tolerance
     misses = np.zeros((len(spans), 2))
@@ -92,8 +106,9 @@ def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
         t = np.minimum(motion.t[0] + samples.t[:-1] + share * spans, motion.t[-1])
         straight = samples.q[:-1] + share * np.diff(samples.q, axis=0)
         for k, (line, exact) in enumerate(zip(straight, motion(t), strict=True)):
-            miss = Task.POSE.miss(robot.pose(exact), robot.pose(line))
-            misses[k] = np.maximum(misses[k], miss)
+            for chain in chains:
+                miss = Task.POSE.miss(chain.place(exact), chain.place(line))
+                misses[k] = np.maximum(misses[k], miss)
     # The miss of a line over a span h is that of a parabola: it grows with h².
     share = (misses / [tolerance.position, tolerance.rotation]).max(axis=1)
     needed = float((np.sqrt(share) / spans).max())

@@ -1,5 +1,7 @@
 """URScript for arms of Universal Robots: a stream of ``servoj`` at a fixed rate."""
 
+from collections.abc import Sequence
+
 from selfmotion.basics import Array, ProblemError
 from selfmotion.robot import RobotModel
 
@@ -10,13 +12,14 @@ _GAIN = 300
 _JOINTS = 6
 
 
-def script(robot: RobotModel, q: Array, rate: float) -> str:
+def script(robot: RobotModel, joints: Sequence[str], q: Array, rate: float) -> str:
     """Return a program that moves to the start and then streams the samples.
 
     Parameters
     ----------
     robot : RobotModel
-        An arm of six revolute joints, in the controller's order: base to wrist.
+    joints : sequence of str
+        Six revolute joints of it, in the controller's order: base to wrist.
     q : (K, 6)
         [rad]
     rate : float
@@ -27,15 +30,15 @@ def script(robot: RobotModel, q: Array, rate: float) -> str:
     ProblemError
         The arm has other joints.
     """
-    slides = [name for name in robot.joint_names if robot.is_prismatic(name)]
-    if robot.dof != _JOINTS or slides:
+    slides = [name for name in joints if robot.is_prismatic(name)]
+    if len(joints) != _JOINTS or slides:
         raise ProblemError(
             f"{robot.name}: URScript is for arms of {_JOINTS} revolute joints, this one has "
-            f"{robot.dof} joints" + (f", of which '{slides[0]}' slides" if slides else "")
+            f"{len(joints)} joints" + (f", of which '{slides[0]}' slides" if slides else "")
         )
     period = repr(1.0 / rate)
     lines = [
-        f"# {robot.name}: {len(q)} setpoints, joints {', '.join(robot.joint_names)} [rad].",
+        f"# {robot.name}: {len(q)} setpoints, joints {', '.join(joints)} [rad].",
         f"# servoj at {rate:g} Hz (t = {period} s), lookahead_time = {_LOOK_AHEAD} s, "
         f"gain = {_GAIN}:",
         f"# the arm follows about {_LOOK_AHEAD} s late, and rounds what is faster than that.",

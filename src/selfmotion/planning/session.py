@@ -515,7 +515,7 @@ class Session:
         t, duration = grid.stage_times, self._still.problem.path.duration
         own, new = (kind.functions(t, duration) for kind in (self._null_motion, motion))
         same = np.linalg.lstsq(new, own)[0]
-        rows = x.reshape(before.null_motion.rows, -1) @ same.T
+        rows = x.reshape(before.null_motion.rows, own.shape[1]) @ same.T
         moved = np.concatenate([z, rows.ravel(), c]), self._on(grid, motion)
         # At once: an interruption finds what belongs together.
         self._x, self._objective, self._null_motion, self._minimum = *moved, motion, None

@@ -100,7 +100,7 @@ def _prescribed(path: Path, task: Task) -> list[str]:
 def _check_redundancy(follows: Follows, is_relaxed: bool) -> None:
     robot, task = follows.robot, follows.items[0].task
     if len(follows.items) > 1:
-        _check_several(follows)
+        _check_several(follows, is_relaxed)
         return
     if not robot.can_follow(task):
         others = _redundant_tasks(robot)
@@ -126,7 +126,7 @@ def _check_redundancy(follows: Follows, is_relaxed: bool) -> None:
         )
 
 
-def _check_several(follows: Follows) -> None:
+def _check_several(follows: Follows, is_relaxed: bool) -> None:
     robot, rows, left = follows.robot, follows.dimension, follows.redundancy
     what = " and ".join(f"'{item.chain.tip_name}'" for item in follows.items)
     for item in follows.items:
@@ -141,10 +141,11 @@ def _check_several(follows: Follows) -> None:
             f"but {robot.dof} joints cannot move them freely in all of these; prescribe fewer "
             f"(Follow(task=))"
         )
-    if left == 0:
+    if left == 0 and not is_relaxed:
         raise RedundancyError(
             f"{robot.name}: {robot.dof} joints and {rows} rows of {what} leave no self-motion; "
-            f"prescribe fewer (Follow(task=)), or take arms with more joints",
+            f"prescribe fewer (Follow(task=)), relax some of the first (relaxations=), or take "
+            f"arms with more joints",
             dof=robot.dof,
             rows=rows,
         )

@@ -94,9 +94,10 @@ class Problem:
         joint position and velocity, and those of acceleration and jerk that the arm's maker
         publishes (`RobotModel.acceleration_limit`).
     relaxations : sequence of Relaxation
-        Rows in which the tool may leave the path, by how much and when; the deviation is optimised
+        Rows in which the tool may leave its path, by how much and when; the deviation is optimised
         along with the self-motion. By default none. A given start is on the path itself, and so
-        are both ends of a closed path and the end of one with conditions there.
+        are both ends of a closed path and the end of one with conditions there. Of several paths
+        the first is relaxed.
     collision : Clearance, optional
         How the arm keeps apart from itself where no constraint says it, and its URDF has bodies: by
         default its links must not overlap. None to leave that out; the verdict then says so.
@@ -150,11 +151,6 @@ class Problem:
         for name, each in SEQUENCES.items():
             object.__setattr__(self, name, as_several(getattr(self, name), name, each))
         check_fit(self.follows, self.relaxations)
-        if self.also and self.relaxations:
-            raise ProblemError(
-                "relaxations: rows of several paths cannot be relaxed; leave them out, or "
-                "prescribe fewer rows (Follow(task=))"
-            )
         if isinstance(self.start, str):
             if self.start != "free":
                 raise ProblemError(f"start is '{self.start}', expected numbers, 'free' or None")

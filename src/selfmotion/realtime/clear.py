@@ -33,14 +33,16 @@ class Surroundings:
 
     def __init__(self, robot: RobotModel, bodies: Sequence[tuple[CollisionModel, float]]) -> None:
         # Models of its own: those of the certificate have obstacles that stand still.
+        exact = [CollisionModel(robot, own.obstacles, own.disabled) for own, _ in bodies]
         self._models = [
-            (ClearanceModel(CollisionModel(robot, own.obstacles, own.disabled), far + LEVEL), far)
-            for own, far in bodies
+            (ClearanceModel(own, far + LEVEL), far)
+            for own, (_, far) in zip(exact, bodies, strict=True)
         ]
-        self._names = [{item.name for item in own.obstacles} for own, _ in bodies]
-        for (model, _), names in zip(self._models, self._names, strict=True):
+        self._names = [{item.name for item in own.obstacles} for own in exact]
+        self._standing = [own.standing for own in exact]
+        for (model, _), standing in zip(self._models, self._standing, strict=True):
             for link, obstacle in model.left_out:
-                if obstacle in names:
+                if obstacle in standing:
                     raise ProblemError(
                         f"{robot.name}: while the arm moves obstacles are their convex hulls, and "
                         f"that of '{obstacle}' always contains '{link}': give its parts as "
@@ -49,7 +51,7 @@ class Surroundings:
         self.blocked, self.message = False, ""
 
     def move(self, obstacles: Mapping[str, SE3]) -> None:
-        """Put obstacles somewhere else: name → pose in world axes."""
+        """Put obstacles somewhere else: name → pose in world axes, or in the frame of its link."""
         known = sorted(set().union(*self._names))
         for name, pose in obstacles.items():
             if name not in known:
@@ -73,8 +75,8 @@ class Surroundings:
         """
         self.blocked, self.message = False, ""
         found = [
-            self._rows(model, far, names, samples, by_q)
-            for (model, far), names in zip(self._models, self._names, strict=True)
+            self._rows(model, far, standing, samples, by_q)
+            for (model, far), standing in zip(self._models, self._standing, strict=True)
         ]
         rows, room = zip(*found, strict=True)
         return np.concatenate(rows), np.concatenate(room)
@@ -83,7 +85,7 @@ class Surroundings:
         self,
         model: ClearanceModel,
         distance: float,
-        names: set[str],
+        standing: frozenset[str],
         samples: Samples,
         by_q: Array,
     ) -> tuple[Array, Array]:
@@ -105,7 +107,7 @@ class Surroundings:
         rows = -(found.slopes[:, None] @ by_q[nodes[found.rows]])[:, 0]
         # From where the arm is, no more can be asked for than to come no nearer. Obstacles that
         # came too near are to be left again, at this speed; links need not.
-        leaving = np.array([LEAVING * (pair[1] in names) for pair in model.pairs])
+        leaving = np.array([LEAVING * (pair[1] in standing) for pair in model.pairs])
         reached = values[0] + times[:, None] * leaving
         room = values - np.minimum(distance + CLEARANCE_MARGIN, reached)
         later = found.rows > 0

@@ -175,7 +175,8 @@ class Replanner:
             The tool's motion, at the time of `t`; another one at each step, if need be. Before it
             begins and after it ends, it rests.
         obstacles : mapping, optional
-            Where obstacles of the `Clearance` are by now: name → pose.
+            Where obstacles of the `Clearance` are by now: name → pose in the world, or in the
+            frame of the link that carries it.
 
         Returns
         -------

@@ -5,7 +5,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array
 from selfmotion.follow import BoundFollow
-from selfmotion.replay import links, scene, shapes
+from selfmotion.replay import links, obstacles, scene, shapes
 from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
 from selfmotion.replay.facts import describe, table
 from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames
@@ -156,9 +156,10 @@ def _plan(
             "tool": payload.array(shown.tool_in_world),
         },
         "clearance": None if motion.clearance is None else _clearance(motion.clearance, payload),
-        "obstacles": {item.name: scene.obstacle_node(root, item) for item in motion.obstacles},
+        "obstacles": {item.name: obstacles.obstacle_node(root, item) for item in motion.obstacles},
+        "riders": obstacles.riders(root, motion.plan.robot, motion.obstacles),
         "commands": [
-            *scene.obstacle_commands(root, motion.obstacles, payload),
+            *obstacles.obstacle_commands(root, motion.plan.robot, motion.obstacles, payload),
             *(
                 command
                 for f, tip in enumerate(motion.tips)

@@ -1,22 +1,18 @@
-"""What stands around the arm: ground, light, camera, obstacles, and the traces of the tool."""
+"""What stands around the arm: ground, light, camera, and the traces of the tool."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import ConvexHull
 
 from selfmotion.basics import Array
-from selfmotion.collision import Box, Capsule, Cylinder, Mesh, Obstacle, Solid, Sphere
 from selfmotion.replay import shapes, three
-from selfmotion.replay.links import Arm, safe
-from selfmotion.replay.meshes import read_meshes
+from selfmotion.replay.links import Arm
 from selfmotion.replay.motion import Curves, KeyFrames
 from selfmotion.replay.payload import Json, Payload
 from selfmotion.replay.shapes import Indices, Surface
 
 _ROOT = "/selfmotion"
-_OBSTACLE = (0.80, 0.62, 0.42)
 _PRESCRIBED = (0.55, 0.57, 0.60)
 # three.js: draw only faces seen from behind.
 _INSIDE = 1
@@ -194,7 +190,7 @@ def trace_commands(
     commands = []
     kept = shapes.distinct(target, 0.5 * radius)
     if len(kept) > 1:
-        drawn = _surface(payload, *shapes.tube(target[kept], 2.2 * radius))
+        drawn = triangles(payload, *shapes.tube(target[kept], 2.2 * radius))
         look = {**three.ghostly(_PRESCRIBED, 0.4), "side": _INSIDE}
         commands.append(three.set_object(f"{root}/prescribed", drawn, look))
     kept = shapes.distinct(shown.tool, 0.5 * radius)
@@ -213,14 +209,14 @@ def _coloured(
     """Return a surface along a curve, coloured by manipulability."""
     colors = shapes.colors_of(curve.manipulability[kept], scale["low"], scale["high"])
     copies = len(surface[0]) // len(kept)
-    return _surface(payload, *surface, np.repeat(colors, copies, axis=0))
+    return triangles(payload, *surface, np.repeat(colors, copies, axis=0))
 
 
 def triad_command(root: str, payload: Payload, shown: Curves, times: Array, length: float) -> Json:
     """Return the command for the tool's axes at the samples nearest to `times` [s]."""
     samples = np.unique(np.abs(shown.t[:, None] - times).argmin(axis=0))
     vertices, faces, colors = shapes.triads(shown.tool[samples], shown.rotation[samples], length)
-    drawn = _surface(payload, vertices, faces, colors)
+    drawn = triangles(payload, vertices, faces, colors)
     return three.set_object(f"{root}/triads", drawn, _painted())
 
 
@@ -228,9 +224,10 @@ def _painted() -> Json:
     return three.material((1.0, 1.0, 1.0), vertexColors=True, roughness=0.8)
 
 
-def _surface(
+def triangles(
     payload: Payload, vertices: Array, faces: Indices, colors: Array | None = None
 ) -> Json:
+    """Return a surface of triangles as geometry, its vertices coloured where colours are given."""
     drawn: Json = {"vertices": payload.array(vertices), "triangles": payload.array(faces, "u4")}
     if colors is not None:
         drawn["colors"] = payload.array(np.round(255 * colors), "u1")
@@ -242,44 +239,3 @@ def ellipsoid_command() -> Json:
     return three.set_object(
         f"{_ROOT}/ellipsoid", three.sphere(1.0), three.ghostly((0.95, 0.55, 0.15), 0.38)
     )
-
-
-def obstacle_node(root: str, obstacle: Obstacle) -> str:
-    """Return the path of the node of an obstacle of the plan at `root`."""
-    return f"{root}/obstacles/{safe(obstacle.name)}"
-
-
-def obstacle_commands(root: str, obstacles: Sequence[Obstacle], payload: Payload) -> list[Json]:
-    """Return the commands that draw the obstacles of the plan at `root`.
-
-    Raises
-    ------
-    RobotError
-        A mesh cannot be read.
-    CollisionError
-        An own shape has no geometry.
-    """
-    look = three.material(_OBSTACLE, opacity=0.85)
-    return [
-        three.set_object(f"{obstacle_node(root, item)}/{k}", geometry, look, matrix)
-        for item in obstacles
-        for k, (geometry, matrix) in enumerate(_obstacle(item, payload))
-    ]
-
-
-def _obstacle(item: Obstacle, payload: Payload) -> list[tuple[Json, Array]]:
-    matrix: Array = item.pose.homogeneous
-    match item:
-        case Box():
-            return [(three.box(item.size), matrix)]
-        case Sphere():
-            return [(three.sphere(item.radius), matrix)]
-        case Cylinder():
-            return [(three.cylinder(item.radius, item.length), three.about_z(matrix))]
-        case Capsule():
-            return [(three.capsule(item.radius, item.length), three.about_z(matrix))]
-        case Mesh():
-            scaled = matrix @ np.diag([item.scale, item.scale, item.scale, 1.0])
-            meshes = read_meshes(str(item.file), item.label)
-            return [(_surface(payload, mesh.vertices, mesh.faces), scaled) for mesh in meshes]
-    return [(_surface(payload, *Solid(item.geometry(), item.label).surface()), matrix)]

@@ -27,7 +27,9 @@ from selfmotion.robot.loading import load_robot as load_robot
 from selfmotion.robot.mesh_files import mesh_digests as mesh_digests
 from selfmotion.robot.model import RobotModel as RobotModel
 from selfmotion.robot.mounting import (
+    CarriedBody as CarriedBody,
     Mounting as Mounting,
+    UrdfShape as UrdfShape,
     mounting_of as mounting_of,
 )
 from selfmotion.robot.named import NAMED_ARMS as NAMED_ARMS, NAMED_PARTS as NAMED_PARTS

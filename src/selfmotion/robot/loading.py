@@ -15,7 +15,7 @@ from selfmotion.robot.building import build_robot
 from selfmotion.robot.composing import composed
 from selfmotion.robot.expansion import expand
 from selfmotion.robot.model import RobotModel
-from selfmotion.robot.mounting import with_base, with_tool_offset
+from selfmotion.robot.mounting import CarriedBody, with_base, with_bodies, with_tool_offset
 from selfmotion.robot.named import NAMED_ARMS, NAMED_PARTS, published, read_named
 from selfmotion.robot.urdf import (
     Urdf,
@@ -36,6 +36,7 @@ def load_robot(
     base: pin.SE3 | npt.ArrayLike | Mapping[str, pin.SE3 | npt.ArrayLike] | None = None,
     on: Mapping[str, str] | None = None,
     tool_offset: pin.SE3 | npt.ArrayLike | None = None,
+    bodies: Sequence[CarriedBody] = (),
     arguments: Mapping[str, str] | None = None,
 ) -> RobotModel:
     """Load an arm, or a cell of several robots.
@@ -63,6 +64,10 @@ def load_robot(
         being its pose there.
     tool_offset : SE3 or (4, 4), optional
         Pose of the frame that follows the path in that of `tool`: a pen in a gripper.
+    bodies : sequence of Obstacle, optional
+        What the arm carries: a torch, a camera. Their poses are, as `tool_offset` is, in the frame
+        of `tool`, or in that of the link that a `frame=` of theirs names. They become links of the
+        arm, without masses; shapes of one's own cannot.
     arguments : dict, optional
         Of a xacro file.
 
@@ -94,6 +99,7 @@ def load_robot(
     if tool is None:
         tool = source.tool or _only_leaf(urdf)
     frames = _tool_frames(tool, urdf)
+    urdf = with_bodies(urdf, frames[0], bodies)
     if tool_offset is not None:
         offset = as_pose(tool_offset, f"{urdf.source}: tool_offset", RobotError)
         urdf, frames[0] = with_tool_offset(urdf, frames[0], offset)

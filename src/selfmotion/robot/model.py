@@ -307,6 +307,17 @@ class RobotModel:
         """
         return solved(self, pose, Task.of(task), seed, random_numbers(rng), attempts)
 
+    def carrier_of(self, link: str) -> tuple[int, pin.SE3]:
+        """Return the joint that moves a link, 0 for none, and the link's place in its frame.
+
+        Raises
+        ------
+        RobotError
+            There is no such link.
+        """
+        frame = self.model.frames[self._frame(link)]
+        return int(frame.parentJoint), pin.SE3(frame.placement)
+
     def link_of(self, frame: int) -> str:
         """Return the link that a piece of `geometry` belongs to, by its frame."""
         return str(self.model.frames[frame].name)

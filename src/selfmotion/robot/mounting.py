@@ -1,4 +1,4 @@
-"""Where an arm stands and what it holds: a placed base and an offset tool, as fixed joints.
+"""Where an arm stands and what it holds: a placed base, an offset tool and bodies, as fixed joints.
 
 They become part of the URDF's text, so that kinematics, bodies, saved plans and replays know of
 them without a word.
@@ -6,16 +6,53 @@ them without a word.
 
 import dataclasses
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import pinocchio as pin
 
-from selfmotion.basics import RobotError
-from selfmotion.robot.urdf import BASE_JOINT, MOUNTING_JOINTS, TOOL_JOINT, Urdf, UrdfJoint
+from selfmotion.basics import RobotError, nearest, shown
+from selfmotion.robot.urdf import BASE_JOINT, BODY_JOINT, TOOL_JOINT, Urdf, UrdfJoint
 
 _BASE_LINK = "placed_base"
+# What carried bodies are drawn in.
+_COLOR = "0.32 0.36 0.42 1"
+
+
+class UrdfShape(NamedTuple):
+    """A shape that a URDF knows.
+
+    Attributes
+    ----------
+    tag : str
+        ``"box"``, ``"sphere"``, ``"cylinder"`` or ``"mesh"``.
+    values : dict
+        Its attributes.
+    height : float
+        Where it is along the z axis of what it is a part of [m].
+    """
+
+    tag: str
+    values: Mapping[str, str]
+    height: float = 0.0
+
+
+@runtime_checkable
+class CarriedBody(Protocol):
+    """What of an obstacle makes a link of it."""
+
+    shape: str
+    name: str
+    pose: pin.SE3
+    frame: str | None
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+
+    def urdf_shapes(self) -> Sequence[UrdfShape]:
+        """Return the shapes that it consists of, the first with all its lengths."""
 
 
 class Mounting(NamedTuple):
@@ -27,11 +64,14 @@ class Mounting(NamedTuple):
         The URDF's own link that the tool frame is fixed to.
     base, tool_offset : tuple of (position (3,), roll-pitch-yaw (3,)) or None
         Pose of the root link in the world, and of the tool frame in that of `tool` [m, rad].
+    bodies : list of dict
+        The bodies that it carries, as files describe obstacles.
     """
 
     tool: str
     base: tuple[list[float], list[float]] | None
     tool_offset: tuple[list[float], list[float]] | None
+    bodies: list[dict[str, Any]]
 
 
 def with_base(urdf: Urdf, pose: pin.SE3) -> Urdf:
@@ -46,31 +86,98 @@ def with_tool_offset(urdf: Urdf, tool: str, pose: pin.SE3) -> tuple[Urdf, str]:
     return _joined(urdf, TOOL_JOINT, tool, frame, frame, pose), frame
 
 
+def with_bodies(urdf: Urdf, tool: str, bodies: Any) -> Urdf:
+    """Return the URDF with bodies as links, each on its frame or else on the link `tool`."""
+    if not isinstance(bodies, list | tuple):
+        bodies = [bodies]
+    for body in bodies:
+        if not isinstance(body, CarriedBody) or isinstance(body, type):
+            raise RobotError(
+                f"{urdf.source}: bodies has {shown(body)}, expected Box, Sphere, Cylinder, Capsule "
+                f"or Mesh"
+            )
+        carrier = tool if body.frame is None else body.frame
+        if carrier not in urdf.links:
+            raise RobotError(
+                f"{urdf.source}: {body.label}: its frame '{carrier}' is no link"
+                f"{nearest(carrier, urdf.links)}; links: {', '.join(urdf.links)}"
+            )
+        shapes = body.urdf_shapes()
+        elements = [
+            _element(kind, body.shape, item) for kind in ("visual", "collision") for item in shapes
+        ]
+        joint = f"{BODY_JOINT}{body.name}"
+        urdf = _joined(urdf, joint, carrier, body.name, body.name, body.pose, elements)
+    return urdf
+
+
+def _element(kind: str, shape: str, item: UrdfShape) -> ElementTree.Element:
+    """Return a ``<visual>`` or ``<collision>`` element, called after the shape it is a part of."""
+    element = ElementTree.Element(kind, name=shape)
+    ElementTree.SubElement(element, "origin", xyz=_text([0.0, 0.0, item.height]), rpy="0 0 0")
+    geometry = ElementTree.SubElement(element, "geometry")
+    ElementTree.SubElement(geometry, item.tag, dict(item.values))
+    if kind == "visual":
+        material = ElementTree.SubElement(element, "material", name="carried_body")
+        ElementTree.SubElement(material, "color", rgba=_COLOR)
+    return element
+
+
 def mounting_of(urdf: Urdf, tool: str) -> Mounting:
-    """Return what `with_base` and `with_tool_offset` added to an arm with that tool frame."""
+    """Return what was added by `with_base`, `with_tool_offset` and `with_bodies`."""
     root = ElementTree.fromstring(urdf.text)
-    found = {}
+    links = {link.get("name"): link for link in root.findall("link")}
+    found: dict[str, tuple[list[float], list[float]]] = {}
+    bodies = []
     for joint in root.findall("joint"):
-        origin = joint.find("origin")
-        if joint.get("name") in MOUNTING_JOINTS and origin is not None:
+        name, origin = joint.get("name", ""), joint.find("origin")
+        if origin is None:
+            continue
+        if name in (BASE_JOINT, TOOL_JOINT) or name.startswith(BODY_JOINT):
             xyz, rpy = ([float(x) for x in origin.get(k, "").split()] for k in ("xyz", "rpy"))
-            found[joint.get("name")] = (xyz, rpy)
+            found[name] = (xyz, rpy)
+        if name.startswith(BODY_JOINT):
+            ends = urdf.joints[name]
+            body = {"name": ends.child, "frame": ends.parent, "position": xyz, "rpy": rpy}
+            bodies.append({**_described(links[ends.child]), **body})
     offset = urdf.joints.get(TOOL_JOINT)
     if offset is None or offset.child != tool:
-        return Mounting(tool, found.get(BASE_JOINT), None)
-    return Mounting(offset.parent, found.get(BASE_JOINT), found.get(TOOL_JOINT))
+        return Mounting(tool, found.get(BASE_JOINT), None, bodies)
+    return Mounting(offset.parent, found.get(BASE_JOINT), found.get(TOOL_JOINT), bodies)
 
 
-def _joined(urdf: Urdf, joint: str, parent: str, child: str, new: str, pose: pin.SE3) -> Urdf:
-    """Return the URDF with a fixed joint and the `new` link at one end of it."""
+def _described(link: ElementTree.Element) -> dict[str, Any]:
+    """Return the shape of a carried body and its lengths, as files describe obstacles."""
+    (first, *_) = link.findall("collision")
+    (geometry,) = first.iterfind("geometry/*")
+    found: dict[str, Any] = {"shape": first.get("name", "")}
+    for key, text in geometry.items():
+        if key == "filename":
+            found["file"] = text
+        else:
+            values = [float(value) for value in text.split()]
+            found[key] = values if key == "size" else values[0]
+    return found
+
+
+def _joined(
+    urdf: Urdf,
+    joint: str,
+    parent: str,
+    child: str,
+    new: str,
+    pose: pin.SE3,
+    elements: Sequence[ElementTree.Element] = (),
+) -> Urdf:
+    """Return the URDF with a fixed joint and the `new` link, of elements, at one end of it."""
     if joint in urdf.joints or new in urdf.links:
         taken = f"joint '{joint}'" if joint in urdf.joints else f"link '{new}'"
+        what = "a body" if joint.startswith(BODY_JOINT) else "the pose of base or tool"
         raise RobotError(
-            f"{urdf.source}: has a {taken}, whose name is needed for the pose of base or tool; "
-            f"rename it"
+            f"{urdf.source}: has a {taken}, whose name is needed for {what}; rename it"
         )
     root = ElementTree.fromstring(urdf.text)
-    ElementTree.SubElement(root, "link", name=new)
+    ElementTree.SubElement(root, "link", name=new).extend(elements)
     root.append(placed(joint, parent, child, pose))
     return dataclasses.replace(
         urdf,

@@ -21,8 +21,9 @@ from selfmotion.robot.link_elements import check_link_elements
 _UNLIMITED = 1e6
 # Elements in each other; URDFs have six.
 _DEEPEST = 100
-# Fixed joints that are ours: where the base stands, and how the tool is held.
-BASE_JOINT, TOOL_JOINT = MOUNTING_JOINTS = ("base_placement", "tool_offset")
+# Fixed joints that are ours: where the base stands, how the tool is held, and before the name of a
+# body that the arm carries.
+BASE_JOINT, TOOL_JOINT, BODY_JOINT = "base_placement", "tool_offset", "carried_body/"
 
 
 @dataclass(frozen=True)
@@ -117,13 +118,19 @@ class Urdf:
         except RobotError:
             return True
 
+    def carrier(self, link: str) -> str:
+        """Return the link that a carried body is fixed to; of other links themselves."""
+        joint = self.joints.get(f"{BODY_JOINT}{link}")
+        return link if joint is None else self.carrier(joint.parent)
+
     def bare_text(self) -> str:
-        """Return the text without base placement and tool offset."""
+        """Return the text without base placement, tool offset and carried bodies."""
         root = ElementTree.fromstring(self.text)
         for joint in root.findall("joint"):
-            if joint.get("name") in MOUNTING_JOINTS:
-                end = "parent" if joint.get("name") == BASE_JOINT else "child"
-                link = getattr(self.joints[joint.get("name", "")], end)
+            name = joint.get("name", "")
+            if name in (BASE_JOINT, TOOL_JOINT) or name.startswith(BODY_JOINT):
+                end = "parent" if name == BASE_JOINT else "child"
+                link = getattr(self.joints[name], end)
                 root.remove(joint)
                 root.remove(next(item for item in root.findall("link") if item.get("name") == link))
         return ElementTree.tostring(root, encoding="unicode")

@@ -40,15 +40,20 @@ def as_pose(pose: Any, what: str = "pose", error: type[Exception] = ProblemError
     Raises
     ------
     error
-        It is something else, not finite, or its rotation is not orthonormal; `what` is what the
-        message calls it.
+        It is something else, not finite, or its rotation is not orthonormal or a mirror; `what` is
+        what the message calls it.
     """
     values = pose.homogeneous if isinstance(pose, pin.SE3) else pose
     matrix = as_numbers(values, what, "an SE3 or a (4, 4) matrix of finite numbers", (4, 4), error)
     rotation = matrix[:3, :3]
     skew = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
-    if not skew < _ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
-        raise error(f"{what}: its rotation is not orthonormal and right-handed (by {skew:.2g})")
+    if not skew < _ROTATION_TOLERANCE:
+        raise error(f"{what}: its rotation is not orthonormal (by {skew:.2g})")
+    if np.linalg.det(rotation) < 0.0:
+        raise error(
+            f"{what}: its rotation is a mirror (determinant -1), expected right-handed axes "
+            f"(determinant 1)"
+        )
     if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
         raise error(f"{what}: its last row is {matrix[3].tolist()}, expected [0, 0, 0, 1]")
     return FixedPose(np.array(rotation), np.array(matrix[:3, 3]))

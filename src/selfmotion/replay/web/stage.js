@@ -87,7 +87,8 @@ class Stage {
       clip: { fps: 1, name: joint.name, tracks: tracks(frames, k, this.content.joints.length) },
     }));
     // What rides on a part moves as the joint that carries it.
-    for (const { root, carrier } of plan.tips.filter((tip) => tip.carrier >= 0)) {
+    const riders = [...plan.tips.filter((tip) => tip.carrier >= 0), ...plan.riders];
+    for (const { root, carrier } of riders) {
       clips.push({ path: root, clip: {
         fps: 1, name: root, tracks: tracks(plan.frames, carrier, this.content.joints.length) } });
     }
