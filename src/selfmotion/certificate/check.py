@@ -91,7 +91,7 @@ def certify(
     singular = smallest_singular_values(follows, trajectory(t))
     damped = () if damping is None else _damped_stretches(damping, t, singular)
     _check(requirements)
-    feeds = tuple(FeedReached(feed) for item in follows.items for feed in item.path.feeds)
+    feeds = tuple(FeedReached(feed, item) for item in follows.items for feed in item.path.feeds)
     wanted = (*arm_limits(robot, requirements), *requirements, *feeds)
     findings = tuple(_judged(item, motion) for item in wanted)
     return Certificate(
