@@ -1,10 +1,10 @@
 """Puts faults into the parts that all else stands on, and counts those that tests catch.
 
 `make mutants`: a sample, by a seed, of the mutants that cosmic-ray's operators make of the rollout,
-the kernels, the objective, the optimiser and the certificate. Each is judged by the tests of its
-part, in a process of its own, the cheapest first, until one fails. Survivors are told with what was
-changed. Those that change no result are listed in data/equivalent_mutants.toml with the reason, and
-are not counted.
+the kernels, the objective, the optimiser, the certificate and the bounds it stands on. Each is
+judged by the tests of its part, in a process of its own, the cheapest first, until one fails.
+Survivors are told with what was changed. Those that change no result are listed in
+data/equivalent_mutants.toml with the reason, and are not counted.
 
 Left out, because every test or none would see them: decorators, annotations, and replacements that
 nobody writes for numbers (bits, shifts, remainders, identity).
@@ -119,6 +119,17 @@ PARTS = (
             "certificate -k 'not default'",
             "constraints/test_torque.py -k 'judged or whole_turns'",
             "whole/test_verdicts.py -k 'not threads'",
+        ),
+    ),
+    Part(
+        "bounds",
+        ("basics/series.py", "robot/chain_series.py", "motion/polynomials.py"),
+        (
+            "path/test_series.py",
+            "motion/test_polynomials.py",
+            "certificate/test_bounds_hold.py",
+            "certificate/test_made_to_deceive.py",
+            "certificate/test_bounding.py",
         ),
     ),
 )
