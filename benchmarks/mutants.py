@@ -67,12 +67,21 @@ OPERATORS = {
 
 
 class Part(NamedTuple):
-    """What is mutated, and the tests that judge it: arguments of pytest, the cheapest first."""
+    """What is mutated, and the tests that judge it: arguments of pytest, the cheapest first.
+
+    Where its `own_first` are quick, the tests of a module come before all others.
+    """
 
     name: str
     files: tuple[str, ...]
     tests: tuple[str, ...]
     compiled: bool = True
+    own_first: bool = False
+
+    def tests_of(self, mutant: Mutant) -> tuple[str, ...]:
+        """Return the tests that judge a mutant, in order."""
+        own = mutant.file.replace("/", "/test_")
+        return (own, *self.tests) if self.own_first and (TESTS / own).is_file() else self.tests
 
 
 PARTS = (
@@ -120,6 +129,7 @@ PARTS = (
             "constraints/test_torque.py -k 'judged or whole_turns'",
             "whole/test_verdicts.py -k 'not threads'",
         ),
+        own_first=True,
     ),
     Part(
         "bounds",
@@ -280,6 +290,7 @@ def main(
                 if fails(one, tests, None, 600.0, log):
                     sys.exit(f"{tests} fails on the code as it is:\n{log.read_text()}")
                 patience[tests] = 10.0 + 5.0 * (time.monotonic() - began)
+            longest = max(patience.values())
             sample, of_all = sample_of(one, count, seed)
             ends = Counter[str]()
             for mutant in sample:
@@ -287,7 +298,10 @@ def main(
                 if reason is not None:
                     ends["equivalent"] += 1
                     continue
-                reasons_to_fail = (fails(one, x, mutant, patience[x], log) for x in one.tests)
+                reasons_to_fail = (
+                    fails(one, x, mutant, patience.get(x, longest), log)
+                    for x in one.tests_of(mutant)
+                )
                 why = next(filter(None, reasons_to_fail), "")
                 ends["caught" if why else "survived"] += 1
                 endless += why == "no end"

@@ -17,6 +17,7 @@ from selfmotion.cli.app import (
     stages,
     terminal,
 )
+from selfmotion.cli.stage_display import StageDisplay
 
 
 @app.command(
@@ -136,30 +137,43 @@ def check(
     """Check a motion by forward kinematics: a saved plan, or one that something else made."""
     judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf
     within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
-    if file.suffix == ".npz":
-        own: dict[str, Any] = {"robot": robot, "path": path, "feed": feed, "corners": corners}
-        own |= {"task": task, "tool": tool, "lock": lock, "degrees": degrees or None}
-        for name, value in own.items():
-            if value:
-                raise sm.ProblemError(f"{file}: --{name} is the plan's own: leave it out")
-        plan = sm.load_plan(file)
-        certificate = plan.certificate
-        if within is not None or any(judged):
-            certificate = plan.check(within, options.requirements(plan.robot, *judged))
-    else:
-        if robot is None or path is None:
-            raise sm.ProblemError(
-                f"{file}: a motion is checked against a robot and a path: give --robot and --path"
+    own: dict[str, Any] = {"path": path, "feed": feed, "corners": corners, "task": task}
+    own |= {"tool": tool, "reference": reference, "lock": lock or None}
+    with StageDisplay(stages) as display:
+        if file.suffix == ".npz":
+            own |= {"robot": robot, "degrees": degrees or None}
+            options.refuse(own, f"{file}:", "the plan's")
+            plan = sm.load_plan(file, progress=display.stage)
+            certificate = plan.certificate
+            if within is not None or any(judged):
+                besides = options.requirements(plan.robot, *judged)
+                certificate = plan.check(within, besides, progress=display.stage)
+        elif robot is not None and Path(robot).suffix in documents.SUFFIXES:
+            options.refuse(own, f"{robot}:", "the problem's")
+            job = sm.read_job(robot)
+            certificate = job.problem.certify(
+                sm.read_motion(file, degrees=degrees),
+                within or job.tolerance,
+                besides=options.requirements(job.problem.robot, *judged),
+                progress=display.stage,
             )
-        arm = sm.load_robot(robot, tool=tool, lock=options.locks(lock or []), reference=reference)
-        certificate = sm.certify(
-            arm,
-            formats.read_path(path, feed=feed, corners=corners or "blend"),
-            task or "pose",
-            sm.read_motion(file, degrees=degrees),
-            within,
-            options.requirements(arm, *judged),
-        )
+        else:
+            if robot is None or path is None:
+                raise sm.ProblemError(
+                    f"{file}: a motion is checked against a robot and a path: give --robot and "
+                    f"--path, or a problem file as --robot"
+                )
+            held = options.locks(lock or [])
+            arm = sm.load_robot(robot, tool=tool, lock=held, reference=reference)
+            certificate = sm.certify(
+                arm,
+                formats.read_path(path, feed=feed, corners=corners or "blend"),
+                task or "pose",
+                sm.read_motion(file, degrees=degrees),
+                within,
+                options.requirements(arm, *judged),
+                progress=display.stage,
+            )
     if as_json:
         terminal.print_json(data=json_tables.certificate_json(certificate))
     else:
