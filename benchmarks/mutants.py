@@ -125,7 +125,8 @@ PARTS = (
         "certificate",
         ("certificate/*.py",),
         (
-            "certificate -k 'not default'",
+            "certificate/test_made_to_deceive.py",
+            "certificate -k 'not default and not deception'",
             "constraints/test_torque.py -k 'judged or whole_turns'",
             "whole/test_verdicts.py -k 'not threads'",
         ),

@@ -101,3 +101,41 @@ def test_a_quintic_that_vanishes_where_it_may_be_looked_at_is_caught() -> None:
         for share in (0.999, 1.001):
             band = sm.Band(coordinate, center, away * share)
             assert band.requirement(robot).judge(motion).kept is (share > 1.0)
+
+
+@pytest.mark.parametrize("name", ["lower", "upper"])
+def test_a_number_between_two_ends_is_kept_up_to_each(name: str) -> None:
+    """What `between` makes of one-dimensional values, slopes and series."""
+    lower, upper = -0.1, 0.3
+    reach = {"lower": lower, "upper": upper}[name]
+    for share, kept in ((0.999, True), (1.001, False)):
+        made = Quantity.between(
+            "sum",
+            lower,
+            upper,
+            lambda q, *_: q[:, 0] + q[:, 1],
+            lambda q, *_: (np.tile([1.0, 1.0, 0.0], (len(q), 1)),),
+            lambda stretch: stretch.chain().joints[0] + stretch.chain().joints[1],
+            "rad",
+        )
+        assert made.bounds.tolist() == [0.2]
+        assert made.middle.tolist() == [pytest.approx(0.1)]
+        assert made.columns == (Column("sum", "sum", "rad"),)
+        motion = swung(share * reach)
+        q, qd, qdd = (motion.trajectory(np.array([0.5]), order) for order in range(3))
+        assert made.values(q, qd, qdd).shape == (1, 1)
+        assert made.derivatives(q, qd, qdd)[0].shape == (1, 1, 3)
+        found = QuantityKept(made).judge(motion)
+        assert found.kept is kept, found.text
+        assert QuantityKept(made).remarks == ()
+    for wrong in ((0.3, -0.1), (np.nan, 1.0), (0.0, np.inf)):
+        with pytest.raises(sm.ProblemError):
+            Quantity.between("sum", *wrong, lambda *_: _[0], lambda *_: ())
+
+
+def swung(to: float) -> sm.FinishedMotion:
+    """A planar arm whose first two joints add up to a number, in between only."""
+    robot = robot_named("planar_3r")
+    t, q, qd = np.array([0.0, 0.5, 1.0]), np.zeros((3, 3)), np.zeros((3, 3))
+    q[1, :2] = [0.25 * to, 0.75 * to]
+    return sm.FinishedMotion(robot, sm.Trajectory(t, q, qd, robot.joint_names, np.zeros((3, 3))))
