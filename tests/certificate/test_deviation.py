@@ -54,6 +54,14 @@ def test_the_deviation_is_that_of_the_poses(task: sm.Task, in_tool_axes: bool) -
         np.testing.assert_allclose(found[k, 3:], turn, atol=1e-9)
 
 
+@pytest.mark.parametrize("task", list(sm.Task))
+def test_turns_of_many_intervals_are_those_one_by_one(task: sm.Task) -> None:
+    rng = np.random.default_rng(3)
+    turns = np.array([rotation(rng) for _ in range(12)])
+    found = rotation_vectors(task, turns.reshape(2, 6, 3, 3))
+    np.testing.assert_array_equal(found.reshape(12, 3), rotation_vectors(task, turns))
+
+
 @pytest.mark.parametrize("task", ["pose", "pointing"])
 def test_half_a_turn_and_none_are_what_they_are(task: str) -> None:
     half = np.diag([1.0, -1.0, -1.0])
