@@ -111,7 +111,7 @@ def test_no_part_of_a_file_is_edited_unseen(plan: sm.Plan, seed: int, tmp_path: 
     document = json.loads(arrays["description"].tobytes())
     if seed % 4:
         leaves = list(_leaves(document))
-        way, old = leaves[rng.integers(len(leaves))] if seed > 1 else (("report", "ending"), "")
+        way, old = leaves[rng.integers(len(leaves))] if seed > 7 else (("report", "ending"), "")
         inside = reduce(lambda table, key: table[key], way[:-1], document)
         others = [1e300, "x", [], {}, None, not old, -1, 0.5]
         inside[way[-1]] = next(x for x in rng.permutation(np.array(others, object)) if x != old)
