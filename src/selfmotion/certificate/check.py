@@ -75,7 +75,7 @@ def certify(
     PathError
         The task prescribes orientations, but the path has none.
     """
-    _check_arguments(robot, path, trajectory)
+    _check_arguments(robot, path, trajectory, ending)
     tolerance, task = Tolerance.of(tolerance), Task.of(task)
     follows = Follows.of(robot, path, task, as_several(also, "also", Follow))
     for item in follows.items:
@@ -117,11 +117,12 @@ def certify(
     )
 
 
-def _check_arguments(robot: RobotModel, path: Path, trajectory: Trajectory) -> None:
+def _check_arguments(robot: RobotModel, path: Path, trajectory: Trajectory, ending: str) -> None:
     for name, value, kind in (
         ("robot", robot, RobotModel),
         ("path", path, Path),
         ("trajectory", trajectory, Trajectory),
+        ("ending", ending, str),
     ):
         if not isinstance(value, kind):
             raise ProblemError(f"certify: {name} is {shown(value)}, expected a {kind.__name__}")

@@ -14,6 +14,7 @@ from selfmotion.basics import (
     PlanError,
     Progress,
     RobotError,
+    SelfmotionError,
     as_path,
     silent,
     write_csv,
@@ -202,8 +203,7 @@ def load_plan(file: str | FilePath, *, progress: Progress = silent) -> Plan:
     except (CollisionError, RobotError) as error:
         unknown = f"it could not be measured anew: {error}"
         certificate = replace(plan.certificate, failures=(unknown, *plan.certificate.failures))
-    # Any number or text of a damaged plan may be any other, and fail anywhere.
-    except Exception as error:
+    except (SelfmotionError, ArithmeticError, ValueError) as error:
         raise FileFormatError(f"{file}: is a damaged plan: {error}") from error
     source = (plan.robot.urdf.source,) if plan.robot.urdf.has_changed() else ()
     for name in (*source, *archive.changed):
