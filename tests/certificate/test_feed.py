@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.certificate.feed import _rounded_down
+from selfmotion.certificate import Stretch
+from selfmotion.certificate.feed import _Along, _rounded_down
 from support.gantries import gantry
 
 
@@ -87,6 +88,30 @@ def test_the_tool_itself_keeps_the_feed(hurry: float, tmp_path: FilePath) -> Non
     assert certificate.verified is (hurry < 0.02), certificate.verdict
     if not certificate.verified:
         assert "kept by the path, but not by 'l3'" in certificate.verdict
+
+
+def test_a_feed_is_proved_where_its_path_has_bounds(tmp_path: FilePath) -> None:
+    class Own(sm.Path):
+        """A line, without saying how large its derivatives are."""
+
+        duration = 10.0
+        knots = np.array([0.0, 10.0])
+
+        def evaluate(self, t: np.ndarray) -> sm.PathSamples:
+            along = np.outer(t, [0.03, 0.0, 0.0])
+            twist = np.tile([0.03, 0.0, 0.0, 0.0, 0.0, 0.0], (len(t), 1))
+            return sm.PathSamples(t, along, np.tile(np.eye(3), (len(t), 1, 1)), twist)
+
+    for path, told in ((sm.Feed(Own(), 0.03), 1), (saddle(0.01), 0)):
+        certificate = followed(path, tmp_path)
+        assert certificate.verified, certificate.verdict
+        assert ["feed" in text for text in certificate.remarks].count(True) == told
+        robot, still = gantry(tmp_path), np.zeros((2, 4))
+        motion = sm.Trajectory([0.0, path.duration], still, still, robot.joint_names)
+        stretch = Stretch(robot, motion, np.array([[0.4, 0.6]]) * path.duration)
+        follow = sm.Follows.of(robot, path, "position").only
+        known = _Along(follow, path.feeds[0]).series(stretch)
+        assert (known is None) is bool(told)
 
 
 def test_an_arm_at_rest_keeps_no_feed(tmp_path: FilePath) -> None:

@@ -62,6 +62,7 @@ def test_a_jump_of_acceleration_breaks_any_limit_of_jerk() -> None:
     assert (found.kept, found.subject, found.time) == (False, motion.robot.joint_names[0], 1.0)
     assert found.amount == pytest.approx(12.0 / (1e-6 * 1e3))
     assert "jumps by 12" in found.text
+    assert (found.allowed, found.of_pace) == (1.0, True)
     assert JointLimits(3, -1e8 * wide, 1e8 * wide).judge(motion).kept
     # A jump just beyond what a limited jerk does in an instant, and just within.
     for share in (1.01, 0.99):

@@ -103,6 +103,17 @@ def test_where_turning_and_moving_hold_in_turn_nothing_is_passed(seed: int) -> N
         assert np.linalg.norm(change[:, part], axis=1).max() <= (1.0 + WITHIN) * most
 
 
+def test_a_straight_line_is_run_through_without_a_dip() -> None:
+    """Two nodes of its pace differ by rounding: between them its slope was 0."""
+    line = sm.Line(pin.SE3.Identity(), pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0])), 10.0)
+    path = sm.Feed(line, 0.03)
+    assert np.diff(path.marks).min() > 1e-6
+    for t in (path.marks, np.arange(0.0, path.duration, 5e-3)):
+        inner = t[(t > 0.2) & (t < path.duration - 0.2)]
+        speeds = np.linalg.norm(path.samples(inner).twist[:, :3], axis=1)
+        np.testing.assert_allclose(speeds, 0.03, rtol=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(40))
 def test_the_tool_rests_where_it_is_asked_to(seed: int) -> None:
     path = at_feed(seed)

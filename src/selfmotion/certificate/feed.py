@@ -37,6 +37,13 @@ class FeedReached(Requirement):
     follow: BoundFollow
     name: str = "feed"
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """See `Requirement.remarks`: whether it is no proof."""
+        path = self.follow.path
+        known = path_series(path, np.array([0.5 * path.duration]), np.array([1e-3 * path.duration]))
+        return () if known else ("feed: judged as measured between marks of the path",)
+
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: the slowest speed where the feed counts."""
         found, allowed = self.found, (1.0 - self.found.within) * self.found.asked
