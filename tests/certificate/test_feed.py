@@ -10,6 +10,7 @@ import selfmotion as sm
 from selfmotion.certificate import Stretch
 from selfmotion.certificate.feed import _Along, _rounded_down
 from support.gantries import gantry
+from support.majorants import check_majorants
 
 
 def saddle(feed: float, **options) -> sm.Feed:
@@ -112,6 +113,17 @@ def test_a_feed_is_proved_where_its_path_has_bounds(tmp_path: FilePath) -> None:
         follow = sm.Follows.of(robot, path, "position").only
         known = _Along(follow, path.feeds[0]).series(stretch)
         assert (known is None) is bool(told)
+
+
+def test_majorants_of_the_speed_along_a_path_are_above_all_derivatives(tmp_path: FilePath) -> None:
+    robot, path, rng = gantry(tmp_path), saddle(0.02), np.random.default_rng(0)
+    t = path.marks[np.append(True, np.diff(path.marks) > 1e-3)]
+    wild = [rng.normal(size=(len(t), 4)) for _ in range(3)]
+    motion = sm.Trajectory(t, *wild[:2], robot.joint_names, wild[2])
+    follow = sm.Follows.of(robot, path, "position").only
+    stretch = Stretch(robot, motion, np.stack([t[:-1], t[1:]], axis=1))
+    alone = np.isin(t[1:], path.marks[1:][np.diff(path.marks) > 1e-3])
+    check_majorants(_Along(follow, path.feeds[0]), stretch.some(np.flatnonzero(alone)))
 
 
 def test_an_arm_at_rest_keeps_no_feed(tmp_path: FilePath) -> None:
