@@ -106,6 +106,8 @@ def test_a_feed_is_proved_where_its_path_has_bounds(tmp_path: FilePath) -> None:
     for path, told in ((sm.Feed(Own(), 0.03), 1), (saddle(0.01), 0)):
         certificate = followed(path, tmp_path)
         assert certificate.verified, certificate.verdict
+        assert len(certificate.notes) == told
+        assert certificate.verdict.count("as measured between its marks") == told
         assert ["feed" in text for text in certificate.remarks].count(True) == told
         robot, still = gantry(tmp_path), np.zeros((2, 4))
         motion = sm.Trajectory([0.0, path.duration], still, still, robot.joint_names)
