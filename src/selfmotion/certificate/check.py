@@ -87,7 +87,7 @@ def certify(
         for k, item in enumerate(follows.items)
     ]
     path_check = checks[0]
-    t = motion.t[:: -(-len(motion.t) // _MOST_POSES)] if damping is None else motion.t
+    t = motion.t[:: 1 + len(motion.t) // _MOST_POSES] if damping is None else motion.t
     singular = smallest_singular_values(follows, trajectory(t))
     damped = () if damping is None else _damped_stretches(damping, t, singular)
     _check(requirements)
