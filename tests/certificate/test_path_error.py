@@ -116,6 +116,22 @@ def test_errors_of_every_row_count(row: int, relaxed: tuple[str, str] | None) ->
     np.testing.assert_allclose(errors, expected, atol=1e-3 * size)
 
 
+@pytest.mark.parametrize("relaxed", [False, True])
+def test_where_any_turn_is_allowed_all_are(relaxed: bool) -> None:
+    """Half a turn and beyond, the tool standing and the path turning: bounds end at half a turn."""
+    robot = robot_named("panda")
+    q = robot.dexterous_configuration("pose")
+    path = sm.Circle.around(robot.pose(q), 0.01, 1.0, turn_tool=True)
+    motion = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
+    bands = [sm.Relaxation("rx", 0.1)] if relaxed else []
+    for tolerance, kept in ((np.pi, True), (3.0, False)):
+        found = sm.certify(
+            robot, path, "pose", motion, sm.Tolerance(1.0, tolerance), relaxations=bands
+        )
+        assert found.on_path is kept
+        assert found.rotation_error.value <= np.pi + 1e-3
+
+
 def test_where_a_path_bends_sharply_a_short_interval_stays_undecided() -> None:
     """Its error peaks at the tolerance in a corner that nothing announces: halved sixteen times."""
     robot = robot_named("planar_3r")

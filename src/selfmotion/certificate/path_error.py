@@ -145,9 +145,10 @@ class _PathErrors(Bounded):
         self._in_tool_axes = any(item.in_tool_axes for item in relaxations)
         self.blocks = np.array([0, 3])
         self.of = np.array([0, 1, *(int(item.angular) for item in relaxations)])
-        rotation = tolerance.rotation
-        if not self._as_vectors:
-            rotation = 2.0 * np.sin(0.5 * min(rotation, np.pi))
+        # No turn is more than half a one.
+        rotation = tolerance.rotation if tolerance.rotation < np.pi else np.inf
+        if rotation < np.pi and not self._as_vectors:
+            rotation = 2.0 * np.sin(0.5 * rotation)
         self.allowed = np.array([tolerance.position, rotation, *(np.inf for _ in relaxations)])
         self.wanted = _FINE * self.allowed[:2]
 
