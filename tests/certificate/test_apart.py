@@ -99,6 +99,8 @@ def test_the_closest_approach_is_found_wherever_it_is(seed: int) -> None:
     assert depth <= found.closest.value <= depth + max(0.021 * depth, 1e-4)
     assert found.names == "first1 - second1"
     assert found.time == pytest.approx(place / 3.0, abs=0.01)
+    at_that_time = depth + min(abs(3.0 * found.time - place), 0.3)
+    assert found.closest.value == pytest.approx(at_that_time, abs=1e-12)
     assert found.open_until is None
     assert bodies.asked < 3000
     for distance, kept in ((0.999 * depth, True), (1.001 * depth, False)):
