@@ -24,6 +24,8 @@ def test_margins_are_those_of_the_nearest_side() -> None:
         assert found.subject == motion.robot.joint_names[joint]
         assert (found.amount, found.allowed) == (pytest.approx(amount), 0.0)
         assert found.kept is (amount >= 0.0)
+        # No pace helps a joint that is where it may not be.
+        assert not found.of_pace
         assert found.time == pytest.approx(time)
         told = f"as near as {amount:.3g} to its" if amount >= 0 else f"is {-amount:.3g} beyond its"
         assert f"{told} limit at t = {time:.3f} s" in found.text

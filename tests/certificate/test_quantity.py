@@ -7,6 +7,7 @@ import selfmotion as sm
 from selfmotion.certificate import Column, Quantity, QuantityKept
 from support.arms import robot_named
 from support.motions import motion_of
+from support.two_arms import baxter_with_both_arms
 
 
 @pytest.mark.parametrize("column", range(4))
@@ -30,6 +31,17 @@ def test_the_tools_rates_are_told_with_the_time_they_take(column: int) -> None:
             found.text
         )
         assert f"give it {longer:.5g} times the duration" in found.text
+
+
+def test_whose_eyes_the_tools_rates_are_seen_with_is_told() -> None:
+    """A limit of what a part sees is none of what stands beside both."""
+    seen = baxter_with_both_arms("right_gripper")
+    requirement = sm.ToolLimits(speed=0.5).requirement(seen)
+    assert requirement.covers == ("tool speed seen from 'right_gripper'",)
+    q = np.tile(seen.dexterous_configuration("pose"), (2, 1))
+    motion = sm.Trajectory([0.0, 1.0], q, 0.0 * q, seen.joint_names)
+    text = requirement.judge(sm.FinishedMotion(seen, motion)).text
+    assert "speed of the tool 'left_gripper' seen from 'right_gripper' is 0 m/s" in text
 
 
 def test_a_band_is_half_its_width_from_its_middle() -> None:
