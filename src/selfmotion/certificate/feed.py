@@ -57,7 +57,7 @@ class FeedReached(Requirement):
                 text = (
                     f"the feed of {found.asked:g} m/s is kept by the path, but not by "
                     f"'{self.follow.chain.tip_name}', which moves along it faster or slower at "
-                    f"t = {time:.3f} s"
+                    f"t = {time:.3f} s: relax no row along the path, or allow it more (within=)"
                 )
                 return Finding(self.name, "path", time, found.slowest, allowed, False, text)
         else:
