@@ -120,6 +120,21 @@ def test_of_long_motions_fewer_poses_are_looked_at_for_singular_ones(
     assert found.smallest_singular_value.time == 0.0
 
 
+def test_long_motions_tell_how_far_their_check_is() -> None:
+    robot, q = robot_named("panda"), robot_named("panda").dexterous_configuration()
+    t = np.linspace(0.0, 10.0, 5001)
+    motion = sm.Trajectory(t, np.tile(q, (5001, 1)), np.zeros((5001, 7)), robot.joint_names)
+    told: list[tuple[str, int, int]] = []
+    problem = sm.Problem(robot, sm.Dwell(robot.pose(q), 10.0), "position")
+    certificate = problem.certify(motion, progress=lambda *given: told.append(given))
+    assert certificate.on_path
+    assert told[:3] == [("checking", k, 3) for k in (1, 2, 3)]
+    told.clear()
+    short = sm.Trajectory([0.0, 10.0], motion.q[:2], motion.qd[:2], robot.joint_names)
+    assert problem.certify(short, progress=lambda *given: told.append(given)).on_path
+    assert not told
+
+
 # Of a few additions of numbers of order 1.
 ROUNDING = 1e-12
 # Errors are interpolated to a ten-thousandth of the tolerance.

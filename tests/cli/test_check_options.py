@@ -114,17 +114,6 @@ def test_a_motion_of_a_cell_is_judged_by_its_problem_file(tmp_path: Path) -> Non
     assert CliRunner().invoke(app, run).exit_code == 1
 
 
-def test_long_motions_tell_how_far_their_check_is(tmp_path: Path) -> None:
-    robot, q = robot_named("panda"), robot_named("panda").dexterous_configuration()
-    t = np.linspace(0.0, 10.0, 5001)
-    motion = sm.Trajectory(t, np.tile(q, (5001, 1)), np.zeros((5001, 7)), robot.joint_names)
-    told: list[tuple[str, int, int]] = []
-    problem = sm.Problem(robot, sm.Dwell(robot.pose(q), 10.0), "position")
-    certificate = problem.certify(motion, progress=lambda *given: told.append(given))
-    assert certificate.on_path
-    assert told[:3] == [("checking", k, 3) for k in (1, 2, 3)]
-
-
 def test_obstacles_are_judged_with_a_plan(plan: Path, tmp_path: Path) -> None:
     at = robot_named("panda").pose(robot_named("panda").dexterous_configuration()).translation
     wall = [{"shape": "box", "name": "wall", "position": at.tolist(), "size": [0.2] * 3}]
