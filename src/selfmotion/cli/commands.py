@@ -8,6 +8,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
+from selfmotion.basics import Progress
 from selfmotion.cli import documents, json_tables, options, outputs, tables
 from selfmotion.cli.app import (
     NOT_VERIFIED,
@@ -141,22 +142,12 @@ def check(
     own |= {"tool": tool, "reference": reference, "lock": lock or None}
     with StageDisplay(stages) as display:
         if file.suffix == ".npz":
-            own |= {"robot": robot, "degrees": degrees or None}
-            options.refuse(own, f"{file}:", "the plan's")
-            plan = sm.load_plan(file, progress=display.stage)
-            certificate = plan.certificate
-            if within is not None or any(judged):
-                besides = options.requirements(plan.robot, *judged)
-                certificate = plan.check(within, besides, progress=display.stage)
+            options.refuse(own | {"robot": robot, "degrees": degrees or None}, file, "the plan's")
+            certificate = _of_plan(file, within, judged, display.stage)
         elif robot is not None and Path(robot).suffix in documents.SUFFIXES:
-            options.refuse(own, f"{robot}:", "the problem's")
-            job = sm.read_job(robot)
-            certificate = job.problem.certify(
-                sm.read_motion(file, degrees=degrees),
-                within or job.tolerance,
-                besides=options.requirements(job.problem.robot, *judged),
-                progress=display.stage,
-            )
+            options.refuse(own, robot, "the problem's")
+            motion = sm.read_motion(file, degrees=degrees)
+            certificate = _of_problem(robot, motion, within, judged, display.stage)
         else:
             if robot is None or path is None:
                 raise sm.ProblemError(
@@ -179,6 +170,30 @@ def check(
     else:
         tables.show_certificate(certificate, terminal)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
+
+
+def _of_plan(
+    file: Path, within: sm.Tolerance | None, judged: tuple[Any, ...], progress: Progress
+) -> sm.Certificate:
+    """Return the certificate of a plan, by what else is asked as well."""
+    plan = sm.load_plan(file, progress=progress)
+    if within is None and not any(judged):
+        return plan.certificate
+    return plan.check(within, options.requirements(plan.robot, *judged), progress=progress)
+
+
+def _of_problem(
+    file: str,
+    motion: sm.Trajectory,
+    within: sm.Tolerance | None,
+    judged: tuple[Any, ...],
+    progress: Progress,
+) -> sm.Certificate:
+    """Return the certificate of a motion by all that a problem file asks, and what else is."""
+    job = sm.read_job(file)
+    besides = options.requirements(job.problem.robot, *judged)
+    within = within or job.tolerance
+    return job.problem.certify(motion, within, besides=besides, progress=progress)
 
 
 @app.command(epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500")

@@ -250,11 +250,11 @@ def locks(texts: list[str]) -> dict[str, float]:
     return held
 
 
-def refuse(given: dict[str, Any], where: str, whose: str) -> None:
+def refuse(given: dict[str, Any], file: Path | str, whose: str) -> None:
     """Raise ProblemError for an option that what is checked says itself."""
     for name, value in given.items():
         if value is not None:
-            raise sm.ProblemError(f"{where} --{name} is {whose} own: leave it out")
+            raise sm.ProblemError(f"{file}: --{name} is {whose} own: leave it out")
 
 
 def requirements(
