@@ -136,8 +136,10 @@ PARTS = (
         "bounds",
         ("basics/series.py", "robot/chain_series.py", "motion/polynomials.py"),
         (
-            "path/test_series.py",
+            "basics/test_series.py",
+            "robot/test_chain_series.py",
             "motion/test_polynomials.py",
+            "path/test_series.py",
             "certificate/test_bounds_hold.py",
             "certificate/test_made_to_deceive.py",
             "certificate/test_bounding.py",

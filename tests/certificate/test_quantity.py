@@ -5,6 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.certificate import Column, Quantity, QuantityKept
+from selfmotion.certificate.bounding import Bounds
 from support.arms import robot_named
 from support.motions import motion_of
 from support.two_arms import baxter_with_both_arms
@@ -151,3 +152,25 @@ def swung(to: float) -> sm.FinishedMotion:
     t, q, qd = np.array([0.0, 0.5, 1.0]), np.zeros((3, 3)), np.zeros((3, 3))
     q[1, :2] = [0.25 * to, 0.75 * to]
     return sm.FinishedMotion(robot, sm.Trajectory(t, q, qd, robot.joint_names, np.zeros((3, 3))))
+
+
+@pytest.mark.parametrize(
+    ("count", "more"), [(1, ""), (2, ", and on 1 more"), (3, ", and on 2 more")]
+)
+def test_what_is_undecided_of_a_quantity_is_told(
+    count: int, more: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where, on how many intervals, and not kept; a limit that is passed is told all the same."""
+    motion, requirement = swung(0.1), QuantityKept(sum_of(True))
+    intervals = tuple((0.25 * k, 0.25 * k + 0.1) for k in range(1, count + 1))
+    for share, told in ((0.9, True), (1.0, True), (1.1, False)):
+        found = Bounds(np.array([share]), np.array([0.5]), intervals, True, 10)
+        monkeypatch.setattr("selfmotion.certificate.quantity.bounded", lambda *_, f=found: f)
+        judged = requirement.judge(motion)
+        assert not judged.kept
+        assert (judged.amount, judged.allowed) == (share, 1.0)
+        words = f"whether sum hold from t = 0.25 to 0.35 s is not decided{more}: no bound"
+        assert (words in judged.text) is told
+        assert judged.time == (0.25 if told else 0.5)
+        if not told:
+            assert "1.1 times its limit of 1 rad" in judged.text
