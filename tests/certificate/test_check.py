@@ -54,7 +54,7 @@ def test_what_is_undecided_is_counted() -> None:
     extreme = sm.Extreme(0.0, 0.0, "tip")
 
     def said(count: int) -> tuple[str, ...]:
-        open_ = ((0.25, 0.5),) * count
+        open_ = tuple((0.25 * k, 0.25 * k + 0.25) for k in range(1, count + 1))
         return _undecided(PathCheck(extreme, extreme, (), open_, True, 1))
 
     assert said(0) == ()
