@@ -132,6 +132,22 @@ def test_where_any_turn_is_allowed_all_are(relaxed: bool) -> None:
         assert found.rotation_error.value <= np.pi + 1e-3
 
 
+@pytest.mark.parametrize("gap", [1e-13, 1e-11, 1e-6])
+def test_between_samples_however_near_the_arm_may_go_anywhere(gap: float) -> None:
+    """A spike of a hundredth at a sample that rounding can hardly tell from those beside it."""
+    robot = robot_named("panda")
+    q = robot.dexterous_configuration("pose")
+    t, spiked = np.array([0.0, 0.5 - gap, 0.5, 0.5 + gap, 1.0]), np.tile(q, (5, 1))
+    spiked[2, 1] += 0.01
+    motion = sm.Trajectory(t, spiked, np.zeros((5, 7)), robot.joint_names)
+    path = sm.Dwell(robot.pose(q), 1.0)
+    found = bound_errors(
+        robot, Follows.of(robot, path, sm.Task.POSE).only, motion, sm.Tolerance(), ()
+    )
+    assert found.position.value > 1e-4
+    assert found.position.time == pytest.approx(0.5, abs=2e-6)
+
+
 def test_where_a_path_bends_sharply_a_short_interval_stays_undecided() -> None:
     """Its error peaks at the tolerance in a corner that nothing announces: halved sixteen times."""
     robot = robot_named("planar_3r")
