@@ -125,7 +125,7 @@ def smooth_between(
     marks = marks[np.append(True, np.diff(marks) > near)]
     # Samples stay however near they are to each other: between two the arm may go anywhere.
     place = np.searchsorted(samples, marks)
-    before, after = samples[np.maximum(place - 1, 0)], samples[np.minimum(place, len(samples) - 1)]
+    before, after = samples[np.maximum(place - 1, 0)], samples[place]
     return np.union1d(samples, marks[np.minimum(marks - before, after - marks) > near])
 
 
