@@ -9,7 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.certificate.path_error import PathCheck, bound_errors
+from selfmotion.certificate.path_error import _FROBENIUS, PathCheck, bound_errors
 from selfmotion.follow import Follows
 from support.arms import robot_named
 
@@ -130,6 +130,11 @@ def test_where_any_turn_is_allowed_all_are(relaxed: bool) -> None:
         )
         assert found.verified is kept, found.verdict
         assert found.rotation_error.value <= np.pi + 1e-3
+
+
+def test_of_all_matrices_the_identity_is_largest_by_frobenius() -> None:
+    """|M|_F ≤ √3 |M| for matrices of three rows: no smaller factor makes a bound of it."""
+    assert np.linalg.norm(np.eye(3)) / np.linalg.norm(np.eye(3), 2) == pytest.approx(_FROBENIUS)
 
 
 @pytest.mark.parametrize("gap", [1e-13, 1e-11, 1e-6])
