@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-generated fuzz-realtime fuzz-files arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -80,6 +80,9 @@ fuzz-cells: $(READY)  ## 200 random cells of two chains, judged by kinematics of
 
 fuzz-certificate: $(READY)  ## 900 motions made to deceive, judged independently; the price of proof
 	$(BIN)/python benchmarks/certificate.py
+
+fuzz-deceptions: $(READY)  ## 2,004 motions made to deceive who reads the source, against an oracle
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/deceptions.py
 
 fuzz-generated: $(READY)  ## 5,000 generated problems: confirmed verdicts and typed errors only
 	$(BIN)/python benchmarks/generated.py

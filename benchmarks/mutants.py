@@ -1,10 +1,10 @@
 """Puts faults into the parts that all else stands on, and counts those that tests catch.
 
 `make mutants`: a sample, by a seed, of the mutants that cosmic-ray's operators make of the rollout,
-the kernels, the objective, the optimiser and the certificate. Each is judged by the tests of its
-part, in a process of its own, the cheapest first, until one fails. Survivors are told with what was
-changed. Those that change no result are listed in data/equivalent_mutants.toml with the reason, and
-are not counted.
+the kernels, the objective, the optimiser, the certificate and the bounds it stands on. Each is
+judged by the tests of its part, in a process of its own, the cheapest first, until one fails.
+Survivors are told with what was changed. Those that change no result are listed in
+data/equivalent_mutants.toml with the reason, and are not counted.
 
 Left out, because every test or none would see them: decorators, annotations, and replacements that
 nobody writes for numbers (bits, shifts, remainders, identity).
@@ -67,12 +67,21 @@ OPERATORS = {
 
 
 class Part(NamedTuple):
-    """What is mutated, and the tests that judge it: arguments of pytest, the cheapest first."""
+    """What is mutated, and the tests that judge it: arguments of pytest, the cheapest first.
+
+    Where its `own_first` are quick, the tests of a module come before all others.
+    """
 
     name: str
     files: tuple[str, ...]
     tests: tuple[str, ...]
     compiled: bool = True
+    own_first: bool = False
+
+    def tests_of(self, mutant: Mutant) -> tuple[str, ...]:
+        """Return the tests that judge a mutant, in order."""
+        own = mutant.file.replace("/", "/test_")
+        return (own, *self.tests) if self.own_first and (TESTS / own).is_file() else self.tests
 
 
 PARTS = (
@@ -116,9 +125,24 @@ PARTS = (
         "certificate",
         ("certificate/*.py",),
         (
-            "certificate -k 'not default'",
+            "certificate/test_made_to_deceive.py",
+            "certificate -k 'not default and not deception'",
             "constraints/test_torque.py -k 'judged or whole_turns'",
             "whole/test_verdicts.py -k 'not threads'",
+        ),
+        own_first=True,
+    ),
+    Part(
+        "bounds",
+        ("basics/series.py", "robot/chain_series.py", "motion/polynomials.py"),
+        (
+            "basics/test_series.py",
+            "robot/test_chain_series.py",
+            "motion/test_polynomials.py",
+            "path/test_series.py",
+            "certificate/test_bounds_hold.py",
+            "certificate/test_made_to_deceive.py",
+            "certificate/test_bounding.py",
         ),
     ),
 )
@@ -269,6 +293,7 @@ def main(
                 if fails(one, tests, None, 600.0, log):
                     sys.exit(f"{tests} fails on the code as it is:\n{log.read_text()}")
                 patience[tests] = 10.0 + 5.0 * (time.monotonic() - began)
+            longest = max(patience.values())
             sample, of_all = sample_of(one, count, seed)
             ends = Counter[str]()
             for mutant in sample:
@@ -276,7 +301,10 @@ def main(
                 if reason is not None:
                     ends["equivalent"] += 1
                     continue
-                reasons_to_fail = (fails(one, x, mutant, patience[x], log) for x in one.tests)
+                reasons_to_fail = (
+                    fails(one, x, mutant, patience.get(x, longest), log)
+                    for x in one.tests_of(mutant)
+                )
                 why = next(filter(None, reasons_to_fail), "")
                 ends["caught" if why else "survived"] += 1
                 endless += why == "no end"

@@ -13,6 +13,7 @@ from selfmotion.certificate.path_error import _PathErrors
 from selfmotion.certificate.quantity import _Shares
 from selfmotion.follow import BoundFollow
 from support.arms import robot_named
+from support.majorants import check_majorants
 from support.two_arms import baxter_with_both_arms
 
 ROUNDING = 1e-9
@@ -119,6 +120,37 @@ def test_bounds_are_never_below_the_truth_nor_far_above(name: str) -> None:
 def _truth(function: Wide, stretch: Stretch) -> Array:
     values = function.values(stretch, DENSE)  # type: ignore[operator]
     return np.asarray(function.sizes(values, stretch).max(axis=1))  # type: ignore[operator]
+
+
+def standing(robot: sm.RobotModel) -> tuple[sm.Trajectory, sm.Path]:
+    """An arm that hardly moves, and a path that turns fast a metre beside it."""
+    q = robot.dexterous_configuration("pose")
+    start = robot.pose(q)
+    start.translation += [0.0, 1.0, 0.0]
+    circle = sm.Circle.around(start, 0.1, 20.0, turns=20.0, turn_tool=True)
+    t, still = np.linspace(0.0, 20.0, 201), np.zeros((201, robot.dof))
+    return sm.Trajectory(t, still + q, still, robot.joint_names, still), circle
+
+
+@pytest.mark.parametrize("axes", ["world", "tool"])
+@pytest.mark.parametrize("angular", [False, True])
+def test_majorants_follow_a_path_that_turns(axes: str, angular: bool) -> None:
+    robot = robot_named("panda")
+    motion, path = standing(robot)
+    rows = [sm.Relaxation("x", 0.1, axes=axes)] + [sm.Relaxation("rz", 0.1)] * angular
+    follow = BoundFollow(robot.chain, path, sm.Task.POSE)
+    stretch = Stretch(robot, motion, np.stack([motion.t[:-1], motion.t[1:]], axis=1))
+    check_majorants(_PathErrors(follow, sm.Tolerance(), rows), stretch)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_majorants_are_above_all_derivatives(name: str) -> None:
+    """What the bound rests on, order by order: sup |∂ᵏf/∂uᵏ| / k! is at most the k-th."""
+    robot, rng = robot_of(name), np.random.default_rng(1 + sum(map(ord, name)))
+    motion = random_motion(robot, rng)
+    ends = motion.t[:-1] + np.diff(motion.t) * (0.1 if name == "swivel" else 1.0)
+    stretch = Stretch(robot, motion, np.stack([motion.t[:-1], ends], axis=1)[::10])
+    check_majorants(kinds(robot, motion)[name], stretch)
 
 
 def test_a_bound_without_its_remainder_is_caught() -> None:

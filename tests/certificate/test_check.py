@@ -9,7 +9,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.certificate import check
 from selfmotion.certificate.check import _because, _damped_stretches, _undecided
+from selfmotion.certificate.deviation import smallest_singular_values
 from selfmotion.certificate.path_error import PathCheck
 from selfmotion.task import DampingLaw
 from support.arms import PANDA_HOME, robot_named
@@ -52,7 +54,7 @@ def test_what_is_undecided_is_counted() -> None:
     extreme = sm.Extreme(0.0, 0.0, "tip")
 
     def said(count: int) -> tuple[str, ...]:
-        open_ = ((0.25, 0.5),) * count
+        open_ = tuple((0.25 * k, 0.25 * k + 0.25) for k in range(1, count + 1))
         return _undecided(PathCheck(extreme, extreme, (), open_, True, 1))
 
     assert said(0) == ()
@@ -97,6 +99,40 @@ def test_a_verdict_names_each_fault_and_what_was_looked_at() -> None:
     assert sm.certify(robot, still, "pose", gone).closure == pytest.approx(0.3)
     ended = sm.certify(robot, still, "pose", motion, ending="it stops here")
     assert ended.failures == ("it stops here",)
+
+
+@pytest.mark.parametrize(("most", "times"), [(1000, 11), (11, 6), (6, 6), (5, 4)])
+def test_of_long_motions_fewer_poses_are_looked_at_for_singular_ones(
+    most: int, times: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two intervals of five times each, and the end: all, each second, each third."""
+    robot, looked = robot_named("panda"), list[int]()
+    motion = sm.Trajectory([0.0, 1.0, 2.0], [PANDA_HOME] * 3, np.zeros((3, 7)), robot.joint_names)
+
+    def counting(follows: sm.Follows, q: Array) -> Array:
+        looked.append(len(q))
+        return smallest_singular_values(follows, q)
+
+    monkeypatch.setattr(check, "_MOST_POSES", most)
+    monkeypatch.setattr(check, "smallest_singular_values", counting)
+    found = sm.certify(robot, sm.Dwell(robot.pose(PANDA_HOME), 2.0), "pose", motion)
+    assert looked == [times]
+    assert found.smallest_singular_value.time == 0.0
+
+
+def test_long_motions_tell_how_far_their_check_is() -> None:
+    robot, q = robot_named("panda"), robot_named("panda").dexterous_configuration()
+    t = np.linspace(0.0, 10.0, 5001)
+    motion = sm.Trajectory(t, np.tile(q, (5001, 1)), np.zeros((5001, 7)), robot.joint_names)
+    told: list[tuple[str, int, int]] = []
+    problem = sm.Problem(robot, sm.Dwell(robot.pose(q), 10.0), "position")
+    certificate = problem.certify(motion, progress=lambda *given: told.append(given))
+    assert certificate.on_path
+    assert told[:3] == [("checking", k, 3) for k in (1, 2, 3)]
+    told.clear()
+    short = sm.Trajectory([0.0, 10.0], motion.q[:2], motion.qd[:2], robot.joint_names)
+    assert problem.certify(short, progress=lambda *given: told.append(given)).on_path
+    assert not told
 
 
 # Of a few additions of numbers of order 1.

@@ -13,9 +13,12 @@ from selfmotion.certificate.deviation import (
     deviation_from,
     deviation_size,
     excess,
+    jacobians,
+    poses,
     rotation_vectors,
 )
 from support.arms import robot_named
+from support.two_arms import baxter_with_both_arms
 
 ROUNDING = 1e-12
 
@@ -52,6 +55,28 @@ def test_the_deviation_is_that_of_the_poses(task: sm.Task, in_tool_axes: bool) -
         elif np.any(task.rows >= 3):
             turn = pin.log3(relative)
         np.testing.assert_allclose(found[k, 3:], turn, atol=1e-9)
+
+
+@pytest.mark.parametrize("reference", [None, "right_gripper"])
+def test_jacobians_are_what_poses_change_by(reference: str | None) -> None:
+    """In the frame of the base, which moves with the other hand."""
+    robot, rng, step = baxter_with_both_arms(reference), np.random.default_rng(0), 1e-6
+    q = robot.dexterous_configuration("pose") + 0.1 * rng.normal(size=robot.dof)
+    found, turns = jacobians(robot.chain, q[None])
+    for joint, unit in enumerate(np.eye(robot.dof)):
+        (ahead, behind), places = poses(robot.chain, q + step * np.outer([1.0, -1.0], unit))
+        moved = (places[0] - places[1]) / (2.0 * step)
+        turned = pin.log3(ahead @ behind.T) / (2.0 * step)
+        np.testing.assert_allclose(found[0, :, joint], [*moved, *turned], atol=1e-8)
+    np.testing.assert_allclose(turns[0], robot.pose(q).rotation, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("task", list(sm.Task))
+def test_turns_of_many_intervals_are_those_one_by_one(task: sm.Task) -> None:
+    rng = np.random.default_rng(3)
+    turns = np.array([rotation(rng) for _ in range(12)])
+    found = rotation_vectors(task, turns.reshape(2, 6, 3, 3))
+    np.testing.assert_array_equal(found.reshape(12, 3), rotation_vectors(task, turns))
 
 
 @pytest.mark.parametrize("task", ["pose", "pointing"])

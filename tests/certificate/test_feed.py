@@ -1,12 +1,16 @@
 """A feed that was asked for is kept, or the motion is not verified."""
 
+from pathlib import Path as FilePath
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import selfmotion as sm
-from selfmotion.certificate.feed import _rounded_down
-from support.arms import robot_named
+from selfmotion.certificate import Stretch
+from selfmotion.certificate.feed import _Along, _rounded_down
+from support.gantries import gantry
+from support.majorants import check_majorants
 
 
 def saddle(feed: float, **options) -> sm.Feed:
@@ -17,12 +21,17 @@ def saddle(feed: float, **options) -> sm.Feed:
     return sm.Feed(sm.Waypoints(a, places), feed, **options)
 
 
-def certified(path: sm.Path) -> sm.Certificate:
-    """A certificate of a motion somewhere else: the feed is a matter of the path."""
-    panda = robot_named("panda")
-    q = panda.dexterous_configuration()
-    rest = sm.Trajectory([0.0, path.duration], [q, q], np.zeros((2, 7)), panda.joint_names)
-    return sm.certify(panda, path, "position", rest, 10.0)
+def followed(path: sm.Path, folder: FilePath, hurry: float = 0.0) -> sm.Certificate:
+    """A certificate of three slides on a path, each second sample faster by a share."""
+    robot = gantry(folder)
+    t = np.unique(np.append(path.marks, np.linspace(0.0, path.duration, 500)))
+    t = np.append(t[:-1][np.diff(t) > 1e-6 * path.duration], path.duration)
+    samples = path.samples(t)
+    still = np.zeros((len(t), 1))
+    factor = 1.0 + hurry * (-1.0) ** np.arange(len(t))[:, None]
+    qd = np.hstack([samples.twist[:, :3] * factor, still])
+    motion = sm.Trajectory(t, np.hstack([samples.translation, still]), qd, robot.joint_names)
+    return sm.certify(robot, path, "position", motion, 10.0)
 
 
 def test_a_feed_of_millimetres_is_refused_at_once() -> None:
@@ -31,11 +40,11 @@ def test_a_feed_of_millimetres_is_refused_at_once() -> None:
 
 
 @pytest.mark.parametrize("feed", [0.005, 0.01, 0.03])
-def test_a_feed_that_is_kept_is_told(feed: float) -> None:
+def test_a_feed_that_is_kept_is_told(feed: float, tmp_path: FilePath) -> None:
     path = saddle(feed)
     (found,) = path.feeds
     assert found.kept
-    certificate = certified(path)
+    certificate = followed(path, tmp_path)
     assert certificate.verified, certificate.verdict
     assert "feed" in certificate.covers
     assert f"the feed of {feed:g} m/s is reached" in certificate.findings[-1].text
@@ -55,10 +64,12 @@ def test_a_feed_that_is_kept_is_told(feed: float) -> None:
         ({"within": 1e-12}, "the"),
     ],
 )
-def test_a_feed_that_is_held_is_not_verified(options: dict, held_by: str) -> None:
+def test_a_feed_that_is_held_is_not_verified(
+    options: dict, held_by: str, tmp_path: FilePath
+) -> None:
     path = saddle(0.03, **options)
     (found,) = path.feeds
-    certificate = certified(path)
+    certificate = followed(path, tmp_path)
     assert not certificate.verified
     assert f"held by {held_by}" in certificate.verdict
     assert found.slowest < (1.0 - found.within) * 0.03
@@ -69,6 +80,61 @@ def test_a_feed_that_is_held_is_not_verified(options: dict, held_by: str) -> Non
         advised = _rounded_down(found.slowest)
         assert f"ask for {advised:g} m/s" in certificate.verdict
         assert saddle(advised, **options).feeds[0].kept
+
+
+@pytest.mark.parametrize("hurry", [0.003, 0.1])
+def test_the_tool_itself_keeps_the_feed(hurry: float, tmp_path: FilePath) -> None:
+    """A path at its feed says nothing of a tool that hurries and lags beside it."""
+    certificate = followed(saddle(0.01), tmp_path, hurry)
+    assert certificate.verified is (hurry < 0.02), certificate.verdict
+    if not certificate.verified:
+        assert "kept by the path, but not by 'l3'" in certificate.verdict
+
+
+def test_a_feed_is_proved_where_its_path_has_bounds(tmp_path: FilePath) -> None:
+    class Own(sm.Path):
+        """A line, without saying how large its derivatives are."""
+
+        duration = 10.0
+        knots = np.array([0.0, 10.0])
+
+        def evaluate(self, t: np.ndarray) -> sm.PathSamples:
+            along = np.outer(t, [0.03, 0.0, 0.0])
+            twist = np.tile([0.03, 0.0, 0.0, 0.0, 0.0, 0.0], (len(t), 1))
+            return sm.PathSamples(t, along, np.tile(np.eye(3), (len(t), 1, 1)), twist)
+
+    for path, told in ((sm.Feed(Own(), 0.03), 1), (saddle(0.01), 0)):
+        certificate = followed(path, tmp_path)
+        assert certificate.verified, certificate.verdict
+        assert len(certificate.notes) == told
+        assert certificate.verdict.count("as measured between its marks") == told
+        assert ["feed" in text for text in certificate.remarks].count(True) == told
+        robot, still = gantry(tmp_path), np.zeros((2, 4))
+        motion = sm.Trajectory([0.0, path.duration], still, still, robot.joint_names)
+        stretch = Stretch(robot, motion, np.array([[0.4, 0.6]]) * path.duration)
+        follow = sm.Follows.of(robot, path, "position").only
+        known = _Along(follow, path.feeds[0]).series(stretch)
+        assert (known is None) is bool(told)
+
+
+def test_majorants_of_the_speed_along_a_path_are_above_all_derivatives(tmp_path: FilePath) -> None:
+    robot, path, rng = gantry(tmp_path), saddle(0.02), np.random.default_rng(0)
+    t = path.marks[np.append(True, np.diff(path.marks) > 1e-3)]
+    wild = [rng.normal(size=(len(t), 4)) for _ in range(3)]
+    motion = sm.Trajectory(t, *wild[:2], robot.joint_names, wild[2])
+    follow = sm.Follows.of(robot, path, "position").only
+    stretch = Stretch(robot, motion, np.stack([t[:-1], t[1:]], axis=1))
+    alone = np.isin(t[1:], path.marks[1:][np.diff(path.marks) > 1e-3])
+    check_majorants(_Along(follow, path.feeds[0]), stretch.some(np.flatnonzero(alone)))
+
+
+def test_an_arm_at_rest_keeps_no_feed(tmp_path: FilePath) -> None:
+    path, robot = saddle(0.01), gantry(tmp_path)
+    q = np.zeros((2, 4))
+    rest = sm.Trajectory([0.0, path.duration], q, q, robot.joint_names)
+    certificate = sm.certify(robot, path, "position", rest, 10.0)
+    assert certificate.on_path
+    assert not certificate.verified
 
 
 def test_a_way_too_short_to_run_up_reaches_no_feed() -> None:

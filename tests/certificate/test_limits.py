@@ -24,8 +24,11 @@ def test_margins_are_those_of_the_nearest_side() -> None:
         assert found.subject == motion.robot.joint_names[joint]
         assert (found.amount, found.allowed) == (pytest.approx(amount), 0.0)
         assert found.kept is (amount >= 0.0)
+        # No pace helps a joint that is where it may not be.
+        assert not found.of_pace
         assert found.time == pytest.approx(time)
-        assert f"is {-amount:.3g} beyond its limit" in found.text
+        told = f"as near as {amount:.3g} to its" if amount >= 0 else f"is {-amount:.3g} beyond its"
+        assert f"{told} limit at t = {time:.3f} s" in found.text
     kept = JointLimits(0, np.array([0.0, 0.0, -1.0]), np.array([1.0, 1.0, 0.0])).judge(motion)
     assert (kept.kept, kept.amount) == (True, pytest.approx(0.0, abs=ROUNDING))
 
@@ -45,7 +48,7 @@ def test_shares_of_rates_say_how_much_longer_it_takes(order: int, longer: float)
     known = ("speeds", "accelerations", "jerks")[order - 1]
     # Not of all joints, so that nothing is said to have been checked.
     assert limits.covers == ()
-    assert limits.remarks == (f"{limits.name}: 1 joints are not limited",)
+    assert limits.remarks == (f"{limits.name}: 1 of 3 joints are not limited",)
     exact = JointLimits(order, np.full(3, -most), np.full(3, most))
     assert exact.covers == (known,)
     assert exact.judge(motion).amount == pytest.approx(1.0)
@@ -62,6 +65,7 @@ def test_a_jump_of_acceleration_breaks_any_limit_of_jerk() -> None:
     assert (found.kept, found.subject, found.time) == (False, motion.robot.joint_names[0], 1.0)
     assert found.amount == pytest.approx(12.0 / (1e-6 * 1e3))
     assert "jumps by 12" in found.text
+    assert (found.allowed, found.of_pace) == (1.0, True)
     assert JointLimits(3, -1e8 * wide, 1e8 * wide).judge(motion).kept
     # A jump just beyond what a limited jerk does in an instant, and just within.
     for share in (1.01, 0.99):

@@ -9,7 +9,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.certificate.path_error import PathCheck, bound_errors
+from selfmotion.certificate.path_error import _FROBENIUS, PathCheck, bound_errors
 from selfmotion.follow import Follows
 from support.arms import robot_named
 
@@ -100,19 +100,57 @@ def test_no_peak_between_the_points_looked_at_is_missed(angular: bool) -> None:
 
 
 @pytest.mark.parametrize("row", range(6))
-def test_errors_of_every_row_count(row: int) -> None:
-    """A tool at rest, and a path that is a constant bit beside it, or turned."""
+@pytest.mark.parametrize("relaxed", [None, ("rx", "world"), ("x", "world"), ("y", "tool")])
+def test_errors_of_every_row_count(row: int, relaxed: tuple[str, str] | None) -> None:
+    """A tool at rest, and a path that is a constant bit beside it, or turned; bands hardly help."""
     robot, size = robot_named("panda"), 1e-4
     q = robot.dexterous_configuration("pose")
     beside = robot.pose(q) * pin.exp6(pin.Motion(size * np.eye(6)[row]))
     path = sm.Waypoints.from_poses([0.0, 1.0], [beside, beside])
     trajectory = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
-    found = bound_errors(
-        robot, Follows.of(robot, path, sm.Task.POSE).only, trajectory, sm.Tolerance(1.0, 1.0), ()
-    )
+    bands = [] if relaxed is None else [sm.Relaxation(relaxed[0], 1e-9, axes=relaxed[1])]
+    follow = Follows.of(robot, path, sm.Task.POSE).only
+    found = bound_errors(robot, follow, trajectory, sm.Tolerance(1.0, 1.0), bands)
     expected = [size, 0.0] if row < 3 else [0.0, size]
     errors = [found.position.value, found.rotation.value]
     np.testing.assert_allclose(errors, expected, atol=1e-3 * size)
+
+
+@pytest.mark.parametrize("relaxed", [False, True])
+def test_where_any_turn_is_allowed_all_are(relaxed: bool) -> None:
+    """Half a turn and beyond, the tool standing and the path turning: bounds end at half a turn."""
+    robot = robot_named("panda")
+    q = robot.dexterous_configuration("pose")
+    path = sm.Circle.around(robot.pose(q), 0.01, 1.0, turn_tool=True)
+    motion = sm.Trajectory([0.0, 1.0], [q, q], np.zeros((2, 7)), robot.joint_names)
+    bands = [sm.Relaxation("rx", 0.1)] if relaxed else []
+    for tolerance, kept in ((np.pi, True), (3.0, False)):
+        found = sm.certify(
+            robot, path, "pose", motion, sm.Tolerance(1.0, tolerance), relaxations=bands
+        )
+        assert found.verified is kept, found.verdict
+        assert found.rotation_error.value <= np.pi + 1e-3
+
+
+def test_of_all_matrices_the_identity_is_largest_by_frobenius() -> None:
+    """|M|_F ≤ √3 |M| for matrices of three rows: no smaller factor makes a bound of it."""
+    assert np.linalg.norm(np.eye(3)) / np.linalg.norm(np.eye(3), 2) == pytest.approx(_FROBENIUS)
+
+
+@pytest.mark.parametrize("gap", [1e-13, 1e-11, 1e-6])
+def test_between_samples_however_near_the_arm_may_go_anywhere(gap: float) -> None:
+    """A spike of a hundredth at a sample that rounding can hardly tell from those beside it."""
+    robot = robot_named("panda")
+    q = robot.dexterous_configuration("pose")
+    t, spiked = np.array([0.0, 0.5 - gap, 0.5, 0.5 + gap, 1.0]), np.tile(q, (5, 1))
+    spiked[2, 1] += 0.01
+    motion = sm.Trajectory(t, spiked, np.zeros((5, 7)), robot.joint_names)
+    path = sm.Dwell(robot.pose(q), 1.0)
+    found = bound_errors(
+        robot, Follows.of(robot, path, sm.Task.POSE).only, motion, sm.Tolerance(), ()
+    )
+    assert found.position.value > 1e-4
+    assert found.position.time == pytest.approx(0.5, abs=2e-6)
 
 
 def test_where_a_path_bends_sharply_a_short_interval_stays_undecided() -> None:

@@ -5,8 +5,10 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.certificate import Column, Quantity, QuantityKept
+from selfmotion.certificate.bounding import Bounds
 from support.arms import robot_named
 from support.motions import motion_of
+from support.two_arms import baxter_with_both_arms
 
 
 @pytest.mark.parametrize("column", range(4))
@@ -32,6 +34,17 @@ def test_the_tools_rates_are_told_with_the_time_they_take(column: int) -> None:
         assert f"give it {longer:.5g} times the duration" in found.text
 
 
+def test_whose_eyes_the_tools_rates_are_seen_with_is_told() -> None:
+    """A limit of what a part sees is none of what stands beside both."""
+    seen = baxter_with_both_arms("right_gripper")
+    requirement = sm.ToolLimits(speed=0.5).requirement(seen)
+    assert requirement.covers == ("tool speed seen from 'right_gripper'",)
+    q = np.tile(seen.dexterous_configuration("pose"), (2, 1))
+    motion = sm.Trajectory([0.0, 1.0], q, 0.0 * q, seen.joint_names)
+    text = requirement.judge(sm.FinishedMotion(seen, motion)).text
+    assert "speed of the tool 'left_gripper' seen from 'right_gripper' is 0 m/s" in text
+
+
 def test_a_band_is_half_its_width_from_its_middle() -> None:
     robot = robot_named("planar_3r")
     name = robot.joint_names[1]
@@ -53,7 +66,7 @@ def test_what_has_no_limit_is_not_covered_and_said() -> None:
     one = np.full(7, np.inf)
     one[2] = 30.0
     some = sm.JointTorqueLimits(one).requirement(robot)
-    assert some.covers == ("torques",)
+    assert some.covers == ("torques of 1 of 7 joints",)
     assert robot.joint_names[2] not in some.remarks[0]
 
 
@@ -101,3 +114,63 @@ def test_a_quintic_that_vanishes_where_it_may_be_looked_at_is_caught() -> None:
         for share in (0.999, 1.001):
             band = sm.Band(coordinate, center, away * share)
             assert band.requirement(robot).judge(motion).kept is (share > 1.0)
+
+
+@pytest.mark.parametrize("name", ["lower", "upper"])
+def test_a_number_between_two_ends_is_kept_up_to_each(name: str) -> None:
+    """What `between` makes of one-dimensional values, slopes and series."""
+    lower, upper = -0.1, 0.3
+    reach = {"lower": lower, "upper": upper}[name]
+    for share, kept in ((0.999, True), (1.001, False)):
+        made = Quantity.between(
+            "sum",
+            lower,
+            upper,
+            lambda q, *_: q[:, 0] + q[:, 1],
+            lambda q, *_: (np.tile([1.0, 1.0, 0.0], (len(q), 1)),),
+            lambda stretch: stretch.chain().joints[0] + stretch.chain().joints[1],
+            "rad",
+        )
+        assert made.bounds.tolist() == [0.2]
+        assert made.middle.tolist() == [pytest.approx(0.1)]
+        assert made.columns == (Column("sum", "sum", "rad"),)
+        motion = swung(share * reach)
+        q, qd, qdd = (motion.trajectory(np.array([0.5]), order) for order in range(3))
+        assert made.values(q, qd, qdd).shape == (1, 1)
+        assert made.derivatives(q, qd, qdd)[0].shape == (1, 1, 3)
+        found = QuantityKept(made).judge(motion)
+        assert found.kept is kept, found.text
+        assert QuantityKept(made).remarks == ()
+    for wrong in ((0.3, -0.1), (np.nan, 1.0), (0.0, np.inf)):
+        with pytest.raises(sm.ProblemError):
+            Quantity.between("sum", *wrong, lambda *_: _[0], lambda *_: ())
+
+
+def swung(to: float) -> sm.FinishedMotion:
+    """A planar arm whose first two joints add up to a number, in between only."""
+    robot = robot_named("planar_3r")
+    t, q, qd = np.array([0.0, 0.5, 1.0]), np.zeros((3, 3)), np.zeros((3, 3))
+    q[1, :2] = [0.25 * to, 0.75 * to]
+    return sm.FinishedMotion(robot, sm.Trajectory(t, q, qd, robot.joint_names, np.zeros((3, 3))))
+
+
+@pytest.mark.parametrize(
+    ("count", "more"), [(1, ""), (2, ", and on 1 more"), (3, ", and on 2 more")]
+)
+def test_what_is_undecided_of_a_quantity_is_told(
+    count: int, more: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where, on how many intervals, and not kept; a limit that is passed is told all the same."""
+    motion, requirement = swung(0.1), QuantityKept(sum_of(True))
+    intervals = tuple((0.25 * k, 0.25 * k + 0.1) for k in range(1, count + 1))
+    for share, told in ((0.9, True), (1.0, True), (1.1, False)):
+        found = Bounds(np.array([share]), np.array([0.5]), intervals, True, 10)
+        monkeypatch.setattr("selfmotion.certificate.quantity.bounded", lambda *_, f=found: f)
+        judged = requirement.judge(motion)
+        assert not judged.kept
+        assert (judged.amount, judged.allowed) == (share, 1.0)
+        words = f"whether sum hold from t = 0.25 to 0.35 s is not decided{more}: no bound"
+        assert (words in judged.text) is told
+        assert judged.time == (0.25 if told else 0.5)
+        if not told:
+            assert "1.1 times its limit of 1 rad" in judged.text

@@ -1,5 +1,6 @@
 """`check` answers each of its options for plans, too, or refuses it."""
 
+import inspect
 import json
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 import selfmotion as sm
-from selfmotion.cli import app
+from selfmotion.cli import app, commands
 from support.arms import robot_named
 from support.shell import complaint
 
@@ -32,6 +33,8 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ["--task", "pose"],
         ["--corners", "stop"],
         ["--tool", "x"],
+        ["--reference", "x"],
+        ["--feed", "0"],
         ["--lock", "a=1"],
         ["--degrees"],
     ],
@@ -55,6 +58,60 @@ def test_what_is_asked_is_judged(plan: Path, options: list[str], words: str) -> 
     found = CliRunner().invoke(app, ["check", str(plan), *options])
     assert found.exit_code == (1 if words else 0), found.output
     assert words in found.output.replace("\n", " ")
+
+
+def test_no_option_is_left_without_an_effect(plan: Path) -> None:
+    """Each is refused, or judged; --json and help change what is printed."""
+    (command,) = (item for item in app.registered_commands if item.callback is commands.check)
+    names = set(inspect.signature(command.callback).parameters) - {"file", "as_json"}
+    refused = {"robot", "path", "feed", "corners", "task", "tool", "reference", "lock", "degrees"}
+    judged = {"velocity", "acceleration", "joint_limits", "obstacles", "clearance", "srdf"}
+    assert names == refused | judged | {"tolerance"}
+
+
+CELL = """
+task = "position"
+start = "dexterous"
+
+[robot]
+tool = "arm/panda_hand_tcp"
+reference = "table/plate"
+
+[robot.parts.arm]
+name = "panda"
+
+[robot.parts.table]
+name = "positioner"
+base = { position = [0.6, 0.0, 0.0] }
+
+[path]
+kind = "circle"
+radius = 0.05
+duration = 4
+
+[[constraints]]
+kind = "Tilt"
+frame = "arm/panda_link4"
+within = 3.1
+"""
+
+
+def test_a_motion_of_a_cell_is_judged_by_its_problem_file(tmp_path: Path) -> None:
+    file = tmp_path / "cell.toml"
+    file.write_text(
+        CELL + "towards = [0, 0, 1]\n" + "[tolerance]\nposition = 1e-3\nrotation = 1e-3\n"
+    )
+    problem = sm.read_problem(file)
+    sm.plan(problem, max_evaluations=5).to_csv(tmp_path / "motion.csv")
+    run = ["check", str(tmp_path / "motion.csv"), "--robot", str(file)]
+    found = CliRunner().invoke(app, run)
+    assert found.exit_code == 0, found.output
+    assert "tilt" in found.output
+    assert CliRunner().invoke(app, [*run, "--velocity", "0.001"]).exit_code == 1
+    assert "--task is the problem's own" in complaint(*run, "--task", "pose")
+    strict = file.read_text().replace("within = 3.1", "within = 0.01")
+    file.write_text(strict)
+    assert CliRunner().invoke(app, run).exit_code == 1
 
 
 def test_obstacles_are_judged_with_a_plan(plan: Path, tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from selfmotion.collision import (
     Mesh,
     Sphere,
 )
+from selfmotion.collision.distances import TOLERANCE
 from selfmotion.robot import NAMED_ARMS, load_robot
 
 TURNED = pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.3, 0.8), np.array([0.5, -0.4, 0.6]))
@@ -75,6 +76,25 @@ def test_gradient_is_the_central_difference(models) -> None:
     assert (gradient != 0.0).any(axis=2).mean() > 0.1
     # Where the closest points jump within the step there is no derivative to agree with.
     assert wrong.any(axis=2).mean() < 2e-3
+
+
+@pytest.mark.parametrize("obstacle", WORLD, ids=lambda item: item.shape)
+def test_slopes_are_as_near_as_gjk_comes_to_the_bodies(obstacle) -> None:
+    """Exact of flat faces and of what is rounded by a radius; of a cylinder's side, √ tolerance."""
+    exact = CollisionModel(load_robot("ur5"), [obstacle])
+    model = ClearanceModel(exact, 10.0, 0.5)
+    near = np.array([second == obstacle.name for _, second in model.pairs])
+    q, step, levers = samples(model.robot, 10), 3e-5, exact.pair_levers.max()
+    found = model.clearances(q)
+    apart = (found.values > 2e-3) & near
+    wrong = np.zeros(apart.shape)
+    for joint, unit in enumerate(np.eye(model.robot.dof)):
+        ahead, behind = (model.clearances(q + side * step * unit).values for side in (1.0, -1.0))
+        off = (ahead - behind) / (2.0 * step) - found.jacobian()[:, :, joint]
+        wrong = np.maximum(wrong, np.abs(off))
+    of_gjk = 3.0 * TOLERANCE**0.5 * levers
+    assert wrong[apart].max() <= (of_gjk if obstacle.shape == "cylinder" else 1e-5)
+    assert np.median(wrong[apart]) <= (of_gjk if obstacle.shape == "cylinder" else 1e-9)
 
 
 def test_clearances_level_off_smoothly_and_from_below() -> None:

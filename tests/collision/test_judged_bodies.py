@@ -130,7 +130,7 @@ def test_what_has_no_limit_is_not_kept(tmp_path: Path) -> None:
     assert not {"speeds", "torques"} & set(found.covers)
     assert "speeds" in found.not_checked
     assert re.search(r"not limited: torque of joint 'j1'", " ".join(found.remarks))
-    assert "joint velocity limits: 4 joints are not limited" in found.remarks
+    assert "joint velocity limits: 4 of 4 joints are not limited" in found.remarks
 
 
 def test_nobody_moves_what_was_judged() -> None:

@@ -1,5 +1,7 @@
 """What is wrong with a problem file is said in one line, with file, key and what was expected."""
 
+import inspect
+import re
 from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
@@ -10,6 +12,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.formats import job_of, read_document
+from selfmotion.formats.documents import ANGLES, LENGTHS
+from selfmotion.robot import Coordinate
 from support.cells import CELL, written
 from support.shell import complaint
 
@@ -63,6 +67,31 @@ MALFORMED = [
     ("band_deg = 5", "band_mm = 5\nduring = [3, 1]", "relaxations[0]: relaxation (rx, ry): during"),
     ("position = 1e-5", "position = -1", "tolerance: "),
 ]  # fmt: skip
+
+
+KINDS = {
+    f"{family.__name__}-{name}": kind
+    for family in (sm.Constraint, sm.Cost, Coordinate)
+    for name, kind in family.kinds().items()
+}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_what_is_an_angle_or_a_length_may_be_in_degrees_or_millimetres(name: str) -> None:
+    """By what the docstring says of each parameter that is one number."""
+    text = inspect.getdoc(KINDS[name]) or ""
+    for block in re.findall(r"^(\w+(?:, \w+)*) : float.*\n((?:    .*\n?)+)", text, re.MULTILINE):
+        units = set(re.findall(r"\[(rad|m|rad or m)\]", block[1]))
+        for parameter in block[0].split(", "):
+            assert parameter in ANGLES or not units & {"rad", "rad or m"}, parameter
+            assert parameter in LENGTHS | {"margin"} or not units & {"m", "rad or m"}, parameter
+
+
+def test_a_tilt_in_degrees_is_the_one_in_radians(tmp_path: Path) -> None:
+    tilt = '[[constraints]]\nkind = "Tilt"\nframe = "panda_link4"\n'
+    for key, value in (("within_deg", 170.0), ("within", float(np.radians(170.0)))):
+        problem = sm.read_problem(written(tmp_path, f"{CELL}\n{tilt}{key} = {value!r}\n"))
+        assert problem.constraints[-1].within == pytest.approx(np.radians(170.0), rel=1e-15)
 
 
 @pytest.mark.parametrize("case", MALFORMED, ids=lambda case: case[2][:40])

@@ -153,6 +153,35 @@ def test_xacro_files_are_expanded(tmp_path: Path) -> None:
         sm.read_problem(tmp_path / "cell.toml")
 
 
+def test_arguments_of_a_cell_are_those_of_each_part(tmp_path: Path) -> None:
+    """They change the arm, so that a file that dropped them would name another one."""
+    file = written(tmp_path, XACRO, "arm.xacro")
+    parts = {"left": file, "right": file, "hand": "panda"}
+    base = {"right": pin.SE3(np.eye(3), np.array([0.0, 5.0, 0.0]))}
+    given = {"left": {"long": 2}, "right": {"long": 3}}
+    robot = sm.load_robot(parts, "left/tool", base=base, arguments=given)
+    other = sm.load_robot(parts, "right/tool", base=base, arguments=given)
+    assert robot.pose(np.zeros(3)).translation[0] == pytest.approx(7.0)
+    assert other.pose(np.zeros(3)).translation[0] == pytest.approx(10.0)
+    start = np.array([0.1, 0.5, 0.5])
+    line = sm.Line(robot.pose(start), robot.pose(start + 0.01), 2.0)
+    sm.write_problem(sm.Problem(robot, line, "planar", start), tmp_path / "cell.toml")
+    read = sm.read_problem(tmp_path / "cell.toml").robot
+    np.testing.assert_array_equal(read.pose(start).homogeneous, robot.pose(start).homogeneous)
+    for wrong, said in (
+        ({"long": 2}, "arguments: 'long' is 2, expected a dict for each part"),
+        ({"lft": {"long": 2}}, "nearest: 'left'"),
+        ({"hand": {"long": 2}}, "panda: arguments are given, which only a .xacro file has"),
+    ):
+        with pytest.raises(sm.RobotError, match=said):
+            sm.load_robot(parts, "left/tool", arguments=wrong)
+    with pytest.raises(sm.RobotError, match="arguments are given, which only"):
+        sm.load_robot("panda", arguments={"long": 2})
+    written(tmp_path, XACRO.replace("-3", "-2"), "arm.xacro")
+    with pytest.raises(sm.ProblemError, match="files of its parts have changed"):
+        sm.write_problem(sm.Problem(robot, line, "planar", start), tmp_path / "cell.toml")
+
+
 def test_code_of_the_user_is_loaded_only_where_allowed(tmp_path: Path) -> None:
     code = """
     from dataclasses import dataclass

@@ -1,6 +1,7 @@
 """Roots of polynomials of all degrees."""
 
 import numpy as np
+import pytest
 
 from selfmotion.motion.polynomials import evaluated, inner_roots, may_vanish
 
@@ -39,3 +40,17 @@ def test_polynomials_that_may_vanish_are_all_found() -> None:
         # Far from zero nothing is looked for.
         coefficients[0] += 100.0
         assert not may_vanish(coefficients).any()
+
+
+@pytest.mark.parametrize("away", [1e-9, 5e-4, 0.3])
+def test_roots_beside_the_interval_are_none_of_it(away: float) -> None:
+    """Before 0, at the ends, and after 1: an extreme there is none of the motion."""
+    places = np.array([-away, 0.0, 0.5, 1.0, 1.0 + away])
+    lines = np.stack([-places, np.ones(5)])
+    np.testing.assert_allclose(inner_roots(lines), [[0.0, 0.0, 0.5, 0.0, 0.0]])
+    # The same of parabolas, the other root of which is inside; ends are a matter of rounding.
+    places = places[[0, 2, 4]]
+    parabolas = np.stack([0.25 * places, -(0.25 + places), np.ones(3)])
+    found = np.sort(inner_roots(parabolas), axis=0)
+    np.testing.assert_allclose(found[0], 0.25 * (places == 0.5), atol=1e-12)
+    np.testing.assert_allclose(found[1], np.where(places == 0.5, 0.5, 0.25), atol=1e-12)

@@ -72,6 +72,48 @@ def test_the_feed_is_kept_where_limits_allow_and_nowhere_passed(seed: int) -> No
     testing.check_path(path)
 
 
+# Numbers of paths on which equal steps passed a limit by up to 160 %.
+@pytest.mark.parametrize("seed", [29, 124, 134, 145, 152, 245, 342, 600, 817, 843, 857, 876])
+def test_where_turning_and_moving_hold_in_turn_nothing_is_passed(seed: int) -> None:
+    """Short legs with large turns: the turn rate holds here, the feed there, and the tool dips."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(3, 9))
+    points = np.cumsum(rng.normal(scale=0.08, size=(count, 3)), axis=0)
+    turns = rng.normal([1.0, 0.0, 0.0, 0.0], 0.2, (count, 4))
+    rounded = sm.Polyline(
+        points,
+        turns,
+        tolerance=10.0 ** rng.uniform(-5.0, -2.0),
+        turn_tolerance=10.0 ** rng.uniform(-4.0, -1.0),
+    )
+    limits = {
+        "turn_rate": 10.0 ** rng.uniform(-1.0, 1.0),
+        "acceleration": 10.0 ** rng.uniform(-1.0, 1.0),
+        "turn_acceleration": 10.0 ** rng.uniform(-0.5, 1.5),
+    }
+    path = sm.Feed(rounded, 10.0 ** rng.uniform(-2.0, 0.0), **limits)
+    t = np.linspace(0.0, path.duration, 20_001)
+    twist = path.samples(t).twist
+    change = np.diff(twist, axis=0) / t[1]
+    for part, rate, most in (
+        (slice(3), path.feed, limits["acceleration"]),
+        (slice(3, 6), limits["turn_rate"], limits["turn_acceleration"]),
+    ):
+        assert np.linalg.norm(twist[:, part], axis=1).max() <= (1.0 + WITHIN) * rate
+        assert np.linalg.norm(change[:, part], axis=1).max() <= (1.0 + WITHIN) * most
+
+
+def test_a_straight_line_is_run_through_without_a_dip() -> None:
+    """Two nodes of its pace differ by rounding: between them its slope was 0."""
+    line = sm.Line(pin.SE3.Identity(), pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0])), 10.0)
+    path = sm.Feed(line, 0.03)
+    assert np.diff(path.marks).min() > 1e-6
+    for t in (path.marks, np.arange(0.0, path.duration, 5e-3)):
+        inner = t[(t > 0.2) & (t < path.duration - 0.2)]
+        speeds = np.linalg.norm(path.samples(inner).twist[:, :3], axis=1)
+        np.testing.assert_allclose(speeds, 0.03, rtol=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(40))
 def test_the_tool_rests_where_it_is_asked_to(seed: int) -> None:
     path = at_feed(seed)

@@ -13,8 +13,9 @@ from support.shell import invoke
 AGREEMENT = 1e-4
 
 
-# x = 0, the plan's null motion, both on a finer grid, and what remains; nothing to search for.
-FEW = 5
+# x = 0, the same and the plan's motion on nodes, a step on each of two grids, and the finer grid's
+# beginning; nothing to search for.
+FEW = 6
 
 
 @pytest.fixture(scope="module")

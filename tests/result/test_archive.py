@@ -1,7 +1,11 @@
 """Plans come back from files without loss, or are refused by name."""
 
 import dataclasses
+import json
+from collections.abc import Iterator
+from functools import reduce
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,3 +90,41 @@ def test_files_that_are_no_plans_are_named(plan: sm.Plan, tmp_path: Path) -> Non
     files.write_archive(tmp_path / "empty.npz", {}, {})
     with pytest.raises(sm.FileFormatError, match="has no format number"):
         sm.load_plan(tmp_path / "empty.npz")
+
+
+def _leaves(value: Any, way: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], Any]]:
+    items = value.items() if isinstance(value, dict) else enumerate(value)
+    for key, inner in items:
+        if isinstance(inner, dict | list):
+            yield from _leaves(inner, (*way, key))
+        else:
+            yield (*way, key), inner
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_no_part_of_a_file_is_edited_unseen(plan: sm.Plan, seed: int, tmp_path: Path) -> None:
+    """Any number, text or array: never verified, or refused by the name of the file."""
+    rng, file = np.random.default_rng(seed), tmp_path / "plan.npz"
+    plan.save(file)
+    with np.load(file) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    document = json.loads(arrays["description"].tobytes())
+    if seed % 4:
+        leaves = list(_leaves(document))
+        way, old = leaves[rng.integers(len(leaves))] if seed > 7 else (("report", "ending"), "")
+        inside = reduce(lambda table, key: table[key], way[:-1], document)
+        others = [1e300, "x", [], {}, None, not old, -1, 0.5]
+        inside[way[-1]] = next(x for x in rng.permutation(np.array(others, object)) if x != old)
+        arrays["description"] = np.frombuffer(json.dumps(document).encode(), np.uint8)
+    else:
+        name = str(rng.choice([name for name in arrays if arrays[name].size > 1]))
+        arrays[name] = [arrays[name] + 1, arrays[name][:-1]][seed // 4 % 2]
+    np.savez(file, **arrays)
+    try:
+        # What is too large for numbers overflows, and is seen to.
+        with np.errstate(all="ignore"):
+            assert not sm.load_plan(file).certificate.verdict.startswith("verified")
+        told = str(file)
+    except sm.FileFormatError as error:
+        told = str(error)
+    assert told.startswith(str(file))

@@ -17,7 +17,7 @@ from selfmotion.collision import Closest, CollisionModel, Obstacle, srdf_line
 from selfmotion.motion import Trajectory
 
 # Intervals to begin with; each is halved so often before it counts as undecided.
-_FIRST, _DEPTH = 16, 26
+_FIRST, _DEPTH = 16, 40
 # More intervals than this at once are not looked at: what is left is undecided.
 _MOST = 200_000
 # Hulls will do where some halvings more settle a pair with them; meshes are slow.

@@ -65,7 +65,9 @@ class Stretch:
 
     def times(self, u: Array) -> Array:
         """Return the times of places u (P,) of each interval, -1 to 1, (I, P)."""
-        return self.middle[:, None] + self.half[:, None] * u
+        inner = self.middle[:, None] + self.half[:, None] * u
+        # By rounding the last one may be after the end.
+        return np.clip(inner, self.intervals[:, :1], self.intervals[:, 1:])
 
     def motion(self, u: Array, order: int = 0) -> Array:
         """Return q (`order` 0), q̇, q̈ or the jerk at places u (P,) of all intervals, (I · P, n)."""

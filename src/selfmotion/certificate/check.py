@@ -75,7 +75,7 @@ def certify(
     PathError
         The task prescribes orientations, but the path has none.
     """
-    _check_arguments(robot, path, trajectory)
+    _check_arguments(robot, path, trajectory, ending)
     tolerance, task = Tolerance.of(tolerance), Task.of(task)
     follows = Follows.of(robot, path, task, as_several(also, "also", Follow))
     for item in follows.items:
@@ -87,11 +87,11 @@ def certify(
         for k, item in enumerate(follows.items)
     ]
     path_check = checks[0]
-    t = motion.t[:: -(-len(motion.t) // _MOST_POSES)] if damping is None else motion.t
+    t = motion.t[:: 1 + len(motion.t) // _MOST_POSES] if damping is None else motion.t
     singular = smallest_singular_values(follows, trajectory(t))
     damped = () if damping is None else _damped_stretches(damping, t, singular)
     _check(requirements)
-    feeds = tuple(FeedReached(feed) for item in follows.items for feed in item.path.feeds)
+    feeds = tuple(FeedReached(feed, item) for item in follows.items for feed in item.path.feeds)
     wanted = (*arm_limits(robot, requirements), *requirements, *feeds)
     findings = tuple(_judged(item, motion) for item in wanted)
     return Certificate(
@@ -117,11 +117,12 @@ def certify(
     )
 
 
-def _check_arguments(robot: RobotModel, path: Path, trajectory: Trajectory) -> None:
+def _check_arguments(robot: RobotModel, path: Path, trajectory: Trajectory, ending: str) -> None:
     for name, value, kind in (
         ("robot", robot, RobotModel),
         ("path", path, Path),
         ("trajectory", trajectory, Trajectory),
+        ("ending", ending, str),
     ):
         if not isinstance(value, kind):
             raise ProblemError(f"certify: {name} is {shown(value)}, expected a {kind.__name__}")

@@ -35,13 +35,13 @@ def smallest_singular_values(follows: Follows, q: Array) -> Array:
     """Return the smallest singular value of all prescribed rows at q (K, n), (K,)."""
     rows = []
     for item in follows.items:
-        jacobian, rotation = _jacobians(item.chain, q)
+        jacobian, rotation = jacobians(item.chain, q)
         rows.append(item.task.select_along(jacobian, rotation))
     values = np.linalg.svd(np.concatenate(rows, axis=1), compute_uv=False)
     return values[:, -1].astype(np.float64)
 
 
-def _jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
+def jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
     """Return Jacobians (K, 6, n) of the tip and its orientations, in the base's axes."""
     model, data, tip, base = chain.model, chain.model.createData(), chain.tip, chain.base
     jacobian, rotation = np.empty((len(q), 6, model.nv)), np.empty((len(q), 3, 3))

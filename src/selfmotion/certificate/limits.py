@@ -70,7 +70,8 @@ class JointLimits(Requirement):
     def remarks(self) -> tuple[str, ...]:
         """See `Requirement.remarks`."""
         count = int(np.sum(~(np.isfinite(self.upper) | np.isfinite(self.lower))))
-        return (f"{self.name}: {count} joints are not limited",) if count else ()
+        told = f"{self.name}: {count} of {len(self.upper)} joints are not limited"
+        return (told,) if count else ()
 
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: a margin (order 0), or the share of the limit that is used."""
@@ -122,6 +123,8 @@ def arm_limits(robot: RobotModel, requirements: Sequence[Requirement]) -> tuple[
 
 
 def _position(name: str, amount: float, time: float) -> str:
+    if amount >= 0.0:
+        return f"joint '{name}' comes as near as {amount:.3g} to its limit at t = {time:.3f} s"
     return f"joint '{name}' is {-amount:.3g} beyond its limit at t = {time:.3f} s"
 
 

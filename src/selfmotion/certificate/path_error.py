@@ -77,7 +77,9 @@ def bound_errors(
     path, tip = follow.path, follow.chain.tip_name
     _check_times(path, trajectory)
     errors = _PathErrors(follow, tolerance, relaxations)
-    found = bounded(errors, robot, trajectory, _edges(path, trajectory, relaxations), progress)
+    found = bounded(
+        errors, robot, trajectory, smooth_between(path, trajectory, relaxations), progress
+    )
     values = errors.angles(found.values)
     names = (tip, tip, *(item.name for item in relaxations))
     extremes = tuple(
@@ -110,16 +112,21 @@ def _check_times(path: Path, trajectory: Trajectory) -> None:
         )
 
 
-def _edges(path: Path, trajectory: Trajectory, relaxations: Sequence[Relaxation]) -> Array:
-    """Return the times between which the deviation is smooth, (E,)."""
+def smooth_between(
+    path: Path, trajectory: Trajectory, relaxations: Sequence[Relaxation] = ()
+) -> Array:
+    """Return the times between which the deviation is smooth, (E,): all samples and marks."""
     end = min(float(trajectory.t[-1]), path.duration)
     start = max(float(trajectory.t[0]), 0.0)
     windows = [time for item in relaxations for time in item.window(path.duration)]
-    marks = np.concatenate([trajectory.t, path.marks, windows])
-    marks = np.unique(np.clip(marks, start, end))
-    kept: Array = marks[np.append(True, np.diff(marks) > _SAME * path.duration)]
-    kept[-1] = end
-    return kept
+    samples = np.unique(np.clip([*trajectory.t, start, end], start, end))
+    near = _SAME * path.duration
+    marks = np.unique(np.clip([*path.marks, *windows], start, end))
+    marks = marks[np.append(True, np.diff(marks) > near)]
+    # Samples stay however near they are to each other: between two the arm may go anywhere.
+    place = np.searchsorted(samples, marks)
+    before, after = samples[np.maximum(place - 1, 0)], samples[place]
+    return np.union1d(samples, marks[np.minimum(marks - before, after - marks) > near])
 
 
 class _PathErrors(Bounded):
@@ -138,9 +145,10 @@ class _PathErrors(Bounded):
         self._in_tool_axes = any(item.in_tool_axes for item in relaxations)
         self.blocks = np.array([0, 3])
         self.of = np.array([0, 1, *(int(item.angular) for item in relaxations)])
-        rotation = tolerance.rotation
-        if not self._as_vectors:
-            rotation = 2.0 * np.sin(0.5 * min(rotation, np.pi))
+        # No turn is more than half a one.
+        rotation = tolerance.rotation if tolerance.rotation < np.pi else np.inf
+        if rotation < np.pi and not self._as_vectors:
+            rotation = 2.0 * np.sin(0.5 * rotation)
         self.allowed = np.array([tolerance.position, rotation, *(np.inf for _ in relaxations)])
         self.wanted = _FINE * self.allowed[:2]
 

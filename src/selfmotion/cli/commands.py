@@ -1,6 +1,7 @@
 """The commands around one plan: parse, call, print."""
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -8,7 +9,8 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.certificate import approaches
+from selfmotion.basics import Progress
+from selfmotion.certificate import Extreme, approaches
 from selfmotion.cli import documents, json_tables, options, outputs, tables
 from selfmotion.cli.app import (
     NOT_VERIFIED,
@@ -18,6 +20,9 @@ from selfmotion.cli.app import (
     stages,
     terminal,
 )
+from selfmotion.cli.stage_display import StageDisplay
+
+_Near = Mapping[str, Extreme]
 
 
 @app.command(
@@ -137,34 +142,72 @@ def check(
     """Check a motion by forward kinematics: a saved plan, or one that something else made."""
     judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf
     within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
-    if file.suffix == ".npz":
-        own: dict[str, Any] = {"robot": robot, "path": path, "feed": feed, "corners": corners}
-        own |= {"task": task, "tool": tool, "lock": lock, "degrees": degrees or None}
-        for name, value in own.items():
-            if value:
-                raise sm.ProblemError(f"{file}: --{name} is the plan's own: leave it out")
-        plan = sm.load_plan(file)
-        arm, motion, certificate = plan.robot, plan.trajectory, plan.certificate
-        asked = options.requirements(arm, *judged)
-        if within is not None or asked:
-            certificate = plan.check(within, asked)
-        asked = (*plan.requirements, *asked)
-    else:
-        if robot is None or path is None:
-            raise sm.ProblemError(
-                f"{file}: a motion is checked against a robot and a path: give --robot and --path"
+    own: dict[str, Any] = {"path": path, "feed": feed, "corners": corners, "task": task}
+    own |= {"tool": tool, "reference": reference, "lock": lock or None}
+    with StageDisplay(stages) as display:
+        if file.suffix == ".npz":
+            options.refuse(own | {"robot": robot, "degrees": degrees or None}, file, "the plan's")
+            certificate, near = _of_plan(file, within, judged, display.stage)
+        elif robot is not None and Path(robot).suffix in documents.SUFFIXES:
+            options.refuse(own, robot, "the problem's")
+            motion = sm.read_motion(file, degrees=degrees)
+            certificate, near = _of_problem(robot, motion, within, judged, display.stage)
+        else:
+            if robot is None or path is None:
+                raise sm.ProblemError(
+                    f"{file}: a motion is checked against a robot and a path: give --robot and "
+                    f"--path, or a problem file as --robot"
+                )
+            held = options.locks(lock or [])
+            arm = sm.load_robot(robot, tool=tool, lock=held, reference=reference)
+            motion, asked = (
+                sm.read_motion(file, degrees=degrees),
+                options.requirements(arm, *judged),
             )
-        arm = sm.load_robot(robot, tool=tool, lock=options.locks(lock or []), reference=reference)
-        followed = formats.read_path(path, feed=feed, corners=corners or "blend")
-        motion, asked = sm.read_motion(file, degrees=degrees), options.requirements(arm, *judged)
-        certificate = sm.certify(arm, followed, task or "pose", motion, within, asked)
-        motion = motion.of_joints(arm.joint_names)
-    near = approaches(asked, sm.FinishedMotion(arm, motion))
+            followed = formats.read_path(path, feed=feed, corners=corners or "blend")
+            certificate = sm.certify(
+                arm, followed, task or "pose", motion, within, asked, progress=display.stage
+            )
+            near = _approaches(arm, motion, asked)
     if as_json:
         terminal.print_json(data=json_tables.certificate_json(certificate, near))
     else:
         tables.show_certificate(certificate, near, terminal)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
+
+
+def _of_plan(
+    file: Path, within: sm.Tolerance | None, judged: tuple[Any, ...], progress: Progress
+) -> tuple[sm.Certificate, _Near]:
+    """Return the certificate of a plan, by what else is asked as well, and how near bodies come."""
+    plan = sm.load_plan(file, progress=progress)
+    besides = options.requirements(plan.robot, *judged)
+    near = _approaches(plan.robot, plan.trajectory, (*plan.requirements, *besides))
+    if within is None and not any(judged):
+        return plan.certificate, near
+    return plan.check(within, besides, progress=progress), near
+
+
+def _of_problem(
+    file: str,
+    motion: sm.Trajectory,
+    within: sm.Tolerance | None,
+    judged: tuple[Any, ...],
+    progress: Progress,
+) -> tuple[sm.Certificate, _Near]:
+    """Return the same of a motion by all that a problem file asks, and what else is."""
+    job = sm.read_job(file)
+    besides = options.requirements(job.problem.robot, *judged)
+    within = within or job.tolerance
+    certificate = job.problem.certify(motion, within, besides=besides, progress=progress)
+    near = _approaches(job.problem.robot, motion, (*job.problem.requirements, *besides))
+    return certificate, near
+
+
+def _approaches(
+    robot: sm.RobotModel, motion: sm.Trajectory, asked: Sequence[sm.Requirement]
+) -> _Near:
+    return approaches(asked, sm.FinishedMotion(robot, motion.of_joints(robot.joint_names)))
 
 
 @app.command(epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500")

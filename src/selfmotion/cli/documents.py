@@ -10,6 +10,8 @@ import selfmotion as sm
 from selfmotion.cli import options
 from selfmotion.formats import grid_documents, job_of, parse_setting, read_document, set_key
 
+# Of problem files.
+SUFFIXES = (".toml", ".json")
 # Costs and their first number, the weight that --cost may give.
 _WEIGHTS = ("weight", "mu")
 
@@ -156,7 +158,7 @@ def read(
 
     Options that say what a problem file says itself are refused beside one.
     """
-    file = Path(given) if Path(given).suffix in (".toml", ".json") else None
+    file = Path(given) if Path(given).suffix in SUFFIXES else None
     if file is None:
         document = Shell.of(context).document(given, warm_start)
     else:

@@ -159,7 +159,11 @@ CheckedArgument = Annotated[
     Path, typer.Argument(help="A plan saved as .npz, or a motion as .csv: t, a column per joint.")
 ]
 RobotOption = Annotated[
-    str | None, typer.Option(help="For a motion: name (`selfmotion robots`) or .urdf file.")
+    str | None,
+    typer.Option(
+        help="For a motion: name (`selfmotion robots`), .urdf file, or a problem file (.toml, "
+        ".json), all of which is judged then: a cell, constraints, what else is followed."
+    ),
 ]
 LockOption = Annotated[
     list[str] | None,
@@ -244,6 +248,13 @@ def locks(texts: list[str]) -> dict[str, float]:
                 f"--lock is '{text}', expected NAME=VALUE like joint_7=0.5"
             ) from None
     return held
+
+
+def refuse(given: dict[str, Any], file: Path | str, whose: str) -> None:
+    """Raise ProblemError for an option that what is checked says itself."""
+    for name, value in given.items():
+        if value is not None:
+            raise sm.ProblemError(f"{file}: --{name} is {whose} own: leave it out")
 
 
 def requirements(

@@ -62,7 +62,10 @@ class Contacts:
     points : (M, 3)
         Nearest points of the first body; those of the second are at points - value normal.
     slopes : (M, n)
-        Derivatives of the distances by the joints, as if these moved the first body only.
+        Derivatives of the distances by the joints, as if these moved the first body only. Of
+        cylinders and cones, whose sides GJK comes near to only, the normal is off by about
+        √`TOLERANCE` = 3e-5 rad, and the slopes by that times the lever [m/rad]; of all other bodies
+        they are exact up to rounding.
     """
 
     values: Array

@@ -22,6 +22,7 @@ TOOL_RATES = (
 class ToolLimits(Constraint):
     """The tool moves and turns no faster, and accelerates no more, than it may.
 
+    All are as the arm's reference sees them, where it has one, and the verdict says so.
     What the path prescribes is the path's: a limit that it passes itself cannot be kept, and the
     verdict says by how much. What the task leaves free, such as turning, keeps the limits.
 
@@ -69,6 +70,7 @@ class ToolLimits(Constraint):
         """See `Constraint.quantity`."""
         rates, tool = ToolRates(robot.chain), robot.tool
         limited = np.isfinite(self.limit)
+        seen = "" if robot.reference is None else f" seen from '{robot.reference}'"
 
         def values(q: Array, qd: Array, qdd: Array) -> Array:
             return np.stack(rates(q, qd, qdd), axis=1).reshape(-1, 4, 3)
@@ -87,7 +89,7 @@ class ToolLimits(Constraint):
         return Quantity(
             "tool limits",
             [
-                Column(tool, f"{name} of the tool '{tool}'", unit, 1 if k < 2 else 2)
+                Column(tool, f"{name} of the tool '{tool}'{seen}", unit, 1 if k < 2 else 2)
                 for k, (name, unit) in enumerate(TOOL_RATES)
             ],
             values,
@@ -97,6 +99,8 @@ class ToolLimits(Constraint):
             series=known,
             components=3,
             covers=tuple(
-                f"tool {name}" for (name, _), own in zip(TOOL_RATES, limited, strict=True) if own
+                f"tool {name}{seen}"
+                for (name, _), own in zip(TOOL_RATES, limited, strict=True)
+                if own
             ),
         )

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, as_number, per_joint
@@ -41,16 +42,16 @@ class JointTorqueLimits(Constraint):
         """See `Constraint.quantity`."""
         dynamics = Dynamics(robot, self.payload, self.center, self.inertia)
         units = ["N" if robot.is_prismatic(name) else "Nm" for name in robot.joint_names]
-        names = zip(robot.joint_names, units, strict=True)
+        names, limit = zip(robot.joint_names, units, strict=True), self.of(robot)
         return Quantity(
             "joint torque limits",
             [Column(name, f"torque of joint '{name}'", unit) for name, unit in names],
             dynamics.torques,
             dynamics.derivatives,
-            limit=self.of(robot),
+            limit=limit,
             of_pace=True,
             series=lambda stretch: dynamics.series(stretch.chain()),
-            covers=("torques",),
+            covers=(_covered(limit),),
         )
 
     def of(self, robot: RobotModel) -> Array:
@@ -59,3 +60,9 @@ class JointTorqueLimits(Constraint):
             return robot.effort_limit
         what = f"{robot.name}: joint torque limits"
         return per_joint(self.limit, robot.dof, what, positive=True)
+
+
+def _covered(limit: Array) -> str:
+    """Return what a verdict may claim: of some motors nobody may have said what they can."""
+    known = int(np.isfinite(limit).sum())
+    return "torques" if known == len(limit) else f"torques of {known} of {len(limit)} joints"

@@ -12,9 +12,19 @@ from selfmotion.basics import FileFormatError, write_atomically
 # Keys with a number for each joint.
 PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "start", "upper")
 # Keys that may end in _deg or _mm: nothing else is an angle or a length.
-ANGLES = frozenset(("band", "corner_angle", "margin", "rotation_vector", "rpy", *PER_JOINT))
+_BANDS = ("band", "center", "half", "target")
+_TURNS = (
+    "corner_angle",
+    "margin",
+    "rotation",
+    "rotation_vector",
+    "rpy",
+    "turn_tolerance",
+    "within",
+)
+ANGLES = frozenset((*_BANDS, *_TURNS, *PER_JOINT))
 _SIZES = ("length", "radius", "size")
-LENGTHS = frozenset(("band", "by", "center", "distance", "jump", "position", "positions", *_SIZES))
+LENGTHS = frozenset((*_BANDS, "by", "distance", "jump", "position", "positions", *_SIZES))
 # Tables or lists in each other; files of the trade have less than ten.
 _DEEPEST = 50
 _SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}

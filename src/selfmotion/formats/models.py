@@ -81,6 +81,7 @@ _ROBOT: _Fields = {
 _PART: _Fields = {
     **dict.fromkeys(("name", "file", "on"), (Text, None)),
     "base": (Pose, None),
+    "arguments": (Table, None),
 }
 # What else follows a path, or is held at a pose.
 _FOLLOW: _Fields = {

@@ -218,17 +218,16 @@ class _Reader:
 
     def _robot(self, given: Mapping[str, Any]) -> RobotModel:
         values = dict(given)
-        arguments = {key: str(value) for key, value in values.pop("arguments", {}).items()}
         parts = values.pop("parts", None)
         values["bodies"] = [self._obstacle(item) for item in values.pop("bodies", [])]
         if parts is None:
-            return load_robot(self._source(values), **values, arguments=arguments)
-        for key in ("name", "file", "base"):
+            return load_robot(self._source(values), **values)
+        for key in ("name", "file", "base", "arguments"):
             if key in values:
                 raise RobotError(f"{key}: is given in each of parts, where there are some")
-        base, on = (
+        base, on, arguments = (
             {part: item[key] for part, item in parts.items() if key in item}
-            for key in ("base", "on")
+            for key in ("base", "on", "arguments")
         )
         robots = {part: self._source(item, f"parts.{part}: ") for part, item in parts.items()}
         return load_robot(robots, **values, base=base, on=on, arguments=arguments)

@@ -53,6 +53,7 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
         table["bodies"] = mounting.bodies
     _check_frames(robot)
     if robot.urdf.parts:
+        _check_unchanged(robot, mounting.tool)
         table["parts"] = {part.name: _part(part) for part in robot.urdf.parts}
         table["lock"] = dict(robot.locked)
         return table
@@ -71,6 +72,23 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
         table["base"] = {"position": mounting.base[0], "rpy": mounting.base[1]}
     table["lock"] = dict(robot.locked)
     return table
+
+
+def _check_unchanged(robot: RobotModel, tool: str) -> None:
+    """Refuse a cell whose parts' files are no longer those that it was made of."""
+    given = robot.urdf.parts
+    now = load_robot(
+        {part.name: part.source for part in given},
+        tool,
+        base={part.name: part.base for part in given if part.base is not None},
+        on={part.name: part.on for part in given if part.on is not None},
+        arguments={part.name: part.arguments for part in given},
+    )
+    if now.urdf.bare_text() != robot.urdf.bare_text():
+        raise ProblemError(
+            f"{robot.name}: the files of its parts have changed since it was loaded, so that a "
+            f"problem file would name another cell; load it anew"
+        )
 
 
 def _check_frames(robot: RobotModel) -> None:
@@ -97,6 +115,8 @@ def _part(part: UrdfPart) -> dict[str, Any]:
         }
     if part.on is not None:
         table["on"] = part.on
+    if part.arguments:
+        table["arguments"] = dict(part.arguments)
     return table
 
 

@@ -25,6 +25,11 @@ _ABOUT = 1000
 _BESIDE = 1e-4
 # How far from a knot it is measured whether the twist jumps there.
 _AT = 1e-8
+# The pace of the original is followed between nodes to this share, by so many halvings at most.
+_ROUGH, _FINER = 0.05, 12
+# Halvings by which it is found where the turn rate begins to hold the tool, and how near to a node,
+# as a share of the way to the next one, that is the node.
+_HALVINGS, _CLOSE = 40, 1e-6
 # Faster feeds [m/s] are slips of units.
 _FASTEST = 3.0
 # A tool that is slower than this share of what it may be rests.
@@ -197,7 +202,34 @@ class Feed(_Derived, kind="feed"):
         for start, end in pairwise(self._path.knots):
             count = max(_FEWEST, int(np.ceil(_ABOUT * (end - start) / self._path.duration)))
             parts.append(np.linspace(start, end, count, endpoint=False))
-        return np.append(np.concatenate(parts), self._path.duration)
+        sigma = np.append(np.concatenate(parts), self._path.duration)
+        for _ in range(_FINER):
+            middle, share = 0.5 * (sigma[:-1] + sigma[1:]), self._share_of(sigma)
+            between, found = 0.5 * (share[:-1] + share[1:]), self._share_of(middle)
+            rough = np.abs(found - between) > _ROUGH * found
+            if not rough.any():
+                break
+            # Where the tool all but rests, its pace changes much faster than elsewhere.
+            sigma = np.union1d(sigma, middle[rough])
+        return self._with_crossings(sigma)
+
+    def _with_crossings(self, sigma: Array) -> Array:
+        """Return nodes, and where the turn rate begins or ends to hold the tool: a kink of σ(λ)."""
+        turns = self._turns(sigma)
+        (cells,) = np.nonzero(turns[:-1] != turns[1:])
+        early, late, before = sigma[cells], sigma[cells + 1], turns[cells]
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (early + late)
+            same = self._turns(middle) == before
+            early, late = np.where(same, middle, early), np.where(same, late, middle)
+        widths = np.minimum(late - sigma[cells], sigma[cells + 1] - late)
+        return np.union1d(sigma, late[widths > _CLOSE * np.diff(sigma)[cells]])
+
+    def _turns(self, sigma: Array) -> Flags:
+        """Return at which times (K,) the turn rate holds the tool, rather than the feed."""
+        speeds = _sizes(self._path.samples(sigma).twist)
+        allowed = np.array([self._limits["feed"], self._limits["turn_rate"]])
+        return np.asarray(np.diff(speeds / allowed, axis=1)[:, 0] > 0.0)
 
     @cached_property
     def _shares(self) -> Array:
@@ -238,11 +270,13 @@ class Feed(_Derived, kind="feed"):
         sigma, share = self._sigma, self._shares[:, None]
         beside = float(_BESIDE * np.diff(self._path.knots).min())
         inner = np.clip(sigma, sigma[0] + beside, sigma[-1] - beside)
-        early, late = (
+        early, here, late = (
             self._path.samples(at).twist / self._share_of(at)[:, None]
-            for at in (inner - beside, inner + beside)
+            for at in (inner - beside, inner, inner + beside)
         )
-        return _sizes((late - early) / (2.0 * beside) / share)
+        # Before and after by themselves: where the turn rate begins to hold, they differ.
+        sides = (_sizes((b - a) / beside / share) for a, b in ((early, here), (here, late)))
+        return np.maximum(*sides)
 
     @cached_property
     def _caps(self) -> Array:

@@ -40,6 +40,12 @@ class FeedKept:
         """Whether the feed is kept where it counts, and reached at all."""
         return self.slowest >= (1.0 - self.within) * self.asked
 
+    @property
+    def left_over(self) -> float:
+        """How much faster or slower than the path the tool may be where the feed counts [m/s]."""
+        most = max((1.0 + self.within) * self.asked, self.reached)
+        return max(min(most - self.reached, self.slowest - (1.0 - self.within) * self.asked), 0.0)
+
     def later(self, seconds: float) -> "FeedKept":
         """Return the same, begun later."""
         return replace(self, time=self.time + seconds)

@@ -11,6 +11,7 @@ from selfmotion.basics import Array, series
 
 # Of samples within this share of a window the first is kept: the jerk of more would be rounding.
 _CLOSE = 0.1
+_SAME = 1e-4
 # Intervals of time are halved so often to find when something is reached.
 _HALVINGS = 52
 
@@ -58,6 +59,8 @@ class Pace:
         way = spline.antiderivative()
         new = np.union1d(self.t, self.t + window)
         new = new[np.unique(np.floor(new / (_CLOSE * window)), return_index=True)[1]]
+        # Two that rounding puts on both sides of such a share are one as well.
+        new = new[np.append(True, np.diff(new) > _SAME * window)]
         new[-1] = self.t[-1] + window
         before = new - window
         mean = np.clip((way(new) - way(before)) / window, self.sigma[0], self.sigma[-1])

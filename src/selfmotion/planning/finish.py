@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Progress
-from selfmotion.certificate import LIMIT_NAMES, Certificate, KeepsApart, Tolerance
+from selfmotion.certificate import LIMIT_NAMES, Certificate, Tolerance
 from selfmotion.engine import MOST_HALVINGS, Evaluation
 from selfmotion.motion import Trajectory
 from selfmotion.optimise import Status
@@ -93,11 +93,10 @@ def _rough(problem: Problem, finished: Finished, session: Session) -> bool:
     """Whether what was asked for and is kept at the nodes is not so between them."""
     if session.violations or not finished.certificate.on_path:
         return False
-    # Where only the default asks it, the arm was not kept apart from itself at the nodes either.
-    unasked = problem.own_collision is not None
-    asked = {
-        item.name for item in problem.requirements if not (unasked and isinstance(item, KeepsApart))
-    }
+    asked = {item.name for item in problem.requirements}
+    if problem.own_collision is not None:
+        # Where only the default asks it, it was not asked of the nodes either.
+        asked.discard(problem.own_collision.requirement(problem.robot).name)
     nodes = finished.motion.trajectory.t
     # Rates are judged on both sides of a node; anything else that is wrong there stays so.
     return any(

@@ -1,6 +1,6 @@
 """What to plan: an arm, a tool motion, the rows that count, and what to minimise."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import and_
@@ -12,10 +12,12 @@ import numpy.typing as npt
 from selfmotion.basics import (
     Array,
     ProblemError,
+    Progress,
     as_flag,
     as_several,
     read_only,
     shown,
+    silent,
 )
 from selfmotion.certificate import (
     AtRest,
@@ -48,6 +50,7 @@ from selfmotion.motion import (
 from selfmotion.path import Path
 from selfmotion.problem.fit import check_fit, rest_orders
 from selfmotion.problem.given import SEQUENCES, check_costs, check_judged, check_kinds, check_start
+from selfmotion.problem.knots import smooth_knots
 from selfmotion.robot import RobotModel
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 
@@ -333,6 +336,7 @@ class Problem:
         tolerance: Tolerance | None = None,
         ending: str = "",
         besides: Sequence[Requirement] = (),
+        progress: Progress = silent,
     ) -> Certificate:
         """Return the certificate of a motion, by all that the problem asks for; see `certify`.
 
@@ -351,6 +355,7 @@ class Problem:
             relaxations=self.relaxations,
             damping=self.damping_law,
             ending=ending,
+            progress=progress,
         )
 
     def errors_between(self, trajectory: Trajectory) -> Array:
@@ -363,14 +368,8 @@ class Problem:
 
     @cached_property
     def knots(self) -> Array:
-        """Times [s] between which path and deviations are smooth; see `Path.knots`."""
-        duration, knots = self.path.duration, list(self.path.knots)
-        for other in self.follows.items[1:]:
-            knots = _with_times(knots, other.path.knots, duration)
-        for item in self.relaxations:
-            times = np.linspace(*item.window(duration), item.intervals + 1)
-            knots = _with_times(knots, times, duration)
-        return read_only(sorted(knots))
+        """Times [s] between which paths and deviations are smooth; see `Path.knots`."""
+        return smooth_knots(self.follows, self.relaxations)
 
     @property
     def pinned(self) -> tuple[bool, bool]:
@@ -381,15 +380,6 @@ class Problem:
 
 # What help() shows of a field that is a descriptor.
 Problem.__init__.__annotations__["task"] = Task | str
-
-
-def _with_times(knots: list[float], times: Iterable[float], duration: float) -> list[float]:
-    """Return knots and times; nearer to each other than rounding, two are one."""
-    found = list(knots)
-    for time in times:
-        if np.abs(np.array(found) - time).min() > 1e-9 * duration:
-            found.append(float(time))
-    return found
 
 
 def check_problem(problem: object) -> None:

@@ -13,9 +13,11 @@ from selfmotion.basics import (
     CollisionError,
     FileFormatError,
     PlanError,
+    Progress,
     RobotError,
     SelfmotionError,
     as_path,
+    silent,
     write_csv,
 )
 from selfmotion.certificate import (
@@ -129,15 +131,20 @@ class Plan:
         return approaches(self.requirements, FinishedMotion(self.robot, self.trajectory))
 
     def check(
-        self, tolerance: Tolerance | None = None, requirements: Sequence[Requirement] = ()
+        self,
+        tolerance: Tolerance | None = None,
+        requirements: Sequence[Requirement] = (),
+        *,
+        progress: Progress = silent,
     ) -> Certificate:
         """Return a new certificate of the motion.
 
         By all that the problem asks for and by `requirements` besides; with another tolerance than
-        the plan's where one is given.
+        the plan's where one is given. `progress` is told how far it is, as in `certify`.
         """
+        within = tolerance or self.tolerance
         found = self.problem.certify(
-            self.trajectory, tolerance or self.tolerance, self.report.ending, requirements
+            self.trajectory, within, self.report.ending, requirements, progress
         )
         if not self.altered:
             return found
@@ -194,11 +201,12 @@ class Plan:
         return None if self.views is None else self.views.notebook_html(self)
 
 
-def load_plan(file: str | FilePath) -> Plan:
+def load_plan(file: str | FilePath, *, progress: Progress = silent) -> Plan:
     """Read a plan that `Plan.save` wrote, and measure its motion anew.
 
     A file that was changed is never verified. Where the robot's own file has changed since, the
-    certificate's notes say so: the plan is checked against the arm it was made for.
+    certificate's notes say so: the plan is checked against the arm it was made for. `progress` is
+    told how far it is, as in `certify`.
 
     Raises
     ------
@@ -208,7 +216,7 @@ def load_plan(file: str | FilePath) -> Plan:
     archive = Archive.read(as_path(file))
     plan = Plan(*archive[:-1])
     try:
-        certificate = plan.check()
+        certificate = plan.check(progress=progress)
     except (CollisionError, RobotError) as error:
         unknown = f"it could not be measured anew: {error}"
         certificate = replace(plan.certificate, failures=(unknown, *plan.certificate.failures))

@@ -37,7 +37,7 @@ def load_robot(
     on: Mapping[str, str] | None = None,
     tool_offset: pin.SE3 | npt.ArrayLike | None = None,
     bodies: Sequence[CarriedBody] = (),
-    arguments: Mapping[str, str] | None = None,
+    arguments: Mapping[str, Any] | None = None,
 ) -> RobotModel:
     """Load an arm, or a cell of several robots.
 
@@ -69,7 +69,7 @@ def load_robot(
         of `tool`, or in that of the link that a `frame=` of theirs names. They become links of the
         arm, without masses; shapes of one's own cannot.
     arguments : dict, optional
-        Of a xacro file.
+        Of a xacro file; of several robots a dict of these, by part.
 
     Returns
     -------
@@ -146,6 +146,7 @@ class _Source:
 def _read(robot: str | Path, arguments: Mapping[str, str]) -> _Source:
     known = {**NAMED_ARMS, **NAMED_PARTS}
     if isinstance(robot, str) and robot in known:
+        _check_no_arguments(robot, arguments)
         arm = known[robot]
         return _Source(read_named(arm), arm.tool, arm.touching, published(robot))
     urdf = _read_file(Path(robot), arguments, str(robot))
@@ -169,7 +170,7 @@ def _parts(
     robots: Mapping[str, str | Path],
     base: Any,
     on: Mapping[str, str] | None,
-    arguments: Mapping[str, str],
+    arguments: Mapping[str, Any],
 ) -> _Source:
     """Return several robots as one."""
     for name in robots:
@@ -186,14 +187,22 @@ def _parts(
         raise RobotError("robot: there is no part, expected names with robots")
     if not isinstance(base, Mapping | None):
         raise RobotError(f"base is {shown(base)}, expected a dict, since there are several robots")
-    sources = {name: _read(robot, arguments) for name, robot in robots.items()}
+    for name, given in arguments.items():
+        if name not in robots or not isinstance(given, Mapping):
+            raise RobotError(
+                f"arguments: '{name}' is {shown(given)}, expected a dict for each part that is a "
+                f".xacro file{nearest(name, robots)}; parts: {', '.join(robots)}"
+            )
+    own_arguments = {name: dict(arguments.get(name, {})) for name in robots}
+    sources = {name: _read(robot, own_arguments[name]) for name, robot in robots.items()}
     poses = {
         name: as_pose(at, f"base of '{name}'", RobotError) for name, at in (base or {}).items()
     }
     urdf = composed({name: source.urdf for name, source in sources.items()}, poses, on or {})
     on = on or {}
     parts = tuple(
-        UrdfPart(name, str(robot), poses.get(name), on.get(name)) for name, robot in robots.items()
+        UrdfPart(name, str(robot), poses.get(name), on.get(name), own_arguments[name])
+        for name, robot in robots.items()
     )
     urdf = dataclasses.replace(urdf, parts=parts)
     first, source = next(iter(sources.items()))
@@ -219,14 +228,18 @@ def _read_file(path: Path, arguments: Mapping[str, str], given: str) -> Urdf:
             package_dirs=package_folders(path),
             mesh_folder=path.resolve().parent,
         )
-    if arguments:
-        raise RobotError(f"{given}: arguments are given, which only a .xacro file has")
+    _check_no_arguments(given, arguments)
     if path.suffix != ".urdf":
         raise RobotError(
             f"unknown robot '{given}', expected a .urdf or .xacro file or one of: "
             f"{', '.join(NAMED_ARMS)}{nearest(str(path), NAMED_ARMS)}"
         )
     return read_urdf(path)
+
+
+def _check_no_arguments(given: str, arguments: Mapping[str, Any]) -> None:
+    if arguments:
+        raise RobotError(f"{given}: arguments are given, which only a .xacro file has")
 
 
 def _only_leaf(urdf: Urdf) -> str:

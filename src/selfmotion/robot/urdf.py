@@ -8,8 +8,8 @@ become single-angle joints without limits; mesh addresses become absolute.
 import contextlib
 import hashlib
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -62,12 +62,15 @@ class UrdfPart:
         Where its root stands: in the world, or on `on`.
     on : str or None
         The link of another part that carries it.
+    arguments : dict
+        Of a xacro file.
     """
 
     name: str
     source: str
     base: Any = None
     on: str | None = None
+    arguments: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,92 @@
+"""A verdict says what was looked at and what was not, and no more."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.certificate import LIMIT_NAMES, DampedStretch, Extreme, Finding
+from support.arms import PANDA_HOME, robot_named
+
+
+def still(*requirements: sm.Requirement, **given: object) -> sm.Certificate:
+    """The certificate of a Panda that stands where it should."""
+    robot = robot_named("panda")
+    motion = sm.Trajectory([0.0, 1.0], [PANDA_HOME] * 2, np.zeros((2, 7)), robot.joint_names)
+    path = sm.Dwell(robot.pose(PANDA_HOME), 1.0)
+    return sm.certify(robot, path, "pose", motion, None, requirements, **given)  # type: ignore[arg-type]
+
+
+def finding(name: str, amount: float) -> Finding:
+    return Finding(name, "x", 0.5, amount, 0.0, True, "told")
+
+
+def test_what_is_relaxed_is_said_where_something_is() -> None:
+    assert "beyond what is relaxed" not in still().verdict
+    relaxed = still(relaxations=[sm.Relaxation("x", 1e-3)])
+    assert "rad off the path, beyond what is relaxed" in relaxed.verdict
+    assert [item.name for item in relaxed.deviations] == ["(x)"]
+
+
+def test_what_was_not_checked_is_said_unless_all_was() -> None:
+    one = still()
+    assert one.not_checked == ("accelerations", "self-collision")
+    assert one.verdict.endswith("; not checked: accelerations, self-collision")
+    every = replace(one, covers=(*one.covers, "accelerations", "self-collision"))
+    assert every.not_checked == ()
+    assert "not checked" not in every.verdict
+    assert repr(every) == f"Certificate({every.verdict})"
+
+
+def test_notes_and_failures_are_told_in_this_order() -> None:
+    noted = replace(still(), notes=("one", "two"))
+    assert noted.verdict.endswith("self-collision; one; two")
+    failed = replace(noted, failures=("first", "second"))
+    assert not failed.verified
+    assert failed.verdict == "not verified: first; second; one; two"
+
+
+def test_other_tips_and_damping_are_told() -> None:
+    pair = Extreme(2e-7, 0.5, "left"), Extreme(3e-7, 0.5, "left")
+    told = replace(still(), others=(pair,))
+    assert ", 'left' 2.0e-07 m and 3.0e-07 rad off its own" in told.verdict
+    damped = replace(still(), damped=(DampedStretch(0.1, 0.2, 1e-3, 2e-2),) * 2)
+    assert damped.verdict.count("0.100 to 0.200 s (smallest singular value 0.001") == 2
+    assert "; damped 0.100" in damped.verdict
+    assert " and 0.100" in damped.verdict
+
+
+@pytest.mark.parametrize("wrong", [2e-6, np.nan])
+@pytest.mark.parametrize("which", range(4))
+def test_each_error_of_each_tip_counts(which: int, wrong: float) -> None:
+    exact = Extreme(1e-6, 0.0, "x")
+    errors = [exact] * 4
+    one = replace(still(), position_error=exact, rotation_error=exact, others=((exact, exact),))
+    assert one.on_path
+    errors[which] = Extreme(wrong, 0.0, "x")
+    off = replace(
+        one,
+        position_error=errors[0],
+        rotation_error=errors[1],
+        others=((errors[2], errors[3]),),
+    )
+    assert not off.on_path
+
+
+def test_the_worst_of_several_findings_is_told() -> None:
+    """Of margins and distances the least, of shares the largest; None where nothing was asked."""
+    names = (LIMIT_NAMES[0], LIMIT_NAMES[1], LIMIT_NAMES[2], "clearance")
+    several = tuple(finding(name, amount) for name in names for amount in (0.2, 0.1, 0.3))
+    found = replace(still(), findings=several)
+    assert found.limit_margin == Extreme(0.1, 0.5, "x")
+    assert found.velocity_ratio.value == 0.3
+    assert found.acceleration_ratio is not None
+    assert found.acceleration_ratio.value == 0.3
+    assert found.clearance is not None
+    assert found.clearance.value == 0.1
+    plain = still()
+    assert plain.clearance is None
+    assert plain.acceleration_ratio is None
+    with pytest.raises(RuntimeError, match="always judges joint position limits"):
+        _ = replace(plain, findings=()).limit_margin

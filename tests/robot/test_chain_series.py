@@ -1,0 +1,86 @@
+"""Majorants of simple chains are what the derivation says, coefficient by coefficient."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array, series
+from selfmotion.robot import ChainSeries
+from support.arms import robot_named
+from support.gantries import gantry
+
+HALF = np.array([0.1, 0.7])
+
+
+def random_joints(robot: sm.RobotModel) -> Array:
+    return np.random.default_rng(0).random((robot.dof, series.LENGTH, 2))
+
+
+def same(found: Array, expected: Array) -> None:
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-15)
+
+
+def test_a_planar_arm_is_bounded_link_by_link() -> None:
+    """Each link is as long as it is, times the exponential of the turns before it."""
+    robot = robot_named("planar_3r")
+    q = random_joints(robot)
+    chain = ChainSeries(robot, q, HALF)
+    tip, base = robot.chain.tip, np.zeros((series.LENGTH, 2))
+    turns = [
+        series.exponential(base),
+        *(series.exponential(q[: k + 1].sum(axis=0)) for k in range(3)),
+    ]
+    model = robot.model
+    links = [float(np.linalg.norm(x.translation)) for x in list(model.jointPlacements)[1:]]
+    last = float(np.linalg.norm(model.frames[tip].placement.translation))
+    places = [base]
+    for k, length in enumerate(links):
+        places.append(places[-1] + length * turns[k])
+    for k in range(4):
+        same(chain.turned[k], turns[k])
+        same(chain.places[k], places[k])
+    same(chain.place(tip), places[3] + last * turns[3])
+    same(chain.orientation(tip), turns[3])
+    spin = sum(series.product(series.derivative(q[k], HALF), turns[k]) for k in range(3))
+    same(chain.spin(tip), spin)
+    same(chain.rate(1), series.derivative(q[1], HALF))
+    assert [chain.parent(joint) for joint in range(3)] == [0, 1, 2]
+    assert all(chain.is_revolute(joint) for joint in range(3))
+    place, turned = chain.relative(robot.chain)
+    same(place, chain.place(tip))
+    same(turned, chain.orientation(tip))
+    same(chain.relative_spin(robot.chain), spin)
+
+
+def test_slides_are_bounded_by_where_they_are(tmp_path: Path) -> None:
+    robot = gantry(tmp_path)
+    q = random_joints(robot)
+    chain = ChainSeries(robot, q, HALF)
+    tip = robot.chain.tip
+    # No link is long, and nothing turns but the last.
+    same(chain.place(tip), q[0] + q[1] + q[2])
+    same(chain.orientation(tip), series.exponential(q[3]))
+    same(chain.spin(tip), series.derivative(q[3], HALF))
+    assert [chain.is_revolute(joint) for joint in range(4)] == [False, False, False, True]
+
+
+@pytest.mark.parametrize(("tool", "base"), [("l3", "l0"), ("l2", "l1"), ("l0", "l3")])
+def test_between_two_frames_only_the_joints_between_count(
+    tool: str, base: str, tmp_path: Path
+) -> None:
+    robot = gantry(tmp_path)
+    q = random_joints(robot)
+    chain = ChainSeries(robot, q, HALF)
+    seen = robot.chain_to(tool, base)
+    first, last = sorted((int(tool[1]), int(base[1])))
+    slides = [k for k in range(first + 1, last + 1) if k < 3]
+    place, turned = chain.relative(seen)
+    turn = q[3] if last == 3 else 0.0 * q[3]
+    same(turned, series.exponential(turn))
+    # Seen from what turns, places are turned as well.
+    by = turned if base == "l3" else series.exponential(0.0 * turn)
+    same(place, sum(series.product(q[k], by) for k in slides))
+    spin = series.derivative(turn, HALF)
+    same(chain.relative_spin(seen), spin)
