@@ -3,7 +3,7 @@
 from selfmotion.engine.conditions import Conditions as Conditions
 from selfmotion.engine.counts import Counts as Counts
 from selfmotion.engine.deviation import Deviation as Deviation
-from selfmotion.engine.frame import transport as transport
+from selfmotion.engine.frame import carried_bases as carried_bases, transport as transport
 from selfmotion.engine.objective import Evaluation as Evaluation, Objective as Objective
 from selfmotion.engine.remaining import Remaining as Remaining, finest as finest
 from selfmotion.engine.rollout import Rollout as Rollout

@@ -4,6 +4,7 @@ import numpy as np
 
 from selfmotion import kernels
 from selfmotion.basics import Array
+from selfmotion.follow import Follows
 from selfmotion.robot import null_space
 
 # Jacobians with a pivot of JJᵀ [m², rad²] below this are taken for singular.
@@ -41,3 +42,8 @@ def transport(jacobians: Array) -> Array:
     bases = np.empty((len(jacobians), *first.shape))
     kernels.transport(first, np.ascontiguousarray(jacobians), _SINGULAR, bases)
     return bases
+
+
+def carried_bases(follows: Follows, q: Array) -> Array:
+    """Return null-space bases along a motion (N, n), (N, n, r), each turned to the last one."""
+    return transport(np.array([follows.jacobian(here) for here in q]))

@@ -6,6 +6,7 @@ import numpy as np
 
 from selfmotion import kernels
 from selfmotion.basics import Array
+from selfmotion.engine import carried_bases
 from selfmotion.follow import Follows
 from selfmotion.nodes.kernels import look, pull
 
@@ -49,18 +50,15 @@ class Charts:
     q: Array
     bases: Array
 
-    def at(self, z: Array, nu: Array, near: Array | None = None) -> Place | None:
-        """Return the nodes at z and ν, (N + 1, r) each; None where one is not to be had.
-
-        Newton's method begins at `near` (N + 1, n), by default at q + N0 z.
-        """
+    def at(self, z: Array, nu: Array) -> Place | None:
+        """Return the nodes at z and ν, (N + 1, r) each; None where one is not to be had."""
         own, bases = self.manifolds, self.bases
-        q = np.array(near) if near is not None else self.q + (bases @ z[:, :, None])[:, :, 0]
-        table = own.targets.copy()
+        q = self.q + (bases @ z[:, :, None])[:, :, 0]
+        table = own.table.copy()
         own.stages(table).epsilon[:] = (bases @ nu[:, :, None])[:, :, 0]
         tangents = np.empty_like(bases)
         z = np.ascontiguousarray(z)
-        failed = look(q, z, bases, self.q, own.chains, own.layout, table, tangents)
+        failed = look(q, z, bases, self.q, own.targets, own.chains, own.layout, table, tangents)
         if failed >= 0:
             return None
         return Place(q, np.array(own.stages(table).qd), tangents, table)
@@ -101,16 +99,17 @@ class Manifolds:
     """
 
     def __init__(self, follows: Follows, t: Array) -> None:
-        self.follows, self.t = follows, t
+        self.follows = follows
         self.chains = tuple(item.chain.arrays for item in follows.items)
         self.layout = follows.layout
         n, m, count = follows.robot.dof, follows.dimension, len(follows.items)
         self._sizes = n, m
-        self.targets = np.zeros((len(t), kernels.columns(n, m, count)))
+        self.targets = follows.targets(t)
+        self.table = np.zeros((len(t), kernels.columns(n, m, count)))
         self.work = np.zeros(kernels.space_size(n, m, count))
         self.no_error = np.zeros((count, 6))
         for f, item in enumerate(follows.items):
-            tip, target = kernels.tip_of(self.targets, f, n, m), item.target(t)
+            tip, target = kernels.tip_of(self.table, f, n, m), item.target(t)
             tip.target_translation[:] = target.translation
             tip.target_rotation[:] = target.rotation
             tip.target_twist[:] = target.twist
@@ -124,20 +123,13 @@ class Manifolds:
 
         None where a node does not come onto its manifold.
         """
-        bases = null_bases(self.follows, q)
+        bases = carried_bases(self.follows, q)
         charts, none = Charts(self, q, bases), np.zeros((len(q), bases.shape[2]))
         place = charts.at(none, none)
         if place is None:
             return None
         centred, _ = charts.recentred(place)
         return centred, np.einsum("knr,kn->kr", centred.bases, qd)
-
-
-def null_bases(follows: Follows, q: Array) -> Array:
-    """Return null-space bases along a motion (K, n), (K, n, r)."""
-    from selfmotion.engine import transport
-
-    return transport(np.array([follows.jacobian(each) for each in q]))
 
 
 def _orthonormal(tangents: Array) -> Array:

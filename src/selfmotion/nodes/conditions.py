@@ -16,7 +16,21 @@ from selfmotion.nodes.hermite import MIDDLE, Hermite, HermiteSamples
 _NONE = -1e3
 
 
-class NearTangents(NodeTangents):
+class _ByOrder(NodeTangents):
+    """Tangents that are kept for each order of derivative."""
+
+    _tables: dict[int, Array]
+
+    def of_order(self, order: int) -> Array:
+        """See `NodeTangents.of_order`."""
+        return self._tables[order]
+
+    def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
+        """See `NodeTangents.picked`."""
+        return np.asarray(self.of_order(order)[nodes, joints])
+
+
+class NearTangents(_ByOrder):
     """How the motion at each point changes with the coordinates of the nodes around it.
 
     The d = 3 · 2r variables of a point, which are nodes and middles in turn, are those of the node
@@ -31,7 +45,6 @@ class NearTangents(NodeTangents):
 
     _spline: Hermite
     _changes: Array
-    _tables: dict[int, Array]
 
     def __init__(self, spline: Hermite, changes: Array) -> None:
         for name, value in (("_spline", spline), ("_changes", changes), ("_tables", {})):
@@ -42,7 +55,7 @@ class NearTangents(NodeTangents):
         """See `NodeTangents.of_order`."""
         if order not in self._tables:
             self._tables[order] = self._made(order)
-        return self._tables[order]
+        return super().of_order(order)
 
     def _made(self, order: int) -> Array:
         spline, changes = self._spline, self._changes
@@ -61,37 +74,21 @@ class NearTangents(NodeTangents):
         table[1::2, :, after] = _weighted(middle[:, 2:], changes[1:])
         return table
 
-    def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
-        """See `NodeTangents.picked`."""
-        return np.asarray(self.of_order(order)[nodes, joints])
-
 
 def _weighted(shares: Array, changes: Array) -> Array:
     """Return Σ_a shares (K, 2) · changes (K, 2, n, d), (K, n, d)."""
     return np.asarray(np.einsum("ka,kani->kni", shares, changes))
 
 
-class UnitTangents(NodeTangents):
+class UnitTangents(_ByOrder):
     """Tangents by q, q̇, q̈ and the jerk of each point themselves: d = 4 n."""
 
     def __init__(self, spline: Hermite, dof: int) -> None:
         ones = np.eye(4 * dof).reshape(4, dof, 4 * dof)
-        count = len(spline.sampling.nodes)
-        tables = [np.broadcast_to(one, (count, dof, 4 * dof)) for one in ones]
+        shape = (len(spline.sampling.nodes), dof, 4 * dof)
+        tables = {order: np.broadcast_to(one, shape) for order, one in enumerate(ones)}
         object.__setattr__(self, "_tables", tables)
         super().__init__(tables[0], tables[1], spline.sampling)
-
-    def of_order(self, order: int) -> Array:
-        """See `NodeTangents.of_order`."""
-        table: Array = self._tables[order]  # type: ignore[attr-defined]
-        return table
-
-    def picked(self, order: int, nodes: Ints, joints: Ints) -> Array:
-        """See `NodeTangents.picked`."""
-        n = self.q.shape[1]
-        rows = np.zeros((len(nodes), 4 * n))
-        rows[np.arange(len(nodes)), order * n + joints] = 1.0
-        return rows
 
 
 class NodeConditions:

@@ -158,6 +158,7 @@ class HermiteSamples(PlacedLater):
     nodes_q: Array
     nodes_qd: Array
     ends: Array
+    _spline: Hermite
 
     def __init__(self, follows: Follows, spline: Hermite, q: Array, qd: Array) -> None:
         ends = np.stack([q[:-1], qd[:-1], q[1:], qd[1:]], axis=1)
@@ -168,7 +169,7 @@ class HermiteSamples(PlacedLater):
         super().__init__(follows, spline.sampling, *at)
 
     def _at_samples(self, order: int, last: Array) -> Array:
-        spline: Hermite = self._spline  # type: ignore[attr-defined]
+        spline = self._spline
         inner = (spline.bases[order] @ self.ends).reshape(-1, self.ends.shape[2])
         return np.concatenate([inner, last[None]])
 
@@ -183,7 +184,7 @@ class HermiteSamples(PlacedLater):
         return self._faster(3)
 
     def _faster(self, order: int) -> Array:
-        spline: Hermite = self._spline  # type: ignore[attr-defined]
+        spline = self._spline
         at_nodes = spline.at_nodes(order, self.nodes_q, self.nodes_qd)
         found = self._at_samples(order, at_nodes[-1])
         found[::_SAMPLES] = at_nodes
@@ -200,6 +201,8 @@ class QuinticSamples(PlacedLater):
     trajectory : Trajectory
     """
 
+    _trajectory: Trajectory
+
     def __init__(self, follows: Follows, sampling: Sampling, trajectory: Trajectory) -> None:
         super().__init__(follows, sampling, trajectory(sampling.t), trajectory(sampling.t, 1))
         object.__setattr__(self, "_trajectory", trajectory)
@@ -207,9 +210,9 @@ class QuinticSamples(PlacedLater):
     @cached_property
     def qdd(self) -> Array:
         """Joint accelerations, (S, n)."""
-        return np.asarray(self._trajectory(self.t, 2))  # type: ignore[attr-defined]
+        return np.asarray(self._trajectory(self.t, 2))
 
     @cached_property
     def qddd(self) -> Array:
         """Joint jerks, (S, n)."""
-        return np.asarray(self._trajectory(self.t, 3))  # type: ignore[attr-defined]
+        return np.asarray(self._trajectory(self.t, 3))

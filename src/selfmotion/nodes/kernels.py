@@ -10,20 +10,19 @@ is the null motion of eq. 4. With B = [J; N0ᵀ],
 import numpy as np
 
 from selfmotion.basics import Array, inlined, kernel
-from selfmotion.basics.layout import KIND, Layout
+from selfmotion.basics.layout import Layout
 from selfmotion.kernels import (
+    Tip,
+    approach_start,
     cholesky,
     errors_and_rows,
     evaluate,
     gram,
-    pose_error,
     pull_stage,
     rows_of,
-    select,
     solve_cholesky,
     space_of,
     stage_of,
-    task_rows,
     tip_of,
 )
 from selfmotion.robot import ChainArrays, place_tips
@@ -40,6 +39,7 @@ def look(
     coordinates: Array,
     bases: Array,
     references: Array,
+    targets: Array,
     chains: tuple[ChainArrays, ...],
     layout: Layout,
     table: Array,
@@ -47,9 +47,9 @@ def look(
 ) -> int:
     """Put each of q (K, n) onto its manifold at its coordinates z (K, r), and evaluate eq. 4 there.
 
-    For charts with `bases` (K, n, r) and `references` (K, n). Rows of the `table` hold paths and
-    null motions already; q, q̇ and all else is set, and T in `tangents` (K, n, r). Returns the
-    first node for which that is impossible, or -1.
+    For charts with `bases` (K, n, r) and `references` (K, n), and `targets` (K, 12 F). Rows of the
+    `table` hold paths and null motions already; q, q̇ and all else is set, and T in `tangents`
+    (K, n, r). Returns the first node for which that is impossible, or -1.
     """
     (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
     tips = layout.shape[0]
@@ -58,53 +58,29 @@ def look(
     jacobians = np.zeros((tips, 6, n))
     system, factor, b = np.empty((n, n)), np.empty((n, n)), np.empty(n)
     for k in range(count):
-        row = table[k]
-        at = stage_of(row, n, m)
-        arrived = False
+        off = np.inf
         for _ in range(_STEPS):
             place_tips(q[k], chains, turns, places, rotations, positions, jacobians)
-            off = 0.0
-            for f in range(tips):
-                tip = tip_of(row, f, n, m)
-                _note(
-                    tip.rotation,
-                    tip.translation,
-                    tip.jacobian,
-                    rotations[f],
-                    positions[f],
-                    jacobians[f],
-                )
-                pose_error(
-                    layout[f, KIND],
-                    tip.target_translation,
-                    tip.target_rotation,
-                    tip.translation,
-                    tip.rotation,
-                    tip.error,
-                )
-                select(layout, f, tip.rotation, tip.error, b)
-                task_rows(layout, f, tip.rotation, tip.jacobian, system)
-            for i in range(r):
-                b[m + i] = coordinates[k, i]
-                for j in range(n):
-                    system[m + i, j] = bases[k, j, i]
-                    b[m + i] -= bases[k, j, i] * (q[k, j] - references[k, j])
-            for i in range(m + r):
-                # Written so that NaN stays.
-                if not abs(b[i]) <= off:
-                    off = abs(b[i])
-            if off < _THERE:
-                arrived = True
+            off = approach_start(
+                q[k],
+                jacobians,
+                rotations,
+                positions,
+                targets[k],
+                layout,
+                bases[k],
+                references[k],
+                coordinates[k],
+            )
+            # Singular, not a number, or there: what that step has moved is rounding.
+            if not off >= _THERE:
                 break
-            gram(system, factor)
-            if not off < np.inf or not cholesky(factor):
-                return k
-            solve_cholesky(factor, b)
-            for j in range(n):
-                for i in range(n):
-                    q[k, j] += system[i, j] * b[i]
-        if not arrived:
+        if not 0.0 <= off < _THERE:
             return k
+        errors_and_rows(layout, targets[k], jacobians, rotations, positions, b, system)
+        for i in range(r):
+            for j in range(n):
+                system[m + i, j] = bases[k, j, i]
         gram(system, factor)
         if not cholesky(factor):
             return k
@@ -116,24 +92,27 @@ def look(
                 tangents[k, j, x] = 0.0
                 for i in range(n):
                     tangents[k, j, x] += system[i, j] * b[i]
+        row = table[k]
+        at = stage_of(row, n, m)
         for j in range(n):
             at.q[j] = q[k, j]
+        for f in range(tips):
+            _note(tip_of(row, f, n, m), rotations[f], positions[f], jacobians[f])
         if not evaluate(row, n, layout, 0.0, None):
             return k
     return -1
 
 
 @inlined
-def _note(
-    rotation: Array, translation: Array, jacobian: Array, turn: Array, place: Array, six: Array
-) -> None:
+def _note(tip: Tip, turn: Array, place: Array, six: Array) -> None:
+    """Set where a tip is, and its Jacobian."""
     for i in range(3):
-        translation[i] = place[i]
+        tip.translation[i] = place[i]
         for j in range(3):
-            rotation[i, j] = turn[i, j]
+            tip.rotation[i, j] = turn[i, j]
     for i in range(6):
         for j in range(six.shape[1]):
-            jacobian[i, j] = six[i, j]
+            tip.jacobian[i, j] = six[i, j]
 
 
 @kernel

@@ -77,11 +77,6 @@ class NodeGrid:
         """Times of the nodes [s], (N + 1,)."""
         return self.spline.t
 
-    def halved(self) -> "NodeGrid":
-        """Return the one with a node in the middle of each interval."""
-        t = np.sort(np.concatenate([self.t, 0.5 * (self.t[:-1] + self.t[1:])]))
-        return self.on(t)
-
     def on(self, t: Array) -> "NodeGrid":
         """Return the same on other nodes."""
         constraints = self.conditions.constraints
@@ -111,8 +106,7 @@ class NodeGrid:
         own = self.manifolds
         q = np.empty((len(self.t), len(start)))
         share = np.minimum(np.append(0.0, np.diff(self.t)) / time, 1.0)
-        targets = own.follows.targets(self.t)
-        if follow(start, wanted, share, targets, own.chains, own.layout, q) >= 0:
+        if follow(start, wanted, share, own.targets, own.chains, own.layout, q) >= 0:
             return None
         return self._near(q, np.asarray(np.gradient(q, self.t, axis=0)))
 

@@ -100,8 +100,7 @@ class Standing:
     def refined(self, where: npt.NDArray[np.bool_] | None = None) -> "Standing":
         """Return it with more nodes, in the middle of each interval or of some (N,)."""
         t = self.motion.grid.t
-        middles = 0.5 * (t[:-1] + t[1:])
-        finer = np.sort(np.concatenate([t, middles if where is None else middles[where]]))
+        finer = Grid(t).halved(where).nodes
         motion = self.motion.on(self.motion.grid.on(finer))
         if motion is None:
             return self

@@ -4,7 +4,6 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, RobotError
-from selfmotion.engine import transport
 from selfmotion.follow import Follows
 from selfmotion.search import projection
 from selfmotion.search.settings import FAR_STEPS, LONGEST_CORRECTION, NEAR_STEPS
@@ -72,10 +71,6 @@ class Manifold:
             arrived,
         )
         return found, arrived
-
-    def carried_bases(self, q: Array) -> Array:
-        """Return null-space bases along a motion (W, n), (W, n, r), each turned to the last one."""
-        return transport(np.array([self.follows.jacobian(here) for here in q]))
 
     def _check(self) -> None:
         """Compare with Pinocchio: where it puts the tool, nothing is left to correct."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from selfmotion.basics import Array, NoSequenceError, Progress, silent
 from selfmotion.collision import CollisionModel
+from selfmotion.engine import carried_bases
 from selfmotion.follow import Follows
 from selfmotion.search import edges
 from selfmotion.search.chains import best_chains, diverse_chains
@@ -267,7 +268,7 @@ def _around(manifold: Manifold, bounds: Admissible, x: Array, q: Array, ring: fl
     At one and two times `ring` to both sides along each axis of a basis of the null space that is
     carried along q: so a chain can move aside as a whole, without zigzag.
     """
-    basis = manifold.carried_bases(q)
+    basis = carried_bases(manifold.follows, q)
     offsets = ring * np.array([-2.0, -1.0, 1.0, 2.0])
     moves = np.einsum("wnr,k->wrkn", basis, offsets).reshape(len(q), -1, q.shape[1])
     guesses = q[:, None] + moves
