@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.costs import Partials, Samples
 from selfmotion.nodes import Step, minimise
 from selfmotion.nodes.banded import Banded
 from selfmotion.optimise import Status
@@ -106,6 +107,23 @@ def test_what_cannot_be_kept_is_said_to_be_so(panda: sm.RobotModel) -> None:
     begin = nodes_of(problem, 24)
     optimum = minimise(begin, np.arange(begin.h.shape[1]), never)
     assert optimum.status in (Status.INFEASIBLE, Status.MAX_ITERATIONS, Status.GRADIENT)
+
+
+class Backwards(sm.JointVelocity):
+    """A cost whose gradient points the wrong way."""
+
+    def gradient(self, samples: Samples) -> Partials:
+        return Partials(qd=-samples.qd)
+
+
+def test_a_wrong_gradient_is_said_to_be_wrong(panda: sm.RobotModel) -> None:
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    problem = sm.Problem(panda, path, "pose", PANDA_HOME, costs=[Backwards()], collision=None)
+    optimum = minimise(nodes_of(problem, 24), NONE, never)
+    assert optimum.status is Status.GRADIENT
+    report = sm.plan(problem).report
+    assert report.status is Status.GRADIENT
+    assert "check_cost" in report.message
 
 
 def test_it_stops_where_it_is_told_to(panda: sm.RobotModel) -> None:

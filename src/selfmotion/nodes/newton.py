@@ -21,6 +21,8 @@ from selfmotion.optimise import Status
 
 # The cost is right to this share of itself once a step promises no more.
 _AGREES = 1e-8
+# A step that promises more than this share of the cost, and lowers it by nothing, is no rounding.
+_ROUNDING = 1e-6
 # Slacks and prices go no further than this share towards 0 in one step.
 _INWARD = 0.995
 # A step is taken if it does at least this share of what it promises, and cut by half otherwise.
@@ -254,7 +256,11 @@ class _Solver:
                     self._tiny = self._tiny + 1 if length < _TINY else 0
                     return None
             length *= 0.5
-        return Status.PRECISION if not self._columns.size else Status.INFEASIBLE
+        if self._columns.size:
+            return Status.INFEASIBLE
+        # What a good step promises and none does is no rounding: the gradient is wrong.
+        precise = self._promised <= _ROUNDING * max(abs(motion.aim), np.finfo(float).tiny)
+        return Status.PRECISION if precise else Status.GRADIENT
 
     def _merit(self, motion: NodeMotion, slacks: Array, gap: Array) -> float:
         barrier = self._barrier * float(np.log(slacks).sum())

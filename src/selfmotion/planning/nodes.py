@@ -213,8 +213,9 @@ class NodeDescent:
         return None
 
     def _kept(self, optimum: Optimum, columns: Ints = _NO_COLUMNS) -> Standing | None:
-        """Return the optimum if it keeps all conditions."""
-        return None if _broken(optimum.motion).any() else self._standing(optimum, columns)
+        """Return the optimum if it is one, and keeps all conditions."""
+        none = optimum.status is Status.GRADIENT or _broken(optimum.motion).any()
+        return None if none else self._standing(optimum, columns)
 
     def _bound(self, optimum: Optimum, columns: Ints, dearest: float = np.inf) -> Standing | None:
         """Return the optimum that keeps all conditions, from one that keeps some columns of them.
