@@ -146,6 +146,7 @@ from selfmotion.planning import (
     Fastest as Fastest,
     Search as Search,
     fastest as fastest,
+    move as move,
     plan as plan,
     plan_in_parts as plan_in_parts,
 )
@@ -156,6 +157,7 @@ from selfmotion.result import (
     Parts as Parts,
     Plan as Plan,
     Report as Report,
+    load_move as load_move,
     load_plan as load_plan,
     retime as retime,
     slowdown as slowdown,

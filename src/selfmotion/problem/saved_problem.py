@@ -31,7 +31,7 @@ def problem_to_dict(
     document: dict[str, Any] = {
         "task": problem.task.value,
         "start": "free" if start is None else start.tolist(),
-        "robot": (describe_robot or _robot_to_dict)(problem.robot),
+        "robot": (describe_robot or robot_to_dict)(problem.robot),
         "path": describe(problem.path),
         "null_motion": describe(problem.null_motion),
         "costs": [describe(cost) for cost in problem.costs],
@@ -74,7 +74,7 @@ def follow_from_dict(values: Mapping[str, Any]) -> Follow:
     return Follow(path, values["task"], values.get("tool"), values.get("reference"))
 
 
-def _robot_to_dict(robot: RobotModel) -> dict[str, Any]:
+def robot_to_dict(robot: RobotModel) -> dict[str, Any]:
     return {
         "text": robot.urdf.text,
         "package_dirs": list(robot.urdf.package_dirs),

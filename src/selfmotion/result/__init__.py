@@ -1,6 +1,11 @@
 """What came of a problem: plans, how they were found, their files, and other paces."""
 
-from selfmotion.result.parts import Move as Move, Parts as Parts
+from selfmotion.result.move import Move as Move, load_move as load_move
+from selfmotion.result.parts import Parts as Parts
 from selfmotion.result.plan import Plan as Plan, Views as Views, load_plan as load_plan
 from selfmotion.result.report import Gap as Gap, Report as Report
-from selfmotion.result.retiming import retime as retime, slowdown as slowdown
+from selfmotion.result.retiming import (
+    paced as paced,
+    retime as retime,
+    slowdown as slowdown,
+)

@@ -57,13 +57,13 @@ class Archive(NamedTuple):
             "certificate": dataclasses.asdict(self.certificate),
         }
         arrays = {
-            **_arrays(self.trajectory, ""),
-            **_arrays(self.initial_trajectory, "initial_"),
+            **arrays_of(self.trajectory),
+            **arrays_of(self.initial_trajectory, "initial_"),
             "coefficients": self.coefficients,
             "history_x": np.concatenate([np.zeros(0), *(item.x for item in history)]),
             "history_sizes": np.array([len(item.x) for item in history], dtype=np.float64),
         }
-        description["digest"] = _digest(description, arrays)
+        description["digest"] = digest_of(description, arrays)
         write_archive(file, description, arrays)
 
     @classmethod
@@ -76,7 +76,7 @@ class Archive(NamedTuple):
         _check_format(file, description)
         written = description.pop("digest", None)
         altered = ""
-        if written != _digest(description, arrays):
+        if written != digest_of(description, arrays):
             altered = f"{file.name} was changed after the plan was written: its digest differs"
         try:
             found = _restore(description, arrays)
@@ -102,7 +102,7 @@ def _meshes(problem: Problem) -> dict[str, str]:
     return found
 
 
-def _digest(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
+def digest_of(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
     """Return a digest of robot, path, requirements, motion and all else that a file holds."""
     digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
     for name in sorted(arrays):
@@ -127,12 +127,16 @@ def _check_format(file: FilePath, description: Mapping[str, Any]) -> None:
     )
 
 
-def _arrays(trajectory: Trajectory, prefix: str) -> dict[str, Array]:
+def arrays_of(trajectory: Trajectory, prefix: str = "") -> dict[str, Array]:
+    """Return the arrays of a motion by name, each with a prefix."""
     named = {"t": trajectory.t, "q": trajectory.q, "qd": trajectory.qd, "qdd": trajectory.qdd}
     return {prefix + name: array for name, array in named.items() if array is not None}
 
 
-def _trajectory(arrays: Mapping[str, Array], prefix: str, names: tuple[str, ...]) -> Trajectory:
+def trajectory_of(
+    arrays: Mapping[str, Array], names: tuple[str, ...], prefix: str = ""
+) -> Trajectory:
+    """Return the motion of which `arrays_of` returned the arrays."""
     t, q, qd = (arrays[prefix + name] for name in ("t", "q", "qd"))
     return Trajectory(t, q, qd, names, arrays.get(prefix + "qdd"))
 
@@ -194,8 +198,8 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archiv
     )
     return Archive(
         problem=problem_from_dict(description["problem"]),
-        trajectory=_trajectory(arrays, "", names),
-        initial_trajectory=_trajectory(arrays, "initial_", names),
+        trajectory=trajectory_of(arrays, names),
+        initial_trajectory=trajectory_of(arrays, names, "initial_"),
         coefficients=arrays["coefficients"],
         report=Report(history=history, **report),
         certificate=_certificate_from_dict(description["certificate"]),

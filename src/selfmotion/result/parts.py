@@ -4,34 +4,10 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from selfmotion.basics import PlanError
-from selfmotion.certificate import Finding
 from selfmotion.motion import Trajectory, joined_motions
 from selfmotion.problem.problem import Problem
+from selfmotion.result.move import Move
 from selfmotion.result.plan import Plan
-
-
-@dataclass(frozen=True, eq=False)
-class Move:
-    """A joint motion from rest to rest between two parts of a path.
-
-    Attributes
-    ----------
-    trajectory : Trajectory or None
-        None where none was found.
-    findings : tuple of Finding
-        What the requirements on limits and clearances say of it; each judges all times.
-    trouble : str
-        What is wrong with it, or why none was found; "" where all is kept.
-    """
-
-    trajectory: Trajectory | None
-    findings: tuple[Finding, ...] = ()
-    trouble: str = ""
-
-    @property
-    def verified(self) -> bool:
-        """Whether there is one that keeps all that is required."""
-        return self.trajectory is not None and not self.trouble
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from operator import and_
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, PlanError, ProblemError, per_joint, shown
+from selfmotion.basics import Array, PlanError, ProblemError, per_joint, read_only, shown
 from selfmotion.constraints import (
     Constraint,
     Envelope,
@@ -28,6 +28,8 @@ _ROUNDING = 1e-9
 # Grid points of toppra, and samples of the new motion, per sample of the old one: the first that
 # keeps the plan's tolerance.
 _DENSITIES = (4, 8, 16)
+# Where nobody limits the jerk, moves reach their full acceleration in this time [s].
+_SOFT = 0.02
 # By how much slower a pace is tried, and how often.
 _FACTOR, _SLOWER = 1.15, 16
 
@@ -97,6 +99,28 @@ def retime(plan: Plan, acceleration: npt.ArrayLike, velocity: npt.ArrayLike | No
         pace = pace.slower(_FACTOR)
         result = _retimed(plan, wanted, pace)
     return result
+
+
+def paced(motion: Trajectory, kept: Envelope) -> Trajectory:
+    """Return a joint path in the shortest time within limits, from rest to rest, from t = 0 on.
+
+    Parameters
+    ----------
+    motion : Trajectory
+        The path over any time of its own.
+    kept : Envelope
+        Finite limits of speed and acceleration, and those of the jerk where there are any.
+
+    Raises
+    ------
+    PlanError
+        No pace keeps the limits.
+    """
+    # Controllers want accelerations without jumps from arms of any make.
+    soft = np.where(np.isfinite(kept.jerk), kept.jerk, kept.acceleration / _SOFT)
+    kept = replace(kept, jerk=read_only(soft))
+    pace = _smoothed(_pace(motion, kept, _DENSITIES[0]), kept)
+    return _along(_slowed(pace, motion, kept), motion)
 
 
 def _check_plan(plan: Plan) -> None:

@@ -1,0 +1,269 @@
+"""Joint motions from one configuration to another that nothing but limits and bodies tells."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    Array,
+    InverseKinematicsError,
+    ProblemError,
+    Progress,
+    as_number,
+    as_several,
+    one_blas_thread,
+    random_numbers,
+    read_only,
+    shown,
+    silent,
+)
+from selfmotion.constraints import Clearance, Constraint, Envelope
+from selfmotion.follow import Follows
+from selfmotion.motion import Trajectory
+from selfmotion.path import Dwell
+from selfmotion.planning.rounding import rounded
+from selfmotion.planning.settings import (
+    END_CONFIGURATIONS,
+    FINER_LOOKS,
+    MOVE_DEADLINE,
+    MOVE_MARGIN,
+    SLOWER_FACTOR,
+    SLOWER_TRIES,
+    TRIES_OF_MOVE,
+    UP_TO_SPEED,
+    USED,
+    USUAL_SPEED,
+    WIDER,
+)
+from selfmotion.planning.ways import Room, find_way
+from selfmotion.problem import KEPT, NO_OVERLAP, envelope_of
+from selfmotion.result import Move, paced
+from selfmotion.robot import RobotModel
+from selfmotion.search import start_candidates
+from selfmotion.task import SE3, Task
+
+
+def move(
+    robot: RobotModel,
+    first: npt.ArrayLike | SE3,
+    last: npt.ArrayLike | SE3,
+    *,
+    constraints: Sequence[Constraint] = KEPT,
+    clearance: Clearance | None = NO_OVERLAP,
+    via: Sequence[npt.ArrayLike] = (),
+    task: Task | str = "pose",
+    deadline: float = MOVE_DEADLINE,
+    rng: np.random.Generator | int = 0,
+    progress: Progress = silent,
+) -> Move:
+    """Move from one configuration to another, from rest to rest, past what is in the way.
+
+    Straight where that is free; else along the best of a few ways that two trees find (RRT-Connect),
+    shortened, with corners rounded as far as there is room. The pace is as fast as the limits of
+    joint velocity, acceleration and jerk allow. The motion is judged like a plan, at all times.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    first, last : (n,) or SE3
+        Configurations [rad or m], or a pose of the tool (an SE3 or a 4 × 4 matrix, in the frame of
+        `RobotModel.pose`): then any configuration that puts the tool there.
+    constraints : sequence of Constraint
+        What the motion must keep. By default limits of joint position and velocity, and those of
+        acceleration and jerk that the arm's maker publishes.
+    clearance : Clearance, optional
+        What keeps the arm apart from obstacles and from itself: by default its links must not
+        overlap. None to leave that out; the verdict then says so. A `Clearance` among the
+        constraints takes the place of the default.
+    via : sequence of (n,)
+        Configurations that the motion passes exactly, in this order, without stopping where there
+        is room for a curve.
+    task : Task or str
+        The rows of the pose that count where an end is one.
+    deadline : float
+        After so many seconds of looking the move counts as not found.
+    rng : Generator or int
+        Shifts the samples; the same one gives the same move, unless the deadline ends it.
+    progress : callable, optional
+        Told the stage, as in `plan`.
+
+    Returns
+    -------
+    Move
+        Also where none was found: `Move.trouble` says after how many seconds, and `Move.require`
+        raises. That none is found does not prove that there is none.
+
+    Raises
+    ------
+    InverseKinematicsError
+        No configuration puts the tool at a pose.
+    ProblemError
+        An argument is not what it should be.
+    """
+    if not isinstance(robot, RobotModel):
+        raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
+    asked = list(as_several(constraints, "constraints", Constraint))
+    if clearance is not None and not isinstance(clearance, Clearance):
+        raise ProblemError(f"clearance is {shown(clearance)}, expected a Clearance, or None")
+    apart = any(item.envelope(robot).bodies for item in asked)
+    default = clearance is NO_OVERLAP and (apart or not robot.urdf.has_collisions)
+    if clearance is not None and not default:
+        asked.append(clearance)
+    if not isinstance(via, list | tuple | np.ndarray):
+        raise ProblemError(f"via is {shown(via)}, expected a list of configurations")
+    seconds, generator = as_number(deadline, "deadline", above=0.0), random_numbers(rng)
+    motions = FreeMotions(robot, asked, generator, progress)
+    with one_blas_thread():
+        ends = [motions.configurations(end, Task.of(task)) for end in (first, *via, last)]
+        return motions.through(ends, seconds)
+
+
+class FreeMotions:
+    """Finds motions of an arm between configurations.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    constraints : sequence of Constraint
+        What they must keep at all times; what is asked of ends only is left out.
+    rng : Generator
+    progress : Progress
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        constraints: Sequence[Constraint],
+        rng: np.random.Generator,
+        progress: Progress = silent,
+    ) -> None:
+        inner = [part.on_last_part() for item in constraints if (part := item.on_part())]
+        kept = [item for item in inner if item is not None and item.applies(robot)]
+        self.robot, self.constraints = robot, tuple(kept)
+        self._rng, self._progress = rng, progress
+        self.asked: Envelope = envelope_of(robot, self.constraints)
+
+    def configurations(self, end: npt.ArrayLike | SE3, task: Task) -> Array:
+        """Return the configurations (k, n) that an end stands for; see `move`."""
+        is_pose = hasattr(end, "homogeneous") or np.shape(end) == (4, 4)  # type: ignore[arg-type]
+        if not is_pose:
+            return self.robot.configuration(end)[None]  # type: ignore[arg-type]
+        arm = self.asked.arm(self.robot)
+        follows = Follows.of(arm, Dwell(end, 1.0), task)
+        room = Room(self.asked, self.robot, MOVE_MARGIN)
+        found = np.array(start_candidates(follows, END_CONFIGURATIONS, self._rng, room.free))
+        free = found[room.free(found)]
+        if not len(free):
+            raise InverseKinematicsError(
+                f"{self.robot.name}: all {len(found)} configurations that were found for the pose "
+                f"of an end are beyond limits or meet something; give a configuration or fewer "
+                f"rows (task=)",
+                position_miss=0.0,
+                rotation_miss=0.0,
+            )
+        return free
+
+    def between(self, first: Array, last: Array, seconds: float = MOVE_DEADLINE) -> Move:
+        """Return the move from a configuration (n,) to another one, or why there is none."""
+        return self.through([first[None], last[None]], seconds)
+
+    def time_of(self, first: Array, last: Array) -> Array:
+        """Return what straight moves (K, n) → (K, n) would take by the limits, at least [s]."""
+        limits = self._limits
+        far = np.abs(last - first)
+        # From rest to rest: full acceleration, full speed, full brake.
+        ramp = limits.speed / limits.acceleration
+        short = 2.0 * np.sqrt(far / limits.acceleration)
+        times = np.where(far > limits.speed * ramp, far / limits.speed + ramp, short)
+        return np.asarray(times.max(axis=-1))
+
+    def through(self, ends: Sequence[Array], seconds: float) -> Move:
+        """Return the move through one of several configurations (k, n) each, in this order."""
+        self._progress("move", 1, 1)
+        began = time.perf_counter()
+        blocked = self._blocked(ends)
+        if blocked:
+            return self._missing(blocked)
+        worst, margin, finer = "", MOVE_MARGIN, 1.0
+        for _ in range(TRIES_OF_MOVE):
+            room = Room(self.asked, self.robot, margin, finer)
+            way = self._way(room, ends, began + seconds)
+            if way is None:
+                break
+            path = rounded(room, *way)
+            if path is not None:
+                found = self._at_its_pace(path)
+                if found.verified:
+                    return found
+                worst = worst or f", where {found.trouble}"
+            margin, finer = WIDER * margin, FINER_LOOKS * finer
+        waited = time.perf_counter() - began
+        return self._missing(f"no way was found between the configurations in {waited:.1f} s{worst}")
+
+    def _missing(self, trouble: str) -> Move:
+        return Move(self.robot, self.constraints, None, (), trouble)
+
+    def _blocked(self, ends: Sequence[Array]) -> str:
+        """Return what is wrong with an end already, "" for nothing."""
+        room = Room(self.asked, self.robot, 0.0)
+        for number, several in enumerate(ends):
+            if room.free(several).any():
+                continue
+            where = "first" if number == 0 else "last" if number == len(ends) - 1 else "via"
+            still = np.stack([several[0], several[0]])
+            names = self.robot.joint_names
+            motion = Trajectory([0.0, 1.0], still, 0.0 * still, names, 0.0 * still)
+            trouble = Move.judged(self.robot, self.constraints, motion).trouble
+            return f"the {where} configuration is not allowed: {trouble or 'a band is left'}"
+        return ""
+
+    def _way(self, room: Room, ends: Sequence[Array], end: float) -> tuple[Array, list[int]] | None:
+        """Return a way (m, n) through all ends, and where on it the inner ones are."""
+        legs: list[Array] = []
+        starts = _allowed(room, ends[0])
+        for goals in ends[1:]:
+            leg = find_way(room, starts, _allowed(room, goals), end, self._rng)
+            if leg is None:
+                return None
+            legs.append(leg)
+            starts = leg[-1:]
+        passed = np.cumsum([len(leg) - 1 for leg in legs]).tolist()[:-1]
+        return np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])]), passed
+
+    @property
+    def _limits(self) -> Envelope:
+        """The limits of the pace: all of speed and acceleration are finite."""
+        asked = self.asked
+        speed = np.where(np.isfinite(asked.speed), asked.speed, USUAL_SPEED)
+        usual = speed / UP_TO_SPEED
+        faster = np.where(np.isfinite(asked.acceleration), asked.acceleration, usual)
+        return replace(
+            asked,
+            speed=read_only(USED * speed),
+            acceleration=read_only(USED * faster),
+            jerk=read_only(USED * asked.jerk),
+        )
+
+    def _at_its_pace(self, path: Trajectory) -> Move:
+        """Return the move along a joint path, as fast as it may be."""
+        motion = paced(path, self._limits)
+        q, qd = motion.q.copy(), motion.qd.copy()
+        # Exactly where it should begin and end.
+        q[0], q[-1], qd[0], qd[-1] = path.q[0], path.q[-1], 0.0, 0.0
+        faster = motion(motion.t, 2)
+        for slower in SLOWER_FACTOR ** np.arange(SLOWER_TRIES):
+            t, names = slower * motion.t, self.robot.joint_names
+            whole = Trajectory(t, q, qd / slower, names, faster / slower**2)
+            found = Move.judged(self.robot, self.constraints, whole)
+            if not any(not item.kept and item.of_pace for item in found.findings):
+                break
+        return found
+
+
+def _allowed(room: Room, several: Array) -> Array:
+    """Return those of configurations that are free; all where none is with its margin."""
+    free = several[room.free(several)]
+    return free if len(free) else several
