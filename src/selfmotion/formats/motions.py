@@ -23,14 +23,14 @@ from selfmotion.formats.mujoco import keyframes
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.formats.urscript import script
 from selfmotion.motion import Trajectory, column_names
-from selfmotion.result import Plan
+from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import RobotModel
 
 
 def write_motion(
-    plan: Plan, file: str | Path, *, rate: float | None = None, form: str | None = None
+    plan: Plan | Parts | Move, file: str | Path, *, rate: float | None = None, form: str | None = None
 ) -> None:
-    """Write the motion of a plan in a format that others read; atomically.
+    """Write the motion of a plan, of parts or a move in a format that others read; atomically.
 
     ============  ========  ==================================================================
     form          suffix    what
@@ -46,7 +46,7 @@ def write_motion(
 
     Parameters
     ----------
-    plan : Plan
+    plan : Plan, Parts or Move
     file : path
     rate : float, optional
         Samples per second; by default those of the plan (URScript: 125).
@@ -59,12 +59,15 @@ def write_motion(
         The form is unknown, or the file cannot be written.
     ProblemError
         The rate gives no samples, or the arm has what the format cannot say.
+    PlanError
+        A move was not found.
     """
-    if not isinstance(plan, Plan):
-        raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
+    if not isinstance(plan, Plan | Parts | Move):
+        raise ProblemError(f"plan is {shown(plan)}, expected a Plan, Parts or a Move")
+    motion = plan.motion if isinstance(plan, Move) else plan.trajectory
     path = as_path(file)
     write, rate = _writer(path, rate, form)
-    write(path, MotionSamples.of(plan.trajectory, rate), plan.robot, rate)
+    write(path, MotionSamples.of(motion, rate), plan.robot, rate)
 
 
 def write_parts(

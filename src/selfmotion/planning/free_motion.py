@@ -61,9 +61,10 @@ def move(
 ) -> Move:
     """Move from one configuration to another, from rest to rest, past what is in the way.
 
-    Straight where that is free; else along the best of a few ways that two trees find (RRT-Connect),
-    shortened, with corners rounded as far as there is room. The pace is as fast as the limits of
-    joint velocity, acceleration and jerk allow. The motion is judged like a plan, at all times.
+    Straight where that is free; else along the best of a few ways that two trees find
+    (RRT-Connect), shortened, with corners rounded as far as there is room. The pace is as fast as
+    the limits of joint velocity, acceleration and jerk allow. The motion is judged like a plan, at
+    all times.
 
     Parameters
     ----------
@@ -148,9 +149,9 @@ class FreeMotions:
 
     def configurations(self, end: npt.ArrayLike | SE3, task: Task) -> Array:
         """Return the configurations (k, n) that an end stands for; see `move`."""
-        is_pose = hasattr(end, "homogeneous") or np.shape(end) == (4, 4)  # type: ignore[arg-type]
+        is_pose = hasattr(end, "homogeneous") or np.shape(end) == (4, 4)
         if not is_pose:
-            return self.robot.configuration(end)[None]  # type: ignore[arg-type]
+            return self.robot.configuration(end)[None]
         arm = self.asked.arm(self.robot)
         follows = Follows.of(arm, Dwell(end, 1.0), task)
         room = Room(self.asked, self.robot, MOVE_MARGIN)
@@ -195,13 +196,15 @@ class FreeMotions:
                 break
             path = rounded(room, *way)
             if path is not None:
-                found = self._at_its_pace(path)
-                if found.verified:
-                    return found
-                worst = worst or f", where {found.trouble}"
+                move = self._at_its_pace(path)
+                if move.verified:
+                    return move
+                worst = worst or f", where {move.trouble}"
             margin, finer = WIDER * margin, FINER_LOOKS * finer
         waited = time.perf_counter() - began
-        return self._missing(f"no way was found between the configurations in {waited:.1f} s{worst}")
+        return self._missing(
+            f"no way was found between the configurations in {waited:.1f} s{worst}"
+        )
 
     def _missing(self, trouble: str) -> Move:
         return Move(self.robot, self.constraints, None, (), trouble)
@@ -213,12 +216,25 @@ class FreeMotions:
             if room.free(several).any():
                 continue
             where = "first" if number == 0 else "last" if number == len(ends) - 1 else "via"
-            still = np.stack([several[0], several[0]])
-            names = self.robot.joint_names
-            motion = Trajectory([0.0, 1.0], still, 0.0 * still, names, 0.0 * still)
-            trouble = Move.judged(self.robot, self.constraints, motion).trouble
-            return f"the {where} configuration is not allowed: {trouble or 'a band is left'}"
+            return f"the {where} configuration is not allowed: {self._wrong_with(several[0])}"
         return ""
+
+    def _wrong_with(self, q: Array) -> str:
+        """Return what forbids a configuration (n,), in words."""
+        asked, beyond = self.asked, []
+        for joint, name in enumerate(self.robot.joint_names):
+            over = max(asked.lower[joint] - q[joint], q[joint] - asked.upper[joint])
+            if over > 0.0:
+                beyond.append(f"joint '{name}' is {over:.3g} beyond its limit")
+        if beyond:
+            return "; ".join(beyond)
+        for model, far in asked.bodies:
+            near = model.distance(q)
+            if near.value < far:
+                apart = f"{near.value * 1e3:.2f} mm apart (wanted: {far * 1e3:.2f} mm)"
+                return f"{near.first} and {near.second} are {apart}"
+        names = ", ".join(item.name for item in asked.quantities)
+        return f"it leaves what is asked of {names}"
 
     def _way(self, room: Room, ends: Sequence[Array], end: float) -> tuple[Array, list[int]] | None:
         """Return a way (m, n) through all ends, and where on it the inner ones are."""

@@ -30,7 +30,8 @@ def rounded(room: Room, way: Array, passed: Sequence[int] = ()) -> Trajectory | 
         counts = np.maximum(fewest, np.ceil(lengths / spacing)).astype(np.int64)
         legs = np.repeat(np.arange(len(lengths)), counts)
         points = [
-            np.linspace(*way[k : k + 2], count, endpoint=False) for k, count in enumerate(counts)
+            np.linspace(way[k], way[k + 1], count, endpoint=False)
+            for k, count in enumerate(counts.tolist())
         ]
         path = _spline(_through(points, way, passed))
         blocked = _blocked(room, path)
@@ -50,12 +51,11 @@ def _through(points: Sequence[Array], way: Array, passed: Sequence[int]) -> Arra
 
     The spline goes through a control point that lies halfway between its neighbours.
     """
-    legs = [leg.copy() for leg in points]
+    legs = list(points)
     for corner in passed:
-        before, after = legs[corner - 1][-1], legs[corner][1] if len(legs[corner]) > 1 else way[corner + 1]
-        towards = way[corner] - before, after - way[corner]
-        step = 0.25 * (towards[0] + towards[1])
-        legs[corner] = np.concatenate([[way[corner] - step, way[corner], way[corner] + step], legs[corner][1:]])
+        here, (one, other) = way[corner], (legs[corner - 1][-1], legs[corner][1])
+        step = 0.25 * (other - one)
+        legs[corner] = np.concatenate([[here - step, here, here + step], legs[corner][1:]])
     return np.concatenate([*legs, way[-1:]])
 
 

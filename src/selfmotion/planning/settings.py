@@ -104,19 +104,22 @@ WIDER = 3.0
 FINER_LOOKS = 2.0
 TRIES_OF_MOVE = 4
 # Legs are looked at in steps in which no point of a body moves farther than this [m], finished
-# paths closely; and in steps of joints [rad] where there are no bodies. So many looks at once.
+# paths closely; and in steps of joints [rad] where there are no bodies. So many looks
+# at once to begin with.
 LEG_STEP = 0.02
 FINE_STEP = 0.005
 TURN_STEP = 0.05
-LOT = 24
+FIRST_LOT = 4
 # Trees grow by legs of so many seconds at full speed; this share of the samples lies around the
 # middle, so far around, in shares of the distance; others are anywhere.
 LEG_RANGE = 1.0
 AROUND_MIDDLE = 0.2
 SPREAD = 0.5
-# The best of so many ways is taken; so many shortcuts are tried on each.
+# The best of so many ways is taken; so many shortcuts are tried on each at most, until so many in
+# turn are blocked.
 WAYS = 4
-SHORTCUTS = 150
+SHORTCUTS = 120
+MISSED = 30
 # Control points of a path to begin with; and how near to each other they may come around corners,
 # as a share of the path. Samples of a path at least.
 FIRST_POINTS = 12

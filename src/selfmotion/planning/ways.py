@@ -6,24 +6,29 @@ planning", ICRA 2000). The best of a few ways is shortened by straight shortcuts
 
 import math
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Ints
 from selfmotion.constraints import Envelope
 from selfmotion.planning.settings import (
     AROUND_MIDDLE,
-    FINE_STEP,
+    FIRST_LOT,
     LEG_RANGE,
     LEG_STEP,
-    LOT,
+    MISSED,
     SHORTCUTS,
     SPREAD,
     TURN_STEP,
     WAYS,
 )
 from selfmotion.robot import RobotModel
+
+# Configurations this near are the same [rad or m].
+_SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +51,7 @@ class Room:
     margin: float
     finer: float = 1.0
 
-    def free(self, q: Array) -> "np.typing.NDArray[np.bool_]":
+    def free(self, q: Array) -> npt.NDArray[np.bool_]:
         """Return which configurations (K, n) are allowed, (K,)."""
         asked = self.asked
         allowed = np.asarray(((q >= asked.lower) & (q <= asked.upper)).all(axis=1))
@@ -57,7 +62,7 @@ class Room:
             allowed[rows] = ~model.colliding(q[rows], far + self.margin)
         return allowed
 
-    def steps(self, way: Array, step: float = LEG_STEP) -> Array:
+    def steps(self, way: Array, step: float = LEG_STEP) -> Ints:
         """Return in how many steps to look at legs from each of configurations (K, n) to the next.
 
         In each no point of a body moves farther than `step` [m].
@@ -66,25 +71,25 @@ class Room:
         count = (turned * self.robot.joint_weights).max(axis=1) / TURN_STEP
         for model, _ in self.asked.bodies:
             count = np.maximum(count, (turned @ model.lever_arms.T).max(axis=1) / step)
-        return np.maximum(1, np.ceil(self.finer * count)).astype(np.int64)
+        return np.asarray(np.maximum(1, np.ceil(self.finer * count)), dtype=np.int64)
 
     def share(self, first: Array, last: Array) -> float:
         """Return up to which share of it a straight leg is free, seen from its beginning."""
         count = int(self.steps(np.stack([first, last]))[0])
         shares = np.arange(1, count + 1) / count
-        for lot in range(0, count, LOT):
-            some = shares[lot : lot + LOT]
+        for lot in _lots(count):
+            some = shares[lot]
             blocked = np.flatnonzero(~self.free(first + some[:, None] * (last - first)))
             if blocked.size:
-                return float((lot + blocked[0]) / count)
+                return float((lot.start + blocked[0]) / count)
         return 1.0
 
     def is_open(self, first: Array, last: Array, step: float = LEG_STEP) -> bool:
         """Whether all of a straight leg is free; what is in the way shows early."""
         count = int(self.steps(np.stack([first, last]), step)[0])
         order = _spread_out(count)
-        for lot in range(0, count, LOT):
-            some = order[lot : lot + LOT] / count
+        for lot in _lots(count):
+            some = order[lot] / count
             if not self.free(first + some[:, None] * (last - first)).all():
                 return False
         return True
@@ -131,8 +136,9 @@ def find_way(
 
 def shortened(room: Room, way: Array, rng: np.random.Generator) -> Array:
     """Return a way (m, n) with straight shortcuts between points of it, where these are free."""
+    missed = 0
     for _ in range(SHORTCUTS):
-        if len(way) < 3:
+        if len(way) < 3 or missed >= MISSED:
             break
         lengths = (np.abs(np.diff(way, axis=0)) * room.rates).max(axis=1)
         ends = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -142,23 +148,21 @@ def shortened(room: Room, way: Array, rng: np.random.Generator) -> Array:
             places = np.array([ends[np.argmin(np.abs(ends - place))] for place in places])
         legs = np.minimum(np.searchsorted(ends, places, side="right") - 1, len(way) - 2)
         shares = (places - ends[legs]) / np.maximum(lengths[legs], 1e-12)
-        first, last = (way[k] + s * (way[k + 1] - way[k]) for k, s in zip(legs, shares, strict=True))
-        if legs[1] > legs[0] and room.is_open(first, last):
-            inner = [first, last]
-            way = _apart(np.concatenate([way[: legs[0] + 1], inner, way[legs[1] + 1 :]]))
+        between = way[legs] + shares[:, None] * (way[legs + 1] - way[legs])
+        missed += 1
+        if legs[1] > legs[0] and room.is_open(*between):
+            way = _apart(np.concatenate([way[: legs[0] + 1], between, way[legs[1] + 1 :]]))
+            missed = 0
     return way
 
 
 def _apart(way: Array) -> Array:
-    """Return a way without configurations that repeat the one before."""
-    kept = np.append(True, np.abs(np.diff(way, axis=0)).max(axis=1) > 1e-9)
-    # The last one stays as it is.
-    kept[-1] = True
-    if not kept[1:-1].all() or len(way) > 2:
-        repeats = np.abs(way[:-1] - way[-1]).max(axis=1) <= 1e-9
-        kept[:-1] &= ~repeats
-        kept[0] = True
-    return way[kept]
+    """Return a way without configurations that repeat the one before; its ends stay."""
+    kept = np.append(True, np.abs(np.diff(way, axis=0)).max(axis=1) > _SAME)
+    if not kept[-1] and len(way) > 2:
+        kept[-1] = True
+        kept[np.flatnonzero(kept[:-1])[-1]] = len(np.flatnonzero(kept[:-1])) == 1
+    return np.asarray(way[kept])
 
 
 def _duration(way: Array, rates: Array) -> float:
@@ -182,6 +186,7 @@ class _Tree:
         return int(np.argmin((((reached - q) * self._rates) ** 2).sum(axis=1)))
 
     def add(self, q: Array, before: int) -> int:
+        """Add a configuration (n,) that a leg leads to from another one; return its number."""
         if len(self._before) == len(self._q):
             self._q = np.concatenate([self._q, np.empty_like(self._q)])
         self._q[len(self._before)] = q
@@ -196,12 +201,13 @@ class _Tree:
         last = q if far <= most else first + most / far * (q - first)
         share = room.share(first, last)
         if share <= 0.0:
-            return near, far < 1e-12
+            return near, far < _SAME
         reached = last if share == 1.0 else first + share * (last - first)
         return self.add(reached, near), share == 1.0 and far <= most
 
     def at(self, k: int) -> Array:
-        return self._q[k]
+        """Return a configuration, (n,)."""
+        return np.asarray(self._q[k])
 
     def way(self, k: int) -> Array:
         """Return the way from a root to a configuration, (m, n)."""
@@ -233,6 +239,14 @@ def _connected(
     return None
 
 
+def _lots(count: int) -> Iterator[slice]:
+    """Yield slices of 0 to count - 1, small ones first: most of what is blocked shows early."""
+    first, size = 0, FIRST_LOT
+    while first < count:
+        yield slice(first, first + size)
+        first, size = first + size, 2 * size
+
+
 def _spread_out(count: int) -> Array:
     """Return 1 to count in an order in which each one is far from those before."""
     bits = max(1, math.ceil(math.log2(count + 1)))
@@ -240,9 +254,3 @@ def _spread_out(count: int) -> Array:
     for bit in range(bits):
         order |= ((np.arange(2**bits) >> bit) & 1) << (bits - 1 - bit)
     return order[(order > 0) & (order <= count)].astype(np.float64)
-
-
-def open_all_along(room: Room, way: Array) -> Array:
-    """Return which legs of a way (m, n) are open, looked at closely, (m - 1,)."""
-    pairs = zip(way[:-1], way[1:], strict=True)
-    return np.array([room.is_open(one, other, FINE_STEP) for one, other in pairs])

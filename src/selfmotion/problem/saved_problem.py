@@ -75,6 +75,7 @@ def follow_from_dict(values: Mapping[str, Any]) -> Follow:
 
 
 def robot_to_dict(robot: RobotModel) -> dict[str, Any]:
+    """Return an arm as JSON-safe values, with its URDF's text; for `rebuild_robot`."""
     return {
         "text": robot.urdf.text,
         "package_dirs": list(robot.urdf.package_dirs),

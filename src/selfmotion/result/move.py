@@ -4,6 +4,7 @@ import dataclasses
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -164,10 +165,9 @@ def load_move(
     altered = written != digest_of(description, arrays)
     try:
         given, listed = description["robot"], description["constraints"]
-        key = json.dumps(given, sort_keys=True)
-        robot = make(key, lambda: rebuild_robot(**given))
+        robot = make(json.dumps(given, sort_keys=True), partial(rebuild_robot, **given))
         constraints = tuple(
-            make(json.dumps(item, sort_keys=True), lambda item=item: restore(Constraint, item))
+            make(json.dumps(item, sort_keys=True), partial(restore, Constraint, item))
             for item in listed
         )
         motion = trajectory_of(arrays, tuple(description["joint_names"]))
@@ -181,5 +181,3 @@ def load_move(
         trouble = f"{path.name} was changed after the move was written: its digest differs"
         found = replace(found, trouble="; ".join(filter(None, (trouble, found.trouble))))
     return found
-
-

@@ -8,6 +8,7 @@ from selfmotion.motion import Trajectory, joined_motions
 from selfmotion.problem.problem import Problem
 from selfmotion.result.move import Move
 from selfmotion.result.plan import Plan
+from selfmotion.robot import RobotModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,11 @@ class Parts:
             for cut, ending in zip(self.cuts, self.endings, strict=True)
         ]
         return "\n".join([*lines, f"  {self.verdict}"])
+
+    @property
+    def robot(self) -> RobotModel:
+        """The arm."""
+        return self.problem.robot
 
     @property
     def verified(self) -> bool:
