@@ -28,7 +28,11 @@ from selfmotion.robot import RobotModel
 
 
 def write_motion(
-    plan: Plan | Parts | Move, file: str | Path, *, rate: float | None = None, form: str | None = None
+    plan: Plan | Parts | Move,
+    file: str | Path,
+    *,
+    rate: float | None = None,
+    form: str | None = None,
 ) -> None:
     """Write the motion of a plan, of parts or a move in a format that others read; atomically.
 
