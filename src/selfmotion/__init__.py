@@ -107,6 +107,13 @@ from selfmotion.formats import (
     write_parts as write_parts,
     write_problem as write_problem,
 )
+from selfmotion.job import (
+    Program as Program,
+    Seam as Seam,
+    Step as Step,
+    load_program as load_program,
+    plan_job as plan_job,
+)
 from selfmotion.motion import (
     BSplineNullMotion as BSplineNullMotion,
     FreeNullMotion as FreeNullMotion,
@@ -136,6 +143,7 @@ from selfmotion.path import (
     Placed as Placed,
     Polyline as Polyline,
     Retimed as Retimed,
+    Reversed as Reversed,
     Section as Section,
     TwistPath as TwistPath,
     Waypoints as Waypoints,

@@ -16,6 +16,7 @@ from selfmotion.path.pace import Pace as Pace, times_along as times_along
 from selfmotion.path.placed import Placed as Placed
 from selfmotion.path.polyline import Polyline as Polyline
 from selfmotion.path.retimed import Retimed as Retimed
+from selfmotion.path.reversed import Reversed as Reversed
 from selfmotion.path.section import Section as Section, section_at_rest as section_at_rest
 from selfmotion.path.shapes import Circle as Circle, Line as Line
 from selfmotion.path.time_law import TimeLaw as TimeLaw

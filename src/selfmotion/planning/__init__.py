@@ -1,5 +1,10 @@
 """From a problem to a plan."""
 
+from selfmotion.planning.branches import (
+    branches as branches,
+    from_start as from_start,
+    near_start as near_start,
+)
 from selfmotion.planning.fastest import Fastest as Fastest, fastest as fastest
 from selfmotion.planning.free_motion import FreeMotions as FreeMotions, move as move
 from selfmotion.planning.parts import plan_in_parts as plan_in_parts

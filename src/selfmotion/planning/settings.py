@@ -128,6 +128,15 @@ PATH_SAMPLES = 64
 # Configurations for an end that is a pose of the tool, at most.
 END_CONFIGURATIONS = 16
 
+# --- branches (branches)
+# So many starts are looked at, and so many for each branch that is asked for, until so many have
+# failed; plans from each take so many evaluations at most, and are the same where both their ends
+# are as near as this [rad or m].
+BRANCH_STARTS = 48
+BRANCH_TRIES = 4
+BRANCH_EVALUATIONS = 60
+SAME_ENDS = 0.2
+
 # --- the fastest motion
 # Rounds end when one gains less than this share, or after so many.
 ROUND_GAIN = 2e-3

@@ -10,6 +10,8 @@ from selfmotion.problem.problem import (
     envelope_of as envelope_of,
 )
 from selfmotion.problem.saved_problem import (
+    arm_and_constraints as arm_and_constraints,
+    describe_arm as describe_arm,
     problem_from_dict as problem_from_dict,
     problem_to_dict as problem_to_dict,
 )

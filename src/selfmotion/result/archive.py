@@ -3,7 +3,7 @@
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, MutableMapping
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
@@ -67,10 +67,11 @@ class Archive(NamedTuple):
         write_archive(file, description, arrays)
 
     @classmethod
-    def read(cls, file: FilePath) -> "Archive":
+    def read(cls, file: FilePath, known: MutableMapping[str, Any] | None = None) -> "Archive":
         """Read a file; FileFormatError where it is none, or of another version.
 
-        The certificate is that of the motion as it is read, measured anew.
+        The certificate is the written one. Arms and constraints are taken from what is `known` by
+        their description, and put there: making their bodies takes a good part of a second.
         """
         description, arrays = read_archive(file)
         _check_format(file, description)
@@ -79,7 +80,7 @@ class Archive(NamedTuple):
         if written != digest_of(description, arrays):
             altered = f"{file.name} was changed after the plan was written: its digest differs"
         try:
-            found = _restore(description, arrays)
+            found = _restore(description, arrays, known)
             known = description.get("meshes", {})
             now = _meshes(found.problem)
             changed = tuple(name for name in known if now.get(name, "") != known[name])
@@ -180,7 +181,11 @@ def _certificate_from_dict(values: Mapping[str, Any]) -> Certificate:
     return Certificate(**restored)
 
 
-def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archive:
+def _restore(
+    description: dict[str, Any],
+    arrays: Mapping[str, Array],
+    known: MutableMapping[str, Any] | None,
+) -> Archive:
     names = tuple(description["joint_names"])
     ends = np.cumsum(arrays["history_sizes"]).astype(int)
     points = np.split(arrays["history_x"], ends[:-1]) if len(ends) else []
@@ -197,7 +202,7 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archiv
         for item in report["active"]
     )
     return Archive(
-        problem=problem_from_dict(description["problem"]),
+        problem=problem_from_dict(description["problem"], known),
         trajectory=trajectory_of(arrays, names),
         initial_trajectory=trajectory_of(arrays, names, "initial_"),
         coefficients=arrays["coefficients"],

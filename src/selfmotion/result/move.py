@@ -1,10 +1,8 @@
 """A joint motion from one configuration to another, and its file."""
 
 import dataclasses
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -14,16 +12,15 @@ from selfmotion.basics import (
     SelfmotionError,
     as_path,
     read_archive,
-    restore,
     write_archive,
 )
 from selfmotion.certificate import AtRest, Finding, FinishedMotion, Requirement, arm_limits
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Constraint
 from selfmotion.motion import Trajectory
-from selfmotion.problem.saved_problem import robot_to_dict
+from selfmotion.problem import arm_and_constraints, describe_arm
 from selfmotion.result.archive import arrays_of, digest_of, trajectory_of
-from selfmotion.robot import RobotModel, rebuild_robot
+from selfmotion.robot import RobotModel
 
 # Raised with every change that older versions cannot read.
 _FORMAT = 1
@@ -124,8 +121,7 @@ class Move:
         motion = self.motion
         description: dict[str, Any] = {
             "move": _FORMAT,
-            "robot": robot_to_dict(self.robot),
-            "constraints": [item.to_dict() for item in self.constraints],
+            **describe_arm(self.robot, self.constraints),
             "joint_names": list(motion.joint_names),
             "findings": [dataclasses.asdict(item) for item in self.findings],
         }
@@ -134,19 +130,10 @@ class Move:
         write_archive(as_path(file), description, arrays)
 
 
-def load_move(
-    file: str | FilePath, *, once: Callable[[str, Callable[[], Any]], Any] | None = None
-) -> Move:
+def load_move(file: str | FilePath, *, known: MutableMapping[str, Any] | None = None) -> Move:
     """Read a move that `Move.save` wrote, and judge it anew.
 
-    A file that was changed is never verified.
-
-    Parameters
-    ----------
-    file : path
-    once : callable, optional
-        Returns what a key stands for, made by a function where it is not known yet: who reads many
-        moves of one arm makes its bodies once.
+    A file that was changed is never verified. `known` is that of `load_plan`.
 
     Raises
     ------
@@ -160,16 +147,10 @@ def load_move(
             f"{path}: is no move of format {_FORMAT}: it is a plan or a program, or was written by "
             f"another version of selfmotion"
         )
-    make = once or (lambda key, made: made())
     written = description.pop("digest", None)
     altered = written != digest_of(description, arrays)
     try:
-        given, listed = description["robot"], description["constraints"]
-        robot = make(json.dumps(given, sort_keys=True), partial(rebuild_robot, **given))
-        constraints = tuple(
-            make(json.dumps(item, sort_keys=True), partial(restore, Constraint, item))
-            for item in listed
-        )
+        robot, constraints = arm_and_constraints(description, {} if known is None else known)
         motion = trajectory_of(arrays, tuple(description["joint_names"]))
         found = Move.judged(robot, constraints, motion)
     except SelfmotionError as error:
