@@ -133,7 +133,7 @@ class Growing:
                 for plan in plans:
                     yield plan, turned, ""
         for turned, problem in problems.items():
-            ((plans, reason),) = self._work.branches([(seam, problem)])
+            ((plans, reason),) = self._work.branches([(seam, problem)], thorough=False)
             for plan in plans:
                 yield plan, turned, ""
             if not plans:

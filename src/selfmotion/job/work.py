@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, Progress, one_blas_thread, silent
+from selfmotion.basics import Array, ProblemError, Progress, one_blas_thread
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import FunctionCost
 from selfmotion.job.files import Shelf
@@ -115,13 +115,16 @@ class Work:
         self.asked, self._shelf, self._executor = asked, shelf, executor
         self.tell = progress
 
-    def branches(self, problems: Sequence[tuple[Seam, Problem]]) -> list[tuple[list[Plan], str]]:
+    def branches(
+        self, problems: Sequence[tuple[Seam, Problem]], thorough: bool = True
+    ) -> list[tuple[list[Plan], str]]:
         """Return verified plans of problems in different branches, and why there are none."""
         tasks: list[_Task] = [
             {
                 "problem": problem,
                 "name": seam.name,
                 "count": self.asked.branches,
+                "thorough": thorough,
                 "seed": [self.asked.seed, _number(seam.name.encode())],
             }
             for seam, problem in problems
@@ -222,7 +225,8 @@ def _plans_here(task: _Task) -> tuple[list[Plan], str]:
     problem = task["problem"]
     with one_blas_thread():
         if "near" not in task:
-            return branches(problem, task["count"], np.random.default_rng(task["seed"]), silent)
+            generator = np.random.default_rng(task["seed"])
+            return branches(problem, task["count"], generator, task["thorough"])
         start = near_start(problem, np.array(task["near"]))
         if start is None:
             return [], "no configuration near"

@@ -21,13 +21,17 @@ from selfmotion.search import start_candidates
 
 
 def branches(
-    problem: Problem, count: int, rng: np.random.Generator, progress: Progress = silent
+    problem: Problem,
+    count: int,
+    rng: np.random.Generator,
+    thorough: bool = True,
+    progress: Progress = silent,
 ) -> tuple[list[Plan], str]:
     """Return up to `count` verified plans of a problem that begin far from each other.
 
     Each begins at a configuration that puts the tool on the start of the path and is allowed there,
     the next one as far as any from those before. Where none of these leads to a verified plan, all
-    that `plan` does is done.
+    that `plan` does is done, if it is to be `thorough`.
 
     Returns
     -------
@@ -47,8 +51,8 @@ def branches(
         reason = reason or why
         if made is not None and all(_apart(made, other) > SAME_ENDS for other in found):
             found.append(made)
-    if found:
-        return found, ""
+    if found or not thorough:
+        return found, "" if found else reason or _nowhere(problem)
     try:
         made = plan(problem, search=Search(rng=rng), progress=progress)
     except SelfmotionError as error:
@@ -112,3 +116,21 @@ def _apart(one: Plan, other: Plan) -> float:
     """Return how far the ends of two plans are apart, of that end where they are farther apart."""
     ends = one.trajectory.q[[0, -1]] - other.trajectory.q[[0, -1]]
     return float(np.abs(ends).max(axis=1).max())
+
+
+def _nowhere(problem: Problem) -> str:
+    """Return why a path cannot even be begun."""
+    asked, follows = problem.envelope, problem.follows.for_robot(problem.robot)
+    try:
+        starts = np.array(start_candidates(follows, BRANCH_TRIES, np.random.default_rng(0)))
+    except SelfmotionError as error:
+        return str(error)
+    for model, far in asked.bodies:
+        near = model.worst(starts)
+        if near.value < far:
+            return (
+                f"no configuration was found that puts the tool on its start and meets nothing: of "
+                f"{len(starts)} one has {near.first} and {near.second} {near.value * 1e3:.2f} mm "
+                f"apart (wanted: {far * 1e3:.2f} mm)"
+            )
+    return "no configuration was found that puts the tool on its start and keeps what is asked"
