@@ -97,12 +97,14 @@ from selfmotion.costs import (
 from selfmotion.follow import Follow as Follow, Follows as Follows
 from selfmotion.formats import (
     Job as Job,
+    SeamJob as SeamJob,
     read_job as read_job,
     read_joint_limits as read_joint_limits,
     read_motion as read_motion,
     read_parts as read_parts,
     read_path as read_path,
     read_problem as read_problem,
+    read_seam_job as read_seam_job,
     write_motion as write_motion,
     write_parts as write_parts,
     write_problem as write_problem,

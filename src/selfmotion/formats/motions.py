@@ -22,19 +22,20 @@ from selfmotion.formats.documents import read_document, write_document, write_te
 from selfmotion.formats.mujoco import keyframes
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.formats.urscript import script
+from selfmotion.job import Program
 from selfmotion.motion import Trajectory, column_names
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import RobotModel
 
 
 def write_motion(
-    plan: Plan | Parts | Move,
+    plan: Plan | Parts | Move | Program,
     file: str | Path,
     *,
     rate: float | None = None,
     form: str | None = None,
 ) -> None:
-    """Write the motion of a plan, of parts or a move in a format that others read; atomically.
+    """Write the motion of a plan, parts, a move or a program as others read it; atomically.
 
     ============  ========  ==================================================================
     form          suffix    what
@@ -50,7 +51,7 @@ def write_motion(
 
     Parameters
     ----------
-    plan : Plan, Parts or Move
+    plan : Plan, Parts, Move or Program
     file : path
     rate : float, optional
         Samples per second; by default those of the plan (URScript: 125).
@@ -66,8 +67,8 @@ def write_motion(
     PlanError
         A move was not found.
     """
-    if not isinstance(plan, Plan | Parts | Move):
-        raise ProblemError(f"plan is {shown(plan)}, expected a Plan, Parts or a Move")
+    if not isinstance(plan, Plan | Parts | Move | Program):
+        raise ProblemError(f"plan is {shown(plan)}, expected a Plan, Parts, a Move or a Program")
     motion = plan.motion if isinstance(plan, Move) else plan.trajectory
     path = as_path(file)
     write, rate = _writer(path, rate, form)

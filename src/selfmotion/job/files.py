@@ -23,8 +23,8 @@ _NAME = "program.json"
 
 def write_program(program: Program, file: Path) -> None:
     """Write a program to one file, atomically; see `Program.save`."""
-    found = [step for step in program.steps if not _is_missing(step)]
-    troubles = {step.name: step.trouble for step in program.steps if _is_missing(step)}
+    found = [step for step in program.steps if not step.is_missing]
+    troubles = {step.name: step.trouble for step in program.steps if step.is_missing}
     description: dict[str, Any] = {
         "program": _FORMAT,
         "steps": [_step_to_dict(step) for step in found],
@@ -99,10 +99,6 @@ def _member(number: int) -> str:
 
 def _digest(description: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()
-
-
-def _is_missing(step: Step) -> bool:
-    return isinstance(step.made, Move) and step.made.trajectory is None
 
 
 def _step_to_dict(step: Step) -> dict[str, Any]:

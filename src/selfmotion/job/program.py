@@ -52,6 +52,11 @@ class Step:
         return isinstance(self.made, Plan)
 
     @property
+    def is_missing(self) -> bool:
+        """Whether it is a move that was not found."""
+        return isinstance(self.made, Move) and self.made.trajectory is None
+
+    @property
     def motion(self) -> Trajectory:
         """Its motion; PlanError for a move that was not found."""
         return self.made.motion if isinstance(self.made, Move) else self.made.trajectory
@@ -185,7 +190,7 @@ class Program:
 
     def _gaps(self) -> Iterator[str]:
         """Yield where the arm would jump, or does not rest."""
-        whole = [step for step in self.steps if not _is_missing(step)]
+        whole = [step for step in self.steps if not step.is_missing]
         for one, other in pairwise(whole):
             ends = one.motion, other.motion
             for order, most in enumerate((_JOINT, _REST, _PUSH)):
@@ -249,9 +254,5 @@ class Program:
 _SHOWN = 12
 
 
-def _is_missing(step: Step) -> bool:
-    return isinstance(step.made, Move) and step.made.trajectory is None
-
-
 def _duration(step: Step) -> float:
-    return 0.0 if _is_missing(step) else step.motion.duration
+    return 0.0 if step.is_missing else step.motion.duration

@@ -26,13 +26,16 @@ from selfmotion.motion import Trajectory
 from selfmotion.path import Dwell
 from selfmotion.planning.rounding import rounded
 from selfmotion.planning.settings import (
+    BRIEFEST_MOVE,
     END_CONFIGURATIONS,
     FINER_LOOKS,
     MOVE_DEADLINE,
     MOVE_MARGIN,
+    SHORTEST_PACED,
     SLOWER_FACTOR,
     SLOWER_TRIES,
     TRIES_OF_MOVE,
+    UNHURRIED_SAMPLES,
     UP_TO_SPEED,
     USED,
     USUAL_SPEED,
@@ -265,7 +268,9 @@ class FreeMotions:
 
     def _at_its_pace(self, path: Trajectory) -> Move:
         """Return the move along a joint path, as fast as it may be."""
-        motion = paced(path, self._limits)
+        # Of the shortest ones a search for the fastest pace sees rounding only.
+        short = path.travelled(path.t[-1:]).max() < SHORTEST_PACED
+        motion = self._unhurried(path) if short else paced(path, self._limits)
         q, qd = motion.q.copy(), motion.qd.copy()
         # Exactly where it should begin and end.
         q[0], q[-1], qd[0], qd[-1] = path.q[0], path.q[-1], 0.0, 0.0
@@ -277,6 +282,26 @@ class FreeMotions:
             if not any(not item.kept and item.of_pace for item in found.findings):
                 break
         return found
+
+    def _unhurried(self, path: Trajectory) -> Trajectory:
+        """Return a joint path over 0 to 1 from rest to rest by one smooth law of time.
+
+        σ = 10τ³ - 15τ⁴ + 6τ⁵, as fast as the limits allow.
+        """
+        tau = np.linspace(0.0, 1.0, UNHURRIED_SAMPLES)
+        sigma = np.clip(tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 0.0, 1.0)
+        rate = 30.0 * tau**2 * (1.0 - tau) ** 2
+        bend = 60.0 * tau * (1.0 - 3.0 * tau + 2.0 * tau**2)
+        q, qd = path(sigma), path(sigma, 1)
+        qdd = path(sigma, 2) * rate[:, None] ** 2 + qd * bend[:, None]
+        unit = Trajectory(tau, q, qd * rate[:, None], self.robot.joint_names, qdd)
+        limits, times = self._limits, [BRIEFEST_MOVE]
+        for order, limit in ((1, limits.speed), (2, limits.acceleration), (3, limits.jerk)):
+            share = float((np.abs(unit.extremes(order)[1]) / limit).max())
+            times.append(share ** (1.0 / order))
+        longest = max(times)
+        faster = qdd / longest**2
+        return Trajectory(longest * tau, q, unit.qd / longest, unit.joint_names, faster)
 
 
 def _allowed(room: Room, several: Array) -> Array:

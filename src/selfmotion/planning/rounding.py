@@ -23,7 +23,8 @@ def rounded(room: Room, way: Array, passed: Sequence[int] = ()) -> Trajectory | 
     `passed`. None where it is not free even when it hardly leaves the legs.
     """
     lengths = (np.abs(np.diff(way, axis=0)) * room.rates).max(axis=1)
-    spacing = np.full(len(lengths), lengths.sum() / FIRST_POINTS)
+    whole = max(float(lengths.sum()), np.finfo(float).tiny)
+    spacing = np.full(len(lengths), whole / FIRST_POINTS)
     # Near its ends a clamped spline goes through no other control point.
     fewest = _DEGREE + 1 if len(passed) else 1
     while True:
@@ -41,7 +42,7 @@ def rounded(room: Room, way: Array, passed: Sequence[int] = ()) -> Trajectory | 
         at = np.clip(blocked * len(legs), 0, len(legs) - 1).astype(np.int64)
         near = np.unique(np.clip(at[:, None] + np.arange(-2, 3), 0, len(legs) - 1))
         tight = np.unique(legs[near])
-        if np.all(spacing[tight] <= lengths.sum() * FINEST):
+        if np.all(spacing[tight] <= whole * FINEST):
             return None
         spacing[tight] *= 0.5
 

@@ -125,6 +125,11 @@ MISSED = 30
 FIRST_POINTS = 12
 FINEST = 1e-3
 PATH_SAMPLES = 64
+# No move is briefer than this [s], also one that leads nowhere. One that is shorter than this
+# [rad or m] goes by one smooth law of time, with so many samples.
+BRIEFEST_MOVE = 0.02
+SHORTEST_PACED = 2e-3
+UNHURRIED_SAMPLES = 65
 # Configurations for an end that is a pose of the tool, at most.
 END_CONFIGURATIONS = 16
 
