@@ -2,7 +2,7 @@
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -86,3 +86,27 @@ def write_program(program: sm.Program, file: Path) -> None:
         write_replay(program, file)
     else:
         sm.write_motion(program, file)
+
+
+def check(program: sm.Program, as_json: bool) -> NoReturn:
+    """Print what is known of a program that was read and judged anew, and end."""
+    if as_json:
+        terminal.print_json(data=json_tables.program_json(program))
+    else:
+        tables.show_program(program, terminal)
+    raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
+
+
+def export(
+    program: sm.Program, out: list[Path], rate: float | None, form: str | None, as_json: bool
+) -> NoReturn:
+    """Write the motion of a program, and its verdict, and end."""
+    for target in out:
+        sm.write_motion(program, target, rate=rate, form=form)
+    if as_json:
+        written = {str(target): program.verdict for target in out}
+        terminal.print_json(data={"verified": program.verified, "written": written})
+    else:
+        for target in out:
+            terminal.print(f"wrote {target}; {program.verdict}", markup=False, soft_wrap=True)
+    raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)

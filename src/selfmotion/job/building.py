@@ -55,6 +55,7 @@ class Builder:
             wanted = [pair for pair in self._pairs(found.states) if pair not in moves]
             self._plan(wanted, moves)
             cost = self._cost(found.states, moves)
+            bound = max(bound, found.bound) if exact else bound
             if np.isfinite(cost):
                 best = min(best, (cost, found.states))
             # Moves not planned yet are estimated below what they take: no other order is better.

@@ -127,15 +127,19 @@ class Growing:
                 continue
             plan, reason = self._past(one.made, problems[one.turned])
             yield plan, one.turned, reason
+        # Others begin clear of what stands there; what they meet later is judged as well.
+        alone = {turned: self._work.asked.problem(seam, (), turned) for turned in problems}
         if sofar.q is not None:
-            wanted = [(seam, problem, sofar.q) for problem in problems.values()]
-            for turned, plans in zip(problems, self._work.nearby(wanted), strict=True):
+            wanted = [(seam, problem, sofar.q) for problem in alone.values()]
+            for turned, plans in zip(alone, self._work.nearby(wanted), strict=True):
                 for plan in plans:
-                    yield plan, turned, ""
+                    past, why = self._past(plan, problems[turned])
+                    yield past, turned, why
         for turned, problem in problems.items():
-            ((plans, reason),) = self._work.branches([(seam, problem)], thorough=False)
+            ((plans, reason),) = self._work.branches([(seam, alone[turned])], problem)
             for plan in plans:
-                yield plan, turned, ""
+                past, why = self._past(plan, problem)
+                yield past, turned, why
             if not plans:
                 yield None, turned, reason
 

@@ -16,8 +16,8 @@ from selfmotion.result import Plan
 
 # So often motions are added that begin where the seam before ends, at most.
 _NEARBY_ROUNDS = 2
-# An added motion shortens a move by this at least [s].
-_WORTH = 0.02
+# Moves that take less than this need none [s]; an added motion shortens one by this at least.
+_SHORT, _WORTH = 0.1, 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,14 +223,17 @@ class Ordering:
 
     def _add_nearby(self) -> None:
         """Add motions that begin near where the one before ends, along the best round."""
+        tried: set[tuple[int | None, int]] = set()
         for _ in range(_NEARBY_ROUNDS):
             states = self.best().states
             wanted = []
             for number, state in enumerate(states):
                 here = self.states[state]
                 before = self._ends[0] if number == 0 else self.states[states[number - 1]].ends[1]
-                if before is None or self.seconds(before, here.ends[0]) <= _WORTH:
+                pair = (states[number - 1] if number else None, state)
+                if before is None or pair in tried or self.seconds(before, here.ends[0]) <= _SHORT:
                     continue
+                tried.add(pair)
                 seam = self.seams[here.seam]
                 problem = self._work.asked.problem(seam, turned=here.turned)
                 wanted.append((here, seam, problem, before))

@@ -87,8 +87,9 @@ class Program:
     missing : mapping
         Seams that could not be made, and why.
     bound : float
-        No order of the seams whose motions are known takes less for moves, as estimated by limits
-        of speed and acceleration [s].
+        No order of the motions that are known of the seams takes less for moves [s]: of up to
+        twelve seams by the times of the moves themselves, of more by limits of speed and
+        acceleration.
     notes : tuple of str
         What a reader should know: which orders were given up, and why.
     """

@@ -116,20 +116,23 @@ class Work:
         self.tell = progress
 
     def branches(
-        self, problems: Sequence[tuple[Seam, Problem]], thorough: bool = True
+        self, wanted: Sequence[tuple[Seam, Problem]], allowed: Problem | None = None
     ) -> list[tuple[list[Plan], str]]:
-        """Return verified plans of problems in different branches, and why there are none."""
+        """Return verified plans of problems in different branches, and why there are none.
+
+        Their starts keep clear of all that is asked by what is `allowed`, where something is.
+        """
         tasks: list[_Task] = [
             {
                 "problem": problem,
                 "name": seam.name,
                 "count": self.asked.branches,
-                "thorough": thorough,
                 "seed": [self.asked.seed, _number(seam.name.encode())],
+                **({} if allowed is None else {"allowed": allowed}),
             }
-            for seam, problem in problems
+            for seam, problem in wanted
         ]
-        return self._plans(tasks, "seam")
+        return self._plans(tasks, "seam" if allowed is None else "other ways")
 
     def nearby(self, wanted: Sequence[tuple[Seam, Problem, Array]]) -> list[list[Plan]]:
         """Return the plans that begin as near as may be to configurations (n,), none or one."""
@@ -226,7 +229,7 @@ def _plans_here(task: _Task) -> tuple[list[Plan], str]:
     with one_blas_thread():
         if "near" not in task:
             generator = np.random.default_rng(task["seed"])
-            return branches(problem, task["count"], generator, task["thorough"])
+            return branches(problem, task["count"], generator, task.get("allowed"))
         start = near_start(problem, np.array(task["near"]))
         if start is None:
             return [], "no configuration near"
@@ -249,7 +252,8 @@ def _missing(task: _Task, trouble: str) -> Move:
 
 
 def _plans_asked(task: _Task) -> dict[str, Any]:
-    return {**task, "problem": problem_to_dict(task["problem"])}
+    problems = [name for name in ("problem", "allowed") if name in task]
+    return {**task, **{name: problem_to_dict(task[name]) for name in problems}}
 
 
 def _move_asked(task: _Task) -> dict[str, Any]:
@@ -264,8 +268,9 @@ _MANY = 64
 def _plans_there(task: _Task) -> tuple[list[bytes], str]:
     """Do a task in another process: plans as the bytes of their files."""
     _forget()
-    problem = problem_from_dict(task["problem"], _known)
-    found, reason = _plans_here({**task, "problem": problem})
+    problems = [name for name in ("problem", "allowed") if name in task]
+    made = {name: problem_from_dict(task[name], _known) for name in problems}
+    found, reason = _plans_here({**task, **made})
     return [_packed(plan) for plan in found], reason
 
 

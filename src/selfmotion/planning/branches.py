@@ -24,14 +24,24 @@ def branches(
     problem: Problem,
     count: int,
     rng: np.random.Generator,
-    thorough: bool = True,
+    allowed: Problem | None = None,
     progress: Progress = silent,
 ) -> tuple[list[Plan], str]:
     """Return up to `count` verified plans of a problem that begin far from each other.
 
     Each begins at a configuration that puts the tool on the start of the path and is allowed there,
     the next one as far as any from those before. Where none of these leads to a verified plan, all
-    that `plan` does is done, if it is to be `thorough`.
+    that `plan` does is done.
+
+    Parameters
+    ----------
+    problem : Problem
+    count : int
+    rng : Generator
+    allowed : Problem, optional
+        The same with more that stands there, which the starts keep clear of; the plans need not.
+        With it nothing more is tried.
+    progress : callable, optional
 
     Returns
     -------
@@ -42,7 +52,7 @@ def branches(
     """
     found: list[Plan] = []
     reason, failed = "", 0
-    for number, start in enumerate(_spread(problem, rng), 1):
+    for number, start in enumerate(_spread(allowed or problem, rng), 1):
         if len(found) == count or failed == BRANCH_TRIES or number > BRANCH_TRIES * count:
             break
         progress("branch", number, BRANCH_TRIES * count)
@@ -51,8 +61,8 @@ def branches(
         reason = reason or why
         if made is not None and all(_apart(made, other) > SAME_ENDS for other in found):
             found.append(made)
-    if found or not thorough:
-        return found, "" if found else reason or _nowhere(problem)
+    if found or allowed is not None:
+        return found, "" if found else reason or _nowhere(allowed or problem)
     try:
         made = plan(problem, search=Search(rng=rng), progress=progress)
     except SelfmotionError as error:
