@@ -41,6 +41,10 @@ bench-starts: $(READY)  ## free starts against the best of everything tried, 60 
 bench-fastest: $(READY)  ## the fastest motions of 20 paths, and retimed plans, against limits
 	$(BIN)/python benchmarks/fastest.py
 
+bench-moves: $(READY)  ## 100 transfers among boxes, some against 50 tries of OMPL
+	$(BIN)/pip install --quiet ompl==2.0.1
+	$(BIN)/python benchmarks/moves.py --peer 3
+
 bench-job: $(READY)  ## a frame of 132 strokes: order, plans, moves past what was made
 	$(BIN)/python benchmarks/job.py
 

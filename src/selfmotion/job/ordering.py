@@ -7,15 +7,16 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
-from selfmotion.job.order import Round, Stops, best_round
+from selfmotion.job.order import EXACT, Round, Stops, best_round
 from selfmotion.job.seam import Seam, backwards_plan
 from selfmotion.job.work import Work
 from selfmotion.planning import FreeMotions
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
 
-# So often motions are added that begin where the seam before ends, at most.
-_NEARBY_ROUNDS = 2
+# So often motions are added that begin where the seam before ends, at most: of few seams and of
+# many.
+_NEARBY_ROUNDS, _NEARBY_ROUNDS_OF_MANY = 6, 2
 # Moves that take less than this need none [s]; an added motion shortens one by this at least.
 _SHORT, _WORTH = 0.1, 0.02
 
@@ -224,7 +225,8 @@ class Ordering:
     def _add_nearby(self) -> None:
         """Add motions that begin near where the one before ends, along the best round."""
         tried: set[tuple[int | None, int]] = set()
-        for _ in range(_NEARBY_ROUNDS):
+        few = len(self.made) <= EXACT
+        for _ in range(_NEARBY_ROUNDS if few else _NEARBY_ROUNDS_OF_MANY):
             states = self.best().states
             wanted = []
             for number, state in enumerate(states):

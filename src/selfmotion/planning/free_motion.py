@@ -48,6 +48,9 @@ from selfmotion.robot import RobotModel
 from selfmotion.search import start_candidates
 from selfmotion.task import SE3, Task
 
+# Roundings that a motion may add up to.
+_ROUNDINGS = 16.0
+
 
 def move(
     robot: RobotModel,
@@ -191,6 +194,7 @@ class FreeMotions:
         blocked = self._blocked(ends)
         if blocked:
             return self._missing(blocked)
+        ends = [self._inside(several) for several in ends]
         worst, margin, finer = "", MOVE_MARGIN, 1.0
         for _ in range(TRIES_OF_MOVE):
             room = Room(self.asked, self.robot, margin, finer)
@@ -199,7 +203,7 @@ class FreeMotions:
                 break
             path = rounded(room, *way)
             if path is not None:
-                move = self._at_its_pace(path)
+                move = self.at_its_pace(path)
                 if move.verified:
                     return move
                 worst = worst or f", where {move.trouble}"
@@ -208,6 +212,11 @@ class FreeMotions:
         return self._missing(
             f"no way was found between the configurations in {waited:.1f} s{worst}"
         )
+
+    def _inside(self, q: Array) -> Array:
+        """Return configurations on a limit as far inside it as rounding may lead beyond."""
+        lower, upper = self.asked.lower, self.asked.upper
+        return np.clip(q, lower + _ulps(lower), upper - _ulps(upper))
 
     def _missing(self, trouble: str) -> Move:
         return Move(self.robot, self.constraints, None, (), trouble)
@@ -266,7 +275,7 @@ class FreeMotions:
             jerk=read_only(USED * asked.jerk),
         )
 
-    def _at_its_pace(self, path: Trajectory) -> Move:
+    def at_its_pace(self, path: Trajectory) -> Move:
         """Return the move along a joint path, as fast as it may be."""
         # Of the shortest ones a search for the fastest pace sees rounding only.
         short = path.travelled(path.t[-1:]).max() < SHORTEST_PACED
@@ -302,6 +311,12 @@ class FreeMotions:
         longest = max(times)
         faster = qdd / longest**2
         return Trajectory(longest * tau, q, unit.qd / longest, unit.joint_names, faster)
+
+
+def _ulps(limit: Array) -> Array:
+    """Return what sums of a few numbers of this size may be off by."""
+    finite = np.where(np.isfinite(limit), limit, 0.0)
+    return np.asarray(_ROUNDINGS * np.spacing(1.0 + np.abs(finite)))
 
 
 def _allowed(room: Room, several: Array) -> Array:

@@ -27,6 +27,8 @@ from selfmotion.planning.settings import (
 )
 from selfmotion.robot import RobotModel
 
+# Samples keep this share of the range from a limit.
+_INSIDE = 1e-6
 # Configurations this near are the same [rad or m].
 _SAME = 1e-9
 
@@ -224,6 +226,9 @@ def _connected(
     """Return a way by two trees, None where the time is over before."""
     rates = room.rates
     lower, upper = room.asked.arm(room.robot).finite_limits()
+    # Not on the limits themselves, which rounding would lead beyond.
+    inside = _INSIDE * (upper - lower)
+    lower, upper = lower + inside, upper - inside
     one, other, forward = _Tree(starts, rates), _Tree(goals, rates), True
     middle = 0.5 * (starts[0] + goals[0])
     spread = SPREAD * float((np.abs(goals[0] - starts[0]) * rates).max()) / rates
