@@ -168,6 +168,7 @@ from selfmotion.result import (
     Plan as Plan,
     Report as Report,
     load_move as load_move,
+    load_parts as load_parts,
     load_plan as load_plan,
     retime as retime,
     slowdown as slowdown,

@@ -3,8 +3,6 @@
 import hashlib
 import json
 import re
-import tempfile
-import zipfile
 from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,13 +10,10 @@ from typing import Any
 from selfmotion.basics import FileFormatError, as_path, write_atomically
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.job.program import Program, Step
-from selfmotion.result import Move, Plan, load_move, load_plan
+from selfmotion.result import Move, Plan, load_move, load_plan, read_bundle, write_bundle
 
 # Raised with every change that older versions cannot read.
 _FORMAT = 1
-# Programs beyond so many bytes are not read.
-_LARGEST = 2_000_000_000
-_NAME = "program.json"
 
 
 def write_program(program: Program, file: Path) -> None:
@@ -26,26 +21,12 @@ def write_program(program: Program, file: Path) -> None:
     found = [step for step in program.steps if not step.is_missing]
     troubles = {step.name: step.trouble for step in program.steps if step.is_missing}
     description: dict[str, Any] = {
-        "program": _FORMAT,
         "steps": [_step_to_dict(step) for step in found],
         "missing": {**program.missing, **troubles},
         "bound": program.bound,
         "notes": list(program.notes),
     }
-
-    def write(stream: Any) -> None:
-        # What is inside is compressed already.
-        with zipfile.ZipFile(stream, "w") as archive, tempfile.TemporaryDirectory() as folder:
-            digests = []
-            for number, step in enumerate(found):
-                member = Path(folder, _member(number))
-                step.made.save(member)
-                digests.append(hashlib.sha256(member.read_bytes()).hexdigest())
-                archive.write(member, member.name)
-            whole = {**description, "digests": digests}
-            archive.writestr(_NAME, json.dumps({**whole, "digest": _digest(whole)}))
-
-    write_atomically(file, write)
+    write_bundle(file, "program", _FORMAT, description, [step.made for step in found])
 
 
 def load_program(file: str | Path) -> Program:
@@ -59,52 +40,22 @@ def load_program(file: str | Path) -> Program:
         The file is missing, is no program, lacks something, or was written by another version.
     """
     path = as_path(file)
+    description, made, changed = read_bundle(path, "program", _FORMAT)
     try:
-        with zipfile.ZipFile(path) as archive, tempfile.TemporaryDirectory() as folder:
-            if sum(item.file_size for item in archive.infolist()) > _LARGEST:
-                raise ValueError(f"it unpacks to more than {_LARGEST:g} bytes")
-            description = json.loads(archive.read(_NAME))
-            if description["program"] != _FORMAT:
-                raise ValueError(f"its format is {description['program']!r}, expected {_FORMAT}")
-            written = description.pop("digest", None)
-            changed = written != _digest(description)
-            steps, known = [], dict[str, Any]()
-            given = zip(description["steps"], description["digests"], strict=True)
-            for number, (values, digest) in enumerate(given):
-                data = archive.read(_member(number))
-                changed |= hashlib.sha256(data).hexdigest() != digest
-                member = Path(folder, _member(number))
-                member.write_bytes(data)
-                steps.append(_step(values, member, known))
-        if not steps:
-            raise ValueError("it has no steps")
-    except FileNotFoundError:
-        raise FileFormatError(f"{path}: no such file") from None
-    except FileFormatError:
-        raise
-    # Any number or key of a damaged file may be any other, and fail anywhere.
-    except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise FileFormatError(f"{path}: is no program, or a damaged one: {reason}") from error
-    missing = dict(description["missing"])
+        pairs = zip(description["steps"], made, strict=True)
+        steps = tuple(_step(values, item) for values, item in pairs)
+        missing = {str(name): str(why) for name, why in description["missing"].items()}
+        notes, bound = tuple(map(str, description["notes"])), float(description["bound"])
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FileFormatError(f"{path}: is a damaged program: {error!r}") from error
     if changed:
         missing[path.name] = "the file was changed after the program was written"
-    notes = tuple(description["notes"])
-    return Program(steps[0].made.robot, tuple(steps), missing, float(description["bound"]), notes)
-
-
-def _member(number: int) -> str:
-    return f"{number:04d}.npz"
-
-
-def _digest(description: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()
+    return Program(made[0].robot, steps, missing, bound, notes)
 
 
 def _step_to_dict(step: Step) -> dict[str, Any]:
     return {
         "name": step.name,
-        "seam": step.is_seam,
         "turned": step.turned,
         "events": [list(event) for event in step.events],
         "leaves": [item.to_dict() for item in step.leaves],
@@ -112,8 +63,7 @@ def _step_to_dict(step: Step) -> dict[str, Any]:
     }
 
 
-def _step(values: Mapping[str, Any], member: Path, known: MutableMapping[str, Any]) -> Step:
-    made = load_plan(member, known=known) if values["seam"] else load_move(member, known=known)
+def _step(values: Mapping[str, Any], made: Plan | Move) -> Step:
     return Step(
         str(values["name"]),
         made,

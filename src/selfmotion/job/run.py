@@ -101,6 +101,8 @@ def plan_job(
         No seam has a motion.
     ProblemError
         An argument is not what it should be, or what has to come first goes round in a circle.
+    KeyboardInterrupt
+        It was interrupted; what is finished by then is in the folder, where there is one.
     """
     if not isinstance(robot, RobotModel):
         raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array, Progress, SelfmotionError, silent
+from selfmotion.optimise import Status
 from selfmotion.planning.run import plan
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import (
@@ -64,7 +65,7 @@ def branches(
     if found or allowed is not None:
         return found, "" if found else reason or _nowhere(allowed or problem)
     try:
-        made = plan(problem, search=Search(rng=rng), progress=progress)
+        made = _whole(plan(problem, search=Search(rng=rng), progress=progress))
     except SelfmotionError as error:
         return [], str(error)
     if made.certificate.verified:
@@ -75,12 +76,19 @@ def branches(
 def from_start(problem: Problem, start: Array) -> tuple[Plan | None, str]:
     """Return the verified plan from a start (n,), or None and why there is none."""
     try:
-        made = plan(replace(problem, start=start), max_evaluations=BRANCH_EVALUATIONS)
+        made = _whole(plan(replace(problem, start=start), max_evaluations=BRANCH_EVALUATIONS))
     except SelfmotionError as error:
         return None, str(error)
     if made.certificate.verified:
         return made, ""
     return None, made.certificate.verdict
+
+
+def _whole(made: Plan) -> Plan:
+    """Return a plan unless it was interrupted: then KeyboardInterrupt goes on."""
+    if made.report.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    return made
 
 
 def near_start(problem: Problem, q: Array) -> Array | None:
