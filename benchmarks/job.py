@@ -2,7 +2,8 @@
 
 Each stroke once, from either end, begun where it is grounded or at what was made before; what was
 made stands there, but within 5 mm of a node that the stroke shares. The tool's axis stays within
-45° of down, turning about it is free; 10 mm/s along a stroke.
+45° of down, turning about it is free; 10 mm/s along a stroke. With `--given` in the order of the
+layers and of the list, and from the first end of each to the second.
 """
 
 import argparse
@@ -21,6 +22,8 @@ FOLDER = Path(__file__).parent / "data" / "frame__topopt100"
 NOZZLE, TIP, HEATER = 0.08, 0.002, 0.008
 # What a stroke shares with its neighbours [m], its speed [m/s], and how near others may come [m].
 SHARED, FEED, APART = 0.005, 0.01, 2e-4
+# So many layers down all is made before a stroke is.
+DOWN = 2
 # The frame stands so much nearer than in the file, where the arm reaches all of it [m].
 NEARER = 0.1
 
@@ -52,14 +55,14 @@ def seams(count: int | None = None, either_way: bool = True) -> list[sm.Seam]:
     grounded, radius = set(job["grounded_nodes"]), job["strut_radius_m"]
     with (FOLDER / "strokes.csv").open() as stream:
         rows = list(csv.DictReader(stream))
-    if count is not None:
-        rows = sorted(rows, key=lambda row: int(row["layer"]))[:count]
+    rows = sorted(rows, key=lambda row: int(row["layer"]))[:count]
     ends = {
         row["stroke"]: np.array([[float(row[f"{axis}{k}"]) for axis in "xyz"] for k in "01"])
         - [NEARER, 0.0, 0.0]
         for row in rows
     }
     nodes = {row["stroke"]: (int(row["node0"]), int(row["node1"])) for row in rows}
+    layers = {row["stroke"]: row["layer"] for row in rows}
     at: dict[int, list[str]] = {}
     for stroke, pair in nodes.items():
         for node in pair:
@@ -76,6 +79,9 @@ def seams(count: int | None = None, either_way: bool = True) -> list[sm.Seam]:
         ]
         if length > 2.0 * SHARED + 1e-3:
             leaves.append(rod(f"{stroke}", first + cut, last - cut, radius))
+        # From below: what is two layers down is made before, so that nothing is built over.
+        layer = int(layers[stroke])
+        below = [other for other in ends if int(layers[other]) <= layer - DOWN]
         others = {other for node in pair for other in at[node]} - {stroke}
         is_grounded = not grounded.isdisjoint(pair)
         line = sm.Line(SE3(down, first), SE3(down, last), 1.0)
@@ -86,6 +92,7 @@ def seams(count: int | None = None, either_way: bool = True) -> list[sm.Seam]:
                 "position",
                 constraints=[sm.Tilt("panda_hand_tcp", within=np.pi / 4)],
                 either_way=either_way,
+                after=below,
                 after_any=() if is_grounded else tuple(sorted(others, key=int)),
                 leaves=leaves,
                 may_meet=tuple(f"{other} at {node}" for node in pair for other in at[node]),
@@ -98,7 +105,7 @@ def main() -> None:
     """Plan the frame, and say how it went."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--strokes", type=int, help="the first ones only")
-    parser.add_argument("--given", action="store_true", help="in the given order and directions")
+    parser.add_argument("--given", action="store_true", help="order and directions as given")
     parser.add_argument("--folder", help="keeps what is finished")
     parser.add_argument("--out", default="out/frame.program")
     options = parser.parse_args()

@@ -1,4 +1,4 @@
-"""Edges of six holes in a panel, deburred in the best order, coming and going along the tool."""
+"""Edges of four holes in a panel, deburred in the best order, coming and going along the tool."""
 
 import numpy as np
 import pinocchio as pin
@@ -10,7 +10,7 @@ down = np.diag([1.0, -1.0, -1.0])
 panel = sm.Box("panel", [0.45, 0.0, 0.19], [0.4, 0.4, 0.02])
 
 seams = []
-for row in range(3):
+for row in range(2):
     for column in range(2):
         center = np.array([0.35 + 0.1 * row, -0.05 + 0.1 * column, 0.24])
         start = pin.SE3(down, center + np.array([0.012, 0.0, 0.0]))

@@ -41,7 +41,7 @@ seams = [
     )
     for k, (first, last) in enumerate(ends)
 ]
-program = sm.plan_job(arm, seams, branches=2, clearance=sm.Clearance(distance=1e-3)).require()
+program = sm.plan_job(arm, seams, branches=1, clearance=sm.Clearance(distance=1e-3)).require()
 print(program)
 print(f"stroke by stroke: {', '.join(name.removeprefix('stroke ') for name in program.order)}")
 last = program.plans[program.order[-1]]

@@ -25,7 +25,7 @@ def seam(name: str, first, last, **given) -> sm.Seam:
     return sm.Seam(name, line, "pointing", **given)
 
 
-def row_of_seams(count: int = 4) -> list[sm.Seam]:
+def row_of_seams(count: int = 3) -> list[sm.Seam]:
     """Return parallel seams in an order and in directions that suit nobody."""
     y = np.linspace(-0.2, 0.2, count)
     order = sorted(range(count), key=lambda k: (k % 2, k))
@@ -34,12 +34,12 @@ def row_of_seams(count: int = 4) -> list[sm.Seam]:
 
 @pytest.fixture(scope="module")
 def program() -> sm.Program:
-    return sm.plan_job(robot_named("panda"), row_of_seams(), start=HOME, end=HOME, branches=2)
+    return sm.plan_job(robot_named("panda"), row_of_seams(), start=HOME, end=HOME, branches=1)
 
 
 def test_every_seam_is_made_once_and_all_is_verified(program) -> None:
     program.require()
-    assert sorted(program.order) == [f"seam {k}" for k in range(4)]
+    assert sorted(program.order) == [f"seam {k}" for k in range(3)]
     motion = program.trajectory
     np.testing.assert_allclose(motion.q[[0, -1]], [HOME, HOME], rtol=0.0, atol=1e-12)
     assert motion.duration == pytest.approx(program.duration, abs=ROUNDING)
@@ -67,21 +67,20 @@ def test_the_order_is_the_best_of_all_by_the_times_of_the_moves(program) -> None
             known[pair.tobytes()] = sm.move(panda, first, last).require().motion.duration
         return known[pair.tobytes()]
 
-    tried = 0
+    orders = []
     for order in itertools.permutations(ends):
         for turned in itertools.product([1, -1], repeat=len(order)):
             ways = zip(order, turned, strict=True)
             q = [HOME, *(x for name, way in ways for x in ends[name][::way]), HOME]
             pairs = list(zip(q[::2], q[1::2], strict=True))
-            least = sum(float(alone.time_of(*pair)) for pair in pairs)
-            # Only those that promise more than the program need their moves.
-            if least < program.transfer_time - ROUNDING:
-                tried += 1
-                total = sum(seconds(*pair) for pair in pairs)
-                assert total >= program.transfer_time - ROUNDING
-    assert tried > 0
+            orders.append((sum(float(alone.time_of(*pair)) for pair in pairs), pairs))
+    # All that promise to take less, and some more.
+    orders.sort(key=lambda item: item[0])
+    for number, (least, pairs) in enumerate(orders):
+        if number < 4 or least < program.transfer_time - ROUNDING:
+            assert sum(seconds(*pair) for pair in pairs) >= program.transfer_time - ROUNDING
     assert program.bound == pytest.approx(program.transfer_time, abs=ROUNDING)
-    given = sm.plan_job(panda, seams, start=HOME, end=HOME, order="given", branches=2).require()
+    given = sm.plan_job(panda, seams, start=HOME, end=HOME, order="given", branches=1).require()
     assert given.order == tuple(item.name for item in seams)
     assert program.transfer_time < given.transfer_time
 
@@ -117,7 +116,7 @@ def test_what_is_made_stands_in_the_way_of_what_comes_later() -> None:
         seam("raise", [0.45, 0.3, 0.35], [0.5, 0.3, 0.35], leaves=[post]),
         seam("beside", [0.4, -0.3, 0.35], [0.5, -0.3, 0.35], after=["raise"]),
     ]
-    made = sm.plan_job(panda, seams, branches=2).require()
+    made = sm.plan_job(panda, seams, branches=1).require()
     move = made.moves[0]
     assert [item.name for item in move.obstacles] == ["post"]
     assert [item.name for item in made.plans["beside"].obstacles] == ["post"]
@@ -161,7 +160,7 @@ def test_a_program_that_was_changed_is_not_verified(program, tmp_path) -> None:
 
 def test_a_job_that_is_ended_anywhere_goes_on_to_the_same_program(program, tmp_path) -> None:
     panda, seams = robot_named("panda"), row_of_seams()
-    for end in (2, 5):
+    for end in (1, 4):
         told = itertools.count()
 
         def stop(*_, told=told, end=end) -> None:
@@ -170,11 +169,11 @@ def test_a_job_that_is_ended_anywhere_goes_on_to_the_same_program(program, tmp_p
 
         with pytest.raises(KeyboardInterrupt):
             sm.plan_job(
-                panda, seams, start=HOME, end=HOME, branches=2, folder=tmp_path, progress=stop
+                panda, seams, start=HOME, end=HOME, branches=1, folder=tmp_path, progress=stop
             )
     kept = {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("*.npz")}
     assert kept
-    again = sm.plan_job(panda, seams, start=HOME, end=HOME, branches=2, folder=tmp_path)
+    again = sm.plan_job(panda, seams, start=HOME, end=HOME, branches=1, folder=tmp_path)
     # What was finished is not done again.
     for name, time in kept.items():
         assert (tmp_path / name).stat().st_mtime_ns == time
@@ -199,14 +198,12 @@ def test_bad_jobs_are_refused() -> None:
     far = seam("far", [2.0, 0.0, 0.3], [2.1, 0.0, 0.3])
     with pytest.raises(sm.PlanError, match="no seam has a motion"):
         sm.plan_job(panda, [far], branches=1)
-    made = sm.plan_job(panda, [far, seams[0]], branches=1)
-    assert made.order == (seams[0].name,)
-    assert "seam 'far' is not made" in made.verdict
 
 
-def test_other_processes_come_to_the_same_program(program) -> None:
-    panda, seams = robot_named("panda"), row_of_seams()
-    with ProcessPoolExecutor(2) as executor:
-        made = sm.plan_job(panda, seams, start=HOME, end=HOME, branches=2, executor=executor)
-    assert made.order == program.order
-    np.testing.assert_array_equal(made.trajectory.q, program.trajectory.q)
+def test_other_processes_come_to_the_same_program() -> None:
+    panda, seams = robot_named("panda"), row_of_seams(2)
+    with ProcessPoolExecutor(1) as executor:
+        there = sm.plan_job(panda, seams, start=HOME, branches=1, executor=executor).require()
+    here = sm.plan_job(panda, seams, start=HOME, branches=1)
+    assert there.order == here.order
+    np.testing.assert_array_equal(there.trajectory.q, here.trajectory.q)

@@ -10,7 +10,7 @@ from typing import Any
 from selfmotion.basics import FileFormatError, as_path, write_atomically
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.job.program import Program, Step
-from selfmotion.result import Move, Plan, load_move, load_plan, read_bundle, write_bundle
+from selfmotion.result import Move, Plan, load_move, read_bundle, read_plan, write_bundle
 
 # Raised with every change that older versions cannot read.
 _FORMAT = 1
@@ -108,7 +108,7 @@ class Shelf:
             return None
         try:
             names = [file.with_suffix(f".{k}.npz") for k in range(int(kept["plans"]))]
-            return [load_plan(name, known=self._known) for name in names], str(kept["reason"])
+            return [read_plan(name, self._known) for name in names], str(kept["reason"])
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None
 

@@ -16,7 +16,7 @@ from selfmotion.result import Plan
 
 # So often motions are added that begin where the seam before ends, at most: of few seams and of
 # many.
-_NEARBY_ROUNDS, _NEARBY_ROUNDS_OF_MANY = 6, 2
+_NEARBY_ROUNDS, _NEARBY_ROUNDS_OF_MANY = 4, 2
 # Moves that take less than this need none [s]; an added motion shortens one by this at least.
 _SHORT, _WORTH = 0.1, 0.02
 

@@ -233,3 +233,17 @@ def load_plan(
         note = f"{name} has changed since the plan was made"
         certificate = replace(certificate, notes=(*certificate.notes, note))
     return replace(plan, certificate=certificate)
+
+
+def read_plan(file: FilePath, known: MutableMapping[str, Any]) -> Plan:
+    """Read a plan as it was written, with the certificate of then; see `load_plan`.
+
+    Raises
+    ------
+    FileFormatError
+        See `load_plan`; also where the file, or a mesh, was changed since.
+    """
+    archive = Archive.read(file, known)
+    if archive.altered or archive.changed:
+        raise FileFormatError(f"{file}: it, or what it depends on, was changed since")
+    return Plan(*archive[:-1])
