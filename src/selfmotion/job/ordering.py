@@ -101,6 +101,7 @@ class Ordering:
                     self._add(State(number, plan, turned=True, mirrored=True))
         self._drop_what_hangs()
         if self.states:
+            self._add_alike()
             self._add_nearby()
 
     def _add(self, state: State) -> None:
@@ -221,6 +222,23 @@ class Ordering:
         last = none if end is None else self._free.time_of(ends, end)
         between = np.array([self._free.time_of(q, begins) for q in ends])
         return first, last, between
+
+    def _add_alike(self) -> None:
+        """Add a motion of each seam that begins as near as may be to where the program does.
+
+        What is near to the same configuration is near to each other.
+        """
+        here = self.states[0].ends[0] if self._ends[0] is None else self._ends[0]
+        made = self.made
+        plans = self._work.nearby([(self.seams[k], self.problems[k], here) for k in made])
+        for seam, found in zip(made, plans, strict=True):
+            known = [state for state in self.states if state.seam == seam]
+            for plan in found:
+                starts = [self.seconds(plan.trajectory.q[0], state.ends[0]) for state in known]
+                if min(starts) > _WORTH:
+                    self._add(State(seam, plan))
+                    if self.seams[seam].either_way:
+                        self._add(State(seam, plan, turned=True, mirrored=True))
 
     def _add_nearby(self) -> None:
         """Add motions that begin near where the one before ends, along the best round."""
