@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-job bench-moves bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-job bench-moves bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -44,6 +44,9 @@ bench-fastest: $(READY)  ## the fastest motions of 20 paths, and retimed plans, 
 bench-moves: $(READY)  ## 100 transfers among boxes, some against 50 tries of OMPL
 	$(BIN)/pip install --quiet ompl==2.0.1
 	$(BIN)/python benchmarks/moves.py --peer 3
+
+fuzz-job: $(READY)  ## a job killed at 20 random times, and begun again
+	$(BIN)/python benchmarks/job_killed.py
 
 bench-job: $(READY)  ## a frame of 132 strokes: order, plans, moves past what was made
 	$(BIN)/python benchmarks/job.py

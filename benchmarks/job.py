@@ -125,8 +125,8 @@ def main() -> None:
         seams(options.strokes, not options.given),
         clearance=sm.Clearance(distance=APART),
         order="given" if options.given else "free",
-        branches=3,
-        deadline=5.0,
+        branches=2,
+        deadline=2.0,
         folder=options.folder,
         progress=progress,
     )

@@ -31,6 +31,7 @@ from selfmotion.planning.settings import (
     FINER_LOOKS,
     MOVE_DEADLINE,
     MOVE_MARGIN,
+    RETREATS,
     SHORTEST_PACED,
     SLOWER_FACTOR,
     SLOWER_TRIES,
@@ -41,7 +42,7 @@ from selfmotion.planning.settings import (
     USUAL_SPEED,
     WIDER,
 )
-from selfmotion.planning.ways import Room, find_way
+from selfmotion.planning.ways import Room, find_way, shortened, straight_way
 from selfmotion.problem import KEPT, NO_OVERLAP, envelope_of
 from selfmotion.result import Move, paced
 from selfmotion.robot import RobotModel
@@ -253,13 +254,50 @@ class FreeMotions:
         legs: list[Array] = []
         starts = _allowed(room, ends[0])
         for goals in ends[1:]:
-            leg = find_way(room, starts, _allowed(room, goals), end, self._rng)
+            leg = self._leg(room, starts, _allowed(room, goals), end)
             if leg is None:
                 return None
             legs.append(leg)
             starts = leg[-1:]
         passed = np.cumsum([len(leg) - 1 for leg in legs]).tolist()[:-1]
         return np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])]), passed
+
+    def _leg(self, room: Room, starts: Array, goals: Array, end: float) -> Array | None:
+        """Return a way from one of starts (a, n) to one of goals (b, n), also after a retreat.
+
+        Among what a tool works on the way out is narrow, and along the tool's axis.
+        """
+        direct = straight_way(room, starts, goals)
+        if direct is not None:
+            return direct
+        out = [self._retreats(room, several) for several in (starts, goals)]
+        first, last = (np.concatenate([q, out[k][0]]) for k, q in enumerate((starts, goals)))
+        way = find_way(room, first, last, end, self._rng)
+        if way is None:
+            return None
+        before, after = (
+            [origin for place, origin in zip(*each, strict=True) if np.array_equal(place, tip)]
+            for each, tip in zip(out, (way[0], way[-1]), strict=True)
+        )
+        if not (before or after):
+            return way
+        whole = np.concatenate([*(q[None] for q in before[:1]), way, *(q[None] for q in after[:1])])
+        return shortened(room, whole, self._rng)
+
+    def _retreats(self, room: Room, several: Array) -> tuple[Array, Array]:
+        """Return where the tool is back along its axis, and from where a free leg leads there."""
+        robot, found, origins = self.robot, list[Array](), list[Array]()
+        for q in several:
+            for length in RETREATS:
+                away = robot.pose(q) * SE3(np.eye(3), np.array([0.0, 0.0, -length]))
+                try:
+                    there = robot.inverse_kinematics(away, seed=q, attempts=1)
+                except InverseKinematicsError:
+                    continue
+                if room.is_open(q, there):
+                    found.append(there)
+                    origins.append(q)
+        return np.reshape(found, (-1, robot.dof)), np.reshape(origins, (-1, robot.dof))
 
     @property
     def _limits(self) -> Envelope:

@@ -110,6 +110,8 @@ LEG_STEP = 0.02
 FINE_STEP = 0.005
 TURN_STEP = 0.05
 FIRST_LOT = 4
+# Where the straight leg is blocked, trees begin so far back along the tool's axis as well [m].
+RETREATS = (0.01, 0.03, 0.08)
 # Trees grow by legs of so many seconds at full speed; this share of the samples lies around the
 # middle, so far around, in shares of the distance; others are anywhere.
 LEG_RANGE = 1.0

@@ -121,19 +121,26 @@ def find_way(
     (m, n) or None
         The quickest of a few; None where none was found in time.
     """
-    rates = room.rates
-    times = (np.abs(starts[:, None] - goals[None]) * rates).max(axis=2)
-    for pair in np.argsort(times, axis=None)[: len(starts) + len(goals)].tolist():
-        i, j = divmod(pair, len(goals))
-        if room.is_open(starts[i], goals[j]):
-            return np.stack([starts[i], goals[j]])
+    way = straight_way(room, starts, goals)
+    if way is not None:
+        return way
     found: list[Array] = []
     while len(found) < WAYS:
         way = _connected(room, starts, goals, end, rng)
         if way is None:
             break
         found.append(shortened(room, way, rng))
-    return min(found, key=lambda way: _duration(way, rates), default=None)
+    return min(found, key=lambda way: _duration(way, room.rates), default=None)
+
+
+def straight_way(room: Room, starts: Array, goals: Array) -> Array | None:
+    """Return the quickest straight leg that is free from a start to a goal, (2, n); see above."""
+    times = (np.abs(starts[:, None] - goals[None]) * room.rates).max(axis=2)
+    for pair in np.argsort(times, axis=None)[: len(starts) + len(goals)].tolist():
+        i, j = divmod(pair, len(goals))
+        if room.is_open(starts[i], goals[j]):
+            return np.stack([starts[i], goals[j]])
+    return None
 
 
 def shortened(room: Room, way: Array, rng: np.random.Generator) -> Array:
