@@ -35,7 +35,7 @@ _FARTHEST = 0.5
 # Barriers begin with this share of the cost for all conditions, and end with that; slacks begin
 # with at least so much [units of h]. Where prices are known, with these.
 _FIRST, _LAST, _SLACK = 1e-1, 1e-7, 1e-1
-_KNOWN_FIRST, _KNOWN_SLACK = 1e-4, 1e-3
+_KNOWN_FIRST, _KNOWN_SLACK = 1e-5, 1e-3
 # A barrier is solved to this many times itself, before it falls to this share, or this power.
 _SOLVED, _FALL, _POWER = 10.0, 0.2, 1.5
 # Conditions are met to this [units of h].
@@ -149,7 +149,7 @@ class _Solver:
         if self._columns.size:
             prices = np.zeros_like(motion.h)
             prices[:, self._columns] = self._prices
-            by_prices = slopes + motion.grid.conditions.pulled(motion.samples, prices)
+            by_prices = slopes + motion.grid.conditions.pulled(motion.samples.checked, prices)
         curved = around.curvature(by_prices)
         intervals = motion.grid.cost.curvature(around.changes)
         gap = motion.h[:, self._columns] + self._slacks
@@ -174,7 +174,7 @@ class _Solver:
         if not self._columns.size:
             return np.zeros((count, 0, 3 * size))
         motion = self.motion
-        return motion.grid.conditions.rows(motion.samples, around.changes, self._columns)
+        return motion.grid.conditions.rows(motion.samples.checked, around.changes, self._columns)
 
     def _solved(self, gap: Array) -> bool:
         """Whether the problem with the present barrier is solved well enough."""

@@ -166,11 +166,11 @@ class NodeDescent:
         if best is not None or self._ended is not None:
             return best
         broken = _broken(freely.motion)
-        orders = grid.conditions.orders(freely.motion.samples)
+        orders = grid.conditions.orders(freely.motion.samples.checked)
         # Along a limit of speed or acceleration what is faster jumps: beyond quintics on few nodes.
-        if (orders[broken] > 0).any():
+        if (orders[broken] > 1).any():
             return None
-        if not self._free:
+        if not self._free and (orders[broken] == 0).any():
             best = self._towards_middle(grid, motion.place.q[0])
         dearest = np.inf if best is None else best.cost
         found = None if self._ended else self._bound(freely, _NO_COLUMNS, dearest)
@@ -187,13 +187,18 @@ class NodeDescent:
         With one more between each two, put onto the path.
         """
         while self._ended is None and 2 * standing.steps <= MOST_NODES * len(self._problem.knots):
-            motion, finer = standing.motion, standing.refined()
+            motion = standing.motion
             off = abs(motion.exact_cost - motion.cost)
-            kept = not _broken(finer.motion).any()
-            if kept and off <= COST_AGREEMENT * abs(motion.exact_cost):
-                # That is on the path and keeps the conditions: between the nodes it does so better.
-                return finer
-            found = self.again(finer)
+            where = None
+            if off <= COST_AGREEMENT * abs(motion.exact_cost):
+                finer = standing.refined()
+                # That is on the path, also between the nodes.
+                broken = finer.motion.broken()
+                if not broken.any():
+                    return finer
+                each = broken.reshape(-1, 2).any(axis=1)
+                where = np.convolve(each, np.ones(3), "same") > 0.0
+            found = self.again(standing.refined(where))
             if found is None:
                 break
             standing = found
@@ -231,7 +236,7 @@ class NodeDescent:
                 return None
             near = (motion.h > -NEARLY).any(axis=0)
             columns = np.union1d(columns, np.flatnonzero(broken | near))
-            if (motion.grid.conditions.orders(motion.samples)[columns] > 0).any():
+            if (motion.grid.conditions.orders(motion.samples.checked)[columns] > 1).any():
                 return None
             optimum = self._minimise(motion, columns, dearest)
         return None
@@ -278,7 +283,9 @@ class NodeDescent:
         least = LEAST_SAVING * abs(motion.cost)
         conditions = Conditions(motion.grid.conditions.constraints, Grid(motion.grid.t))
         each = [part.ravel() for part in motion.grid.conditions.by_constraint(optimum.prices)]
-        active = conditions.active(motion.samples, np.concatenate([np.zeros(0), *each]), least)
+        active = conditions.active(
+            motion.samples.checked, np.concatenate([np.zeros(0), *each]), least
+        )
         off = abs(motion.exact_cost - motion.cost)
         promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
         return Standing(motion, status, columns, optimum.prices, active, off + promised)
