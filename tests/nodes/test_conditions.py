@@ -68,9 +68,10 @@ def test_columns_are_those_of_all(panda: sm.RobotModel) -> None:
     around = Around.of(motion.charts, motion.nu)
     assert around is not None
     rows = motion.grid.conditions.rows
-    every = rows(motion.samples.checked, around.changes, np.arange(motion.h.shape[1]))
+    checked = motion.samples.checked
+    every = rows(checked, around.changes, np.arange(motion.h.shape[1]))
     some = np.array([3, 17, 40, 55])
-    np.testing.assert_array_equal(rows(motion.samples.checked, around.changes, some), every[:, some])
+    np.testing.assert_array_equal(rows(checked, around.changes, some), every[:, some])
 
 
 def test_orders_are_those_of_what_is_limited(panda: sm.RobotModel) -> None:

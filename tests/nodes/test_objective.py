@@ -25,7 +25,7 @@ def costs_of(robot: sm.RobotModel) -> tuple[sm.Cost, ...]:
 
 
 def gradient(motion):
-    slopes = scattered(motion.grid.cost.slopes(motion.samples))
+    slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
     return motion.charts.pulled(motion.place, slopes[:, 0], slopes[:, 1])
 
 
@@ -42,10 +42,10 @@ def test_gradient_and_curvature_are_central_differences(case: Case, rest: bool) 
     # Charts around the same motion: ν there is another function of z, but its zero is the same.
     around = Around.of(motion.charts, motion.nu)
     assert around is not None
-    slopes = scattered(motion.grid.cost.slopes(motion.samples))
+    slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
     matrix = Banded(len(motion.nu), step.shape[1], 1)
     matrix.add(0, 0, around.curvature(slopes))
-    matrix.add_pairs(0, motion.grid.cost.curvature(around.changes))
+    matrix.add_pairs(0, motion.grid.cost.curvature(motion.samples, around.changes))
     change = (gradient(above) - gradient(below)) / (2 * NEAR)
     product = matrix.dense() @ step.ravel()
     np.testing.assert_allclose(product, change.ravel(), atol=CURVATURE * np.abs(product).max())

@@ -85,7 +85,7 @@ class Charts:
 
     def recentred(self, place: Place) -> tuple["Charts", Array]:
         """Return the charts around a place, and its ν there."""
-        bases = _orthonormal(place.tangents)
+        bases = orthonormal(place.tangents)
         epsilon = self.manifolds.stages(place.table).epsilon
         nu = np.einsum("knr,kn->kr", bases, epsilon)
         return Charts(self.manifolds, place.q, bases), nu
@@ -172,7 +172,7 @@ class Manifolds:
         return np.concatenate(found, axis=1), rotations
 
 
-def _orthonormal(tangents: Array) -> Array:
+def orthonormal(tangents: Array) -> Array:
     """Return orthonormal bases of the spans of full-rank matrices (K, n, r): Gram-Schmidt."""
     found = np.array(tangents)
     for x in range(found.shape[2]):

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints
-from selfmotion.constraints import BoundConstraint, NodeTangents, linearised
+from selfmotion.basics import Array, Flags, Ints
+from selfmotion.constraints import BoundClearance, BoundConstraint, NodeTangents, linearised
 from selfmotion.costs import Samples
 from selfmotion.nodes.hermite import CheckedSamples, Hermite
 
@@ -149,6 +149,11 @@ class NodeConditions:
             first += own
         return found
 
+    def of_bodies(self) -> Flags:
+        """Return which conditions are distances of bodies, (C,)."""
+        each = [isinstance(item, BoundClearance) for item in self.constraints]
+        return np.tile(np.repeat(np.array(each, dtype=np.bool_), self._counts), 2)
+
     def orders(self, samples: CheckedSamples) -> Ints:
         """Return the highest derivative of q that each condition depends on, (C,)."""
         found = [np.zeros(0, dtype=np.int64)]
@@ -156,7 +161,9 @@ class NodeConditions:
             known = linearised(item, samples, self._units)
             first = np.arange(known.count // (2 * len(self.spline.t) - 1))
             rows = known.picked(self._units, first).reshape(len(first), 4, -1)
-            does = np.any(rows != 0.0, axis=(2,))
+            # What is far from counting, as bodies are, has no rows: those depend on q alone.
+            does = np.any(rows != 0.0, axis=2)
+            does[:, 0] = True
             found.append(3 - np.argmax(np.flip(does, axis=1), axis=1))
         return np.tile(np.concatenate(found), 2)
 

@@ -46,7 +46,7 @@ class Hermite:
 
     def __init__(self, t: Array) -> None:
         self.t, self.steps = t, np.diff(t)
-        shares, weights = np.append(0.0, _POINTS), np.append(0.0, _WEIGHTS)
+        shares, weights = self.shares_within, np.append(0.0, _WEIGHTS)
         h = self.steps[:, None]
         times, each = (t[:-1, None] + h * shares).ravel(), (h * weights).ravel()
         times = np.append(times, t[-1])
@@ -60,7 +60,7 @@ class Hermite:
         From q, q̇ at the left and q, q̇ at the right end; at the node itself it is the derivative of
         the interval that begins there.
         """
-        s, h = np.append(0.0, _POINTS), self.steps[:, None]
+        s, h = self.shares_within, self.steps[:, None]
         one = np.ones_like(s)
         tables = (
             (1 - s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (3 - 2 * s), s**2 * (s - 1)),
@@ -78,6 +78,11 @@ class Hermite:
             )
             for order, table in enumerate(tables)
         )
+
+    @property
+    def shares_within(self) -> Array:
+        """Where an interval's samples are, as shares of it, (4,)."""
+        return np.append(0.0, _POINTS)
 
     @cached_property
     def between(self) -> tuple[Array, ...]:

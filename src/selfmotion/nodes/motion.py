@@ -8,7 +8,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, read_only
 from selfmotion.constraints import BoundConstraint
-from selfmotion.costs import JointVelocity
+from selfmotion.costs import JointVelocity, Partials
 from selfmotion.costs.base import weight_matrix
 from selfmotion.engine import Counts
 from selfmotion.motion import Trajectory
@@ -187,6 +187,11 @@ class NodeMotion:
     def aim(self) -> float:
         """What is minimised: F and what keeps the motion smooth."""
         return self.cost + self.grid.cost.roughness(self.samples)
+
+    @cached_property
+    def partials(self) -> Partials:
+        """Derivatives of the integrand at the samples."""
+        return self.grid.cost.partials(self.samples)
 
     @cached_property
     def h(self) -> Array:
