@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 
 import selfmotion as sm
+from selfmotion.nodes.hermite import Hermite
 from selfmotion.nodes.objective import Around
 from support.arms import PANDA_HOME
 from support.nodes import centred, moved, nodes_of, random_step
@@ -91,3 +93,20 @@ def test_between_nodes_a_limit_counts_as_well(panda: sm.RobotModel) -> None:
     limits = panda.velocity_limit.clip(max=1.0)
     expected = middle / limits - 1.0 + 2e-3
     np.testing.assert_allclose(motion.h[:-1, half : half + 7], expected, atol=1e-12)
+
+
+def test_what_is_between_two_nodes_says_how_fast_the_motion_is_at_most() -> None:
+    """Of the spline's q̇, a parabola on each interval: the bound is attained where that is flat."""
+    rng = np.random.default_rng(3)
+    spline = Hermite(np.cumsum(rng.uniform(0.1, 1.0, 9)))
+    q, qd = rng.normal(size=(2, 9, 3))
+    ends = np.stack([q[:-1], qd[:-1], q[1:], qd[1:]], axis=1)
+    control = np.einsum("ka,kan->kn", spline.between[1], ends)
+    most = np.maximum(np.maximum(qd[:-1], qd[1:]), control)
+    fine = np.linspace(0.0, 1.0, 101)
+    for k, h in enumerate(spline.steps):
+        known = CubicHermiteSpline([0.0, h], q[k : k + 2], qd[k : k + 2])
+        rates = known(h * fine, 1)
+        assert (rates <= most[k] + 1e-12).all()
+        bent = (1 - fine) ** 2 * qd[k, :1] + 2 * fine * (1 - fine) * control[k, :1]
+        np.testing.assert_allclose(rates[:, 0], bent + fine**2 * qd[k + 1, :1], atol=1e-9)

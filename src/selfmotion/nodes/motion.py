@@ -173,6 +173,11 @@ class NodeMotion:
         """What each cost contributes along `trajectory`."""
         return self.grid.cost.terms(self.exact)
 
+    @cached_property
+    def along(self) -> Flags:
+        """On which intervals a condition binds, (N,)."""
+        return np.asarray(np.any(self.h[:-1, self.h.shape[1] // 2 :] > -_ALONG, axis=1))
+
     def broken(self) -> Flags:
         """Return on which intervals `trajectory` does not keep the conditions, (N,)."""
         over = self.grid.conditions.over(self.exact)[:-1] > 0.0
@@ -224,7 +229,7 @@ class NodeMotion:
         problem, t, place = self.grid.problem, self.grid.t, self.place
         qdd = self.grid.manifolds.accelerations(place.q, place.qd)
         near = np.gradient(place.qd, t, axis=0, edge_order=2)
-        along = np.any(self.h[:-1, self.h.shape[1] // 2 :] > -_ALONG, axis=1)
+        along = self.along
         before, after = np.append(False, along), np.append(along, False)
         sides = self.grid.spline.accelerations(self.samples.ends)
         for which, side in zip((before & ~after, after & ~before), sides, strict=True):

@@ -30,8 +30,9 @@ _SHARE, _SHORTEST = 1e-4, 1e-6
 # A matrix that is not positive definite gets this share of its largest entry on the diagonal, or a
 # third of what the last one needed; then more by this factor, again and again.
 _SHIFT, _LESS, _MORE = 1e-6, 1.0 / 3.0, 8.0
-# Nodes go no further than this in one step [rad or m].
-_FARTHEST = 0.5
+# Nodes go no further than this in one step [rad or m]; one that would go beyond that is none of a
+# matrix that says something.
+_FARTHEST, _TRUSTED = 0.5, 5.0
 # Barriers begin with this share of the cost for all conditions, and end with that; slacks begin
 # with at least so much [units of h]. Where prices are known, with these.
 _FIRST, _LAST, _SLACK = 1e-1, 1e-6, 1e-1
@@ -204,7 +205,7 @@ class _Solver:
             matrix.add_diagonal(shift)
             matrix.hold(self.motion.grid.held)
             step = matrix.solve(-right)
-            if step is not None:
+            if step is not None and np.abs(step.reshape(count, 2, -1)[:, 0]).max() <= _TRUSTED:
                 self._shift = shift
                 self._promised = float(-right @ step)
                 return step.reshape(count, size)
