@@ -36,7 +36,7 @@ _FARTHEST, _TRUSTED = 0.5, 5.0
 # Barriers begin with this share of the cost for all conditions, and end with that; slacks begin
 # with at least so much [units of h]. Where prices are known, with these.
 _FIRST, _LAST, _SLACK = 1e-1, 1e-6, 1e-1
-_KNOWN_FIRST, _KNOWN_SLACK = 1e-5, 1e-3
+_KNOWN_FIRST, _KNOWN_SLACK = 1e-4, 1e-3
 # A barrier is solved to this many times itself, before it falls to this share, or this power.
 _SOLVED, _FALL, _POWER = 10.0, 0.2, 1.5
 # Conditions are met to this [units of h].
