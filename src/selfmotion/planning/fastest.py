@@ -74,7 +74,7 @@ def fastest(
     Raises
     ------
     ProblemError
-        No limits of acceleration are given or known, or toppra is not installed.
+        No limits of acceleration are given or known.
     PlanError
         No motion that was found keeps all limits at any pace; says the last verdict.
     """
