@@ -41,6 +41,8 @@ from selfmotion.path import Path, TimeLaw
 from selfmotion.planning import Search
 from selfmotion.task import SE3, Damping, Relaxation, Task
 
+# What is looked for: the motion that is best by its costs, or the fastest one.
+GOALS = ("best", "fastest")
 # Kinds that no file names: what is missing of a plan, a cost that damping adds, functions (which
 # are named by module:attribute).
 _NOT_IN_FILES = {"LostCost", "OffPath", "FunctionCost"}
@@ -138,6 +140,7 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
         "damping": (model_of(Damping), None),
         "rest": (bool, True),
         "joint_limits": (Text, None),
+        "goal": (Literal[GOALS], None),
         "search": (model_of(Search), None),
         "optimiser": (model_of(QuasiNewton), None),
         "tolerance": (model_of(Tolerance), None),

@@ -11,10 +11,8 @@ import numpy.typing as npt
 from selfmotion.basics import (
     Array,
     PlanError,
-    ProblemError,
     Progress,
     as_number,
-    per_joint,
     silent,
 )
 from selfmotion.certificate import Tolerance
@@ -27,7 +25,7 @@ from selfmotion.planning.run import plan
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import COARSE, DEGREE, POWER, ROUND_GAIN, ROUNDS
 from selfmotion.problem import Problem, check_problem
-from selfmotion.result import Plan, retime
+from selfmotion.result import Plan, rate_limits, retime
 
 # What brings a path to another pace.
 Pace = Callable[[Path], Path]
@@ -113,7 +111,7 @@ def fastest(
         The interruption came before there was a motion.
     """
     check_problem(problem)
-    rounds = _Rounds(problem, *_limits(problem, acceleration, velocity))
+    rounds = _Rounds(problem, *rate_limits(problem, acceleration, velocity))
     clock = Deadline(np.inf)
     if deadline is not None:
         clock = Deadline.after(as_number(deadline, "deadline", above=0.0))
@@ -122,12 +120,14 @@ def fastest(
     try:
         rounds.run(options)
     except KeyboardInterrupt:
-        status = Status.DEADLINE if clock.passed else Status.INTERRUPTED
-        if rounds.best is None and not clock.passed:
+        # A plan in between may have seen first that it is late.
+        late = time.perf_counter() >= clock.end
+        status = Status.DEADLINE if late else Status.INTERRUPTED
+        if rounds.best is None and not late:
             raise
     if rounds.best is None:
-        late = f" in {deadline} s" if clock.passed else ""
-        raise PlanError(f"no motion keeps all limits at any pace{late}: {rounds.verdict}")
+        when = f" in {deadline} s" if status is Status.DEADLINE else ""
+        raise PlanError(f"no motion keeps all limits at any pace{when}: {rounds.verdict}")
     found = rounds.retimed
     return Fastest(rounds.best, found["x = 0"], found["costs"], tuple(rounds.times), status)
 
@@ -217,23 +217,6 @@ class _Rounds:
             if found.path.duration < self._duration:
                 self.best = found
         return found
-
-
-def _limits(
-    problem: Problem, acceleration: npt.ArrayLike | None, velocity: npt.ArrayLike | None
-) -> tuple[Array, Array]:
-    robot, asked = problem.robot, problem.envelope
-    v = asked.speed if velocity is None else velocity
-    a = asked.acceleration if acceleration is None else acceleration
-    v = per_joint(v, robot.dof, f"{robot.name}: velocity limits", positive=True)
-    a = per_joint(a, robot.dof, f"{robot.name}: acceleration limits", positive=True)
-    if not np.all(np.isfinite(a)):
-        joint = robot.joint_names[int(np.argmax(~np.isfinite(a)))]
-        raise ProblemError(
-            f"{robot.name}: no limit of acceleration is known of joint '{joint}', without which "
-            f"no pace is the fastest; give acceleration="
-        )
-    return np.minimum(v, asked.speed), np.minimum(a, asked.acceleration)
 
 
 def _at_its_fastest(planned: Plan, problem: Problem, v: Array, a: Array) -> Plan:

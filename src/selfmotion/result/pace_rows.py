@@ -79,13 +79,18 @@ class PaceLimits:
         """
         steps = np.diff(motion.t)
         at = np.minimum(motion.t[:-1, None] + steps[:, None] * PLACES, motion.t[-1]).ravel()
-        states = [motion(at, order) for order in range(4)]
+        used = self.shares_at(motion, at)
+        return [table.reshape(len(steps), len(PLACES), -1).max(axis=1) for table in used]
+
+    def shares_at(self, motion: Trajectory, t: Array) -> list[Array]:
+        """Return what of each limit is used at times (K,), a table (K, n or m) for each."""
+        states = [motion(t, order) for order in range(4)]
         used = [np.abs(x) / limit for x, limit in zip(states[1:], self.of_orders, strict=True)]
         for item in self.quantities:
             away = item.away(*states[:3])
             sizes = np.linalg.norm(away, axis=2) if away.ndim == 3 else np.abs(away)
             used.append(sizes / item.bounds)
-        return [table.reshape(len(steps), len(PLACES), -1).max(axis=1) for table in used]
+        return used
 
 
 @dataclass(frozen=True, eq=False)

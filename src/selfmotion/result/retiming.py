@@ -8,18 +8,18 @@ from operator import and_
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, one_blas_thread, per_joint, shown
-from selfmotion.certificate import Quantity, QuantityKept, Requirement
+from selfmotion.basics import Array, ProblemError, one_blas_thread, per_joint, read_only, shown
 from selfmotion.constraints import (
     Constraint,
     JointAccelerationLimits,
     JointVelocityLimits,
 )
 from selfmotion.path import Pace, Retimed
+from selfmotion.problem import Problem
+from selfmotion.result.limits_used import quantities_of_pace
 from selfmotion.result.pace_rows import PaceLimits
 from selfmotion.result.pacing import Ends, along, fastest_pace
 from selfmotion.result.plan import Plan
-from selfmotion.robot import RobotModel
 from selfmotion.task import Relaxation
 
 # Time between two samples of the new motion [s]: the first that keeps the plan's tolerance.
@@ -47,7 +47,11 @@ def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
     return factor
 
 
-def retime(plan: Plan, acceleration: npt.ArrayLike, velocity: npt.ArrayLike | None = None) -> Plan:
+def retime(
+    plan: Plan,
+    acceleration: npt.ArrayLike | None = None,
+    velocity: npt.ArrayLike | None = None,
+) -> Plan:
     """Return the plan's joint path in the shortest time within the limits, from rest to rest.
 
     Velocity, acceleration, jerk and torque limits and those of the tool are kept, all that the
@@ -59,28 +63,25 @@ def retime(plan: Plan, acceleration: npt.ArrayLike, velocity: npt.ArrayLike | No
     Parameters
     ----------
     plan : Plan
-    acceleration : (n,) or float
-        Limits [rad/s² or m/s²].
+    acceleration : (n,) or float, optional
+        Limits [rad/s² or m/s²]; by default those that the plan was asked to keep, or the maker's.
     velocity : (n,) or float, optional
         Limits [rad/s or m/s]; by default those that the plan was asked to keep, or the URDF's.
 
     Raises
     ------
     ProblemError
-        A limit is not positive.
+        A limit is not positive, or no limits of acceleration are given or known.
     PlanError
         No pace keeps the limits.
     """
     _check_plan(plan)
-    robot, asked = plan.robot, plan.problem.envelope
-    velocity = asked.speed if velocity is None else velocity
-    wanted = [
-        JointVelocityLimits(_positive(robot, velocity, "velocity")),
-        JointAccelerationLimits(_positive(robot, acceleration, "acceleration")),
-    ]
+    v, a = rate_limits(plan.problem, acceleration, velocity)
+    wanted = [JointVelocityLimits(v), JointAccelerationLimits(a)]
     # The problem's own limits stay: the tighter of both is kept.
-    kept = reduce(and_, (item.envelope(robot) for item in wanted), asked)
-    quantities = _quantities(plan.requirements)
+    robot = plan.robot
+    kept = reduce(and_, (item.envelope(robot) for item in wanted), plan.problem.envelope)
+    quantities = quantities_of_pace(plan.requirements)
     limits = PaceLimits(kept.speed, kept.acceleration, kept.jerk, quantities)
     for step in _STEPS:
         with one_blas_thread():
@@ -89,12 +90,6 @@ def retime(plan: Plan, acceleration: npt.ArrayLike, velocity: npt.ArrayLike | No
         if result.certificate.on_path:
             break
     return result
-
-
-def _quantities(requirements: Sequence[Requirement]) -> tuple[Quantity, ...]:
-    """Return the quantities that a slower pace may keep."""
-    kept = (item.quantity for item in requirements if isinstance(item, QuantityKept))
-    return tuple(item for item in kept if item.of_pace and len(item.limited))
 
 
 def _ends(plan: Plan) -> Ends:
@@ -108,9 +103,30 @@ def _check_plan(plan: Plan) -> None:
         raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
 
 
-def _positive(robot: RobotModel, limit: npt.ArrayLike, name: str) -> Array:
-    what = f"{robot.name}: {name} limits for retiming"
-    return per_joint(limit, robot.dof, what, positive=True)
+def rate_limits(
+    problem: Problem, acceleration: npt.ArrayLike | None, velocity: npt.ArrayLike | None
+) -> tuple[Array, Array]:
+    """Return the limits of velocity and acceleration of a fastest motion, (n,) each.
+
+    Those that are given, or else those that the problem asks for.
+
+    Raises
+    ------
+    ProblemError
+        One is not positive, or no joint's acceleration is limited.
+    """
+    robot, asked = problem.robot, problem.envelope
+    v = asked.speed if velocity is None else velocity
+    a = asked.acceleration if acceleration is None else acceleration
+    v = per_joint(v, robot.dof, f"{robot.name}: velocity limits", positive=True)
+    a = per_joint(a, robot.dof, f"{robot.name}: acceleration limits", positive=True)
+    if not np.all(np.isfinite(a)):
+        joint = robot.joint_names[int(np.argmax(~np.isfinite(a)))]
+        raise ProblemError(
+            f"{robot.name}: no limit of acceleration is known of joint '{joint}', without which "
+            f"no pace is the fastest; give acceleration="
+        )
+    return read_only(np.minimum(v, asked.speed)), read_only(np.minimum(a, asked.acceleration))
 
 
 def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
