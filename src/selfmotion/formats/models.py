@@ -35,6 +35,7 @@ from selfmotion.formats.field_types import (
     Whole,
 )
 from selfmotion.formats.poses import ORIENTATIONS
+from selfmotion.formats.problem_parts import FEED_BOUNDS
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import QuasiNewton
 from selfmotion.path import Path, TimeLaw
@@ -53,7 +54,8 @@ _Fields = dict[str, tuple[Any, Any]]
 # Where a file says more, or says it otherwise, than the class's own signature.
 _LAWS: Any = Literal[tuple(law.value for law in TimeLaw)]
 _SHAPE: _Fields = {"frame": (Pose, None)}
-_PACED: _Fields = {"duration": (Number, None), "feed": (Number, None), **_SHAPE}
+_BOUNDS: _Fields = dict.fromkeys(FEED_BOUNDS, (Number, None))
+_PACED: _Fields = {"duration": (Number, None), "feed": (Number, None), **_BOUNDS, **_SHAPE}
 _OWN: Mapping[str, _Fields] = {
     "circle": {"start": (Pose, None), "center": (Numbers, None), "radius": (Number, None),
                "normal": (Numbers, [0.0, 0.0, 1.0]), **_PACED},
@@ -63,7 +65,7 @@ _OWN: Mapping[str, _Fields] = {
     "twist": {"start": (Pose, ...), "breaks": (Numbers, ...), "coefficients": (Numbers, ...)},
     "retimed": {"path": (Table, ...)},
     "section": {"path": (Table, ...)},
-    "feed": {"path": (Table, ...), **_SHAPE},
+    "feed": {"path": (Table, ...), "stretches": (list[Numbers], None), **_SHAPE},
     "joined": {"pieces": (list[Table], ...)},
     "placed": {"path": (Table, ...)},
     "Relaxation": {"rows": (Names, ...), "during": (Numbers, None)},
@@ -98,6 +100,7 @@ _PATH_FILE: _Fields = {
     **dict.fromkeys(("feed", "duration", "jump", "ramp"), (Number, None)),
     **dict.fromkeys(("tolerance", "corner_angle"), (Number, None)),
     "corners": (Text, None),
+    **_BOUNDS,
 }
 # A cost that is a function of one's own.
 _FUNCTION: _Fields = {
