@@ -28,7 +28,7 @@ from selfmotion.result.squares import Squares, basis
 # The square of a rate is at least this share of what it was.
 _LEAST = 1e-6
 # And at most so much of it, unless more is asked for: at rest little else bounds it.
-_MOST = 50.0
+_MOST = 500.0
 # Where in an interval limits are measured: its beginning and its end, from inside, and between.
 PLACES = np.clip(0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 9)), 1e-6, 1.0 - 1e-6)
 _NOTHING = 1e-150
