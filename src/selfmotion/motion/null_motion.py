@@ -222,7 +222,8 @@ class FreeNullMotion(RefinedNullMotion):
 
     Newton's method finds where each node lies on its self-motion. Where that does not apply (the
     tool may leave the path, joint jerks have a cost, the end is given, limits of acceleration bind
-    or bodies are too near), or leads nowhere, it is what `RefinedNullMotion` is. `Report.null_motion` tells what became of it.
+    or bodies are too near), or leads nowhere, it is what `RefinedNullMotion` is.
+    `Report.null_motion` tells what became of it.
     """
 
 
