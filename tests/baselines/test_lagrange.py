@@ -1,6 +1,7 @@
 """The optimal control problem by its necessary conditions: the same optimum as ours."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,6 +26,16 @@ def test_lagrangian_optimum_agrees_with_ours(ours: sm.Plan, lagrangian: sm.Plan)
     assert lagrangian.report.cost == pytest.approx(ours.report.cost, rel=FOUR_DIGITS)
     # The reading notes' 32-term expansion.
     assert lagrangian.report.cost == pytest.approx(10.48496, abs=2e-5)
+
+
+@pytest.mark.parametrize("duration", [1.0, 2.0])
+@pytest.mark.parametrize("mu", [0.05, 1.0])
+def test_the_default_is_at_the_lagrangian_optimum(duration: float, mu: float) -> None:
+    """Over all joint motions there are; its own solution is right to its tolerance, 1e-9."""
+    problem = replace(sm.sample_problem(mu=mu, duration=duration), null_motion=sm.FreeNullMotion())
+    plan = sm.plan(problem)
+    best = sm.plan_by(problem, sm.LagrangianOptimum(plan, tolerance=1e-9))
+    assert plan.report.cost == pytest.approx(best.report.cost, rel=1e-5)
 
 
 def test_lagrangian_optimum_needs_no_guess(lagrangian: sm.Plan) -> None:

@@ -17,6 +17,7 @@ from selfmotion.planning.settings import (
     LEAST_SAVING,
     MOST_NODES,
     NEARLY,
+    NODE_AGREEMENT,
     TOWARDS_MIDDLE,
 )
 from selfmotion.problem import Problem
@@ -192,7 +193,7 @@ class NodeDescent:
             motion = standing.motion
             off = abs(motion.exact_cost - motion.cost)
             where = None
-            if off <= COST_AGREEMENT * abs(motion.exact_cost):
+            if off <= NODE_AGREEMENT * abs(motion.exact_cost):
                 finer = standing.refined()
                 # That is on the path, also between the nodes.
                 broken = finer.motion.broken()
