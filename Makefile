@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-job bench-moves bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -41,6 +41,16 @@ bench-starts: $(READY)  ## free starts against the best of everything tried, 60 
 bench-fastest: $(READY)  ## 60 paces against linear programmes; the fastest motions of 20 paths, against retimed plans
 	$(BIN)/python benchmarks/paces.py
 	$(BIN)/python benchmarks/fastest.py
+
+bench-moves: $(READY)  ## 100 transfers among boxes, some against 50 tries of OMPL
+	$(BIN)/pip install --quiet ompl==2.0.1
+	$(BIN)/python benchmarks/moves.py --peer 3
+
+fuzz-job: $(READY)  ## a job killed at 20 random times, and begun again
+	$(BIN)/python benchmarks/job_killed.py
+
+bench-job: $(READY)  ## a frame of 132 strokes: order, plans, moves past what was made
+	$(BIN)/python benchmarks/job.py
 
 bench-latency: $(READY)  ## 10,000 steps of the replanner: percentiles, misses, and the cost of short sight
 	$(BIN)/python benchmarks/latency.py

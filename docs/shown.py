@@ -21,7 +21,7 @@ GROUPS = {
     "Jobs": (
         "quickstart", "weld_seam", "deburring", "painting", "closed_loop", "ur5_pointing", "rail",
         "weld_positioner", "weld_torch", "part_in_hand", "two_arms", "own_arm", "relaxed_rows",
-        "in_parts", "retiming", "warm_start",
+        "in_parts", "weld_frame", "print_frame", "deburr_holes", "retiming", "warm_start",
     ),
     "To and from other programs": (
         "ros2_handover", "foreign_motion", "placement_map", "dask_cluster",

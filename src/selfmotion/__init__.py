@@ -97,15 +97,24 @@ from selfmotion.costs import (
 from selfmotion.follow import Follow as Follow, Follows as Follows
 from selfmotion.formats import (
     Job as Job,
+    SeamJob as SeamJob,
     read_job as read_job,
     read_joint_limits as read_joint_limits,
     read_motion as read_motion,
     read_parts as read_parts,
     read_path as read_path,
     read_problem as read_problem,
+    read_seam_job as read_seam_job,
     write_motion as write_motion,
     write_parts as write_parts,
     write_problem as write_problem,
+)
+from selfmotion.job import (
+    Program as Program,
+    Seam as Seam,
+    Step as Step,
+    load_program as load_program,
+    plan_job as plan_job,
 )
 from selfmotion.motion import (
     BSplineNullMotion as BSplineNullMotion,
@@ -136,6 +145,7 @@ from selfmotion.path import (
     Placed as Placed,
     Polyline as Polyline,
     Retimed as Retimed,
+    Reversed as Reversed,
     Section as Section,
     TwistPath as TwistPath,
     Waypoints as Waypoints,
@@ -146,6 +156,7 @@ from selfmotion.planning import (
     Fastest as Fastest,
     Search as Search,
     fastest as fastest,
+    move as move,
     plan as plan,
     plan_in_parts as plan_in_parts,
 )
@@ -157,6 +168,8 @@ from selfmotion.result import (
     Parts as Parts,
     Plan as Plan,
     Report as Report,
+    load_move as load_move,
+    load_parts as load_parts,
     load_plan as load_plan,
     retime as retime,
     slowdown as slowdown,

@@ -38,6 +38,22 @@ def test_they_move_by_equation_4(case: Case) -> None:
         np.testing.assert_allclose(qd, expected, atol=1e-9)
 
 
+def test_accelerations_are_those_of_the_path(case: Case) -> None:
+    """With J⁺(ẍ - J̇q̇) and any null acceleration, q(t) is on the path to third order."""
+    motion = nodes_of(problem_of(case), 8)
+    motion = centred(moved(motion, random_step(motion, 5, 0.05)))
+    q, qd, t = motion.place.q[1:-1], motion.place.qd[1:-1], motion.grid.t[1:-1]
+    qdd = motion.grid.manifolds.accelerations(motion.place.q, motion.place.qd)[1:-1]
+    null = motion.charts.bases[1:-1, :, 0]
+    item, errors = motion.grid.problem.follows.items[0], []
+    for step in np.array([2e-2, 1e-2]) / max(1.0, np.abs(qd).max()):
+        later = q + step * qd + 0.5 * step**2 * (qdd + 0.3 * null)
+        each = [item.error(x + step, y) for x, y in zip(t, later, strict=True)]
+        errors.append(np.abs(each).max())
+    if errors[0] > 1e-9:
+        assert np.log2(errors[0] / errors[1]) > 2.8, errors
+
+
 def test_tangents_and_pullbacks_are_central_differences(case: Case) -> None:
     motion = nodes_of(problem_of(case))
     motion = moved(motion, random_step(motion, 2, 0.02))

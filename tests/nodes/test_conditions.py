@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 
 import selfmotion as sm
+from selfmotion.nodes.hermite import Hermite
 from selfmotion.nodes.objective import Around
 from support.arms import PANDA_HOME
 from support.nodes import centred, moved, nodes_of, random_step
@@ -48,7 +50,7 @@ def test_rows_and_pullbacks_are_central_differences(panda: sm.RobotModel, name: 
     around = Around.of(motion.charts, motion.nu)
     assert around is not None
     columns = np.arange(motion.h.shape[1])
-    rows = conditions.rows(motion.samples, around.changes, columns)
+    rows = conditions.rows(motion.samples.checked, around.changes, columns)
     padded = np.pad(step, ((1, 1), (0, 0)))
     near = np.concatenate([padded[:-2], step, padded[2:]], axis=1)
     along = np.einsum("kcd,kd->kc", rows, near)
@@ -57,7 +59,7 @@ def test_rows_and_pullbacks_are_central_differences(panda: sm.RobotModel, name: 
     allowed = 1e-3 if name == "clearance" else DIFFERENCE
     np.testing.assert_allclose(along, change, atol=allowed * scale)
     prices = np.random.default_rng(3).uniform(size=motion.h.shape)
-    by = conditions.pulled(motion.samples, prices)
+    by = conditions.pulled(motion.samples.checked, prices)
     pulled = motion.charts.pulled(motion.place, by[:, 0], by[:, 1])
     expected = float(np.sum(prices * change))
     assert float(np.sum(pulled * step)) == pytest.approx(expected, abs=allowed * scale * 100)
@@ -68,17 +70,18 @@ def test_columns_are_those_of_all(panda: sm.RobotModel) -> None:
     around = Around.of(motion.charts, motion.nu)
     assert around is not None
     rows = motion.grid.conditions.rows
-    every = rows(motion.samples, around.changes, np.arange(motion.h.shape[1]))
+    checked = motion.samples.checked
+    every = rows(checked, around.changes, np.arange(motion.h.shape[1]))
     some = np.array([3, 17, 40, 55])
-    np.testing.assert_array_equal(rows(motion.samples, around.changes, some), every[:, some])
+    np.testing.assert_array_equal(rows(checked, around.changes, some), every[:, some])
 
 
 def test_orders_are_those_of_what_is_limited(panda: sm.RobotModel) -> None:
     motion = motion_with(panda, "rates")
-    orders = motion.grid.conditions.orders(motion.samples)
+    orders = motion.grid.conditions.orders(motion.samples.checked)
     assert orders.tolist() == 2 * (14 * [1] + 14 * [2] + 14 * [3])
     motion = motion_with(panda, "a band")
-    assert set(motion.grid.conditions.orders(motion.samples)) == {0}
+    assert set(motion.grid.conditions.orders(motion.samples.checked)) == {0}
 
 
 def test_between_nodes_a_limit_counts_as_well(panda: sm.RobotModel) -> None:
@@ -86,7 +89,24 @@ def test_between_nodes_a_limit_counts_as_well(panda: sm.RobotModel) -> None:
     motion = motion_with(panda, "rates")
     half = motion.h.shape[1] // 2
     assert (motion.h[-1, half:] < -100.0).all()
-    middle = np.einsum("ka,kan->kn", motion.grid.spline.bases[1][:, 2], motion.samples.ends)
+    middle = np.einsum("ka,kan->kn", motion.grid.spline.between[1], motion.samples.ends)
     limits = panda.velocity_limit.clip(max=1.0)
     expected = middle / limits - 1.0 + 2e-3
     np.testing.assert_allclose(motion.h[:-1, half : half + 7], expected, atol=1e-12)
+
+
+def test_what_is_between_two_nodes_says_how_fast_the_motion_is_at_most() -> None:
+    """Of the spline's q̇, a parabola on each interval: the bound is attained where that is flat."""
+    rng = np.random.default_rng(3)
+    spline = Hermite(np.cumsum(rng.uniform(0.1, 1.0, 9)))
+    q, qd = rng.normal(size=(2, 9, 3))
+    ends = np.stack([q[:-1], qd[:-1], q[1:], qd[1:]], axis=1)
+    control = np.einsum("ka,kan->kn", spline.between[1], ends)
+    most = np.maximum(np.maximum(qd[:-1], qd[1:]), control)
+    fine = np.linspace(0.0, 1.0, 101)
+    for k, h in enumerate(spline.steps):
+        known = CubicHermiteSpline([0.0, h], q[k : k + 2], qd[k : k + 2])
+        rates = known(h * fine, 1)
+        assert (rates <= most[k] + 1e-12).all()
+        bent = (1 - fine) ** 2 * qd[k, :1] + 2 * fine * (1 - fine) * control[k, :1]
+        np.testing.assert_allclose(rates[:, 0], bent + fine**2 * qd[k + 1, :1], atol=1e-9)

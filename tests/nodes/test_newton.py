@@ -1,5 +1,7 @@
 """Newton's method on nodes: quadratic, as quick on many nodes as on few, and right at limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -68,6 +70,37 @@ def test_it_is_below_the_finest_spline(case: Case) -> None:
         )
     )
     assert optimum.motion.exact_cost <= spline.report.cost * (1.0 + 1e-5)
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_other_costs_take_few_iterations(case: Case, free: bool) -> None:
+    """Their curvature is nearly right, so that each step makes the gradient far smaller."""
+    costs = (sm.JointVelocity(), sm.InverseManipulability(0.02))
+    slopes = slopes_of(problem_of(case, costs=costs), 24, free=free)
+    assert len(slopes) <= 12
+    if len(slopes) > 1 and slopes[-2] > 1e-9 * slopes[0]:
+        assert slopes[-1] <= 0.2 * slopes[-2]
+
+
+@pytest.mark.parametrize(("joint", "share"), [(0, 0.7), (1, 0.95), (3, 0.95), (5, 0.85)])
+def test_limits_of_speed_are_kept_at_all_times(
+    panda: sm.RobotModel, joint: int, share: float
+) -> None:
+    """The optimum is found on nodes, is verified, and no dearer than that of splines."""
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    free = sm.plan(sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(), rest=False))
+    fastest = np.abs(free.trajectory.qd).max(axis=0)
+    limit = np.where(np.arange(7) == joint, share * fastest, np.inf)
+    limits = sm.JointVelocityLimits(limit)
+    problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(limits,), rest=False)
+    plan = sm.plan(problem)
+    assert plan.certificate.verified
+    assert isinstance(plan.report.null_motion, sm.NodeNullMotion)
+    t = np.linspace(0.0, path.duration, 20001)
+    assert (np.abs(plan.trajectory(t, 1)) <= limit).all()
+    assert plan.report.cost > free.report.cost
+    spline = sm.plan(replace(problem, null_motion=sm.BSplineNullMotion(32)))
+    assert plan.report.cost <= 1.0005 * spline.report.cost
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])

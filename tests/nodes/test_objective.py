@@ -6,6 +6,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.nodes.banded import Banded
 from selfmotion.nodes.objective import Around, scattered
+from selfmotion.robot import has_masses
 from support.arms import Case
 from support.nodes import centred, moved, nodes_of, problem_of, random_step
 
@@ -25,7 +26,7 @@ def costs_of(robot: sm.RobotModel) -> tuple[sm.Cost, ...]:
 
 
 def gradient(motion):
-    slopes = scattered(motion.grid.cost.slopes(motion.samples))
+    slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
     return motion.charts.pulled(motion.place, slopes[:, 0], slopes[:, 1])
 
 
@@ -42,13 +43,48 @@ def test_gradient_and_curvature_are_central_differences(case: Case, rest: bool) 
     # Charts around the same motion: ν there is another function of z, but its zero is the same.
     around = Around.of(motion.charts, motion.nu)
     assert around is not None
-    slopes = scattered(motion.grid.cost.slopes(motion.samples))
+    slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
     matrix = Banded(len(motion.nu), step.shape[1], 1)
     matrix.add(0, 0, around.curvature(slopes))
-    matrix.add_pairs(0, motion.grid.cost.curvature(around.changes))
+    matrix.add_pairs(0, motion.grid.cost.curvature(motion.samples, around.changes))
     change = (gradient(above) - gradient(below)) / (2 * NEAR)
     product = matrix.dense() @ step.ravel()
     np.testing.assert_allclose(product, change.ravel(), atol=CURVATURE * np.abs(product).max())
+
+
+@pytest.mark.parametrize("kind", ["manipulability", "energy", "function", "limits"])
+def test_curvature_of_other_costs_is_right_to_second_order(case: Case, kind: str) -> None:
+    """Differences along the self-motion are all there is of it, as intervals become short."""
+    robot = case[0]
+    costs = {
+        "manipulability": sm.InverseManipulability(0.1),
+        "energy": sm.KineticEnergy(robot) if has_masses(robot) else None,
+        "function": sm.FunctionCost(lambda qd, q, t: np.sum(qd**4 + np.cos(q) * qd**2, axis=1)),
+        "limits": sm.JointLimitDistance(np.full(robot.dof, -4.0), np.full(robot.dof, 4.0)),
+    }
+    cost = costs[kind]
+    if cost is None:
+        return
+    off = []
+    for count in (12, 48):
+        motion = nodes_of(problem_of(case, costs=(sm.JointVelocity(), cost)), count)
+        shape = np.sin(np.linspace(0.0, 3.0, count + 1))[:, None]
+        step = shape * np.ones(2 * motion.nu.shape[1])
+        around = Around.of(motion.charts, motion.nu)
+        assert around is not None
+        intervals = motion.grid.cost.curvature(motion.samples, around.changes)
+        slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
+        matrix = Banded(count + 1, step.shape[1], 1)
+        matrix.add(0, 0, around.curvature(slopes))
+        matrix.add_pairs(0, intervals)
+        change = gradient(moved(motion, NEAR * step)) - gradient(moved(motion, -NEAR * step))
+        change = change.ravel() / (2 * NEAR)
+        product = matrix.dense() @ step.ravel()
+        # Along some self-motions a cost is the same: what is left of two terms that cancel.
+        size = np.abs(matrix.dense()).max()
+        off.append(np.abs(product - change).max() / size)
+    assert off[1] < max(0.3 * off[0], 1e-4), off
+    assert off[1] < 0.05
 
 
 def test_what_is_minimised_besides_is_no_cost(case: Case) -> None:

@@ -53,6 +53,7 @@ PATHS: dict[str, Callable[[np.random.Generator], sm.Path]] = {
     "placed": lambda rng: sm.Placed(waypoints(rng), pose(rng)),
     "section": lambda rng: Section(waypoints(rng), 0.3, 1.7),
     "section at rest": lambda rng: section_at_rest(waypoints(rng), 0.3, 1.7, 0.4, (True, True)),
+    "backwards": lambda rng: sm.Reversed(sm.Feed(waypoints(rng), 0.05)),
     "dwell": lambda rng: sm.Dwell(pose(rng), 1.0),
 }
 

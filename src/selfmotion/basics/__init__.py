@@ -44,7 +44,7 @@ from selfmotion.basics.inputs import (
     as_whole as as_whole,
     random_numbers as random_numbers,
 )
-from selfmotion.basics.jit import inlined as inlined, kernel as kernel
+from selfmotion.basics.jit import called as called, inlined as inlined, kernel as kernel
 from selfmotion.basics.names import nearest as nearest
 from selfmotion.basics.progress import Progress as Progress, silent as silent
 from selfmotion.basics.saved import Saved as Saved, is_known as is_known, restore as restore

@@ -70,13 +70,26 @@ def _forgive(compiled: Any) -> None:
 
 
 def inlined(function: _Function) -> _Function:
-    """Make a numeric function one that kernels can call: LLVM puts it into each of them.
+    """Make a small numeric function one that kernels can call: LLVM puts it into each of them.
 
     It has no wrapper for Python, which spares a good part of its compilation; from Python it runs
     as it is written, uncompiled. Division in kernels follows NumPy.
     """
+    return _callable(function, forced=True)
+
+
+def called(function: _Function) -> _Function:
+    """Make a longer numeric function one that kernels can call.
+
+    Like `inlined`, but LLVM puts it where that pays: longer ones in each place take seconds to
+    compile, and run no faster.
+    """
+    return _callable(function, forced=False)
+
+
+def _callable(function: _Function, *, forced: bool) -> _Function:
     made: _Function = numba.extending.register_jitable(
-        error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True
+        error_model="numpy", forceinline=forced, no_cpython_wrapper=True, no_cfunc_wrapper=True
     )(function)
     return made
 

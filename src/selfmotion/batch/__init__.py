@@ -7,4 +7,5 @@ from selfmotion.batch.run import (
     BatchProgress as BatchProgress,
     plan_items as plan_items,
     plan_many as plan_many,
+    processes as processes,
 )

@@ -204,7 +204,7 @@ class _Run:
         """Run what is pending in processes; where one dies, begin again with what it left."""
         suspects: deque[Item] = deque()
         while pending or suspects:
-            with _pool(workers) as pool:
+            with processes(workers) as pool:
                 # One of these killed its worker: alone, a second death tells which.
                 while suspects:
                     suspect = suspects.popleft()
@@ -237,7 +237,7 @@ class _Run:
 
 
 @contextmanager
-def _pool(workers: int) -> Iterator[Executor]:
+def processes(workers: int) -> Iterator[Executor]:
     """Return processes of this machine, each with one thread for linear algebra."""
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor

@@ -11,7 +11,7 @@ import selfmotion as sm
 from selfmotion import formats
 from selfmotion.basics import Progress
 from selfmotion.certificate import Extreme, approaches
-from selfmotion.cli import documents, json_tables, options, outputs, tables
+from selfmotion.cli import documents, jobs, json_tables, options, outputs, tables
 from selfmotion.cli.app import (
     NOT_VERIFIED,
     VERIFIED,
@@ -149,6 +149,10 @@ def check(
     within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
     own: dict[str, Any] = {"path": path, "feed": feed, "corners": corners, "task": task}
     own |= {"tool": tool, "reference": reference, "lock": lock or None}
+    if file.suffix == jobs.PROGRAM:
+        given = own | {"robot": robot, "degrees": degrees or None, "tolerance": tolerance}
+        options.refuse(given | {"limits": any(judged) or None}, file, "the program's")
+        jobs.check(sm.load_program(file), as_json)
     with StageDisplay(stages) as display:
         if file.suffix == ".npz":
             options.refuse(own | {"robot": robot, "degrees": degrees or None}, file, "the plan's")
@@ -217,7 +221,7 @@ def _approaches(
 
 @app.command(epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500")
 def export(
-    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, or a .program.")],
     out: Annotated[
         list[Path],
         typer.Option(
@@ -238,6 +242,9 @@ def export(
     as_json: options.JsonOption = False,
 ) -> None:
     """Write a plan's motion for controllers and simulators, and check what was written."""
+    if file.suffix == jobs.PROGRAM:
+        options.refuse({"parts": parts or None}, file, "a program's motion is")
+        jobs.export(sm.load_program(file), out, rate, form, as_json)
     saved = sm.load_plan(file)
     verified, verdicts = not saved.altered, dict[str, str]()
 
@@ -293,7 +300,9 @@ def compare(
     epilog="Example: selfmotion replay plan.npz --html replay.html --png 1.5 --gif motion.gif"
 )
 def replay(
-    plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz, of one robot.")],
+    plans: Annotated[
+        list[Path], typer.Argument(help="Plans saved as .npz, of one robot; or one .program.")
+    ],
     html: Annotated[Path, typer.Option(help="The page to write.")] = Path("replay.html"),
     png: Annotated[
         float | None, typer.Option(help="Also draw the scene at this time (s), beside the page.")
@@ -306,12 +315,17 @@ def replay(
     """
     from selfmotion.replay import render_gif, render_png, write_replay
 
-    saved = [sm.load_plan(plan) for plan in plans]
+    if len(plans) == 1 and plans[0].suffix == jobs.PROGRAM:
+        saved: Any = sm.load_program(plans[0])
+        first = saved
+    else:
+        saved = [sm.load_plan(plan) for plan in plans]
+        first = saved[0]
     labels = [plan.stem for plan in plans] if len(plans) > 1 else None
     written = [write_replay(saved, html, labels=labels)]
     if png is not None:
-        written.append(render_png(saved[0], html.with_suffix(".png"), t=png))
+        written.append(render_png(first, html.with_suffix(".png"), t=png))
     if gif is not None:
-        written.append(render_gif(saved[0], gif))
+        written.append(render_gif(first, gif))
     for file in written:
         terminal.print(f"wrote {file}", markup=False, soft_wrap=True)

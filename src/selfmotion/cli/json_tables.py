@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from selfmotion.certificate import Certificate, Extreme
+from selfmotion.job import Program
 from selfmotion.result import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -70,4 +71,30 @@ def plan_json(plan: Plan) -> dict[str, Any]:
             "shares": dict(plan.limits_used.shares),
         },
         "certificate": certificate_json(plan.certificate, plan.approaches),
+    }
+
+
+def program_json(program: Program) -> dict[str, Any]:
+    """Return the steps of a program and what is known of it, as JSON-safe values."""
+    return {
+        "verified": program.verified,
+        "verdict": program.verdict,
+        "duration": program.duration,
+        "transfer_time": program.transfer_time,
+        "bound": program.bound,
+        "missing": dict(program.missing),
+        "notes": list(program.notes),
+        "steps": [
+            {
+                "name": step.name,
+                "kind": "seam" if step.is_seam else "move",
+                "backwards": step.turned,
+                "begin": begin,
+                "duration": 0.0 if step.is_missing else step.motion.duration,
+            }
+            for begin, step in zip(program.begins, program.steps, strict=True)
+        ],
+        "events": [
+            {"time": time, "seam": seam, "event": event} for time, seam, event in program.events
+        ],
     }

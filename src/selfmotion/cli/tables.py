@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from selfmotion.certificate import LIMIT_NAMES, Certificate, Extreme
+from selfmotion.job import Program
 from selfmotion.result import Gap, Plan, Report
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from selfmotion.study import Claim
 
 
+# Moves that are told to take longest.
+_LONGEST = 5
 # Columns of a log, which has no width of its own: those of the widest table.
 _LOG_WIDTH = 120
 
@@ -219,6 +222,39 @@ def show_claims(claims: Sequence["Claim"], console: Console) -> None:
     for claim in claims:
         table.add_row(claim.statement, claim.verdict.value, claim.number)
     console.print(table)
+
+
+def show_program(program: Program, console: Console) -> None:
+    """Print what is made when, the steps that take longest, and the verdict."""
+    table = _table(f"{program.robot.name}, {len(program.order)} seams")
+    table.add_column("seam")
+    table.add_column("way")
+    for column in ("begins", "takes", "move to it"):
+        table.add_column(f"{column} [s]", justify="right")
+    before = 0.0
+    for begin, step in zip(program.begins, program.steps, strict=True):
+        takes = 0.0 if step.is_missing else step.motion.duration
+        if not step.is_seam:
+            before += takes
+            continue
+        way = "backwards" if step.turned else "forwards"
+        table.add_row(escape(step.name), way, f"{begin:.2f}", f"{takes:.2f}", f"{before:.2f}")
+        before = 0.0
+    console.print(table)
+    moves = [step for step in program.steps if not step.is_seam and not step.is_missing]
+    longest = sorted(moves, key=lambda step: step.motion.duration, reverse=True)[:_LONGEST]
+    if longest:
+        told = ", ".join(f"{step.name} {step.motion.duration:.2f} s" for step in longest)
+        console.print(f"longest moves: {told}", markup=False, soft_wrap=True)
+    for note in program.notes:
+        console.print(f"note: {note}", markup=False, soft_wrap=True)
+    console.print(
+        f"{program.duration:.2f} s in all, {program.transfer_time:.2f} s of it moves and waits; no "
+        f"order of these motions takes less than {program.bound:.2f} s for moves",
+        markup=False,
+        soft_wrap=True,
+    )
+    console.print(program.verdict, markup=False, soft_wrap=True)
 
 
 def _table(title: str | None = None) -> Table:

@@ -3,7 +3,10 @@
 from selfmotion.constraints.band import Band as Band
 from selfmotion.constraints.base import Constraint as Constraint
 from selfmotion.constraints.binding import Binding as Binding
-from selfmotion.constraints.clearance import Clearance as Clearance
+from selfmotion.constraints.clearance import (
+    BoundClearance as BoundClearance,
+    Clearance as Clearance,
+)
 from selfmotion.constraints.conditions import (
     BoundConstraint as BoundConstraint,
     Linearised as Linearised,

@@ -38,6 +38,7 @@ from selfmotion.formats.problem_writing import (
     write_problem as write_problem,
 )
 from selfmotion.formats.samples import LinearMiss as LinearMiss, linear_miss as linear_miss
+from selfmotion.formats.seam_job import SeamJob as SeamJob, read_seam_job as read_seam_job
 
 
 def json_schema() -> dict[str, Any]:

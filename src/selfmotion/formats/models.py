@@ -68,6 +68,7 @@ _OWN: Mapping[str, _Fields] = {
     "feed": {"path": (Table, ...), "stretches": (list[Numbers], None), **_SHAPE},
     "joined": {"pieces": (list[Table], ...)},
     "placed": {"path": (Table, ...)},
+    "reversed": {"path": (Table, ...)},
     "Relaxation": {"rows": (Names, ...), "during": (Numbers, None)},
     "Search": {"rng": (Whole, 0)},
 }  # fmt: skip

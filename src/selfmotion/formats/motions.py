@@ -22,15 +22,20 @@ from selfmotion.formats.documents import read_document, write_document, write_te
 from selfmotion.formats.mujoco import keyframes
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.formats.urscript import script
+from selfmotion.job import Program
 from selfmotion.motion import Trajectory, column_names
-from selfmotion.result import Plan
+from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import RobotModel
 
 
 def write_motion(
-    plan: Plan, file: str | Path, *, rate: float | None = None, form: str | None = None
+    plan: Plan | Parts | Move | Program,
+    file: str | Path,
+    *,
+    rate: float | None = None,
+    form: str | None = None,
 ) -> None:
-    """Write the motion of a plan in a format that others read; atomically.
+    """Write the motion of a plan, parts, a move or a program as others read it; atomically.
 
     ============  ========  ==================================================================
     form          suffix    what
@@ -46,7 +51,7 @@ def write_motion(
 
     Parameters
     ----------
-    plan : Plan
+    plan : Plan, Parts, Move or Program
     file : path
     rate : float, optional
         Samples per second; by default those of the plan (URScript: 125).
@@ -59,12 +64,15 @@ def write_motion(
         The form is unknown, or the file cannot be written.
     ProblemError
         The rate gives no samples, or the arm has what the format cannot say.
+    PlanError
+        A move was not found.
     """
-    if not isinstance(plan, Plan):
-        raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
+    if not isinstance(plan, Plan | Parts | Move | Program):
+        raise ProblemError(f"plan is {shown(plan)}, expected a Plan, Parts, a Move or a Program")
+    motion = plan.motion if isinstance(plan, Move) else plan.trajectory
     path = as_path(file)
     write, rate = _writer(path, rate, form)
-    write(path, MotionSamples.of(plan.trajectory, rate), plan.robot, rate)
+    write(path, MotionSamples.of(motion, rate), plan.robot, rate)
 
 
 def write_parts(

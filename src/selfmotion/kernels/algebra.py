@@ -2,7 +2,7 @@
 
 from math import sqrt
 
-from selfmotion.basics import Array, inlined
+from selfmotion.basics import Array, called, inlined
 
 Vector = tuple[float, float, float]
 
@@ -78,7 +78,7 @@ def gram(jacobian: Array, out: Array) -> None:
             out[i, j] = total
 
 
-@inlined
+@called
 def cholesky(a: Array) -> bool:
     """Replace the lower triangle of `a` by its Cholesky factor L; False where it is not positive.
 
@@ -100,7 +100,7 @@ def cholesky(a: Array) -> bool:
     return True
 
 
-@inlined
+@called
 def solve_cholesky(factor: Array, b: Array) -> None:
     """Replace `b` by A⁻¹b, given what `cholesky` made of A."""
     m = b.shape[0]
@@ -131,7 +131,7 @@ def respond(jacobian: Array, factor: Array, y: Array, epsilon: Array, qd: Array)
         qd[k] = total
 
 
-@inlined
+@called
 def smallest_eigenvector(a: Array, vectors: Array, out: Array) -> float:
     """Return the smallest eigenvalue of the symmetric a (m, m); set `out` (m,) to its unit vector.
 

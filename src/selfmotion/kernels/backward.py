@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics import Array, called, inlined, kernel
 from selfmotion.basics.layout import KIND, NO_ANGLE, POINTING, Layout
 from selfmotion.kernels.algebra import add_angular, angular, angular_part, cross, plus, respond
 from selfmotion.kernels.contraction import contract
@@ -70,7 +70,7 @@ def space_size(n: int, m: int, tips: int) -> int:
     return 13 * n + m + 24 + 12 * tips
 
 
-@inlined
+@called
 def pull_stage(
     row: Array,
     n: int,

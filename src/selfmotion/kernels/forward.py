@@ -2,7 +2,7 @@
 
 from math import isfinite
 
-from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics import Array, called, inlined, kernel
 from selfmotion.basics.layout import KIND, Layout
 from selfmotion.kernels.algebra import (
     add_scaled,
@@ -46,7 +46,7 @@ def advance(
     return True
 
 
-@inlined
+@called
 def evaluate(row: Array, n: int, layout: Layout, gain: float, law: Law | None) -> bool:
     """Evaluate eq. 4: q̇ = J⁺u + (I - J⁺J) ε, with u = S(ẋ_d + K e) of all tips.
 

@@ -64,5 +64,9 @@ def transport(first: Array, jacobians: Array, pivot: float, bases: Array) -> Non
                     better[k, a] = 1.5 * basis[k, a]
                     for b in range(r):
                         better[k, a] -= 0.5 * basis[k, b] * inner[b, a]
-            basis[:] = better
-        bases[s] = basis
+            for k in range(n):
+                for a in range(r):
+                    basis[k, a] = better[k, a]
+        for k in range(n):
+            for a in range(r):
+                bases[s, k, a] = basis[k, a]

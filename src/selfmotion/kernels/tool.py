@@ -4,7 +4,7 @@ from math import atan2, sqrt, tan
 
 import numpy as np
 
-from selfmotion.basics import Array, inlined
+from selfmotion.basics import Array, called, inlined
 from selfmotion.basics.layout import (
     COUNT,
     FIRST,
@@ -30,7 +30,7 @@ from selfmotion.kernels.table import view
 _SMALL = 0.05
 
 
-@inlined
+@called
 def pose_error(
     angle_kind: int,
     target_translation: Array,
@@ -141,7 +141,7 @@ def pointing_coefficients(sine: float, cosine: float) -> tuple[float, float]:
     return angle / sine, (angle * cosine - sine) / (sine * sine * sine)
 
 
-@inlined
+@called
 def errors_and_rows(
     layout: Layout,
     target: Array,

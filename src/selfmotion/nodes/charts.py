@@ -5,10 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion import kernels
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Flags
 from selfmotion.engine import carried_bases
 from selfmotion.follow import Follows
 from selfmotion.nodes.kernels import look, pull
+
+# Rates along a motion are differences over this share of its duration.
+_STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +85,7 @@ class Charts:
 
     def recentred(self, place: Place) -> tuple["Charts", Array]:
         """Return the charts around a place, and its ν there."""
-        bases = _orthonormal(place.tangents)
+        bases = orthonormal(place.tangents)
         epsilon = self.manifolds.stages(place.table).epsilon
         nu = np.einsum("knr,kn->kr", bases, epsilon)
         return Charts(self.manifolds, place.q, bases), nu
@@ -99,7 +102,7 @@ class Manifolds:
     """
 
     def __init__(self, follows: Follows, t: Array) -> None:
-        self.follows = follows
+        self.follows, self.t = follows, t
         self.chains = tuple(item.chain.arrays for item in follows.items)
         self.layout = follows.layout
         n, m, count = follows.robot.dof, follows.dimension, len(follows.items)
@@ -131,8 +134,45 @@ class Manifolds:
         centred, _ = charts.recentred(place)
         return centred, np.einsum("knr,kn->kr", centred.bases, qd)
 
+    def accelerations(self, q: Array, qd: Array) -> Array:
+        """Return the least q̈ by which motions q, q̇ (N + 1, n) follow the path: J⁺(ẍ - J̇q̇).
 
-def _orthonormal(tangents: Array) -> Array:
+        J q̈ is the rate of ẋ - J q̇ along the motion at fixed q̇. It is taken from both sides of each
+        node: at marks of the path it may jump, and is the mean.
+        """
+        step = _STEP * self.t[-1]
+        sides = []
+        for sign, inside in ((-1.0, self.t > 2.0 * step), (1.0, self.t < self.t[-1] - 2.0 * step)):
+            near, far = (self._unmet(q, qd, sign * k * step, inside) for k in (1.0, 2.0))
+            sides.append((far - near) / (sign * step))
+        before, after = sides
+        before[0], after[-1] = after[0], before[-1]
+        rows = self._rows(q)[0]
+        right = 0.5 * (before + after)[:, :, None]
+        turned = np.swapaxes(rows, 1, 2)
+        return np.asarray((turned @ np.linalg.solve(rows @ turned, right))[:, :, 0])
+
+    def _unmet(self, q: Array, qd: Array, later: float, inside: Flags) -> Array:
+        """Return ẋ - J q̇ at t + `later`, q + q̇ `later`, (N + 1, m); at t where that is outside."""
+        t = np.where(inside, self.t + later, self.t)
+        rows, rotations = self._rows(q + later * qd)
+        twists = []
+        for item, rotation in zip(self.follows.items, rotations, strict=True):
+            twist = item.target(t).twist[:, :, None]
+            twists.append(item.task.select_along(twist, rotation)[:, :, 0])
+        return np.concatenate(twists, axis=1) - (rows @ qd[:, :, None])[:, :, 0]
+
+    def _rows(self, q: Array) -> tuple[Array, list[Array]]:
+        """Return the rows of all Jacobians at q (K, n), (K, m, n), and the tips' rotations."""
+        found, rotations = [], []
+        for item in self.follows.items:
+            jacobian, rotation, _ = item.chain.along(q)
+            found.append(item.task.select_along(jacobian, rotation))
+            rotations.append(rotation)
+        return np.concatenate(found, axis=1), rotations
+
+
+def orthonormal(tangents: Array) -> Array:
     """Return orthonormal bases of the spans of full-rank matrices (K, n, r): Gram-Schmidt."""
     found = np.array(tangents)
     for x in range(found.shape[2]):

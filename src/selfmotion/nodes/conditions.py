@@ -1,16 +1,17 @@
 """The conditions on a motion given by its nodes: each depends on a node and its two neighbours.
 
-They are asked for at the nodes and in the middle of each interval: a limit of speed that only the
-nodes keep would let the motion be faster between them.
+They are asked for at the nodes and between each two, see `Hermite.between`: a limit of speed that
+only the nodes keep would let the motion be faster between them.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints
-from selfmotion.constraints import BoundConstraint, NodeTangents, linearised
-from selfmotion.nodes.hermite import MIDDLE, Hermite, HermiteSamples
+from selfmotion.basics import Array, Flags, Ints
+from selfmotion.constraints import BoundClearance, BoundConstraint, NodeTangents, linearised
+from selfmotion.costs import Samples
+from selfmotion.nodes.hermite import CheckedSamples, Hermite
 
 # There is no interval after the last node: its conditions are kept by this much.
 _NONE = -1e3
@@ -49,7 +50,7 @@ class NearTangents(_ByOrder):
     def __init__(self, spline: Hermite, changes: Array) -> None:
         for name, value in (("_spline", spline), ("_changes", changes), ("_tables", {})):
             object.__setattr__(self, name, value)
-        super().__init__(self.of_order(0), self.of_order(1), spline.sampling)
+        super().__init__(self.of_order(0), self.of_order(1), spline.checked)
 
     def of_order(self, order: int) -> Array:
         """See `NodeTangents.of_order`."""
@@ -69,7 +70,7 @@ class NearTangents(_ByOrder):
             table[::2, :, own] = _weighted(shares[:, 1], changes)
             table[2::2, :, before] = _weighted(shares[1:, 0], changes[:-1])
             table[:-2:2, :, after] = _weighted(shares[:-1, 2], changes[1:])
-        middle = spline.bases[order][:, MIDDLE]
+        middle = spline.between[order]
         table[1::2, :, own] = _weighted(middle[:, :2], changes[:-1])
         table[1::2, :, after] = _weighted(middle[:, 2:], changes[1:])
         return table
@@ -85,10 +86,10 @@ class UnitTangents(_ByOrder):
 
     def __init__(self, spline: Hermite, dof: int) -> None:
         ones = np.eye(4 * dof).reshape(4, dof, 4 * dof)
-        shape = (len(spline.sampling.nodes), dof, 4 * dof)
+        shape = (len(spline.checked.t), dof, 4 * dof)
         tables = {order: np.broadcast_to(one, shape) for order, one in enumerate(ones)}
         object.__setattr__(self, "_tables", tables)
-        super().__init__(tables[0], tables[1], spline.sampling)
+        super().__init__(tables[0], tables[1], spline.checked)
 
 
 class NodeConditions:
@@ -111,12 +112,18 @@ class NodeConditions:
         self._units = UnitTangents(spline, dof)
         self._counts: list[int] = []
 
-    def residuals(self, samples: HermiteSamples) -> Array:
+    def residuals(self, samples: CheckedSamples) -> Array:
         """Return h, (N + 1, C)."""
         tables = [item.residual(samples) for item in self.constraints]
         self._counts = [table.shape[1] for table in tables]
         none = np.zeros((2 * len(self.spline.t) - 1, 0))
         return _by_node(np.concatenate([none, *tables], axis=1), _NONE)
+
+    def over(self, samples: Samples) -> Array:
+        """Return how far each condition is beyond its tolerance at other samples, (S, C / 2)."""
+        none = np.zeros((len(samples.nodes), 0))
+        tables = [item.residual(samples) - item.tolerance for item in self.constraints]
+        return np.concatenate([none, *tables], axis=1)
 
     @property
     def tolerances(self) -> Array:
@@ -124,7 +131,7 @@ class NodeConditions:
         each = [item.tolerance for item in self.constraints]
         return np.tile(np.repeat(each, self._counts), 2)
 
-    def rows(self, samples: HermiteSamples, changes: Array, columns: Ints) -> Array:
+    def rows(self, samples: CheckedSamples, changes: Array, columns: Ints) -> Array:
         """Return ∂h/∂w of c columns, by w of each node and its neighbours, (N + 1, c, 6r)."""
         motion, count = NearTangents(self.spline, changes), len(self.spline.t)
         found = np.zeros((count, len(columns), motion.size))
@@ -142,14 +149,21 @@ class NodeConditions:
             first += own
         return found
 
-    def orders(self, samples: HermiteSamples) -> Ints:
+    def of_bodies(self) -> Flags:
+        """Return which conditions are distances of bodies, (C,)."""
+        each = [isinstance(item, BoundClearance) for item in self.constraints]
+        return np.tile(np.repeat(np.array(each, dtype=np.bool_), self._counts), 2)
+
+    def orders(self, samples: CheckedSamples) -> Ints:
         """Return the highest derivative of q that each condition depends on, (C,)."""
         found = [np.zeros(0, dtype=np.int64)]
         for item in self.constraints:
             known = linearised(item, samples, self._units)
             first = np.arange(known.count // (2 * len(self.spline.t) - 1))
             rows = known.picked(self._units, first).reshape(len(first), 4, -1)
-            does = np.any(rows != 0.0, axis=(2,))
+            # What is far from counting, as bodies are, has no rows: those depend on q alone.
+            does = np.any(rows != 0.0, axis=2)
+            does[:, 0] = True
             found.append(3 - np.argmax(np.flip(does, axis=1), axis=1))
         return np.tile(np.concatenate(found), 2)
 
@@ -160,7 +174,7 @@ class NodeConditions:
         points[::2], points[1::2] = table[:, :half], table[:-1, half:]
         return np.split(points, np.cumsum(self._counts)[:-1], axis=1)
 
-    def pulled(self, samples: HermiteSamples, prices: Array) -> Array:
+    def pulled(self, samples: CheckedSamples, prices: Array) -> Array:
         """Return Σ prices · ∂h/∂(q, q̇) of the nodes, (N + 1, 2, n); `prices` are (N + 1, C)."""
         n = samples.q.shape[1]
         by = np.zeros((2 * len(prices) - 1, 4 * n))
@@ -173,7 +187,7 @@ class NodeConditions:
         found = np.stack([by[::2, :n], by[::2, n : 2 * n]], axis=1)
         for order in range(4):
             own = by[:, order * n : (order + 1) * n]
-            middle = self.spline.bases[order][:, MIDDLE, :, None] * own[1::2, None]
+            middle = self.spline.between[order][:, :, None] * own[1::2, None]
             found[:-1] += middle[:, :2]
             found[1:] += middle[:, 2:]
             if order > 1:

@@ -14,8 +14,13 @@ from selfmotion.motion import Sampling, Trajectory
 _ROOT = 0.5 * np.sqrt(0.6)
 _POINTS, _WEIGHTS = np.array([0.5 - _ROOT, 0.5, 0.5 + _ROOT]), np.array([5.0, 8.0, 5.0]) / 18.0
 _SAMPLES = 4
+# q̈ and the jerk of the right, then the left end of an interval of length 1, by q, q̇ of both ends.
+_ENDS = {
+    2: np.array([[6.0, 2.0, -6.0, 4.0], [-6.0, -4.0, 6.0, -2.0]]),
+    3: np.array([[12.0, 6.0, -12.0, 6.0], [12.0, 6.0, -12.0, 6.0]]),
+}
 # Which of an interval's samples is in its middle.
-MIDDLE = 2
+_MIDDLE = 2
 
 
 class Hermite:
@@ -34,16 +39,19 @@ class Hermite:
     steps : (N,)
         Lengths of the intervals [s].
     sampling : Sampling
-        Constraints look at its nodes: those here, and the middle of each interval.
+        What costs look at.
+    checked : Sampling
+        What constraints look at: the nodes, and what is between each two.
     """
 
     def __init__(self, t: Array) -> None:
         self.t, self.steps = t, np.diff(t)
-        shares, weights = np.append(0.0, _POINTS), np.append(0.0, _WEIGHTS)
+        shares, weights = self.shares_within, np.append(0.0, _WEIGHTS)
         h = self.steps[:, None]
         times, each = (t[:-1, None] + h * shares).ravel(), (h * weights).ravel()
-        points = MIDDLE * np.arange(2 * len(t) - 1)
-        self.sampling = Sampling(np.append(times, t[-1]), np.append(each, 0.0), points)
+        times = np.append(times, t[-1])
+        self.sampling = Sampling(times, np.append(each, 0.0), np.arange(len(times)))
+        self.checked = Sampling.trapezoidal(times[::_MIDDLE])
 
     @cached_property
     def bases(self) -> tuple[Array, ...]:
@@ -52,7 +60,7 @@ class Hermite:
         From q, q̇ at the left and q, q̇ at the right end; at the node itself it is the derivative of
         the interval that begins there.
         """
-        s, h = np.append(0.0, _POINTS), self.steps[:, None]
+        s, h = self.shares_within, self.steps[:, None]
         one = np.ones_like(s)
         tables = (
             (1 - s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (3 - 2 * s), s**2 * (s - 1)),
@@ -71,6 +79,22 @@ class Hermite:
             for order, table in enumerate(tables)
         )
 
+    @property
+    def shares_within(self) -> Array:
+        """Where an interval's samples are, as shares of it, (4,)."""
+        return np.append(0.0, _POINTS)
+
+    @cached_property
+    def between(self) -> tuple[Array, ...]:
+        """How q, q̇, q̈ and the jerk between two nodes follow from both ends, (N, 4) each.
+
+        In the middle; but of q̇, a parabola, the control point of its Bernstein form: together with
+        its ends it says how fast the motion is at most.
+        """
+        q, qd, qdd, qddd = (table[:, _MIDDLE] for table in self.bases)
+        ends = np.array([0.0, 1.0, 0.0, 1.0])
+        return q, 2.0 * qd - 0.5 * ends, qdd, qddd
+
     @cached_property
     def weights(self) -> Array:
         """Quadrature weights of an interval's samples [s], (N, 4)."""
@@ -83,20 +107,32 @@ class Hermite:
         At the node before, at itself and at the next one: the mean of what the intervals on both
         sides say; at the ends there is one.
         """
-        h, count = self.steps, len(self.t)
+        count = len(self.t)
         half = np.full((count, 1, 1), 0.5)
         half[[0, -1]] = 1.0
         found = []
-        for order, right, left in (
-            (2, (6.0, 2.0, -6.0, 4.0), (-6.0, -4.0, 6.0, -2.0)),
-            (3, (12.0, 6.0, -12.0, 6.0), (12.0, 6.0, -12.0, 6.0)),
-        ):
-            powers = np.stack([1.0 / h**order, 1.0 / h ** (order - 1)] * 2, axis=1)
+        for order in (2, 3):
+            right, left = (rows.reshape(-1, 2, 2) for rows in self._at_ends(order))
             shares = np.zeros((count, 3, 2))
-            shares[1:, :2] += half[1:] * (powers * right).reshape(-1, 2, 2)
-            shares[:-1, 1:] += half[:-1] * (powers * left).reshape(-1, 2, 2)
+            shares[1:, :2] += half[1:] * right
+            shares[:-1, 1:] += half[:-1] * left
             found.append(shares)
         return found[0], found[1]
+
+    def _at_ends(self, order: int) -> tuple[Array, Array]:
+        """How q̈ (2) or the jerk (3) at an interval's right and left end follow from both."""
+        h = self.steps
+        powers = np.stack([1.0 / h**order, 1.0 / h ** (order - 1)] * 2, axis=1)
+        right, left = _ENDS[order]
+        return powers * right, powers * left
+
+    def accelerations(self, ends: Array) -> tuple[Array, Array]:
+        """Return q̈ at the nodes as the intervals before and after say it, (N + 1, n) each.
+
+        For q and q̇ at both ends of each, (N, 4, n); where there is no interval, the other's.
+        """
+        right, left = (np.einsum("ka,kan->kn", rows, ends) for rows in self._at_ends(2))
+        return np.concatenate([left[:1], right]), np.concatenate([left, right[-1:]])
 
     def at_nodes(self, order: int, q: Array, qd: Array) -> Array:
         """Return q̈ (2) or the jerk (3) at the nodes, (N + 1, …), see `shares`."""
@@ -138,7 +174,7 @@ class PlacedLater(Samples):
 
 
 class HermiteSamples(PlacedLater):
-    """A Hermite spline as costs and constraints see it.
+    """A Hermite spline as costs see it.
 
     Parameters
     ----------
@@ -149,45 +185,83 @@ class HermiteSamples(PlacedLater):
 
     Attributes
     ----------
-    nodes_q, nodes_qd : (N + 1, n)
-        Those.
+    spline : Hermite
     ends : (N, 4, n)
         q and q̇ at both ends of each interval.
     """
 
-    nodes_q: Array
-    nodes_qd: Array
     ends: Array
-    _spline: Hermite
+    spline: Hermite
+    _at_nodes: tuple[Array, Array]
 
     def __init__(self, follows: Follows, spline: Hermite, q: Array, qd: Array) -> None:
         ends = np.stack([q[:-1], qd[:-1], q[1:], qd[1:]], axis=1)
-        given = {"_spline": spline, "nodes_q": q, "nodes_qd": qd, "ends": ends}
+        given = {"spline": spline, "_at_nodes": (q, qd), "ends": ends}
         for name, value in given.items():
             object.__setattr__(self, name, value)
-        at = (self._at_samples(0, q[-1]), self._at_samples(1, qd[-1]))
-        super().__init__(follows, spline.sampling, *at)
+        super().__init__(follows, spline.sampling, self._of_order(0), self._of_order(1))
 
-    def _at_samples(self, order: int, last: Array) -> Array:
-        spline = self._spline
-        inner = (spline.bases[order] @ self.ends).reshape(-1, self.ends.shape[2])
-        return np.concatenate([inner, last[None]])
+    @cached_property
+    def checked(self) -> "CheckedSamples":
+        """The same as constraints see it."""
+        return CheckedSamples(self)
 
     @cached_property
     def qdd(self) -> Array:
         """Joint accelerations, (S, n): of the spline, at the nodes means of both sides."""
-        return self._faster(2)
+        return self._of_order(2)
 
     @cached_property
     def qddd(self) -> Array:
         """Joint jerks, (S, n): likewise."""
-        return self._faster(3)
+        return self._of_order(3)
 
-    def _faster(self, order: int) -> Array:
-        spline = self._spline
-        at_nodes = spline.at_nodes(order, self.nodes_q, self.nodes_qd)
-        found = self._at_samples(order, at_nodes[-1])
-        found[::_SAMPLES] = at_nodes
+    def _of_order(self, order: int) -> Array:
+        count, _, n = self.ends.shape
+        found = np.empty((_SAMPLES * count + 1, n))
+        inner = self.spline.bases[order] @ self.ends
+        found[:-1] = inner.reshape(-1, n)
+        found[::_SAMPLES] = self.at_nodes(order)
+        return found
+
+    def at_nodes(self, order: int) -> Array:
+        """Return q (0), q̇ (1), q̈ (2) or the jerk (3) at the nodes, (N + 1, n)."""
+        if order < 2:
+            return self._at_nodes[order]
+        return self.spline.at_nodes(order, *self._at_nodes)
+
+
+class CheckedSamples(PlacedLater):
+    """A Hermite spline as constraints see it: at its nodes, and `between` them.
+
+    Parameters
+    ----------
+    samples : HermiteSamples
+    """
+
+    _samples: HermiteSamples
+
+    def __init__(self, samples: HermiteSamples) -> None:
+        object.__setattr__(self, "_samples", samples)
+        spline = samples.spline
+        super().__init__(samples.follows, spline.checked, self._of_order(0), self._of_order(1))
+
+    @cached_property
+    def qdd(self) -> Array:
+        """Joint accelerations, (2 N + 1, n): at the nodes means of both sides."""
+        return self._of_order(2)
+
+    @cached_property
+    def qddd(self) -> Array:
+        """Joint jerks, (2 N + 1, n): likewise."""
+        return self._of_order(3)
+
+    def _of_order(self, order: int) -> Array:
+        samples = self._samples
+        found = np.empty((2 * len(samples.ends) + 1, samples.ends.shape[2]))
+        found[::2] = samples.at_nodes(order)
+        between = samples.spline.between[order]
+        found[1::2] = np.einsum("ka,kan->kn", between, samples.ends)
         return found
 
 

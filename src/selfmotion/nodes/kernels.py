@@ -192,5 +192,6 @@ def follow(
                 break
         if not off < _NEAR:
             return k
-        q[k] = here
+        for j in range(n):
+            q[k, j] = here[j]
     return -1

@@ -6,12 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints, read_only
+from selfmotion.basics import Array, Flags, Ints, read_only
 from selfmotion.constraints import BoundConstraint
-from selfmotion.costs import JointVelocity
+from selfmotion.costs import JointVelocity, Partials
 from selfmotion.costs.base import weight_matrix
 from selfmotion.engine import Counts
-from selfmotion.motion import Sampling, Trajectory
+from selfmotion.motion import Trajectory
 from selfmotion.nodes.charts import Charts, Manifolds, Place
 from selfmotion.nodes.conditions import NodeConditions
 from selfmotion.nodes.hermite import Hermite, HermiteSamples, QuinticSamples
@@ -22,6 +22,9 @@ from selfmotion.problem import Problem
 # An arm that rests takes about this share of the duration to start and to stop its self-motion;
 # that is asked for over so many times as long.
 _STARTING, _NEAR_REST = 0.02, 4.0
+
+# A limit binds between two nodes where it is this near [units of h].
+_ALONG = 1e-5
 
 
 class NodeGrid:
@@ -160,11 +163,25 @@ class NodeMotion:
         return sum(self.terms.values())
 
     @cached_property
-    def exact_terms(self) -> dict[str, float]:
-        """What each cost contributes along `trajectory`, which is on its path between the nodes."""
+    def exact(self) -> QuinticSamples:
+        """The `trajectory`, which is on its path between the nodes, at the spline's samples."""
         grid = self.grid
-        sampling = grid.spline.sampling
-        return grid.cost.terms(QuinticSamples(grid.problem.follows, sampling, self.trajectory))
+        return QuinticSamples(grid.problem.follows, grid.spline.sampling, self.trajectory)
+
+    @cached_property
+    def exact_terms(self) -> dict[str, float]:
+        """What each cost contributes along `trajectory`."""
+        return self.grid.cost.terms(self.exact)
+
+    @cached_property
+    def along(self) -> Flags:
+        """On which intervals a condition binds, (N,)."""
+        return np.asarray(np.any(self.h[:-1, self.h.shape[1] // 2 :] > -_ALONG, axis=1))
+
+    def broken(self) -> Flags:
+        """Return on which intervals `trajectory` does not keep the conditions, (N,)."""
+        over = self.grid.conditions.over(self.exact)[:-1] > 0.0
+        return np.asarray(over.reshape(len(self.grid.t) - 1, -1).any(axis=1))
 
     @property
     def exact_cost(self) -> float:
@@ -177,9 +194,14 @@ class NodeMotion:
         return self.cost + self.grid.cost.roughness(self.samples)
 
     @cached_property
+    def partials(self) -> Partials:
+        """Derivatives of the integrand at the samples."""
+        return self.grid.cost.partials(self.samples)
+
+    @cached_property
     def h(self) -> Array:
         """The conditions, (N + 1, C)."""
-        return self.grid.conditions.residuals(self.samples)
+        return self.grid.conditions.residuals(self.samples.checked)
 
     @property
     def epsilon(self) -> Array:
@@ -199,21 +221,26 @@ class NodeMotion:
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """The quintic through the nodes, with q̈ by differences of q̇; 0 where the arm rests.
+        """The quintic through the nodes, with q̈ by eq. 4: q̈ = J⁺(ẍ - J̇q̇) + N α.
 
-        Five nodes tell what the path asks, which is smooth; three what the self-motion does, which
-        may have kinks at limits.
+        α is by differences of q̇. Where a limit begins or ends to bind the self-motion has a kink,
+        and α is that of the side along the limit. q̈ is 0 where the arm rests.
         """
-        problem, t, qd = self.grid.problem, self.grid.t, self.place.qd
-        qdd = np.array(Sampling.trapezoidal(t).differentiation(1) @ qd)
-        near = np.gradient(qd, t, axis=0, edge_order=2) - qdd
+        problem, t, place = self.grid.problem, self.grid.t, self.place
+        qdd = self.grid.manifolds.accelerations(place.q, place.qd)
+        near = np.gradient(place.qd, t, axis=0, edge_order=2)
+        along = self.along
+        before, after = np.append(False, along), np.append(along, False)
+        sides = self.grid.spline.accelerations(self.samples.ends)
+        for which, side in zip((before & ~after, after & ~before), sides, strict=True):
+            near[which] = side[which]
         bases = self.charts.bases
         qdd += (bases @ (np.swapaxes(bases, 1, 2) @ near[:, :, None]))[:, :, 0]
         for order, node in zip(problem.rest_orders, (0, -1), strict=True):
             if order > 1:
                 qdd[node] = 0.0
         names = problem.robot.joint_names
-        return Trajectory(t, read_only(self.place.q), read_only(qd), names, read_only(qdd))
+        return Trajectory(t, read_only(place.q), read_only(place.qd), names, read_only(qdd))
 
     def on(self, grid: NodeGrid) -> "NodeMotion | None":
         """Return the motion on other nodes."""

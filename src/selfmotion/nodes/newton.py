@@ -19,8 +19,8 @@ from selfmotion.nodes.motion import NodeMotion
 from selfmotion.nodes.objective import Around, scattered
 from selfmotion.optimise import Status
 
-# The cost is right to this share of itself once a step promises no more.
-_AGREES = 1e-8
+# The cost is right to this share of itself once a step promises no more; where conditions count.
+_AGREES, _AGREES_BOUND = 1e-8, 1e-6
 # A step that promises more than this share of the cost, and lowers it by nothing, is no rounding.
 _ROUNDING = 1e-6
 # Slacks and prices go no further than this share towards 0 in one step.
@@ -30,11 +30,12 @@ _SHARE, _SHORTEST = 1e-4, 1e-6
 # A matrix that is not positive definite gets this share of its largest entry on the diagonal, or a
 # third of what the last one needed; then more by this factor, again and again.
 _SHIFT, _LESS, _MORE = 1e-6, 1.0 / 3.0, 8.0
-# Nodes go no further than this in one step [rad or m].
-_FARTHEST = 0.5
+# Nodes go no further than this in one step [rad or m]; one that would go beyond that is none of a
+# matrix that says something.
+_FARTHEST, _TRUSTED = 0.5, 5.0
 # Barriers begin with this share of the cost for all conditions, and end with that; slacks begin
 # with at least so much [units of h]. Where prices are known, with these.
-_FIRST, _LAST, _SLACK = 1e-1, 1e-7, 1e-1
+_FIRST, _LAST, _SLACK = 1e-1, 1e-6, 1e-1
 _KNOWN_FIRST, _KNOWN_SLACK = 1e-4, 1e-3
 # A barrier is solved to this many times itself, before it falls to this share, or this power.
 _SOLVED, _FALL, _POWER = 10.0, 0.2, 1.5
@@ -139,7 +140,7 @@ class _Solver:
         motion.grid.counts.gradients += 1
         if around is None:
             return Status.GRADIENT
-        slopes = scattered(motion.grid.cost.slopes(motion.samples))
+        slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
         gradient = motion.charts.pulled(motion.place, slopes[:, 0], slopes[:, 1])
         gradient.reshape(-1)[motion.grid.held] = 0.0
         if told(Step(motion, float(np.linalg.norm(gradient)), self._length)):
@@ -149,9 +150,9 @@ class _Solver:
         if self._columns.size:
             prices = np.zeros_like(motion.h)
             prices[:, self._columns] = self._prices
-            by_prices = slopes + motion.grid.conditions.pulled(motion.samples, prices)
+            by_prices = slopes + motion.grid.conditions.pulled(motion.samples.checked, prices)
         curved = around.curvature(by_prices)
-        intervals = motion.grid.cost.curvature(around.changes)
+        intervals = motion.grid.cost.curvature(motion.samples, around.changes)
         gap = motion.h[:, self._columns] + self._slacks
         while True:
             step = self._step(gradient, curved, intervals, rows, gap)
@@ -161,7 +162,8 @@ class _Solver:
             size = max(abs(motion.aim), np.finfo(float).tiny)
             met = np.abs(gap).max(initial=0.0) <= _MET
             last = not self._columns.size or self._barrier <= self._least
-            if self._promised <= _AGREES * size and met and last:
+            agrees = _AGREES_BOUND if self._columns.size else _AGREES
+            if self._promised <= agrees * size and met and last:
                 return Status.CONVERGED
             if last or not self._solved(gap):
                 break
@@ -174,7 +176,7 @@ class _Solver:
         if not self._columns.size:
             return np.zeros((count, 0, 3 * size))
         motion = self.motion
-        return motion.grid.conditions.rows(motion.samples, around.changes, self._columns)
+        return motion.grid.conditions.rows(motion.samples.checked, around.changes, self._columns)
 
     def _solved(self, gap: Array) -> bool:
         """Whether the problem with the present barrier is solved well enough."""
@@ -203,7 +205,7 @@ class _Solver:
             matrix.add_diagonal(shift)
             matrix.hold(self.motion.grid.held)
             step = matrix.solve(-right)
-            if step is not None:
+            if step is not None and np.abs(step.reshape(count, 2, -1)[:, 0]).max() <= _TRUSTED:
                 self._shift = shift
                 self._promised = float(-right @ step)
                 return step.reshape(count, size)

@@ -6,8 +6,10 @@ and λ = ∂F/∂(q, q̇),
 
     ∂F/∂w = Γᵀλ,   ∂²F/∂w∂w' = Γᵀ (∂²F/∂(q, q̇)∂(q, q̇)') Γ' + [w is w'] ∂(Γᵀλ)/∂w at fixed λ.
 
-Costs are quadratic forms of q and its derivatives, so that the first term is exact. The last one,
-the manifold's own curvature, is a central difference of exact derivatives along the manifold.
+Where costs are quadratic forms of q and its derivatives, the first term is exact. Of others, second
+derivatives are differences of gradients: by q along the self-motion, which is where nodes can go,
+and by q̇. The last term, the manifold's own curvature, is a central difference of exact derivatives
+along the manifold.
 """
 
 from collections.abc import Sequence
@@ -16,14 +18,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.costs import Cost, Samples
+from selfmotion.costs import Cost, Partials, Samples
 from selfmotion.follow import Follows
-from selfmotion.nodes.charts import Charts, Place
-from selfmotion.nodes.hermite import Hermite, HermiteSamples
+from selfmotion.nodes.charts import Charts, Place, orthonormal
+from selfmotion.nodes.hermite import Hermite, HermiteSamples, PlacedLater
 
 # Differences along a manifold are taken this far to both sides [rad or m]: their error is about
 # its square, and rounding's is 1e-12 over it.
 _REACH = 1e-4
+# Those of costs are taken to one side, so far [rad, m and their rates]: they are second derivatives
+# of a matrix that need not be exact.
+_NEAR = 1e-6
 _NAMES = ("q", "qd", "qdd", "qddd")
 
 
@@ -51,7 +56,7 @@ class NodeCost:
     follows : Follows
     spline : Hermite
     costs : sequence of Cost
-        Quadratic forms: see `Cost.curvature`.
+        Of q and q̇, or quadratic forms: see `Cost.curvature`.
     smoothing : Smoothing, optional
         Minimised besides, and no part of the costs.
     """
@@ -64,8 +69,9 @@ class NodeCost:
         smoothing: Smoothing | None = None,
     ) -> None:
         self._spline, self._costs = spline, tuple(costs)
+        self._bent = tuple(cost for cost in costs if not cost.is_quadratic)
         self._forms: list[tuple[Array, Array]] = []
-        for cost in costs:
+        for cost in (cost for cost in costs if cost.is_quadratic):
             for order, weight in cost.curvature(follows.robot.dof).items():
                 self._forms.append((self._stiffness(order, spline.weights), weight))
         self._smoothing: tuple[Array, Array] | None = None
@@ -91,24 +97,31 @@ class NodeCost:
         ends = samples.ends
         return 0.5 * float(np.sum((stiffness @ ends) * (ends @ weight)))
 
-    def slopes(self, samples: HermiteSamples) -> Array:
+    def partials(self, samples: Samples) -> Partials:
+        """Return the derivatives of the integrand at the samples, of all costs together."""
+        return _summed([cost.gradient(samples) for cost in self._costs])
+
+    def slopes(self, samples: HermiteSamples, partials: Partials) -> Array:
         """Return the derivatives of each interval's cost by q, q̇ at its ends, (N, 4, n)."""
         weights, bases = self._spline.weights, self._spline.bases
         count, n = len(weights), samples.q.shape[1]
         found = np.zeros((count, 4, n))
-        for cost in self._costs:
-            partials = cost.gradient(samples)
-            for order, name in enumerate(_NAMES):
-                part = getattr(partials, name)
-                if part is not None:
-                    shares = weights[:, :, None] * bases[order]
-                    found += np.swapaxes(shares, 1, 2) @ part[:-1].reshape(count, 4, n)
+        for order, name in enumerate(_NAMES):
+            part = getattr(partials, name)
+            if part is not None:
+                shares = weights[:, :, None] * bases[order]
+                found += np.swapaxes(shares, 1, 2) @ part[:-1].reshape(count, 4, n)
         if self._smoothing is not None:
             stiffness, weight = self._smoothing
             found += stiffness @ (samples.ends @ weight)
         return found
 
-    def curvature(self, changes: Array) -> Array:
+    def bends_by_rates(self, samples: HermiteSamples) -> bool:
+        """Whether a cost that is no quadratic form is one of q̈, the jerk or errors."""
+        bent = _summed([cost.gradient(samples) for cost in self._bent])
+        return any(part is not None for part in (bent.qdd, bent.qddd, bent.error))
+
+    def curvature(self, samples: HermiteSamples, changes: Array) -> Array:
         """Return Γᵀ (∂²F) Γ on each interval, by w of its left, then its right node, (N, 4r, 4r).
 
         `changes` (N + 1, 2, n, 2r) is Γ of the nodes.
@@ -121,7 +134,74 @@ class NodeCost:
         for stiffness, weight in self._forms:
             turned = stiffness @ (weight @ both).reshape(count - 1, 4, -1)
             found += flat @ turned.reshape(count - 1, 4 * n, 2 * size)
+        if self._bent:
+            found += self._bending(samples, both)
         return found
+
+    def _bending(self, samples: HermiteSamples, both: Array) -> Array:
+        """Return what costs that are no quadratic forms add to the curvature.
+
+        `both` (N, 4, n, 4r) are the changes of q and q̇ at the ends of each interval.
+        """
+        spline, (count, _, n, size) = self._spline, both.shape
+        r = size // 4
+        by_q, by_qd = (
+            (bases @ both.reshape(count, 4, -1)).reshape(-1, n, size) for bases in spline.bases[:2]
+        )
+        # Along the self-motion at the samples: between what it is at the nodes.
+        left, right = both[:, None, 0, :, :r], both[:, None, 2, :, 2 * r : 3 * r]
+        share = spline.shares_within[:, None, None]
+        along = orthonormal((left + share * (right - left)).reshape(-1, n, r))
+        turned = np.swapaxes(along, 1, 2)
+        moved = turned @ by_q
+        here = _summed([cost.gradient(samples) for cost in self._bent])
+        directions = np.concatenate([along, along[-1:]])
+        found = np.zeros((count * len(spline.shares_within), size, size))
+        for x in range(r):
+            changed = self._changed(samples, here, directions[:, :, x], 0.0)
+            if changed.q is not None:
+                row = (turned @ changed.q[:-1, :, None])[:, :, 0]
+                found += _outer(np.einsum("sr,srw->sw", row, moved), moved[:, x])
+            if changed.qd is not None:
+                cross = _outer(np.einsum("sn,snw->sw", changed.qd[:-1], by_qd), moved[:, x])
+                found += cross + np.swapaxes(cross, 1, 2)
+        if here.qd is not None:
+            for j, axis in enumerate(np.eye(n)):
+                faster = self._changed(samples, here, 0.0, axis).qd
+                if faster is not None:
+                    found += _outer(np.einsum("sn,snw->sw", faster[:-1], by_qd), by_qd[:, j])
+        found = (spline.weights.reshape(-1, 1, 1) * found).reshape(count, -1, size, size)
+        found = found.sum(axis=1)
+        return np.asarray(0.5 * (found + np.swapaxes(found, 1, 2)))
+
+    def _changed(
+        self, samples: HermiteSamples, here: Partials, q: Array | float, qd: Array | float
+    ) -> Partials:
+        """Return how the derivatives `here` of bent costs change in directions of q and q̇."""
+        moved = samples.q + _NEAR * q, samples.qd + _NEAR * qd
+        shifted = PlacedLater(samples.follows, samples.sampling, *moved)
+        there = _summed([cost.gradient(shifted) for cost in self._bent])
+        parts = {}
+        for name in ("q", "qd"):
+            before, after = getattr(here, name), getattr(there, name)
+            if before is not None and after is not None:
+                parts[name] = (after - before) / _NEAR
+        return Partials(**parts)
+
+
+def _summed(each: Sequence[Partials]) -> Partials:
+    """Return the sum of derivatives."""
+    parts = {}
+    for name in (*_NAMES, "error"):
+        own = [part for part in (getattr(one, name) for one in each) if part is not None]
+        if own:
+            parts[name] = own[0] if len(own) == 1 else np.sum(own, axis=0)
+    return Partials(**parts)
+
+
+def _outer(a: Array, b: Array) -> Array:
+    """Return a bᵀ for each row, (S, k, k)."""
+    return np.asarray(a[:, :, None] * b[:, None, :])
 
 
 def scattered(slopes: Array) -> Array:

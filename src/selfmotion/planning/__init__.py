@@ -1,6 +1,12 @@
 """From a problem to a plan."""
 
+from selfmotion.planning.branches import (
+    branches as branches,
+    from_start as from_start,
+    near_start as near_start,
+)
 from selfmotion.planning.fastest import Fastest as Fastest, fastest as fastest
+from selfmotion.planning.free_motion import FreeMotions as FreeMotions, move as move
 from selfmotion.planning.parts import plan_in_parts as plan_in_parts
 from selfmotion.planning.run import plan as plan
 from selfmotion.planning.search import Search as Search

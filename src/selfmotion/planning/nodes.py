@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from selfmotion.basics import Array, Ints
+from selfmotion.basics import Array, Flags, Ints
 from selfmotion.constraints import Binding, BoundConstraint
 from selfmotion.engine import Conditions, Evaluation
 from selfmotion.motion import FreeNullMotion, Grid, NodeNullMotion, NullMotion, Trajectory
@@ -27,8 +26,8 @@ def takes(problem: Problem, effort: Effort, constraints: Sequence[BoundConstrain
     """Whether a problem is one for nodes.
 
     Not where the user asks for another null motion or optimiser, the tool leaves the path, nothing
-    is free, a cost is no quadratic form or weighs jerks, which cubic splines do not have, or a
-    condition is on the whole motion.
+    is free, a cost weighs jerks, which cubic splines do not have, or a condition is on the whole
+    motion.
     """
     dof = problem.robot.dof
     orders = [order for cost in problem.all_costs for order in cost.curvature(dof)]
@@ -38,8 +37,7 @@ def takes(problem: Problem, effort: Effort, constraints: Sequence[BoundConstrain
         and problem.damping is None
         and not problem.relaxations
         and problem.follows.redundancy == dof - problem.follows.dimension > 0
-        and all(cost.is_quadratic for cost in problem.all_costs)
-        and max(orders) < 3
+        and max(orders, default=0) < 3
         and not any(item.equality for item in constraints)
     )
 
@@ -97,7 +95,7 @@ class Standing:
         motion = self.motion
         return Evaluation(self.coefficients, motion.exact_terms, motion.trajectory, damped=False)
 
-    def refined(self, where: npt.NDArray[np.bool_] | None = None) -> "Standing":
+    def refined(self, where: Flags | None = None) -> "Standing":
         """Return it with more nodes, in the middle of each interval or of some (N,)."""
         t = self.motion.grid.t
         finer = Grid(t).halved(where).nodes
@@ -159,19 +157,23 @@ class NodeDescent:
         grid = self.grid(t)
         motions = [grid.motion_near(trajectory) for trajectory in trajectories]
         motion = min((one for one in motions if one), key=_aim_of, default=None)
-        if motion is None:
+        # Of what is infinite, or depends on accelerations in other ways, there is no curvature.
+        if (
+            motion is None
+            or not np.isfinite(motion.aim)
+            or grid.cost.bends_by_rates(motion.samples)
+        ):
             return None
         freely = self._minimise(motion, _NO_COLUMNS)
         best = self._kept(freely)
         if best is not None or self._ended is not None:
             return best
         broken = _broken(freely.motion)
-        orders = grid.conditions.orders(freely.motion.samples)
-        # Along a limit of speed or acceleration what is faster jumps: beyond quintics on few nodes.
-        if (orders[broken] > 0).any():
+        orders = grid.conditions.orders(freely.motion.samples.checked)
+        if _too_much(freely.motion, broken):
             return None
-        if not self._free:
-            best = self._towards_middle(grid, motion.place.q[0])
+        if not self._free and (orders[broken] == 0).any():
+            best = self._towards_middle(grid, freely.motion)
         dearest = np.inf if best is None else best.cost
         found = None if self._ended else self._bound(freely, _NO_COLUMNS, dearest)
         return min((one for one in (best, found) if one), key=_cost_of, default=None)
@@ -187,28 +189,42 @@ class NodeDescent:
         With one more between each two, put onto the path.
         """
         while self._ended is None and 2 * standing.steps <= MOST_NODES * len(self._problem.knots):
-            motion, finer = standing.motion, standing.refined()
+            motion = standing.motion
             off = abs(motion.exact_cost - motion.cost)
-            kept = not _broken(finer.motion).any()
-            if kept and off <= COST_AGREEMENT * abs(motion.exact_cost):
-                # That is on the path and keeps the conditions: between the nodes it does so better.
-                return finer
+            where = None
+            if off <= COST_AGREEMENT * abs(motion.exact_cost):
+                finer = standing.refined()
+                # That is on the path, also between the nodes.
+                broken = finer.motion.broken()
+                if not broken.any():
+                    return finer
+                each = broken.reshape(-1, 2).any(axis=1)
+                where = np.convolve(each, np.ones(3), "same") > 0.0
+            finer = standing.refined(where)
+            if where is not None:
+                # A limit begins or ends to bind there: that wants to be known well.
+                finer = finer.refined(np.repeat(where, 1 + where))
             found = self.again(finer)
             if found is None:
                 break
             standing = found
         return standing
 
-    def _towards_middle(self, grid: NodeGrid, start: Array) -> Standing | None:
-        """Return what is best near motions whose self-motion goes towards the limits' middle."""
-        robot = self._problem.robot
+    def _towards_middle(self, grid: NodeGrid, known: NodeMotion) -> Standing | None:
+        """Return what is best near motions whose self-motion goes towards the limits' middle.
+
+        Not where that is what is known already, and does not keep the conditions.
+        """
+        robot, start = self._problem.robot, known.place.q[0]
         limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
         middle = np.where(limited, 0.5 * (robot.lower + robot.upper), start)
         for share in TOWARDS_MIDDLE:
             motion = grid.motion_towards(start, middle, share * self._problem.path.duration)
             if motion is not None and self._ended is None:
-                best = self._kept(self._minimise(motion, _NO_COLUMNS))
-                if best is not None:
+                optimum = self._minimise(motion, _NO_COLUMNS)
+                best = self._kept(optimum)
+                same = abs(optimum.motion.cost - known.cost) <= COST_AGREEMENT * abs(known.cost)
+                if best is not None or same:
                     return best
         return None
 
@@ -231,7 +247,7 @@ class NodeDescent:
                 return None
             near = (motion.h > -NEARLY).any(axis=0)
             columns = np.union1d(columns, np.flatnonzero(broken | near))
-            if (motion.grid.conditions.orders(motion.samples)[columns] > 0).any():
+            if _too_much(motion, columns):
                 return None
             optimum = self._minimise(motion, columns, dearest)
         return None
@@ -278,13 +294,26 @@ class NodeDescent:
         least = LEAST_SAVING * abs(motion.cost)
         conditions = Conditions(motion.grid.conditions.constraints, Grid(motion.grid.t))
         each = [part.ravel() for part in motion.grid.conditions.by_constraint(optimum.prices)]
-        active = conditions.active(motion.samples, np.concatenate([np.zeros(0), *each]), least)
+        active = conditions.active(
+            motion.samples.checked, np.concatenate([np.zeros(0), *each]), least
+        )
         off = abs(motion.exact_cost - motion.cost)
         promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
         return Standing(motion, status, columns, optimum.prices, active, off + promised)
 
 
-def _broken(motion: NodeMotion) -> npt.NDArray[np.bool_]:
+def _too_much(motion: NodeMotion, columns: Ints | Flags) -> bool:
+    """Whether some of the conditions are not for nodes.
+
+    Along a limit of acceleration, jerks jump: beyond quintics on few nodes. Distances of bodies
+    bend too much between the few bodies that count for interior points.
+    """
+    conditions = motion.grid.conditions
+    orders = conditions.orders(motion.samples.checked)
+    return bool((orders[columns] > 1).any() or conditions.of_bodies()[columns].any())
+
+
+def _broken(motion: NodeMotion) -> Flags:
     """Return which columns of the conditions are not kept, (C,)."""
     # Written so that NaN is not.
     return np.asarray(~(motion.h <= motion.grid.conditions.tolerances).all(axis=0))

@@ -58,7 +58,12 @@ from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
 NO_OVERLAP = Clearance(distance=0.0)
 # Defaults of a problem; values, meant to be shared.
 _FREE = FreeNullMotion()
-_KEPT = (JointPositionLimits(), JointVelocityLimits(), JointAccelerationLimits(), JointJerkLimits())
+KEPT: tuple[Constraint, ...] = (
+    JointPositionLimits(),
+    JointVelocityLimits(),
+    JointAccelerationLimits(),
+    JointJerkLimits(),
+)
 # Stands for the usual cost of whatever arm it is.
 _USUAL: tuple[Cost, ...] = (JointVelocity(),)
 
@@ -138,7 +143,7 @@ class Problem:
     start: npt.ArrayLike | str | None = None
     null_motion: NullMotion = _FREE
     costs: Sequence[Cost] = _USUAL
-    constraints: Sequence[Constraint] = _KEPT
+    constraints: Sequence[Constraint] = KEPT
     relaxations: Sequence[Relaxation] = ()
     damping: Damping | None = None
     collision: Clearance | None = NO_OVERLAP
@@ -313,14 +318,12 @@ class Problem:
     @cached_property
     def asked_envelope(self) -> Envelope:
         """What the constraints ask of single configurations and velocities."""
-        free = Envelope.unbounded(self.robot.dof)
-        return reduce(and_, (item.envelope(self.robot) for item in self.all_constraints), free)
+        return _asked_envelope(self.robot, self.all_constraints)
 
     @cached_property
     def envelope(self) -> Envelope:
         """The same, with the arm's own limits where the certificate judges these."""
-        own = (Envelope.of_limits(item) for item in arm_limits(self.robot, self.requirements))
-        return reduce(and_, own, self.asked_envelope)
+        return _with_own_limits(self.robot, self.requirements, self.asked_envelope)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -376,6 +379,25 @@ class Problem:
         """Whether the tool has to be on the path itself at its start and at its end."""
         pins = [(self.start is not None, False), *(item.pins for item in self.constraints)]
         return any(start for start, _ in pins), any(end for _, end in pins)
+
+
+def envelope_of(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
+    """Return what constraints ask of single configurations, with the arm's own limits."""
+    requirements = [item.requirement(robot) for item in constraints]
+    return _with_own_limits(robot, requirements, _asked_envelope(robot, constraints))
+
+
+def _asked_envelope(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
+    free = Envelope.unbounded(robot.dof)
+    return reduce(and_, (item.envelope(robot) for item in constraints), free)
+
+
+def _with_own_limits(
+    robot: RobotModel, requirements: Sequence[Requirement], asked: Envelope
+) -> Envelope:
+    """Return an envelope with the arm's own limits where the certificate judges these."""
+    own = (Envelope.of_limits(item) for item in arm_limits(robot, requirements))
+    return reduce(and_, own, asked)
 
 
 # What help() shows of a field that is a descriptor.

@@ -2,7 +2,8 @@
 
 import dataclasses
 import json
-from collections.abc import Callable, Mapping, MutableMapping
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from functools import partial
 from operator import methodcaller
 from typing import Any
 
@@ -75,6 +76,7 @@ def follow_from_dict(values: Mapping[str, Any]) -> Follow:
 
 
 def _robot_to_dict(robot: RobotModel) -> dict[str, Any]:
+    """Return an arm as JSON-safe values, with its URDF's text; for `rebuild_robot`."""
     return {
         "text": robot.urdf.text,
         "package_dirs": list(robot.urdf.package_dirs),
@@ -98,18 +100,10 @@ def problem_from_dict(
     bodies takes a good part of a second.
     """
     known = {} if known is None else known
-
-    def once(description: Mapping[str, Any], make: Callable[[], Any]) -> Any:
-        key = json.dumps(description, sort_keys=True)
-        return known[key] if key in known else known.setdefault(key, make())
-
-    def constraint(item: Mapping[str, Any]) -> Any:
-        return once(item, lambda: restore(Constraint, item))
-
-    robot = once(values["robot"], lambda: rebuild_robot(**values["robot"]))
+    robot, constraints = arm_and_constraints(values, known)
     damping, collision = values.get("damping"), values.get("collision", NO_OVERLAP)
     if isinstance(collision, Mapping):
-        collision = constraint(collision)
+        collision = _once(known, collision, lambda: restore(Constraint, collision))
     return Problem(
         robot,
         restore(Path, values["path"]),
@@ -117,10 +111,37 @@ def problem_from_dict(
         values["start"],
         restore(NullMotion, values["null_motion"]),
         tuple(cost_from_dict(item, robot) for item in values["costs"]),
-        tuple(constraint(item) for item in values["constraints"]),
+        constraints,
         tuple(Relaxation(**item) for item in values.get("relaxations", ())),
         None if damping is None else Damping(**damping),
         collision or None,
         values.get("rest", True),
         tuple(follow_from_dict(item) for item in values.get("also", ())),
     )
+
+
+def describe_arm(robot: RobotModel, constraints: Sequence[Constraint]) -> dict[str, Any]:
+    """Return an arm and what it has to keep as JSON-safe values, with the URDF's text."""
+    return {
+        "robot": _robot_to_dict(robot),
+        "constraints": [item.to_dict() for item in constraints],
+    }
+
+
+def arm_and_constraints(
+    values: Mapping[str, Any], known: MutableMapping[str, Any]
+) -> tuple[RobotModel, tuple[Constraint, ...]]:
+    """Return what `describe_arm` described, taken from what is known, or put there."""
+    given = values["robot"]
+    robot = _once(known, given, lambda: rebuild_robot(**given))
+    constraints = tuple(
+        _once(known, item, partial(restore, Constraint, item)) for item in values["constraints"]
+    )
+    return robot, constraints
+
+
+def _once(
+    known: MutableMapping[str, Any], description: Mapping[str, Any], make: Callable[[], Any]
+) -> Any:
+    key = json.dumps(description, sort_keys=True)
+    return known[key] if key in known else known.setdefault(key, make())

@@ -12,8 +12,7 @@ from typing import IO, Any
 import numpy as np
 
 from selfmotion.basics import RenderError, as_path, write_atomically
-from selfmotion.replay.page import replay_html
-from selfmotion.result import Plan
+from selfmotion.replay.page import Shown, replay_html
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # Draw on the processor: the same picture on every machine, and no display needed.
@@ -22,7 +21,7 @@ LAYERS = ("trace", "triads")
 
 
 def render_png(
-    plans: Plan | Sequence[Plan],
+    plans: Shown,
     file: str | os.PathLike[str],
     *,
     t: float,
@@ -36,7 +35,7 @@ def render_png(
 
     Parameters
     ----------
-    plans : Plan or sequence of Plan
+    plans : Plan or sequence of Plan, Program, Parts or Move
         As for `replay_html`.
     file : path
         The picture; written whole or not at all.
@@ -73,7 +72,7 @@ def render_png(
 
 
 def render_gif(
-    plans: Plan | Sequence[Plan],
+    plans: Shown,
     file: str | os.PathLike[str],
     *,
     size: tuple[int, int] = (640, 400),

@@ -10,6 +10,7 @@ from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
 from selfmotion.replay.facts import describe, table
 from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames
 from selfmotion.replay.payload import Json, Payload
+from selfmotion.replay.whole import Whole
 from selfmotion.result import Plan
 
 # What can be shown and hidden: with its key, and whether it is shown at first.
@@ -30,10 +31,12 @@ _ELLIPSOID_LENGTH = 0.3
 class _Tip:
     """What follows a path, sampled: where it is and was to be, where the path is carried."""
 
-    def __init__(self, plan: Plan, follow: BoundFollow) -> None:
+    def __init__(self, plan: Plan, follow: BoundFollow, whole: Whole | None) -> None:
         self.carrier = follow.chain.carrier
-        self.shown = curves(plan, plan.trajectory, follow)
-        self.start = curves(plan, plan.initial_trajectory, follow)
+        points = {} if whole is None else {"points": whole.points}
+        self.shown = curves(plan, plan.trajectory, follow, **points)
+        still = plan.initial_trajectory is plan.trajectory
+        self.start = self.shown if still else curves(plan, plan.initial_trajectory, follow)
         # The whole path, also where the motion ends before it.
         times = np.linspace(0.0, follow.path.duration, len(self.shown.t))
         base = follow.chain.base_placement
@@ -50,16 +53,17 @@ class _Tip:
 class _Motion:
     """A plan, sampled: the motion itself and x = 0."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, whole: Whole | None) -> None:
         robot = plan.robot
-        self.plan = plan
+        self.plan, self.whole = plan, whole
         self.frames = key_frames(robot, plan.trajectory)
         self.ghost = key_frames(robot, plan.initial_trajectory)
-        self.tips = [_Tip(plan, item) for item in plan.problem.follows.items]
+        self.tips = [_Tip(plan, item, whole) for item in plan.problem.follows.items]
         self.shown, self.start = self.tips[0].shown, self.tips[0].start
-        self.obstacles = plan.obstacles
+        self.obstacles = plan.obstacles if whole is None else whole.obstacles
         models = [model for model, _ in plan.problem.envelope.bodies]
-        self.clearance = clearance_curve(plan.trajectory, models)
+        grows = whole is not None and whole.grows
+        self.clearance = None if grows else clearance_curve(plan.trajectory, models)
 
 
 def page_content(
@@ -68,11 +72,15 @@ def page_content(
     payload: Payload,
     *,
     triads: int | npt.ArrayLike,
+    whole: Whole | None = None,
 ) -> Json:
-    """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`."""
+    """Return the JSON of a page; its arrays go into `payload`. Parameters as in `replay_html`.
+
+    `whole` is what the one plan stands for, where it does.
+    """
     robot = plans[0].robot
     arm = links.bake(robot, payload)
-    motions = [_Motion(plan) for plan in plans]
+    motions = [_Motion(plan, whole) for plan in plans]
     hull = scene.outline(
         arm,
         [frames for motion in motions for frames in (motion.frames, motion.ghost)],
@@ -91,7 +99,7 @@ def page_content(
         ],
         "meshes": arm.meshes,
         "joints": _joints(plans[0]),
-        "layers": [*_LAYERS, _PAIR_LAYER] if any(m.clearance for m in motions) else _LAYERS,
+        "layers": _layers(motions),
         "scale": {**scale, "colors": shapes.COLOR_SCALE},
         "ellipsoidSize": _ELLIPSOID_LENGTH * box.radius / longest,
         "links": {visual.link: links.link_node(robot, visual) for visual in arm.visuals},
@@ -99,8 +107,20 @@ def page_content(
             _plan(motion, name, f"/selfmotion/plan{k}", payload, scale, triads, box.radius)
             for k, (motion, name) in enumerate(zip(motions, names, strict=True))
         ],
-        "table": [*_missing(arm, len(plans)), *table(plans)],
+        "table": [*_missing(arm, len(plans)), *_facts(plans, whole)],
     }
+
+
+def _layers(motions: list[_Motion]) -> list[Json]:
+    """Return what can be shown and hidden; of several steps there is no motion at x = 0."""
+    kept = [item for item in _LAYERS if item["name"] != "ghost" or motions[0].whole is None]
+    return [*kept, _PAIR_LAYER] if any(motion.clearance for motion in motions) else kept
+
+
+def _facts(plans: list[Plan], whole: Whole | None) -> list[Json]:
+    if whole is None:
+        return table(plans)
+    return [{"label": label, "cells": [cell]} for label, cell in whole.facts.items()]
 
 
 def _missing(arm: links.Arm, plans: int) -> list[Json]:
@@ -130,7 +150,7 @@ def _plan(
     size: float,
 ) -> Json:
     """Return what a page needs of one plan, its traces below the node `root`."""
-    shown = motion.shown
+    shown, whole = motion.shown, motion.whole
     times = (
         np.linspace(0.0, shown.t[-1], triads)
         if isinstance(triads, int)
@@ -138,14 +158,15 @@ def _plan(
     )
     return {
         "label": name,
-        "description": describe(motion.plan),
+        "description": describe(motion.plan) if whole is None else whole.description,
+        "steps": [] if whole is None else whole.steps(),
         "root": root,
         "tips": [
             {"root": f"{root}/tip{f}", "carrier": tip.carrier} for f, tip in enumerate(motion.tips)
         ],
         "duration": motion.plan.trajectory.duration,
-        "verdict": motion.plan.certificate.verdict,
-        "verified": bool(motion.plan.certificate.verified),
+        "verdict": motion.plan.certificate.verdict if whole is None else whole.verdict,
+        "verified": bool((motion.plan.certificate if whole is None else whole).verified),
         "frames": _packed(motion.frames, payload),
         "ghost": _packed(motion.ghost, payload),
         "curves": _curves(motion.plan, shown, payload),
@@ -165,8 +186,19 @@ def _plan(
                 for f, tip in enumerate(motion.tips)
                 for command in _traces(f"{root}/tip{f}", payload, tip, scale, times, size)
             ),
+            *(
+                []
+                if whole is None
+                else whole.commands(f"{root}/tip0", payload, shown, _TRACE_RADIUS * size)
+            ),
         ],
     }
+
+
+def _seams(
+    whole: Whole | None, root: str, payload: Payload, shown: Curves, size: float
+) -> list[Json]:
+    return [] if whole is None else whole.commands(root, payload, shown, _TRACE_RADIUS * size)
 
 
 def _traces(

@@ -15,18 +15,22 @@ from typing import IO, Any
 import numpy.typing as npt
 
 from selfmotion.basics import ProblemError, as_path, write_atomically
+from selfmotion.job import Program
 from selfmotion.replay.content import page_content
 from selfmotion.replay.facts import describe
 from selfmotion.replay.payload import Payload
-from selfmotion.result import Plan
+from selfmotion.replay.whole import Whole
+from selfmotion.result import Move, Parts, Plan
 
+# What a page can show.
+Shown = Plan | Sequence[Plan] | Program | Parts | Move
 _TRIADS = 7
 _VIEWER = "meshcat/viewer/dist/main.min.js"
 _SCRIPTS = ("payload.js", "stage.js", "plots.js", "page.js")
 
 
 def replay_html(
-    plans: Plan | Sequence[Plan],
+    plans: Shown,
     *,
     title: str | None = None,
     labels: Sequence[str] | None = None,
@@ -39,8 +43,9 @@ def replay_html(
 
     Parameters
     ----------
-    plans : Plan or sequence of Plan
-        What to show; several plans of one robot share a page with a switch.
+    plans : Plan or sequence of Plan, Program, Parts or Move
+        What to show; several plans of one robot share a page with a switch. Of a program and of
+        parts the seams have colours, and a table to jump to each.
     title : str, optional
         Heading of the page. Default: the robot's name and the task.
     labels : sequence of str, optional
@@ -57,18 +62,23 @@ def replay_html(
     RobotError
         A visual of the robot cannot be read.
     """
-    shown = _as_list(plans)
+    whole = Whole.of(plans) if isinstance(plans, Program | Parts | Move) else None
+    shown = _as_list(plans if whole is None else whole.plan)
     names = _labels(shown, labels)
     payload = Payload()
     content = page_content(
         shown,
         names,
         payload,
-        triads=triads,
+        triads=triads if whole is None else 0,
+        whole=whole,
     )
     if description is not None:
         for shown_plan in content["plans"]:
             shown_plan["description"] = description
+    if whole is not None:
+        heading = title or f"{shown[0].robot.name}, {type(plans).__name__.lower()}"
+        return _assemble(heading, description or whole.description, payload.pack(content))
     heading = title or f"{shown[0].robot.name}, {shown[0].task.value} task"
     sentences = [describe(plan) for plan in shown]
     if len(shown) > 1:
@@ -76,9 +86,7 @@ def replay_html(
     return _assemble(heading, description or " ".join(sentences), payload.pack(content))
 
 
-def write_replay(
-    plans: Plan | Sequence[Plan], file: str | os.PathLike[str], **options: Any
-) -> Path:
+def write_replay(plans: Shown, file: str | os.PathLike[str], **options: Any) -> Path:
     """Write `replay_html` to `file`, whole or not at all; options are those of `replay_html`.
 
     Returns

@@ -1,8 +1,16 @@
 """What came of a problem: plans, how they were found, their files, and other paces."""
 
+from selfmotion.result.bundle import read_bundle as read_bundle, write_bundle as write_bundle
 from selfmotion.result.limits_used import LimitsUsed as LimitsUsed
-from selfmotion.result.parts import Move as Move, Parts as Parts
-from selfmotion.result.plan import Plan as Plan, Views as Views, load_plan as load_plan
+from selfmotion.result.move import Move as Move, load_move as load_move
+from selfmotion.result.moves_pace import paced as paced
+from selfmotion.result.parts import Parts as Parts, load_parts as load_parts
+from selfmotion.result.plan import (
+    Plan as Plan,
+    Views as Views,
+    load_plan as load_plan,
+    read_plan as read_plan,
+)
 from selfmotion.result.report import Gap as Gap, Report as Report
 from selfmotion.result.retiming import (
     rate_limits as rate_limits,

@@ -3,7 +3,7 @@
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, MutableMapping
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
@@ -57,29 +57,30 @@ class Archive(NamedTuple):
             "certificate": dataclasses.asdict(self.certificate),
         }
         arrays = {
-            **_arrays(self.trajectory, ""),
-            **_arrays(self.initial_trajectory, "initial_"),
+            **arrays_of(self.trajectory),
+            **arrays_of(self.initial_trajectory, "initial_"),
             "coefficients": self.coefficients,
             "history_x": np.concatenate([np.zeros(0), *(item.x for item in history)]),
             "history_sizes": np.array([len(item.x) for item in history], dtype=np.float64),
         }
-        description["digest"] = _digest(description, arrays)
+        description["digest"] = digest_of(description, arrays)
         write_archive(file, description, arrays)
 
     @classmethod
-    def read(cls, file: FilePath) -> "Archive":
+    def read(cls, file: FilePath, known: MutableMapping[str, Any] | None = None) -> "Archive":
         """Read a file; FileFormatError where it is none, or of another version.
 
-        The certificate is that of the motion as it is read, measured anew.
+        The certificate is the written one. Arms and constraints are taken from what is `known` by
+        their description, and put there: making their bodies takes a good part of a second.
         """
         description, arrays = read_archive(file)
         _check_format(file, description)
         written = description.pop("digest", None)
         altered = ""
-        if written != _digest(description, arrays):
+        if written != digest_of(description, arrays):
             altered = f"{file.name} was changed after the plan was written: its digest differs"
         try:
-            found = _restore(description, arrays)
+            found = _restore(description, arrays, known)
             known = description.get("meshes", {})
             now = _meshes(found.problem)
             changed = tuple(name for name in known if now.get(name, "") != known[name])
@@ -102,7 +103,7 @@ def _meshes(problem: Problem) -> dict[str, str]:
     return found
 
 
-def _digest(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
+def digest_of(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
     """Return a digest of robot, path, requirements, motion and all else that a file holds."""
     digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
     for name in sorted(arrays):
@@ -127,12 +128,16 @@ def _check_format(file: FilePath, description: Mapping[str, Any]) -> None:
     )
 
 
-def _arrays(trajectory: Trajectory, prefix: str) -> dict[str, Array]:
+def arrays_of(trajectory: Trajectory, prefix: str = "") -> dict[str, Array]:
+    """Return the arrays of a motion by name, each with a prefix."""
     named = {"t": trajectory.t, "q": trajectory.q, "qd": trajectory.qd, "qdd": trajectory.qdd}
     return {prefix + name: array for name, array in named.items() if array is not None}
 
 
-def _trajectory(arrays: Mapping[str, Array], prefix: str, names: tuple[str, ...]) -> Trajectory:
+def trajectory_of(
+    arrays: Mapping[str, Array], names: tuple[str, ...], prefix: str = ""
+) -> Trajectory:
+    """Return the motion of which `arrays_of` returned the arrays."""
     t, q, qd = (arrays[prefix + name] for name in ("t", "q", "qd"))
     return Trajectory(t, q, qd, names, arrays.get(prefix + "qdd"))
 
@@ -176,7 +181,11 @@ def _certificate_from_dict(values: Mapping[str, Any]) -> Certificate:
     return Certificate(**restored)
 
 
-def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archive:
+def _restore(
+    description: dict[str, Any],
+    arrays: Mapping[str, Array],
+    known: MutableMapping[str, Any] | None,
+) -> Archive:
     names = tuple(description["joint_names"])
     ends = np.cumsum(arrays["history_sizes"]).astype(int)
     points = np.split(arrays["history_x"], ends[:-1]) if len(ends) else []
@@ -193,9 +202,9 @@ def _restore(description: dict[str, Any], arrays: Mapping[str, Array]) -> Archiv
         for item in report["active"]
     )
     return Archive(
-        problem=problem_from_dict(description["problem"]),
-        trajectory=_trajectory(arrays, "", names),
-        initial_trajectory=_trajectory(arrays, "initial_", names),
+        problem=problem_from_dict(description["problem"], known),
+        trajectory=trajectory_of(arrays, names),
+        initial_trajectory=trajectory_of(arrays, names, "initial_"),
         coefficients=arrays["coefficients"],
         report=Report(history=history, **report),
         certificate=_certificate_from_dict(description["certificate"]),

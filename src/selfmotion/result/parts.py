@@ -2,36 +2,18 @@
 
 from dataclasses import dataclass
 from itertools import accumulate
+from pathlib import Path as FilePath
 
-from selfmotion.basics import PlanError
-from selfmotion.certificate import Finding
+from selfmotion.basics import FileFormatError, PlanError, SelfmotionError, as_path
 from selfmotion.motion import Trajectory, joined_motions
-from selfmotion.problem.problem import Problem
+from selfmotion.problem import Problem, problem_from_dict, problem_to_dict
+from selfmotion.result.bundle import read_bundle, write_bundle
+from selfmotion.result.move import Move
 from selfmotion.result.plan import Plan
+from selfmotion.robot import RobotModel
 
-
-@dataclass(frozen=True, eq=False)
-class Move:
-    """A joint motion from rest to rest between two parts of a path.
-
-    Attributes
-    ----------
-    trajectory : Trajectory or None
-        None where none was found.
-    findings : tuple of Finding
-        What the requirements on limits and clearances say of it; each judges all times.
-    trouble : str
-        What is wrong with it, or why none was found; "" where all is kept.
-    """
-
-    trajectory: Trajectory | None
-    findings: tuple[Finding, ...] = ()
-    trouble: str = ""
-
-    @property
-    def verified(self) -> bool:
-        """Whether there is one that keeps all that is required."""
-        return self.trajectory is not None and not self.trouble
+# Raised with every change that older versions cannot read.
+_FORMAT = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +33,8 @@ class Parts:
         Where on the path each part but the last ends, and the next begins [s].
     endings : tuple of str
         Why each part but the last goes no further.
+    altered : str
+        Why the file that they were read from is not the one that was written; "" where it is.
     """
 
     problem: Problem
@@ -58,6 +42,7 @@ class Parts:
     moves: tuple[Move, ...] = ()
     cuts: tuple[float, ...] = ()
     endings: tuple[str, ...] = ()
+    altered: str = ""
 
     def __repr__(self) -> str:
         """Return a few lines: the parts, where they are cut and why, and the verdict."""
@@ -67,6 +52,11 @@ class Parts:
             for cut, ending in zip(self.cuts, self.endings, strict=True)
         ]
         return "\n".join([*lines, f"  {self.verdict}"])
+
+    @property
+    def robot(self) -> RobotModel:
+        """The arm."""
+        return self.problem.robot
 
     @property
     def verified(self) -> bool:
@@ -92,7 +82,7 @@ class Parts:
             for number, move in enumerate(self.moves, 1)
             if not move.verified
         ]
-        return parts + moves
+        return [*([self.altered] if self.altered else []), *parts, *moves]
 
     @property
     def trajectory(self) -> Trajectory:
@@ -141,3 +131,45 @@ class Parts:
         if not self.verified:
             raise PlanError(f"{self.problem.robot.name}: {self.verdict}")
         return self
+
+    def save(self, file: str | FilePath) -> None:
+        """Write all parts and moves to one file that `load_parts` reads; atomically.
+
+        Raises
+        ------
+        PlanError
+            A move was not found.
+        """
+        description = {
+            "problem": problem_to_dict(self.problem),
+            "cuts": list(self.cuts),
+            "endings": list(self.endings),
+        }
+        for number, move in enumerate(self.moves, 1):
+            if move.trajectory is None:
+                raise PlanError(f"move {number} was not found: {move.trouble}")
+        write_bundle(as_path(file), "parts", _FORMAT, description, [*self.plans, *self.moves])
+
+
+def load_parts(file: str | FilePath) -> Parts:
+    """Read parts that `Parts.save` wrote, and judge all of them anew.
+
+    A file that was changed is never verified.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, holds no parts, lacks something, or was written by another version.
+    """
+    path = as_path(file)
+    description, made, changed = read_bundle(path, "parts", _FORMAT)
+    try:
+        problem = problem_from_dict(description["problem"])
+        cuts = tuple(map(float, description["cuts"]))
+        endings = tuple(map(str, description["endings"]))
+    except (KeyError, TypeError, ValueError, SelfmotionError) as error:
+        raise FileFormatError(f"{path}: are damaged parts: {error!r}") from error
+    plans = tuple(item for item in made if isinstance(item, Plan))
+    moves = tuple(item for item in made if isinstance(item, Move))
+    altered = f"{path.name} was changed after the parts were written" if changed else ""
+    return Parts(problem, plans, moves, cuts, endings, altered)

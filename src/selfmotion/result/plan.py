@@ -1,10 +1,10 @@
 """A finished plan: the motion, the problem it solves, how it was found, and what the check says."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -210,19 +210,25 @@ class Plan:
         return None if self.views is None else self.views.notebook_html(self)
 
 
-def load_plan(file: str | FilePath, *, progress: Progress = silent) -> Plan:
+def load_plan(
+    file: str | FilePath,
+    *,
+    progress: Progress = silent,
+    known: MutableMapping[str, Any] | None = None,
+) -> Plan:
     """Read a plan that `Plan.save` wrote, and measure its motion anew.
 
     A file that was changed is never verified. Where the robot's own file has changed since, the
     certificate's notes say so: the plan is checked against the arm it was made for. `progress` is
-    told how far it is, as in `certify`.
+    told how far it is, as in `certify`. Who reads many plans of one arm hands the same `known` to
+    each: arms and constraints are put there, and taken from there.
 
     Raises
     ------
     FileFormatError
         The file is missing, is no plan, lacks something, or was written by a newer version.
     """
-    archive = Archive.read(as_path(file))
+    archive = Archive.read(as_path(file), known)
     plan = Plan(*archive[:-1])
     try:
         certificate = plan.check(progress=progress)
@@ -236,3 +242,17 @@ def load_plan(file: str | FilePath, *, progress: Progress = silent) -> Plan:
         note = f"{name} has changed since the plan was made"
         certificate = replace(certificate, notes=(*certificate.notes, note))
     return replace(plan, certificate=certificate)
+
+
+def read_plan(file: FilePath, known: MutableMapping[str, Any]) -> Plan:
+    """Read a plan as it was written, with the certificate of then; see `load_plan`.
+
+    Raises
+    ------
+    FileFormatError
+        See `load_plan`; also where the file, or a mesh, was changed since.
+    """
+    archive = Archive.read(file, known)
+    if archive.altered or archive.changed:
+        raise FileFormatError(f"{file}: it, or what it depends on, was changed since")
+    return Plan(*archive[:-1])

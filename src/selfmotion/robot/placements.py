@@ -51,7 +51,8 @@ def placements(
     Row 0 is the base. Each joint has a coordinate, `joints` (c,), a place in the frame of another
     row, `parents` (c,), which is (c, 3, 3) and (c, 3), and an axis in its own, (c, 3).
     """
-    # Loops: numba takes seconds for what NumPy checks of shapes.
+    # Loops, here and in all kernels: for an array assigned to a slice of another, numba compiles
+    # for seconds what NumPy says of shapes that differ.
     turn, middle, shift, slide = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     for a in range(3):
         p[0, a] = 0.0

@@ -88,20 +88,23 @@ def _advance(
     # NaN fails these comparisons, too.
     sound = 0.0 <= length <= CONVERGED and cosine > ALIGNED
     if sound and 0.3 * state[0] < moved < 1.2 * state[0]:
-        samples[count, :] = q
+        for k in range(n):
+            samples[count, k] = q[k]
         state[2] = count + 1
         if count >= 3 and _passes_start(samples, count, revolute, tangents):
             return CLOSED
         if count + 1 == samples.shape[0]:
             return ENDED
-        tangents[0, :] = tangents[1]
+        for k in range(n):
+            tangents[0, k] = tangents[1, k]
         state[0] = min(state[3], 1.5 * state[0])
         last = samples[count]
     else:
         state[0] *= 0.5
         if state[0] < SMALLEST_STEP * state[3]:
             return ENDED
-        tangents[1, :] = tangents[0]
+        for k in range(n):
+            tangents[1, k] = tangents[0, k]
     state[1] = 0
     for k in range(n):
         q[k] = last[k] + state[0] * tangents[0, k]

@@ -41,6 +41,7 @@ class Page {
     this.stage?.load(this.plan);
     this.applyLayers();
     this.makePlots();
+    this.makeSteps();
     this.seek(Math.min(this.now, this.duration));
   }
 
@@ -59,6 +60,7 @@ class Page {
     get("clock").textContent = `${time.toFixed(2)} / ${this.duration.toFixed(2)} s`;
     for (const plot of this.plots) plot.seek(time);
     this.showPair(time);
+    this.showStep(time);
     if (this.layers.ellipsoid) this.stage?.stretch(this.plan.ellipsoid, time, this.content.ellipsoidSize);
   }
 
@@ -189,7 +191,7 @@ class Page {
   applyLayers() {
     this.showPair(this.now);
     if (!this.stage) return;
-    const { ghost, trace, triads, ellipsoid } = this.layers;
+    const { ghost = false, trace, triads, ellipsoid } = this.layers;
     this.stage.show("/selfmotion/ghost", ghost);
     this.stage.show("/selfmotion/ellipsoid", ellipsoid);
     this.content.plans.forEach((plan, k) => {
@@ -210,6 +212,27 @@ class Page {
     for (const plot of this.plots) plot.remove();
     this.plots = plotSpecs(this.content, this.plan).map((spec, id) => new Plot(
       get("plots"), { ...spec, id }, (time) => { this.pause(); this.seek(time); }));
+  }
+
+  // What a program consists of: a button for each step, which leads to its begin.
+  makeSteps() {
+    get("steps").hidden = this.plan.steps.length < 2;
+    get("steps").replaceChildren();
+    this.steps = this.plan.steps.map(({ begin, end, name, color }) => {
+      const title = `from ${begin.toFixed(2)} to ${end.toFixed(2)} s`;
+      const button = element(get("steps"), "button", { type: "button", title, class: color ? "seam" : "move" }, name);
+      if (color) button.style.borderLeftColor = color;
+      element(button, "small", {}, `${begin.toFixed(1)} s`);
+      button.addEventListener("click", () => { this.pause(); this.seek(begin); });
+      return button;
+    });
+  }
+
+  showStep(time) {
+    const { steps } = this.plan;
+    // At the end of one the next one has begun.
+    const now = steps.findLastIndex(({ begin }) => begin <= time + 1e-9);
+    this.steps?.forEach((button, k) => button.setAttribute("aria-current", k === now ? "step" : "false"));
   }
 
   makeTable() {
@@ -238,14 +261,14 @@ function column(table, k, width) {
   return Float32Array.from({ length: table.length / width }, (_, row) => table[row * width + k]);
 }
 
-function plotSpecs({ joints }, { curves, start, clearance }) {
+function plotSpecs({ joints }, { curves, start, clearance, steps }) {
   const unit = [...new Set(joints.map((joint) => joint.unit))].join(" or ");
   const perJoint = (table, low, high) => joints.map((joint, k) => ({
     name: joint.name, values: column(table, k, joints.length), color: COLORS[k % COLORS.length],
     low: low(joint) ?? NaN, high: high(joint) ?? NaN }));
   const both = (name) => [
     { name: "plan", values: curves[name], color: COLORS[0] },
-    { name: "x = 0", values: start[name], color: COLORS[1], start: true }];
+    ...(steps.length ? [] : [{ name: "x = 0", values: start[name], color: COLORS[1], start: true }])];
   const errors = [
     ...("position" in curves ? [{ name: "position [m]", values: curves.position, color: COLORS[0] }] : []),
     ...("rotation" in curves ? [{ name: "rotation [rad]", values: curves.rotation, color: COLORS[3] }] : [])];
@@ -256,7 +279,8 @@ function plotSpecs({ joints }, { curves, start, clearance }) {
     { title: "Joint velocities q̇", unit: unit.replaceAll(/rad|m/g, "$&/s"), t, note,
       curves: perJoint(curves.qd, (j) => (j.speed === null ? null : -j.speed), (j) => j.speed) },
     { title: "Manipulability √det(JJᵀ)", unit: "", t, zero: true, curves: both("manipulability") },
-    { title: "Path error", unit: "", t, log: true, floor: 1e-16, curves: errors },
+    // Of several steps each has a path of its own, or none.
+    ...(steps.length ? [] : [{ title: "Path error", unit: "", t, log: true, floor: 1e-16, curves: errors }]),
     ...(clearance ? [{ title: "Clearance", unit: "m", t: clearance.t, zero: true,
       curves: [{ name: "closest pair", values: clearance.value, color: COLORS[0] }] }] : []),
   ];

@@ -1,0 +1,112 @@
+"""Commands about many seams in one program."""
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+import selfmotion as sm
+from selfmotion import formats
+from selfmotion.cli import json_tables, options, tables
+from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, complain, stages, terminal
+from selfmotion.cli.batch_display import executor_at
+from selfmotion.cli.stage_display import StageDisplay
+
+PROGRAM = ".program"
+TIMETABLE = ".timetable.csv"
+
+
+@app.command(epilog="Example: selfmotion job frame.toml --out frame.program --out frame.yaml")
+def job(
+    file: Annotated[Path, typer.Argument(help="A job file: a problem file with seams.")],
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="File: .program (all of it), .timetable.csv (what happens when), or the motion "
+            "as `export` writes it. Repeatable."
+        ),
+    ] = None,
+    html: options.HtmlOption = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="Keeps what is finished; a job that was stopped goes on there."),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    dask: Annotated[
+        str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
+    ] = None,
+    allow_code: options.AllowCodeOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Plan many seams as one program: order, directions, and the moves in between."""
+    from selfmotion.batch import processes
+
+    wanted = [*(out or []), *([] if html is None else [html])]
+    for target in wanted:
+        _check(target)
+    work = sm.read_seam_job(file, allow_code=allow_code)
+    kept = folder or Path("out") / f"{file.stem}.job"
+    here: Any = processes(workers) if workers > 1 else nullcontext()
+    try:
+        with executor_at(dask) as cluster, here as pool, StageDisplay(stages) as display:
+            program = work.plan(folder=kept, executor=cluster or pool, progress=display.stage)
+    except KeyboardInterrupt:
+        complain(f"stopped; what is finished is in '{kept}': run again to go on")
+        raise typer.Exit(NOT_VERIFIED) from None
+    if as_json:
+        terminal.print_json(data=json_tables.program_json(program))
+    else:
+        tables.show_program(program, terminal)
+    for target in wanted:
+        write_program(program, target)
+        if not as_json:
+            terminal.print(f"wrote {target}", markup=False, soft_wrap=True)
+    raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
+
+
+def _check(file: Path) -> None:
+    if not (file.suffix in (PROGRAM, ".html", *formats.SUFFIXES) or file.name.endswith(TIMETABLE)):
+        known = ", ".join(formats.SUFFIXES)
+        raise sm.FileFormatError(
+            f"{file}: --out writes .program, .timetable.csv, .html (a replay) or the motion "
+            f"({known})"
+        )
+
+
+def write_program(program: sm.Program, file: Path) -> None:
+    """Write a program as what the name of a file says."""
+    if file.suffix == PROGRAM:
+        program.save(file)
+    elif file.name.endswith(TIMETABLE):
+        program.write_timetable(file)
+    elif file.suffix == ".html":
+        from selfmotion.replay import write_replay
+
+        write_replay(program, file)
+    else:
+        sm.write_motion(program, file)
+
+
+def check(program: sm.Program, as_json: bool) -> NoReturn:
+    """Print what is known of a program that was read and judged anew, and end."""
+    if as_json:
+        terminal.print_json(data=json_tables.program_json(program))
+    else:
+        tables.show_program(program, terminal)
+    raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
+
+
+def export(
+    program: sm.Program, out: list[Path], rate: float | None, form: str | None, as_json: bool
+) -> NoReturn:
+    """Write the motion of a program, and its verdict, and end."""
+    for target in out:
+        sm.write_motion(program, target, rate=rate, form=form)
+    if as_json:
+        written = {str(target): program.verdict for target in out}
+        terminal.print_json(data={"verified": program.verified, "written": written})
+    else:
+        for target in out:
+            terminal.print(f"wrote {target}; {program.verdict}", markup=False, soft_wrap=True)
+    raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)

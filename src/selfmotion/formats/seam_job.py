@@ -1,0 +1,246 @@
+"""From a file of many seams to a job."""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any
+
+from selfmotion.basics import FileFormatError, SelfmotionError, as_path, nearest
+from selfmotion.constraints import Clearance
+from selfmotion.formats.documents import in_si, read_document
+from selfmotion.formats.path_files import read_path
+from selfmotion.formats.poses import pose_of
+from selfmotion.formats.problem_file import Job, job_of
+from selfmotion.formats.problem_parts import obstacle, start_of
+from selfmotion.job import Program, Seam, plan_job
+from selfmotion.path import Path, Placed, section_at_rest
+from selfmotion.problem import NO_OVERLAP
+from selfmotion.robot import RobotModel
+
+# Keys of a job, of a seam besides those of a problem, and of seams in one table.
+_JOB = ("start", "end", "order", "branches", "seconds_per_cost", "deadline", "rng")
+_SEAM = ("name", "either_way", "after", "after_any", "wait", "events", "leaves", "may_meet")
+_OF_PROBLEM = ("path", "task", "costs", "constraints", "relaxations")
+_TABLE = ("file", "frame", "ramp", "feed", "duration", "jump", "corners", "tolerance")
+# What stands for the motion of all seams while what they share is read.
+_COLUMN = "seam"
+
+
+@dataclass(frozen=True, eq=False)
+class SeamJob:
+    """What a job file says: an arm, seams, and how to plan them.
+
+    Attributes
+    ----------
+    robot : RobotModel
+    seams : tuple of Seam
+    settings : mapping
+        What `plan_job` is given besides.
+    """
+
+    robot: RobotModel
+    seams: tuple[Seam, ...]
+    settings: Mapping[str, Any]
+
+    def plan(self, **options: Any) -> Program:
+        """Plan it; `options` are further ones of `plan_job`."""
+        return plan_job(self.robot, self.seams, **{**self.settings, **options})
+
+
+def read_seam_job(file: str | FilePath, *, allow_code: bool = False) -> SeamJob:
+    """Read a job file: a problem file with seams instead of a path; TOML, or the same as JSON.
+
+    Tables ``[robot]``, ``[[constraints]]``, ``[[costs]]``, ``[[relaxations]]`` and ``task`` are
+    those of a problem file (`read_job`), and hold for all seams. ``[job]`` has the settings of
+    `plan_job`. Seams are a list ``[[seams]]``, each with a ``name``, a ``path``, and what a `Seam`
+    may say besides; or one table ``[seams]`` that names a ``file`` of poses with a column ``seam``,
+    as `read_path` reads them, with a ``feed`` or ``duration``, and what else all of them have.
+
+    Parameters
+    ----------
+    file : path
+    allow_code : bool
+        As for `read_job`.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or says something that cannot be planned; file and key are named.
+    """
+    path = as_path(file)
+    document = read_document(path)
+    given, settings = document.pop("seams", None), document.pop("job", {})
+    if "path" in document or not isinstance(given, dict | list) or not given:
+        raise FileFormatError(
+            f"{path}: expected seams, a list [[seams]] or a table [seams] with a file, and no path "
+            f"beside them"
+        )
+    reader = _Reader(path, document, allow_code, {})
+    entries = [reader.of_table(given)] if isinstance(given, dict) else map(reader.of_list, given)
+    seams = [seam for several in entries for seam in several]
+    whole = reader.first
+    apart = [item for item in whole.problem.constraints if isinstance(item, Clearance)]
+    if len(apart) > 1:
+        raise FileFormatError(f"{path}: constraints: two clearances, expected one for all")
+    options = reader.settings(settings)
+    kept = [item for item in reader.shared if not isinstance(item, Clearance)]
+    clearance = apart[0] if apart else whole.problem.collision
+    if apart or whole.problem.collision is not NO_OVERLAP:
+        options["clearance"] = clearance
+    return SeamJob(whole.problem.robot, tuple(seams), {**options, "constraints": kept})
+
+
+class _Reader:
+    """Reads the seams of a file, with what they share."""
+
+    def __init__(
+        self, file: FilePath, shared: dict[str, Any], allow_code: bool, memory: dict[str, Any]
+    ) -> None:
+        self._file, self._shared, self._code, self._memory = file, shared, allow_code, memory
+        # The arm and what all keep, read with any motion at all.
+        self.first = self._read({"path": _ANY}, "seams")
+        self.shared = list(self.first.problem.constraints)
+
+    def of_list(self, given: Any) -> list[Seam]:
+        """Return the seam of an entry of [[seams]]."""
+        if not isinstance(given, Mapping):
+            raise FileFormatError(f"{self._file}: seams: an entry is no table, expected [[seams]]")
+        name = given.get("name")
+        where = f"seams, '{name}'"
+        self._check(given, (*_SEAM, *_OF_PROBLEM), where)
+        if "path" not in given:
+            raise FileFormatError(f"{self._file}: {where}: path is missing")
+        return [self._seam(given, None, where)]
+
+    def of_table(self, given: Mapping[str, Any]) -> list[Seam]:
+        """Return the seams of a file with a column ``seam``."""
+        self._check(given, (*_SEAM[1:], *_OF_PROBLEM[1:], *_TABLE), "seams")
+        values = in_si(given)
+        if "file" not in values:
+            raise FileFormatError(f"{self._file}: seams: file is missing, or a list [[seams]]")
+        try:
+            frame = pose_of(values["frame"]) if "frame" in values else None
+        except (SelfmotionError, ValueError) as error:
+            raise FileFormatError(f"{self._file}: seams: frame: {error}") from error
+        table = self._file.parent / values["file"]
+        options = {key: values[key] for key in _TABLE[3:] if key in values}
+        rest = {key: value for key, value in given.items() if key not in _TABLE}
+        found = []
+        for name, path in _paths(table, options).items():
+            if "ramp" in values:
+                path = section_at_rest(path, ramp=values["ramp"])
+            if frame is not None:
+                path = Placed(path, frame)
+            found.append(self._seam({**rest, "name": name}, path, f"seams, '{name}'"))
+        return found
+
+    def settings(self, given: Any) -> dict[str, Any]:
+        """Return the settings of [job]."""
+        if not isinstance(given, Mapping):
+            raise FileFormatError(f"{self._file}: job: expected a table [job]")
+        values = in_si(given)
+        self._check(values, _JOB, "job")
+        robot, task = self.first.problem.robot, self.first.problem.task
+        try:
+            for name in ("start", "end"):
+                if name in values:
+                    values[name] = start_of(values[name], robot, task)
+        except SelfmotionError as error:
+            raise FileFormatError(f"{self._file}: job: {name}: {error}") from error
+        return values
+
+    def _seam(self, given: Mapping[str, Any], path: Path | None, where: str) -> Seam:
+        own = {key: value for key, value in given.items() if key in _OF_PROBLEM}
+        constraints = own.pop("constraints", [])
+        whole = self._shared.get("constraints", [])
+        document = {"path": _ANY, **own}
+        if constraints:
+            document["constraints"] = [*whole, *constraints]
+        problem = self._read(document, where).problem
+        besides = list(problem.constraints)[len(whole) :] if constraints else []
+        values = {key: value for key, value in in_si(given).items() if key in _SEAM}
+        try:
+            leaves = [
+                obstacle(in_si(item), lambda name: self._file.parent / name)
+                for item in values.pop("leaves", [])
+            ]
+            return Seam(
+                path=problem.path if path is None else path,
+                task=problem.task,
+                relaxations=problem.relaxations,
+                costs=problem.costs,
+                constraints=besides,
+                leaves=leaves,
+                **values,
+            )
+        except (SelfmotionError, TypeError) as error:
+            raise FileFormatError(f"{self._file}: {where}: {error}") from error
+
+    def _read(self, own: Mapping[str, Any], where: str) -> Job:
+        document = {**self._shared, **own}
+        try:
+            return job_of(document, self._file, allow_code=self._code, memory=self._memory)
+        except SelfmotionError as error:
+            text = str(error).removeprefix(f"{self._file}: ")
+            raise FileFormatError(f"{self._file}: {where}: {text}") from error
+
+    def _check(self, given: Mapping[str, Any], known: Sequence[str], where: str) -> None:
+        for key in given:
+            plain = key.removesuffix("_deg").removesuffix("_mm")
+            if plain not in known:
+                raise FileFormatError(
+                    f"{self._file}: {where}: unknown key '{key}'{nearest(key, known)}; expected "
+                    f"{', '.join(known)}"
+                )
+
+
+# A motion that any arm's tool may have, so that what seams share can be read.
+_ANY = {
+    "kind": "line",
+    "start": {"position": [0.0, 0.0, 0.0]},
+    "by": [0.0, 0.0, 0.01],
+    "duration": 1.0,
+}
+
+
+def _paths(file: FilePath, options: Mapping[str, Any]) -> dict[str, Path]:
+    """Return the tool motions of a table with a column ``seam``, by its names."""
+    try:
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileFormatError(f"{file}: cannot be read: {error}") from error
+    rows = [k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")]
+    if not rows:
+        raise FileFormatError(f"{file}: is empty, expected a header line and rows")
+    mark = max(",;\t", key=lines[rows[0]].count)
+    header = [name.strip().strip('"') for name in lines[rows[0]].split(mark)]
+    if _COLUMN not in header:
+        raise FileFormatError(
+            f"{file}: has no column '{_COLUMN}', expected one that names the seam of each row; "
+            f"the header is {','.join(header)}"
+        )
+    at = header.index(_COLUMN)
+    cells = {k: lines[k].split(mark) for k in rows}
+    names = {k: each[at].strip() if at < len(each) else "" for k, each in cells.items()}
+    found: dict[str, Path] = {}
+    for name in dict.fromkeys(names[k] for k in rows[1:]):
+        # Rows of other seams become comments, so that lines keep their numbers.
+        own = [
+            mark.join(cells[k][:at] + cells[k][at + 1 :])
+            if k == rows[0] or names.get(k) == name
+            else "#"
+            for k in range(len(lines))
+        ]
+        found[name] = _read_one(file, "\n".join(own), options)
+    return found
+
+
+def _read_one(file: FilePath, text: str, options: Mapping[str, Any]) -> Path:
+    with tempfile.TemporaryDirectory() as folder:
+        part = FilePath(folder, file.name)
+        part.write_text(text, encoding="utf-8")
+        try:
+            return read_path(part, **options)
+        except FileFormatError as error:
+            raise FileFormatError(str(error).replace(str(part), str(file))) from error

@@ -1,0 +1,156 @@
+"""Programs as files, and what a job has finished so far."""
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping, MutableMapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from selfmotion.basics import FileFormatError, as_path, write_atomically
+from selfmotion.collision import obstacle_from_dict
+from selfmotion.job.program import Program, Step
+from selfmotion.result import Move, Plan, load_move, read_bundle, read_plan, write_bundle
+
+# Raised with every change that older versions cannot read.
+_FORMAT = 1
+
+
+def write_program(program: Program, file: Path) -> None:
+    """Write a program to one file, atomically; see `Program.save`."""
+    found = [step for step in program.steps if not step.is_missing]
+    troubles = {step.name: step.trouble for step in program.steps if step.is_missing}
+    description: dict[str, Any] = {
+        "steps": [_step_to_dict(step) for step in found],
+        "missing": {**program.missing, **troubles},
+        "bound": program.bound,
+        "notes": list(program.notes),
+    }
+    write_bundle(file, "program", _FORMAT, description, [step.made for step in found])
+
+
+def load_program(file: str | Path) -> Program:
+    """Read a program that `Program.save` wrote, and judge all of it anew.
+
+    A file that was changed is never verified.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, is no program, lacks something, or was written by another version.
+    """
+    path = as_path(file)
+    description, made, changed = read_bundle(path, "program", _FORMAT)
+    try:
+        pairs = zip(description["steps"], made, strict=True)
+        steps = tuple(_step(values, item) for values, item in pairs)
+        missing = {str(name): str(why) for name, why in description["missing"].items()}
+        notes, bound = tuple(map(str, description["notes"])), float(description["bound"])
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FileFormatError(f"{path}: is a damaged program: {error!r}") from error
+    if changed:
+        missing[path.name] = "the file was changed after the program was written"
+    return Program(made[0].robot, steps, missing, bound, notes)
+
+
+def _step_to_dict(step: Step) -> dict[str, Any]:
+    return {
+        "name": step.name,
+        "turned": step.turned,
+        "events": [list(event) for event in step.events],
+        "leaves": [item.to_dict() for item in step.leaves],
+        "may_meet": list(step.may_meet),
+    }
+
+
+def _step(values: Mapping[str, Any], made: Plan | Move) -> Step:
+    return Step(
+        str(values["name"]),
+        made,
+        bool(values["turned"]),
+        tuple((str(name), float(at)) for name, at in values["events"]),
+        tuple(obstacle_from_dict(item) for item in values["leaves"]),
+        tuple(map(str, values["may_meet"])),
+    )
+
+
+class Shelf:
+    """A folder with what a job has finished: plans and moves by what was asked for.
+
+    Parameters
+    ----------
+    folder : Path or None
+        None keeps nothing.
+    known : mapping
+        Arms and constraints that are made already; see `load_plan`.
+    """
+
+    def __init__(self, folder: Path | None, known: MutableMapping[str, Any]) -> None:
+        self._folder, self._known = folder, known
+        if folder is not None:
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise FileFormatError(f"{folder}: cannot be made: {error.strerror}") from error
+
+    def file(self, name: str, asked: Any) -> Path | None:
+        """Return the file for what was asked (JSON-safe) under a name; None without a folder."""
+        if self._folder is None:
+            return None
+        key = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:16]
+        plain = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:40]
+        return self._folder / f"{plain}.{key}.json"
+
+    def plans(self, file: Path | None) -> tuple[list[Plan], str] | None:
+        """Return the plans that were kept, and why there are none; None for nothing kept."""
+        kept = self._read(file)
+        if file is None or kept is None:
+            return None
+        try:
+            names = [file.with_suffix(f".{k}.npz") for k in range(int(kept["plans"]))]
+            return [read_plan(name, self._known) for name in names], str(kept["reason"])
+        except (FileFormatError, KeyError, TypeError, ValueError):
+            return None
+
+    def keep_plans(self, file: Path | None, plans: Sequence[Plan], reason: str) -> None:
+        """Keep plans, or why there are none."""
+        if file is None:
+            return
+        for number, plan in enumerate(plans):
+            plan.save(file.with_suffix(f".{number}.npz"))
+        self._write(file, {"plans": len(plans), "reason": reason})
+
+    def move(self, file: Path | None, missing: Move) -> Move | None:
+        """Return the move that was kept, `missing` with the reason, or None for nothing kept."""
+        kept = self._read(file)
+        if file is None or kept is None:
+            return None
+        try:
+            if kept["trouble"]:
+                return Move(missing.robot, missing.constraints, None, (), str(kept["trouble"]))
+            return load_move(file.with_suffix(".npz"), known=self._known)
+        except (FileFormatError, KeyError, TypeError, ValueError):
+            return None
+
+    def keep_move(self, file: Path | None, move: Move) -> None:
+        """Keep a move, or why there is none."""
+        if file is None:
+            return
+        if move.trajectory is not None:
+            move.save(file.with_suffix(".npz"))
+        self._write(file, {"trouble": "" if move.trajectory is not None else move.trouble})
+
+    def _read(self, file: Path | None) -> dict[str, Any] | None:
+        if file is None or not file.exists():
+            return None
+        try:
+            found = json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return found if isinstance(found, dict) else None
+
+    def _write(self, file: Path, values: Mapping[str, Any]) -> None:
+        def write(stream: Any) -> None:
+            stream.write(json.dumps(values).encode())
+
+        write_atomically(file, write)

@@ -1,0 +1,274 @@
+"""The order of a job by what is known of its moves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError
+from selfmotion.job.order import EXACT, Round, Stops, best_round
+from selfmotion.job.seam import Seam, backwards_plan
+from selfmotion.job.work import Work
+from selfmotion.planning import FreeMotions
+from selfmotion.problem import Problem
+from selfmotion.result import Plan
+
+# So often motions are added that begin where the seam before ends, at most: of few seams and of
+# many.
+_NEARBY_ROUNDS, _NEARBY_ROUNDS_OF_MANY = 4, 2
+# Moves that take less than this need none [s]; an added motion shortens one by this at least.
+_SHORT, _WORTH = 0.1, 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """One way to make a seam.
+
+    Attributes
+    ----------
+    seam : int
+        Which one.
+    plan : Plan
+    turned : bool
+        Whether from the seam's end to its start.
+    mirrored : bool
+        Whether the plan is that of the other direction, to be turned round.
+    """
+
+    seam: int
+    plan: Plan
+    turned: bool = False
+    mirrored: bool = False
+
+    @property
+    def ends(self) -> Array:
+        """The configurations at its begin and end, (2, n)."""
+        ends = self.plan.trajectory.q[[0, -1]]
+        return ends[::-1] if self.mirrored else ends
+
+    @cached_property
+    def made(self) -> Plan:
+        """The plan as it is made."""
+        return backwards_plan(self.plan) if self.mirrored else self.plan
+
+
+class Ordering:
+    """Which states there are, what leads from one to another, and the best round of them.
+
+    Parameters
+    ----------
+    seams : sequence of Seam
+    work : Work
+    ends : ((n,) or None, (n,) or None)
+        Where the program begins and ends.
+    price : float
+        What a unit of cost counts [s].
+    is_free : bool
+        Whether the order is.
+
+    Attributes
+    ----------
+    states : list of State
+    missing : dict
+        Seams without a state, and why.
+    """
+
+    def __init__(
+        self,
+        seams: Sequence[Seam],
+        work: Work,
+        ends: tuple[Array | None, ...],
+        price: float,
+        is_free: bool,
+    ) -> None:
+        self.seams, self._work, self._ends = list(seams), work, ends
+        self._price, self._is_free = price, is_free
+        asked = work.asked
+        self._free = FreeMotions(asked.robot, asked.of_moves(()), np.random.default_rng(0))
+        self.states: list[State] = []
+        self.missing: dict[str, str] = {}
+        # What is known better than by limits: from state to state, None for the ends.
+        self._known: dict[tuple[int | None, int | None], float] = {}
+        self.problems: list[Problem] = [asked.problem(seam) for seam in self.seams]
+        found = work.branches(list(zip(self.seams, self.problems, strict=True)))
+        for number, (plans, reason) in enumerate(found):
+            if not plans:
+                self.missing[self.seams[number].name] = reason
+            for plan in plans:
+                self._add(State(number, plan))
+                if self.seams[number].either_way:
+                    self._add(State(number, plan, turned=True, mirrored=True))
+        self._drop_what_hangs()
+        if self.states:
+            self._add_alike()
+            self._add_nearby()
+
+    def _add(self, state: State) -> None:
+        self.states.append(state)
+        self.__dict__.pop("estimates", None)
+
+    def own(self, state: int) -> float:
+        """Return what a state costs by itself [s]."""
+        return self._price * self.states[state].plan.report.cost
+
+    def name_of(self, state: int) -> str:
+        """Return the name of a state's seam."""
+        return self.seams[self.states[state].seam].name
+
+    def seconds(self, first: Array, last: Array) -> float:
+        """Return what a move between configurations (n,) takes at least [s]."""
+        return float(self._free.time_of(first, last))
+
+    def drop(self, seam: int, reason: str) -> None:
+        """Leave a seam out of all that follows, and what cannot be made without it."""
+        self.missing[self.seams[seam].name] = reason
+        self._drop_what_hangs()
+
+    def _drop_what_hangs(self) -> None:
+        """Leave out what comes after seams that are not made."""
+        while True:
+            lost = {seam.name: self._hangs(seam) for seam in self.seams if self._hangs(seam)}
+            if not lost:
+                break
+            self.missing |= lost
+
+    def _hangs(self, seam: Seam) -> str:
+        if seam.name in self.missing:
+            return ""
+        gone = [name for name in seam.after if name in self.missing]
+        if gone:
+            return f"it comes after '{gone[0]}', which is not made"
+        if seam.after_any and all(name in self.missing for name in seam.after_any):
+            return "none of what it stands on is made"
+        return ""
+
+    def learn(self, first: int | None, last: int | None, seconds: float) -> None:
+        """Take it from now on that a move between states takes so long; inf for none at all."""
+        self._known[first, last] = seconds
+
+    @property
+    def made(self) -> list[int]:
+        """The seams that are not missing."""
+        return [k for k, seam in enumerate(self.seams) if seam.name not in self.missing]
+
+    def keeps(self, order: Sequence[int]) -> bool:
+        """Whether an order of seams makes none before what it has to come after."""
+        made: set[str] = set()
+        for number in order:
+            seam = self.seams[number]
+            after = [name for name in seam.after if name not in self.missing]
+            any_of = [name for name in seam.after_any if name not in self.missing]
+            if not made.issuperset(after) or (any_of and made.isdisjoint(any_of)):
+                return False
+            made.add(seam.name)
+        return True
+
+    def best(self) -> Round:
+        """Return the best round of states by what is known; its states are numbers of `states`.
+
+        Raises
+        ------
+        ProblemError
+            What has to come first goes round in a circle.
+        """
+        made = self.made
+        place = {seam: k for k, seam in enumerate(made)}
+        kept = [k for k, state in enumerate(self.states) if state.seam in place]
+        if not made:
+            return Round((), 0.0, 0.0)
+        stops = self._stops(kept, made, place)
+        given = None if self._is_free else list(range(len(made)))
+        if given is not None and not stops.keeps(given):
+            raise ProblemError(
+                "the seams are in an order in which one comes before what it has to come after; "
+                "give order='free', or another list"
+            )
+        found = best_round(stops, given)
+        if not found.states and np.isfinite(stops.between).all():
+            raise ProblemError("what seams have to come after goes round in a circle")
+        return Round(tuple(kept[k] for k in found.states), found.cost, found.bound)
+
+    def _stops(self, kept: list[int], made: list[int], place: dict[int, int]) -> Stops:
+        first, last, between = self.estimates
+        first, last, between = first[kept].copy(), last[kept].copy(), between[np.ix_(kept, kept)]
+        row = {state: k for k, state in enumerate(kept)}
+        for (one, other), seconds in self._known.items():
+            if one is None and other in row:
+                first[row[other]] = seconds
+            elif other is None and one in row:
+                last[row[one]] = seconds
+            elif one in row and other in row:
+                between[row[one], row[other]] = seconds
+        names = {self.seams[k].name: place[k] for k in made}
+        return Stops(
+            np.array([place[self.states[k].seam] for k in kept]),
+            np.array([self.own(k) for k in kept]),
+            between,
+            first,
+            last,
+            [frozenset(names[n] for n in self.seams[k].after if n in names) for k in made],
+            [frozenset(names[n] for n in self.seams[k].after_any if n in names) for k in made],
+        )
+
+    @cached_property
+    def estimates(self) -> tuple[Array, Array, Array]:
+        """What moves take at least: to states (m,), from them (m,), and between them (m, m) [s]."""
+        begins = np.array([state.ends[0] for state in self.states])
+        ends = np.array([state.ends[1] for state in self.states])
+        start, end = self._ends
+        none = np.zeros(len(self.states))
+        first = none if start is None else self._free.time_of(start, begins)
+        last = none if end is None else self._free.time_of(ends, end)
+        between = np.array([self._free.time_of(q, begins) for q in ends])
+        return first, last, between
+
+    def _add_alike(self) -> None:
+        """Add a motion of each seam that begins as near as may be to where the program does.
+
+        What is near to the same configuration is near to each other.
+        """
+        here = self.states[0].ends[0] if self._ends[0] is None else self._ends[0]
+        made = self.made
+        plans = self._work.nearby([(self.seams[k], self.problems[k], here) for k in made])
+        for seam, found in zip(made, plans, strict=True):
+            known = [state for state in self.states if state.seam == seam]
+            for plan in found:
+                starts = [self.seconds(plan.trajectory.q[0], state.ends[0]) for state in known]
+                if min(starts) > _WORTH:
+                    self._add(State(seam, plan))
+                    if self.seams[seam].either_way:
+                        self._add(State(seam, plan, turned=True, mirrored=True))
+
+    def _add_nearby(self) -> None:
+        """Add motions that begin near where the one before ends, along the best round."""
+        tried: set[tuple[int | None, int]] = set()
+        few = len(self.made) <= EXACT
+        for _ in range(_NEARBY_ROUNDS if few else _NEARBY_ROUNDS_OF_MANY):
+            states = self.best().states
+            wanted = []
+            for number, state in enumerate(states):
+                here = self.states[state]
+                before = self._ends[0] if number == 0 else self.states[states[number - 1]].ends[1]
+                pair = (states[number - 1] if number else None, state)
+                if before is None or pair in tried or self.seconds(before, here.ends[0]) <= _SHORT:
+                    continue
+                tried.add(pair)
+                seam = self.seams[here.seam]
+                problem = self._work.asked.problem(seam, turned=here.turned)
+                wanted.append((here, seam, problem, before))
+            if not wanted:
+                break
+            plans = self._work.nearby([item[1:] for item in wanted])
+            added = 0
+            for (here, _, _, before), found in zip(wanted, plans, strict=True):
+                for plan in found:
+                    nearer = State(here.seam, plan, here.turned)
+                    times = [self.seconds(before, one.ends[0]) for one in (nearer, here)]
+                    if times[0] < times[1] - _WORTH:
+                        self._add(nearer)
+                        if self.seams[here.seam].either_way:
+                            self._add(State(here.seam, plan, not here.turned, mirrored=True))
+                        added += 1
+            if not added:
+                break

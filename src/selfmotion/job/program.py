@@ -1,0 +1,259 @@
+"""A whole job as one motion: seams, moves between them, and what is known of all of it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import accumulate, pairwise
+from pathlib import Path as FilePath
+from typing import IO
+
+import numpy as np
+
+from selfmotion.basics import PlanError, as_path, write_atomically
+from selfmotion.collision import Obstacle
+from selfmotion.motion import Trajectory, joined_motions
+from selfmotion.result import Move, Plan
+from selfmotion.robot import RobotModel
+
+# From one step to the next configurations may differ by rounding [rad or m], velocities and
+# accelerations by what rest may be off.
+_JOINT, _REST, _PUSH = 1e-9, 1e-6, 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One seam of a program, a move, or a wait.
+
+    Attributes
+    ----------
+    name : str
+        That of the seam; of a move ``"A → B"``.
+    made : Plan or Move
+    turned : bool
+        Whether the seam is made from its end to its start.
+    events : tuple of (str, float)
+        What happens how long after its begin [s].
+    leaves : tuple of Obstacle
+        What stands there from its end on.
+    may_meet : tuple of str
+        Names of what stands there that it may meet.
+    """
+
+    name: str
+    made: Plan | Move
+    turned: bool = False
+    events: tuple[tuple[str, float], ...] = ()
+    leaves: tuple[Obstacle, ...] = ()
+    may_meet: tuple[str, ...] = ()
+
+    @property
+    def is_seam(self) -> bool:
+        """Whether it is a seam."""
+        return isinstance(self.made, Plan)
+
+    @property
+    def is_missing(self) -> bool:
+        """Whether it is a move that was not found."""
+        return isinstance(self.made, Move) and self.made.trajectory is None
+
+    @property
+    def motion(self) -> Trajectory:
+        """Its motion; PlanError for a move that was not found."""
+        return self.made.motion if isinstance(self.made, Move) else self.made.trajectory
+
+    @property
+    def trouble(self) -> str:
+        """What is wrong with it, "" for nothing."""
+        if isinstance(self.made, Move):
+            return "" if self.made.verified else f"move '{self.name}': {self.made.trouble}"
+        check = self.made.certificate
+        return "" if check.verified else f"seam '{self.name}': {check.verdict}"
+
+    def meets(self, standing: Mapping[str, str]) -> list[str]:
+        """Return what it is not judged against though it stands there: name → who left it."""
+        known = {item.name for item in self.made.obstacles}
+        return [name for name in standing if name not in known and name not in self.may_meet]
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A job as one motion, certified as a whole.
+
+    Attributes
+    ----------
+    robot : RobotModel
+    steps : tuple of Step
+        Seams, and the moves and waits between them, in order of time.
+    missing : mapping
+        Seams that could not be made, and why.
+    bound : float
+        No order of the motions that are known of the seams takes less for moves [s]: of up to
+        twelve seams by the times of the moves themselves, of more by limits of speed and
+        acceleration.
+    notes : tuple of str
+        What a reader should know: which orders were given up, and why.
+    """
+
+    robot: RobotModel
+    steps: tuple[Step, ...]
+    missing: Mapping[str, str] = field(default_factory=dict)
+    bound: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return a few lines: how many seams in what order, how long, and the verdict."""
+        names = " → ".join(self.order[:_SHOWN]) + (" → …" if len(self.order) > _SHOWN else "")
+        return (
+            f"Program({self.robot.name}, {len(self.order)} seams, {self.duration:.6g} s, "
+            f"{self.transfer_time:.6g} s of it moves)\n  {names}\n  {self.verdict}"
+        )
+
+    @property
+    def order(self) -> tuple[str, ...]:
+        """The names of the seams, as they are made."""
+        return tuple(step.name for step in self.steps if step.is_seam)
+
+    @property
+    def plans(self) -> dict[str, Plan]:
+        """The plans of the seams by name, as they are made."""
+        return {step.name: step.made for step in self.steps if isinstance(step.made, Plan)}
+
+    @property
+    def moves(self) -> tuple[Move, ...]:
+        """The moves and waits, in order."""
+        return tuple(step.made for step in self.steps if isinstance(step.made, Move))
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """All of it as one motion from t = 0 on.
+
+        Raises
+        ------
+        PlanError
+            A move was not found, or there is no seam.
+        """
+        if not self.steps:
+            raise PlanError(f"{self.robot.name}: {self.verdict}")
+        return joined_motions([step.motion for step in self.steps])
+
+    @property
+    def begins(self) -> tuple[float, ...]:
+        """When each step begins in `trajectory` [s]."""
+        durations = [_duration(step) for step in self.steps]
+        return tuple(accumulate(durations[:-1], initial=0.0))[: len(self.steps)]
+
+    @property
+    def duration(self) -> float:
+        """How long all of it takes [s]."""
+        return sum(_duration(step) for step in self.steps)
+
+    @property
+    def transfer_time(self) -> float:
+        """How long moves and waits take [s]."""
+        return sum(_duration(step) for step in self.steps if not step.is_seam)
+
+    @property
+    def events(self) -> tuple[tuple[float, str, str], ...]:
+        """What happens when: time in `trajectory` [s], seam, event."""
+        return tuple(
+            (begin + at, step.name, event)
+            for begin, step in zip(self.begins, self.steps, strict=True)
+            for event, at in step.events
+        )
+
+    @property
+    def verified(self) -> bool:
+        """Whether every seam is made, and everything is kept at all times."""
+        return not self.failures
+
+    @property
+    def verdict(self) -> str:
+        """One line: verified, or what is wrong with which seam or move."""
+        if self.verified:
+            return (
+                f"verified at all times: {len(self.order)} seams, and all moves in between, from "
+                f"rest to rest"
+            )
+        return f"not verified: {'; '.join(self.failures)}"
+
+    @cached_property
+    def failures(self) -> tuple[str, ...]:
+        """What speaks against it; empty for a verified one."""
+        return tuple(
+            [
+                *(f"seam '{name}' is not made: {why}" for name, why in self.missing.items()),
+                *([] if self.steps else ["there is no step"]),
+                *(step.trouble for step in self.steps if step.trouble),
+                *self._gaps(),
+                *self._left_out(),
+            ]
+        )
+
+    def _gaps(self) -> Iterator[str]:
+        """Yield where the arm would jump, or does not rest."""
+        whole = [step for step in self.steps if not step.is_missing]
+        for one, other in pairwise(whole):
+            ends = one.motion, other.motion
+            for order, most in enumerate((_JOINT, _REST, _PUSH)):
+                last = ends[0](ends[0].t[-1], order)
+                first = ends[1](ends[1].t[0], order)
+                still = np.zeros_like(last) if order else last
+                gap = max(float(np.abs(each - still).max()) for each in (last, first))
+                # Written so that NaN is a gap.
+                if not gap <= most:
+                    what = ("configurations differ", "the arm does not rest", "it accelerates")
+                    yield f"from '{one.name}' to '{other.name}' {what[order]}: {gap:.2e}"
+
+    def _left_out(self) -> Iterator[str]:
+        """Yield what stands there and was not looked at."""
+        standing: dict[str, str] = {}
+        for step in self.steps:
+            met = step.meets(standing)
+            if met:
+                yield f"'{step.name}' is not judged against '{met[0]}', which stands there by then"
+            standing |= {item.name: step.name for item in step.leaves}
+
+    def require(self) -> "Program":
+        """Return the program itself if all of it is verified.
+
+        Raises
+        ------
+        PlanError
+            It is not; the message is the verdict.
+        """
+        if not self.verified:
+            raise PlanError(f"{self.robot.name}: {self.verdict}")
+        return self
+
+    def write_timetable(self, file: str | FilePath) -> None:
+        """Write when each step begins and ends, and each event is, as CSV; atomically."""
+        rows = [
+            (begin, begin + _duration(step), "seam" if step.is_seam else "move", step.name)
+            for begin, step in zip(self.begins, self.steps, strict=True)
+        ]
+        rows += [(at, at, "event", f"{seam}: {event}") for at, seam, event in self.events]
+        lines = ["begin,end,kind,name"]
+        lines += [
+            f'{begin!r},{end!r},{kind},"{name.replace(chr(34), chr(34) * 2)}"'
+            for begin, end, kind, name in sorted(rows)
+        ]
+        text = "\n".join(lines) + "\n"
+
+        def write(stream: IO[bytes]) -> None:
+            stream.write(text.encode())
+
+        write_atomically(as_path(file), write)
+
+    def save(self, file: str | FilePath) -> None:
+        """Write the program, without loss, to a file that `load_program` reads; atomically."""
+        from selfmotion.job.files import write_program
+
+        write_program(self, as_path(file))
+
+
+# Names in a printed program.
+_SHOWN = 12
+
+
+def _duration(step: Step) -> float:
+    return 0.0 if step.is_missing else step.motion.duration

@@ -1,0 +1,167 @@
+"""From seams to a program."""
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    PlanError,
+    ProblemError,
+    Progress,
+    as_choice,
+    as_number,
+    as_path,
+    as_several,
+    as_whole,
+    shown,
+    silent,
+)
+from selfmotion.constraints import Clearance, Constraint
+from selfmotion.job.building import Builder
+from selfmotion.job.files import Shelf
+from selfmotion.job.ordering import Ordering
+from selfmotion.job.program import Program
+from selfmotion.job.seam import Seam
+from selfmotion.job.work import Asked, Work, check_can_be_sent
+from selfmotion.problem import KEPT, NO_OVERLAP
+from selfmotion.robot import RobotModel
+
+
+def plan_job(
+    robot: RobotModel,
+    seams: Sequence[Seam],
+    *,
+    start: npt.ArrayLike | None = None,
+    end: npt.ArrayLike | None = None,
+    order: str = "free",
+    constraints: Sequence[Constraint] = KEPT,
+    clearance: Clearance | None = NO_OVERLAP,
+    branches: int = 4,
+    seconds_per_cost: float = 0.0,
+    deadline: float = 10.0,
+    folder: str | Path | None = None,
+    executor: Executor | None = None,
+    rng: int = 0,
+    progress: Progress = silent,
+) -> Program:
+    """Plan a job: every seam once, in the best order and directions, with moves in between.
+
+    For each seam several motions are planned that begin in different configurations, and each may
+    be made either way. From the end of each to the start of each other the least time that the
+    limits allow is known. The order, the directions and the motions that take the least are found
+    exactly for up to twelve seams, and beyond that by insertion and exchange, with a bound told.
+    Then the moves are planned. Where one takes longer than it should, or is not found, the order is
+    looked for again: up to twelve seams the one that results is the best of all orders of the
+    motions that are known, by the times of the moves themselves. Where a seam leaves something
+    behind, what comes later is planned past it, one after the other.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    seams : sequence of Seam
+    start, end : (n,), optional
+        Configurations in which the program begins and ends [rad or m]; by default where the first
+        seam begins, and the last one ends.
+    order : {"free", "given"}
+        Whether the order is looked for, within what seams say comes after others, or is that of the
+        list. In either case `Seam.either_way` says whether directions are free.
+    constraints : sequence of Constraint
+        What all seams and moves must keep; see `Problem`.
+    clearance : Clearance, optional
+        What keeps the arm apart from obstacles and itself; see `Problem.collision`.
+    branches : int
+        Motions in different configurations that are planned for each seam.
+    seconds_per_cost : float
+        What a unit of a seam's cost counts, beside the time of moves [s]; by default only time
+        counts.
+    deadline : float
+        After so many seconds a move counts as not found.
+    folder : path, optional
+        Keeps every plan and move there as soon as it is finished; a job that is begun again takes
+        what it finds, and ends in the same program.
+    executor : Executor, optional
+        Plans seams and moves at the same time; any of `concurrent.futures`, or a Dask client's. The
+        program is the same.
+    rng : int
+        Seed of all random numbers.
+    progress : callable, optional
+        Told the stage, as in `plan`: ``("seam", 3, 12)``, ``("move", 1, 11)``.
+
+    Returns
+    -------
+    Program
+        Also where seams could not be made, or moves not be found: `Program.verdict` names them and
+        says why, and `Program.require` raises.
+
+    Raises
+    ------
+    PlanError
+        No seam has a motion.
+    ProblemError
+        An argument is not what it should be, or what has to come first goes round in a circle.
+    KeyboardInterrupt
+        It was interrupted; what is finished by then is in the folder, where there is one.
+    """
+    if not isinstance(robot, RobotModel):
+        raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
+    listed = as_several(seams, "seams", Seam)
+    _check_names(listed)
+    asked = Asked(
+        robot,
+        _checked_constraints(constraints),
+        _checked_clearance(clearance),
+        as_whole(branches, "branches", 1, 1000),
+        as_number(deadline, "deadline", above=0.0),
+        as_whole(rng, "rng", 0, 2**63),
+    )
+    is_free = as_choice(order, "order", ("free", "given")) == "free"
+    if folder is not None or executor is not None:
+        for seam in listed:
+            check_can_be_sent(seam.costs or ())
+    ends = tuple(None if q is None else robot.configuration(q) for q in (start, end))
+    price = as_number(seconds_per_cost, "seconds_per_cost", least=0.0)
+    shelf = Shelf(None if folder is None else as_path(folder), {})
+    work = Work(asked, shelf, executor, progress)
+    ordering = Ordering(listed, work, ends, price, is_free)
+    if not ordering.states:
+        reasons = "; ".join(f"'{name}': {why}" for name, why in ordering.missing.items())
+        raise PlanError(f"{robot.name}: no seam has a motion: {reasons}")
+    return Builder(ordering, work, ends).program()
+
+
+def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+    listed = as_several(constraints, "constraints", Constraint)
+    for item in listed:
+        if isinstance(item, Clearance):
+            raise ProblemError(
+                "a Clearance is among the constraints of the job; give it as clearance=, so that "
+                "what seams leave behind is kept clear of as well"
+            )
+    return listed
+
+
+def _checked_clearance(clearance: object) -> Clearance | None:
+    if clearance is not None and not isinstance(clearance, Clearance):
+        raise ProblemError(f"clearance is {shown(clearance)}, expected a Clearance, or None")
+    return clearance
+
+
+def _check_names(seams: Sequence[Seam]) -> None:
+    if not seams:
+        raise ProblemError("there are no seams, expected one or more")
+    names = [seam.name for seam in seams]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ProblemError(f"seam '{twice[0]}' is there twice; give each its own name")
+    left = [item.name for seam in seams for item in seam.leaves]
+    again = sorted({name for name in left if left.count(name) > 1})
+    if again:
+        raise ProblemError(f"'{again[0]}' is left by two seams; give each body its own name")
+    for seam in seams:
+        for name in (*seam.after, *seam.after_any):
+            if name not in names or name == seam.name:
+                raise ProblemError(
+                    f"seam '{seam.name}' comes after '{name}', which is no other seam of the job"
+                )

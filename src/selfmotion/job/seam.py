@@ -1,0 +1,141 @@
+"""One of the seams of a job."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from selfmotion.basics import ProblemError, as_flag, as_number, as_several, shown
+from selfmotion.collision import Obstacle
+from selfmotion.constraints import Constraint
+from selfmotion.costs import Cost
+from selfmotion.motion import reversed_motion
+from selfmotion.path import Path, Reversed
+from selfmotion.problem import Problem
+from selfmotion.result import Plan
+from selfmotion.task import Relaxation, Task
+
+
+@dataclass(frozen=True, eq=False)
+class Seam:
+    """A stroke, a weld, an edge: a tool motion that a job has to make once.
+
+    Parameters
+    ----------
+    name : str
+        What to call it; each seam of a job has its own name.
+    path : Path
+        The tool's motion, with its leads where it has some (`with_leads`). It begins and ends at
+        rest.
+    task : Task or str
+        The rows of it that are prescribed.
+    relaxations : sequence of Relaxation
+        Rows in which the tool may leave the path.
+    costs : sequence of Cost, optional
+        What is minimised along it; by default that of a `Problem`.
+    constraints : sequence of Constraint
+        What it has to keep besides what the job asks for.
+    either_way : bool
+        Whether it may be made from its end to its start.
+    after : sequence of str
+        Names of the seams that have to be made before it.
+    after_any : sequence of str
+        Names of seams of which one has to be made before it: what it stands on.
+    wait : float
+        How long the arm rests after it [s].
+    events : sequence of (str, float)
+        What happens how long after its start [s], whichever way it is made: ``("arc on", 0.1)``.
+    leaves : sequence of Obstacle
+        What stands there when it is made, for all that comes later.
+    may_meet : sequence of str
+        Names of what others leave that it may meet, and the moves that lead to and from it.
+
+    Raises
+    ------
+    ProblemError
+        An argument is not what it should be.
+    """
+
+    name: str
+    path: Path
+    task: Task | str = Task.POSE
+    relaxations: Sequence[Relaxation] = ()
+    costs: Sequence[Cost] | None = None
+    constraints: Sequence[Constraint] = ()
+    either_way: bool = True
+    after: Sequence[str] = ()
+    after_any: Sequence[str] = ()
+    wait: float = 0.0
+    events: Sequence[tuple[str, float]] = ()
+    leaves: Sequence[Obstacle] = ()
+    may_meet: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name.strip():
+            raise ProblemError(f"seam: name is {shown(self.name)}, expected a text")
+        what = f"seam '{self.name}'"
+        if not isinstance(self.path, Path):
+            raise ProblemError(f"{what}: path is {shown(self.path)}, expected a Path (Line, …)")
+        object.__setattr__(self, "task", Task.of(self.task))
+        kinds = {"relaxations": Relaxation, "constraints": Constraint, "leaves": Obstacle}
+        if self.costs is not None:
+            kinds["costs"] = Cost
+        for name, kind in kinds.items():
+            object.__setattr__(self, name, as_several(getattr(self, name), name, kind))
+        object.__setattr__(self, "either_way", as_flag(self.either_way, f"{what}: either_way"))
+        for name in ("after", "after_any", "may_meet"):
+            object.__setattr__(self, name, _names(getattr(self, name), f"{what}: {name}"))
+        wait = as_number(self.wait, f"{what}: wait", least=0.0)
+        object.__setattr__(self, "wait", wait)
+        object.__setattr__(self, "events", self._checked_events(what))
+        if self.either_way and any(one_way(item) for item in self.constraints):
+            raise ProblemError(
+                f"{what}: a constraint is on one end of it, so that it can be made one way only; "
+                f"give either_way=False"
+            )
+
+    def __repr__(self) -> str:
+        return f"Seam('{self.name}', {self.path!r}, task '{Task.of(self.task).value}')"
+
+    def _checked_events(self, what: str) -> tuple[tuple[str, float], ...]:
+        found = []
+        for event in self.events:
+            if not (isinstance(event, list | tuple) and len(event) == 2):
+                raise ProblemError(f"{what}: event {shown(event)}, expected a text and a time [s]")
+            name, seconds = event
+            if not isinstance(name, str):
+                raise ProblemError(f"{what}: event {shown(name)}, expected a text and a time [s]")
+            at = as_number(seconds, f"{what}: event '{name}'", least=0.0, most=self.path.duration)
+            found.append((name, at))
+        return tuple(found)
+
+
+def one_way(constraint: Constraint) -> bool:
+    """Whether a constraint asks something of one end of a motion."""
+    return constraint.on_part() is not constraint or constraint.on_last_part() is not constraint
+
+
+def backwards(problem: Problem) -> Problem:
+    """Return the problem of a path the other way round."""
+    duration = problem.path.duration
+    turned = [
+        item
+        if item.during is None
+        else replace(item, during=(duration - item.during[1], duration - item.during[0]))
+        for item in problem.relaxations
+    ]
+    path = Reversed(problem.path)
+    return replace(problem, path=path, start=None, relaxations=turned)
+
+
+def backwards_plan(plan: Plan) -> Plan:
+    """Return a plan the other way round, judged anew."""
+    problem = backwards(plan.problem)
+    motion = reversed_motion(plan.trajectory)
+    still = reversed_motion(plan.initial_trajectory)
+    turned = replace(plan, problem=problem, trajectory=motion, initial_trajectory=still)
+    return replace(turned, certificate=turned.check())
+
+
+def _names(given: object, what: str) -> tuple[str, ...]:
+    if not isinstance(given, list | tuple) or not all(isinstance(name, str) for name in given):
+        raise ProblemError(f"{what} is {shown(given)}, expected a list of names")
+    return tuple(given)

@@ -1,0 +1,300 @@
+"""What a job plans: branches of seams and moves, here or in other processes, kept when finished.
+
+Each piece of work depends on what it is asked alone, its random numbers too: so the same comes of
+it wherever it is done, and whenever.
+"""
+
+import tempfile
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError, Progress, one_blas_thread
+from selfmotion.constraints import Clearance, Constraint
+from selfmotion.costs import FunctionCost
+from selfmotion.job.files import Shelf
+from selfmotion.job.seam import Seam, backwards
+from selfmotion.planning import FreeMotions, branches, from_start, near_start
+from selfmotion.problem import (
+    Problem,
+    arm_and_constraints,
+    describe_arm,
+    problem_from_dict,
+    problem_to_dict,
+)
+from selfmotion.result import Move, Plan, load_move, load_plan
+from selfmotion.robot import RobotModel
+
+# Clearances that are remembered: of a seam, and of the moves around it.
+_REMEMBERED = 8
+
+
+# What is asked of a piece of work, by name.
+_Task = Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What a job asks of all seams and moves.
+
+    Attributes
+    ----------
+    robot : RobotModel
+    constraints : tuple of Constraint
+    clearance : Clearance or None
+    branches : int
+        Motions in different branches for each seam.
+    deadline : float
+        For each move [s].
+    seed : int
+    """
+
+    robot: RobotModel
+    constraints: tuple[Constraint, ...]
+    clearance: Clearance | None
+    branches: int
+    deadline: float
+    seed: int
+    _apart: dict[tuple[str, ...], Clearance] = field(default_factory=dict, repr=False)
+
+    def apart(self, standing: Sequence[Any]) -> Clearance | None:
+        """Return the clearance with what stands there by then as well."""
+        if not standing:
+            return self.clearance
+        key = tuple(item.name for item in standing)
+        if key not in self._apart:
+            # Made once for a seam and the move to it: bodies take a while.
+            if len(self._apart) >= _REMEMBERED:
+                self._apart.clear()
+            known = self.clearance or Clearance(distance=0.0)
+            obstacles = (*known.obstacles, *standing)
+            self._apart[key] = replace(known, obstacles=obstacles, srdf=None)
+        return self._apart[key]
+
+    def problem(self, seam: Seam, standing: Sequence[Any] = (), turned: bool = False) -> Problem:
+        """Return the problem of a seam, with what stands there by then."""
+        given = Problem(
+            self.robot,
+            seam.path,
+            seam.task,
+            constraints=(*self.constraints, *seam.constraints),
+            relaxations=tuple(seam.relaxations),
+            collision=self.apart(standing),
+        )
+        if seam.costs is not None:
+            given = replace(given, costs=tuple(seam.costs))
+        return backwards(given) if turned else given
+
+    def of_moves(self, standing: Sequence[Any]) -> tuple[Constraint, ...]:
+        """Return what moves have to keep, with what stands there by then."""
+        apart = self.apart(standing)
+        has_bodies = self.robot.urdf.has_collisions or bool(apart and apart.obstacles)
+        return self.constraints if apart is None or not has_bodies else (*self.constraints, apart)
+
+
+class Work:
+    """Does the work of a job.
+
+    Parameters
+    ----------
+    asked : Asked
+    shelf : Shelf
+    executor : Executor or None
+        None does all here.
+    progress : Progress
+    """
+
+    def __init__(
+        self, asked: Asked, shelf: Shelf, executor: Executor | None, progress: Progress
+    ) -> None:
+        self.asked, self._shelf, self._executor = asked, shelf, executor
+        self.tell = progress
+
+    def branches(
+        self, wanted: Sequence[tuple[Seam, Problem]], allowed: Problem | None = None
+    ) -> list[tuple[list[Plan], str]]:
+        """Return verified plans of problems in different branches, and why there are none.
+
+        Their starts keep clear of all that is asked by what is `allowed`, where something is.
+        """
+        tasks: list[_Task] = [
+            {
+                "problem": problem,
+                "name": seam.name,
+                "count": self.asked.branches,
+                "seed": [self.asked.seed, _number(seam.name.encode())],
+                **({} if allowed is None else {"allowed": allowed}),
+            }
+            for seam, problem in wanted
+        ]
+        return self._plans(tasks, "seam" if allowed is None else "other ways")
+
+    def nearby(self, wanted: Sequence[tuple[Seam, Problem, Array]]) -> list[list[Plan]]:
+        """Return the plans that begin as near as may be to configurations (n,), none or one."""
+        tasks: list[_Task] = [
+            {"problem": problem, "name": seam.name, "near": q.tolist()}
+            for seam, problem, q in wanted
+        ]
+        return [found for found, _ in self._plans(tasks, "nearby")]
+
+    def moves(self, wanted: Sequence[tuple[Array, Array, Sequence[Any]]]) -> list[Move]:
+        """Return moves from configurations (n,) to others, with what stands there each time."""
+        tasks: list[_Task] = []
+        for first, last, standing in wanted:
+            ends = np.stack([first, last])
+            tasks.append(
+                {
+                    "arm": (self.asked.robot, self.asked.of_moves(standing)),
+                    "ends": ends,
+                    "seconds": self.asked.deadline,
+                    "seed": [self.asked.seed, _number(ends.tobytes())],
+                }
+            )
+        keeps = self._shelf.file("", "") is not None
+        files = [self._shelf.file("move", _move_asked(task)) if keeps else None for task in tasks]
+        found: list[Move] = []
+        kept = [
+            self._shelf.move(file, _missing(task, ""))
+            for file, task in zip(files, tasks, strict=True)
+        ]
+        todo = [task for task, known in zip(tasks, kept, strict=True) if known is None]
+        fresh = self._done(todo, "move")
+        for number, (file, known) in enumerate(zip(files, kept, strict=True), 1):
+            self.tell("move", number, len(tasks))
+            move = known or next(fresh)
+            if known is None:
+                self._shelf.keep_move(file, move)
+            found.append(move)
+        return found
+
+    def _plans(self, tasks: Sequence[_Task], stage: str) -> list[tuple[list[Plan], str]]:
+        keeps = self._shelf.file("", "") is not None
+        files = [
+            self._shelf.file(f"{stage} {task['name']}", _plans_asked(task)) if keeps else None
+            for task in tasks
+        ]
+        kept = [self._shelf.plans(file) for file in files]
+        todo = [task for task, known in zip(tasks, kept, strict=True) if known is None]
+        fresh = self._done(todo, "plans")
+        found: list[tuple[list[Plan], str]] = []
+        for number, (file, known) in enumerate(zip(files, kept, strict=True), 1):
+            self.tell(stage, number, len(tasks))
+            made = known or next(fresh)
+            if known is None:
+                self._shelf.keep_plans(file, *made)
+            found.append(made)
+        return found
+
+    def _done(self, tasks: Sequence[_Task], kind: str) -> Iterator[Any]:
+        """Yield what comes of tasks, in their order; all of it is begun at once elsewhere."""
+        if self._executor is None:
+            for task in tasks:
+                yield _move_here(task) if kind == "move" else _plans_here(task)
+            return
+        known: dict[str, Any] = {}
+        if kind == "move":
+            sent = [self._executor.submit(_move_there, _move_asked(task)) for task in tasks]
+            for future, task in zip(sent, tasks, strict=True):
+                data, trouble = future.result()
+                missing = _missing(task, trouble)
+                yield _unpacked(data, load_move, known) if data else missing
+            return
+        several = [self._executor.submit(_plans_there, _plans_asked(task)) for task in tasks]
+        for each in several:
+            packed, reason = each.result()
+            yield [_unpacked(data, load_plan, known) for data in packed], reason
+
+
+def check_can_be_sent(costs: Sequence[Any]) -> None:
+    """Raise ProblemError where a cost is a function: no file and no other process knows it."""
+    for cost in costs:
+        if isinstance(cost, FunctionCost):
+            raise ProblemError(
+                f"cost '{cost.name}' is a function, which can neither be kept in a folder nor sent "
+                f"to another process; derive a class from selfmotion.Cost"
+            )
+
+
+def _number(data: bytes) -> int:
+    return zlib.crc32(data)
+
+
+def _plans_here(task: _Task) -> tuple[list[Plan], str]:
+    problem = task["problem"]
+    with one_blas_thread():
+        if "near" not in task:
+            generator = np.random.default_rng(task["seed"])
+            return branches(problem, task["count"], generator, task.get("allowed"))
+        start = near_start(problem, np.array(task["near"]))
+        if start is None:
+            return [], "no configuration near"
+        made, why = from_start(problem, start)
+        return ([], why) if made is None else ([made], "")
+
+
+def _move_here(task: _Task) -> Move:
+    robot, constraints = task["arm"]
+    first, last = task["ends"]
+    generator = np.random.default_rng(task["seed"])
+    with one_blas_thread():
+        free = FreeMotions(robot, constraints, generator)
+        return free.between(first, last, task["seconds"])
+
+
+def _missing(task: _Task, trouble: str) -> Move:
+    robot, constraints = task["arm"]
+    return Move(robot, constraints, None, (), trouble)
+
+
+def _plans_asked(task: _Task) -> dict[str, Any]:
+    problems = [name for name in ("problem", "allowed") if name in task]
+    return {**task, **{name: problem_to_dict(task[name]) for name in problems}}
+
+
+def _move_asked(task: _Task) -> dict[str, Any]:
+    return {**task, "arm": describe_arm(*task["arm"]), "ends": task["ends"].tolist()}
+
+
+# Arms and bodies of tasks done before in this process; forgotten when there are many.
+_known: dict[str, Any] = {}
+_MANY = 64
+
+
+def _plans_there(task: _Task) -> tuple[list[bytes], str]:
+    """Do a task in another process: plans as the bytes of their files."""
+    _forget()
+    problems = [name for name in ("problem", "allowed") if name in task]
+    made = {name: problem_from_dict(task[name], _known) for name in problems}
+    found, reason = _plans_here({**task, **made})
+    return [_packed(plan) for plan in found], reason
+
+
+def _move_there(task: _Task) -> tuple[bytes, str]:
+    _forget()
+    arm, ends = arm_and_constraints(task["arm"], _known), np.array(task["ends"])
+    move = _move_here({**task, "arm": arm, "ends": ends})
+    return (b"" if move.trajectory is None else _packed(move)), move.trouble
+
+
+def _forget() -> None:
+    if len(_known) > _MANY:
+        _known.clear()
+
+
+def _packed(made: Plan | Move) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "made.npz")
+        made.save(file)
+        return file.read_bytes()
+
+
+def _unpacked(data: bytes, load: Any, known: dict[str, Any]) -> Any:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "made.npz")
+        file.write_bytes(data)
+        return load(file, known=known)

@@ -1,0 +1,154 @@
+"""Several motions along one path that begin in different configurations."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from selfmotion.basics import Array, Progress, SelfmotionError, silent
+from selfmotion.optimise import Status
+from selfmotion.planning.run import plan
+from selfmotion.planning.search import Search
+from selfmotion.planning.settings import (
+    BRANCH_EVALUATIONS,
+    BRANCH_STARTS,
+    BRANCH_TRIES,
+    MOVE_MARGIN,
+    SAME_ENDS,
+)
+from selfmotion.planning.ways import Room
+from selfmotion.problem import Problem
+from selfmotion.result import Plan
+from selfmotion.search import start_candidates
+
+
+def branches(
+    problem: Problem,
+    count: int,
+    rng: np.random.Generator,
+    allowed: Problem | None = None,
+    progress: Progress = silent,
+) -> tuple[list[Plan], str]:
+    """Return up to `count` verified plans of a problem that begin far from each other.
+
+    Each begins at a configuration that puts the tool on the start of the path and is allowed there,
+    the next one as far as any from those before. Where none of these leads to a verified plan, all
+    that `plan` does is done.
+
+    Parameters
+    ----------
+    problem : Problem
+    count : int
+    rng : Generator
+    allowed : Problem, optional
+        The same with more that stands there, which the starts keep clear of; the plans need not.
+        With it nothing more is tried.
+    progress : callable, optional
+
+    Returns
+    -------
+    plans : list of Plan
+        Different ones at both ends; empty where there are none.
+    reason : str
+        Why not, where there are none.
+    """
+    found: list[Plan] = []
+    reason, failed = "", 0
+    for number, start in enumerate(_spread(allowed or problem, rng), 1):
+        if len(found) == count or failed == BRANCH_TRIES or number > BRANCH_TRIES * count:
+            break
+        progress("branch", number, BRANCH_TRIES * count)
+        made, why = from_start(problem, start)
+        failed += made is None
+        reason = reason or why
+        if made is not None and all(_apart(made, other) > SAME_ENDS for other in found):
+            found.append(made)
+    if found or allowed is not None:
+        return found, "" if found else reason or _nowhere(allowed or problem)
+    try:
+        made = _whole(plan(problem, search=Search(rng=rng), progress=progress))
+    except SelfmotionError as error:
+        return [], str(error)
+    if made.certificate.verified:
+        return [made], ""
+    return [], reason or made.certificate.verdict
+
+
+def from_start(problem: Problem, start: Array) -> tuple[Plan | None, str]:
+    """Return the verified plan from a start (n,), or None and why there is none."""
+    try:
+        made = _whole(plan(replace(problem, start=start), max_evaluations=BRANCH_EVALUATIONS))
+    except SelfmotionError as error:
+        return None, str(error)
+    if made.certificate.verified:
+        return made, ""
+    return None, made.certificate.verdict
+
+
+def _whole(made: Plan) -> Plan:
+    """Return a plan unless it was interrupted: then KeyboardInterrupt goes on."""
+    if made.report.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    return made
+
+
+def near_start(problem: Problem, q: Array) -> Array | None:
+    """Return the start of a problem's path (n,) that Newton's method finds from a configuration.
+
+    None where it finds none that is allowed.
+    """
+    robot = problem.envelope.arm(problem.robot)
+    try:
+        start = robot.inverse_kinematics(problem.path.pose(0.0), problem.task, seed=q, attempts=1)
+    except SelfmotionError:
+        return None
+    return start if _room(problem).free(start[None])[0] else None
+
+
+def _room(problem: Problem) -> Room:
+    return Room(problem.envelope, problem.robot, MOVE_MARGIN)
+
+
+def _spread(problem: Problem, rng: np.random.Generator) -> list[Array]:
+    """Return allowed starts, each as far as any from those before, the first in the middle."""
+    robot = problem.envelope.arm(problem.robot)
+    follows = problem.follows.for_robot(robot)
+    room = _room(problem)
+    try:
+        starts = np.array(start_candidates(follows, BRANCH_STARTS, rng, room.free))
+    except SelfmotionError:
+        return []
+    starts = starts[room.free(starts)]
+    if not len(starts):
+        return []
+    apart = np.abs(starts[:, None] - starts) @ robot.joint_weights
+    lower, upper = robot.finite_limits()
+    order = [int(np.argmin(np.abs(starts - 0.5 * (lower + upper)) @ robot.joint_weights))]
+    while len(order) < len(starts):
+        nearest = apart[order].min(axis=0)
+        nearest[order] = -1.0
+        order.append(int(np.argmax(nearest)))
+    return [starts[k] for k in order]
+
+
+def _apart(one: Plan, other: Plan) -> float:
+    """Return how far the ends of two plans are apart, of that end where they are farther apart."""
+    ends = one.trajectory.q[[0, -1]] - other.trajectory.q[[0, -1]]
+    return float(np.abs(ends).max(axis=1).max())
+
+
+def _nowhere(problem: Problem) -> str:
+    """Return why a path cannot even be begun."""
+    asked, follows = problem.envelope, problem.follows.for_robot(problem.robot)
+    try:
+        starts = np.array(start_candidates(follows, BRANCH_TRIES, np.random.default_rng(0)))
+    except SelfmotionError as error:
+        return str(error)
+    for model, far in asked.bodies:
+        near = model.worst(starts)
+        if near.value < far:
+            return (
+                f"no configuration was found that puts the tool on its start and meets nothing: of "
+                f"{len(starts)} one has {near.first} and {near.second} {near.value * 1e3:.2f} mm "
+                f"apart (wanted: {far * 1e3:.2f} mm)"
+            )
+    return "no configuration was found that puts the tool on its start and keeps what is asked"

@@ -1,0 +1,363 @@
+"""Joint motions from one configuration to another that nothing but limits and bodies tells."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import (
+    Array,
+    InverseKinematicsError,
+    ProblemError,
+    Progress,
+    as_number,
+    as_several,
+    one_blas_thread,
+    random_numbers,
+    read_only,
+    shown,
+    silent,
+)
+from selfmotion.constraints import Clearance, Constraint, Envelope
+from selfmotion.follow import Follows
+from selfmotion.motion import Trajectory
+from selfmotion.path import Dwell
+from selfmotion.planning.rounding import rounded
+from selfmotion.planning.settings import (
+    BRIEFEST_MOVE,
+    END_CONFIGURATIONS,
+    FINER_LOOKS,
+    MOVE_DEADLINE,
+    MOVE_MARGIN,
+    RETREATS,
+    SHORTEST_PACED,
+    SLOWER_FACTOR,
+    SLOWER_TRIES,
+    TRIES_OF_MOVE,
+    UNHURRIED_SAMPLES,
+    UP_TO_SPEED,
+    USED,
+    USUAL_SPEED,
+    WIDER,
+)
+from selfmotion.planning.ways import Room, find_way, shortened, straight_way
+from selfmotion.problem import KEPT, NO_OVERLAP, envelope_of
+from selfmotion.result import Move, paced
+from selfmotion.robot import RobotModel
+from selfmotion.search import start_candidates
+from selfmotion.task import SE3, Task
+
+# Roundings that a motion may add up to.
+_ROUNDINGS = 16.0
+
+
+def move(
+    robot: RobotModel,
+    first: npt.ArrayLike | SE3,
+    last: npt.ArrayLike | SE3,
+    *,
+    constraints: Sequence[Constraint] = KEPT,
+    clearance: Clearance | None = NO_OVERLAP,
+    via: Sequence[npt.ArrayLike] = (),
+    task: Task | str = "pose",
+    deadline: float = MOVE_DEADLINE,
+    rng: np.random.Generator | int = 0,
+    progress: Progress = silent,
+) -> Move:
+    """Move from one configuration to another, from rest to rest, past what is in the way.
+
+    Straight where that is free; else along the best of a few ways that two trees find
+    (RRT-Connect), shortened, with corners rounded as far as there is room. The pace is as fast as
+    the limits of joint velocity, acceleration and jerk allow. The motion is judged like a plan, at
+    all times.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    first, last : (n,) or SE3
+        Configurations [rad or m], or a pose of the tool (an SE3 or a 4 × 4 matrix, in the frame of
+        `RobotModel.pose`): then any configuration that puts the tool there.
+    constraints : sequence of Constraint
+        What the motion must keep. By default limits of joint position and velocity, and those of
+        acceleration and jerk that the arm's maker publishes.
+    clearance : Clearance, optional
+        What keeps the arm apart from obstacles and from itself: by default its links must not
+        overlap. None to leave that out; the verdict then says so. A `Clearance` among the
+        constraints takes the place of the default.
+    via : sequence of (n,)
+        Configurations that the motion passes exactly, in this order, without stopping where there
+        is room for a curve.
+    task : Task or str
+        The rows of the pose that count where an end is one.
+    deadline : float
+        After so many seconds of looking the move counts as not found.
+    rng : Generator or int
+        Shifts the samples; the same one gives the same move, unless the deadline ends it.
+    progress : callable, optional
+        Told the stage, as in `plan`.
+
+    Returns
+    -------
+    Move
+        Also where none was found: `Move.trouble` says after how many seconds, and `Move.require`
+        raises. That none is found does not prove that there is none.
+
+    Raises
+    ------
+    InverseKinematicsError
+        No configuration puts the tool at a pose.
+    ProblemError
+        An argument is not what it should be.
+    """
+    if not isinstance(robot, RobotModel):
+        raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
+    asked = list(as_several(constraints, "constraints", Constraint))
+    if clearance is not None and not isinstance(clearance, Clearance):
+        raise ProblemError(f"clearance is {shown(clearance)}, expected a Clearance, or None")
+    apart = any(item.envelope(robot).bodies for item in asked)
+    default = clearance is NO_OVERLAP and (apart or not robot.urdf.has_collisions)
+    if clearance is not None and not default:
+        asked.append(clearance)
+    if not isinstance(via, list | tuple | np.ndarray):
+        raise ProblemError(f"via is {shown(via)}, expected a list of configurations")
+    seconds, generator = as_number(deadline, "deadline", above=0.0), random_numbers(rng)
+    motions = FreeMotions(robot, asked, generator, progress)
+    with one_blas_thread():
+        ends = [motions.configurations(end, Task.of(task)) for end in (first, *via, last)]
+        return motions.through(ends, seconds)
+
+
+class FreeMotions:
+    """Finds motions of an arm between configurations.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    constraints : sequence of Constraint
+        What they must keep at all times; what is asked of ends only is left out.
+    rng : Generator
+    progress : Progress
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        constraints: Sequence[Constraint],
+        rng: np.random.Generator,
+        progress: Progress = silent,
+    ) -> None:
+        inner = [part.on_last_part() for item in constraints if (part := item.on_part())]
+        kept = [item for item in inner if item is not None and item.applies(robot)]
+        self.robot, self.constraints = robot, tuple(kept)
+        self._rng, self._progress = rng, progress
+        self.asked: Envelope = envelope_of(robot, self.constraints)
+
+    def configurations(self, end: npt.ArrayLike | SE3, task: Task) -> Array:
+        """Return the configurations (k, n) that an end stands for; see `move`."""
+        is_pose = hasattr(end, "homogeneous") or np.shape(end) == (4, 4)
+        if not is_pose:
+            return self.robot.configuration(end)[None]
+        arm = self.asked.arm(self.robot)
+        follows = Follows.of(arm, Dwell(end, 1.0), task)
+        room = Room(self.asked, self.robot, MOVE_MARGIN)
+        found = np.array(start_candidates(follows, END_CONFIGURATIONS, self._rng, room.free))
+        free = found[room.free(found)]
+        if not len(free):
+            raise InverseKinematicsError(
+                f"{self.robot.name}: all {len(found)} configurations that were found for the pose "
+                f"of an end are beyond limits or meet something; give a configuration or fewer "
+                f"rows (task=)",
+                position_miss=0.0,
+                rotation_miss=0.0,
+            )
+        return free
+
+    def between(self, first: Array, last: Array, seconds: float = MOVE_DEADLINE) -> Move:
+        """Return the move from a configuration (n,) to another one, or why there is none."""
+        return self.through([first[None], last[None]], seconds)
+
+    def time_of(self, first: Array, last: Array) -> Array:
+        """Return what straight moves (K, n) → (K, n) would take by the limits, at least [s]."""
+        limits = self._limits
+        far = np.abs(last - first)
+        # From rest to rest: full acceleration, full speed, full brake.
+        ramp = limits.speed / limits.acceleration
+        short = 2.0 * np.sqrt(far / limits.acceleration)
+        times = np.where(far > limits.speed * ramp, far / limits.speed + ramp, short)
+        return np.asarray(times.max(axis=-1))
+
+    def through(self, ends: Sequence[Array], seconds: float) -> Move:
+        """Return the move through one of several configurations (k, n) each, in this order."""
+        self._progress("move", 1, 1)
+        began = time.perf_counter()
+        blocked = self._blocked(ends)
+        if blocked:
+            return self._missing(blocked)
+        ends = [self._inside(several) for several in ends]
+        worst, margin, finer = "", MOVE_MARGIN, 1.0
+        for _ in range(TRIES_OF_MOVE):
+            room = Room(self.asked, self.robot, margin, finer)
+            way = self._way(room, ends, began + seconds)
+            if way is None:
+                break
+            path = rounded(room, *way)
+            if path is not None:
+                move = self.at_its_pace(path)
+                if move.verified:
+                    return move
+                worst = worst or f", where {move.trouble}"
+            margin, finer = WIDER * margin, FINER_LOOKS * finer
+        waited = time.perf_counter() - began
+        return self._missing(
+            f"no way was found between the configurations in {waited:.1f} s{worst}"
+        )
+
+    def _inside(self, q: Array) -> Array:
+        """Return configurations on a limit as far inside it as rounding may lead beyond."""
+        lower, upper = self.asked.lower, self.asked.upper
+        return np.clip(q, lower + _ulps(lower), upper - _ulps(upper))
+
+    def _missing(self, trouble: str) -> Move:
+        return Move(self.robot, self.constraints, None, (), trouble)
+
+    def _blocked(self, ends: Sequence[Array]) -> str:
+        """Return what is wrong with an end already, "" for nothing."""
+        room = Room(self.asked, self.robot, 0.0)
+        for number, several in enumerate(ends):
+            if room.free(several).any():
+                continue
+            where = "first" if number == 0 else "last" if number == len(ends) - 1 else "via"
+            return f"the {where} configuration is not allowed: {self._wrong_with(several[0])}"
+        return ""
+
+    def _wrong_with(self, q: Array) -> str:
+        """Return what forbids a configuration (n,), in words."""
+        asked, beyond = self.asked, []
+        for joint, name in enumerate(self.robot.joint_names):
+            over = max(asked.lower[joint] - q[joint], q[joint] - asked.upper[joint])
+            if over > 0.0:
+                beyond.append(f"joint '{name}' is {over:.3g} beyond its limit")
+        if beyond:
+            return "; ".join(beyond)
+        for model, far in asked.bodies:
+            near = model.distance(q)
+            if near.value < far:
+                apart = f"{near.value * 1e3:.2f} mm apart (wanted: {far * 1e3:.2f} mm)"
+                return f"{near.first} and {near.second} are {apart}"
+        names = ", ".join(item.name for item in asked.quantities)
+        return f"it leaves what is asked of {names}"
+
+    def _way(self, room: Room, ends: Sequence[Array], end: float) -> tuple[Array, list[int]] | None:
+        """Return a way (m, n) through all ends, and where on it the inner ones are."""
+        legs: list[Array] = []
+        starts = _allowed(room, ends[0])
+        for goals in ends[1:]:
+            leg = self._leg(room, starts, _allowed(room, goals), end)
+            if leg is None:
+                return None
+            legs.append(leg)
+            starts = leg[-1:]
+        passed = np.cumsum([len(leg) - 1 for leg in legs]).tolist()[:-1]
+        return np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])]), passed
+
+    def _leg(self, room: Room, starts: Array, goals: Array, end: float) -> Array | None:
+        """Return a way from one of starts (a, n) to one of goals (b, n), also after a retreat.
+
+        Among what a tool works on the way out is narrow, and along the tool's axis.
+        """
+        direct = straight_way(room, starts, goals)
+        if direct is not None:
+            return direct
+        out = [self._retreats(room, several) for several in (starts, goals)]
+        first, last = (np.concatenate([q, out[k][0]]) for k, q in enumerate((starts, goals)))
+        way = find_way(room, first, last, end, self._rng)
+        if way is None:
+            return None
+        before, after = (
+            [origin for place, origin in zip(*each, strict=True) if np.array_equal(place, tip)]
+            for each, tip in zip(out, (way[0], way[-1]), strict=True)
+        )
+        if not (before or after):
+            return way
+        whole = np.concatenate([*(q[None] for q in before[:1]), way, *(q[None] for q in after[:1])])
+        return shortened(room, whole, self._rng)
+
+    def _retreats(self, room: Room, several: Array) -> tuple[Array, Array]:
+        """Return where the tool is back along its axis, and from where a free leg leads there."""
+        robot, found, origins = self.robot, list[Array](), list[Array]()
+        for q in several:
+            for length in RETREATS:
+                away = robot.pose(q) * SE3(np.eye(3), np.array([0.0, 0.0, -length]))
+                try:
+                    there = robot.inverse_kinematics(away, seed=q, attempts=1)
+                except InverseKinematicsError:
+                    continue
+                if room.is_open(q, there):
+                    found.append(there)
+                    origins.append(q)
+        return np.reshape(found, (-1, robot.dof)), np.reshape(origins, (-1, robot.dof))
+
+    @property
+    def _limits(self) -> Envelope:
+        """The limits of the pace: all of speed and acceleration are finite."""
+        asked = self.asked
+        speed = np.where(np.isfinite(asked.speed), asked.speed, USUAL_SPEED)
+        usual = speed / UP_TO_SPEED
+        faster = np.where(np.isfinite(asked.acceleration), asked.acceleration, usual)
+        return replace(
+            asked,
+            speed=read_only(USED * speed),
+            acceleration=read_only(USED * faster),
+            jerk=read_only(USED * asked.jerk),
+        )
+
+    def at_its_pace(self, path: Trajectory) -> Move:
+        """Return the move along a joint path, as fast as it may be."""
+        # Of the shortest ones a search for the fastest pace sees rounding only.
+        short = path.travelled(path.t[-1:]).max() < SHORTEST_PACED
+        motion = self._unhurried(path) if short else paced(path, self._limits)
+        q, qd = motion.q.copy(), motion.qd.copy()
+        # Exactly where it should begin and end.
+        q[0], q[-1], qd[0], qd[-1] = path.q[0], path.q[-1], 0.0, 0.0
+        faster = motion(motion.t, 2)
+        for slower in SLOWER_FACTOR ** np.arange(SLOWER_TRIES):
+            t, names = slower * motion.t, self.robot.joint_names
+            whole = Trajectory(t, q, qd / slower, names, faster / slower**2)
+            found = Move.judged(self.robot, self.constraints, whole)
+            if not any(not item.kept and item.of_pace for item in found.findings):
+                break
+        return found
+
+    def _unhurried(self, path: Trajectory) -> Trajectory:
+        """Return a joint path over 0 to 1 from rest to rest by one smooth law of time.
+
+        σ = 10τ³ - 15τ⁴ + 6τ⁵, as fast as the limits allow.
+        """
+        tau = np.linspace(0.0, 1.0, UNHURRIED_SAMPLES)
+        sigma = np.clip(tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), 0.0, 1.0)
+        rate = 30.0 * tau**2 * (1.0 - tau) ** 2
+        bend = 60.0 * tau * (1.0 - 3.0 * tau + 2.0 * tau**2)
+        q, qd = path(sigma), path(sigma, 1)
+        qdd = path(sigma, 2) * rate[:, None] ** 2 + qd * bend[:, None]
+        unit = Trajectory(tau, q, qd * rate[:, None], self.robot.joint_names, qdd)
+        limits, times = self._limits, [BRIEFEST_MOVE]
+        for order, limit in ((1, limits.speed), (2, limits.acceleration), (3, limits.jerk)):
+            share = float((np.abs(unit.extremes(order)[1]) / limit).max())
+            times.append(share ** (1.0 / order))
+        longest = max(times)
+        faster = qdd / longest**2
+        return Trajectory(longest * tau, q, unit.qd / longest, unit.joint_names, faster)
+
+
+def _ulps(limit: Array) -> Array:
+    """Return what sums of a few numbers of this size may be off by."""
+    finite = np.where(np.isfinite(limit), limit, 0.0)
+    return np.asarray(_ROUNDINGS * np.spacing(1.0 + np.abs(finite)))
+
+
+def _allowed(room: Room, several: Array) -> Array:
+    """Return those of configurations that are free; all where none is with its margin."""
+    free = several[room.free(several)]
+    return free if len(free) else several

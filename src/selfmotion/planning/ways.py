@@ -1,0 +1,268 @@
+"""Ways of straight legs between configurations: two trees that grow towards each other.
+
+RRT-Connect (J. Kuffner, S. LaValle, "RRT-Connect: an efficient approach to single-query path
+planning", ICRA 2000). The best of a few ways is shortened by straight shortcuts.
+"""
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array, Ints
+from selfmotion.constraints import Envelope
+from selfmotion.planning.settings import (
+    AROUND_MIDDLE,
+    FIRST_LOT,
+    LEG_RANGE,
+    LEG_STEP,
+    MISSED,
+    SHORTCUTS,
+    SPREAD,
+    TURN_STEP,
+    WAYS,
+)
+from selfmotion.robot import RobotModel
+
+# Samples keep this share of the range from a limit.
+_INSIDE = 1e-6
+# Configurations this near are the same [rad or m].
+_SAME = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """The configurations that are allowed, and how far they are apart.
+
+    Attributes
+    ----------
+    asked : Envelope
+        Limits, bodies and quantities.
+    robot : RobotModel
+    margin : float
+        How much farther apart bodies are kept, since they are looked at at some times only [m].
+    finer : float
+        How many times more often legs are looked at.
+    """
+
+    asked: Envelope
+    robot: RobotModel
+    margin: float
+    finer: float = 1.0
+
+    def free(self, q: Array) -> npt.NDArray[np.bool_]:
+        """Return which configurations (K, n) are allowed, (K,)."""
+        asked = self.asked
+        allowed = np.asarray(((q >= asked.lower) & (q <= asked.upper)).all(axis=1))
+        if asked.quantities:
+            allowed &= asked.admits(q)
+        for model, far in asked.bodies:
+            rows = np.flatnonzero(allowed)
+            allowed[rows] = ~model.colliding(q[rows], far + self.margin)
+        return allowed
+
+    def steps(self, way: Array, step: float = LEG_STEP) -> Ints:
+        """Return in how many steps to look at legs from each of configurations (K, n) to the next.
+
+        In each no point of a body moves farther than `step` [m].
+        """
+        turned = np.abs(np.diff(way, axis=0))
+        count = (turned * self.robot.joint_weights).max(axis=1) / TURN_STEP
+        for model, _ in self.asked.bodies:
+            count = np.maximum(count, (turned @ model.lever_arms.T).max(axis=1) / step)
+        return np.asarray(np.maximum(1, np.ceil(self.finer * count)), dtype=np.int64)
+
+    def share(self, first: Array, last: Array) -> float:
+        """Return up to which share of it a straight leg is free, seen from its beginning."""
+        count = int(self.steps(np.stack([first, last]))[0])
+        shares = np.arange(1, count + 1) / count
+        for lot in _lots(count):
+            some = shares[lot]
+            blocked = np.flatnonzero(~self.free(first + some[:, None] * (last - first)))
+            if blocked.size:
+                return float((lot.start + blocked[0]) / count)
+        return 1.0
+
+    def is_open(self, first: Array, last: Array, step: float = LEG_STEP) -> bool:
+        """Whether all of a straight leg is free; what is in the way shows early."""
+        count = int(self.steps(np.stack([first, last]), step)[0])
+        order = _spread_out(count)
+        for lot in _lots(count):
+            some = order[lot] / count
+            if not self.free(first + some[:, None] * (last - first)).all():
+                return False
+        return True
+
+    @property
+    def rates(self) -> Array:
+        """What a unit of each joint takes at full speed, (n,) [s]; where that is endless, 1."""
+        return np.where(np.isfinite(self.asked.speed), 1.0 / self.asked.speed, 1.0)
+
+
+def find_way(
+    room: Room, starts: Array, goals: Array, end: float, rng: np.random.Generator
+) -> Array | None:
+    """Return a way of straight legs that are free, (m, n), from one of starts to one of goals.
+
+    Parameters
+    ----------
+    room : Room
+    starts, goals : (a, n), (b, n)
+        Free configurations.
+    end : float
+        When to give up, by the clock `time.perf_counter` [s].
+    rng : Generator
+
+    Returns
+    -------
+    (m, n) or None
+        The quickest of a few; None where none was found in time.
+    """
+    way = straight_way(room, starts, goals)
+    if way is not None:
+        return way
+    found: list[Array] = []
+    while len(found) < WAYS:
+        way = _connected(room, starts, goals, end, rng)
+        if way is None:
+            break
+        found.append(shortened(room, way, rng))
+    return min(found, key=lambda way: _duration(way, room.rates), default=None)
+
+
+def straight_way(room: Room, starts: Array, goals: Array) -> Array | None:
+    """Return the quickest straight leg that is free from a start to a goal, (2, n); see above."""
+    times = (np.abs(starts[:, None] - goals[None]) * room.rates).max(axis=2)
+    for pair in np.argsort(times, axis=None)[: len(starts) + len(goals)].tolist():
+        i, j = divmod(pair, len(goals))
+        if room.is_open(starts[i], goals[j]):
+            return np.stack([starts[i], goals[j]])
+    return None
+
+
+def shortened(room: Room, way: Array, rng: np.random.Generator) -> Array:
+    """Return a way (m, n) with straight shortcuts between points of it, where these are free."""
+    missed = 0
+    for _ in range(SHORTCUTS):
+        if len(way) < 3 or missed >= MISSED:
+            break
+        lengths = (np.abs(np.diff(way, axis=0)) * room.rates).max(axis=1)
+        ends = np.concatenate([[0.0], np.cumsum(lengths)])
+        places = np.sort(rng.uniform(0.0, ends[-1], 2))
+        # Now and then whole legs: only these lose their ends.
+        if rng.uniform() < 0.5:
+            places = np.array([ends[np.argmin(np.abs(ends - place))] for place in places])
+        legs = np.minimum(np.searchsorted(ends, places, side="right") - 1, len(way) - 2)
+        shares = (places - ends[legs]) / np.maximum(lengths[legs], 1e-12)
+        between = way[legs] + shares[:, None] * (way[legs + 1] - way[legs])
+        missed += 1
+        if legs[1] > legs[0] and room.is_open(*between):
+            way = _apart(np.concatenate([way[: legs[0] + 1], between, way[legs[1] + 1 :]]))
+            missed = 0
+    return way
+
+
+def _apart(way: Array) -> Array:
+    """Return a way without configurations that repeat the one before; its ends stay."""
+    kept = np.append(True, np.abs(np.diff(way, axis=0)).max(axis=1) > _SAME)
+    if not kept[-1] and len(way) > 2:
+        kept[-1] = True
+        kept[np.flatnonzero(kept[:-1])[-1]] = len(np.flatnonzero(kept[:-1])) == 1
+    return np.asarray(way[kept])
+
+
+def _duration(way: Array, rates: Array) -> float:
+    """Return what a way takes at full speed, more or less [s]; corners cost something as well."""
+    legs = np.abs(np.diff(way, axis=0)) * rates
+    return float(legs.max(axis=1).sum() + 0.1 * np.linalg.norm(legs, axis=1).sum())
+
+
+class _Tree:
+    """Configurations that are reached from roots by straight legs that are free."""
+
+    def __init__(self, roots: Array, rates: Array) -> None:
+        self._q = np.empty((256, roots.shape[1]))
+        self._q[: len(roots)] = roots
+        self._before = [-1] * len(roots)
+        self._rates = rates
+
+    def nearest(self, q: Array) -> int:
+        """Return which configuration is nearest to q (n,), in time."""
+        reached = self._q[: len(self._before)]
+        return int(np.argmin((((reached - q) * self._rates) ** 2).sum(axis=1)))
+
+    def add(self, q: Array, before: int) -> int:
+        """Add a configuration (n,) that a leg leads to from another one; return its number."""
+        if len(self._before) == len(self._q):
+            self._q = np.concatenate([self._q, np.empty_like(self._q)])
+        self._q[len(self._before)] = q
+        self._before.append(before)
+        return len(self._before) - 1
+
+    def grow(self, room: Room, q: Array, most: float) -> tuple[int, bool]:
+        """Grow towards q, by a leg of `most` [s]; return the new or nearest one, and if it is q."""
+        near = self.nearest(q)
+        first = self._q[near]
+        far = float((np.abs(q - first) * self._rates).max())
+        last = q if far <= most else first + most / far * (q - first)
+        share = room.share(first, last)
+        if share <= 0.0:
+            return near, far < _SAME
+        reached = last if share == 1.0 else first + share * (last - first)
+        return self.add(reached, near), share == 1.0 and far <= most
+
+    def at(self, k: int) -> Array:
+        """Return a configuration, (n,)."""
+        return np.asarray(self._q[k])
+
+    def way(self, k: int) -> Array:
+        """Return the way from a root to a configuration, (m, n)."""
+        found = []
+        while k >= 0:
+            found.append(self._q[k])
+            k = self._before[k]
+        return np.array(found[::-1])
+
+
+def _connected(
+    room: Room, starts: Array, goals: Array, end: float, rng: np.random.Generator
+) -> Array | None:
+    """Return a way by two trees, None where the time is over before."""
+    rates = room.rates
+    lower, upper = room.asked.arm(room.robot).finite_limits()
+    # Not on the limits themselves, which rounding would lead beyond.
+    inside = _INSIDE * (upper - lower)
+    lower, upper = lower + inside, upper - inside
+    one, other, forward = _Tree(starts, rates), _Tree(goals, rates), True
+    middle = 0.5 * (starts[0] + goals[0])
+    spread = SPREAD * float((np.abs(goals[0] - starts[0]) * rates).max()) / rates
+    while time.perf_counter() < end:
+        near = rng.uniform() < AROUND_MIDDLE
+        sample = rng.normal(middle, spread) if near else rng.uniform(lower, upper)
+        k, _ = one.grow(room, np.clip(sample, lower, upper), LEG_RANGE)
+        j, met = other.grow(room, one.at(k), math.inf)
+        if met:
+            halves = (one.way(k), other.way(j)) if forward else (other.way(j), one.way(k))
+            return _apart(np.concatenate([halves[0], halves[1][::-1]]))
+        one, other, forward = other, one, not forward
+    return None
+
+
+def _lots(count: int) -> Iterator[slice]:
+    """Yield slices of 0 to count - 1, small ones first: most of what is blocked shows early."""
+    first, size = 0, FIRST_LOT
+    while first < count:
+        yield slice(first, first + size)
+        first, size = first + size, 2 * size
+
+
+def _spread_out(count: int) -> Array:
+    """Return 1 to count in an order in which each one is far from those before."""
+    bits = max(1, math.ceil(math.log2(count + 1)))
+    order = np.zeros(2**bits, dtype=np.int64)
+    for bit in range(bits):
+        order |= ((np.arange(2**bits) >> bit) & 1) << (bits - 1 - bit)
+    return order[(order > 0) & (order <= count)].astype(np.float64)

@@ -1,0 +1,189 @@
+"""What is more than one plan, as a page shows it: programs, parts, moves."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import Array, ProblemError
+from selfmotion.certificate import Certificate, Extreme, Tolerance
+from selfmotion.collision import Obstacle
+from selfmotion.constraints import Clearance, Constraint
+from selfmotion.job import Program
+from selfmotion.motion import Trajectory
+from selfmotion.optimise import Status
+from selfmotion.path import Path, PathSamples
+from selfmotion.problem import Problem
+from selfmotion.replay import scene, shapes, three
+from selfmotion.replay.facts import Cell
+from selfmotion.replay.motion import Curves
+from selfmotion.replay.payload import Json, Payload
+from selfmotion.result import Move, Parts, Plan, Report
+from selfmotion.robot import RobotModel
+from selfmotion.task import Task
+
+# Points of curves for each step, at least and in all; fewer than these nobody sees.
+_POINTS, _MOST_POINTS = 25, 6001
+# Colours of seams, by turns: those of the page's plots.
+_COLORS = ((66, 105, 208), (232, 135, 30), (60, 169, 81), (224, 80, 140), (164, 99, 242))
+# Steps that are told to take longest.
+_LONGEST = 3
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A step of a whole: when it begins and ends [s], what it is called, and if it is a seam."""
+
+    begin: float
+    end: float
+    name: str
+    is_seam: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """A motion of several steps.
+
+    Attributes
+    ----------
+    plan : Plan
+        Stands for it: its motion, along the path that the tool goes.
+    marks : tuple of Mark
+    verdict : str
+    verified : bool
+    obstacles : tuple of Obstacle
+        All that stands there in the end.
+    grows : bool
+        Whether some of it stands there only later, so that one distance tells nothing.
+    """
+
+    plan: Plan
+    marks: tuple[Mark, ...]
+    verdict: str
+    verified: bool
+    obstacles: tuple[Obstacle, ...]
+    grows: bool
+
+    @classmethod
+    def of(cls, made: Program | Parts | Move) -> "Whole":
+        """Return what a page shows of several steps; PlanError where a move is missing."""
+        motion = made.motion if isinstance(made, Move) else made.trajectory
+        marks = tuple(_marks(made))
+        left: tuple[Obstacle, ...] = ()
+        if isinstance(made, Program):
+            left = tuple(item for step in made.steps for item in step.leaves)
+            moves = [step.made for step in made.steps]
+            constraints = tuple(moves[0].constraints) if isinstance(moves[0], Move) else ()
+            known = [*moves[0].obstacles, *left]
+        elif isinstance(made, Parts):
+            constraints, known = tuple(made.problem.constraints), list(made.plans[0].obstacles)
+        else:
+            constraints, known = made.constraints, list(made.obstacles)
+        unique = {item.name: item for item in known}
+        plan = _stand_in(made.robot, motion, constraints)
+        return cls(plan, marks, made.verdict, made.verified, tuple(unique.values()), bool(left))
+
+    @property
+    def points(self) -> int:
+        """How many points its curves need."""
+        return min(max(401, _POINTS * len(self.marks)), _MOST_POINTS)
+
+    @property
+    def description(self) -> str:
+        """One sentence that tells a stranger what the page shows."""
+        seams = sum(mark.is_seam for mark in self.marks)
+        return (
+            f"{self.plan.robot.name}: {seams} seams and {len(self.marks) - seams} moves in "
+            f"{self.marks[-1].end:.4g} s. {self.verdict}"
+        )
+
+    @property
+    def facts(self) -> dict[str, Cell]:
+        """What a reader wants to know of it: label → number and remark."""
+        between = [mark for mark in self.marks if not mark.is_seam]
+        longest = sorted(between, key=lambda mark: mark.begin - mark.end)[:_LONGEST]
+        told = ", ".join(f"{mark.name} {mark.end - mark.begin:.2f} s" for mark in longest)
+        moved = sum(mark.end - mark.begin for mark in between)
+        return {
+            "verdict": (self.verdict, ""),
+            "duration": (f"{self.marks[-1].end:.4g} s", ""),
+            "seams": (str(len(self.marks) - len(between)), ""),
+            "moves": (f"{moved:.4g} s", f"longest: {told}" if told else ""),
+        }
+
+    def commands(self, root: str, payload: Payload, shown: Curves, radius: float) -> list[Json]:
+        """Return the commands that draw each seam in a colour of its own, below a node."""
+        found, number = list[Json](), 0
+        for mark in self.marks:
+            if not mark.is_seam:
+                continue
+            within = (shown.t >= mark.begin) & (shown.t <= mark.end)
+            points = shown.tool[within]
+            kept = shapes.distinct(points, 0.5 * radius)
+            if len(kept) > 1:
+                drawn = scene.triangles(payload, *shapes.tube(points[kept], 1.5 * radius))
+                color = tuple(part / 255.0 for part in _COLORS[number % len(_COLORS)])
+                look = three.material(color, roughness=0.8)
+                found.append(three.set_object(f"{root}/trace/seam{number}", drawn, look))
+            number += 1
+        return found
+
+    def steps(self) -> list[Json]:
+        """Return the steps for the page's table of jumps."""
+        found, number = list[Json](), 0
+        for mark in self.marks:
+            color = ""
+            if mark.is_seam:
+                color = "rgb({}, {}, {})".format(*_COLORS[number % len(_COLORS)])
+                number += 1
+            found.append({"begin": mark.begin, "end": mark.end, "name": mark.name, "color": color})
+        return found
+
+
+class _Performed(Path, kind="_performed"):
+    """Where the tool is along a motion."""
+
+    def __init__(self, robot: RobotModel, motion: Trajectory) -> None:
+        self._robot, self._motion = robot, motion
+        self.duration = motion.duration
+
+    def evaluate(self, t: Array) -> PathSamples:
+        """See `Path.evaluate`."""
+        times = np.minimum(self._motion.t[0] + t, self._motion.t[-1])
+        chain = self._robot.chain
+        placed = [chain.at(q) for q in self._motion(times)]
+        twists = np.array(
+            [at[0] @ qd for at, qd in zip(placed, self._motion(times, 1), strict=True)]
+        )
+        places, turns = (np.array([at[k] for at in placed]) for k in (2, 1))
+        return PathSamples(t, places, turns, twists)
+
+
+def _stand_in(robot: RobotModel, motion: Trajectory, asked: tuple[Constraint, ...]) -> Plan:
+    """Return a plan with a motion, for what pages do with plans."""
+    tasks = [task for task in (Task.POSITION, Task.PLANAR) if robot.can_follow(task)]
+    free = [task for task in tasks if robot.redundancy(task) > 0]
+    if not free:
+        raise ProblemError(f"{robot.name}: has no redundancy in position, which a replay shows")
+    apart = [item for item in asked if isinstance(item, Clearance)]
+    path = _Performed(robot, motion)
+    problem = Problem(robot, path, free[0], constraints=apart, rest=False)
+    nothing = Extreme(0.0, 0.0, "")
+    certificate = Certificate(nothing, nothing, nothing, 0.0, 0, Tolerance(), (), ())
+    report = Report(0.0, 0.0, {}, {}, 0, 0, 0, 0, 0, (), Status.CONVERGED, "", 0.0)
+    return Plan(problem, motion, motion, np.zeros(0), report, certificate)
+
+
+def _marks(made: Program | Parts | Move) -> Iterator[Mark]:
+    if isinstance(made, Move):
+        yield Mark(0.0, made.motion.duration, "move", False)
+        return
+    if isinstance(made, Program):
+        for begin, step in zip(made.begins, made.steps, strict=True):
+            yield Mark(begin, begin + step.motion.duration, step.name, step.is_seam)
+        return
+    for number, (begin, plan) in enumerate(zip(made.begins, made.plans, strict=True), 1):
+        end = begin + plan.trajectory.duration
+        yield Mark(begin, end, f"part {number}", True)
+        if number <= len(made.moves):
+            yield Mark(end, end + made.moves[number - 1].motion.duration, f"move {number}", False)

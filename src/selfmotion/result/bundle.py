@@ -1,0 +1,99 @@
+"""Plans and moves as one file: a description in JSON, and their own files, in one archive."""
+
+import hashlib
+import json
+import tempfile
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from selfmotion.basics import FileFormatError, write_atomically
+from selfmotion.result.move import Move, load_move
+from selfmotion.result.plan import Plan, load_plan
+
+# Bundles beyond so many bytes are not read.
+_LARGEST = 2_000_000_000
+_NAME = "bundle.json"
+
+
+def write_bundle(
+    file: Path, kind: str, version: int, description: Mapping[str, Any], made: Sequence[Plan | Move]
+) -> None:
+    """Write plans and moves, and what else is known, to one file; atomically.
+
+    Parameters
+    ----------
+    file : Path
+    kind : str
+        What it is, for who reads it: ``"program"``.
+    version : int
+        Raised with every change that older versions cannot read.
+    description : mapping
+        JSON-safe.
+    made : sequence of Plan or Move
+        Moves that were found.
+    """
+
+    def write(stream: Any) -> None:
+        # What is inside is compressed already.
+        with zipfile.ZipFile(stream, "w") as archive, tempfile.TemporaryDirectory() as folder:
+            members = []
+            for number, item in enumerate(made):
+                member = Path(folder, _member(number))
+                item.save(member)
+                digest = hashlib.sha256(member.read_bytes()).hexdigest()
+                members.append({"plan": isinstance(item, Plan), "digest": digest})
+                archive.write(member, member.name)
+            whole = {"kind": kind, "version": version, "members": members, **description}
+            archive.writestr(_NAME, json.dumps({**whole, "digest": _digest(whole)}))
+
+    write_atomically(file, write)
+
+
+def read_bundle(
+    file: Path, kind: str, version: int
+) -> tuple[dict[str, Any], list[Plan | Move], bool]:
+    """Return what `write_bundle` wrote, judged anew, and whether the file was changed since.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, is of another kind, lacks something, or was written by another version.
+    """
+    try:
+        with zipfile.ZipFile(file) as archive, tempfile.TemporaryDirectory() as folder:
+            if sum(item.file_size for item in archive.infolist()) > _LARGEST:
+                raise ValueError(f"it unpacks to more than {_LARGEST:g} bytes")
+            description: dict[str, Any] = json.loads(archive.read(_NAME))
+            found = description["kind"], description["version"]
+            if found != (kind, version):
+                raise ValueError(f"it is a {found[0]} of format {found[1]}, expected {version}")
+            changed = description.pop("digest", None) != _digest(description)
+            made, known = list[Plan | Move](), dict[str, Any]()
+            for number, item in enumerate(description["members"]):
+                data = archive.read(_member(number))
+                changed |= hashlib.sha256(data).hexdigest() != item["digest"]
+                member = Path(folder, _member(number))
+                member.write_bytes(data)
+                load = load_plan if item["plan"] else load_move
+                made.append(load(member, known=known))
+    except FileNotFoundError:
+        raise FileFormatError(f"{file}: no such file") from None
+    except OSError as error:
+        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
+    # Any number or key of a damaged file may be any other, and fail anywhere.
+    except Exception as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise FileFormatError(f"{file}: is no {kind}, or a damaged one: {reason}") from error
+    if not made:
+        raise FileFormatError(f"{file}: is no {kind}, or a damaged one: it holds no motion")
+    return description, made, changed
+
+
+def _member(number: int) -> str:
+    return f"{number:04d}.npz"
+
+
+def _digest(description: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()

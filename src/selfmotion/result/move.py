@@ -1,0 +1,164 @@
+"""A joint motion from one configuration to another, and its file."""
+
+import dataclasses
+from collections.abc import MutableMapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
+from typing import Any
+
+from selfmotion.basics import (
+    FileFormatError,
+    PlanError,
+    SelfmotionError,
+    as_path,
+    read_archive,
+    write_archive,
+)
+from selfmotion.certificate import AtRest, Finding, FinishedMotion, Requirement, arm_limits
+from selfmotion.collision import Obstacle
+from selfmotion.constraints import Constraint
+from selfmotion.motion import Trajectory
+from selfmotion.problem import arm_and_constraints, describe_arm
+from selfmotion.result.archive import arrays_of, digest_of, trajectory_of
+from selfmotion.robot import RobotModel
+
+# Raised with every change that older versions cannot read.
+_FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """A joint motion from rest to rest.
+
+    Attributes
+    ----------
+    robot : RobotModel
+        The arm.
+    constraints : tuple of Constraint
+        What it has to keep at all times.
+    trajectory : Trajectory or None
+        None where none was found.
+    findings : tuple of Finding
+        What the requirements on limits and clearances say of it; each judges all times.
+    trouble : str
+        What is wrong with it, or why none was found; "" where all is kept.
+    """
+
+    robot: RobotModel
+    constraints: tuple[Constraint, ...]
+    trajectory: Trajectory | None
+    findings: tuple[Finding, ...] = ()
+    trouble: str = ""
+
+    @classmethod
+    def judged(
+        cls, robot: RobotModel, constraints: Sequence[Constraint], trajectory: Trajectory
+    ) -> "Move":
+        """Return a motion with what all that is required says of it, at all times."""
+        own = [item.requirement(robot) for item in constraints]
+        wanted = (AtRest(True, True), *arm_limits(robot, own), *own)
+        finished = FinishedMotion(robot, trajectory)
+        findings = tuple(item.judge(finished) for item in wanted)
+        trouble = "; ".join(item.text for item in findings if not item.kept)
+        return cls(robot, tuple(constraints), trajectory, findings, trouble)
+
+    def __repr__(self) -> str:
+        """Return two lines: how long it takes, and the verdict."""
+        found = "none found" if self.trajectory is None else f"{self.trajectory.duration:.6g} s"
+        return f"Move({self.robot.name}, {found})\n  {self.verdict}"
+
+    @property
+    def verified(self) -> bool:
+        """Whether there is one that keeps all that is required."""
+        return self.trajectory is not None and not self.trouble
+
+    @property
+    def verdict(self) -> str:
+        """One line: verified, with what was checked at all times, or what is wrong."""
+        if not self.verified:
+            return f"not verified: {self.trouble}"
+        covers = dict.fromkeys(what for item in self.requirements for what in item.covers)
+        return f"verified at all times ({', '.join(covers)})"
+
+    @property
+    def requirements(self) -> tuple[Requirement, ...]:
+        """What it is judged by."""
+        own = tuple(item.requirement(self.robot) for item in self.constraints)
+        return (AtRest(True, True), *arm_limits(self.robot, own), *own)
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """The obstacles that the requirements are about."""
+        return tuple(body for item in self.requirements for body in item.obstacles)
+
+    @property
+    def motion(self) -> Trajectory:
+        """The trajectory; PlanError where none was found."""
+        if self.trajectory is None:
+            raise PlanError(f"{self.robot.name}: {self.trouble}")
+        return self.trajectory
+
+    def require(self) -> "Move":
+        """Return the move itself if it is verified.
+
+        Raises
+        ------
+        PlanError
+            It is not; the message is the verdict.
+        """
+        if not self.verified:
+            raise PlanError(f"{self.robot.name}: {self.verdict}")
+        return self
+
+    def save(self, file: str | FilePath) -> None:
+        """Write the move, without loss, to a ``.npz`` file that `load_move` reads; atomically.
+
+        Raises
+        ------
+        PlanError
+            None was found.
+        """
+        motion = self.motion
+        description: dict[str, Any] = {
+            "move": _FORMAT,
+            **describe_arm(self.robot, self.constraints),
+            "joint_names": list(motion.joint_names),
+            "findings": [dataclasses.asdict(item) for item in self.findings],
+        }
+        arrays = arrays_of(motion)
+        description["digest"] = digest_of(description, arrays)
+        write_archive(as_path(file), description, arrays)
+
+
+def load_move(file: str | FilePath, *, known: MutableMapping[str, Any] | None = None) -> Move:
+    """Read a move that `Move.save` wrote, and judge it anew.
+
+    A file that was changed is never verified. `known` is that of `load_plan`.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, is no move, lacks something, or was written by another version.
+    """
+    path = as_path(file)
+    description, arrays = read_archive(path)
+    if description.get("move") != _FORMAT:
+        raise FileFormatError(
+            f"{path}: is no move of format {_FORMAT}: it is a plan or a program, or was written by "
+            f"another version of selfmotion"
+        )
+    written = description.pop("digest", None)
+    altered = written != digest_of(description, arrays)
+    try:
+        robot, constraints = arm_and_constraints(description, {} if known is None else known)
+        motion = trajectory_of(arrays, tuple(description["joint_names"]))
+        found = Move.judged(robot, constraints, motion)
+    except SelfmotionError as error:
+        raise FileFormatError(f"{path}: is a damaged move: {error}") from error
+    # Any number or key of a damaged file may be any other, and fail anywhere.
+    except Exception as error:
+        raise FileFormatError(f"{path}: is no move, or a damaged one: {error!r}") from error
+    if altered:
+        trouble = f"{path.name} was changed after the move was written: its digest differs"
+        found = replace(found, trouble="; ".join(filter(None, (trouble, found.trouble))))
+    return found

@@ -1,0 +1,117 @@
+"""Jobs from the shell: seams from a table or a list, files, exit codes, refusals."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from support.places import ROOT
+from support.shell import complaint, invoke
+
+TABLE = (ROOT / "examples" / "seams.csv").read_text()
+JOB = """
+task = "pointing"
+[robot]
+name = "panda"
+[job]
+start = "home"
+branches = 1
+"""
+IN_A_TABLE = """
+[seams]
+file = "seams.csv"
+feed = 0.05
+frame = { position = [0.45, 0.0, 0.3], rpy_deg = [180, 0, 0] }
+"""
+LISTED = """
+[[seams]]
+name = "there"
+events = [["on", 0.1]]
+[seams.path]
+kind = "line"
+duration = 1.0
+by = [0.1, 0, 0]
+start = { position = [0.4, 0.1, 0.3], rpy_deg = [180, 0, 0] }
+[[seams]]
+name = "then"
+after = ["there"]
+either_way = false
+task = "position"
+constraints = [{ kind = "Tilt", frame = "panda_hand_tcp", within_deg = 20 }]
+[seams.path]
+kind = "line"
+duration = 1.0
+by = [0.1, 0, 0]
+start = { position = [0.4, -0.1, 0.3], rpy_deg = [180, 0, 0] }
+"""
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    (tmp_path / "seams.csv").write_text(TABLE)
+    file = tmp_path / "job.toml"
+    file.write_text(JOB + IN_A_TABLE)
+    return file
+
+
+def test_a_column_of_a_table_tells_the_seams(table) -> None:
+    job = sm.read_seam_job(table)
+    assert [seam.name for seam in job.seams] == ["left", "right", "front", "back"]
+    np.testing.assert_allclose(job.seams[0].path.pose(0.0).translation, [0.45, 0.2, 0.3])
+    assert job.seams[0].path.feeds[0].asked == 0.05
+    np.testing.assert_allclose(job.settings["start"], sm.NAMED_ARMS["panda"].home)
+
+
+def test_a_job_from_the_shell_is_written_read_and_exported(tmp_path) -> None:
+    file, whole = tmp_path / "job.toml", tmp_path / "a.program"
+    file.write_text(JOB + LISTED)
+    outs = [whole, tmp_path / "a.timetable.csv", tmp_path / "a.yaml"]
+    options = [word for out in outs for word in ("--out", str(out))]
+    code, text = invoke("job", file, *options, "--folder", tmp_path / "kept")
+    assert code == 0, text
+    assert "verified at all times: 2 seams" in text
+    program = sm.load_program(whole).require()
+    assert program.order == ("there", "then")
+    with outs[1].open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert {row["kind"] for row in rows} == {"seam", "move", "event"}
+    assert "there: on" in {row["name"] for row in rows}
+    motion = sm.read_motion(outs[2])
+    np.testing.assert_allclose(motion.q[-1], program.trajectory.q[-1], atol=1e-9)
+    code, text = invoke("check", whole, "--json")
+    assert json.loads(text)["verified"]
+    code, text = invoke("export", whole, "--out", tmp_path / "b.csv", "--rate", "100")
+    assert code == 0, text
+    assert len(sm.read_motion(tmp_path / "b.csv").t) == int(program.duration * 100) + 2
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "expected seams"),
+        ("[[seams]]\nname = 'a'", "seams, 'a': path is missing"),
+        (LISTED.replace("after =", "aftr ="), "unknown key 'aftr'; nearest: 'after'"),
+        (LISTED.replace('"there"]', '"nobody"]'), "no other seam"),
+        (LISTED.replace("task =", "tusk ="), "unknown key 'tusk'; nearest: 'task'"),
+        (LISTED.replace("0.1, 0.3]", "0.1]"), "seams, 'there'"),
+        ("[seams]\nfeed = 0.1", "file is missing"),
+        ("[seams]\nfile = 'none.csv'\nfeed = 0.1", "none.csv: cannot be read"),
+        ("[seams]\nfile = 'plain.csv'\nfeed = 0.1", "has no column 'seam'"),
+        ("[seams]\nfile = 'seams.csv'", "seams.csv: has no times"),
+    ],
+)
+def test_what_is_wrong_with_a_job_file_is_said_by_key(text, said, tmp_path) -> None:
+    (tmp_path / "seams.csv").write_text(TABLE)
+    (tmp_path / "plain.csv").write_text("x,y,z\n0,0,0\n1,0,0\n")
+    file = tmp_path / "job.toml"
+    file.write_text(JOB + text)
+    with pytest.raises(sm.SelfmotionError) as caught:
+        sm.read_seam_job(file).plan()
+    assert said in str(caught.value)
+
+
+def test_bad_targets_are_refused_before_anything_is_planned(table) -> None:
+    assert ".timetable.csv" in complaint("job", table, "--out", "frame.docx")

@@ -1,0 +1,209 @@
+"""A program makes every seam once, keeps everything at all times, and is the best that is known."""
+
+import itertools
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.planning import FreeMotions
+from selfmotion.task import SE3
+from support.arms import robot_named
+
+DOWN = np.diag([1.0, -1.0, -1.0])
+HOME = np.array(sm.NAMED_ARMS["panda"].home)
+# Sums of a few durations in another order differ by this [s].
+ROUNDING = 1e-9
+
+
+def seam(name: str, first, last, **given) -> sm.Seam:
+    """Return a straight seam of a second, the tool pointing down."""
+    line = sm.Line(SE3(DOWN, np.array(first)), SE3(DOWN, np.array(last)), 1.0)
+    return sm.Seam(name, line, "pointing", **given)
+
+
+def row_of_seams(count: int = 3) -> list[sm.Seam]:
+    """Return parallel seams in an order and in directions that suit nobody."""
+    y = np.linspace(-0.2, 0.2, count)
+    order = sorted(range(count), key=lambda k: (k % 2, k))
+    return [seam(f"seam {k}", [0.4, y[k], 0.3], [0.5, y[k], 0.3]) for k in order]
+
+
+@pytest.fixture(scope="module")
+def program() -> sm.Program:
+    return sm.plan_job(robot_named("panda"), row_of_seams(), start=HOME, end=HOME, branches=1)
+
+
+def test_every_seam_is_made_once_and_all_is_verified(program) -> None:
+    program.require()
+    assert sorted(program.order) == [f"seam {k}" for k in range(3)]
+    motion = program.trajectory
+    np.testing.assert_allclose(motion.q[[0, -1]], [HOME, HOME], rtol=0.0, atol=1e-12)
+    assert motion.duration == pytest.approx(program.duration, abs=ROUNDING)
+    # Every time belongs to one step.
+    begins = [*program.begins, program.duration]
+    durations = [step.motion.duration for step in program.steps]
+    np.testing.assert_allclose(np.diff(begins), durations, atol=ROUNDING)
+    for begin, step in zip(program.begins, program.steps, strict=True):
+        t = np.linspace(0.0, step.motion.duration, 7)
+        whole = motion(np.clip(begin + t, 0.0, motion.duration))
+        np.testing.assert_allclose(whole, step.motion(step.motion.t[0] + t), atol=1e-9)
+
+
+def test_the_order_is_the_best_of_all_by_the_times_of_the_moves(program) -> None:
+    panda = robot_named("panda")
+    seams = row_of_seams()
+    alone = FreeMotions(panda, program.moves[0].constraints, np.random.default_rng(0))
+    plans = program.plans
+    ends = {name: plan.trajectory.q[[0, -1]] for name, plan in plans.items()}
+    known: dict[bytes, float] = {}
+
+    def seconds(first, last) -> float:
+        pair = np.stack([first, last])
+        if pair.tobytes() not in known:
+            known[pair.tobytes()] = sm.move(panda, first, last).require().motion.duration
+        return known[pair.tobytes()]
+
+    orders = []
+    for order in itertools.permutations(ends):
+        for turned in itertools.product([1, -1], repeat=len(order)):
+            ways = zip(order, turned, strict=True)
+            q = [HOME, *(x for name, way in ways for x in ends[name][::way]), HOME]
+            pairs = list(zip(q[::2], q[1::2], strict=True))
+            orders.append((sum(float(alone.time_of(*pair)) for pair in pairs), pairs))
+    # All that promise to take less, and some more.
+    orders.sort(key=lambda item: item[0])
+    for number, (least, pairs) in enumerate(orders):
+        if number < 4 or least < program.transfer_time - ROUNDING:
+            assert sum(seconds(*pair) for pair in pairs) >= program.transfer_time - ROUNDING
+    assert program.bound == pytest.approx(program.transfer_time, abs=ROUNDING)
+    given = sm.plan_job(panda, seams, start=HOME, end=HOME, order="given", branches=1).require()
+    assert given.order == tuple(item.name for item in seams)
+    assert program.transfer_time < given.transfer_time
+
+
+def test_directions_order_waits_and_events_are_as_asked() -> None:
+    panda, seams = robot_named("panda"), {item.name: item for item in row_of_seams(3)}
+    seams = {name: replace(item, either_way=False) for name, item in seams.items()}
+    events = [("on", 0.1), ("off", 0.9)]
+    first = replace(seams["seam 0"], after=("seam 1",), wait=0.5, events=events)
+    second = replace(seams["seam 1"], after_any=("seam 0", "seam 2"))
+    listed = [first, second, seams["seam 2"]]
+    with pytest.raises(sm.ProblemError, match="circle"):
+        sm.plan_job(panda, [first, replace(second, after=("seam 0",)), listed[2]], branches=1)
+    made = sm.plan_job(panda, listed, branches=1).require()
+    assert made.order == ("seam 2", "seam 1", "seam 0")
+    assert not any(step.turned for step in made.steps)
+    for name, plan in made.plans.items():
+        first = seams[name].path.pose(0.0)
+        reached = panda.pose(plan.trajectory.q[0]).translation
+        np.testing.assert_allclose(reached, first.translation, atol=1e-6)
+    assert made.steps[-1].name == "seam 0, wait"
+    assert made.steps[-1].motion.duration == 0.5
+    begin = made.begins[[step.name for step in made.steps].index("seam 0")]
+    assert made.events == ((begin + 0.1, "seam 0", "on"), (begin + 0.9, "seam 0", "off"))
+
+
+def test_what_is_made_stands_in_the_way_of_what_comes_later() -> None:
+    panda = robot_named("panda")
+    hand = panda.urdf.links
+    assert "panda_hand" in hand
+    post = sm.Box("post", [0.45, 0.0, 0.3], [0.04, 0.04, 0.3])
+    seams = [
+        seam("raise", [0.45, 0.3, 0.35], [0.5, 0.3, 0.35], leaves=[post]),
+        seam("beside", [0.4, -0.3, 0.35], [0.5, -0.3, 0.35], after=["raise"]),
+    ]
+    made = sm.plan_job(panda, seams, branches=1).require()
+    move = made.moves[0]
+    assert [item.name for item in move.obstacles] == ["post"]
+    assert [item.name for item in made.plans["beside"].obstacles] == ["post"]
+    # One without it is not verified: what stands there was not looked at.
+    blind = sm.move(panda, move.motion.q[0], move.motion.q[-1]).require()
+    steps = tuple(replace(s, made=blind) if s.made is move else s for s in made.steps)
+    assert "is not judged against 'post'" in replace(made, steps=steps).verdict
+    # What is made where another one stands has to come before it.
+    inside = seam("inside", [0.45, 0.0, 0.3], [0.45, 0.05, 0.3])
+    early = sm.plan_job(panda, [seams[0], inside], branches=1).require()
+    assert early.order == ("inside", "raise")
+    late = sm.plan_job(panda, [seams[0], replace(inside, after=("raise",))], branches=1)
+    assert "seam 'inside' is not made" in late.verdict
+    assert "post" in late.verdict
+    assert late.order == ("raise",)
+
+
+def not_verified(file: Path) -> bool:
+    """Whether a file is refused, or is not verified."""
+    try:
+        return not sm.load_program(file).verified
+    except sm.FileFormatError:
+        return True
+
+
+def test_a_program_that_was_changed_is_not_verified(program, tmp_path) -> None:
+    program.save(tmp_path / "whole.program")
+    again = sm.load_program(tmp_path / "whole.program").require()
+    assert again.order == program.order
+    np.testing.assert_array_equal(again.trajectory.q, program.trajectory.q)
+    assert again.verdict == program.verdict
+    # Steps in another order leave gaps, and one left out as well.
+    swapped = replace(program, steps=program.steps[::-1])
+    assert "configurations differ" in swapped.verdict
+    assert not replace(program, steps=program.steps[:2] + program.steps[3:]).verified
+    data = bytearray((tmp_path / "whole.program").read_bytes())
+    data[len(data) // 3] ^= 1
+    (tmp_path / "spoiled.program").write_bytes(bytes(data))
+    assert not_verified(tmp_path / "spoiled.program")
+
+
+def test_a_job_that_is_ended_anywhere_goes_on_to_the_same_program(program, tmp_path) -> None:
+    panda, seams = robot_named("panda"), row_of_seams()
+    for end in (1, 4):
+        told = itertools.count()
+
+        def stop(*_, told=told, end=end) -> None:
+            if next(told) == end:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            sm.plan_job(
+                panda, seams, start=HOME, end=HOME, branches=1, folder=tmp_path, progress=stop
+            )
+    kept = {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("*.npz")}
+    assert kept
+    again = sm.plan_job(panda, seams, start=HOME, end=HOME, branches=1, folder=tmp_path)
+    # What was finished is not done again.
+    for name, time in kept.items():
+        assert (tmp_path / name).stat().st_mtime_ns == time
+    assert again.order == program.order
+    np.testing.assert_array_equal(again.trajectory.q, program.trajectory.q)
+
+
+def test_bad_jobs_are_refused() -> None:
+    panda, seams = robot_named("panda"), row_of_seams(2)
+    for given, message in (
+        ([], "no seams"),
+        ([seams[0], seams[0]], "there twice"),
+        ([replace(seams[0], after=("nobody",))], "no other seam"),
+        (["seam"], "expected a Seam"),
+    ):
+        with pytest.raises(sm.ProblemError, match=message):
+            sm.plan_job(panda, given)
+    with pytest.raises(sm.ProblemError, match="give it as clearance="):
+        sm.plan_job(panda, seams, constraints=[sm.Clearance()])
+    with pytest.raises(sm.ProblemError, match="one way only"):
+        replace(seams[0], constraints=[sm.EndConfiguration(HOME)])
+    far = seam("far", [2.0, 0.0, 0.3], [2.1, 0.0, 0.3])
+    with pytest.raises(sm.PlanError, match="no seam has a motion"):
+        sm.plan_job(panda, [far], branches=1)
+
+
+def test_other_processes_come_to_the_same_program() -> None:
+    panda, seams = robot_named("panda"), row_of_seams(2)
+    with ProcessPoolExecutor(1) as executor:
+        there = sm.plan_job(panda, seams, start=HOME, branches=1, executor=executor).require()
+    here = sm.plan_job(panda, seams, start=HOME, branches=1)
+    assert there.order == here.order
+    np.testing.assert_array_equal(there.trajectory.q, here.trajectory.q)

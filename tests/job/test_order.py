@@ -1,0 +1,88 @@
+"""Orders are the best there are where they say so, and never break what has to come first."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from selfmotion.job.order import Stops, along, best_round, exact, improved, lower_bound
+
+# Sums of a dozen costs in another order differ by this share.
+ROUNDING = 1e-12
+
+
+def random_stops(rng: np.random.Generator, count: int, states: int, share: float = 0.0) -> Stops:
+    """Return stops with random costs; a share of them has to come after another one."""
+    of = np.repeat(np.arange(count), states)
+    m = len(of)
+    # A hidden order, so that some order keeps what has to come first.
+    hidden = rng.permutation(count)
+    after = [frozenset[int]()] * count
+    after_any = [frozenset[int]()] * count
+    for place in range(1, count):
+        if rng.uniform() < share:
+            after[hidden[place]] = frozenset({int(hidden[rng.integers(place)])})
+        elif rng.uniform() < share:
+            after_any[hidden[place]] = frozenset(hidden[:place][-2:].tolist())
+    between = rng.uniform(0.1, 1.0, (m, m))
+    between[rng.uniform(size=(m, m)) < 0.1] = np.inf
+    ends = rng.uniform(0.0, 1.0, (3, m))
+    return Stops(of, ends[0], between, ends[1], ends[2], after, after_any)
+
+
+def by_force(stops: Stops) -> float:
+    """Return the least cost of all orders and states, one by one."""
+    least = np.inf
+    for order in itertools.permutations(range(stops.count)):
+        if stops.keeps(order):
+            for states in itertools.product(*(stops.states[k] for k in order)):
+                least = min(least, stops.cost(states))
+    return least
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_up_to_a_dozen_stops_the_order_is_the_best_of_all(seed) -> None:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(5, 7))
+    stops = random_stops(rng, count, 2, share=0.4 * (seed % 2))
+    found = best_round(stops)
+    assert found.cost == pytest.approx(by_force(stops), rel=ROUNDING)
+    assert found.cost == pytest.approx(stops.cost(found.states), rel=ROUNDING)
+    assert stops.keeps(stops.of[list(found.states)].tolist())
+    assert found.bound == found.cost
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_for_a_given_order_the_states_are_the_best(seed) -> None:
+    rng = np.random.default_rng(seed)
+    stops = random_stops(rng, 5, 3)
+    order = rng.permutation(5).tolist()
+    states, cost = along(stops, order)
+    ways = itertools.product(*(stops.states[k] for k in order))
+    assert cost == pytest.approx(min(map(stops.cost, ways)), rel=ROUNDING)
+    assert stops.of[list(states)].tolist() == order
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_many_stops_are_ordered_well_and_not_below_the_bound(seed) -> None:
+    rng = np.random.default_rng(seed)
+    stops = random_stops(rng, 10, 2, share=0.3 * (seed % 2))
+    best, found = exact(stops), improved(stops)
+    assert stops.keeps(stops.of[list(found.states)].tolist())
+    assert lower_bound(stops) <= best.cost * (1.0 + ROUNDING)
+    assert best.cost <= found.cost * (1.0 + ROUNDING)
+    assert found.bound <= found.cost
+    # Random costs have no geometry: worse than what any job has.
+    assert found.cost <= 1.5 * best.cost
+
+
+def test_what_cannot_be_ordered_has_no_round() -> None:
+    rng = np.random.default_rng(0)
+    stops = random_stops(rng, 3, 1)
+    circle = [frozenset({1}), frozenset({2}), frozenset({0})]
+    none = Stops(
+        stops.of, stops.own, stops.between, stops.first, stops.last, circle, stops.after_any
+    )
+    assert best_round(none).states == ()
+    assert improved(none).states == ()
+    assert best_round(none, given=[0, 1, 2]).cost == np.inf

@@ -1,0 +1,53 @@
+"""Pages of programs, parts and moves: every step can be jumped to, and seams have colours."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.replay import replay_html
+from selfmotion.replay.whole import Whole
+from selfmotion.task import SE3
+from support.arms import robot_named
+
+AHEAD = np.array([0.1, 0.0, 0.0])
+HOME = np.array(sm.NAMED_ARMS["panda"].home)
+
+
+@pytest.fixture(scope="module")
+def program() -> sm.Program:
+    down = np.diag([1.0, -1.0, -1.0])
+    ends = [np.array([0.4, y, 0.3]) for y in (-0.1, 0.1)]
+    seams = [
+        sm.Seam(f"seam {k}", sm.Line(SE3(down, end), SE3(down, end + AHEAD), 1.0), "pointing")
+        for k, end in enumerate(ends)
+    ]
+    post = sm.Sphere("post", [0.8, 0.0, 0.2], 0.05)
+    return sm.plan_job(
+        robot_named("panda"), seams, start=HOME, branches=1, clearance=sm.Clearance([post], 5e-3)
+    ).require()
+
+
+def test_the_steps_of_a_page_are_those_of_the_program(program) -> None:
+    whole = Whole.of(program)
+    assert [mark.name for mark in whole.marks] == [step.name for step in program.steps]
+    assert [mark.begin for mark in whole.marks] == list(program.begins)
+    # Without a gap in between.
+    for one, other in zip(whole.marks[:-1], whole.marks[1:], strict=True):
+        assert one.end == pytest.approx(other.begin, abs=1e-12)
+    assert [bool(step["color"]) for step in whole.steps()] == [s.is_seam for s in program.steps]
+    # The path that stands for it is where the tool goes.
+    t = np.linspace(0.0, program.duration, 9)
+    path = whole.plan.problem.path.samples(t)
+    for place, q in zip(path.translation, program.trajectory(t), strict=True):
+        np.testing.assert_allclose(place, program.robot.pose(q).translation, atol=1e-12)
+    assert [item.name for item in whole.obstacles] == ["post"]
+
+
+def test_a_program_becomes_a_page_and_what_is_missing_none(program) -> None:
+    page = replay_html(program)
+    assert "panda, program" in page
+    assert program.verdict in page
+    assert Whole.of(program.moves[0]).marks[0].end == program.moves[0].motion.duration
+    missing = sm.Move(program.robot, (), None, (), "no way")
+    with pytest.raises(sm.PlanError, match="no way"):
+        replay_html(missing)
