@@ -38,7 +38,8 @@ bench-batch: $(READY)  ## two processes against one, and what a plan costs besid
 bench-starts: $(READY)  ## free starts against the best of everything tried, 60 paths
 	$(BIN)/python benchmarks/starts.py
 
-bench-fastest: $(READY)  ## the fastest motions of 20 paths, and retimed plans, against limits
+bench-fastest: $(READY)  ## 60 paces against linear programmes; the fastest motions of 20 paths, against retimed plans
+	$(BIN)/python benchmarks/paces.py
 	$(BIN)/python benchmarks/fastest.py
 
 bench-moves: $(READY)  ## 100 transfers among boxes, some against 50 tries of OMPL

@@ -15,7 +15,7 @@ from support.arms import PANDA_HOME, robot_named
 
 ACCELERATION = 6.0
 # A pace is the fastest where some limit is used by so much at nearly all times.
-USED, BUSY = 0.95, 0.95
+USED, BUSY = 0.9, 0.95
 # How much longer a motion may be than the optimum of its limits of velocity and acceleration on a
 # grid: limits are kept between its points, and accelerations do not jump.
 LONGER = 1.02

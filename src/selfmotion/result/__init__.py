@@ -3,6 +3,7 @@
 from selfmotion.result.bundle import read_bundle as read_bundle, write_bundle as write_bundle
 from selfmotion.result.limits_used import LimitsUsed as LimitsUsed
 from selfmotion.result.move import Move as Move, load_move as load_move
+from selfmotion.result.moves_pace import paced as paced
 from selfmotion.result.parts import Parts as Parts, load_parts as load_parts
 from selfmotion.result.plan import (
     Plan as Plan,
@@ -12,7 +13,6 @@ from selfmotion.result.plan import (
 )
 from selfmotion.result.report import Gap as Gap, Report as Report
 from selfmotion.result.retiming import (
-    paced as paced,
     rate_limits as rate_limits,
     retime as retime,
     slowdown as slowdown,

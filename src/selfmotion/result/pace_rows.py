@@ -32,10 +32,12 @@ _MOST = 500.0
 # Where in an interval limits are measured: its beginning and its end, from inside, and between.
 PLACES = np.clip(0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 9)), 1e-6, 1.0 - 1e-6)
 _NOTHING = 1e-150
+# Where in an interval rows are: between, too, since near a rest b might rise and fall there unseen.
+SHARES = np.array([0.0, 0.5, 1.0])
 # What is at a knot up to rounding is at it: this near, by the length of an interval.
 _BESIDE = 1e-6
 # Where the arm rests its length goes on at this share of its largest speed.
-_STILL = 0.05
+_STILL = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +103,9 @@ class States:
     ----------
     q : (K + 1, n)
         At the knots.
-    orders : three of (2, K, n + 1)
-        First, second and third derivative of the joints and of the length, at the beginning and the
-        end of each interval, as they are inside it.
+    orders : three of (3, K, n + 1)
+        First, second and third derivative of the joints and of the length at `SHARES` of each
+        interval, as they are inside it.
     """
 
     q: Array
@@ -113,12 +115,17 @@ class States:
     def of(cls, motion: Trajectory, pace: Pace, knots: Array) -> "States":
         """Return those of a motion at a pace of its own time, at knots (K + 1,) of the pace."""
         at = np.clip(pace(knots) + motion.t[0], *motion.t[[0, -1]])
-        sides, inside = _inside(knots), _inside(at)
+        sides, count = _inside(knots), len(knots) - 1
+        inside = np.clip(pace(sides.ravel()) + motion.t[0], *motion.t[[0, -1]]).reshape(-1, count)
+        # What lies beside a knot is on that side of what the motion has there.
+        beside = _BESIDE * np.diff(at)
+        inside[0] = np.maximum(inside[0], at[:-1] + beside)
+        inside[-1] = np.minimum(inside[-1], at[1:] - beside)
         by = _with_length(
-            *(motion(inside.ravel(), k).reshape(2, len(at) - 1, -1) for k in (1, 2, 3))
+            *(motion(inside.ravel(), k).reshape(len(SHARES), count, -1) for k in (1, 2, 3))
         )
         rate, bend, surge = (
-            pace(sides.ravel(), order).reshape(2, -1)[:, :, None] for order in (1, 2, 3)
+            pace(sides.ravel(), order).reshape(len(SHARES), -1)[:, :, None] for order in (1, 2, 3)
         )
         return cls(
             motion(at),
@@ -132,13 +139,13 @@ class States:
     def at_knots(self, order: int) -> Array:
         """Return a derivative of the joints and of the length at the knots, (K + 1, n + 1)."""
         table = self.orders[order - 1]
-        return np.vstack([table[0], table[1, -1:]])
+        return np.vstack([table[0], table[-1, -1:]])
 
 
 def _inside(t: Array) -> Array:
-    """Return times right after the beginning and right before the end of each interval, (2, K)."""
-    beside = _BESIDE * np.diff(t)
-    return np.stack([t[:-1] + beside, t[1:] - beside])
+    """Return times at `SHARES` of each interval, inside it, (3, K)."""
+    shares = np.clip(SHARES, _BESIDE, 1.0 - _BESIDE)
+    return np.asarray(t[:-1] + shares[:, None] * np.diff(t))
 
 
 def length_speed(qd: Array) -> Array:
@@ -149,7 +156,7 @@ def length_speed(qd: Array) -> Array:
 
 
 def _with_length(first: Array, second: Array, third: Array) -> list[Array]:
-    """Return derivatives (2, K, n) of joints with those of the length, (2, K, n + 1) each."""
+    """Return derivatives (3, K, n) of joints with those of the length, (3, K, n + 1) each."""
     speed = length_speed(first)
     gain = np.einsum("skn,skn->sk", first, second) / speed
     change = (
@@ -187,12 +194,12 @@ def rows_of(
     table, limits = _Table(len(t) - 1), limits.with_length()
     # The length has all the room there is.
     room = [np.column_stack([own, own.max(axis=1)]) for own in room[:3]] + list(room[3:])
-    for side, share in enumerate((0.0, 1.0)):
+    for side, share in enumerate(SHARES.tolist()):
         value, slope, bend = (part[:, :, None] for part in basis(t, share))
         first, second, third = (order[side] for order in states.orders)
         own = np.zeros_like(value)
-        own[2 * side] = 1.0
-        part = slice(2, None) if side else slice(None, -2)
+        own[side] = 1.0
+        part = slice(side, len(near.c) - 2 + side)
         free = ~fixed[part, None]
         upper = np.minimum(most * near.c[part, None], _MOST) + 2.0 * _LEAST
         table.add(own, np.where(free, _LEAST, -np.inf), np.where(free, upper, np.inf))

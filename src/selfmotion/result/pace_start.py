@@ -9,7 +9,11 @@ from selfmotion.result.pace_rows import length_speed
 
 # A pace of constant joint speed has so many knots at least and about so many at most.
 _FEWEST, _ENOUGH = 600, 3000
-# A smooth pace is as smooth as the mean, so often, over so many knots.
+# Its first and last intervals have so many parts.
+_GRADED = 12
+# A smooth pace has so many intervals at least.
+_INTERVALS = 250
+# It is as smooth as the mean, so often, over so many knots.
 _MEANS, _WINDOW = 4, 3
 # Accelerations build up over so many knots where the arm begins at rest and jerks are limited.
 _EASED = 8
@@ -27,6 +31,18 @@ def of_constant_speed(motion: Trajectory) -> Pace:
         knots = np.interp(places, np.arange(len(knots)), knots)
     elif len(knots) > 2 * _ENOUGH:
         knots = np.append(knots[: -1 : len(knots) // _ENOUGH], knots[-1])
+    # From rest a fast motion needs as long for the first of these as for the others.
+    graded = np.square(np.arange(1, _GRADED) / _GRADED)
+    first, last = knots[1] - knots[0], knots[-1] - knots[-2]
+    knots = np.concatenate(
+        [
+            knots[:1],
+            knots[0] + first * graded,
+            knots[1:-1],
+            knots[-1] - last * graded[::-1],
+            knots[-1:],
+        ]
+    )
     qd, qdd = motion(knots, 1), motion(knots, 2)
     speed = length_speed(qd)
     gain = np.einsum("kn,kn->k", qd, qdd) / speed
@@ -47,7 +63,7 @@ def smooth(pace: Pace, step: float, jerk: bool) -> Pace:
     """
     from scipy.interpolate import make_interp_spline
 
-    count = max(int(np.ceil(pace.t[-1] / step)), _WINDOW * (_MEANS + 2))
+    count = max(int(np.ceil(pace.t[-1] / step)), _INTERVALS)
     t = np.linspace(0.0, pace.t[-1], count + 1)
     sigma = np.maximum.accumulate(pace(t))
     beyond = _WINDOW // 2 * _MEANS
@@ -62,7 +78,7 @@ def smooth(pace: Pace, step: float, jerk: bool) -> Pace:
     # By as much as the ends have moved.
     mean = sigma[0] + (mean - mean[0]) * (sigma[-1] - sigma[0]) / (mean[-1] - mean[0])
     spline = make_interp_spline(t, mean, 5)
-    start, end = (_EASED * step if jerk and rate <= still else 0.0 for rate in rates)
+    start, end = (_EASED * t[1] if jerk and rate <= still else 0.0 for rate in rates)
     w, dw, ddw, new = _eased(pace.t[-1], start, end, count)
     rate, bend = spline(w, 1), spline(w, 2)
     for at in (0, -1):

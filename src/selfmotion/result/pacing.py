@@ -34,8 +34,8 @@ _JUMP = 0.02
 _ROUGH_GAP, _GAP = 1e-3, 1e-6
 # Times are this share longer than limits ask: third differences of samples round so much.
 _ROUNDING = 1e-6
-# Derivatives below this share of the largest are none.
-_NONE = 1e-9
+# Derivatives below this share of the largest are none: they are looked at beside the ends.
+_NONE = 1e-5
 # Programmes begin with so much of what is known to keep the limits: there is room to all sides.
 _INSIDE = 0.9
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)

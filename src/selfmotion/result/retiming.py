@@ -11,11 +11,9 @@ import numpy.typing as npt
 from selfmotion.basics import Array, ProblemError, one_blas_thread, per_joint, read_only, shown
 from selfmotion.constraints import (
     Constraint,
-    Envelope,
     JointAccelerationLimits,
     JointVelocityLimits,
 )
-from selfmotion.motion import Trajectory
 from selfmotion.path import Pace, Retimed
 from selfmotion.problem import Problem
 from selfmotion.result.limits_used import quantities_of_pace
@@ -26,8 +24,6 @@ from selfmotion.task import Relaxation
 
 # Time between two samples of the new motion [s]: the first that keeps the plan's tolerance.
 _STEPS = (4e-3, 2e-3, 1e-3)
-# Moves reach their full acceleration in this time [s] at least: gears last longer.
-_SOFT = 0.02
 
 
 def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
@@ -94,28 +90,6 @@ def retime(
         if result.certificate.on_path:
             break
     return result
-
-
-def paced(motion: Trajectory, kept: Envelope) -> Trajectory:
-    """Return a joint path in the shortest time within limits, from rest to rest, from t = 0 on.
-
-    Parameters
-    ----------
-    motion : Trajectory
-        The path over any time of its own.
-    kept : Envelope
-        Finite limits of speed and acceleration, and those of the jerk where there are any.
-
-    Raises
-    ------
-    PlanError
-        No pace keeps the limits.
-    """
-    # Controllers want accelerations without jumps from arms of any make.
-    soft = np.minimum(kept.jerk, kept.acceleration / _SOFT)
-    limits = PaceLimits(kept.speed, kept.acceleration, read_only(soft))
-    with one_blas_thread():
-        return along(fastest_pace(motion, limits, Ends(), _STEPS[0]), motion)
 
 
 def _ends(plan: Plan) -> Ends:
