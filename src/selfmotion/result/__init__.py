@@ -10,8 +10,5 @@ from selfmotion.result.plan import (
     read_plan as read_plan,
 )
 from selfmotion.result.report import Gap as Gap, Report as Report
-from selfmotion.result.retiming import (
-    paced as paced,
-    retime as retime,
-    slowdown as slowdown,
-)
+from selfmotion.result.retiming import retime as retime, slowdown as slowdown
+from selfmotion.result.toppra_pace import paced as paced
