@@ -1,7 +1,7 @@
 """How much faster the fastest motion is than the pseudo-inverse's at its fastest; and retiming.
 
 Random lines, circles and splines of a Panda with the limits that its maker publishes. Of each: the
-time of the motion x = 0 retimed by toppra, that of `fastest`, and what the certificate says. Then
+time of the motion x = 0 retimed, that of `fastest`, and what the certificate says. Then
 plans with a free start on circles, retimed: all have to be verified.
 """
 

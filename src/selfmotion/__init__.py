@@ -163,6 +163,7 @@ from selfmotion.planning import (
 from selfmotion.problem import Problem as Problem, sample_problem as sample_problem
 from selfmotion.result import (
     Gap as Gap,
+    LimitsUsed as LimitsUsed,
     Move as Move,
     Parts as Parts,
     Plan as Plan,

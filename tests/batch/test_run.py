@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.batch import BatchProgress, Item, grid_items, plan_items, run, worker
+from selfmotion.batch import BatchProgress, Item, grid_items, plan_items, run
 from support.arms import PANDA_HOME, robot_named
 from support.places import TESTS
 from support.shell import complaint, invoke
@@ -247,17 +247,17 @@ def test_bad_problems_do_not_stop_the_rest(tmp_path: Path) -> None:
 def test_a_fault_of_ones_own_code_is_said_and_tried_again(
     grid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = worker.plan
+    real = sm.Job.plan
 
-    def faulty(problem: sm.Problem, **options: Any) -> sm.Plan:
-        if problem.path.duration == 4.0:
+    def faulty(job: sm.Job, **options: Any) -> sm.Plan:
+        if job.problem.path.duration == 4.0:
             raise ZeroDivisionError("own code")
-        return real(problem, **options)
+        return real(job, **options)
 
-    monkeypatch.setattr(worker, "plan", faulty)
+    monkeypatch.setattr(sm.Job, "plan", faulty)
     batch = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
     assert [row.error for row in batch.rows if row.error] == ["ZeroDivisionError: own code"] * 2
-    monkeypatch.setattr(worker, "plan", real)
+    monkeypatch.setattr(sm.Job, "plan", real)
     again = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
     assert again.resumed == 4
     assert all(not row.error for row in again.rows)

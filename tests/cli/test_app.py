@@ -150,3 +150,21 @@ def test_a_log_names_the_stages_and_the_gap(tmp_path: Path) -> None:
     assert "refining sequence" in planned.stderr
     assert "\x1b" not in planned.stderr
     assert "% from its best motion" in planned.stdout
+
+
+def test_retime_and_fastest(tmp_path: Path) -> None:
+    robot = sm.load_robot("panda")
+    start = robot.dexterous_configuration()
+    line = sm.Line(robot.pose(start), robot.pose(start + 0.05), 2.0)
+    problem = sm.Problem(robot, line, start=start)
+    file, plan, fast = (tmp_path / name for name in ("line.toml", "plan.npz", "fast.npz"))
+    sm.write_problem(problem, file)
+    sm.plan(problem).save(plan)
+    code, told = invoke("retime", plan, "--acceleration", "8", "--out", fast)
+    assert code == 0, told
+    assert "limits used fully" in told
+    assert sm.load_plan(fast).trajectory.duration < 1.0
+    with pytest.raises(sm.PlanError, match=r"at any pace in 1e-06 s"):
+        invoke("fastest", file, "--deadline", "1e-6")
+    with pytest.raises(sm.ProblemError, match="expected a problem file"):
+        invoke("fastest", "panda")

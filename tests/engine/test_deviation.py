@@ -372,7 +372,6 @@ def test_closed_paths_begin_and_end_on_the_path(panda_circle: Callable) -> None:
 
 
 def test_relaxations_survive_saving_and_retiming(panda_circle: Callable, tmp_path: Path) -> None:
-    pytest.importorskip("toppra")
     relaxations = [
         sm.Relaxation(("rx", "ry"), 0.1, during=(1.0, 3.0)),
         sm.Relaxation("x", axes="tool", during=(0.5, 2.0)),

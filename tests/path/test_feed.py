@@ -1,5 +1,7 @@
 """Constant feeds, rounded corners, leads and rests: the tool does what the process asks for."""
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -203,3 +205,57 @@ def test_files_at_a_feed(tmp_path) -> None:
     assert "corners are 'round', which needs --feed" in complaint(
         "plan", "panda", "--path", file, "--duration", "4", "--corners", "round"
     )
+
+
+def test_feeds_of_stretches_are_kept_and_judged_each_by_itself() -> None:
+    legs = np.array([[0.4, -0.2, 0.3], [0.4, 0.2, 0.3], [0.5, 0.2, 0.3]])
+    asked = ((0.0, 0.05), (0.1, 0.15), (0.25, 0.03))
+    path = sm.Feed(sm.Polyline(legs, tolerance=2e-3), 0.05, stretches=asked[1:])
+    assert [item.asked for item in path.feeds] == [feed for _, feed in asked]
+    assert all(item.kept for item in path.feeds)
+    t = np.linspace(0.0, path.duration, 4001)
+    speeds = np.linalg.norm(path.samples(t).twist[:, :3], axis=1)
+    passed, _ = path.pace(t)
+    for (start, feed), end in zip(asked, (0.1, 0.25, 0.5), strict=True):
+        here = speeds[(passed >= start) & (passed < end)]
+        # Near a slower stretch the mean over the smoothing reaches into the faster one.
+        assert here.max() <= (1.0 + path.feeds[0].within) * feed
+        assert np.median(here) == pytest.approx(feed, rel=0.02)
+    described = path.to_dict()
+    again = sm.Feed.from_dict({key: described[key] for key in described if key != "kind"})
+    np.testing.assert_array_equal(again.samples(t).twist, path.samples(t).twist)
+    # Too short to run up to: that stretch alone is refused, with the feed that it reaches.
+    short = sm.Feed(sm.Polyline(legs), 0.05, stretches=[[0.1, 1.0], [0.12, 0.05]])
+    kept = {item.asked: item for item in short.feeds}
+    assert kept[0.05].kept
+    assert not kept[1.0].kept
+    assert 0.05 < kept[1.0].slowest < 0.5
+
+
+@pytest.mark.parametrize(
+    "stretches", [[[0.3, 0.1], [0.2, 0.1]], [[0.1, 0.0]], [[-0.1, 0.1]], [[0.1, 0.1, 0.1]], []]
+)
+def test_stretches_that_are_none(stretches: list[list[float]]) -> None:
+    path = sm.Polyline(np.array([[0.4, -0.2, 0.3], [0.4, 0.2, 0.3]]))
+    with pytest.raises(sm.PathError, match="feed: stretches"):
+        sm.Feed(path, 0.05, stretches=stretches)
+
+
+def test_a_table_has_a_feed_from_each_pose_on(tmp_path: Path) -> None:
+    file = tmp_path / "seam.csv"
+    rows = [f"{400.0},{20.0 * k},300,{30.0 if k < 5 else 60.0}" for k in range(11)]
+    file.write_text("\n".join(["x_mm,y_mm,z_mm,feed_mm", *rows]) + "\n", encoding="utf-8")
+    for corners in ("blend", "round"):
+        path = sm.read_path(file, corners=corners, acceleration=0.4)
+        assert isinstance(path, sm.Feed)
+        assert [item.asked for item in path.feeds] == [0.03, 0.06]
+        assert all(item.kept for item in path.feeds)
+        assert path.to_dict()["acceleration"] == 0.4
+    with pytest.raises(sm.FileFormatError, match="has a column feed, so that feed has no effect"):
+        sm.read_path(file, feed=0.1)
+    file.write_text("x,y,z,feed\n0.4,0,0.3,0.1\n0.4,0.1,0.3,-1\n", encoding="utf-8")
+    with pytest.raises(sm.FileFormatError, match="line 3: feed is -1 m/s, expected a number above"):
+        sm.read_path(file)
+    file.write_text("x,y,z\n0.4,0,0.3\n0.4,0.1,0.3\n", encoding="utf-8")
+    with pytest.raises(sm.FileFormatError, match="turn_rate has no effect without a feed"):
+        sm.read_path(file, duration=1.0, turn_rate=2.0)

@@ -1,5 +1,9 @@
 """The fastest motion: never slower than x = 0 at its fastest, all limits kept, none left unused."""
 
+import dataclasses
+import time
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -62,3 +66,68 @@ def test_arms_and_paths_without_a_fastest_pace(panda: sm.RobotModel) -> None:
         sm.fastest(sm.Problem(panda, sm.Line(start, away, 4.0), start=PANDA_HOME))
     with pytest.raises(sm.ProblemError, match="problem is 1, expected a Problem"):
         sm.fastest(1)
+
+
+def slow_line() -> sm.Problem:
+    panda = robot_named("panda")
+    start = panda.pose(PANDA_HOME)
+    end = pin.SE3(start.rotation, start.translation + np.array([-0.1, 0.2, 0.1]))
+    return sm.Problem(panda, sm.Line(start, end, 2.0), start=PANDA_HOME)
+
+
+def test_it_is_no_slower_than_the_motion_that_is_best_by_the_costs(found: sm.Fastest) -> None:
+    problem = dataclasses.replace(
+        found.plan.problem, path=slow_line().path, constraints=(sm.JointPositionLimits(),)
+    )
+    assert found.duration <= found.retimed < np.inf
+    assert found.status is sm.Status.CONVERGED
+    assert found.plan.limits_used.busy > 0.9
+    slow = sm.plan(problem)
+    assert slow.limits_used.busy < 0.1
+
+
+def test_an_interruption_and_a_deadline_keep_the_best_so_far(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupting(stage: str, done: int, total: int) -> None:
+        if stage == "fastest":
+            raise KeyboardInterrupt
+
+    stopped = sm.fastest(slow_line(), progress=interrupting)
+    assert stopped.status is sm.Status.INTERRUPTED
+    assert stopped.plan.certificate.verified
+    assert stopped.times == ()
+    assert stopped.duration == min(stopped.retimed, stopped.pseudo_inverse)
+
+    clock, real = [0.0], time.perf_counter
+    monkeypatch.setattr(time, "perf_counter", lambda: real() + clock[0])
+
+    def late(stage: str, done: int, total: int) -> None:
+        clock[0] += 100.0 * (stage == "fastest")
+
+    out = sm.fastest(slow_line(), deadline=90.0, progress=late)
+    assert out.status is sm.Status.DEADLINE
+    assert out.plan.certificate.verified
+    with pytest.raises(sm.PlanError, match="no motion keeps all limits at any pace in 1e-06 s"):
+        sm.fastest(slow_line(), deadline=1e-6)
+
+
+def test_a_file_may_ask_for_the_fastest_motion(tmp_path: Path) -> None:
+    file = tmp_path / "line.toml"
+    sm.write_problem(slow_line(), file)
+    text = file.read_text(encoding="utf-8")
+    file.write_text(f'goal = "fastest"\n{text}', encoding="utf-8")
+    job = sm.read_job(file)
+    assert job.goal == "fastest"
+
+    def interrupting(stage: str, done: int, total: int) -> None:
+        if stage == "fastest":
+            raise KeyboardInterrupt
+
+    assert job.plan(progress=interrupting).path.duration < 1.0
+    file.write_text(f'goal = "fastest"\nmax_evaluations = 3\n{text}', encoding="utf-8")
+    with pytest.raises(sm.ProblemError, match="max_evaluations: has no effect on the fastest"):
+        sm.read_job(file).plan()
+    file.write_text(f'goal = "quick"\n{text}', encoding="utf-8")
+    with pytest.raises(sm.FileFormatError, match="goal"):
+        sm.read_job(file)

@@ -3,13 +3,22 @@
 import dataclasses
 
 import numpy as np
+import pinocchio as pin
 import pytest
+from scipy.interpolate import CubicSpline
+from scipy.optimize import linprog
+from scipy.sparse import lil_array, vstack
 
 import selfmotion as sm
 from selfmotion.robot import Dynamics
 from support.arms import PANDA_HOME, robot_named
 
 ACCELERATION = 6.0
+# A pace is the fastest where some limit is used by so much at nearly all times.
+USED, BUSY = 0.95, 0.95
+# How much longer a motion may be than the optimum of its limits of velocity and acceleration on a
+# grid: limits are kept between its points, and accelerations do not jump.
+LONGER = 1.02
 
 
 @pytest.fixture(scope="module")
@@ -21,8 +30,6 @@ def fast() -> sm.Plan:
     return sm.plan(sm.Problem(panda, path, start=PANDA_HOME, constraints=only))
 
 
-# toppra 0.6 still asks NumPy for a name that has another one now.
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_retimed_plans_keep_limits_and_geometry(fast: sm.Plan, tmp_path) -> None:
     assert not fast.certificate.verified
     slow = sm.retime(fast, ACCELERATION)
@@ -80,7 +87,6 @@ def test_a_retimed_plan_keeps_what_the_plan_was_asked_to_keep(panda: sm.RobotMod
             sm.retime(plan, bad)
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_retiming_keeps_torques_and_what_the_tool_may(panda: sm.RobotModel) -> None:
     path = sm.Circle.around(panda.pose(PANDA_HOME), 0.12, 4.0, normal=(1.0, 0.0, 0.0))
     slow = sm.plan(sm.Problem(panda, path, start=PANDA_HOME)).require()
@@ -94,3 +100,99 @@ def test_retiming_keeps_torques_and_what_the_tool_may(panda: sm.RobotModel) -> N
         free, kept = sm.retime(slow, 15.0), sm.retime(asked, 15.0)
         assert kept.certificate.verified, kept.certificate.verdict
         assert free.path.duration < kept.path.duration < slow.path.duration
+
+
+def cornered(robot: sm.RobotModel, start: np.ndarray) -> sm.Path:
+    """Straight legs around corners of 2 mm, at a constant feed."""
+    pose = robot.pose(start)
+    legs = np.array(
+        [[0, 0, 0], [0, 0.1, 0], [0, 0.1, 0.03], [0, 0, 0.03], [0, 0, 0.06], [0, 0.1, 0.06]]
+    )
+    return sm.Feed(
+        sm.Polyline(pose.translation + legs, np.tile(_quaternion(pose), (6, 1)), tolerance=2e-3),
+        0.1,
+    )
+
+
+def _quaternion(pose: pin.SE3) -> np.ndarray:
+    x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
+    return np.array([w, x, y, z])
+
+
+def optimum(motion: sm.Trajectory, velocity: np.ndarray, acceleration: np.ndarray) -> float:
+    """Return the least time of a joint path by limits on a grid over its length: by HiGHS."""
+    q_grid = motion(np.linspace(motion.t[0], motion.t[-1], 20001))
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(q_grid, axis=0), axis=1)))
+    keep = np.append(True, np.diff(length) > 1e-12)
+    s = np.linspace(0.0, length[-1], 1501)
+    path = CubicSpline(length[keep], q_grid[keep])
+    slope, bend, h = path(s, 1), path(s, 2), s[1]
+    n, count = slope.shape[1], len(s)
+    most = (velocity / np.maximum(np.abs(slope), 1e-12)).min(axis=1) ** 2
+    most[0] = most[-1] = 0.0
+    rows, right = [], []
+    for k in range(count - 1):
+        for at in (k, k + 1):
+            table = lil_array((n, count))
+            table[:, [k]] = -(slope[at] / (2.0 * h))[:, None]
+            table[:, [k + 1]] = (slope[at] / (2.0 * h))[:, None]
+            table[:, [at]] += bend[at][:, None]
+            rows += [table, -table]
+            right += [acceleration, acceleration]
+    found = linprog(
+        -np.ones(count),
+        A_ub=vstack(rows, format="csr"),
+        b_ub=np.concatenate(right),
+        bounds=[(0.0, value) for value in most],
+        method="highs",
+    )
+    rate = np.sqrt(np.maximum(found.x, 0.0))
+    return float((2.0 * h / (rate[1:] + rate[:-1])).sum())
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda"])
+def test_no_motion_along_the_path_is_much_faster(name: str) -> None:
+    robot = robot_named(name)
+    start = robot.dexterous_configuration()
+    only = (sm.JointPositionLimits(),)
+    plan = sm.plan(
+        sm.Problem(robot, cornered(robot, start), "position", start=start, constraints=only)
+    )
+    velocity = np.full(robot.dof, 1.5)
+    acceleration = np.minimum(8.0, robot.acceleration_limit)
+    fast = sm.retime(plan, acceleration, velocity)
+    assert fast.certificate.verified, fast.certificate.verdict
+    motion = fast.trajectory
+    assert motion.duration <= LONGER * optimum(plan.trajectory, velocity, acceleration)
+    t = np.linspace(0.0, motion.duration, 5001)
+    used = np.maximum(np.abs(motion(t, 1)) / velocity, np.abs(motion(t, 2)) / acceleration).max(
+        axis=1
+    )
+    assert used.max() <= 1.0
+    assert np.mean(used >= USED) >= BUSY
+
+
+def test_jerks_cost_time_and_are_kept(panda: sm.RobotModel) -> None:
+    path = cornered(panda, PANDA_HOME)
+    times = []
+    for jerk in (1000.0, np.inf):
+        limits = () if jerk == np.inf else (sm.JointJerkLimits(jerk, replace=True),)
+        only = (sm.JointPositionLimits(), *limits)
+        plan = sm.plan(sm.Problem(panda, path, "position", start=PANDA_HOME, constraints=only))
+        fast = sm.retime(plan, 8.0, 1.5)
+        assert fast.certificate.verified, fast.certificate.verdict
+        assert np.abs(fast.trajectory.extremes(3)[1]).max() <= jerk
+        times.append(fast.trajectory.duration)
+    assert times[0] > times[1]
+
+
+def test_a_motion_that_begins_moving_goes_on_as_it_did(panda: sm.RobotModel) -> None:
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0, normal=(1.0, 0.0, 0.0))
+    free = sm.plan(sm.Problem(panda, path, start=PANDA_HOME))
+    qd = free.trajectory.qd[0]
+    kept = (*free.problem.constraints, sm.StartVelocity(qd), sm.StartAcceleration(np.zeros(7)))
+    plan = dataclasses.replace(free, problem=dataclasses.replace(free.problem, constraints=kept))
+    fast = sm.retime(plan, 8.0)
+    assert np.abs(fast.trajectory.qd[0] - qd).max() <= 1e-9
+    assert np.abs(fast.trajectory.qd[-1]).max() <= 1e-9
+    assert fast.trajectory.duration < 0.7 * free.trajectory.duration

@@ -53,7 +53,8 @@ class Item:
         parts = (*paths, job.problem.null_motion, *job.problem.costs)
         own = {type(part).__module__ for part in (*parts, *job.problem.constraints)}
         modules = sorted(name for name in own if not name.startswith(("selfmotion.", "__main__")))
-        return {"problem": problem, "options": job.settings, "modules": modules}
+        options = {**job.settings, "goal": job.goal}
+        return {"problem": problem, "options": options, "modules": modules}
 
     def forget(self) -> None:
         """Let go of the task, which is large and not needed any more."""

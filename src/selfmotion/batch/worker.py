@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import SelfmotionError
-from selfmotion.planning import plan
+from selfmotion.formats import Job
 from selfmotion.problem import problem_from_dict
 
 # Arms and bodies of problems planned before; forgotten when there are many.
@@ -35,7 +35,7 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
             importlib.import_module(name)
         if len(_known) > _MANY:
             _known.clear()
-        found = plan(problem_from_dict(task["problem"], _known), **task["options"])
+        found = Job(problem_from_dict(task["problem"], _known), **task["options"]).plan()
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "plan.npz")
             found.save(file)

@@ -16,6 +16,7 @@ from selfmotion.cli.app import (
     NOT_VERIFIED,
     VERIFIED,
     app,
+    fastest_with_progress,
     plan_with_progress,
     stages,
     terminal,
@@ -79,7 +80,11 @@ def plan(
     given = {key: value for key, value in asked.items() if value is not None}
     for remark in job.problem.remarks:
         stages.print(f"note: {remark}", markup=False, soft_wrap=True)
-    result = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
+    if job.goal == "fastest":
+        options.refuse({"from": warm, **given}, "the fastest motion", "its own")
+        result = fastest_with_progress(job).plan
+    else:
+        result = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
     if as_json:
         terminal.print_json(data=json_tables.plan_json(result))
     else:

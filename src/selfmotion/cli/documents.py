@@ -158,20 +158,30 @@ def read(
 
     Options that say what a problem file says itself are refused beside one.
     """
-    file = Path(given) if Path(given).suffix in SUFFIXES else None
-    if file is None:
+    if Path(given).suffix not in SUFFIXES:
         document = Shell.of(context).document(given, warm_start)
-    else:
-        typed = _typed(context)
-        if typed:
-            raise sm.ProblemError(
-                f"{file}: the problem is in the file, so that {typed[0]} has no effect; change the "
-                f"file, or use --set KEY=VALUE"
-            )
-        document = read_document(file)
-        if "grid" in document:
-            count = len(grid_documents(document))
-            raise sm.ProblemError(f"{file}: grid has {count} problems: use `selfmotion batch`")
+        return _with_settings(document, None, settings, allow_code)
+    typed = _typed(context)
+    if typed:
+        raise sm.ProblemError(
+            f"{given}: the problem is in the file, so that {typed[0]} has no effect; change the "
+            f"file, or use --set KEY=VALUE"
+        )
+    return of_file(Path(given), settings, allow_code)
+
+
+def of_file(file: Path, settings: list[str], allow_code: bool) -> sm.Job:
+    """Return the job of a problem file."""
+    document = read_document(file)
+    if "grid" in document:
+        count = len(grid_documents(document))
+        raise sm.ProblemError(f"{file}: grid has {count} problems: use `selfmotion batch`")
+    return _with_settings(document, file, settings, allow_code)
+
+
+def _with_settings(
+    document: dict[str, Any], file: Path | None, settings: list[str], allow_code: bool
+) -> sm.Job:
     for text in settings:
         set_key(document, *parse_setting(text))
     return job_of(document, file, allow_code=allow_code)

@@ -66,6 +66,10 @@ def plan_json(plan: Plan) -> dict[str, Any]:
         "status": report.status.value,
         "message": report.message,
         "duration": plan.trajectory.duration,
+        "limits_used": {
+            "busy": plan.limits_used.busy,
+            "shares": dict(plan.limits_used.shares),
+        },
         "certificate": certificate_json(plan.certificate, plan.approaches),
     }
 

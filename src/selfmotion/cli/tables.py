@@ -63,8 +63,13 @@ def show(plan: Plan, console: Console) -> None:
     if report.gap is not None:
         console.print(_distance(report.gap))
     show_certificate(plan.certificate, plan.approaches, console)
+    if plan.limits_used.busy > _SELDOM:
+        told = f"{plan.trajectory.duration:.4g} s; limits used fully {plan.limits_used}"
+        console.print(told, markup=False, soft_wrap=not console.is_terminal)
 
 
+# For less of the time than this it is not told which limits are used.
+_SELDOM = 0.1
 # How much of a limit is used.
 _SHARE = "{:.1%} of its limit"
 

@@ -45,7 +45,7 @@ class Cost(Saved, ABC, family="cost"):
         What to call the cost in reports.
     is_quadratic : bool
         Whether G is of second degree in q and its derivatives, with `curvature` for all that bends:
-        Newton's method needs that.
+        Newton's method takes that, and differences of gradients of other costs.
     """
 
     name: str

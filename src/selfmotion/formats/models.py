@@ -35,12 +35,15 @@ from selfmotion.formats.field_types import (
     Whole,
 )
 from selfmotion.formats.poses import ORIENTATIONS
+from selfmotion.formats.problem_parts import FEED_BOUNDS
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import QuasiNewton
 from selfmotion.path import Path, TimeLaw
 from selfmotion.planning import Search
 from selfmotion.task import SE3, Damping, Relaxation, Task
 
+# What is looked for: the motion that is best by its costs, or the fastest one.
+GOALS = ("best", "fastest")
 # Kinds that no file names: what is missing of a plan, a cost that damping adds, functions (which
 # are named by module:attribute).
 _NOT_IN_FILES = {"LostCost", "OffPath", "FunctionCost"}
@@ -51,7 +54,8 @@ _Fields = dict[str, tuple[Any, Any]]
 # Where a file says more, or says it otherwise, than the class's own signature.
 _LAWS: Any = Literal[tuple(law.value for law in TimeLaw)]
 _SHAPE: _Fields = {"frame": (Pose, None)}
-_PACED: _Fields = {"duration": (Number, None), "feed": (Number, None), **_SHAPE}
+_BOUNDS: _Fields = dict.fromkeys(FEED_BOUNDS, (Number, None))
+_PACED: _Fields = {"duration": (Number, None), "feed": (Number, None), **_BOUNDS, **_SHAPE}
 _OWN: Mapping[str, _Fields] = {
     "circle": {"start": (Pose, None), "center": (Numbers, None), "radius": (Number, None),
                "normal": (Numbers, [0.0, 0.0, 1.0]), **_PACED},
@@ -61,7 +65,7 @@ _OWN: Mapping[str, _Fields] = {
     "twist": {"start": (Pose, ...), "breaks": (Numbers, ...), "coefficients": (Numbers, ...)},
     "retimed": {"path": (Table, ...)},
     "section": {"path": (Table, ...)},
-    "feed": {"path": (Table, ...), **_SHAPE},
+    "feed": {"path": (Table, ...), "stretches": (list[Numbers], None), **_SHAPE},
     "joined": {"pieces": (list[Table], ...)},
     "placed": {"path": (Table, ...)},
     "reversed": {"path": (Table, ...)},
@@ -97,6 +101,7 @@ _PATH_FILE: _Fields = {
     **dict.fromkeys(("feed", "duration", "jump", "ramp"), (Number, None)),
     **dict.fromkeys(("tolerance", "corner_angle"), (Number, None)),
     "corners": (Text, None),
+    **_BOUNDS,
 }
 # A cost that is a function of one's own.
 _FUNCTION: _Fields = {
@@ -139,6 +144,7 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
         "damping": (model_of(Damping), None),
         "rest": (bool, True),
         "joint_limits": (Text, None),
+        "goal": (Literal[GOALS], None),
         "search": (model_of(Search), None),
         "optimiser": (model_of(QuasiNewton), None),
         "tolerance": (model_of(Tolerance), None),

@@ -1,5 +1,6 @@
 """Tool motions from files: tables, arrays, and what ROS writes."""
 
+from collections.abc import Mapping
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -24,6 +25,8 @@ _ROUND = 2.0 * np.pi + 1e-6
 _JUMP = 0.5
 # Rotations by more than this [rad] are a jump, too: their direction would be a guess.
 _FLIP = 2.6
+# Times this near [s] are the same.
+_MOMENT = 1e-9
 # Legs that bend by more than this [rad] make a corner, unless another angle is given.
 _BEND = np.pi / 6
 
@@ -37,6 +40,11 @@ def read_path(
     corners: str = "blend",
     tolerance: float = 1e-3,
     corner_angle: float | None = None,
+    turn_rate: float | None = None,
+    acceleration: float | None = None,
+    turn_acceleration: float | None = None,
+    smoothing: float | None = None,
+    within: float | None = None,
 ) -> Path:
     """Read a tool motion through poses.
 
@@ -44,7 +52,8 @@ def read_path(
     .csv .txt .tsv  columns in any order: ``t`` [s], ``x,y,z`` [m], and one of
                     ``qw,qx,qy,qz``, ``rx,ry,rz`` (rotation vector [rad]),
                     ``roll,pitch,yaw`` [rad], ``nx,ny,nz`` (the tool's z axis) or
-                    none; ``x_mm`` and ``roll_deg`` are in those units
+                    none; ``feed`` [m/s] from a pose on, instead of ``t``; ``x_mm``,
+                    ``feed_mm`` and ``roll_deg`` are in those units
     .npy            (N, 4, 4) poses, or a table (N, 3) x,y,z; (N, 4) t,x,y,z;
                     (N, 7) x,y,z,qw,qx,qy,qz; (N, 8) with t first
     .yaml .json     ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``
@@ -66,6 +75,8 @@ def read_path(
         [m].
     corner_angle : float, optional
         As in `Waypoints`.
+    turn_rate, acceleration, turn_acceleration, smoothing, within : float, optional
+        Bounds of a feed, as in `Feed`.
 
     Raises
     ------
@@ -91,25 +102,47 @@ def read_path(
     _check_jumps(path, rows, rotations, jump)
     turns = _quaternions(rotations) if rows.orientation else None
     t = _times(path, rows, feed, duration)
+    asked = {
+        "turn_rate": turn_rate,
+        "acceleration": acceleration,
+        "turn_acceleration": turn_acceleration,
+        "smoothing": smoothing,
+        "within": within,
+    }
+    bounds = {name: value for name, value in asked.items() if value is not None}
+    feeds = rows.feed if feed is None else np.full(len(rows.positions), feed)
+    if bounds and feeds is None:
+        raise FileFormatError(f"{path}: {next(iter(bounds))} has no effect without a feed")
     try:
         as_choice(corners, "corners", ("blend", "stop", "round"), PathError)
         if corners == "round":
-            if feed is None:
+            if feeds is None:
                 raise PathError("corners are 'round', which needs a feed [m/s]; give it")
-            return Feed(Polyline(rows.positions, turns, tolerance=tolerance), feed)
+            legs = Polyline(rows.positions, turns, tolerance=tolerance)
+            return _at_feed(legs, legs.pose_times, feeds, bounds)
         bend = _BEND if corner_angle is None else corner_angle
         through = Waypoints(t, rows.positions, turns, corners=corners, corner_angle=bend)
         through.samples([0.0])
-        return through if feed is None else _at_feed(through, feed)
+        if feeds is None:
+            return through
+        pieces: list[Path] = []
+        passed = t - t[0]
+        for piece in through.between_corners():
+            # From one rest to the next.
+            here = (passed >= -_MOMENT) & (passed <= piece.duration + _MOMENT)
+            pieces.append(_at_feed(piece, passed[here], feeds[here], bounds))
+            passed = passed - piece.duration
+        return pieces[0] if len(pieces) == 1 else Joined(pieces)
     # Splines refuse times that differ, but by less than they can divide by.
     except (PathError, ValueError) as error:
         raise FileFormatError(f"{path}: {error}") from error
 
 
-def _at_feed(through: Waypoints, feed: float) -> Path:
-    """Return waypoints at a constant feed, from one rest to the next."""
-    pieces = [Feed(piece, feed) for piece in through.between_corners()]
-    return pieces[0] if len(pieces) == 1 else Joined(pieces)
+def _at_feed(path: Path, t: Array, feeds: Array, bounds: Mapping[str, float]) -> Feed:
+    """Return a path at the feeds (N,) that begin at its times (N,); the last one has no way."""
+    changes = 1 + np.flatnonzero(np.diff(feeds[:-1]))
+    stretches = np.stack([t[changes], feeds[changes]], axis=1) if len(changes) else None
+    return Feed(path, float(feeds[0]), stretches=stretches, **bounds)
 
 
 def _check_rows(file: FilePath, rows: PoseRows) -> None:
@@ -183,11 +216,23 @@ def _remedy(jump: float) -> str:
 def _times(file: FilePath, rows: PoseRows, feed: float | None, duration: float | None) -> Array:
     given = {"feed": feed, "duration": duration}
     named = [name for name, value in given.items() if value is not None]
+    columns = [name for name, own in (("t", rows.t), ("feed", rows.feed)) if own is not None]
+    if len(columns) > 1:
+        raise FileFormatError(f"{file}: has times and a column feed; keep one of them")
+    if columns and named:
+        what = "times" if rows.t is not None else "a column feed"
+        raise FileFormatError(f"{file}: has {what}, so that {named[0]} has no effect; drop one")
     if rows.t is not None:
-        if named:
-            raise FileFormatError(f"{file}: has times, so that {named[0]} has no effect; drop one")
         return rows.t
-    if len(named) != 1:
+    if rows.feed is not None:
+        bad = np.flatnonzero(~(rows.feed > 0.0) | ~np.isfinite(rows.feed))
+        if bad.size:
+            row = int(bad[0])
+            raise FileFormatError(
+                f"{file}: {rows.places[row]}: feed is {rows.feed[row]:.6g} m/s, expected a number "
+                f"above 0"
+            )
+    elif len(named) != 1:
         raise FileFormatError(
             f"{file}: has no times; give either a feed [m/s] or a duration [s]"
             + (", not both" if named else "")
@@ -199,6 +244,8 @@ def _times(file: FilePath, rows: PoseRows, feed: float | None, duration: float |
             f"{file}: {rows.places[int(still[0]) + 1]}: the tool does not move from the pose "
             f"before, which takes no time by feed or duration; give a column t"
         )
+    if rows.feed is not None:
+        return np.append(0.0, np.cumsum(steps / rows.feed[:-1]))
     length = np.append(0.0, np.cumsum(steps))
     return length / feed if feed is not None else length * (float(duration or 0.0) / length[-1])
 

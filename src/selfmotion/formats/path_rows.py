@@ -27,10 +27,13 @@ _COLUMNS: Mapping[tuple[str, ...], str] = {
 }
 
 
-_KNOWN = {"t", *_POSITION, *(name for names in _COLUMNS for name in names)}
+_KNOWN = {"t", "feed", *_POSITION, *(name for names in _COLUMNS for name in names)}
 
 
-_UNITS = {"_mm": (_POSITION, 1e-3), "_deg": (("rx", "ry", "rz", "roll", "pitch", "yaw"), None)}
+_UNITS = {
+    "_mm": ((*_POSITION, "feed"), 1e-3),
+    "_deg": (("rx", "ry", "rz", "roll", "pitch", "yaw"), None),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +50,8 @@ class PoseRows:
     values : (N, …)
         Numbers of the orientations.
     t : (N,) or None
+    feed : (N,) or None
+        From each pose on [m/s].
     """
 
     places: Sequence[str]
@@ -54,6 +59,7 @@ class PoseRows:
     orientation: str
     values: Array
     t: Array | None
+    feed: Array | None = None
 
 
 def _read_table(file: FilePath) -> PoseRows:
@@ -85,6 +91,7 @@ def _read_table(file: FilePath) -> PoseRows:
         _COLUMNS[given[0]] if given else "",
         values,
         columns.get("t"),
+        columns.get("feed"),
     )
 
 
@@ -98,7 +105,7 @@ def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, A
                 name, scale = title.removesuffix(suffix), factor or np.pi / 180.0
         if name not in _KNOWN:
             raise FileFormatError(
-                f"{file}: unknown column '{title}', expected t, x,y,z and "
+                f"{file}: unknown column '{title}', expected t, feed, x,y,z and "
                 f"{' or '.join(','.join(names) for names in _COLUMNS)}"
             )
         if name in columns:

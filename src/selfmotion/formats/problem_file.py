@@ -26,7 +26,7 @@ from selfmotion.formats.joint_limits import read_joint_limits
 from selfmotion.formats.problem_parts import obstacle, path_of, start_of
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import LineSearch, Optimizer, QuasiNewton
-from selfmotion.planning import Search, plan
+from selfmotion.planning import Fastest, Search, fastest, plan
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
 from selfmotion.robot import NAMED_ARMS, NAMED_PARTS, RobotModel, load_robot
@@ -50,6 +50,8 @@ class Job:
         See `plan`.
     outputs : tuple of Path
         Files to write.
+    goal : {"best", "fastest"}
+        Whether `plan` looks for the motion that is best by its costs, or for the `fastest` one.
     """
 
     problem: Problem
@@ -58,6 +60,7 @@ class Job:
     tolerance: Tolerance | None = None
     max_evaluations: int | None = None
     outputs: tuple[FilePath, ...] = ()
+    goal: str = "best"
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -66,8 +69,24 @@ class Job:
         return {name: getattr(self, name) for name in names}
 
     def plan(self, **options: Any) -> Plan:
-        """Plan it; `options` are further ones of `plan`."""
+        """Plan it; `options` are further ones of `plan`, or of `fastest` where that is the goal."""
+        if self.goal == "fastest":
+            return self.fastest(**options).plan
         return plan(self.problem, **self.settings, **options)
+
+    def fastest(self, **options: Any) -> Fastest:
+        """Return its fastest motion; `options` are further ones of `fastest`.
+
+        Raises
+        ------
+        ProblemError
+            The file has settings of an optimiser, which `fastest` has not.
+        """
+        for name in ("optimizer", "max_evaluations"):
+            if getattr(self, name) is not None:
+                said = {"optimizer": "optimiser"}.get(name, name)
+                raise ProblemError(f"{said}: has no effect on the fastest motion; leave it out")
+        return fastest(self.problem, search=self.search, tolerance=self.tolerance, **options)
 
 
 def read_problem(file: str | FilePath, *, allow_code: bool = False) -> Problem:
@@ -301,7 +320,7 @@ class _Reader:
         if "max_evaluations" in table:
             found["max_evaluations"] = table["max_evaluations"]
         outputs = tuple(self._beside(name) for name in table.get("outputs", ()))
-        return {**found, "outputs": outputs}
+        return {**found, "outputs": outputs, "goal": table.get("goal", "best")}
 
     def _beside(self, name: str) -> FilePath:
         return FilePath(name) if self.file is None else self.file.parent / name

@@ -23,6 +23,9 @@ from selfmotion.task import Task
 if TYPE_CHECKING:
     from selfmotion.task import SE3
 
+# What bounds a feed in tables of tool motions.
+FEED_BOUNDS = ("turn_rate", "acceleration", "turn_acceleration", "smoothing", "within")
+
 
 def path_of(
     given: Mapping[str, Any],
@@ -43,7 +46,11 @@ def path_of(
         if frame is not None:
             raise ProblemError("frame: needs start, the tool's first pose in that frame")
         values["start"] = robot.pose(start)
-    feed = values.pop("feed", None) if kind in ("circle", "line") else None
+    shape = kind in ("circle", "line")
+    feed = values.pop("feed", None) if shape else None
+    bounds = {name: values.pop(name) for name in FEED_BOUNDS if shape and name in values}
+    if bounds and feed is None:
+        raise ProblemError(f"{next(iter(bounds))}: has no effect without a feed")
     if kind in ("circle", "line"):
         _exactly_one({**values, "feed": feed} if feed else values, "duration", "feed")
         # At a feed, the shape's own pace does not matter.
@@ -60,7 +67,7 @@ def path_of(
             path = _line(values)
         case _:
             path = _restored(values)
-    path = path if feed is None else Feed(path, feed)
+    path = path if feed is None else Feed(path, feed, **bounds)
     return path if frame is None else Placed(path, frame)
 
 

@@ -221,8 +221,9 @@ class FreeNullMotion(RefinedNullMotion):
     """Any ε(t): the motion is optimised at nodes, as many as its cost asks for.
 
     Newton's method finds where each node lies on its self-motion. Where that does not apply (the
-    tool may leave the path, joint jerks have a cost, the end is given), or leads nowhere, it is
-    what `RefinedNullMotion` is. `Report.null_motion` tells what became of it.
+    tool may leave the path, joint jerks have a cost, the end is given, limits of acceleration bind
+    or bodies are too near), or leads nowhere, it is what `RefinedNullMotion` is.
+    `Report.null_motion` tells what became of it.
     """
 
 

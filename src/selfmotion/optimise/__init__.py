@@ -1,5 +1,6 @@
 """Minimisation; knows only numbers."""
 
+from selfmotion.optimise.banded import BandedRows as BandedRows, banded_optimum as banded_optimum
 from selfmotion.optimise.base import (
     Callback as Callback,
     ConstrainedFunction as ConstrainedFunction,

@@ -8,12 +8,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, Ints, PathError, as_number, read_only, series
+from selfmotion.basics import (
+    Array,
+    Flags,
+    Ints,
+    PathError,
+    as_number,
+    as_numbers,
+    read_only,
+    series,
+)
 from selfmotion.path.base import STILL, Path, PathSamples, PathSeries, _Derived, check_path
 from selfmotion.path.feed_kept import FeedKept
 from selfmotion.path.pace import Pace, times_along, times_when
-
-Flags = npt.NDArray[np.bool_]
 
 # What holds a tool that is slower than its feed.
 _CAUSES = "the turn rate", "the acceleration in a bend", "the turn acceleration in a bend"
@@ -67,6 +74,10 @@ class Feed(_Derived, kind="feed"):
     within : float
         What may be missing of the feed, as a share, but in run-up, run-down and rounded corners:
         a certificate judges that.
+    stretches : (M, 2), optional
+        Times of the original [s], increasing, and the feed from each of them on [m/s], `feed`
+        before the first. The tool runs up to a faster feed, and down to a slower one before that
+        begins.
 
     Raises
     ------
@@ -84,6 +95,7 @@ class Feed(_Derived, kind="feed"):
         turn_acceleration: float = 10.0,
         smoothing: float = 0.05,
         within: float = 0.02,
+        stretches: npt.ArrayLike | None = None,
     ) -> None:
         self._path = check_path(path, "feed: path").at_constant_speed()
         given = {
@@ -97,6 +109,10 @@ class Feed(_Derived, kind="feed"):
             name: as_number(value, f"feed: {name}", above=0.0, error=PathError)
             for name, value in given.items()
         }
+        self._own_feed = self._limits["feed"]
+        self._asked = self._checked(stretches)
+        # Elsewhere it is held below the fastest one.
+        self._limits["feed"] = float(self._asked[:, 1].max())
         if self.feed > _FASTEST:
             raise PathError(
                 f"feed: {self.feed:g} m/s is faster than any arm, expected at most {_FASTEST:g}: "
@@ -105,9 +121,28 @@ class Feed(_Derived, kind="feed"):
         self._within = as_number(within, "feed: within", above=0.0, most=1.0, error=PathError)
         self.duration = float(self._paces[-1][1])
 
+    def _checked(self, stretches: npt.ArrayLike | None) -> Array:
+        """Return when which feed begins, with that of the start, (M + 1, 2)."""
+        table = as_numbers(
+            [] if stretches is None else stretches, "feed: stretches", error=PathError
+        )
+        if stretches is not None and (table.ndim != 2 or table.shape[1] != 2 or not len(table)):
+            raise PathError(f"feed: stretches have shape {table.shape}, expected (M, 2)")
+        table = table.reshape(-1, 2)
+        times = np.append(table[:, 0], self._path.duration)
+        if not (np.all(np.diff(times) > 0.0) and times[0] >= 0.0 and np.all(table[:, 1] > 0.0)):
+            raise PathError(
+                f"feed: stretches begin at {table[:, 0].tolist()} s with {table[:, 1].tolist()} "
+                f"m/s, expected times that increase from 0 on and end before "
+                f"{self._path.duration:.6g} s, and feeds above 0"
+            )
+        if len(table) and table[0, 0] == 0.0:
+            return table
+        return read_only(np.vstack([[0.0, self._own_feed], table]))
+
     @property
     def feed(self) -> float:
-        """Speed of the tool where nothing is in its way [m/s]."""
+        """Speed of the tool where nothing is in its way [m/s]; of several feeds the fastest."""
         return self._limits["feed"]
 
     @property
@@ -211,7 +246,7 @@ class Feed(_Derived, kind="feed"):
                 break
             # Where the tool all but rests, its pace changes much faster than elsewhere.
             sigma = np.union1d(sigma, middle[rough])
-        return self._with_crossings(sigma)
+        return np.union1d(self._with_crossings(sigma), self._asked[:, 0])
 
     def _with_crossings(self, sigma: Array) -> Array:
         """Return nodes, and where the turn rate begins or ends to hold the tool: a kink of σ(λ)."""
@@ -282,7 +317,19 @@ class Feed(_Derived, kind="feed"):
     def _caps(self) -> Array:
         """What the square of the pace may be by feed and accelerations, (K, 3)."""
         bends = 1.0 / np.maximum(self._bends / self._half, 1e-300)
-        return np.hstack([np.ones((len(bends), 1)), bends])
+        if len(self._asked) == 1:
+            return np.hstack([np.ones((len(bends), 1)), bends])
+        speeds = _sizes(self._path.samples(self._sigma).twist)[:, :1] / self._shares[:, None]
+        slower = self._feeds_at_nodes[:, None] / np.maximum(speeds, _RESTS * self.feed)
+        return np.hstack([np.minimum(slower, 1.0) ** 2, bends])
+
+    @cached_property
+    def _feeds_at_nodes(self) -> Array:
+        """The feed that is asked for at each node, where it changes the slower one, (K,)."""
+        times, feeds = self._asked.T
+        after = feeds[np.searchsorted(times, self._sigma, side="right") - 1]
+        before = feeds[np.maximum(np.searchsorted(times, self._sigma) - 1, 0)]
+        return np.asarray(np.minimum(before, after))
 
     @cached_property
     def _most(self) -> Array:
@@ -310,26 +357,44 @@ class Feed(_Derived, kind="feed"):
     @cached_property
     def feeds(self) -> tuple[FeedKept, ...]:
         """See `Path.feeds`: how well its own feed is kept."""
-        t, counts, causes = self._counted
+        t, counts, causes, asked = self._counted
         speeds = _sizes(self.samples(t).twist)[:, 0]
-        fastest = int(np.argmax(speeds))
-        if not counts.any():
+        lasts = np.gradient(t)
+        return tuple(
+            self._kept(float(feed), t, speeds, counts, causes, lasts, asked == feed)
+            for feed in dict.fromkeys(asked.tolist())
+        )
+
+    def _kept(
+        self,
+        feed: float,
+        t: Array,
+        speeds: Array,
+        counts: Flags,
+        causes: list[str],
+        lasts: Array,
+        here: Flags,
+    ) -> FeedKept:
+        """Return how well a feed is kept at those times where it is asked for."""
+        fastest = int(np.argmax(np.where(here, speeds, -np.inf)))
+        counted = counts & here
+        if not counted.any():
             # Too short to run up and down.
             found = float(speeds[fastest]), float(t[fastest]), 0.0, "run-up and run-down"
-            return (FeedKept(self.feed, self._within, float(speeds[fastest]), *found),)
-        slow = (speeds < (1.0 - self._within) * self.feed) & counts
-        worst = int(np.argmin(np.where(counts, speeds, np.inf)))
-        lasts = np.gradient(t) @ slow
-        found = float(speeds[worst]), float(t[worst]), float(lasts), causes[worst]
-        return (FeedKept(self.feed, self._within, float(speeds[fastest]), *found),)
+            return FeedKept(feed, self._within, float(speeds[fastest]), *found)
+        slow = (speeds < (1.0 - self._within) * feed) & counted
+        worst = int(np.argmin(np.where(counted, speeds, np.inf)))
+        found = float(speeds[worst]), float(t[worst]), float(lasts @ slow), causes[worst]
+        return FeedKept(feed, self._within, float(speeds[fastest]), *found)
 
     @property
-    def _counted(self) -> tuple[Array, Flags, list[str]]:
-        """Return when nodes are passed (K,), whether the feed counts there, and what holds it."""
+    def _counted(self) -> tuple[Array, Flags, list[str], Array]:
+        """Return when nodes are passed (K,), whether the feed counts, what holds it, and which."""
         sigma, window = self._sigma, self._limits["smoothing"]
         speeds = _sizes(self._path.samples(sigma).twist) / self._shares[:, None]
         causes = [_CAUSES[k] for k in np.argmin(self._caps, axis=1)[self._narrowest]]
-        turning = speeds[:, 0] < (1.0 - 0.5 * self._within) * self.feed
+        feeds = self._feeds_at_nodes
+        turning = speeds[:, 0] < (1.0 - 0.5 * self._within) * feeds
         corners = self._path.rounded
         inside = (sigma[:, None] >= corners[:, 0]) & (sigma[:, None] <= corners[:, 1])
         free = (inside.any(axis=1) | (speeds[:, 0] <= _RESTS * self.feed))[self._narrowest]
@@ -341,7 +406,9 @@ class Feed(_Derived, kind="feed"):
             own = free[part].copy()
             own[[0, -1]] = True
             times.append(start + pace.t + 0.5 * window)
-            exempt.append(own[anchors])
+            # Down to a slower feed, and up from one, the tool runs as at the ends.
+            slower = feeds[self._narrowest][part][anchors] < feeds[part]
+            exempt.append(own[anchors] | slower)
             held += [causes[first + k] for k in anchors]
         t, rests = np.concatenate(times), np.concatenate(exempt)
         # From there to the next node the pace changes, and near that its mean does.
@@ -354,7 +421,8 @@ class Feed(_Derived, kind="feed"):
             "the turn rate" if x and y == _CAUSES[0] else y
             for x, y in zip(every, held, strict=True)
         ]
-        return np.clip(t, 0.0, self.duration), counts, named
+        asked = np.concatenate([feeds[a : b + 1] for a, b in pairwise(stops)])
+        return np.clip(t, 0.0, self.duration), counts, named, asked
 
     @property
     def _half(self) -> Array:
@@ -362,7 +430,9 @@ class Feed(_Derived, kind="feed"):
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""
-        described = {**self._limits, "within": self._within}
+        described: dict[str, Any] = {**self._limits, "feed": self._own_feed, "within": self._within}
+        if len(self._asked) > 1:
+            described["stretches"] = self._asked.tolist()
         return {"kind": self.kind, "path": self._path.to_dict(), **described}
 
 

@@ -69,28 +69,33 @@ class Pace:
         return Pace(new, mean, speed, (spline(new, 1) - spline(before, 1)) / window)
 
     def __call__(self, t: Array, order: int = 0) -> Array:
-        """Return σ (`order` 0), dσ/dt (1) or d²σ/dt² (2) at times (K,)."""
+        """Return σ (`order` 0) or a derivative (1 to 3) at times (K,), after a sample at it."""
         found: Array = self._spline(t, nu=order)
         return np.clip(found, self.sigma[0], self.sigma[-1]) if order == 0 else found
 
     def series(self, middle: Array, half: Array) -> Array:
         """Return the majorants of σ on intervals between samples, (K + 1, I)."""
-        breaks, coefficients = self._pieces
-        return series.of_polynomial(series.of_pieces(breaks, coefficients, middle, half))
-
-    @cached_property
-    def _pieces(self) -> tuple[Array, Array]:
-        from scipy.interpolate import PPoly
-
-        pieces = PPoly.from_bernstein_basis(self._spline)
-        return pieces.x, pieces.c[::-1]
+        spline = self._spline
+        pieces = series.of_pieces(spline.x, spline.c[::-1], middle, half)
+        return series.of_polynomial(pieces)
 
     @cached_property
     def _spline(self) -> Any:
-        from scipy.interpolate import BPoly
+        from scipy.interpolate import CubicHermiteSpline, PPoly
 
-        given = [self.sigma, self.rate] + ([] if self.bend is None else [self.bend])
-        return BPoly.from_derivatives(self.t, np.stack(given, axis=1))
+        if self.bend is None:
+            return CubicHermiteSpline(self.t, self.sigma, self.rate)
+        h, start, end = np.diff(self.t), 0.5 * self.bend[:-1], 0.5 * self.bend[1:]
+        # What is left at the end of each interval, of the value and of two derivatives.
+        rise = (np.diff(self.sigma) - h * (self.rate[:-1] + h * start)) / h**3
+        gain = (np.diff(self.rate) - 2.0 * h * start) / h**2
+        surge = (end - start) / h
+        higher = (
+            (6.0 * rise - 3.0 * gain + surge) / h**2,
+            (-15.0 * rise + 7.0 * gain - 2.0 * surge) / h,
+            10.0 * rise - 4.0 * gain + surge,
+        )
+        return PPoly(np.stack([*higher, start, self.rate[:-1], self.sigma[:-1]]), self.t)
 
 
 def times_along(places: Array, rates: Array) -> Array:

@@ -136,6 +136,11 @@ class Polyline(Path, kind="polyline"):
         """When the corners are passed, without both ends [s], (N - 2,)."""
         return self._times[1:-1]
 
+    @property
+    def pose_times(self) -> Array:
+        """When each pose is passed, corners within their tolerance [s], (N,)."""
+        return self._times
+
     @cached_property
     def _edges(self) -> Array:
         legs = self._corners

@@ -1,23 +1,36 @@
 """The fastest motion along a path: pace and null motion, each in its turn."""
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, PlanError, ProblemError, Progress, per_joint, silent
+from selfmotion.basics import (
+    Array,
+    PlanError,
+    Progress,
+    as_number,
+    silent,
+)
+from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Constraint
 from selfmotion.costs import LimitUse
+from selfmotion.optimise import Status
 from selfmotion.path import Path, Retimed
+from selfmotion.planning.deadline import Deadline
 from selfmotion.planning.run import plan
+from selfmotion.planning.search import Search
 from selfmotion.planning.settings import COARSE, DEGREE, POWER, ROUND_GAIN, ROUNDS
 from selfmotion.problem import Problem, check_problem
-from selfmotion.result import Plan, retime
+from selfmotion.result import Plan, rate_limits, retime
 
 # What brings a path to another pace.
 Pace = Callable[[Path], Path]
+# After these there is nothing to be tried any more.
+_CUT = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,17 +41,22 @@ class Fastest:
     ----------
     plan : Plan
         The motion, from rest to rest.
-    duration : float
-        Its time [s].
     pseudo_inverse : float
-        Time of the motion x = 0 at its fastest [s]; inf where that keeps other limits at no pace.
+        Time of the motion x = 0 at its fastest [s]; inf where that keeps other limits at no pace,
+        or there was no time to find out.
+    retimed : float
+        Likewise of the motion that is best by the problem's own costs.
     times : tuple of float
-        After each round [s].
+        Of the best motion after each round [s].
+    status : Status
+        `DEADLINE` or `INTERRUPTED` where more rounds might have gained more.
     """
 
     plan: Plan
     pseudo_inverse: float
+    retimed: float
     times: tuple[float, ...]
+    status: Status = Status.CONVERGED
 
     @property
     def duration(self) -> float:
@@ -51,82 +69,154 @@ def fastest(
     acceleration: npt.ArrayLike | None = None,
     velocity: npt.ArrayLike | None = None,
     *,
+    search: Search | None = None,
+    tolerance: Tolerance | None = None,
+    deadline: float | None = None,
     progress: Progress = silent,
 ) -> Fastest:
     """Return the fastest motion along the problem's path, whatever its own pace and costs.
 
-    In turn, the pace is the fastest for the joint path (`retime`), and the null motion minimises
-    what is used of the limits at that pace (`LimitUse`); rounds go on while they gain, and the best
-    motion is returned. It is never slower than the pseudo-inverse's motion at its own fastest pace
-    is, where that can be driven at all.
+    The motion that is best by the problem's costs, and that of x = 0, each at its fastest pace
+    (`retime`), are begun with. Then in turn the null motion minimises what is used of the limits at
+    the pace found so far (`LimitUse`), and the pace is the fastest for that joint path; rounds go
+    on while they gain. The best motion is returned: it is never slower than those begun with.
 
     Parameters
     ----------
     problem : Problem
-        Its constraints are kept, its costs are not used.
+        Its constraints are kept; its costs decide only what is begun with.
     acceleration : (n,) or float, optional
         Limits [rad/s² or m/s²]; by default those of the arm's maker.
     velocity : (n,) or float, optional
         Limits [rad/s or m/s]; by default those that the problem asks for, or the URDF's.
+    search : Search, optional
+        See `plan`.
+    tolerance : Tolerance, optional
+        See `plan`.
+    deadline : float, optional
+        After so many seconds the best so far has to do; what is left, such as judging a motion,
+        takes some time more. Ctrl-C does the same.
     progress : callable, optional
-        Called with ``("fastest", round, rounds)``.
+        Called with ``("fastest", round, rounds)``, and with the stages of `plan` in between. It may
+        raise `KeyboardInterrupt` to stop.
 
     Raises
     ------
     ProblemError
-        No limits of acceleration are given or known, or toppra is not installed.
+        No limits of acceleration are given or known.
     PlanError
-        No motion that was found keeps all limits at any pace; says the last verdict.
+        No motion that was found keeps all limits at any pace, or none was found in time; says the
+        last verdict.
+    KeyboardInterrupt
+        The interruption came before there was a motion.
     """
     check_problem(problem)
-    v, a = _limits(problem, acceleration, velocity)
-    geometric = tuple(item for item in problem.constraints if not item.of_pace)
-    free = replace(problem, constraints=geometric, costs=(LimitUse(v, a, POWER),))
-    best: Plan | None = None
-    pace: Pace = _own
-    times, verdict, still = [], "", np.inf
-    for number in range(ROUNDS):
-        progress("fastest", number, ROUNDS)
-        planned = plan(replace(free, **free.along(pace)))
+    rounds = _Rounds(problem, *rate_limits(problem, acceleration, velocity))
+    clock = Deadline(np.inf)
+    if deadline is not None:
+        clock = Deadline.after(as_number(deadline, "deadline", above=0.0))
+    options = _Options(search, tolerance, clock, clock.telling(progress))
+    status = Status.CONVERGED
+    try:
+        rounds.run(options)
+    except KeyboardInterrupt:
+        # A plan in between may have seen first that it is late.
+        late = time.perf_counter() >= clock.end
+        status = Status.DEADLINE if late else Status.INTERRUPTED
+        if rounds.best is None and not late:
+            raise
+    if rounds.best is None:
+        when = f" in {deadline} s" if status is Status.DEADLINE else ""
+        raise PlanError(f"no motion keeps all limits at any pace{when}: {rounds.verdict}")
+    found = rounds.retimed
+    return Fastest(rounds.best, found["x = 0"], found["costs"], tuple(rounds.times), status)
+
+
+class _Options(NamedTuple):
+    """How each plan is made."""
+
+    search: Search | None
+    tolerance: Tolerance | None
+    clock: Deadline
+    progress: Progress
+
+    def plan(self, problem: Problem) -> Plan:
+        """Plan, in the time that is left; KeyboardInterrupt where something stopped it."""
+        self.clock.check()
+        left = self.clock.end - time.perf_counter()
+        try:
+            return plan(
+                problem,
+                search=self.search,
+                tolerance=self.tolerance,
+                deadline=left if np.isfinite(left) else None,
+                progress=self.progress,
+            )
+        except PlanError:
+            self.clock.check()
+            raise
+
+
+class _Rounds:
+    """The best so far, and what it is looked for with.
+
+    Parameters
+    ----------
+    problem : Problem
+    v, a : (n,)
+        Limits of velocity and acceleration.
+    """
+
+    def __init__(self, problem: Problem, v: Array, a: Array) -> None:
+        self._problem, self._v, self._a = problem, v, a
+        geometric = tuple(item for item in problem.constraints if not item.of_pace)
+        self._free = replace(problem, constraints=geometric)
+        self.best: Plan | None = None
+        self.verdict = "nothing was planned yet"
+        self.times: list[float] = []
+        self.retimed = {"x = 0": np.inf, "costs": np.inf}
+
+    def run(self, options: _Options) -> None:
+        """Go on while rounds gain; KeyboardInterrupt where they were stopped."""
+        planned = options.plan(self._free)
         if planned.report.ending or not planned.certificate.on_path:
             # At no pace can it be followed to its end.
-            verdict = planned.certificate.verdict
-            break
-        found = _at_its_fastest(planned, problem, v, a)
-        if number == 0:
-            slow = replace(planned, trajectory=planned.initial_trajectory)
-            other = _at_its_fastest(slow, problem, v, a)
-            if other.certificate.verified:
-                still, best = other.path.duration, other
-        before = np.inf if best is None else best.path.duration
-        if found.certificate.verified and found.path.duration < before:
-            best = found
-        verdict = found.certificate.verdict
-        if best is not None:
-            times.append(best.path.duration)
-            if times[-1] > (1.0 - ROUND_GAIN) * before:
-                break
-        pace = _stand_in(problem.path, planned.path, found.path)
-    if best is None:
-        raise PlanError(f"no motion keeps all limits at any pace: {verdict}")
-    return Fastest(best, still, tuple(times))
+            self.verdict = planned.certificate.verdict
+            return
+        found = self._taken("costs", planned)
+        still = replace(planned, trajectory=planned.initial_trajectory)
+        self._taken("x = 0", still)
+        if planned.report.status in _CUT:
+            raise KeyboardInterrupt
+        use = replace(self._free, costs=(LimitUse(self._v, self._a, POWER),))
+        pace: Pace = _own
+        for number in range(ROUNDS):
+            options.progress("fastest", number, ROUNDS)
+            before = self._duration
+            planned = options.plan(replace(use, **use.along(pace)))
+            self.verdict = planned.certificate.verdict
+            if planned.certificate.on_path and not planned.report.ending:
+                found = self._taken("rounds", planned)
+            if planned.report.status in _CUT:
+                raise KeyboardInterrupt
+            self.times.append(self._duration)
+            if number and self._duration > (1.0 - ROUND_GAIN) * before:
+                return
+            pace = _stand_in(self._problem.path, planned.path, found.path)
 
+    @property
+    def _duration(self) -> float:
+        return np.inf if self.best is None else self.best.path.duration
 
-def _limits(
-    problem: Problem, acceleration: npt.ArrayLike | None, velocity: npt.ArrayLike | None
-) -> tuple[Array, Array]:
-    robot, asked = problem.robot, problem.envelope
-    v = asked.speed if velocity is None else velocity
-    a = asked.acceleration if acceleration is None else acceleration
-    v = per_joint(v, robot.dof, f"{robot.name}: velocity limits", positive=True)
-    a = per_joint(a, robot.dof, f"{robot.name}: acceleration limits", positive=True)
-    if not np.all(np.isfinite(a)):
-        joint = robot.joint_names[int(np.argmax(~np.isfinite(a)))]
-        raise ProblemError(
-            f"{robot.name}: no limit of acceleration is known of joint '{joint}', without which "
-            f"no pace is the fastest; give acceleration="
-        )
-    return np.minimum(v, asked.speed), np.minimum(a, asked.acceleration)
+    def _taken(self, name: str, planned: Plan) -> Plan:
+        """Return a motion at its fastest; it is the best so far where none is faster."""
+        found = _at_its_fastest(planned, self._problem, self._v, self._a)
+        self.verdict = found.certificate.verdict
+        if found.certificate.verified:
+            self.retimed[name] = found.path.duration
+            if found.path.duration < self._duration:
+                self.best = found
+        return found
 
 
 def _at_its_fastest(planned: Plan, problem: Problem, v: Array, a: Array) -> Plan:

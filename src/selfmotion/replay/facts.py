@@ -29,6 +29,8 @@ def facts(plan: Plan) -> dict[str, Cell]:
     rows["margin to a joint limit, least"] = _extreme(certificate.limit_margin, "rad or m")
     fastest = certificate.velocity_ratio
     rows["speed, most"] = _extreme(replace(fastest, value=100.0 * fastest.value), "% of its limit")
+    used, *which = str(plan.limits_used).split(": ", 1)
+    rows["limits used fully"] = (used, "".join(which))
     for name, near in plan.approaches.items():
         rows[f"closest to {name}"] = _extreme(near, "m")
     rows["smallest singular value"] = _extreme(certificate.smallest_singular_value, "")

@@ -1,6 +1,7 @@
 """What came of a problem: plans, how they were found, their files, and other paces."""
 
 from selfmotion.result.bundle import read_bundle as read_bundle, write_bundle as write_bundle
+from selfmotion.result.limits_used import LimitsUsed as LimitsUsed
 from selfmotion.result.move import Move as Move, load_move as load_move
 from selfmotion.result.parts import Parts as Parts, load_parts as load_parts
 from selfmotion.result.plan import (
@@ -10,5 +11,9 @@ from selfmotion.result.plan import (
     read_plan as read_plan,
 )
 from selfmotion.result.report import Gap as Gap, Report as Report
-from selfmotion.result.retiming import retime as retime, slowdown as slowdown
-from selfmotion.result.toppra_pace import paced as paced
+from selfmotion.result.retiming import (
+    paced as paced,
+    rate_limits as rate_limits,
+    retime as retime,
+    slowdown as slowdown,
+)

@@ -33,6 +33,7 @@ from selfmotion.motion import Trajectory, column_names
 from selfmotion.path import Path
 from selfmotion.problem.problem import Problem
 from selfmotion.result.archive import Archive
+from selfmotion.result.limits_used import LimitsUsed, limits_used
 from selfmotion.result.report import Report
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
@@ -129,6 +130,14 @@ class Plan:
         when it is asked for.
         """
         return approaches(self.requirements, FinishedMotion(self.robot, self.trajectory))
+
+    @cached_property
+    def limits_used(self) -> LimitsUsed:
+        """For what share of the time limits of speeds, accelerations, torques … are used fully.
+
+        By joint and limit: what keeps the motion from being faster. Found when it is asked for.
+        """
+        return limits_used(self.problem, self.trajectory)
 
     def check(
         self,

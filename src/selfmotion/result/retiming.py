@@ -8,23 +8,26 @@ from operator import and_
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, per_joint, shown
+from selfmotion.basics import Array, ProblemError, one_blas_thread, per_joint, read_only, shown
 from selfmotion.constraints import (
     Constraint,
+    Envelope,
     JointAccelerationLimits,
     JointVelocityLimits,
 )
+from selfmotion.motion import Trajectory
 from selfmotion.path import Pace, Retimed
+from selfmotion.problem import Problem
+from selfmotion.result.limits_used import quantities_of_pace
+from selfmotion.result.pace_rows import PaceLimits
+from selfmotion.result.pacing import Ends, along, fastest_pace
 from selfmotion.result.plan import Plan
-from selfmotion.result.toppra_pace import along, slowed, smoothed, toppra_pace
-from selfmotion.robot import RobotModel
 from selfmotion.task import Relaxation
 
-# Grid points of toppra, and samples of the new motion, per sample of the old one: the first that
-# keeps the plan's tolerance.
-_DENSITIES = (4, 8, 16)
-# By how much slower a pace is tried, and how often.
-_FACTOR, _SLOWER = 1.15, 16
+# Time between two samples of the new motion [s]: the first that keeps the plan's tolerance.
+_STEPS = (4e-3, 2e-3, 1e-3)
+# Moves reach their full acceleration in this time [s] at least: gears last longer.
+_SOFT = 0.02
 
 
 def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
@@ -48,50 +51,77 @@ def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
     return factor
 
 
-def retime(plan: Plan, acceleration: npt.ArrayLike, velocity: npt.ArrayLike | None = None) -> Plan:
+def retime(
+    plan: Plan,
+    acceleration: npt.ArrayLike | None = None,
+    velocity: npt.ArrayLike | None = None,
+) -> Plan:
     """Return the plan's joint path in the shortest time within the limits, from rest to rest.
 
-    Time-optimal path parametrisation by reachability analysis (H. Pham and Q.-C. Pham, IEEE
-    Trans. Robotics 34(3), 2018), by the package toppra. The geometric path of joints and tool
-    stays; the tool motion becomes a `Retimed` one, the certificate is made anew, the report stays.
+    Velocity, acceleration, jerk and torque limits and those of the tool are kept, all that the
+    plan was asked to keep, by linear programmes in the square of the pace (`result.pacing`). Where
+    the problem says how fast the arm begins or ends, it does so. The geometric path of joints and
+    tool stays; the tool motion becomes a `Retimed` one, the certificate is made anew, the report
+    stays.
 
     Parameters
     ----------
     plan : Plan
-    acceleration : (n,) or float
-        Limits [rad/s² or m/s²].
+    acceleration : (n,) or float, optional
+        Limits [rad/s² or m/s²]; by default those that the plan was asked to keep, or the maker's.
     velocity : (n,) or float, optional
         Limits [rad/s or m/s]; by default those that the plan was asked to keep, or the URDF's.
 
     Raises
     ------
     ProblemError
-        toppra is not installed, or a limit is not positive.
+        A limit is not positive, or no limits of acceleration are given or known.
     PlanError
         No pace keeps the limits.
     """
     _check_plan(plan)
-    robot, asked = plan.robot, plan.problem.envelope
-    velocity = asked.speed if velocity is None else velocity
-    wanted = [
-        JointVelocityLimits(_positive(robot, velocity, "velocity")),
-        JointAccelerationLimits(_positive(robot, acceleration, "acceleration")),
-    ]
+    v, a = rate_limits(plan.problem, acceleration, velocity)
+    wanted = [JointVelocityLimits(v), JointAccelerationLimits(a)]
     # The problem's own limits stay: the tighter of both is kept.
-    kept = reduce(and_, (item.envelope(robot) for item in wanted), asked)
-    for density in _DENSITIES:
-        pace = smoothed(toppra_pace(plan.trajectory, kept, density), kept)
-        pace = slowed(pace, plan.trajectory, kept)
+    robot = plan.robot
+    kept = reduce(and_, (item.envelope(robot) for item in wanted), plan.problem.envelope)
+    quantities = quantities_of_pace(plan.requirements)
+    limits = PaceLimits(kept.speed, kept.acceleration, kept.jerk, quantities)
+    for step in _STEPS:
+        with one_blas_thread():
+            pace = fastest_pace(plan.trajectory, limits, _ends(plan), step)
         result = _retimed(plan, wanted, pace)
         if result.certificate.on_path:
             break
-    # Torques, and what else depends on the pace, are seen only now.
-    for _ in range(_SLOWER):
-        if not _is_too_fast(result):
-            break
-        pace = pace.slower(_FACTOR)
-        result = _retimed(plan, wanted, pace)
     return result
+
+
+def paced(motion: Trajectory, kept: Envelope) -> Trajectory:
+    """Return a joint path in the shortest time within limits, from rest to rest, from t = 0 on.
+
+    Parameters
+    ----------
+    motion : Trajectory
+        The path over any time of its own.
+    kept : Envelope
+        Finite limits of speed and acceleration, and those of the jerk where there are any.
+
+    Raises
+    ------
+    PlanError
+        No pace keeps the limits.
+    """
+    # Controllers want accelerations without jumps from arms of any make.
+    soft = np.minimum(kept.jerk, kept.acceleration / _SOFT)
+    limits = PaceLimits(kept.speed, kept.acceleration, read_only(soft))
+    with one_blas_thread():
+        return along(fastest_pace(motion, limits, Ends(), _STEPS[0]), motion)
+
+
+def _ends(plan: Plan) -> Ends:
+    """Return where the problem says how fast the arm is: its rate there stays."""
+    said = [item.sets_velocity for item in plan.problem.constraints]
+    return Ends(any(start for start, _ in said), any(end for _, end in said))
 
 
 def _check_plan(plan: Plan) -> None:
@@ -99,16 +129,30 @@ def _check_plan(plan: Plan) -> None:
         raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
 
 
-def _positive(robot: RobotModel, limit: npt.ArrayLike, name: str) -> Array:
-    what = f"{robot.name}: {name} limits for retiming"
-    return per_joint(limit, robot.dof, what, positive=True)
+def rate_limits(
+    problem: Problem, acceleration: npt.ArrayLike | None, velocity: npt.ArrayLike | None
+) -> tuple[Array, Array]:
+    """Return the limits of velocity and acceleration of a fastest motion, (n,) each.
 
+    Those that are given, or else those that the problem asks for.
 
-def _is_too_fast(plan: Plan) -> bool:
-    """Return whether a plan breaks nothing but what a slower pace may keep."""
-    broken = [item for item in plan.certificate.findings if not item.kept]
-    of_pace = bool(broken) and all(item.of_pace for item in broken)
-    return of_pace and plan.certificate.on_path
+    Raises
+    ------
+    ProblemError
+        One is not positive, or no joint's acceleration is limited.
+    """
+    robot, asked = problem.robot, problem.envelope
+    v = asked.speed if velocity is None else velocity
+    a = asked.acceleration if acceleration is None else acceleration
+    v = per_joint(v, robot.dof, f"{robot.name}: velocity limits", positive=True)
+    a = per_joint(a, robot.dof, f"{robot.name}: acceleration limits", positive=True)
+    if not np.all(np.isfinite(a)):
+        joint = robot.joint_names[int(np.argmax(~np.isfinite(a)))]
+        raise ProblemError(
+            f"{robot.name}: no limit of acceleration is known of joint '{joint}', without which "
+            f"no pace is the fastest; give acceleration="
+        )
+    return read_only(np.minimum(v, asked.speed)), read_only(np.minimum(a, asked.acceleration))
 
 
 def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:

@@ -1,0 +1,80 @@
+"""The commands that change how fast motions are."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import selfmotion as sm
+from selfmotion.cli import documents, json_tables, options, outputs, tables
+from selfmotion.cli.app import (
+    NOT_VERIFIED,
+    VERIFIED,
+    app,
+    fastest_with_progress,
+    stages,
+    terminal,
+)
+
+
+@app.command(epilog="Example: selfmotion retime plan.npz --acceleration 8 --out fast.npz")
+def retime(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz.")],
+    acceleration: options.AccelerationOption = None,
+    velocity: options.VelocityOption = None,
+    out: options.OutOption = None,
+    html: options.HtmlOption = None,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Run through a plan's joint path in the least time within limits, and check it."""
+    outputs.check_suffixes(out or [])
+    result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity))
+    _show(result, out, html, as_json)
+
+
+@app.command(epilog="Example: selfmotion fastest cell.toml --deadline 60 --out fast.npz")
+def fastest(
+    problem: Annotated[str, typer.Argument(help="A problem file (.toml, .json).")],
+    acceleration: options.AccelerationOption = None,
+    velocity: options.VelocityOption = None,
+    deadline: Annotated[
+        float | None, typer.Option(help="After so many seconds the best so far has to do.")
+    ] = None,
+    settings: options.SetOption = None,
+    allow_code: options.AllowCodeOption = False,
+    out: options.OutOption = None,
+    html: options.HtmlOption = None,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Look for the fastest motion along a path, whatever its own pace; Ctrl-C keeps the best."""
+    if Path(problem).suffix not in documents.SUFFIXES:
+        raise sm.ProblemError(
+            f"{problem}: expected a problem file ({', '.join(documents.SUFFIXES)}); "
+            f"selfmotion init writes one"
+        )
+    job = documents.of_file(Path(problem), settings or [], allow_code)
+    outputs.check_suffixes([*job.outputs, *(out or [])])
+    given = dict(zip(("acceleration", "velocity"), _limits(acceleration, velocity), strict=True))
+    found = fastest_with_progress(job, deadline=deadline, **given)
+    if not as_json:
+        stages.print(
+            f"{found.duration:.4g} s; best by its costs and then retimed: {found.retimed:.4g} s, "
+            f"without self-motion: {found.pseudo_inverse:.4g} s; {found.status.message}",
+            markup=False,
+            soft_wrap=True,
+        )
+    _show(found.plan, [*job.outputs, *(out or [])], html, as_json)
+
+
+def _limits(acceleration: str | None, velocity: str | None) -> tuple[Any, ...]:
+    named = ((acceleration, "--acceleration"), (velocity, "--velocity"))
+    return tuple(None if text is None else options.one_or_each(text, name) for text, name in named)
+
+
+def _show(result: sm.Plan, out: list[Path] | None, html: Path | None, as_json: bool) -> None:
+    if as_json:
+        terminal.print_json(data=json_tables.plan_json(result))
+    else:
+        tables.show(result, terminal)
+    outputs.write(result, out or [], html, terminal, quiet=as_json)
+    raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)

@@ -1,0 +1,267 @@
+"""What limits allow of the pace of a joint path, as rows of a linear programme.
+
+Along a motion q(τ) run through at another pace, with b(τ) the square of dτ/dt,
+
+    q̇² = q_τ² b,   q̈ = q_ττ b + ½ q_τ b',   q⃛ = √b (q_τττ b + 3/2 q_ττ b' + ½ q_τ b'')
+
+(D. Verscheure et al., IEEE Trans. Automatic Control 54(10), 2009). The first two are linear in b;
+|…| ≤ J/√b of the third has its right side replaced by the tangent J (3 - b)/2 at b = 1, which lies
+below: what keeps that keeps the jerk. b is a quadratic spline, so that accelerations do not jump.
+
+Where the arm rests on its path, nothing of these bounds b. So the length of the joint path counts
+as one more joint, which goes on at a share of its largest speed there, within the limits that all
+joints have together.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags
+from selfmotion.certificate import Quantity
+from selfmotion.motion import Trajectory
+from selfmotion.optimise import BandedRows
+from selfmotion.path import Pace
+from selfmotion.result.squares import Squares, basis
+
+# The square of a rate is at least this share of what it was.
+_LEAST = 1e-6
+# And at most so much of it, unless more is asked for: at rest little else bounds it.
+_MOST = 500.0
+# Where in an interval limits are measured: its beginning and its end, from inside, and between.
+PLACES = np.clip(0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 9)), 1e-6, 1.0 - 1e-6)
+_NOTHING = 1e-150
+# What is at a knot up to rounding is at it: this near, by the length of an interval.
+_BESIDE = 1e-6
+# Where the arm rests its length goes on at this share of its largest speed.
+_STILL = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class PaceLimits:
+    """What depends on how fast a joint path is run through, and may not be passed.
+
+    Attributes
+    ----------
+    speed, acceleration, jerk : (n,)
+        Of joints; inf where there is none.
+    quantities : sequence of Quantity
+        Such as torques, and how fast the tool is.
+    """
+
+    speed: Array
+    acceleration: Array
+    jerk: Array
+    quantities: Sequence[Quantity] = ()
+
+    @property
+    def of_orders(self) -> tuple[Array, Array, Array]:
+        """The limits of q̇, q̈ and the jerk."""
+        return self.speed, self.acceleration, self.jerk
+
+    def with_length(self) -> "PaceLimits":
+        """Return the same with the length of the joint path as one more joint."""
+        speed, acceleration = (
+            np.append(limit, np.linalg.norm(limit)) for limit in (self.speed, self.acceleration)
+        )
+        return PaceLimits(speed, acceleration, np.append(self.jerk, np.inf), self.quantities)
+
+    def without_jerk(self) -> "PaceLimits":
+        """Return the same but for limits of the jerk."""
+        free = np.full(len(self.jerk), np.inf)
+        return PaceLimits(self.speed, self.acceleration, free, self.quantities)
+
+    def shares(self, motion: Trajectory) -> list[Array]:
+        """Return what of each limit is used, a table (I, n or m) of all intervals for each.
+
+        Of q̇, q̈, the jerk and the quantities, in this order; 0 where there is no limit.
+        """
+        steps = np.diff(motion.t)
+        at = np.minimum(motion.t[:-1, None] + steps[:, None] * PLACES, motion.t[-1]).ravel()
+        used = self.shares_at(motion, at)
+        return [table.reshape(len(steps), len(PLACES), -1).max(axis=1) for table in used]
+
+    def shares_at(self, motion: Trajectory, t: Array) -> list[Array]:
+        """Return what of each limit is used at times (K,), a table (K, n or m) for each."""
+        states = [motion(t, order) for order in range(4)]
+        used = [np.abs(x) / limit for x, limit in zip(states[1:], self.of_orders, strict=True)]
+        for item in self.quantities:
+            away = item.away(*states[:3])
+            sizes = np.linalg.norm(away, axis=2) if away.ndim == 3 else np.abs(away)
+            used.append(sizes / item.bounds)
+        return used
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """A joint path at a pace: its derivatives by the time of that pace, at knots.
+
+    Attributes
+    ----------
+    q : (K + 1, n)
+        At the knots.
+    orders : three of (2, K, n + 1)
+        First, second and third derivative of the joints and of the length, at the beginning and the
+        end of each interval, as they are inside it.
+    """
+
+    q: Array
+    orders: tuple[Array, Array, Array]
+
+    @classmethod
+    def of(cls, motion: Trajectory, pace: Pace, knots: Array) -> "States":
+        """Return those of a motion at a pace of its own time, at knots (K + 1,) of the pace."""
+        at = np.clip(pace(knots) + motion.t[0], *motion.t[[0, -1]])
+        sides, inside = _inside(knots), _inside(at)
+        by = _with_length(
+            *(motion(inside.ravel(), k).reshape(2, len(at) - 1, -1) for k in (1, 2, 3))
+        )
+        rate, bend, surge = (
+            pace(sides.ravel(), order).reshape(2, -1)[:, :, None] for order in (1, 2, 3)
+        )
+        return cls(
+            motion(at),
+            (
+                by[0] * rate,
+                by[1] * rate**2 + by[0] * bend,
+                by[2] * rate**3 + 3.0 * by[1] * rate * bend + by[0] * surge,
+            ),
+        )
+
+    def at_knots(self, order: int) -> Array:
+        """Return a derivative of the joints and of the length at the knots, (K + 1, n + 1)."""
+        table = self.orders[order - 1]
+        return np.vstack([table[0], table[1, -1:]])
+
+
+def _inside(t: Array) -> Array:
+    """Return times right after the beginning and right before the end of each interval, (2, K)."""
+    beside = _BESIDE * np.diff(t)
+    return np.stack([t[:-1] + beside, t[1:] - beside])
+
+
+def length_speed(qd: Array) -> Array:
+    """Return how fast the length of a joint path grows at velocities (…, n), (…)."""
+    size: Array = np.linalg.norm(qd, axis=-1)
+    speed: Array = np.hypot(size, _STILL * max(float(size.max()), np.finfo(float).tiny))
+    return speed
+
+
+def _with_length(first: Array, second: Array, third: Array) -> list[Array]:
+    """Return derivatives (2, K, n) of joints with those of the length, (2, K, n + 1) each."""
+    speed = length_speed(first)
+    gain = np.einsum("skn,skn->sk", first, second) / speed
+    change = (
+        np.square(second).sum(axis=2) + np.einsum("skn,skn->sk", first, third) - gain**2
+    ) / speed
+    own = ((first, speed), (second, gain), (third, change))
+    return [np.concatenate([joints, length[:, :, None]], axis=2) for joints, length in own]
+
+
+def rows_of(
+    states: States,
+    limits: PaceLimits,
+    room: Sequence[Array],
+    near: Squares,
+    most: float,
+    fixed: Flags,
+) -> BandedRows:
+    """Return what limits allow of b, a spline over the same knots as one that it is near.
+
+    Parameters
+    ----------
+    states : States
+        At the pace that b is the square of a change of.
+    limits : PaceLimits
+    room : sequence of (K, n or m)
+        Which share of each limit may be used, in the order of `PaceLimits.shares`.
+    near : Squares
+        Around which what is not linear is replaced by its tangent.
+    most : float
+        How many times the coefficients of that b's may be.
+    fixed : (K + 2,) bool
+        Coefficients that stay as they are, whatever they are.
+    """
+    t = near.knots
+    table, limits = _Table(len(t) - 1), limits.with_length()
+    # The length has all the room there is.
+    room = [np.column_stack([own, own.max(axis=1)]) for own in room[:3]] + list(room[3:])
+    for side, share in enumerate((0.0, 1.0)):
+        value, slope, bend = (part[:, :, None] for part in basis(t, share))
+        first, second, third = (order[side] for order in states.orders)
+        own = np.zeros_like(value)
+        own[2 * side] = 1.0
+        part = slice(2, None) if side else slice(None, -2)
+        free = ~fixed[part, None]
+        upper = np.minimum(most * near.c[part, None], _MOST) + 2.0 * _LEAST
+        table.add(own, np.where(free, _LEAST, -np.inf), np.where(free, upper, np.inf))
+        fastest = (limits.speed * room[0] / np.maximum(np.abs(first), _NOTHING)) ** 2
+        table.add(value, -np.inf, fastest.min(axis=1, keepdims=True))
+        some = np.isfinite(limits.acceleration)
+        bent = (second * value + 0.5 * first * slope)[:, :, some] / limits.acceleration[some]
+        table.add(bent, -room[1][:, some], room[1][:, some])
+        some = np.isfinite(limits.jerk)
+        if some.any():
+            b = np.maximum(near.inside(share), _LEAST)[:, None]
+            surge = (third * value + 1.5 * second * slope + 0.5 * first * bend)[:, :, some]
+            surge *= np.sqrt(b) / (limits.jerk[some] * room[2][:, some])
+            for sign in (1.0, -1.0):
+                table.add(sign * surge + 0.5 * value / b, -np.inf, 1.5)
+    for item, own in zip(limits.quantities, room[3:], strict=True):
+        _add_quantity(table, states, item, own, near)
+    return table.rows()
+
+
+class _Table:
+    """Rows, as they are found."""
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._parts: list[tuple[Array, Array, Array]] = []
+
+    def add(self, matrix: Array, lower: Array | float, upper: Array | float) -> None:
+        shape = matrix.shape[1:]
+        self._parts.append((matrix, np.broadcast_to(lower, shape), np.broadcast_to(upper, shape)))
+
+    def rows(self) -> BandedRows:
+        matrix, lower, upper = (
+            np.concatenate(each, axis=-1) for each in zip(*self._parts, strict=True)
+        )
+        return BandedRows(matrix, lower, upper)
+
+
+def _add_quantity(
+    table: _Table, states: States, item: Quantity, room: Array, near: Squares
+) -> None:
+    """Add a quantity f(q, q̇, q̈), of first order around b, which is exact for torques.
+
+    df = (½ f_q̇ q_τ / √b + f_q̈ q_ττ) db + ½ f_q̈ q_τ db'; of vectors the part along what they are.
+    """
+    first, second = (states.at_knots(order)[:, :-1] for order in (1, 2))
+    b, change = (near.at_knots(order)[:, None] for order in (0, 1))
+    root = np.sqrt(np.maximum(b, _LEAST))
+    state = states.q, root * first, second * b + 0.5 * first * change
+    found, (_, *by) = item.away(*state), item.derivatives(*state)
+    by_value = by_slope = np.zeros_like(found)
+    if by:
+        by_value = 0.5 * np.einsum("k...n,kn->k...", by[0], first / root)
+    if len(by) > 1:
+        by_value = by_value + np.einsum("k...n,kn->k...", by[1], second)
+        by_slope = 0.5 * np.einsum("k...n,kn->k...", by[1], first)
+    vector = found.ndim == 3
+    if vector:
+        size = np.linalg.norm(found, axis=2)
+        along = found / np.maximum(size, _NOTHING)[:, :, None]
+        by_value, by_slope = (np.einsum("kmc,kmc->km", along, x) for x in (by_value, by_slope))
+        found = size
+    some = item.limited
+    still = found - by_value * b - by_slope * change
+    still, by_value, by_slope = (
+        x[:, some] / item.bounds[some] for x in (still, by_value, by_slope)
+    )
+    for share, part in ((0.0, slice(None, -1)), (1.0, slice(1, None))):
+        value, slope, _ = (x[:, :, None] for x in basis(near.knots, share))
+        upper = room[:, some] - still[part]
+        lower = np.full_like(upper, -np.inf) if vector else -room[:, some] - still[part]
+        table.add(by_value[part] * value + by_slope[part] * slope, lower, upper)

@@ -1,0 +1,244 @@
+"""The fastest pace of a joint path within limits of its rates.
+
+A pace is improved by linear programmes in b(τ), the square of how much faster it becomes at its own
+time τ. Velocity, acceleration and torque limits are linear in b, so that one programme finds their
+optimum (D. Verscheure et al., IEEE Trans. Automatic Control 54(10), 2009); limits of the jerk and
+of the tool's acceleration are kept by tangents, anew in each programme. Where the motion between
+two knots uses more than it may, a knot is put between them, or these two get less room: never is
+the whole motion slowed for one of its samples.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, PlanError
+from selfmotion.motion import Trajectory
+from selfmotion.optimise import banded_optimum
+from selfmotion.path import Pace, times_when
+from selfmotion.result.pace_rows import PaceLimits, States, rows_of
+from selfmotion.result.pace_start import of_constant_speed, smooth
+from selfmotion.result.squares import Squares
+
+# How much faster a pace may become in each of the first steps, and in the others: squared.
+_FIRST, _OTHERS = (50.0, 50.0, 9.0), 9.0
+# Steps from there, until one gains less than this share; knots are added in the first ones.
+_MOST_STEPS, _ADDING, _GAIN = 12, 7, 5e-4
+# What of limits is aimed at, what is left as it is, and what is near enough.
+_AIM, _KEPT, _NEAR = 0.999, 0.9998, 1.0003
+# A knot is added where a limit is passed by this share, unless knots are so near [s].
+_ROUGH, _NEAREST = 1.002, 6e-4
+# A jump of this share of a limit has a knot of its own.
+_JUMP = 0.02
+# Gaps of the linear programmes, as shares: while the pace is rough, and then.
+_ROUGH_GAP, _GAP = 1e-3, 1e-6
+# Times are this share longer than limits ask: third differences of samples round so much.
+_ROUNDING = 1e-6
+# Derivatives below this share of the largest are none.
+_NONE = 1e-9
+# Programmes begin with so much of what is known to keep the limits: there is room to all sides.
+_INSIDE = 0.9
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+@dataclass(frozen=True)
+class Ends:
+    """How a motion begins and ends: whether its original rate is kept there, or it rests."""
+
+    start_kept: bool = False
+    end_kept: bool = False
+
+
+def fastest_pace(motion: Trajectory, limits: PaceLimits, ends: Ends, step: float) -> Pace:
+    """Return the fastest pace of a motion within limits.
+
+    Parameters
+    ----------
+    motion : Trajectory
+        Whose joint path is kept.
+    limits : PaceLimits
+    ends : Ends
+    step : float
+        Time between two knots of the pace [s], about.
+
+    Raises
+    ------
+    PlanError
+        No pace keeps the limits.
+    """
+    rough = limits.without_jerk()
+    pace = _scaled(of_constant_speed(motion), motion, rough)
+    for most in _FIRST:
+        near = Squares.constant(pace.t, 1.0)
+        room = _all_room(len(pace.t) - 1, rough)
+        pace = _changed(pace, _improved(pace, motion, rough, room, near, ends, most, _ROUGH_GAP))
+    jerk = bool(np.isfinite(limits.jerk).any())
+    pace = _scaled(smooth(pace, step, jerk), motion, limits)
+    return _settled(pace, motion, limits, ends)
+
+
+def along(pace: Pace, motion: Trajectory) -> Trajectory:
+    """Return a motion at a pace of its own time."""
+    at = np.minimum(pace.sigma + motion.t[0], motion.t[-1])
+    q, qd, rate = motion(at), motion(at, 1), pace.rate[:, None]
+    bend = pace(pace.t, 2) if pace.bend is None else pace.bend
+    return Trajectory(
+        pace.t, q, qd * rate, motion.joint_names, motion(at, 2) * rate**2 + qd * bend[:, None]
+    )
+
+
+def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> Pace:
+    """Return a pace after steps until none gains any more, within limits between knots too."""
+    best, before = ((np.inf, np.inf), base), base.t[-1]
+    near = Squares.constant(_knots(base, motion, limits), 1.0)
+    room = _all_room(len(near.knots) - 1, limits)
+    for number in range(_MOST_STEPS):
+        near = _improved(base, motion, limits, room, near, ends, _OTHERS, _GAP)
+        pace = _changed(base, near)
+        used = limits.shares(along(pace, motion))
+        kept = _scaled(pace, motion, limits, least=1.0)
+        over = np.max([table.max(axis=1) for table in used], axis=0)
+        # A motion that passes what no slower pace surely keeps stands back.
+        passed = max((float(table.max()) for table in used[3:]), default=0.0)
+        rank = max(passed, _KEPT), float(kept.t[-1])
+        if rank < best[0]:
+            best = rank, kept
+        if over.max() < _NEAR and passed <= _KEPT and abs(before / pace.t[-1] - 1.0) < _GAIN:
+            break
+        before = pace.t[-1]
+        cut = _to_cut(over, pace) if number < _ADDING else np.zeros(len(over), dtype=bool)
+        # A limit that is passed where a knot is added is looked at again before there is less room.
+        room = [
+            np.repeat(own * _less(table, cut), 1 + cut, axis=0)
+            for own, table in zip(room, used, strict=True)
+        ]
+        knots, middles = near.knots, 0.5 * (near.knots[1:] + near.knots[:-1])
+        near = near.on(np.sort(np.append(knots, middles[cut])))
+    return best[1]
+
+
+def _knots(base: Pace, motion: Trajectory, limits: PaceLimits) -> Array:
+    """Return the knots of a pace, and when a motion's accelerations or jerks jump."""
+    inner = motion.t[1:-1]
+    reached = times_when(
+        base, inner - motion.t[0], np.zeros(len(inner)), np.full(len(inner), base.t[-1])
+    )
+    before, jumps = np.nextafter(inner, -np.inf), np.zeros(len(inner), dtype=bool)
+    rates = base(reached, 1)[:, None]
+    for order, limit in ((2, limits.acceleration), (3, limits.jerk)):
+        jump = np.abs(motion(inner, order) - motion(before, order)) * rates**order
+        jumps |= (jump > _JUMP * limit).any(axis=1)
+    jumps &= (reached > 0.0) & (reached < base.t[-1])
+    wanted = reached[jumps]
+    if not len(wanted):
+        return base.t
+    # A knot near a jump is in its place.
+    after = np.searchsorted(wanted, base.t)
+    ends = np.concatenate([[-np.inf], wanted, [np.inf]])
+    beside = np.minimum(base.t - ends[after], ends[after + 1] - base.t)
+    far = beside > 0.3 * (base.t[1] - base.t[0])
+    far[[0, -1]] = True
+    knots = np.union1d(base.t[far], wanted)
+    return knots
+
+
+def _less(used: Array, cut: Flags) -> Array:
+    return np.where(cut[:, None] | (used <= _KEPT), 1.0, _AIM / np.maximum(used, _AIM))
+
+
+def _to_cut(over: Array, pace: Pace) -> Flags:
+    """Return which intervals are too long for what happens in them or beside them."""
+    passed = np.concatenate([[False], over > _ROUGH, [False]])
+    near = passed[:-2] | passed[1:-1] | passed[2:]
+    return np.asarray(near & (np.diff(pace.t) > _NEAREST))
+
+
+def _all_room(count: int, limits: PaceLimits) -> list[Array]:
+    widths = [len(limits.speed)] * 3 + [len(item.columns) for item in limits.quantities]
+    return [np.full((count, width), _AIM) for width in widths]
+
+
+def _scaled(pace: Pace, motion: Trajectory, limits: PaceLimits, least: float = 0.0) -> Pace:
+    """Return a pace slower as a whole, at least by a factor, so that joints keep their limits."""
+    trial = along(pace, motion)
+    shares = [
+        float((np.abs(trial.extremes(order)[1]) / limit).max()) ** (1.0 / order)
+        if np.isfinite(limit).any()
+        else 0.0
+        for order, limit in enumerate(limits.of_orders, 1)
+    ]
+    return pace.slower(max(*shares, least) * (1.0 + _ROUNDING))
+
+
+def _improved(
+    base: Pace,
+    motion: Trajectory,
+    limits: PaceLimits,
+    room: list[Array],
+    near: Squares,
+    ends: Ends,
+    most: float,
+    gap: float,
+) -> Squares:
+    """Return the square of how much faster a pace becomes, near one that is known."""
+    knots = near.knots
+    states = States.of(motion, base, knots)
+    start, fixed = _INSIDE * near.c, np.zeros(len(near.c), dtype=bool)
+    jerk = bool(np.isfinite(limits.jerk).any())
+    for kept, end in ((ends.start_kept, 0), (ends.end_kept, -1)):
+        if kept:
+            _keep(start, fixed, end, base, knots)
+        elif _starts(states, end, jerk):
+            start[end], fixed[end] = 0.0, True
+    rows = rows_of(states, limits, room, near, most, fixed)
+    # To first order the time falls with half the integral of b by b^(3/2).
+    widths = np.diff(np.concatenate([[knots[0]] * 2, knots, [knots[-1]] * 2]))
+    weights = np.convolve(widths, np.ones(3), mode="full")[2:-2] / 3.0
+    gradient = weights * np.maximum(near.c, 1e-4) ** -1.5
+    found, _ = banded_optimum(gradient, rows, start, fixed, gap)
+    return Squares(knots, found)
+
+
+def _keep(start: Array, fixed: Flags, end: int, base: Pace, knots: Array) -> None:
+    """Fix two coefficients so that dσ/dt = 1 and d²σ/dt² = 0 at an end."""
+    rate, bend = (float(base(knots[[end]], order)[0]) for order in (1, 2))
+    inner, step = (1, knots[1] - knots[0]) if end == 0 else (-2, knots[-2] - knots[-1])
+    start[end] = 1.0 / rate**2
+    start[inner] = start[end] * (1.0 - bend / rate * step)
+    fixed[[end, inner]] = True
+
+
+def _starts(states: States, end: int, jerk: bool) -> bool:
+    """Return whether the pace has to begin from rest at an end, since else the arm would not.
+
+    With limits of the jerk it rests where accelerations are 0 as well.
+    """
+    tables = [np.abs(states.at_knots(1))]
+    if jerk:
+        tables.append(np.abs(states.at_knots(2)[:, :-1]))
+    return any(float(table[end].max()) > _NONE * float(table.max()) for table in tables)
+
+
+def _changed(base: Pace, squares: Squares) -> Pace:
+    """Return a pace that is faster by the square roots of b."""
+    knots = squares.knots
+    h, roots, weights = np.diff(knots), 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
+    steps = np.zeros(len(h))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for node, weight in zip(roots, weights, strict=True):
+            steps += weight * h / np.sqrt(squares.inside(float(node)))
+        # From rest b grows from 0: as a function of the root of the way the time is smooth.
+        for end, shares in ((0, roots**2), (-1, 1.0 - roots**2)):
+            if squares.c[end] == 0.0:
+                values = np.array([squares.inside(float(share))[end] for share in shares])
+                steps[end] = h[end] * float(_WEIGHTS @ (roots / np.sqrt(values)))
+    if not (np.all(np.isfinite(steps)) and np.all(steps > 0.0)):
+        raise PlanError("no pace keeps the limits of rates along this joint path")
+    value, slope = np.maximum(squares.at_knots(), 0.0), squares.at_knots(1)
+    rate = base(knots, 1)
+    return Pace(
+        np.append(0.0, np.cumsum(steps)),
+        np.maximum.accumulate(base(knots)),
+        np.maximum(rate, 0.0) * np.sqrt(value),
+        base(knots, 2) * value + 0.5 * rate * slope,
+    )
