@@ -1,7 +1,7 @@
 """A whole job as one motion: seams, moves between them, and what is known of all of it."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
 from pathlib import Path as FilePath
@@ -96,7 +96,7 @@ class Program:
 
     robot: RobotModel
     steps: tuple[Step, ...]
-    missing: Mapping[str, str] = field(default_factory=dict)
+    missing: Mapping[str, str]
     bound: float = 0.0
     notes: tuple[str, ...] = ()
 

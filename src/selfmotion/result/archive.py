@@ -50,7 +50,7 @@ class Archive(NamedTuple):
         description = {
             "format": FORMAT,
             "problem": problem_to_dict(self.problem),
-            "meshes": _meshes(self.problem),
+            "meshes": _meshes(self.problem, {}),
             "joint_names": list(self.trajectory.joint_names),
             "report": _report_to_dict(self.report),
             "history": [_without(iteration, "x") for iteration in history],
@@ -81,9 +81,9 @@ class Archive(NamedTuple):
             altered = f"{file.name} was changed after the plan was written: its digest differs"
         try:
             found = _restore(description, arrays, known)
-            known = description.get("meshes", {})
-            now = _meshes(found.problem)
-            changed = tuple(name for name in known if now.get(name, "") != known[name])
+            then = description.get("meshes", {})
+            now = _meshes(found.problem, {} if known is None else known)
+            changed = tuple(name for name in then if now.get(name, "") != then[name])
             return found._replace(altered=altered, changed=changed)
         except (CollisionError, RobotError) as error:
             raise FileFormatError(f"{file}: cannot be measured anew: {error}") from error
@@ -94,9 +94,13 @@ class Archive(NamedTuple):
             raise FileFormatError(f"{file}: is no plan, or a damaged one: {error!r}") from error
 
 
-def _meshes(problem: Problem) -> dict[str, str]:
-    """Return the digests of all mesh files that bodies are made of."""
-    found = mesh_digests(problem.robot.urdf, "collision")
+def _meshes(problem: Problem, known: MutableMapping[str, Any]) -> dict[str, str]:
+    """Return the digests of all mesh files that bodies are made of, of an arm once."""
+    urdf = problem.robot.urdf
+    own = f"meshes of {urdf.sha256}"
+    if own not in known:
+        known[own] = mesh_digests(urdf, "collision")
+    found = dict(known[own])
     bodies = (body for item in problem.requirements for body in item.obstacles)
     for file in (file for body in bodies for file in body.files):
         found[str(file)] = hashlib.sha256(file.read_bytes()).hexdigest()
