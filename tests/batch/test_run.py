@@ -189,7 +189,7 @@ class Deadly(InPlace):
 def test_a_problem_that_kills_its_worker_is_found_out(
     grid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run, "_pool", lambda workers: nullcontext(Deadly()))
+    monkeypatch.setattr(run, "processes", lambda workers: nullcontext(Deadly()))
     grid.write_text(GRID.replace("[0, 1]", "[0]"))
     batch = plan_items(grid_items(grid), out=tmp_path / "out", workers=1)
     assert [row.verified for row in batch.rows] == [True, False, True]

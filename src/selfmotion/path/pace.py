@@ -71,6 +71,10 @@ class Pace:
     def __call__(self, t: Array, order: int = 0) -> Array:
         """Return σ (`order` 0) or a derivative (1 to 3) at times (K,), after a sample at it."""
         found: Array = self._spline(t, nu=order)
+        known = (self.sigma, self.rate, self.bend, None)[order]
+        if known is not None:
+            # Where a motion ends at rest it does so exactly.
+            found = np.where(np.asarray(t) == self.t[-1], known[-1], found)
         return np.clip(found, self.sigma[0], self.sigma[-1]) if order == 0 else found
 
     def series(self, middle: Array, half: Array) -> Array:
