@@ -33,6 +33,6 @@ program = sm.plan_job(cell, seams, branches=1).require()
 print(program)
 longest = max((step for step in program.steps if not step.is_seam), key=lambda s: s.motion.duration)
 print(f"the longest move: {longest.name}, {longest.motion.duration:.2f} s")
-print(f"{sum(step.turned for step in program.steps)} seams are made from their end")
+print(f"made from their end: {sum(step.turned for step in program.steps)} seams")
 time, seam, event = program.events[0]
 print(f"at {time:.2f} s, {seam}: {event}")
