@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 import selfmotion as sm
 
 OUT = Path("out") / "placement"
-X, Y = np.linspace(-0.15, 0.15, 4), np.linspace(-0.2, 0.2, 4)
+X, Y = np.linspace(-0.15, 0.15, 3), np.linspace(-0.2, 0.2, 3)
 
 
 def problem_at(x: float, y: float) -> sm.Problem:
@@ -23,7 +23,7 @@ def problem_at(x: float, y: float) -> sm.Problem:
 if __name__ == "__main__":  # the processes that plan import this file
     places = [(x, y) for y in Y for x in X]
     batch = sm.plan_many([problem_at(*place) for place in places], out=OUT, workers=2)
-    cost = np.array([row.cost if row.verified else np.nan for row in batch.rows]).reshape(4, 4)
+    cost = np.array([row.cost if row.verified else np.nan for row in batch.rows]).reshape(3, 3)
     print(f"{np.isfinite(cost).sum()} of {cost.size} places have a verified plan")
     for line in cost[::-1]:
         print("  ".join("  -   " if np.isnan(value) else f"{value:.4f}" for value in line))
