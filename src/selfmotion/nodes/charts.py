@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion import kernels
-from selfmotion.basics import Array, Flags
+from selfmotion.basics import Array
 from selfmotion.engine import carried_bases
 from selfmotion.follow import Follows
 from selfmotion.nodes.kernels import look, pull
@@ -140,27 +140,30 @@ class Manifolds:
         J q̈ is the rate of ẋ - J q̇ along the motion at fixed q̇. It is taken from both sides of each
         node: at marks of the path it may jump, and is the mean.
         """
-        step = _STEP * self.t[-1]
-        sides = []
-        for sign, inside in ((-1.0, self.t > 2.0 * step), (1.0, self.t < self.t[-1] - 2.0 * step)):
-            near, far = (self._unmet(q, qd, sign * k * step, inside) for k in (1.0, 2.0))
-            sides.append((far - near) / (sign * step))
-        before, after = sides
-        before[0], after[-1] = after[0], before[-1]
+        step, end = _STEP * self.t[-1], self.t[-1]
+        # Two steps back, one back, one on, two on; at the ends of the path both inside.
+        steps = step * np.array([-2.0, -1.0, 1.0, 2.0])[:, None] * np.ones(len(self.t))
+        steps[:2, self.t <= 2.0 * step] = steps[3:1:-1, self.t <= 2.0 * step]
+        steps[2:, self.t >= end - 2.0 * step] = steps[1::-1, self.t >= end - 2.0 * step]
+        far, near, soon, late = self._unmet(q, qd, steps)
+        before = (far - near) / (steps[0] - steps[1])[:, None]
+        after = (late - soon) / (steps[3] - steps[2])[:, None]
         rows = self._rows(q)[0]
         right = 0.5 * (before + after)[:, :, None]
         turned = np.swapaxes(rows, 1, 2)
         return np.asarray((turned @ np.linalg.solve(rows @ turned, right))[:, :, 0])
 
-    def _unmet(self, q: Array, qd: Array, later: float, inside: Flags) -> Array:
-        """Return ẋ - J q̇ at t + `later`, q + q̇ `later`, (N + 1, m); at t where that is outside."""
-        t = np.where(inside, self.t + later, self.t)
-        rows, rotations = self._rows(q + later * qd)
+    def _unmet(self, q: Array, qd: Array, steps: Array) -> Array:
+        """Return ẋ - J q̇ so much later (4, N + 1), at t + s and q + q̇ s, (4, N + 1, m)."""
+        moved = (q + steps[:, :, None] * qd).reshape(-1, q.shape[1])
+        rows, rotations = self._rows(moved)
         twists = []
         for item, rotation in zip(self.follows.items, rotations, strict=True):
-            twist = item.target(t).twist[:, :, None]
+            twist = item.target((self.t + steps).ravel()).twist[:, :, None]
             twists.append(item.task.select_along(twist, rotation)[:, :, 0])
-        return np.concatenate(twists, axis=1) - (rows @ qd[:, :, None])[:, :, 0]
+        rates = np.tile(qd, (len(steps), 1))[:, :, None]
+        found = np.concatenate(twists, axis=1) - (rows @ rates)[:, :, 0]
+        return found.reshape(len(steps), len(self.t), -1)
 
     def _rows(self, q: Array) -> tuple[Array, list[Array]]:
         """Return the rows of all Jacobians at q (K, n), (K, m, n), and the tips' rotations."""

@@ -18,6 +18,7 @@ from selfmotion.planning.settings import (
     MOST_NODES,
     NEARLY,
     NODE_AGREEMENT,
+    SHORT_STEP,
     TOWARDS_MIDDLE,
 )
 from selfmotion.problem import Problem
@@ -261,7 +262,9 @@ class NodeDescent:
         prices: Array | None = None,
     ) -> Optimum:
         def told(step: Step) -> bool:
-            return self._told(step) or step.motion.cost > dearest
+            # Where another motion is known, a way of short steps is not worth it.
+            short = dearest < np.inf and 0.0 < step.length < SHORT_STEP
+            return self._told(step) or step.motion.cost > dearest or short
 
         return minimise(motion, columns, told, prices)
 

@@ -25,6 +25,8 @@ NEARLY = 0.02
 # Where the motion at x = 0 does not lead to what keeps the conditions: the self-motion goes towards
 # the middle of the limits in such shares of the duration.
 TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0)
+# Newton's method with limits takes steps this short where they are hard to keep [share].
+SHORT_STEP = 0.25
 # What would save less than this share of the cost does not bind.
 LEAST_SAVING = 1e-6
 # Between its nodes a motion may be off the path by this share of the tolerance where that is looked
