@@ -3,9 +3,8 @@
 20 straight lines that a Panda was planned along, 20 paths with rounded corners (UR5, UR10, Panda:
 rows of panels and random legs), 20 random joint splines. Of each: the time at the fastest pace,
 that of a linear programme on a fine grid over the length of the joint path, solved by HiGHS, which
-shares no code with ours, and the share of the time during which some limit is used by 90 %. With
-limits of the jerk, of some paths, against sequential linear programmes by HiGHS. Each motion is
-looked at 1,000 times a second.
+shares no code with ours, and the share of the time during which some limit is used by 90 %. Each
+motion is looked at 1,000 times a second.
 """
 
 import argparse
@@ -25,7 +24,7 @@ from selfmotion.motion import Trajectory
 from selfmotion.result.pace_rows import PaceLimits
 from selfmotion.result.pacing import Ends, along, fastest_pace
 
-GRID, JERK_GRID = 3000, 800
+GRID = 3000
 
 
 def planned_lines(count: int) -> Iterator[tuple[str, Trajectory]]:
