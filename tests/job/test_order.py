@@ -27,7 +27,7 @@ def random_stops(rng: np.random.Generator, count: int, states: int, share: float
     between = rng.uniform(0.1, 1.0, (m, m))
     between[rng.uniform(size=(m, m)) < 0.1] = np.inf
     ends = rng.uniform(0.0, 1.0, (3, m))
-    return Stops(of, ends[0], between, ends[1], ends[2], after, after_any)
+    return Stops(after, after_any, of, ends[0], between, ends[1], ends[2])
 
 
 def by_force(stops: Stops) -> float:
@@ -81,7 +81,7 @@ def test_what_cannot_be_ordered_has_no_round() -> None:
     stops = random_stops(rng, 3, 1)
     circle = [frozenset({1}), frozenset({2}), frozenset({0})]
     none = Stops(
-        stops.of, stops.own, stops.between, stops.first, stops.last, circle, stops.after_any
+        circle, stops.after_any, stops.of, stops.own, stops.between, stops.first, stops.last
     )
     assert best_round(none).states == ()
     assert improved(none).states == ()

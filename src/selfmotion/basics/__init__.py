@@ -33,7 +33,9 @@ from selfmotion.basics.files import (
     read_table as read_table,
     write_archive as write_archive,
     write_atomically as write_atomically,
+    write_bytes as write_bytes,
     write_csv as write_csv,
+    write_text as write_text,
 )
 from selfmotion.basics.inputs import (
     as_choice as as_choice,

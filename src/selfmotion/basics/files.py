@@ -19,7 +19,7 @@ _DESCRIPTION = "description"
 _LARGEST = 250_000_000
 
 
-def write_atomically(file: Path, write: Callable[[IO[bytes]], None]) -> None:
+def write_atomically(file: Path, write: Callable[[IO[bytes]], object]) -> None:
     """Let `write` fill a temporary file beside `file`, then put it in place.
 
     Raises
@@ -45,6 +45,16 @@ def write_atomically(file: Path, write: Callable[[IO[bytes]], None]) -> None:
         raise FileFormatError(f"{file}: cannot be written: {error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_bytes(file: Path, data: bytes) -> None:
+    """Write a file, atomically."""
+    write_atomically(file, lambda stream: stream.write(data))
+
+
+def write_text(file: Path, text: str) -> None:
+    """Write a text file, atomically."""
+    write_bytes(file, text.encode())
 
 
 def write_archive(file: Path, description: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
@@ -136,13 +146,8 @@ def _read_array(stream: Any, size: int, name: str) -> Array:
 
 def write_csv(file: Path, header: Sequence[str], table: Array) -> None:
     """Write a table with a header line, numbers with all their digits."""
-
-    def write(stream: IO[bytes]) -> None:
-        stream.write((",".join(header) + "\n").encode())
-        for row in table.tolist():
-            stream.write((",".join(map(repr, row)) + "\n").encode())
-
-    write_atomically(file, write)
+    lines = [",".join(header), *(",".join(map(repr, row)) for row in table.tolist())]
+    write_text(file, "\n".join(lines) + "\n")
 
 
 def read_table(file: Path) -> tuple[list[str], Array]:

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import FileFormatError, write_atomically
-from selfmotion.formats import write_text
+from selfmotion.basics import FileFormatError, write_bytes, write_text
 from selfmotion.result import Plan, load_plan
 
 
@@ -91,11 +90,7 @@ class Folder:
     def record(self, row: Row, archive: bytes) -> Row:
         """Write plan and row, in this order: a row says that all is there."""
         if archive:
-
-            def write(stream: Any) -> None:
-                stream.write(archive)
-
-            write_atomically(row.file, write)
+            write_bytes(row.file, archive)
         values = {k: v for k, v in dataclasses.asdict(row).items() if k != "file"}
         write_text(self._row_file(row.name), json.dumps(values) + "\n")
         return row

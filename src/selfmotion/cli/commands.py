@@ -9,7 +9,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.basics import Progress
+from selfmotion.basics import Progress, write_text
 from selfmotion.certificate import Extreme, approaches
 from selfmotion.cli import documents, jobs, json_tables, options, outputs, tables
 from selfmotion.cli.app import (
@@ -85,12 +85,7 @@ def plan(
         result = fastest_with_progress(job).plan
     else:
         result = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
-    if as_json:
-        terminal.print_json(data=json_tables.plan_json(result))
-    else:
-        tables.show(result, terminal)
-    outputs.write(result, [*job.outputs, *(out or [])], html, terminal, quiet=as_json)
-    raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
+    outputs.finish(result, [*job.outputs, *(out or [])], html, as_json)
 
 
 @app.command(epilog="Example: selfmotion init panda; then: selfmotion plan panda.toml")
@@ -104,7 +99,7 @@ def init(
     text = formats.example_text(robot, file.name)
     if file.exists() and not force:
         raise sm.FileFormatError(f"{file}: is there already; give --out or --force")
-    formats.write_text(file, text)
+    write_text(file, text)
     terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
 
 
@@ -117,7 +112,7 @@ def schema(
     if out is None:
         typer.echo(text)
         return
-    formats.write_text(out, text + "\n")
+    write_text(out, text + "\n")
     terminal.print(f"wrote {out}", markup=False, soft_wrap=True)
 
 

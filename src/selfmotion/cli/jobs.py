@@ -54,10 +54,7 @@ def job(
     except KeyboardInterrupt:
         complain(f"stopped; what is finished is in '{kept}': run again to go on")
         raise typer.Exit(NOT_VERIFIED) from None
-    if as_json:
-        terminal.print_json(data=json_tables.program_json(program))
-    else:
-        tables.show_program(program, terminal)
+    _show(program, as_json)
     for target in wanted:
         write_program(program, target)
         if not as_json:
@@ -88,12 +85,16 @@ def write_program(program: sm.Program, file: Path) -> None:
         sm.write_motion(program, file)
 
 
-def check(program: sm.Program, as_json: bool) -> NoReturn:
-    """Print what is known of a program that was read and judged anew, and end."""
+def _show(program: sm.Program, as_json: bool) -> None:
     if as_json:
         terminal.print_json(data=json_tables.program_json(program))
     else:
         tables.show_program(program, terminal)
+
+
+def check(program: sm.Program, as_json: bool) -> NoReturn:
+    """Print what is known of a program that was read and judged anew, and end."""
+    _show(program, as_json)
     raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
 
 

@@ -2,11 +2,15 @@
 
 import tempfile
 from pathlib import Path
+from typing import NoReturn
 
+import typer
 from rich.console import Console
 
 import selfmotion as sm
 from selfmotion import formats
+from selfmotion.cli import json_tables, tables
+from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, terminal
 
 
 def write(
@@ -36,6 +40,16 @@ def write(
     if faults:
         kept = next(file for file in written if file.suffix == ".npz")
         raise sm.FileFormatError(f"{'; '.join(faults)}; the plan is in {kept}")
+
+
+def finish(result: sm.Plan, out: list[Path], html: Path | None, as_json: bool) -> NoReturn:
+    """Print a plan, write its files, and end with what its verdict says."""
+    if as_json:
+        terminal.print_json(data=json_tables.plan_json(result))
+    else:
+        tables.show(result, terminal)
+    write(result, out, html, terminal, quiet=as_json)
+    raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
 
 
 def _write_one(result: sm.Plan, file: Path, *, page: bool) -> None:

@@ -6,15 +6,8 @@ from typing import Annotated, Any
 import typer
 
 import selfmotion as sm
-from selfmotion.cli import documents, json_tables, options, outputs, tables
-from selfmotion.cli.app import (
-    NOT_VERIFIED,
-    VERIFIED,
-    app,
-    fastest_with_progress,
-    stages,
-    terminal,
-)
+from selfmotion.cli import documents, options, outputs
+from selfmotion.cli.app import app, fastest_with_progress, stages
 
 
 @app.command(epilog="Example: selfmotion retime plan.npz --acceleration 8 --out fast.npz")
@@ -29,7 +22,7 @@ def retime(
     """Run through a plan's joint path in the least time within limits, and check it."""
     outputs.check_suffixes(out or [])
     result = sm.retime(sm.load_plan(file), *_limits(acceleration, velocity))
-    _show(result, out, html, as_json)
+    outputs.finish(result, out or [], html, as_json)
 
 
 @app.command(epilog="Example: selfmotion fastest cell.toml --deadline 60 --out fast.npz")
@@ -63,18 +56,9 @@ def fastest(
             markup=False,
             soft_wrap=True,
         )
-    _show(found.plan, [*job.outputs, *(out or [])], html, as_json)
+    outputs.finish(found.plan, [*job.outputs, *(out or [])], html, as_json)
 
 
 def _limits(acceleration: str | None, velocity: str | None) -> tuple[Any, ...]:
     named = ((acceleration, "--acceleration"), (velocity, "--velocity"))
     return tuple(None if text is None else options.one_or_each(text, name) for text, name in named)
-
-
-def _show(result: sm.Plan, out: list[Path] | None, html: Path | None, as_json: bool) -> None:
-    if as_json:
-        terminal.print_json(data=json_tables.plan_json(result))
-    else:
-        tables.show(result, terminal)
-    outputs.write(result, out or [], html, terminal, quiet=as_json)
-    raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)

@@ -7,7 +7,6 @@ from selfmotion.formats.documents import (
     read_document as read_document,
     read_values as read_values,
     write_document as write_document,
-    write_text as write_text,
 )
 from selfmotion.formats.example import example_text as example_text
 from selfmotion.formats.joint_limits import read_joint_limits as read_joint_limits

@@ -5,9 +5,9 @@ import math
 import tomllib
 from collections.abc import Hashable, Iterable, Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
-from selfmotion.basics import FileFormatError, write_atomically
+from selfmotion.basics import FileFormatError, write_text
 
 # Keys with a number for each joint.
 PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "start", "upper")
@@ -148,15 +148,6 @@ def write_document(file: Path, document: Mapping[str, Any]) -> None:
         case _:
             raise FileFormatError(f"{file}: has suffix '{file.suffix}', expected .toml or .json")
     write_text(file, text)
-
-
-def write_text(file: Path, text: str) -> None:
-    """Write a text file, atomically."""
-
-    def write(stream: IO[bytes]) -> None:
-        stream.write(text.encode())
-
-    write_atomically(file, write)
 
 
 def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:

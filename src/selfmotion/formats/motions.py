@@ -14,11 +14,12 @@ from selfmotion.basics import (
     as_path,
     read_arrays,
     shown,
-    write_atomically,
+    write_bytes,
     write_csv,
+    write_text,
 )
 from selfmotion.formats import ros
-from selfmotion.formats.documents import read_document, write_document, write_text
+from selfmotion.formats.documents import read_document, write_document
 from selfmotion.formats.mujoco import keyframes
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.formats.urscript import script
@@ -188,11 +189,7 @@ def _write_npz(file: Path, motion: MotionSamples, robot: RobotModel, rate: float
     stream = io.BytesIO()
     arrays: dict[str, Any] = {"t": motion.t, "q": motion.q, "qd": motion.qd, "qdd": motion.qdd}
     np.savez_compressed(stream, joint_names=np.array(motion.joint_names), **arrays)
-
-    def write(out: Any) -> None:
-        out.write(stream.getvalue())
-
-    write_atomically(file, write)
+    write_bytes(file, stream.getvalue())
 
 
 def _write_json(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:

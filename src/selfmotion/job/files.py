@@ -3,11 +3,12 @@
 import hashlib
 import json
 import re
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import FileFormatError, as_path, write_atomically
+from selfmotion.basics import FileFormatError, as_path, write_text
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.job.program import Program, Step
 from selfmotion.result import Move, Plan, load_move, read_bundle, read_plan, write_bundle
@@ -93,11 +94,12 @@ class Shelf:
             except OSError as error:
                 raise FileFormatError(f"{folder}: cannot be made: {error.strerror}") from error
 
-    def file(self, name: str, asked: Any) -> Path | None:
+    def file(self, name: str, asked: Callable[[], Any]) -> Path | None:
         """Return the file for what was asked (JSON-safe) under a name; None without a folder."""
         if self._folder is None:
             return None
-        key = hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:16]
+        text = json.dumps(asked(), sort_keys=True)
+        key = hashlib.sha256(text.encode()).hexdigest()[:16]
         plain = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:40]
         return self._folder / f"{plain}.{key}.json"
 
@@ -112,13 +114,14 @@ class Shelf:
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None
 
-    def keep_plans(self, file: Path | None, plans: Sequence[Plan], reason: str) -> None:
+    def keep_plans(self, file: Path | None, made: tuple[Sequence[Plan], str]) -> None:
         """Keep plans, or why there are none."""
         if file is None:
             return
+        plans, reason = made
         for number, plan in enumerate(plans):
             plan.save(file.with_suffix(f".{number}.npz"))
-        self._write(file, {"plans": len(plans), "reason": reason})
+        _write(file, {"plans": len(plans), "reason": reason})
 
     def move(self, file: Path | None, missing: Move) -> Move | None:
         """Return the move that was kept, `missing` with the reason, or None for nothing kept."""
@@ -127,7 +130,7 @@ class Shelf:
             return None
         try:
             if kept["trouble"]:
-                return Move(missing.robot, missing.constraints, None, (), str(kept["trouble"]))
+                return replace(missing, trouble=str(kept["trouble"]))
             return load_move(file.with_suffix(".npz"), known=self._known)
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None
@@ -138,7 +141,7 @@ class Shelf:
             return
         if move.trajectory is not None:
             move.save(file.with_suffix(".npz"))
-        self._write(file, {"trouble": "" if move.trajectory is not None else move.trouble})
+        _write(file, {"trouble": "" if move.trajectory is not None else move.trouble})
 
     def _read(self, file: Path | None) -> dict[str, Any] | None:
         if file is None or not file.exists():
@@ -149,8 +152,6 @@ class Shelf:
             return None
         return found if isinstance(found, dict) else None
 
-    def _write(self, file: Path, values: Mapping[str, Any]) -> None:
-        def write(stream: Any) -> None:
-            stream.write(json.dumps(values).encode())
 
-        write_atomically(file, write)
+def _write(file: Path, values: Mapping[str, Any]) -> None:
+    write_text(file, json.dumps(values))

@@ -27,43 +27,19 @@ _TRIED, _PROMISE, _GAIN = 4, 0.5, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Stops:
-    """What there is to order.
+class Before:
+    """What has to come before what.
 
     Attributes
     ----------
-    of : (m,)
-        Whose state each state is: numbers of stops from 0 on.
-    own : (m,)
-        What a state costs by itself.
-    between : (m, m)
-        What it costs to go from the end of one state to the beginning of another; inf where it
-        cannot be done.
-    first, last : (m,)
-        What it costs to come to a state from the start, and from a state to the end.
     after : sequence of frozenset
         For each stop those that have to be made before it.
     after_any : sequence of frozenset
         For each stop those of which one has to be made before it; an empty set asks for nothing.
     """
 
-    of: Ints
-    own: Array
-    between: Array
-    first: Array
-    last: Array
     after: Sequence[frozenset[int]]
     after_any: Sequence[frozenset[int]]
-
-    @property
-    def count(self) -> int:
-        """How many stops there are."""
-        return len(self.after)
-
-    @cached_property
-    def states(self) -> list[Ints]:
-        """The states of each stop."""
-        return [np.flatnonzero(self.of == stop) for stop in range(self.count)]
 
     def allows(self, stop: int, made: frozenset[int] | set[int]) -> bool:
         """Whether a stop may come next when others are made."""
@@ -78,6 +54,40 @@ class Stops:
                 return False
             made.add(stop)
         return True
+
+
+@dataclass(frozen=True, eq=False)
+class Stops(Before):
+    """What there is to order.
+
+    Attributes
+    ----------
+    of : (m,)
+        Whose state each state is: numbers of stops from 0 on.
+    own : (m,)
+        What a state costs by itself.
+    between : (m, m)
+        What it costs to go from the end of one state to the beginning of another; inf where it
+        cannot be done.
+    first, last : (m,)
+        What it costs to come to a state from the start, and from a state to the end.
+    """
+
+    of: Ints
+    own: Array
+    between: Array
+    first: Array
+    last: Array
+
+    @property
+    def count(self) -> int:
+        """How many stops there are."""
+        return len(self.after)
+
+    @cached_property
+    def states(self) -> list[Ints]:
+        """The states of each stop."""
+        return [np.flatnonzero(self.of == stop) for stop in range(self.count)]
 
     def cost(self, states: Sequence[int]) -> float:
         """Return what a round of states, in order, costs."""

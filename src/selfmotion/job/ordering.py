@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
-from selfmotion.job.order import EXACT, Round, Stops, best_round
+from selfmotion.job.order import EXACT, Before, Round, Stops, best_round
 from selfmotion.job.seam import Seam, backwards_plan
 from selfmotion.job.work import Work
 from selfmotion.planning import FreeMotions
@@ -96,16 +96,17 @@ class Ordering:
             if not plans:
                 self.missing[self.seams[number].name] = reason
             for plan in plans:
-                self._add(State(number, plan))
-                if self.seams[number].either_way:
-                    self._add(State(number, plan, turned=True, mirrored=True))
+                self._add(number, plan)
         self._drop_what_hangs()
         if self.states:
             self._add_alike()
             self._add_nearby()
 
-    def _add(self, state: State) -> None:
-        self.states.append(state)
+    def _add(self, seam: int, plan: Plan, turned: bool = False) -> None:
+        """Add a way to make a seam, and the same the other way round where that is one."""
+        self.states.append(State(seam, plan, turned))
+        if self.seams[seam].either_way:
+            self.states.append(State(seam, plan, not turned, mirrored=True))
         self.__dict__.pop("estimates", None)
 
     def own(self, state: int) -> float:
@@ -154,15 +155,23 @@ class Ordering:
 
     def keeps(self, order: Sequence[int]) -> bool:
         """Whether an order of seams makes none before what it has to come after."""
-        made: set[str] = set()
-        for number in order:
-            seam = self.seams[number]
-            after = [name for name in seam.after if name not in self.missing]
-            any_of = [name for name in seam.after_any if name not in self.missing]
-            if not made.issuperset(after) or (any_of and made.isdisjoint(any_of)):
-                return False
-            made.add(seam.name)
-        return True
+        place = self._places
+        return self._before(place).keeps([place[seam] for seam in order])
+
+    @property
+    def _places(self) -> dict[int, int]:
+        """The seams that are not missing, numbered anew from 0 on."""
+        return {seam: k for k, seam in enumerate(self.made)}
+
+    def _before(self, place: dict[int, int]) -> Before:
+        """Return what has to come before what, by their places."""
+        names = {self.seams[seam].name: k for seam, k in place.items()}
+        each = [self.seams[seam] for seam in place]
+        after, after_any = (
+            [frozenset(names[name] for name in wanted if name in names) for wanted in several]
+            for several in ([seam.after for seam in each], [seam.after_any for seam in each])
+        )
+        return Before(after, after_any)
 
     def best(self) -> Round:
         """Return the best round of states by what is known; its states are numbers of `states`.
@@ -172,13 +181,12 @@ class Ordering:
         ProblemError
             What has to come first goes round in a circle.
         """
-        made = self.made
-        place = {seam: k for k, seam in enumerate(made)}
+        place = self._places
         kept = [k for k, state in enumerate(self.states) if state.seam in place]
-        if not made:
+        if not place:
             return Round((), 0.0, 0.0)
-        stops = self._stops(kept, made, place)
-        given = None if self._is_free else list(range(len(made)))
+        stops = self._stops(kept, place)
+        given = None if self._is_free else list(range(len(place)))
         if given is not None and not stops.keeps(given):
             raise ProblemError(
                 "the seams are in an order in which one comes before what it has to come after; "
@@ -189,7 +197,7 @@ class Ordering:
             raise ProblemError("what seams have to come after goes round in a circle")
         return Round(tuple(kept[k] for k in found.states), found.cost, found.bound)
 
-    def _stops(self, kept: list[int], made: list[int], place: dict[int, int]) -> Stops:
+    def _stops(self, kept: list[int], place: dict[int, int]) -> Stops:
         first, last, between = self.estimates
         first, last, between = first[kept].copy(), last[kept].copy(), between[np.ix_(kept, kept)]
         row = {state: k for k, state in enumerate(kept)}
@@ -200,15 +208,15 @@ class Ordering:
                 last[row[one]] = seconds
             elif one in row and other in row:
                 between[row[one], row[other]] = seconds
-        names = {self.seams[k].name: place[k] for k in made}
+        before = self._before(place)
         return Stops(
+            before.after,
+            before.after_any,
             np.array([place[self.states[k].seam] for k in kept]),
             np.array([self.own(k) for k in kept]),
             between,
             first,
             last,
-            [frozenset(names[n] for n in self.seams[k].after if n in names) for k in made],
-            [frozenset(names[n] for n in self.seams[k].after_any if n in names) for k in made],
         )
 
     @cached_property
@@ -236,9 +244,7 @@ class Ordering:
             for plan in found:
                 starts = [self.seconds(plan.trajectory.q[0], state.ends[0]) for state in known]
                 if min(starts) > _WORTH:
-                    self._add(State(seam, plan))
-                    if self.seams[seam].either_way:
-                        self._add(State(seam, plan, turned=True, mirrored=True))
+                    self._add(seam, plan)
 
     def _add_nearby(self) -> None:
         """Add motions that begin near where the one before ends, along the best round."""
@@ -263,12 +269,10 @@ class Ordering:
             added = 0
             for (here, _, _, before), found in zip(wanted, plans, strict=True):
                 for plan in found:
-                    nearer = State(here.seam, plan, here.turned)
-                    times = [self.seconds(before, one.ends[0]) for one in (nearer, here)]
-                    if times[0] < times[1] - _WORTH:
-                        self._add(nearer)
-                        if self.seams[here.seam].either_way:
-                            self._add(State(here.seam, plan, not here.turned, mirrored=True))
+                    starts = plan.trajectory.q[0], here.ends[0]
+                    nearer, present = (self.seconds(before, q) for q in starts)
+                    if nearer < present - _WORTH:
+                        self._add(here.seam, plan, here.turned)
                         added += 1
             if not added:
                 break

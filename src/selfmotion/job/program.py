@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
 from pathlib import Path as FilePath
-from typing import IO
 
 import numpy as np
 
-from selfmotion.basics import PlanError, as_path, write_atomically
+from selfmotion.basics import PlanError, as_path, write_text
 from selfmotion.collision import Obstacle
 from selfmotion.motion import Trajectory, joined_motions
 from selfmotion.result import Move, Plan
@@ -237,12 +236,7 @@ class Program:
             f'{begin!r},{end!r},{kind},"{name.replace(chr(34), chr(34) * 2)}"'
             for begin, end, kind, name in sorted(rows)
         ]
-        text = "\n".join(lines) + "\n"
-
-        def write(stream: IO[bytes]) -> None:
-            stream.write(text.encode())
-
-        write_atomically(as_path(file), write)
+        write_text(as_path(file), "\n".join(lines) + "\n")
 
     def save(self, file: str | FilePath) -> None:
         """Write the program, without loss, to a file that `load_program` reads; atomically."""

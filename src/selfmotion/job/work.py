@@ -6,11 +6,12 @@ it wherever it is done, and whenever.
 
 import tempfile
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -34,8 +35,9 @@ from selfmotion.robot import RobotModel
 _REMEMBERED = 8
 
 
-# What is asked of a piece of work, by name.
+# What is asked of a piece of work, by name, and what comes of it.
 _Task = Mapping[str, Any]
+_Made = TypeVar("_Made")
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,38 +157,37 @@ class Work:
                     "seed": [self.asked.seed, _number(ends.tobytes())],
                 }
             )
-        keeps = self._shelf.file("", "") is not None
-        files = [self._shelf.file("move", _move_asked(task)) if keeps else None for task in tasks]
-        found: list[Move] = []
-        kept = [
-            self._shelf.move(file, _missing(task, ""))
-            for file, task in zip(files, tasks, strict=True)
-        ]
-        todo = [task for task, known in zip(tasks, kept, strict=True) if known is None]
-        fresh = self._done(todo, "move")
-        for number, (file, known) in enumerate(zip(files, kept, strict=True), 1):
-            self.tell("move", number, len(tasks))
-            move = known or next(fresh)
-            if known is None:
-                self._shelf.keep_move(file, move)
-            found.append(move)
-        return found
+        shelf = self._shelf
+        files = [shelf.file("move", partial(_move_asked, task)) for task in tasks]
+        both = zip(files, tasks, strict=True)
+        kept = [shelf.move(file, _missing(task, "")) for file, task in both]
+        return self._finished("move", "move", tasks, files, kept, shelf.keep_move)
 
     def _plans(self, tasks: Sequence[_Task], stage: str) -> list[tuple[list[Plan], str]]:
-        keeps = self._shelf.file("", "") is not None
+        shelf = self._shelf
         files = [
-            self._shelf.file(f"{stage} {task['name']}", _plans_asked(task)) if keeps else None
-            for task in tasks
+            shelf.file(f"{stage} {task['name']}", partial(_plans_asked, task)) for task in tasks
         ]
-        kept = [self._shelf.plans(file) for file in files]
+        kept = [shelf.plans(file) for file in files]
+        return self._finished("plans", stage, tasks, files, kept, shelf.keep_plans)
+
+    def _finished(
+        self,
+        kind: str,
+        stage: str,
+        tasks: Sequence[_Task],
+        files: Sequence[Path | None],
+        kept: Sequence[_Made | None],
+        keep: Callable[[Path | None, _Made], None],
+    ) -> list[_Made]:
+        """Return what comes of tasks: what was kept, and the others, kept from now on."""
         todo = [task for task, known in zip(tasks, kept, strict=True) if known is None]
-        fresh = self._done(todo, "plans")
-        found: list[tuple[list[Plan], str]] = []
+        fresh, found = self._done(todo, kind), list[_Made]()
         for number, (file, known) in enumerate(zip(files, kept, strict=True), 1):
             self.tell(stage, number, len(tasks))
-            made = known or next(fresh)
+            made = next(fresh) if known is None else known
             if known is None:
-                self._shelf.keep_plans(file, *made)
+                keep(file, made)
             found.append(made)
         return found
 
@@ -248,7 +249,7 @@ def _move_here(task: _Task) -> Move:
 
 def _missing(task: _Task, trouble: str) -> Move:
     robot, constraints = task["arm"]
-    return Move(robot, constraints, None, (), trouble)
+    return Move.missing(robot, constraints, trouble)
 
 
 def _plans_asked(task: _Task) -> dict[str, Any]:

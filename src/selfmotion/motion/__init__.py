@@ -5,6 +5,7 @@ from selfmotion.motion.grid import Grid as Grid
 from selfmotion.motion.joining import (
     joined_motions as joined_motions,
     reversed_motion as reversed_motion,
+    slowdown_of as slowdown_of,
 )
 from selfmotion.motion.null_motion import (
     BSplineNullMotion as BSplineNullMotion,

@@ -1,9 +1,10 @@
-"""Motions one after the other, and backwards."""
+"""Motions one after the other, backwards, and slower."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from selfmotion.basics import Array
 from selfmotion.motion.trajectory import Trajectory
 
 
@@ -27,3 +28,16 @@ def reversed_motion(motion: Trajectory) -> Trajectory:
     t = motion.t
     q, qd, qdd = (motion(t, order)[::-1] for order in range(3))
     return Trajectory(t[-1] - t[::-1], q, -qd, motion.joint_names, qdd)
+
+
+def slowdown_of(motion: Trajectory, limits: Sequence[Array]) -> float:
+    """Return how many times as long a motion would have to take to keep limits at all times.
+
+    Of q̇, q̈, … in turn, (n,) each; inf where there is none. Below 1 it might be faster.
+    """
+    shares = (
+        float((np.abs(motion.extremes(order)[1]) / limit).max()) ** (1.0 / order)
+        for order, limit in enumerate(limits, 1)
+        if np.isfinite(limit).any()
+    )
+    return max(shares, default=0.0)

@@ -157,12 +157,14 @@ class NodeConditions:
     def orders(self, samples: CheckedSamples) -> Ints:
         """Return the highest derivative of q that each condition depends on, (C,)."""
         found = [np.zeros(0, dtype=np.int64)]
-        for item in self.constraints:
+        for item, own in zip(self.constraints, self._counts, strict=True):
+            if isinstance(item, BoundClearance):
+                found.append(np.zeros(own, dtype=np.int64))
+                continue
+            # At all points: a square of what is 0, as at rest, has no slope.
             known = linearised(item, samples, self._units)
-            first = np.arange(known.count // (2 * len(self.spline.t) - 1))
-            rows = known.picked(self._units, first).reshape(len(first), 4, -1)
-            # What is far from counting, as bodies are, has no rows: those depend on q alone.
-            does = np.any(rows != 0.0, axis=2)
+            rows = known.picked(self._units, np.arange(known.count))
+            does = np.any(rows.reshape(-1, own, 4, rows.shape[1] // 4) != 0.0, axis=(0, 3))
             does[:, 0] = True
             found.append(3 - np.argmax(np.flip(does, axis=1), axis=1))
         return np.tile(np.concatenate(found), 2)

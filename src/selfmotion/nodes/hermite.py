@@ -1,5 +1,6 @@
 """A motion between nodes: the cubic Hermite spline of q and q̇, and what costs see of it."""
 
+from abc import ABC, abstractmethod
 from functools import cached_property
 
 import numpy as np
@@ -173,7 +174,25 @@ class PlacedLater(Samples):
         return self._placed.task_jacobian
 
 
-class HermiteSamples(PlacedLater):
+class _WithRates(PlacedLater, ABC):
+    """A motion whose derivatives are known; those of splines at nodes are means of both sides."""
+
+    @cached_property
+    def qdd(self) -> Array:
+        """Joint accelerations, (S, n)."""
+        return self._of_order(2)
+
+    @cached_property
+    def qddd(self) -> Array:
+        """Joint jerks, (S, n)."""
+        return self._of_order(3)
+
+    @abstractmethod
+    def _of_order(self, order: int) -> Array:
+        """Return a derivative of q at the samples, (S, n)."""
+
+
+class HermiteSamples(_WithRates):
     """A Hermite spline as costs see it.
 
     Parameters
@@ -206,16 +225,6 @@ class HermiteSamples(PlacedLater):
         """The same as constraints see it."""
         return CheckedSamples(self)
 
-    @cached_property
-    def qdd(self) -> Array:
-        """Joint accelerations, (S, n): of the spline, at the nodes means of both sides."""
-        return self._of_order(2)
-
-    @cached_property
-    def qddd(self) -> Array:
-        """Joint jerks, (S, n): likewise."""
-        return self._of_order(3)
-
     def _of_order(self, order: int) -> Array:
         count, _, n = self.ends.shape
         found = np.empty((_SAMPLES * count + 1, n))
@@ -231,7 +240,7 @@ class HermiteSamples(PlacedLater):
         return self.spline.at_nodes(order, *self._at_nodes)
 
 
-class CheckedSamples(PlacedLater):
+class CheckedSamples(_WithRates):
     """A Hermite spline as constraints see it: at its nodes, and `between` them.
 
     Parameters
@@ -246,16 +255,6 @@ class CheckedSamples(PlacedLater):
         spline = samples.spline
         super().__init__(samples.follows, spline.checked, self._of_order(0), self._of_order(1))
 
-    @cached_property
-    def qdd(self) -> Array:
-        """Joint accelerations, (2 N + 1, n): at the nodes means of both sides."""
-        return self._of_order(2)
-
-    @cached_property
-    def qddd(self) -> Array:
-        """Joint jerks, (2 N + 1, n): likewise."""
-        return self._of_order(3)
-
     def _of_order(self, order: int) -> Array:
         samples = self._samples
         found = np.empty((2 * len(samples.ends) + 1, samples.ends.shape[2]))
@@ -265,7 +264,7 @@ class CheckedSamples(PlacedLater):
         return found
 
 
-class QuinticSamples(PlacedLater):
+class QuinticSamples(_WithRates):
     """A trajectory as costs see it.
 
     Parameters
@@ -281,12 +280,5 @@ class QuinticSamples(PlacedLater):
         super().__init__(follows, sampling, trajectory(sampling.t), trajectory(sampling.t, 1))
         object.__setattr__(self, "_trajectory", trajectory)
 
-    @cached_property
-    def qdd(self) -> Array:
-        """Joint accelerations, (S, n)."""
-        return np.asarray(self._trajectory(self.t, 2))
-
-    @cached_property
-    def qddd(self) -> Array:
-        """Joint jerks, (S, n)."""
-        return np.asarray(self._trajectory(self.t, 3))
+    def _of_order(self, order: int) -> Array:
+        return np.asarray(self._trajectory(self.t, order))

@@ -194,8 +194,8 @@ class NodeMotion:
         return self.cost + self.grid.cost.roughness(self.samples)
 
     @cached_property
-    def partials(self) -> Partials:
-        """Derivatives of the integrand at the samples."""
+    def partials(self) -> tuple[Partials, ...]:
+        """Derivatives of each cost's integrand at the samples."""
         return self.grid.cost.partials(self.samples)
 
     @cached_property

@@ -152,7 +152,7 @@ class _Solver:
             prices[:, self._columns] = self._prices
             by_prices = slopes + motion.grid.conditions.pulled(motion.samples.checked, prices)
         curved = around.curvature(by_prices)
-        intervals = motion.grid.cost.curvature(motion.samples, around.changes)
+        intervals = motion.grid.cost.curvature(motion.samples, motion.partials, around.changes)
         gap = motion.h[:, self._columns] + self._slacks
         while True:
             step = self._step(gradient, curved, intervals, rows, gap)

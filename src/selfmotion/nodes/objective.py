@@ -97,17 +97,18 @@ class NodeCost:
         ends = samples.ends
         return 0.5 * float(np.sum((stiffness @ ends) * (ends @ weight)))
 
-    def partials(self, samples: Samples) -> Partials:
-        """Return the derivatives of the integrand at the samples, of all costs together."""
-        return _summed([cost.gradient(samples) for cost in self._costs])
+    def partials(self, samples: Samples) -> tuple[Partials, ...]:
+        """Return the derivatives of the integrand of each cost at the samples."""
+        return tuple(cost.gradient(samples) for cost in self._costs)
 
-    def slopes(self, samples: HermiteSamples, partials: Partials) -> Array:
+    def slopes(self, samples: HermiteSamples, partials: Sequence[Partials]) -> Array:
         """Return the derivatives of each interval's cost by q, q̇ at its ends, (N, 4, n)."""
+        together = _summed(partials)
         weights, bases = self._spline.weights, self._spline.bases
         count, n = len(weights), samples.q.shape[1]
         found = np.zeros((count, 4, n))
         for order, name in enumerate(_NAMES):
-            part = getattr(partials, name)
+            part = getattr(together, name)
             if part is not None:
                 shares = weights[:, :, None] * bases[order]
                 found += np.swapaxes(shares, 1, 2) @ part[:-1].reshape(count, 4, n)
@@ -116,12 +117,19 @@ class NodeCost:
             found += stiffness @ (samples.ends @ weight)
         return found
 
-    def bends_by_rates(self, samples: HermiteSamples) -> bool:
+    def bends_by_rates(self, partials: Sequence[Partials]) -> bool:
         """Whether a cost that is no quadratic form is one of q̈, the jerk or errors."""
-        bent = _summed([cost.gradient(samples) for cost in self._bent])
+        bent = self._of_bent(partials)
         return any(part is not None for part in (bent.qdd, bent.qddd, bent.error))
 
-    def curvature(self, samples: HermiteSamples, changes: Array) -> Array:
+    def _of_bent(self, partials: Sequence[Partials]) -> Partials:
+        """Return the derivatives of all costs that are no quadratic forms."""
+        both = zip(self._costs, partials, strict=True)
+        return _summed([own for cost, own in both if not cost.is_quadratic])
+
+    def curvature(
+        self, samples: HermiteSamples, partials: Sequence[Partials], changes: Array
+    ) -> Array:
         """Return Γᵀ (∂²F) Γ on each interval, by w of its left, then its right node, (N, 4r, 4r).
 
         `changes` (N + 1, 2, n, 2r) is Γ of the nodes.
@@ -135,11 +143,11 @@ class NodeCost:
             turned = stiffness @ (weight @ both).reshape(count - 1, 4, -1)
             found += flat @ turned.reshape(count - 1, 4 * n, 2 * size)
         if self._bent:
-            found += self._bending(samples, both)
+            found += self._bending(samples, self._of_bent(partials), both)
         return found
 
-    def _bending(self, samples: HermiteSamples, both: Array) -> Array:
-        """Return what costs that are no quadratic forms add to the curvature.
+    def _bending(self, samples: HermiteSamples, here: Partials, both: Array) -> Array:
+        """Return what costs that are no quadratic forms, with derivatives `here`, add to it.
 
         `both` (N, 4, n, 4r) are the changes of q and q̇ at the ends of each interval.
         """
@@ -154,7 +162,6 @@ class NodeCost:
         along = orthonormal((left + share * (right - left)).reshape(-1, n, r))
         turned = np.swapaxes(along, 1, 2)
         moved = turned @ by_q
-        here = _summed([cost.gradient(samples) for cost in self._bent])
         directions = np.concatenate([along, along[-1:]])
         found = np.zeros((count * len(spline.shares_within), size, size))
         for x in range(r):

@@ -16,7 +16,7 @@ from selfmotion.basics import (
 )
 from selfmotion.constraints import Constraint, Envelope
 from selfmotion.follow import Follows
-from selfmotion.motion import Trajectory
+from selfmotion.motion import Trajectory, slowdown_of
 from selfmotion.path import Dwell
 from selfmotion.planning.rounding import rounded
 from selfmotion.planning.settings import (
@@ -66,9 +66,8 @@ class FreeMotions:
         rng: np.random.Generator,
         progress: Progress = silent,
     ) -> None:
-        inner = [part.on_last_part() for item in constraints if (part := item.on_part())]
-        kept = [item for item in inner if item is not None and item.applies(robot)]
-        self.robot, self.constraints = robot, tuple(kept)
+        kept = at_all_times(constraints)
+        self.robot, self.constraints = robot, tuple(item for item in kept if item.applies(robot))
         self._rng, self._progress = rng, progress
         self.asked: Envelope = envelope_of(robot, self.constraints)
 
@@ -138,7 +137,7 @@ class FreeMotions:
         return np.clip(q, lower + _ulps(lower), upper - _ulps(upper))
 
     def _missing(self, trouble: str) -> Move:
-        return Move(self.robot, self.constraints, None, (), trouble)
+        return Move.missing(self.robot, self.constraints, trouble)
 
     def _blocked(self, ends: Sequence[Array]) -> str:
         """Return what is wrong with an end already, "" for nothing."""
@@ -260,13 +259,18 @@ class FreeMotions:
         q, qd = path(sigma), path(sigma, 1)
         qdd = path(sigma, 2) * rate[:, None] ** 2 + qd * bend[:, None]
         unit = Trajectory(tau, q, qd * rate[:, None], self.robot.joint_names, qdd)
-        limits, times = self._limits, [BRIEFEST_MOVE]
-        for order, limit in ((1, limits.speed), (2, limits.acceleration), (3, limits.jerk)):
-            share = float((np.abs(unit.extremes(order)[1]) / limit).max())
-            times.append(share ** (1.0 / order))
-        longest = max(times)
+        limits = self._limits
+        needed = slowdown_of(unit, (limits.speed, limits.acceleration, limits.jerk))
+        longest = max(needed, BRIEFEST_MOVE)
         faster = qdd / longest**2
         return Trajectory(longest * tau, q, unit.qd / longest, unit.joint_names, faster)
+
+
+def at_all_times(constraints: Sequence[Constraint]) -> list[Constraint]:
+    """Return what constraints ask of all times, and nothing that they ask of an end."""
+    parts = (item.on_part() for item in constraints)
+    inner = (part.on_last_part() for part in parts if part is not None)
+    return [item for item in inner if item is not None]
 
 
 def _ulps(limit: Array) -> Array:

@@ -8,7 +8,7 @@ from selfmotion.basics import Array, Progress, SelfmotionError
 from selfmotion.costs import JointVelocity
 from selfmotion.motion import Trajectory, joined_motions, reversed_motion
 from selfmotion.path import Line
-from selfmotion.planning.free_motion import FreeMotions
+from selfmotion.planning.free_motion import FreeMotions, at_all_times
 from selfmotion.planning.run import plan
 from selfmotion.planning.settings import BRIEFEST_RETREAT, RETREAT_SPEED
 from selfmotion.problem import Problem
@@ -62,7 +62,7 @@ class Mover:
             away, back = (self._lead(q, self._retreat) for q in (first, last))
         except SelfmotionError as error:
             trouble = f"the tool cannot retreat along its axis: {error}"
-            return Move(self._free.robot, self._free.constraints, None, (), trouble)
+            return Move.missing(self._free.robot, self._free.constraints, trouble)
         between = self._free.between(away.q[-1], back.q[-1])
         if between.trajectory is None:
             return between
@@ -80,14 +80,11 @@ class Mover:
 
 def between_parts(problem: Problem) -> Problem:
     """Return a problem with what it asks of all times, and nothing that it asks of an end."""
-    parts = (item.on_part() for item in problem.constraints)
-    inner = [part.on_last_part() for part in parts if part is not None]
-    kept = [item for item in inner if item is not None]
     return replace(
         problem,
         start=None,
         costs=(JointVelocity.usual(problem.robot),),
-        constraints=kept,
+        constraints=at_all_times(problem.constraints),
         relaxations=(),
         rest=True,
     )

@@ -1,14 +1,13 @@
 """The best motion near others, by Newton's method on the nodes, and how fine it has to be."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints
-from selfmotion.constraints import Binding, BoundConstraint
-from selfmotion.engine import Conditions, Evaluation
-from selfmotion.motion import FreeNullMotion, Grid, NodeNullMotion, NullMotion, Trajectory
+from selfmotion.constraints import BoundConstraint
+from selfmotion.engine import Conditions
+from selfmotion.motion import FreeNullMotion, Grid, Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, QuasiNewton, Status
 from selfmotion.planning.effort import Effort
@@ -21,6 +20,7 @@ from selfmotion.planning.settings import (
     SHORT_STEP,
     TOWARDS_MIDDLE,
 )
+from selfmotion.planning.standing import Standing
 from selfmotion.problem import Problem
 
 
@@ -46,68 +46,6 @@ def takes(problem: Problem, effort: Effort, constraints: Sequence[BoundConstrain
 
 _NO_COLUMNS: Ints = np.zeros(0, dtype=np.int64)
 _ARRIVED = (Status.CONVERGED, Status.PRECISION)
-
-
-@dataclass(frozen=True, eq=False)
-class Standing:
-    """A motion of nodes that stands: an optimum that keeps the conditions.
-
-    Attributes
-    ----------
-    motion : NodeMotion
-    status : Status
-    columns : (c,)
-        Of the conditions: those that counted.
-    prices : (N + 1, C)
-        Of the conditions, on the nodes of the optimum.
-    active : tuple of Binding
-    remaining : float
-        What a finer grid and another step might still save [cost].
-    """
-
-    motion: NodeMotion
-    status: Status
-    columns: Ints
-    prices: Array
-    active: tuple[Binding, ...]
-    remaining: float
-
-    @property
-    def steps(self) -> int:
-        """Intervals between the nodes."""
-        return len(self.motion.grid.t) - 1
-
-    @property
-    def null_motion(self) -> NullMotion:
-        """The null motion's functions: of its values at the nodes, for each joint."""
-        return NodeNullMotion(tuple(self.motion.grid.t / self.motion.grid.t[-1]))
-
-    @property
-    def coefficients(self) -> Array:
-        """The null motion at the nodes, joint by joint."""
-        return self.motion.epsilon.T.ravel()
-
-    @property
-    def cost(self) -> float:
-        """F."""
-        return self.motion.exact_cost
-
-    def evaluation(self) -> Evaluation:
-        """Return the motion as others are."""
-        motion = self.motion
-        return Evaluation(self.coefficients, motion.exact_terms, motion.trajectory, damped=False)
-
-    def refined(self, where: Flags | None = None) -> "Standing":
-        """Return it with more nodes, in the middle of each interval or of some (N,)."""
-        t = self.motion.grid.t
-        finer = Grid(t).halved(where).nodes
-        motion = self.motion.on(self.motion.grid.on(finer))
-        if motion is None:
-            return self
-        # Prices are of conditions at nodes: the more there are, the less each counts.
-        near = np.searchsorted(t, finer, side="right") - 1
-        prices = self.prices[near] * (len(t) / len(finer))
-        return replace(self, motion=motion, prices=prices)
 
 
 class NodeDescent:
@@ -163,7 +101,7 @@ class NodeDescent:
         if (
             motion is None
             or not np.isfinite(motion.aim)
-            or grid.cost.bends_by_rates(motion.samples)
+            or grid.cost.bends_by_rates(motion.partials)
         ):
             return None
         freely = self._minimise(motion, _NO_COLUMNS)

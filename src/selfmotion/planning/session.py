@@ -24,7 +24,7 @@ from selfmotion.optimise import Iteration, Minimum, Status
 from selfmotion.planning.closing import closed
 from selfmotion.planning.descent import Descent, breaks
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.nodes import NodeDescent, Standing, takes
+from selfmotion.planning.nodes import NodeDescent, takes
 from selfmotion.planning.settings import (
     ALIKE,
     COST_AGREEMENT,
@@ -34,6 +34,7 @@ from selfmotion.planning.settings import (
     ROUGH_AGREEMENT,
     THINNER,
 )
+from selfmotion.planning.standing import Standing
 from selfmotion.planning.warm_start import coefficients_of, slower
 from selfmotion.problem import Problem
 from selfmotion.result import Plan

@@ -11,7 +11,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from selfmotion.basics import RenderError, as_path, write_atomically
+from selfmotion.basics import RenderError, as_path, write_atomically, write_bytes
 from selfmotion.replay.page import Shown, replay_html
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -63,11 +63,7 @@ def render_png(
         if not 0.0 <= t <= duration:
             raise RenderError(f"there is no picture at t = {t} s: the motion lasts {duration} s")
         picture = _shot(page, t, whole_page)
-
-    def write(stream: IO[bytes]) -> None:
-        stream.write(picture)
-
-    write_atomically(path, write)
+    write_bytes(path, picture)
     return path
 
 

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from string import Template
-from typing import IO, Any
+from typing import Any
 
 import numpy.typing as npt
 
-from selfmotion.basics import ProblemError, as_path, write_atomically
+from selfmotion.basics import ProblemError, as_path, write_text
 from selfmotion.job import Program
 from selfmotion.replay.content import page_content
 from selfmotion.replay.facts import describe
@@ -95,12 +95,7 @@ def write_replay(plans: Shown, file: str | os.PathLike[str], **options: Any) -> 
         The file.
     """
     path = as_path(file)
-    data = replay_html(plans, **options).encode()
-
-    def write(stream: IO[bytes]) -> None:
-        stream.write(data)
-
-    write_atomically(path, write)
+    write_text(path, replay_html(plans, **options))
     return path
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import FileFormatError, write_atomically
+from selfmotion.result.archive import digest_of
 from selfmotion.result.move import Move, load_move
 from selfmotion.result.plan import Plan, load_plan
 
@@ -46,7 +47,7 @@ def write_bundle(
                 members.append({"plan": isinstance(item, Plan), "digest": digest})
                 archive.write(member, member.name)
             whole = {"kind": kind, "version": version, "members": members, **description}
-            archive.writestr(_NAME, json.dumps({**whole, "digest": _digest(whole)}))
+            archive.writestr(_NAME, json.dumps({**whole, "digest": digest_of(whole, {})}))
 
     write_atomically(file, write)
 
@@ -69,7 +70,7 @@ def read_bundle(
             found = description["kind"], description["version"]
             if found != (kind, version):
                 raise ValueError(f"it is a {found[0]} of format {found[1]}, expected {version}")
-            changed = description.pop("digest", None) != _digest(description)
+            changed = description.pop("digest", None) != digest_of(description, {})
             made, known = list[Plan | Move](), dict[str, Any]()
             for number, item in enumerate(description["members"]):
                 data = archive.read(_member(number))
@@ -93,7 +94,3 @@ def read_bundle(
 
 def _member(number: int) -> str:
     return f"{number:04d}.npz"
-
-
-def _digest(description: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()

@@ -55,12 +55,16 @@ class Move:
         cls, robot: RobotModel, constraints: Sequence[Constraint], trajectory: Trajectory
     ) -> "Move":
         """Return a motion with what all that is required says of it, at all times."""
-        own = [item.requirement(robot) for item in constraints]
-        wanted = (AtRest(True, True), *arm_limits(robot, own), *own)
+        found = cls(robot, tuple(constraints), trajectory)
         finished = FinishedMotion(robot, trajectory)
-        findings = tuple(item.judge(finished) for item in wanted)
+        findings = tuple(item.judge(finished) for item in found.requirements)
         trouble = "; ".join(item.text for item in findings if not item.kept)
-        return cls(robot, tuple(constraints), trajectory, findings, trouble)
+        return replace(found, findings=findings, trouble=trouble)
+
+    @classmethod
+    def missing(cls, robot: RobotModel, constraints: Sequence[Constraint], trouble: str) -> "Move":
+        """Return that no motion was found, and why."""
+        return cls(robot, tuple(constraints), None, (), trouble)
 
     def __repr__(self) -> str:
         """Return two lines: how long it takes, and the verdict."""

@@ -12,12 +12,11 @@ import numpy as np
 
 from selfmotion.basics import Array, PlanError, read_only
 from selfmotion.constraints import Envelope
-from selfmotion.motion import Trajectory
+from selfmotion.motion import Trajectory, slowdown_of
 from selfmotion.path import Pace, times_along
+from selfmotion.result.pace_rows import length_speed
 from selfmotion.result.pacing import along
 
-# Where the motion rests, its length goes on at this share of its largest speed.
-_STILL = 0.05
 # Times are this share longer than limits ask, for the last digits of a product.
 _ROUNDING = 1e-9
 # Grid points of toppra per sample of the motion.
@@ -55,8 +54,7 @@ def _pace(motion: Trajectory, kept: Envelope) -> Pace:
     q, qd = motion(sigma), motion(sigma, order=1)
     # The pace is looked for over the length of the joint path: over σ, a motion that begins at
     # rest would bound nothing there. A share of the largest speed keeps it increasing.
-    speed = np.linalg.norm(qd, axis=1)
-    stretch = np.hypot(speed, _STILL * max(float(speed.max()), np.finfo(float).tiny))
+    stretch = length_speed(qd)
     length = np.append(0.0, np.cumsum(0.5 * (stretch[1:] + stretch[:-1]) * np.diff(sigma)))
     rates = _toppra(length, q, kept.speed, kept.acceleration)
     t = times_along(length, rates)
@@ -64,25 +62,17 @@ def _pace(motion: Trajectory, kept: Envelope) -> Pace:
 
 
 def _smoothed(pace: Pace, kept: Envelope) -> Pace:
-    """Return a pace so smooth that jerks keep their limits, where there are any.
+    """Return a pace so smooth that jerks keep their limits.
 
     From one limit of the acceleration to the other within the window, the jerk keeps its limit.
     """
-    limited = np.isfinite(kept.jerk) & np.isfinite(kept.acceleration)
-    if not limited.any():
-        return pace
-    return pace.smoothed(float((2.0 * kept.acceleration[limited] / kept.jerk[limited]).max()))
+    return pace.smoothed(float((2.0 * kept.acceleration / kept.jerk).max()))
 
 
 def _slowed(pace: Pace, motion: Trajectory, kept: Envelope) -> Pace:
     """Return a pace so much slower that limits are kept between its samples as well."""
-    trial = along(pace, motion)
-    factors = [1.0]
-    for order, limit in ((1, kept.speed), (2, kept.acceleration), (3, kept.jerk)):
-        if order < 3 or pace.bend is not None:
-            share = float((np.abs(trial.extremes(order)[1]) / limit).max())
-            factors.append(share ** (1.0 / order))
-    return pace.slower(max(factors) * (1.0 + _ROUNDING))
+    needed = slowdown_of(along(pace, motion), (kept.speed, kept.acceleration, kept.jerk))
+    return pace.slower(max(needed, 1.0) * (1.0 + _ROUNDING))
 
 
 def _toppra(length: Array, q: Array, velocity: Array, acceleration: Array) -> Array:

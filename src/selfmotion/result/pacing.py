@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, Flags, PlanError
-from selfmotion.motion import Trajectory
+from selfmotion.motion import Trajectory, slowdown_of
 from selfmotion.optimise import banded_optimum
 from selfmotion.path import Pace, times_when
 from selfmotion.result.pace_rows import PaceLimits, States, rows_of
@@ -160,14 +160,8 @@ def _all_room(count: int, limits: PaceLimits) -> list[Array]:
 
 def _scaled(pace: Pace, motion: Trajectory, limits: PaceLimits, least: float = 0.0) -> Pace:
     """Return a pace slower as a whole, at least by a factor, so that joints keep their limits."""
-    trial = along(pace, motion)
-    shares = [
-        float((np.abs(trial.extremes(order)[1]) / limit).max()) ** (1.0 / order)
-        if np.isfinite(limit).any()
-        else 0.0
-        for order, limit in enumerate(limits.of_orders, 1)
-    ]
-    return pace.slower(max(*shares, least) * (1.0 + _ROUNDING))
+    needed = slowdown_of(along(pace, motion), limits.of_orders)
+    return pace.slower(max(needed, least) * (1.0 + _ROUNDING))
 
 
 def _improved(

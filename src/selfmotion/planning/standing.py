@@ -1,0 +1,74 @@
+"""A motion of nodes that stands: an optimum that keeps the conditions."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints
+from selfmotion.constraints import Binding
+from selfmotion.engine import Evaluation
+from selfmotion.motion import Grid, NodeNullMotion, NullMotion
+from selfmotion.nodes import NodeMotion
+from selfmotion.optimise import Status
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A motion of nodes that stands: an optimum that keeps the conditions.
+
+    Attributes
+    ----------
+    motion : NodeMotion
+    status : Status
+    columns : (c,)
+        Of the conditions: those that counted.
+    prices : (N + 1, C)
+        Of the conditions, on the nodes of the optimum.
+    active : tuple of Binding
+    remaining : float
+        What a finer grid and another step might still save [cost].
+    """
+
+    motion: NodeMotion
+    status: Status
+    columns: Ints
+    prices: Array
+    active: tuple[Binding, ...]
+    remaining: float
+
+    @property
+    def steps(self) -> int:
+        """Intervals between the nodes."""
+        return len(self.motion.grid.t) - 1
+
+    @property
+    def null_motion(self) -> NullMotion:
+        """The null motion's functions: of its values at the nodes, for each joint."""
+        return NodeNullMotion(tuple(self.motion.grid.t / self.motion.grid.t[-1]))
+
+    @property
+    def coefficients(self) -> Array:
+        """The null motion at the nodes, joint by joint."""
+        return self.motion.epsilon.T.ravel()
+
+    @property
+    def cost(self) -> float:
+        """F."""
+        return self.motion.exact_cost
+
+    def evaluation(self) -> Evaluation:
+        """Return the motion as others are."""
+        motion = self.motion
+        return Evaluation(self.coefficients, motion.exact_terms, motion.trajectory, damped=False)
+
+    def refined(self, where: Flags | None = None) -> "Standing":
+        """Return it with more nodes, in the middle of each interval or of some (N,)."""
+        t = self.motion.grid.t
+        finer = Grid(t).halved(where).nodes
+        motion = self.motion.on(self.motion.grid.on(finer))
+        if motion is None:
+            return self
+        # Prices are of conditions at nodes: the more there are, the less each counts.
+        near = np.searchsorted(t, finer, side="right") - 1
+        prices = self.prices[near] * (len(t) / len(finer))
+        return replace(self, motion=motion, prices=prices)
