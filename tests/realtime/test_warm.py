@@ -47,5 +47,5 @@ def test_after_warming_up_nothing_is_compiled_and_no_memory_grows(
         finally:
             tracemalloc.stop()
     assert listener.count == 0
-    # Less is left behind than the smallest of a step's arrays would be; free lists fill in the first 200.
+    # Less is left behind than the smallest of a step's arrays would be; before, free lists fill.
     assert sizes[-1] - sizes[1] < 200 * sys.getsizeof(np.zeros(7))
