@@ -149,6 +149,7 @@ from selfmotion.path import (
     Section as Section,
     TwistPath as TwistPath,
     Waypoints as Waypoints,
+    Weave as Weave,
     section_at_rest as section_at_rest,
     with_leads as with_leads,
 )

@@ -294,3 +294,20 @@ def test_a_path_from_a_file_is_run_up_to_its_speed(tmp_path: Path) -> None:
     assert not path.twist(0.0).any()
     assert not path.twist(path.duration).any()
     np.testing.assert_allclose(path.twist(1.0), seam.twist(0.75), atol=1e-12)
+
+
+def test_a_seam_is_woven_as_a_file_says(tmp_path: Path) -> None:
+    file = tmp_path / "cell.toml"
+    line = 'kind = "line"\nby_mm = [0, 100, 0]\nfeed = 0.02\n'
+    swing = "weave = {amplitude_mm = 2, pitch_mm = 10, axis = [1, 0, 0], dwell = 0.1}\n"
+    text = 'start = "home"\nrobot.name = "panda"\n[path]\n' + line
+    file.write_text(text)
+    plain = sm.read_problem(file).path
+    file.write_text(text + swing)
+    woven = sm.read_problem(file).path
+    expected = sm.Weave(plain, 2e-3, 0.01, axis=(1.0, 0.0, 0.0), dwell=0.1)
+    assert woven.to_dict() == expected.to_dict()
+    for wrong in ("pich = 0.1", "amplitude = 0.1"):
+        file.write_text(text + f"weave = {{{wrong}}}\n")
+        with pytest.raises(sm.FileFormatError, match=r"path: weave: '(pich|pitch)' is"):
+            sm.read_problem(file)

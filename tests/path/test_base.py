@@ -30,6 +30,7 @@ PATHS = {
     "ramped waypoints": lambda: sm.section_at_rest(random_waypoints(), ramp=0.9),
     "end of waypoints": lambda: sm.Section(random_waypoints(), 0.7, 1.9, crowding=True),
     "there and back": there_and_back,
+    "waypoints, woven": lambda: sm.Weave(random_waypoints(), 0.01, 0.5, dwell=0.1),
     "waypoints backwards": lambda: sm.Reversed(random_waypoints()),
 }
 

@@ -54,6 +54,10 @@ PATHS: dict[str, Callable[[np.random.Generator], sm.Path]] = {
     "section": lambda rng: Section(waypoints(rng), 0.3, 1.7),
     "section at rest": lambda rng: section_at_rest(waypoints(rng), 0.3, 1.7, 0.4, (True, True)),
     "backwards": lambda rng: sm.Reversed(sm.Feed(waypoints(rng), 0.05)),
+    "woven": lambda rng: sm.Weave(sm.Feed(waypoints(rng), 0.05), 0.01, 0.05, axis=(1.0, 2.0, 0.0)),
+    "woven with dwells": lambda rng: sm.Weave(
+        sm.Line(pose(rng), pose(rng), 2.0), 0.01, 0.05, dwell=0.2
+    ),
     "dwell": lambda rng: sm.Dwell(pose(rng), 1.0),
 }
 

@@ -55,7 +55,13 @@ _Fields = dict[str, tuple[Any, Any]]
 _LAWS: Any = Literal[tuple(law.value for law in TimeLaw)]
 _SHAPE: _Fields = {"frame": (Pose, None)}
 _BOUNDS: _Fields = dict.fromkeys(FEED_BOUNDS, (Number, None))
-_PACED: _Fields = {"duration": (Number, None), "feed": (Number, None), **_BOUNDS, **_SHAPE}
+_WOVEN: _Fields = {"weave": (Table, None)}
+_PACED: _Fields = {
+    **{"duration": (Number, None), "feed": (Number, None)},
+    **_BOUNDS,
+    **_SHAPE,
+    **_WOVEN,
+}
 _OWN: Mapping[str, _Fields] = {
     "circle": {"start": (Pose, None), "center": (Numbers, None), "radius": (Number, None),
                "normal": (Numbers, [0.0, 0.0, 1.0]), **_PACED},
@@ -69,6 +75,7 @@ _OWN: Mapping[str, _Fields] = {
     "joined": {"pieces": (list[Table], ...)},
     "placed": {"path": (Table, ...)},
     "reversed": {"path": (Table, ...)},
+    "weave": {"path": (Table, ...), **_SHAPE},
     "Relaxation": {"rows": (Names, ...), "during": (Numbers, None)},
     "Search": {"rng": (Whole, 0)},
 }  # fmt: skip
@@ -102,6 +109,7 @@ _PATH_FILE: _Fields = {
     **dict.fromkeys(("tolerance", "corner_angle"), (Number, None)),
     "corners": (Text, None),
     **_BOUNDS,
+    **_WOVEN,
 }
 # A cost that is a function of one's own.
 _FUNCTION: _Fields = {

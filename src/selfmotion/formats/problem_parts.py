@@ -16,7 +16,7 @@ from selfmotion.basics import (
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import ORIENTATIONS
-from selfmotion.path import Circle, Feed, Line, Path, Placed, section_at_rest
+from selfmotion.path import Circle, Feed, Line, Path, Placed, Weave, section_at_rest
 from selfmotion.robot import NAMED_ARMS, RobotModel
 from selfmotion.task import Task
 
@@ -37,6 +37,7 @@ def path_of(
     values = dict(given)
     kind = values.get("kind")
     frame = None if kind == Placed.kind else values.pop("frame", None)
+    weave = values.pop("weave", None)
     if kind in ("circle", "line") and "start" not in values:
         if start is None:
             raise ProblemError(
@@ -68,6 +69,7 @@ def path_of(
         case _:
             path = _restored(values)
     path = path if feed is None else Feed(path, feed, **bounds)
+    path = path if weave is None else woven(path, weave)
     return path if frame is None else Placed(path, frame)
 
 
@@ -112,6 +114,17 @@ def _restored(values: Mapping[str, Any]) -> Path:
         reason = " ".join(str(error).split())
         raise ProblemError(f"{values['kind']}: is no path with these numbers: {reason}") from error
     return path
+
+
+def woven(path: Path, values: Mapping[str, Any]) -> Path:
+    """Return a path along which the tool swings, as a file says it."""
+    known = ("amplitude", "pitch", "axis", "dwell")
+    wrong = [name for name in values if name not in known]
+    missing = [name for name in known[:2] if name not in values]
+    if wrong or missing:
+        what = f"'{wrong[0]}' is unknown" if wrong else f"'{missing[0]}' is missing"
+        raise ProblemError(f"weave: {what}, expected amplitude, pitch and perhaps axis, dwell")
+    return Weave(path, **values)
 
 
 def _circle(values: dict[str, Any]) -> Path:

@@ -12,7 +12,7 @@ from selfmotion.formats.documents import in_si, read_document
 from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import pose_of
 from selfmotion.formats.problem_file import Job, job_of
-from selfmotion.formats.problem_parts import obstacle, start_of
+from selfmotion.formats.problem_parts import obstacle, start_of, woven
 from selfmotion.job import Program, Seam, plan_job
 from selfmotion.path import Path, Placed, section_at_rest
 from selfmotion.problem import NO_OVERLAP
@@ -22,7 +22,7 @@ from selfmotion.robot import RobotModel
 _JOB = ("start", "end", "order", "branches", "seconds_per_cost", "deadline", "rng")
 _SEAM = ("name", "either_way", "after", "after_any", "wait", "events", "leaves", "may_meet")
 _OF_PROBLEM = ("path", "task", "costs", "constraints", "relaxations")
-_TABLE = ("file", "frame", "ramp", "feed", "duration", "jump", "corners", "tolerance")
+_TABLE = ("file", "frame", "ramp", "weave", "feed", "duration", "jump", "corners", "tolerance")
 # What stands for the motion of all seams while what they share is read.
 _COLUMN = "seam"
 
@@ -124,12 +124,14 @@ class _Reader:
         except (SelfmotionError, ValueError) as error:
             raise FileFormatError(f"{self._file}: seams: frame: {error}") from error
         table = self._file.parent / values["file"]
-        options = {key: values[key] for key in _TABLE[3:] if key in values}
+        options = {key: values[key] for key in _TABLE[4:] if key in values}
         rest = {key: value for key, value in given.items() if key not in _TABLE}
         found = []
         for name, path in _paths(table, options).items():
             if "ramp" in values:
                 path = section_at_rest(path, ramp=values["ramp"])
+            if "weave" in values:
+                path = woven(path, values["weave"])
             if frame is not None:
                 path = Placed(path, frame)
             found.append(self._seam({**rest, "name": name}, path, f"seams, '{name}'"))

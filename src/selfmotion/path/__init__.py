@@ -22,3 +22,4 @@ from selfmotion.path.shapes import Circle as Circle, Line as Line
 from selfmotion.path.time_law import TimeLaw as TimeLaw
 from selfmotion.path.twist import TwistPath as TwistPath
 from selfmotion.path.waypoints import Waypoints as Waypoints
+from selfmotion.path.weave import Weave as Weave

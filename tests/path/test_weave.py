@@ -1,0 +1,90 @@
+"""A woven seam swings evenly to both sides, and is the seam at its ends."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.task import SE3
+
+AMPLITUDE, PITCH = 4e-3, 0.02
+LENGTH = 0.3
+# Interpolation of the length along the seam, as a share of a swing.
+COUNTED = 1e-6
+
+
+def seam(turned: bool = False) -> sm.Path:
+    rotation = np.diag([1.0, -1.0, -1.0]) if turned else np.eye(3)
+    first = SE3(rotation, np.array([0.1, 0.2, 0.3]))
+    last = SE3(rotation, np.array([0.1 + LENGTH, 0.2, 0.3]))
+    return sm.Line(first, last, 5.0)
+
+
+def offsets(woven: sm.Path, plain: sm.Path, t: Array) -> Array:
+    """Return how far the tool is from the seam, in its own frame, (K, 3)."""
+    one, other = woven.samples(t), plain.samples(t)
+    away = one.translation - other.translation
+    return np.einsum("kba,kb->ka", other.rotation, away)
+
+
+@pytest.mark.parametrize("dwell", [0.0, 0.2])
+def test_it_swings_evenly_whatever_the_feed(dwell: float) -> None:
+    plain = sm.Feed(seam(turned=True), 0.03)
+    woven = sm.Weave(plain, AMPLITUDE, PITCH, dwell=dwell)
+    assert woven.swings == round(LENGTH / PITCH)
+    t = np.linspace(0.0, woven.duration, 20001)
+    away = offsets(woven, plain, t)
+    np.testing.assert_allclose(away[:, [0, 2]], 0.0, atol=1e-15)
+    assert np.abs(away[:, 1]).max() == pytest.approx(AMPLITUDE, rel=1e-6)
+    # Crossed every half pitch of the way; the feed starts and ends at rest.
+    way = np.linalg.norm(plain.samples(t).translation - plain.pose(0.0).translation, axis=1)
+    inner = away[:-1, 1] * away[1:, 1] < 0.0
+    crossings = way[:-1][inner] / (LENGTH / woven.swings)
+    expected = np.arange(0.5, woven.swings - 0.25, 0.5)
+    np.testing.assert_allclose(crossings, expected, atol=COUNTED + np.diff(way).max() / PITCH)
+    at_edges = np.abs(away[:, 1]) > (1.0 - 1e-9) * AMPLITUDE
+    middle = (way > 2.0 * PITCH) & (way < LENGTH - 2.0 * PITCH)
+    assert at_edges[middle].mean() == pytest.approx(2.0 * dwell, abs=0.01)
+
+
+def test_a_sine_is_a_sine() -> None:
+    plain = seam()
+    woven = sm.Weave(plain, AMPLITUDE, PITCH, axis=(0.0, 0.0, 2.0))
+    t = np.linspace(0.0, plain.duration, 501)
+    x = (plain.samples(t).translation[:, 0] - 0.1) / LENGTH * woven.swings
+    inner = (x > 1.0) & (x < woven.swings - 1.0)
+    expected = AMPLITUDE * np.sin(2.0 * np.pi * x)
+    away = offsets(woven, plain, t)[:, 2]
+    allowed = 2.0 * np.pi * COUNTED * AMPLITUDE
+    np.testing.assert_allclose(away[inner], expected[inner], atol=allowed)
+    for end in (0.0, plain.duration):
+        np.testing.assert_array_equal(woven.twist(end), plain.twist(end))
+        np.testing.assert_array_equal(woven.pose(end).homogeneous, plain.pose(end).homogeneous)
+
+
+def test_a_woven_seam_is_planned_and_verified() -> None:
+    panda = sm.load_robot("panda")
+    pose = panda.pose(sm.NAMED_ARMS["panda"].home)
+    last = SE3(pose.rotation, pose.translation + np.array([0.0, 0.08, 0.0]))
+    woven = sm.Weave(sm.Feed(sm.Line(pose, last, 1.0), 0.02), 2e-3, 0.02, axis=(1.0, 0.0, 0.0))
+    plan = sm.plan(sm.Problem(panda, woven, start=sm.NAMED_ARMS["panda"].home))
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert not plan.certificate.notes
+    plain = sm.Section(sm.Feed(sm.Line(pose, last, 1.0), 0.02), 0.0, woven.duration)
+    assert not sm.certify(panda, plain, "pose", plan.trajectory).verified
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ({"amplitude": 0.0}, "amplitude"),
+        ({"amplitude": 4.0}, "amplitude"),
+        ({"pitch": -1.0}, "pitch"),
+        ({"pitch": 0.2}, "two swings"),
+        ({"dwell": 0.5}, "dwell"),
+        ({"axis": (0.0, 0.0, 0.0)}, "axis"),
+    ],
+)
+def test_what_is_no_swing_is_refused(given: dict, named: str) -> None:
+    with pytest.raises(sm.PathError, match=named):
+        sm.Weave(seam(), **{"amplitude": AMPLITUDE, "pitch": PITCH, **given})
