@@ -83,6 +83,7 @@ from selfmotion.costs import (
     JointAcceleration as JointAcceleration,
     JointJerk as JointJerk,
     JointLimitDistance as JointLimitDistance,
+    JointReversals as JointReversals,
     JointVelocity as JointVelocity,
     KineticEnergy as KineticEnergy,
     LimitUse as LimitUse,

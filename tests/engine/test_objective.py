@@ -70,6 +70,7 @@ COSTS = {
     "posture": lambda r, t: sm.Posture(np.arange(1.0, r.dof + 1.0), posture=np.ones(r.dof)),
     "joint limits": lambda r, t: sm.JointLimitDistance(r.lower, r.upper),
     "path length": lambda r, t: sm.PathLength(),
+    "reversals": lambda r, t: sm.JointReversals(0.5, speed=0.2),
     "inverse manipulability": lambda r, t: sm.InverseManipulability(0.01),
     "manipulability": lambda r, t: sm.Manipulability(0.7),
     "directional": lambda r, t: sm.DirectionalManipulability(np.arange(1.0, t.dimension + 1)),

@@ -281,6 +281,12 @@ def cost_rows() -> list[Row]:
             power={**WHOLE, "3": 3, "0": 0},
         ),
         *bad_values_of(area, "PathLength", _cost(sm.PathLength), smoothing=POSITIVE, name=names),
+        *bad_values_of(
+            *(area, "JointReversals", _cost(sm.JointReversals)),
+            weight={key: value for key, value in POSITIVE.items() if key != "0"},
+            speed=POSITIVE,
+            smoothing=POSITIVE,
+        ),
         *bad_values_of(area, "Manipulability", _cost(sm.Manipulability), mu=factors),
         *bad_values_of(
             area, "InverseManipulability", _cost(sm.InverseManipulability), mu=factors, name=names

@@ -70,6 +70,7 @@ def plan_json(plan: Plan) -> dict[str, Any]:
             "busy": plan.limits_used.busy,
             "shares": dict(plan.limits_used.shares),
         },
+        "reversals": {name: times.tolist() for name, times in plan.reversals.times.items()},
         "certificate": certificate_json(plan.certificate, plan.approaches),
     }
 

@@ -66,6 +66,7 @@ def show(plan: Plan, console: Console) -> None:
     if plan.limits_used.busy > _SELDOM:
         told = f"{plan.trajectory.duration:.4g} s; limits used fully {plan.limits_used}"
         console.print(told, markup=False, soft_wrap=not console.is_terminal)
+    console.print(f"joints turn round: {plan.reversals}", markup=False)
 
 
 # For less of the time than this it is not told which limits are used.

@@ -31,6 +31,7 @@ from selfmotion.costs.manipulability import (
 )
 from selfmotion.costs.off_path import OffPath as OffPath
 from selfmotion.costs.path_length import PathLength as PathLength
+from selfmotion.costs.reversals import JointReversals as JointReversals
 from selfmotion.costs.samples import (
     Samples as Samples,
     TipSamples as TipSamples,

@@ -31,6 +31,8 @@ def facts(plan: Plan) -> dict[str, Cell]:
     rows["speed, most"] = _extreme(replace(fastest, value=100.0 * fastest.value), "% of its limit")
     used, *which = str(plan.limits_used).split(": ", 1)
     rows["limits used fully"] = (used, "".join(which))
+    turns, *which = str(plan.reversals).split(": ", 1)
+    rows["joints turn round"] = (turns, "".join(which))
     for name, near in plan.approaches.items():
         rows[f"closest to {name}"] = _extreme(near, "m")
     rows["smallest singular value"] = _extreme(certificate.smallest_singular_value, "")

@@ -17,3 +17,4 @@ from selfmotion.result.retiming import (
     retime as retime,
     slowdown as slowdown,
 )
+from selfmotion.result.reversals import Reversals as Reversals

@@ -35,6 +35,7 @@ from selfmotion.problem.problem import Problem
 from selfmotion.result.archive import Archive
 from selfmotion.result.limits_used import LimitsUsed, limits_used
 from selfmotion.result.report import Report
+from selfmotion.result.reversals import Reversals
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
@@ -138,6 +139,11 @@ class Plan:
         By joint and limit: what keeps the motion from being faster. Found when it is asked for.
         """
         return limits_used(self.problem, self.trajectory)
+
+    @cached_property
+    def reversals(self) -> Reversals:
+        """When each joint turns round, by more than 1 mrad or 1 mm. Found when it is asked for."""
+        return Reversals.of(self.trajectory)
 
     def check(
         self,
