@@ -1,5 +1,6 @@
 """A feed that was asked for is kept, or the motion is not verified."""
 
+import re
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.certificate import Stretch
 from selfmotion.certificate.feed import _Along, _rounded_down
+from support.arms import PANDA_HOME
 from support.gantries import gantry
 from support.majorants import check_majorants
 
@@ -163,3 +165,19 @@ def test_rounded_corners_and_turning_on_the_spot_do_not_count() -> None:
 def test_an_advised_feed_has_two_digits_and_is_no_larger(speed: float) -> None:
     advised = _rounded_down(speed)
     assert 0.9 * speed < advised <= speed
+
+
+def test_a_feed_that_the_arm_can_keep_is_named() -> None:
+    panda = sm.load_robot("panda")
+    pose = panda.pose(PANDA_HOME)
+    end = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.35, 0.0]))
+    fast = sm.Feed(sm.Line(pose, end, 1.0), 2.0, acceleration=60.0)
+    refused = sm.plan(sm.Problem(panda, fast, "position", PANDA_HOME)).certificate
+    assert not refused.verified
+    named = re.search(r"a feed of ([0-9.]+) m/s.*Feed\.slower\(([0-9.]+)\)", refused.verdict)
+    assert named is not None
+    slower = fast.slower(float(named[2]))
+    assert slower.feed == pytest.approx(float(named[1]), rel=1e-3)
+    found = sm.plan(sm.Problem(panda, slower, "position", PANDA_HOME)).certificate
+    assert found.verified, found.verdict
+    assert "Feed.slower" not in found.verdict

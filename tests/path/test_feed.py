@@ -259,3 +259,18 @@ def test_a_table_has_a_feed_from_each_pose_on(tmp_path: Path) -> None:
     file.write_text("x,y,z\n0.4,0,0.3\n0.4,0.1,0.3\n", encoding="utf-8")
     with pytest.raises(sm.FileFormatError, match="turn_rate has no effect without a feed"):
         sm.read_path(file, duration=1.0, turn_rate=2.0)
+
+
+def test_a_slower_feed_is_the_same_motion_in_more_time() -> None:
+    points = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.2, 0.3, 0.0]])
+    inner = sm.Polyline(points, tolerance=5e-3)
+    feed = sm.Feed(inner, 0.1, acceleration=2.0, stretches=[[0.5 * inner.duration, 0.05]])
+    slower = feed.slower(1.7)
+    assert slower.duration == pytest.approx(1.7 * feed.duration, rel=1e-12)
+    t = np.linspace(0.0, feed.duration, 301)
+    one, other = feed.samples(t), slower.samples(np.minimum(1.7 * t, slower.duration))
+    np.testing.assert_allclose(other.translation, one.translation, atol=1e-12)
+    np.testing.assert_allclose(1.7 * other.twist, one.twist, atol=1e-9)
+    assert [item.asked for item in slower.feeds] == [item.asked / 1.7 for item in feed.feeds]
+    with pytest.raises(sm.PathError, match="factor"):
+        feed.slower(0.0)

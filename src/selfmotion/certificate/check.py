@@ -6,7 +6,7 @@ import numpy as np
 
 from selfmotion.basics import Array, ProblemError, Progress, as_several, shown, silent
 from selfmotion.certificate.deviation import smallest_singular_values
-from selfmotion.certificate.feed import FeedReached
+from selfmotion.certificate.feed import FeedReached, possible_feeds
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import arm_limits
 from selfmotion.certificate.path_error import PathCheck, bound_errors
@@ -107,6 +107,7 @@ def certify(
             *(text for check in checks for text in _off_path(check, tolerance, damped)),
             *(text for check in checks for text in _undecided(check)),
             *(item.text for item in findings if not item.kept),
+            *possible_feeds(feeds, findings),
         ),
         covers=tuple(dict.fromkeys(["path", *(what for item in wanted for what in item.covers)])),
         remarks=tuple(remark for item in wanted for remark in item.remarks),

@@ -1,5 +1,6 @@
 """The feed that was asked for, and the one that is reached."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,6 +100,29 @@ class _Along(Bounded):
     def sizes(self, values: Array, stretch: Stretch) -> Array:
         """See `Bounded.sizes`."""
         return np.abs(values)
+
+
+def possible_feeds(feeds: Sequence[FeedReached], findings: Sequence[Finding]) -> tuple[str, ...]:
+    """Return which feeds a motion could have whose arm is too slow for those that were asked for.
+
+    Nothing where something else is wrong, too, or no feed was asked for.
+    """
+    broken = [item for item in findings if not item.kept]
+    factor = max((item.factor for item in broken), default=1.0)
+    if not (feeds and 1.0 < factor < np.inf and all(item.of_pace for item in broken)):
+        return ()
+    asked = max(item.found.asked for item in feeds)
+    slower = asked / _rounded_down(asked / factor)
+    return (
+        f"the arm keeps its limits at a feed of {asked / slower:g} m/s, accelerations of the path "
+        f"being {slower**2:.3g} times smaller and its smoothing {slower:.3g} times longer: "
+        f"Feed.slower({_rounded_up(slower)})",
+    )
+
+
+def _rounded_up(factor: float) -> str:
+    """Return a number of four digits that is no smaller."""
+    return f"{np.ceil(1e3 * factor) / 1e3:.3f}"
 
 
 def _rounded_down(speed: float) -> float:

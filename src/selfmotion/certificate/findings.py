@@ -82,6 +82,9 @@ class Finding:
         In words: who, how much, when, what was wanted, and what to do about it.
     of_pace : bool
         Whether a slower pace may keep what is not kept.
+    factor : float
+        By what factor it takes longer where it is kept, at the same pace but slower; 1 where it is
+        kept, inf where that is not known.
     """
 
     requirement: str
@@ -92,6 +95,7 @@ class Finding:
     kept: bool
     text: str
     of_pace: bool = False
+    factor: float = 1.0
 
     @property
     def extreme(self) -> Extreme:

@@ -205,7 +205,9 @@ class QuantityKept(Requirement):
         if found.undecided and not share > 1.0:
             first, last = found.undecided[0]
             time, text = first, self._open(found, first, last)
-        return Finding(self.name, subject, time, share, 1.0, kept, text, quantity.of_pace)
+        slows = quantity.columns[column].slows
+        factor = 1.0 if kept else share ** (1.0 / slows) if slows and share > 1.0 else np.inf
+        return Finding(self.name, subject, time, share, 1.0, kept, text, quantity.of_pace, factor)
 
     def _amount(self, motion: FinishedMotion, column: int, time: float, share: float) -> float:
         """Return how far a column is from its centre at a time, in size what was bounded."""

@@ -359,33 +359,10 @@ class Feed(_Derived, kind="feed"):
         """See `Path.feeds`: how well its own feed is kept."""
         t, counts, causes, asked = self._counted
         speeds = _sizes(self.samples(t).twist)[:, 0]
-        lasts = np.gradient(t)
         return tuple(
-            self._kept(float(feed), t, speeds, counts, causes, lasts, asked == feed)
+            FeedKept.of(float(feed), self._within, t, speeds, causes, asked == feed, counts)
             for feed in dict.fromkeys(asked.tolist())
         )
-
-    def _kept(
-        self,
-        feed: float,
-        t: Array,
-        speeds: Array,
-        counts: Flags,
-        causes: list[str],
-        lasts: Array,
-        here: Flags,
-    ) -> FeedKept:
-        """Return how well a feed is kept at those times where it is asked for."""
-        fastest = int(np.argmax(np.where(here, speeds, -np.inf)))
-        counted = counts & here
-        if not counted.any():
-            # Too short to run up and down.
-            found = float(speeds[fastest]), float(t[fastest]), 0.0, "run-up and run-down"
-            return FeedKept(feed, self._within, float(speeds[fastest]), *found)
-        slow = (speeds < (1.0 - self._within) * feed) & counted
-        worst = int(np.argmin(np.where(counted, speeds, np.inf)))
-        found = float(speeds[worst]), float(t[worst]), float(lasts @ slow), causes[worst]
-        return FeedKept(feed, self._within, float(speeds[fastest]), *found)
 
     @property
     def _counted(self) -> tuple[Array, Flags, list[str], Array]:
@@ -427,6 +404,19 @@ class Feed(_Derived, kind="feed"):
     @property
     def _half(self) -> Array:
         return 0.5 * np.array([self._limits["acceleration"], self._limits["turn_acceleration"]])
+
+    def slower(self, factor: float) -> "Feed":
+        """Return the same motion, taking `factor` times as long.
+
+        Feed and turn rate are smaller by the factor, accelerations by its square, and the smoothing
+        is longer.
+        """
+        factor = as_number(factor, "feed: factor", above=0.0, error=PathError)
+        powers = {"acceleration": 2, "turn_acceleration": 2, "smoothing": -1}
+        limits = {name: own / factor ** powers.get(name, 1) for name, own in self._limits.items()}
+        limits["feed"] = self._own_feed / factor
+        stretches = self._asked / [1.0, factor] if len(self._asked) > 1 else None
+        return Feed(self._path, **limits, within=self._within, stretches=stretches)
 
     def to_dict(self) -> dict[str, Any]:
         """See `Saved.to_dict`."""

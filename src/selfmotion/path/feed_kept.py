@@ -1,6 +1,11 @@
 """How well a path at a feed keeps it: what was asked, what is reached, and what holds it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,42 @@ class FeedKept:
     time: float
     slower: float
     held_by: str
+
+    @classmethod
+    def of(
+        cls,
+        asked: float,
+        within: float,
+        t: Array,
+        speeds: Array,
+        causes: Sequence[str],
+        here: Flags,
+        counts: Flags,
+    ) -> "FeedKept":
+        """Return how well a feed is kept.
+
+        Parameters
+        ----------
+        asked, within : float
+        t, speeds : (K,)
+            Times [s], and how fast the tool is then [m/s].
+        causes : sequence of str
+            What holds it at each time.
+        here, counts : (K,)
+            When this feed is asked for, and when a feed counts.
+        """
+        fastest = float(np.max(speeds[here]))
+        counted = counts & here
+        if not counted.any():
+            # Too short to run up and down.
+            at = float(t[int(np.argmax(np.where(here, speeds, -np.inf)))])
+            return cls(asked, within, fastest, fastest, at, 0.0, "run-up and run-down")
+        slow = (speeds < (1.0 - within) * asked) & counted
+        worst = int(np.argmin(np.where(counted, speeds, np.inf)))
+        lasts = float(np.gradient(t) @ slow)
+        return cls(
+            asked, within, fastest, float(speeds[worst]), float(t[worst]), lasts, causes[worst]
+        )
 
     @property
     def kept(self) -> bool:
