@@ -9,6 +9,7 @@ costs O(N).
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
@@ -154,26 +155,44 @@ class _Side:
     def _with(self, slack: Array, price: Array) -> "_Side":
         return _Side(self.sign, self.limit, self.there, self.size, slack, price)
 
+    @cached_property
+    def ratio(self) -> Array:
+        """Price by slack."""
+        return np.asarray(self.price / self.slack)
+
     def missed(self, reached: Array) -> Array:
-        return np.where(self.there, self.slack + self.sign * reached - self.limit, 0.0)
+        found = self.slack - self.limit
+        found += reached if self.sign > 0.0 else -reached
+        found[~self.there] = 0.0
+        return np.asarray(found)
 
     def products(self) -> float:
         return float(np.vdot(self.slack, self.price))
 
     def towards(self, wanted: Array | float, missed: Array) -> Array:
         """Return what the prices become where c stays."""
-        return np.where(self.there, (wanted + self.price * missed) / self.slack, 0.0)
+        becomes = self.ratio * missed
+        becomes += wanted / self.slack
+        becomes[~self.there] = 0.0
+        return np.asarray(becomes)
 
     def moved(self, change: Array, missed: Array, becomes: Array) -> tuple[Array, Array]:
         """Return the changes of slacks and prices with that of R c."""
-        slack = np.where(self.there, -missed - self.sign * change, 0.0)
-        return slack, becomes + self.price / self.slack * self.sign * change - self.price
+        signed = change if self.sign > 0.0 else -change
+        slack = -missed - signed
+        slack[~self.there] = 0.0
+        price = self.ratio * signed
+        price += becomes
+        price -= self.price
+        return slack, price
 
     def after(self, moves: tuple[Array, Array], primal: float, dual: float) -> "_Side":
         return self._with(self.slack + primal * moves[0], self.price + dual * moves[1])
 
     def least_product(self) -> float:
-        return float((self.slack * self.price)[self.there].min(initial=np.inf))
+        products = self.slack * self.price
+        products[~self.there] = np.inf
+        return float(products.min(initial=np.inf))
 
 
 def _step(
@@ -186,7 +205,7 @@ def _step(
     count: int,
 ) -> tuple[Array, list[_Side], float] | None:
     """Return a change of c, the sides after a step, and how far it goes; None where none is."""
-    band = rows.normal(sum((side.price / side.slack for side in sides), np.zeros(rows.lower.shape)))
+    band = rows.normal(sides[0].ratio + sides[1].ratio)
     band[0] *= 1.0 + _ROUNDING
     band[0, fixed] = _STAYS
     try:
@@ -226,7 +245,8 @@ def _longest(
     lengths = [1.0, 1.0]
     for side, move in zip(sides, moves, strict=True):
         for k, (x, change) in enumerate(zip((side.slack, side.price), move, strict=True)):
-            falling = change < 0.0
-            most = float((x[falling] / -change[falling]).min(initial=np.inf))
-            lengths[k] = min(lengths[k], share * most)
+            # Prices of what has no limit are 0 and stay so.
+            falling = np.divide(change, x, out=np.zeros_like(x), where=x > 0.0)
+            most = -float(falling.min(initial=0.0))
+            lengths[k] = min(lengths[k], share / most if most > 0.0 else np.inf)
     return lengths[0], lengths[1]
