@@ -148,6 +148,7 @@ from selfmotion.path import (
     Retimed as Retimed,
     Reversed as Reversed,
     Section as Section,
+    Spiral as Spiral,
     TwistPath as TwistPath,
     Waypoints as Waypoints,
     Weave as Weave,

@@ -23,6 +23,10 @@ PATHS = {
     "line at constant speed": lambda: sm.Line(pose(1), pose(2), 2.0, "constant"),
     "circle": lambda: sm.Circle(pose(1), [0, 0, 0], [0, 1, 1], 2.0),
     "turning arc": lambda: sm.Circle(pose(1), [0, 0, 0], [0, 1, 1], 2.0, -0.4, turn_tool=True),
+    "spiral": lambda: sm.Spiral(pose(1), [0, 0, 0], [0, 1, 1], 2.0, 1.5, 0.1),
+    "helix": lambda: sm.Spiral(
+        pose(1), pose(1).translation, [0, 1, 1], 2.0, -1.5, 0.2, rise=0.3, turn_tool=True
+    ),
     "twist": lambda: sm.TwistPath(pose(1), tumbling, 2.0),
     "waypoints": random_waypoints,
     "waypoints with stops": lambda: random_waypoints("stop"),
@@ -90,7 +94,7 @@ def test_times_outside_are_refused(path: sm.Path) -> None:
         (lambda: sm.Circle.around(pose(1), -0.1, 1.0), "radius is -0.1"),
         (lambda: sm.Waypoints([0, 1], [[0, 0, 0]]), "positions has shape"),
         (lambda: sm.Waypoints([0, 1], [[0, 0, 0]] * 2, corners="cut"), "corners is 'cut'"),
-        (lambda: restore(sm.Path, {"kind": "spiral"}), "path kind is 'spiral'"),
+        (lambda: restore(sm.Path, {"kind": "corkscrew"}), "path kind is 'corkscrew'"),
         (lambda: restore(sm.Path, {"kind": "line", "begin": 1}), "path of kind 'line'"),
     ],
 )

@@ -43,6 +43,10 @@ PATHS: dict[str, Callable[[np.random.Generator], sm.Path]] = {
     "line": lambda rng: sm.Line(pose(rng), pose(rng), 2.0),
     "steady line": lambda rng: sm.Line(pose(rng), pose(rng), 2.0, "constant"),
     "circle": lambda rng: sm.Circle.around(pose(rng), 0.2, 3.0, turn_tool=True, turns=1.5),
+    "spiral": lambda rng: sm.Spiral(pose(rng), [0, 0, 0], [0, 1, 1], 3.0, 1.0, 0.3, rise=0.1),
+    "spiral from its middle": lambda rng: sm.Spiral(
+        pose(rng), [0, 0, 0], [0, 0, 1], 3.0, -1.0, 0.0, turn_tool=True
+    ),
     "waypoints": waypoints,
     "stops": lambda rng: waypoints(rng, "stop"),
     "polyline": polyline,

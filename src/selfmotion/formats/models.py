@@ -65,6 +65,8 @@ _PACED: _Fields = {
 _OWN: Mapping[str, _Fields] = {
     "circle": {"start": (Pose, None), "center": (Numbers, None), "radius": (Number, None),
                "normal": (Numbers, [0.0, 0.0, 1.0]), **_PACED},
+    "spiral": {"start": (Pose, None), "center": (Numbers, ...), "normal": (Numbers, ...),
+               **_PACED},
     "line": {"start": (Pose, None), "end": (Pose, None), "by": (Numbers, None), **_PACED},
     "waypoints": _SHAPE,
     "polyline": _SHAPE,

@@ -16,13 +16,15 @@ from selfmotion.basics import (
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import ORIENTATIONS
-from selfmotion.path import Circle, Feed, Line, Path, Placed, Weave, section_at_rest
+from selfmotion.path import Circle, Feed, Line, Path, Placed, Spiral, Weave, section_at_rest
 from selfmotion.robot import NAMED_ARMS, RobotModel
 from selfmotion.task import Task
 
 if TYPE_CHECKING:
     from selfmotion.task import SE3
 
+# Tool motions that may begin where the arm does, and have a feed.
+_SHAPES = ("circle", "line", "spiral")
 # What bounds a feed in tables of tool motions.
 FEED_BOUNDS = ("turn_rate", "acceleration", "turn_acceleration", "smoothing", "within")
 
@@ -38,7 +40,8 @@ def path_of(
     kind = values.get("kind")
     frame = None if kind == Placed.kind else values.pop("frame", None)
     weave = values.pop("weave", None)
-    if kind in ("circle", "line") and "start" not in values:
+    shape = kind in _SHAPES
+    if shape and "start" not in values:
         if start is None:
             raise ProblemError(
                 "start: is missing, and there is no start configuration whose pose to take; "
@@ -47,12 +50,11 @@ def path_of(
         if frame is not None:
             raise ProblemError("frame: needs start, the tool's first pose in that frame")
         values["start"] = robot.pose(start)
-    shape = kind in ("circle", "line")
     feed = values.pop("feed", None) if shape else None
     bounds = {name: values.pop(name) for name in FEED_BOUNDS if shape and name in values}
     if bounds and feed is None:
         raise ProblemError(f"{next(iter(bounds))}: has no effect without a feed")
-    if kind in ("circle", "line"):
+    if shape:
         _exactly_one({**values, "feed": feed} if feed else values, "duration", "feed")
         # At a feed, the shape's own pace does not matter.
         values.setdefault("duration", 1.0)
@@ -66,6 +68,8 @@ def path_of(
             path = _circle(values)
         case "line":
             path = _line(values)
+        case "spiral":
+            path = Spiral(**{key: value for key, value in values.items() if key != "kind"})
         case _:
             path = _restored(values)
     path = path if feed is None else Feed(path, feed, **bounds)

@@ -19,6 +19,7 @@ from selfmotion.path.retimed import Retimed as Retimed
 from selfmotion.path.reversed import Reversed as Reversed
 from selfmotion.path.section import Section as Section, section_at_rest as section_at_rest
 from selfmotion.path.shapes import Circle as Circle, Line as Line
+from selfmotion.path.spiral import Spiral as Spiral
 from selfmotion.path.time_law import TimeLaw as TimeLaw
 from selfmotion.path.twist import TwistPath as TwistPath
 from selfmotion.path.waypoints import Waypoints as Waypoints
