@@ -77,6 +77,13 @@ def good_files() -> tuple[Good, ...]:
             sm.write_motion(plan, folder / f"motion{suffix}", rate=10.0)
             content = (folder / f"motion{suffix}").read_bytes()
             found.append(Good("motion", suffix, content, sm.read_motion))
+        limits = [sm.JointAccelerationLimits([9.0] * 3)]
+        ends = np.zeros(3), np.array([0.4, 0.3, -0.5])
+        move = sm.move(arm, *ends, constraints=limits, clearance=None)
+        for suffix in (".src", ".mod"):
+            sm.write_motion(move, folder / f"motion{suffix}")
+            content = (folder / f"motion{suffix}").read_bytes()
+            found.append(Good("program", suffix, content, sm.read_motion))
         for suffix in (".toml", ".json"):
             sm.write_problem(problem, folder / f"problem{suffix}")
             content = (folder / f"problem{suffix}").read_bytes()

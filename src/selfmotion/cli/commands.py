@@ -214,68 +214,6 @@ def _approaches(
     return approaches(asked, sm.FinishedMotion(robot, motion.of_joints(robot.joint_names)))
 
 
-@app.command(epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500")
-def export(
-    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, or a .program.")],
-    out: Annotated[
-        list[Path],
-        typer.Option(
-            help="File: .csv, .npz, .json, .yaml (ROS 2 JointTrajectory), .xml (MuJoCo keyframes), "
-            ".script (URScript). Repeatable."
-        ),
-    ],
-    rate: Annotated[
-        float | None, typer.Option(help="Samples per second; by default the plan's own.")
-    ] = None,
-    form: Annotated[
-        str | None,
-        typer.Option("--format", help=f"Whatever the suffix: {', '.join(formats.FORMS)}."),
-    ] = None,
-    parts: Annotated[
-        bool, typer.Option("--parts", help="Of a cell a file for each part as well, in step.")
-    ] = False,
-    as_json: options.JsonOption = False,
-) -> None:
-    """Write a plan's motion for controllers and simulators, and check what was written."""
-    if file.suffix == jobs.PROGRAM:
-        options.refuse({"parts": parts or None}, file, "a program's motion is")
-        jobs.export(sm.load_program(file), out, rate, form, as_json)
-    saved = sm.load_plan(file)
-    verified, verdicts = not saved.altered, dict[str, str]()
-
-    def judged(motion: sm.Trajectory, name: str) -> bool:
-        found = saved.problem.certify(motion, saved.tolerance, saved.report.ending)
-        verdicts[name] = f"read back: {found.verdict}"
-        return found.verified
-
-    for target in out:
-        files = sm.write_parts(saved, target, rate=rate, form=form) if parts else {}
-        together = ", ".join(map(str, files.values()))
-        sm.write_motion(saved, target, rate=rate, form=form)
-        if form in formats.READABLE or (form is None and target.suffix not in (".xml", ".script")):
-            verified &= judged(sm.read_motion(target), str(target))
-            if files:
-                verified &= judged(sm.read_parts(files), together)
-        else:
-            verified &= saved.certificate.verified
-            verdicts |= {str(target): "", **({together: ""} if files else {})}
-    miss = formats.linear_miss(saved, rate)
-    if as_json:
-        terminal.print_json(
-            data={"verified": verified, "written": verdicts, "linear_miss": miss._asdict()}
-        )
-        raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
-    for name, verdict in verdicts.items():
-        terminal.print(f"wrote {name}{verdict and '; '}{verdict}", markup=False, soft_wrap=True)
-    terminal.print(
-        f"joined by straight lines, the samples stay within {miss.position:.2g} m and "
-        f"{miss.rotation:.2g} rad of the motion; --rate {miss.rate:.0f} keeps the plan's tolerance",
-        markup=False,
-        soft_wrap=True,
-    )
-    raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
-
-
 @app.command(epilog="Example: selfmotion compare a.npz b.npz")
 def compare(
     plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz.")],
