@@ -40,6 +40,7 @@ def plan(
     duration: options.DurationOption = None,
     feed: options.FeedOption = None,
     jump: options.JumpOption = None,
+    seam: options.SeamOption = None,
     frame: options.FrameOption = None,
     ramp: options.RampOption = None,
     corners: options.CornersOption = "blend",

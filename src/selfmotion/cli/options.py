@@ -53,6 +53,9 @@ JumpOption = Annotated[
     float | None,
     typer.Option(help="Distance between poses of --path that is refused (m; 0.5 by default)."),
 ]
+SeamOption = Annotated[
+    str | None, typer.Option(help="Which seam or cut of --path, where it has several.")
+]
 FrameOption = Annotated[
     str | None,
     typer.Option(help="Pose of the frame that --path is in: x,y,z,roll,pitch,yaw (m, rad)."),

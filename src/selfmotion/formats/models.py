@@ -101,6 +101,7 @@ _PATH_FILE: _Fields = {
     **dict.fromkeys(("feed", "duration", "jump", "ramp"), (Number, None)),
     **dict.fromkeys(("tolerance", "corner_angle"), (Number, None)),
     "corners": (Text, None),
+    "seam": (Text, None),
     **_BOUNDS,
 }
 # A cost that is a function of one's own.

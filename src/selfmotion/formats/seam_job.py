@@ -1,6 +1,5 @@
 """From a file of many seams to a job."""
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -9,10 +8,11 @@ from typing import Any
 from selfmotion.basics import FileFormatError, SelfmotionError, as_path, nearest
 from selfmotion.constraints import Clearance
 from selfmotion.formats.documents import in_si, read_document
-from selfmotion.formats.path_files import read_path
+from selfmotion.formats.path_building import times_of_events
+from selfmotion.formats.path_files import read_seams
 from selfmotion.formats.poses import pose_of
 from selfmotion.formats.problem_file import Job, job_of
-from selfmotion.formats.problem_parts import obstacle, start_of
+from selfmotion.formats.problem_parts import FEED_BOUNDS, obstacle, start_of
 from selfmotion.job import Program, Seam, plan_job
 from selfmotion.path import Path, Placed, section_at_rest
 from selfmotion.problem import NO_OVERLAP
@@ -22,9 +22,9 @@ from selfmotion.robot import RobotModel
 _JOB = ("start", "end", "order", "branches", "seconds_per_cost", "deadline", "rng")
 _SEAM = ("name", "either_way", "after", "after_any", "wait", "events", "leaves", "may_meet")
 _OF_PROBLEM = ("path", "task", "costs", "constraints", "relaxations")
-_TABLE = ("file", "frame", "ramp", "feed", "duration", "jump", "corners", "tolerance")
-# What stands for the motion of all seams while what they share is read.
-_COLUMN = "seam"
+_PLACED = ("file", "frame", "ramp")
+_PACED = ("feed", "duration", "jump", "corners", "tolerance", "corner_angle", *FEED_BOUNDS)
+_TABLE = (*_PLACED, *_PACED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,9 @@ def read_seam_job(file: str | FilePath, *, allow_code: bool = False) -> SeamJob:
     those of a problem file (`read_job`), and hold for all seams. ``[job]`` has the settings of
     `plan_job`. Seams are a list ``[[seams]]``, each with a ``name``, a ``path``, and what a `Seam`
     may say besides; or one table ``[seams]`` that names a ``file`` of poses with a column ``seam``,
-    as `read_path` reads them, with a ``feed`` or ``duration``, and what else all of them have.
+    as `read_path` reads them, with a ``feed`` or ``duration``, and what else all of them have. That
+    may be a program of a machine tool, whose cuts are seams. Rows with an ``event``, and cuts, are
+    made one way only, unless ``either_way = true`` is said.
 
     Parameters
     ----------
@@ -124,15 +126,22 @@ class _Reader:
         except (SelfmotionError, ValueError) as error:
             raise FileFormatError(f"{self._file}: seams: frame: {error}") from error
         table = self._file.parent / values["file"]
-        options = {key: values[key] for key in _TABLE[3:] if key in values}
+        options = {key: values[key] for key in _PACED if key in values}
         rest = {key: value for key, value in given.items() if key not in _TABLE}
         found = []
-        for name, path in _paths(table, options).items():
+        for name, (path, rows) in read_seams(table, options).items():
             if "ramp" in values:
                 path = section_at_rest(path, ramp=values["ramp"])
+            own = {**rest, "name": name}
+            events = times_of_events(path, rows)
+            if events:
+                own["events"] = [*events, *rest.get("events", [])]
+            if events or rows.straight:
+                # What happens where, and how a machine cuts, is meant one way.
+                own.setdefault("either_way", False)
             if frame is not None:
                 path = Placed(path, frame)
-            found.append(self._seam({**rest, "name": name}, path, f"seams, '{name}'"))
+            found.append(self._seam(own, path, f"seams, '{name}'"))
         return found
 
     def settings(self, given: Any) -> dict[str, Any]:
@@ -202,45 +211,3 @@ _ANY = {
     "by": [0.0, 0.0, 0.01],
     "duration": 1.0,
 }
-
-
-def _paths(file: FilePath, options: Mapping[str, Any]) -> dict[str, Path]:
-    """Return the tool motions of a table with a column ``seam``, by its names."""
-    try:
-        lines = file.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{file}: cannot be read: {error}") from error
-    rows = [k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")]
-    if not rows:
-        raise FileFormatError(f"{file}: is empty, expected a header line and rows")
-    mark = max(",;\t", key=lines[rows[0]].count)
-    header = [name.strip().strip('"') for name in lines[rows[0]].split(mark)]
-    if _COLUMN not in header:
-        raise FileFormatError(
-            f"{file}: has no column '{_COLUMN}', expected one that names the seam of each row; "
-            f"the header is {','.join(header)}"
-        )
-    at = header.index(_COLUMN)
-    cells = {k: lines[k].split(mark) for k in rows}
-    names = {k: each[at].strip() if at < len(each) else "" for k, each in cells.items()}
-    found: dict[str, Path] = {}
-    for name in dict.fromkeys(names[k] for k in rows[1:]):
-        # Rows of other seams become comments, so that lines keep their numbers.
-        own = [
-            mark.join(cells[k][:at] + cells[k][at + 1 :])
-            if k == rows[0] or names.get(k) == name
-            else "#"
-            for k in range(len(lines))
-        ]
-        found[name] = _read_one(file, "\n".join(own), options)
-    return found
-
-
-def _read_one(file: FilePath, text: str, options: Mapping[str, Any]) -> Path:
-    with tempfile.TemporaryDirectory() as folder:
-        part = FilePath(folder, file.name)
-        part.write_text(text, encoding="utf-8")
-        try:
-            return read_path(part, **options)
-        except FileFormatError as error:
-            raise FileFormatError(str(error).replace(str(part), str(file))) from error
