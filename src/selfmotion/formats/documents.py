@@ -24,7 +24,8 @@ _TURNS = (
 )
 ANGLES = frozenset((*_BANDS, *_TURNS, *PER_JOINT))
 _SIZES = ("length", "radius", "size")
-LENGTHS = frozenset((*_BANDS, "by", "distance", "jump", "position", "positions", *_SIZES))
+_WAYS = ("by", "distance", "feed", "jump", "position", "positions", "retreat")
+LENGTHS = frozenset((*_BANDS, *_WAYS, *_SIZES))
 # Tables or lists in each other; files of the trade have less than ten.
 _DEEPEST = 50
 _SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}

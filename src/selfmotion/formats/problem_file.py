@@ -24,6 +24,7 @@ from selfmotion.formats.code import FUNCTION, name_kinds
 from selfmotion.formats.documents import PER_JOINT, in_si, read_document
 from selfmotion.formats.joint_limits import read_joint_limits
 from selfmotion.formats.problem_parts import obstacle, path_of, start_of
+from selfmotion.formats.workpiece import placed_table
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import LineSearch, Optimizer, QuasiNewton
 from selfmotion.planning import Fastest, Search, fastest, plan
@@ -132,7 +133,7 @@ def job_of(
     with _named(file, ""):
         raw = in_si(document)
         functions = name_kinds(raw, FilePath() if file is None else file.parent, allow_code)
-        table = checked(raw)
+        table = placed_table(checked(raw))
         return _Reader(
             file, table, functions, _degrees_per_joint(document), {} if memory is None else memory
         ).job()

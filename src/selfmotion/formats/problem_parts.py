@@ -16,7 +16,7 @@ from selfmotion.basics import (
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import ORIENTATIONS
-from selfmotion.path import Circle, Feed, Line, Path, Placed, section_at_rest
+from selfmotion.path import Circle, Feed, Line, Path, Placed, section_at_rest, with_leads
 from selfmotion.robot import NAMED_ARMS, RobotModel
 from selfmotion.task import Task
 
@@ -37,6 +37,7 @@ def path_of(
     values = dict(given)
     kind = values.get("kind")
     frame = None if kind == Placed.kind else values.pop("frame", None)
+    leads = values.pop("leads", None)
     if kind in ("circle", "line") and "start" not in values:
         if start is None:
             raise ProblemError(
@@ -66,9 +67,34 @@ def path_of(
         case "line":
             path = _line(values)
         case _:
-            path = _restored(values)
+            inner = lambda table: path_of(table, robot, start, beside)  # noqa: E731  # of this arm
+            path = _restored(_with_inner(values, inner))
     path = path if feed is None else Feed(path, feed, **bounds)
+    path = path if leads is None else _with_leads(path, leads)
     return path if frame is None else Placed(path, frame)
+
+
+def _with_leads(path: Path, leads: Mapping[str, Any]) -> Path:
+    known = ("length", "duration", "axis")
+    for key in leads:
+        if key not in known:
+            raise ProblemError(f"leads.{key}: unknown key, expected {', '.join(known)}")
+    for key in known[:2]:
+        if key not in leads:
+            raise ProblemError(f"leads.{key}: is missing")
+    return with_leads(path, **leads)
+
+
+def _with_inner(
+    values: dict[str, Any], read: Callable[[Mapping[str, Any]], Path]
+) -> dict[str, Any]:
+    """Return the table of a path with the paths that it is made of in place of their tables."""
+    found = dict(values)
+    if "path" in found:
+        found["path"] = read(found["path"])
+    if "pieces" in found:
+        found["pieces"] = [read(item) for item in found["pieces"]]
+    return found
 
 
 def obstacle(values: Mapping[str, Any], beside: Callable[[str], FilePath]) -> Any:
@@ -106,11 +132,19 @@ def _restored(values: Mapping[str, Any]) -> Path:
     """Return a path of tables of numbers, such as a plan's file has; ProblemError for others."""
     try:
         with np.errstate(invalid="raise", over="raise"):
-            path: Path = restore(Path, values)
+            made_of = {"path", "pieces"} & set(values)
+            path: Path = _made(values) if made_of else restore(Path, values)
             path.samples([0.0, 0.5 * path.duration, path.duration])
     except (ArithmeticError, IndexError, TypeError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise ProblemError(f"{values['kind']}: is no path with these numbers: {reason}") from error
+    return path
+
+
+def _made(values: Mapping[str, Any]) -> Path:
+    """Return a path that is made of others."""
+    given = {key: value for key, value in values.items() if key != "kind"}
+    path: Path = Path.kinds()[values["kind"]](**given)
     return path
 
 

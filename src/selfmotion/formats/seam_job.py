@@ -13,6 +13,7 @@ from selfmotion.formats.path_files import read_seams
 from selfmotion.formats.poses import pose_of
 from selfmotion.formats.problem_file import Job, job_of
 from selfmotion.formats.problem_parts import FEED_BOUNDS, obstacle, start_of
+from selfmotion.formats.workpiece import NAME, placed_body, standing
 from selfmotion.job import Program, Seam, plan_job
 from selfmotion.path import Path, Placed, section_at_rest
 from selfmotion.problem import NO_OVERLAP
@@ -103,6 +104,7 @@ class _Reader:
         # The arm and what all keep, read with any motion at all.
         self.first = self._read({"path": _ANY}, "seams")
         self.shared = list(self.first.problem.constraints)
+        self._standing = standing(shared)
 
     def of_list(self, given: Any) -> list[Seam]:
         """Return the seam of an entry of [[seams]]."""
@@ -139,8 +141,9 @@ class _Reader:
             if events or rows.straight:
                 # What happens where, and how a machine cuts, is meant one way.
                 own.setdefault("either_way", False)
-            if frame is not None:
-                path = Placed(path, frame)
+            place = self._standing[0] if frame is None else self._standing[0] * frame
+            if frame is not None or NAME in self._shared:
+                path = Placed(path, place)
             found.append(self._seam(own, path, f"seams, '{name}'"))
         return found
 
@@ -170,10 +173,7 @@ class _Reader:
         besides = list(problem.constraints)[len(whole) :] if constraints else []
         values = {key: value for key, value in in_si(given).items() if key in _SEAM}
         try:
-            leaves = [
-                obstacle(in_si(item), lambda name: self._file.parent / name)
-                for item in values.pop("leaves", [])
-            ]
+            leaves = [self._left(in_si(item)) for item in values.pop("leaves", [])]
             return Seam(
                 path=problem.path if path is None else path,
                 task=problem.task,
@@ -185,6 +185,12 @@ class _Reader:
             )
         except (SelfmotionError, TypeError) as error:
             raise FileFormatError(f"{self._file}: {where}: {error}") from error
+
+    def _left(self, values: Mapping[str, Any]) -> Any:
+        """Return a body that a seam leaves, where the workpiece stands if there is one."""
+        if NAME in self._shared:
+            values = placed_body(values, *self._standing)
+        return obstacle(values, lambda name: self._file.parent / name)
 
     def _read(self, own: Mapping[str, Any], where: str) -> Job:
         document = {**self._shared, **own}
