@@ -76,14 +76,21 @@ def plan(
     """Plan a motion, check it, and write it."""
     warm_start = None if warm is None else sm.load_plan(warm)
     job = documents.read(context, problem, settings or [], allow_code, warm_start)
-    outputs.check_suffixes([*job.outputs, *(out or [])])
+    if job.goal != "parts":
+        outputs.check_suffixes([*job.outputs, *(out or [])])
     asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
     given = {key: value for key, value in asked.items() if value is not None}
     for remark in job.problem.remarks:
         stages.print(f"note: {remark}", markup=False, soft_wrap=True)
+    if job.goal == "parts":
+        options.refuse({"from": warm, **given}, "a motion in parts", "its own")
+        jobs.finish_parts(job, [*(out or []), *([] if html is None else [html])], as_json)
     if job.goal == "fastest":
         options.refuse({"from": warm, **given}, "the fastest motion", "its own")
         result = fastest_with_progress(job).plan
+    elif job.goal == "retimed":
+        found = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
+        result = sm.retime(found)
     else:
         result = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
     outputs.finish(result, [*job.outputs, *(out or [])], html, as_json)

@@ -10,14 +10,14 @@ from selfmotion import formats
 from selfmotion.cli import jobs, options
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, terminal
 
-_Made = sm.Plan | sm.Program
+_Made = sm.Plan | sm.Parts | sm.Program
 
 
 @app.command(
     epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500; or: --out weld.src"
 )
 def export(
-    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, or a .program.")],
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, a .program or .parts.")],
     out: Annotated[
         list[Path],
         typer.Option(
@@ -55,6 +55,10 @@ def export(
     if file.suffix == jobs.PROGRAM:
         options.refuse({"parts": parts or None}, file, "a program's motion is")
         made = sm.load_program(file)
+        _check_verified(made, made.verified, made.verdict, force, as_json)
+    elif file.suffix == jobs.PARTS:
+        options.refuse({"parts": parts or None}, file, "the motion of parts is")
+        made = sm.load_parts(file)
         _check_verified(made, made.verified, made.verdict, force, as_json)
     else:
         made = sm.load_plan(file)
@@ -112,13 +116,15 @@ def _read_back(made: _Made, target: Path, form: str | None) -> tuple[bool, str]:
         )
         # The file states nine digits.
         return found.position <= stated.position + 1e-9 and _verified(made), text
-    if not _is_readable(target, form) or isinstance(made, sm.Program):
-        return _verified(made), made.verdict if isinstance(made, sm.Program) else ""
+    if not isinstance(made, sm.Plan):
+        return made.verified, made.verdict
+    if not _is_readable(target, form):
+        return made.certificate.verified, ""
     return _judged(made, sm.read_motion(target))
 
 
 def _verified(made: _Made) -> bool:
-    return made.verified if isinstance(made, sm.Program) else made.certificate.verified
+    return made.certificate.verified if isinstance(made, sm.Plan) else made.verified
 
 
 def _judged(plan: sm.Plan, motion: sm.Trajectory) -> tuple[bool, str]:

@@ -13,7 +13,7 @@ from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, complain, stages, te
 from selfmotion.cli.batch_display import executor_at
 from selfmotion.cli.stage_display import StageDisplay
 
-PROGRAM = ".program"
+PROGRAM, PARTS = ".program", ".parts"
 TIMETABLE = ".timetable.csv"
 
 
@@ -90,6 +90,39 @@ def write_program(program: sm.Program, file: Path) -> None:
         write_replay(program, file)
     else:
         sm.write_motion(program, file)
+
+
+def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:
+    """Plan a motion in parts, print it, write its files, and end."""
+    wanted = [*job.outputs, *out]
+    for file in wanted:
+        if file.suffix not in (PARTS, ".html", *formats.SUFFIXES):
+            known = ", ".join(formats.SUFFIXES)
+            raise sm.FileFormatError(
+                f"{file}: of parts --out writes {PARTS} (all of it), .html or the motion ({known})"
+            )
+    with StageDisplay(stages) as display:
+        found = job.in_parts(progress=display.stage)
+    if as_json:
+        data = {"verified": found.verified, "verdict": found.verdict, "cuts": list(found.cuts)}
+        terminal.print_json(data=data)
+    else:
+        terminal.print(repr(found), markup=False, soft_wrap=True)
+    for file in wanted:
+        if not found.verified and outputs.is_motion(file):
+            outputs.tell_left_out(file, terminal, quiet=as_json)
+            continue
+        if file.suffix == PARTS:
+            found.save(file)
+        elif file.suffix == ".html":
+            from selfmotion.replay import write_replay
+
+            write_replay(found, file)
+        else:
+            sm.write_motion(found, file)
+        if not as_json:
+            terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+    raise typer.Exit(VERIFIED if found.verified else NOT_VERIFIED)
 
 
 def _show(program: sm.Program, as_json: bool) -> None:

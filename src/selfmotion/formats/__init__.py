@@ -9,6 +9,7 @@ from selfmotion.formats.documents import (
     write_document as write_document,
 )
 from selfmotion.formats.example import example_text as example_text
+from selfmotion.formats.job import Job as Job
 from selfmotion.formats.joint_limits import read_joint_limits as read_joint_limits
 from selfmotion.formats.motion_parts import read_parts as read_parts, write_parts as write_parts
 from selfmotion.formats.motions import (
@@ -26,7 +27,6 @@ from selfmotion.formats.overrides import (
 from selfmotion.formats.path_files import read_path as read_path
 from selfmotion.formats.poses import pose_of as pose_of
 from selfmotion.formats.problem_file import (
-    Job as Job,
     job_of as job_of,
     read_job as read_job,
     read_problem as read_problem,

@@ -34,6 +34,7 @@ from selfmotion.formats.field_types import (
     Text,
     Whole,
 )
+from selfmotion.formats.job import GOALS
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.formats.problem_parts import FEED_BOUNDS
 from selfmotion.motion import NullMotion
@@ -42,8 +43,6 @@ from selfmotion.path import Path, TimeLaw
 from selfmotion.planning import Search
 from selfmotion.task import SE3, Damping, Relaxation, Task
 
-# What is looked for: the motion that is best by its costs, or the fastest one.
-GOALS = ("best", "fastest")
 # Kinds that no file names: what is missing of a plan, a cost that damping adds, functions (which
 # are named by module:attribute).
 _NOT_IN_FILES = {"LostCost", "OffPath", "FunctionCost"}
@@ -94,6 +93,8 @@ _FOLLOW: _Fields = {
     **dict.fromkeys(("tool", "reference"), (Text, None)),
     "pose": (Pose, None),
 }
+# How a motion in parts leaves and meets the path; its other settings are the problem's.
+_IN_PARTS: _Fields = {"retreat": (Number, 0.0), "ramp": (Number, 0.5), "axis": (Numbers, None)}
 # What paths and bodies are placed with.
 _WORKPIECE: _Fields = {
     "frame": (Pose, None),
@@ -168,6 +169,7 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
         "rest": (bool, True),
         "joint_limits": (Text, None),
         "goal": (Literal[GOALS], None),
+        "parts": (_model("InParts", _IN_PARTS), None),
         "search": (model_of(Search), None),
         "optimiser": (model_of(QuasiNewton), None),
         "tolerance": (model_of(Tolerance), None),

@@ -8,10 +8,11 @@ from typing import Any
 from selfmotion.basics import FileFormatError, SelfmotionError, as_path, nearest
 from selfmotion.constraints import Clearance
 from selfmotion.formats.documents import in_si, read_document
+from selfmotion.formats.job import Job
 from selfmotion.formats.path_building import times_of_events
 from selfmotion.formats.path_files import read_seams
 from selfmotion.formats.poses import pose_of
-from selfmotion.formats.problem_file import Job, job_of
+from selfmotion.formats.problem_file import job_of
 from selfmotion.formats.problem_parts import FEED_BOUNDS, obstacle, start_of
 from selfmotion.formats.workpiece import NAME, placed_body, standing
 from selfmotion.job import Program, Seam, plan_job
