@@ -96,15 +96,25 @@ def plan(
     outputs.finish(result, [*job.outputs, *(out or [])], html, as_json)
 
 
-@app.command(epilog="Example: selfmotion init panda; then: selfmotion plan panda.toml")
+@app.command(
+    epilog="Example: selfmotion init panda; then: selfmotion plan panda.toml; or: selfmotion init "
+    "arm.xacro --job --out seams.toml"
+)
 def init(
-    robot: Annotated[str, typer.Argument(help="Name (see `selfmotion robots`).")],
+    robot: Annotated[
+        str, typer.Argument(help="Name (see `selfmotion robots`), or a .urdf or .xacro file.")
+    ],
     out: Annotated[Path | None, typer.Option(help="File; by default ROBOT.toml.")] = None,
+    tool: options.ToolOption = None,
+    job: Annotated[bool, typer.Option("--job", help="Of many seams: selfmotion job FILE.")] = False,
+    positioner: Annotated[
+        bool, typer.Option("--positioner", help="Of a cell: a table that tilts and turns as well.")
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
 ) -> None:
     """Write a commented problem file to begin with."""
-    file = Path(f"{robot}.toml") if out is None else out
-    text = formats.example_text(robot, file.name)
+    file = Path(f"{Path(robot).stem}.toml") if out is None else out
+    text = formats.example_text(robot, file, tool=tool, job=job, positioner=positioner)
     if file.exists() and not force:
         raise sm.FileFormatError(f"{file}: is there already; give --out or --force")
     write_text(file, text)
@@ -254,14 +264,19 @@ def replay(
 
     Pictures need a browser (chromium) on this machine.
     """
-    from selfmotion.replay import render_gif, render_png, write_replay
+    from selfmotion.replay import check_pictures, render_gif, render_png, write_replay
 
+    if png is not None or gif is not None:
+        check_pictures()
     if len(plans) == 1 and plans[0].suffix == jobs.PROGRAM:
         saved: Any = sm.load_program(plans[0])
         first = saved
     else:
         saved = [sm.load_plan(plan) for plan in plans]
         first = saved[0]
+    if png is not None and not 0.0 <= png <= first.trajectory.duration:
+        lasts = f"the motion lasts {first.trajectory.duration:.6g} s"
+        raise sm.RenderError(f"--png: there is no picture at t = {png:g} s: {lasts}")
     labels = [plan.stem for plan in plans] if len(plans) > 1 else None
     written = [write_replay(saved, html, labels=labels)]
     if png is not None:

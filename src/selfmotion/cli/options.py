@@ -187,7 +187,7 @@ JointLimitsOption = Annotated[
 ]
 ObstaclesOption = Annotated[
     Path | None,
-    typer.Option(help="Obstacles: a list of shapes in JSON, or TOML with [[obstacles]]."),
+    typer.Option(help=r"Obstacles: a list of shapes in JSON, or TOML with \[\[obstacles]]."),
 ]
 ClearanceOption = Annotated[
     float, typer.Option(help="Distance to keep from obstacles and of links from each other (m).")
