@@ -18,6 +18,7 @@ import tempfile
 import time
 import traceback
 from collections import Counter
+from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -98,7 +99,7 @@ def limited(megabytes: int):
         resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY,) * 2)
 
 
-def _work(numbers: range, seed: int, folder: Path, out: Connection) -> None:
+def _work(numbers: Sequence[int], seed: int, folder: Path, out: Connection) -> None:
     sys.stdout = open(os.devnull, "w")  # noqa: SIM115  # for as long as the process lives
     for good in good_files():  # compiles and imports what reading needs
         file = folder / f"good{good.suffix}"
@@ -110,7 +111,7 @@ def _work(numbers: range, seed: int, folder: Path, out: Connection) -> None:
     out.close()
 
 
-def read_all(numbers: range, seed: int, folder: Path, told: Console) -> list[End]:
+def read_all(numbers: Sequence[int], seed: int, folder: Path, told: Console) -> list[End]:
     """Read the files in a process of their own, and in another one after a crash."""
     context, ends = mp.get_context("spawn"), list[End]()
     while numbers:
@@ -150,6 +151,7 @@ def main(
     count: Annotated[int, typer.Option(help="How many files.")] = 20_000,
     first: Annotated[int, typer.Option(help="Number of the first one.")] = 0,
     seed: Annotated[int, typer.Option(help="Of all of them.")] = 0,
+    kind: Annotated[str, typer.Option(help="Only files of these kinds, by comma.")] = "",
     out: Annotated[Path | None, typer.Option(help="Folder that keeps what went wrong.")] = None,
 ) -> None:
     """Spoil, read, and tell what is wrong."""
@@ -157,7 +159,14 @@ def main(
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) if out is None else out
         folder.mkdir(parents=True, exist_ok=True)
-        ends = read_all(range(first, first + count), seed, folder, console)
+        numbers = range(first, first + count)
+        if kind:
+            goods, asked = good_files(), kind.split(",")
+            chosen = [k for k, good in enumerate(goods) if good.kind in asked]
+            # Of each lap through all kinds, those that were asked for.
+            numbers = [first + len(goods) * (n // len(chosen)) + chosen[n % len(chosen)]
+                       for n in range(count)]  # fmt: skip
+        ends = read_all(numbers, seed, folder, console)
     for what in sorted({end.what for end in ends}):
         kinds = Counter(end.kind for end in ends if end.what == what)
         console.print(f"{what}: {dict(kinds)}", markup=False)

@@ -98,6 +98,7 @@ from selfmotion.costs import (
 from selfmotion.follow import Follow as Follow, Follows as Follows
 from selfmotion.formats import (
     Job as Job,
+    ProgramSettings as ProgramSettings,
     SeamJob as SeamJob,
     read_job as read_job,
     read_joint_limits as read_joint_limits,
@@ -105,6 +106,7 @@ from selfmotion.formats import (
     read_parts as read_parts,
     read_path as read_path,
     read_problem as read_problem,
+    read_program_settings as read_program_settings,
     read_seam_job as read_seam_job,
     write_motion as write_motion,
     write_parts as write_parts,

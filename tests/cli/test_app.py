@@ -1,6 +1,7 @@
 """The command line as a user types it."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.cli import app
 from support.shell import invoke
 
 SELFMOTION = Path(sys.executable).with_name("selfmotion")
@@ -112,6 +114,19 @@ def test_help_has_an_example(command: str) -> None:
     code, text = invoke(command, "--help")
     assert code == 0
     assert f"Example: selfmotion {command}" in text
+
+
+def test_help_loses_no_words() -> None:
+    """What is in brackets is no markup, or says so."""
+    from typer.main import get_command
+
+    for name, command in get_command(app).commands.items():  # type: ignore[attr-defined]
+        _, text = invoke(name, "--help")
+        seen = "".join(re.findall(r"[^\s│]", text))
+        for parameter in command.params:
+            said = (getattr(parameter, "help", None) or "").replace("\\[", "[")
+            for word in re.findall(r"\[+[^\]]*\]+", said):
+                assert "".join(word.split()) in seen, (name, parameter.name, word)
 
 
 def test_demo(tmp_path: Path) -> None:

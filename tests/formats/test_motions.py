@@ -214,13 +214,14 @@ def test_urscript_streams_the_motion(ur_plan: sm.Plan, tmp_path: Path) -> None:
     body = [line for line in lines if not line.startswith("#")]
     assert (body[0], body[-1]) == ("def selfmotion():", "end")
     calls = [re.fullmatch(r"  servoj\((\[.*?\]), t=(\S+), lookahead_time=0.1, gain=300\)", line)
-             for line in body[2:-2]]  # fmt: skip
+             for line in body[3:-2]]  # fmt: skip
     q = np.array([ast.literal_eval(call[1]) for call in calls if call is not None])
     assert len(q) == len(calls) == 203
     assert {float(call[2]) for call in calls if call is not None} == {0.005}
     times = np.minimum(np.arange(203) / 200, 1.01)
     np.testing.assert_allclose(q, ur_plan.trajectory(times), atol=1e-6)
-    assert body[1] == f"  movej([{', '.join(map(repr, q[0].tolist()))}])"
+    assert body[1].startswith("  set_tcp(p[")
+    assert body[2] == f"  movej([{', '.join(map(repr, q[0].tolist()))}], a=0.14, v=0.314)"
     assert body[-2] == "  stopj(2.0)"
 
 

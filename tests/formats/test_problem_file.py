@@ -263,6 +263,29 @@ def test_examples_run_as_they_are(name: str, tmp_path: Path) -> None:
         example_text("none", "cell.toml")
 
 
+def test_examples_of_files_jobs_and_cells_are_read(tmp_path: Path) -> None:
+    urdf = (ROOT / "robots" / "planar_3r.urdf").read_text()
+    (tmp_path / "arms").mkdir()
+    for name in ("arm.urdf", "arm.xacro"):
+        (tmp_path / "arms" / name).write_text(urdf)
+        file = tmp_path / f"{name}.toml"
+        asked = ("init", tmp_path / "arms" / name, "--out", file)
+        assert invoke(*asked)[0] == 0
+        assert f'file = "arms/{name}"' in file.read_text()
+        assert sm.read_job(file).problem.robot.dof == 3
+        assert invoke(*asked, "--job", "--force")[0] == 0
+        first, second = sm.read_seam_job(file).seams
+        assert (first.name, second.name) == ("one", "two")
+        assert first.events == (("tool on", 0.0),)
+    file = tmp_path / "cell.toml"
+    for options in ((), ("--job",)):
+        asked = ("init", "panda", "--positioner", "--out", file, "--force", *options)
+        assert invoke(*asked)[0] == 0
+        cell = sm.read_seam_job(file).robot if options else sm.read_job(file).problem.robot
+        assert cell.dof == 9
+        assert cell.reference == "table/plate"
+
+
 def test_the_example_cell_runs() -> None:
     cell = ROOT / "examples" / "cell.toml"
     assert sm.read_job(cell).plan().certificate.verified
@@ -309,5 +332,7 @@ def test_a_seam_is_woven_as_a_file_says(tmp_path: Path) -> None:
     assert woven.to_dict() == expected.to_dict()
     for wrong in ("pich = 0.1", "amplitude = 0.1"):
         file.write_text(text + f"weave = {{{wrong}}}\n")
-        with pytest.raises(sm.FileFormatError, match=r"path: weave: '(pich|pitch)' is"):
+        with pytest.raises(
+            sm.FileFormatError, match=r"path: weave\.(pich: unknown|pitch: is missing)"
+        ):
             sm.read_problem(file)

@@ -18,6 +18,7 @@ from selfmotion.basics.errors import RenderError
 from selfmotion.replay import browser, figure, render_gif, render_png
 from support.places import TESTS
 from support.replay_plans import arm_plan, planar_plan
+from support.shell import complaint
 
 needs_browser = pytest.mark.skipif(
     not any(map(shutil.which, browser._BROWSERS)) and not os.environ.get("CI"),
@@ -64,6 +65,16 @@ def test_no_browser_is_said_clearly(tmp_path, monkeypatch):
     with pytest.raises(RenderError, match="install Chromium"):
         render_png(planar_plan(), tmp_path / "a.png", t=0.0)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_pictures_fail_before_work(tmp_path, monkeypatch):
+    planar_plan().save(tmp_path / "a.npz")
+    asked = ("replay", tmp_path / "a.npz", "--html", tmp_path / "a.html")
+    assert "no picture at t = 99 s" in complaint(*asked, "--png", "99")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path))
+    assert "install Chromium" in complaint(*asked, "--gif", tmp_path / "a.gif")
+    assert [file.name for file in tmp_path.iterdir()] == ["a.npz"]
 
 
 def test_no_playwright_is_said_clearly(tmp_path, monkeypatch):

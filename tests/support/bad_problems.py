@@ -315,6 +315,18 @@ def setting_rows() -> list[Row]:
         ),
         *bad_values_of(
             "Files",
+            "ProgramSettings",
+            sm.ProgramSettings,
+            deviation={"None": None, "0.1": 0.1},
+            axes={"['A1']": ["A1"], "{'joint1': 'A7'}": {"joint1": "A7"}},
+            signals={"3": 3, "{'on': 7}": {"on": 7}, "{'on': (7, 1)}": {"on": (7, 1)}},
+            flange={"3": 3},
+            mass={"0": 0, "'heavy'": "heavy"},
+            center={"[0, 0]": [0, 0], "'tip'": "tip"},
+            approach={"0": 0, "2": 2},
+        ),
+        *bad_values_of(
+            "Files",
             "write_problem",
             lambda **g: sm.write_problem(**{"problem": sm.sample_problem(), "file": "a.toml", **g}),
             problem={"None": None, "'panda'": "panda"},

@@ -243,7 +243,6 @@ def cost_rows() -> list[Row]:
     del weights["0"]
     factors = {key: value for key, value in POSITIVE.items() if key != "0"}
     limits = {
-        "None": None,
         "[0, 1]": [0, 1],
         "[9, 9, 9]": [9, 9, 9],
         "[nan] * 3": [NAN] * 3,
@@ -276,7 +275,7 @@ def cost_rows() -> list[Row]:
             "JointLimitDistance",
             _cost(sm.JointLimitDistance, lower=[-1] * 3, upper=[1] * 3),
             lower=limits,
-            upper={"[-2] * 3": [-2] * 3, "[1] * 4": [1] * 4, "None": None},
+            upper={"[-2] * 3": [-2] * 3, "[1] * 4": [1] * 4},
             mu=factors,
             power={**WHOLE, "3": 3, "0": 0},
         ),

@@ -65,7 +65,7 @@ def good_files() -> tuple[Good, ...]:
     found = [
         Good("URDF", ".urdf", arm.urdf.bare_text().encode(), sm.load_robot),
         Good("URDF", ".urdf", _URDF, sm.load_robot),
-        *(Good("path", suffix, content, _path) for suffix, content in _paths()),
+        *(Good(_kind(suffix), suffix, content, _path) for suffix, content in _paths()),
         Good("SRDF", ".srdf", _SRDF, lambda file: sm.Clearance(srdf=file)),
         Good("obstacles", ".json", json.dumps(_OBSTACLES, indent=1).encode(), read_obstacles),
         Good("obstacles", ".toml", _OBSTACLES_TOML, read_obstacles),
@@ -77,6 +77,13 @@ def good_files() -> tuple[Good, ...]:
             sm.write_motion(plan, folder / f"motion{suffix}", rate=10.0)
             content = (folder / f"motion{suffix}").read_bytes()
             found.append(Good("motion", suffix, content, sm.read_motion))
+        limits = [sm.JointAccelerationLimits([9.0] * 3)]
+        ends = np.zeros(3), np.array([0.4, 0.3, -0.5])
+        move = sm.move(arm, *ends, constraints=limits, clearance=None)
+        for suffix in (".src", ".mod"):
+            sm.write_motion(move, folder / f"motion{suffix}")
+            content = (folder / f"motion{suffix}").read_bytes()
+            found.append(Good("program", suffix, content, sm.read_motion))
         for suffix in (".toml", ".json"):
             sm.write_problem(problem, folder / f"problem{suffix}")
             content = (folder / f"problem{suffix}").read_bytes()
@@ -277,12 +284,16 @@ def _zip_bomb(name: str) -> bytes:
     return out.getvalue()
 
 
+def _kind(suffix: str) -> str:
+    return "cut" if suffix in (".nc", ".apt") else "path"
+
+
 def _path(file: Path) -> object:
     """Read a path, and draw it: what is wrong with it must be said before it is followed."""
     try:
         path = sm.read_path(file)
     except sm.FileFormatError as error:
-        if "has no times" not in str(error):
+        if not re.search("has no times|says no feed", str(error)):
             raise
         path = sm.read_path(file, feed=0.1)
     return path.samples([0.0, 0.5 * path.duration, path.duration])
@@ -319,9 +330,44 @@ def _paths() -> list[tuple[str, bytes]]:
         out = io.BytesIO()
         np.save(out, array)
         found.append((".npy", out.getvalue()))
+    found += [(".nc", _GCODE), (".apt", _CLDATA), (".csv", _SEAMS)]
     return found
 
 
+_GCODE = b"""%
+O1 (SLOT)
+N10 G21 G90 G94 G17 G54
+G0 X0 Y0 Z5 M3
+G1 Z-2 F600
+X40 F1200
+G3 X41 Y1 I0 J1
+G2 X42 Y2 R1
+G1 Y50 B15 A-3 C40
+Y60 I0 J0.1 K1
+G91
+G1 Z5.5
+M30
+"""
+_CLDATA = b"""PARTNO/SLOT
+UNITS/MM
+LOADTL/1 $$ a ball
+FROM/0,0,50
+RAPID
+GOTO/0,0,5
+FEDRAT/600,MMPM
+GOTO/0,0,-2,0,0,1
+COOLNT/ON
+GOTO/40,0,-2
+GOTO/40,50,-2,$
+  0.258819045,0,0.965925826
+GODLTA/0,0,7.5
+FINI
+"""
+_SEAMS = b"""seam,x,y,z,feed,event
+left,0,0,0,0.05,
+left,0.05,0,0,0.05,arc on
+left,0.1,0.02,0,0.03,"arc off"
+"""
 _SRDF = b"""<?xml version="1.0"?>
 <robot name="arm">
   <group name="arm"><chain base_link="base" tip_link="tool"/></group>

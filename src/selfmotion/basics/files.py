@@ -152,7 +152,7 @@ def write_csv(file: Path, header: Sequence[str], table: Array) -> None:
 
 def read_table(file: Path) -> tuple[list[str], Array]:
     """Read a table of numbers with a header line: names and values of `read_rows`."""
-    names, values, _ = read_rows(file)
+    names, values, _, _ = read_rows(file)
     return names, values
 
 
@@ -163,7 +163,9 @@ def as_path(file: Any) -> Path:
     return Path(file)
 
 
-def read_rows(file: Path) -> tuple[list[str], Array, list[int]]:
+def read_rows(
+    file: Path, texts: Sequence[str] = ()
+) -> tuple[list[str], Array, list[int], dict[str, list[str]]]:
     """Read a table of numbers with a header line, and tell on which line each row stands.
 
     Columns are separated by comma, semicolon or tab, whichever the header has; lines that begin
@@ -172,8 +174,11 @@ def read_rows(file: Path) -> tuple[list[str], Array, list[int]]:
     Returns
     -------
     names : list of str
+        Of the columns of numbers.
     values : (N, C)
     lines : list of int
+    cells : dict
+        The columns of `texts` that the table has, as they are.
 
     Raises
     ------
@@ -194,6 +199,8 @@ def read_rows(file: Path) -> tuple[list[str], Array, list[int]]:
     if twice:
         raise FileFormatError(f"{file}: line {kept[0][0]}: column '{twice[0]}' appears twice")
     rows, numbers = [], []
+    plain = [k for k, name in enumerate(names) if name not in texts]
+    cells_of: dict[str, list[str]] = {name: [] for name in names if name in texts}
     for number, line in kept[1:]:
         cells = line.split(mark)
         if len(cells) != len(names):
@@ -201,11 +208,14 @@ def read_rows(file: Path) -> tuple[list[str], Array, list[int]]:
                 f"{file}: line {number} has {len(cells)} values, expected {len(names)}"
             )
         try:
-            rows.append([_number(cell) for cell in cells])
+            rows.append([_number(cells[k]) for k in plain])
             numbers.append(number)
         except ValueError as error:
             raise FileFormatError(f"{file}: line {number}: {error}") from error
-    return names, np.array(rows, dtype=np.float64).reshape(-1, len(names)), numbers
+        for name, column in cells_of.items():
+            column.append(cells[names.index(name)].strip().strip('"'))
+    found = np.array(rows, dtype=np.float64).reshape(-1, len(plain))
+    return [names[k] for k in plain], found, numbers, cells_of
 
 
 def _number(cell: str) -> float:

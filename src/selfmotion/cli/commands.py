@@ -40,6 +40,7 @@ def plan(
     duration: options.DurationOption = None,
     feed: options.FeedOption = None,
     jump: options.JumpOption = None,
+    seam: options.SeamOption = None,
     frame: options.FrameOption = None,
     ramp: options.RampOption = None,
     corners: options.CornersOption = "blend",
@@ -75,28 +76,45 @@ def plan(
     """Plan a motion, check it, and write it."""
     warm_start = None if warm is None else sm.load_plan(warm)
     job = documents.read(context, problem, settings or [], allow_code, warm_start)
-    outputs.check_suffixes([*job.outputs, *(out or [])])
+    if job.goal != "parts":
+        outputs.check_suffixes([*job.outputs, *(out or [])])
     asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
     given = {key: value for key, value in asked.items() if value is not None}
     for remark in job.problem.remarks:
         stages.print(f"note: {remark}", markup=False, soft_wrap=True)
+    if job.goal == "parts":
+        options.refuse({"from": warm, **given}, "a motion in parts", "its own")
+        jobs.finish_parts(job, [*(out or []), *([] if html is None else [html])], as_json)
     if job.goal == "fastest":
         options.refuse({"from": warm, **given}, "the fastest motion", "its own")
         result = fastest_with_progress(job).plan
+    elif job.goal == "retimed":
+        found = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
+        result = sm.retime(found)
     else:
         result = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
     outputs.finish(result, [*job.outputs, *(out or [])], html, as_json)
 
 
-@app.command(epilog="Example: selfmotion init panda; then: selfmotion plan panda.toml")
+@app.command(
+    epilog="Example: selfmotion init panda; then: selfmotion plan panda.toml; or: selfmotion init "
+    "arm.xacro --job --out seams.toml"
+)
 def init(
-    robot: Annotated[str, typer.Argument(help="Name (see `selfmotion robots`).")],
+    robot: Annotated[
+        str, typer.Argument(help="Name (see `selfmotion robots`), or a .urdf or .xacro file.")
+    ],
     out: Annotated[Path | None, typer.Option(help="File; by default ROBOT.toml.")] = None,
+    tool: options.ToolOption = None,
+    job: Annotated[bool, typer.Option("--job", help="Of many seams: selfmotion job FILE.")] = False,
+    positioner: Annotated[
+        bool, typer.Option("--positioner", help="Of a cell: a table that tilts and turns as well.")
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
 ) -> None:
     """Write a commented problem file to begin with."""
-    file = Path(f"{robot}.toml") if out is None else out
-    text = formats.example_text(robot, file.name)
+    file = Path(f"{Path(robot).stem}.toml") if out is None else out
+    text = formats.example_text(robot, file, tool=tool, job=job, positioner=positioner)
     if file.exists() and not force:
         raise sm.FileFormatError(f"{file}: is there already; give --out or --force")
     write_text(file, text)
@@ -214,68 +232,6 @@ def _approaches(
     return approaches(asked, sm.FinishedMotion(robot, motion.of_joints(robot.joint_names)))
 
 
-@app.command(epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500")
-def export(
-    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, or a .program.")],
-    out: Annotated[
-        list[Path],
-        typer.Option(
-            help="File: .csv, .npz, .json, .yaml (ROS 2 JointTrajectory), .xml (MuJoCo keyframes), "
-            ".script (URScript). Repeatable."
-        ),
-    ],
-    rate: Annotated[
-        float | None, typer.Option(help="Samples per second; by default the plan's own.")
-    ] = None,
-    form: Annotated[
-        str | None,
-        typer.Option("--format", help=f"Whatever the suffix: {', '.join(formats.FORMS)}."),
-    ] = None,
-    parts: Annotated[
-        bool, typer.Option("--parts", help="Of a cell a file for each part as well, in step.")
-    ] = False,
-    as_json: options.JsonOption = False,
-) -> None:
-    """Write a plan's motion for controllers and simulators, and check what was written."""
-    if file.suffix == jobs.PROGRAM:
-        options.refuse({"parts": parts or None}, file, "a program's motion is")
-        jobs.export(sm.load_program(file), out, rate, form, as_json)
-    saved = sm.load_plan(file)
-    verified, verdicts = not saved.altered, dict[str, str]()
-
-    def judged(motion: sm.Trajectory, name: str) -> bool:
-        found = saved.problem.certify(motion, saved.tolerance, saved.report.ending)
-        verdicts[name] = f"read back: {found.verdict}"
-        return found.verified
-
-    for target in out:
-        files = sm.write_parts(saved, target, rate=rate, form=form) if parts else {}
-        together = ", ".join(map(str, files.values()))
-        sm.write_motion(saved, target, rate=rate, form=form)
-        if form in formats.READABLE or (form is None and target.suffix not in (".xml", ".script")):
-            verified &= judged(sm.read_motion(target), str(target))
-            if files:
-                verified &= judged(sm.read_parts(files), together)
-        else:
-            verified &= saved.certificate.verified
-            verdicts |= {str(target): "", **({together: ""} if files else {})}
-    miss = formats.linear_miss(saved, rate)
-    if as_json:
-        terminal.print_json(
-            data={"verified": verified, "written": verdicts, "linear_miss": miss._asdict()}
-        )
-        raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
-    for name, verdict in verdicts.items():
-        terminal.print(f"wrote {name}{verdict and '; '}{verdict}", markup=False, soft_wrap=True)
-    terminal.print(
-        f"joined by straight lines, the samples stay within {miss.position:.2g} m and "
-        f"{miss.rotation:.2g} rad of the motion; --rate {miss.rate:.0f} keeps the plan's tolerance",
-        markup=False,
-        soft_wrap=True,
-    )
-    raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)
-
-
 @app.command(epilog="Example: selfmotion compare a.npz b.npz")
 def compare(
     plans: Annotated[list[Path], typer.Argument(help="Plans saved as .npz.")],
@@ -308,14 +264,19 @@ def replay(
 
     Pictures need a browser (chromium) on this machine.
     """
-    from selfmotion.replay import render_gif, render_png, write_replay
+    from selfmotion.replay import check_pictures, render_gif, render_png, write_replay
 
+    if png is not None or gif is not None:
+        check_pictures()
     if len(plans) == 1 and plans[0].suffix == jobs.PROGRAM:
         saved: Any = sm.load_program(plans[0])
         first = saved
     else:
         saved = [sm.load_plan(plan) for plan in plans]
         first = saved[0]
+    if png is not None and not 0.0 <= png <= first.trajectory.duration:
+        lasts = f"the motion lasts {first.trajectory.duration:.6g} s"
+        raise sm.RenderError(f"--png: there is no picture at t = {png:g} s: {lasts}")
     labels = [plan.stem for plan in plans] if len(plans) > 1 else None
     written = [write_replay(saved, html, labels=labels)]
     if png is not None:

@@ -27,6 +27,7 @@ class Shell:
     duration: float | None
     feed: float | None
     jump: float | None
+    seam: str | None
     frame: str | None
     ramp: float | None
     corners: str
@@ -100,14 +101,18 @@ class Shell:
         if sum(option is not None for option in (self.path, self.circle, self.line)) != 1:
             raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
         if self.path is not None:
-            given = {name: getattr(self, name) for name in ("feed", "duration", "jump", "ramp")}
+            given = {
+                name: getattr(self, name) for name in ("seam", "feed", "duration", "jump", "ramp")
+            }
             given["tolerance"] = self.corner_tolerance
             frame = {} if self.frame is None else {"frame": options.pose(self.frame, "--frame")}
             return {"kind": "file", "file": str(self.path), "corners": self.corners, **frame} | {
                 key: value for key, value in given.items() if value is not None
             }
-        if self.frame is not None or self.ramp is not None:
-            raise sm.ProblemError("--frame and --ramp are for --path; a shape rests at its ends")
+        if any(option is not None for option in (self.frame, self.ramp, self.seam)):
+            raise sm.ProblemError(
+                "--frame, --ramp and --seam are for --path; a shape is one, and rests at its ends"
+            )
         if self.feed is not None and self.duration is not None:
             raise sm.ProblemError("give the pace by one of --feed and --duration")
         pace = {"feed": self.feed} if self.feed is not None else {"duration": self.duration or 4.0}

@@ -8,12 +8,12 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.cli import json_tables, options, tables
+from selfmotion.cli import json_tables, options, outputs, tables
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, complain, stages, terminal
 from selfmotion.cli.batch_display import executor_at
 from selfmotion.cli.stage_display import StageDisplay
 
-PROGRAM = ".program"
+PROGRAM, PARTS = ".program", ".parts"
 TIMETABLE = ".timetable.csv"
 
 
@@ -56,6 +56,9 @@ def job(
         raise typer.Exit(NOT_VERIFIED) from None
     _show(program, as_json)
     for target in wanted:
+        if not program.verified and outputs.is_motion(target) and not _is_timetable(target):
+            outputs.tell_left_out(target, terminal, quiet=as_json)
+            continue
         write_program(program, target)
         if not as_json:
             terminal.print(f"wrote {target}", markup=False, soft_wrap=True)
@@ -63,7 +66,7 @@ def job(
 
 
 def _check(file: Path) -> None:
-    if not (file.suffix in (PROGRAM, ".html", *formats.SUFFIXES) or file.name.endswith(TIMETABLE)):
+    if not (file.suffix in (PROGRAM, ".html", *formats.SUFFIXES) or _is_timetable(file)):
         known = ", ".join(formats.SUFFIXES)
         raise sm.FileFormatError(
             f"{file}: --out writes .program, .timetable.csv, .html (a replay) or the motion "
@@ -71,11 +74,15 @@ def _check(file: Path) -> None:
         )
 
 
+def _is_timetable(file: Path) -> bool:
+    return file.name.endswith(TIMETABLE)
+
+
 def write_program(program: sm.Program, file: Path) -> None:
     """Write a program as what the name of a file says."""
     if file.suffix == PROGRAM:
         program.save(file)
-    elif file.name.endswith(TIMETABLE):
+    elif _is_timetable(file):
         program.write_timetable(file)
     elif file.suffix == ".html":
         from selfmotion.replay import write_replay
@@ -83,6 +90,39 @@ def write_program(program: sm.Program, file: Path) -> None:
         write_replay(program, file)
     else:
         sm.write_motion(program, file)
+
+
+def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:
+    """Plan a motion in parts, print it, write its files, and end."""
+    wanted = [*job.outputs, *out]
+    for file in wanted:
+        if file.suffix not in (PARTS, ".html", *formats.SUFFIXES):
+            known = ", ".join(formats.SUFFIXES)
+            raise sm.FileFormatError(
+                f"{file}: of parts --out writes {PARTS} (all of it), .html or the motion ({known})"
+            )
+    with StageDisplay(stages) as display:
+        found = job.in_parts(progress=display.stage)
+    if as_json:
+        data = {"verified": found.verified, "verdict": found.verdict, "cuts": list(found.cuts)}
+        terminal.print_json(data=data)
+    else:
+        terminal.print(repr(found), markup=False, soft_wrap=True)
+    for file in wanted:
+        if not found.verified and outputs.is_motion(file):
+            outputs.tell_left_out(file, terminal, quiet=as_json)
+            continue
+        if file.suffix == PARTS:
+            found.save(file)
+        elif file.suffix == ".html":
+            from selfmotion.replay import write_replay
+
+            write_replay(found, file)
+        else:
+            sm.write_motion(found, file)
+        if not as_json:
+            terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
+    raise typer.Exit(VERIFIED if found.verified else NOT_VERIFIED)
 
 
 def _show(program: sm.Program, as_json: bool) -> None:
@@ -95,19 +135,4 @@ def _show(program: sm.Program, as_json: bool) -> None:
 def check(program: sm.Program, as_json: bool) -> NoReturn:
     """Print what is known of a program that was read and judged anew, and end."""
     _show(program, as_json)
-    raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
-
-
-def export(
-    program: sm.Program, out: list[Path], rate: float | None, form: str | None, as_json: bool
-) -> NoReturn:
-    """Write the motion of a program, and its verdict, and end."""
-    for target in out:
-        sm.write_motion(program, target, rate=rate, form=form)
-    if as_json:
-        written = {str(target): program.verdict for target in out}
-        terminal.print_json(data={"verified": program.verified, "written": written})
-    else:
-        for target in out:
-            terminal.print(f"wrote {target}; {program.verdict}", markup=False, soft_wrap=True)
     raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)

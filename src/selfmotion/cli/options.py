@@ -53,6 +53,9 @@ JumpOption = Annotated[
     float | None,
     typer.Option(help="Distance between poses of --path that is refused (m; 0.5 by default)."),
 ]
+SeamOption = Annotated[
+    str | None, typer.Option(help="Which seam or cut of --path, where it has several.")
+]
 FrameOption = Annotated[
     str | None,
     typer.Option(help="Pose of the frame that --path is in: x,y,z,roll,pitch,yaw (m, rad)."),
@@ -184,7 +187,7 @@ JointLimitsOption = Annotated[
 ]
 ObstaclesOption = Annotated[
     Path | None,
-    typer.Option(help="Obstacles: a list of shapes in JSON, or TOML with [[obstacles]]."),
+    typer.Option(help=r"Obstacles: a list of shapes in JSON, or TOML with \[\[obstacles]]."),
 ]
 ClearanceOption = Annotated[
     float, typer.Option(help="Distance to keep from obstacles and of links from each other (m).")

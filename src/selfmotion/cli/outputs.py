@@ -24,7 +24,11 @@ def write(
         A file could not be written; says where the plan is.
     """
     written, faults = list[Path](), list[str]()
+    verified = result.certificate.verified
     for file in [*out, *([] if html is None else [html])]:
+        if not verified and is_motion(file):
+            tell_left_out(file, console, quiet=quiet)
+            continue
         try:
             _write_one(result, file, page=file is html)
             written.append(file)
@@ -50,6 +54,21 @@ def finish(result: sm.Plan, out: list[Path], html: Path | None, as_json: bool) -
         tables.show(result, terminal)
     write(result, out, html, terminal, quiet=as_json)
     raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
+
+
+def is_motion(file: Path) -> bool:
+    """Whether a file is a motion that a controller may be given."""
+    return file.suffix in formats.SUFFIXES and file.suffix != ".npz"
+
+
+def tell_left_out(file: Path, console: Console, *, quiet: bool) -> None:
+    """Say that a motion that is not verified was not written."""
+    if not quiet:
+        console.print(
+            f"{file} is not written, as it is not verified; `selfmotion export --force` writes it",
+            markup=False,
+            soft_wrap=True,
+        )
 
 
 def _write_one(result: sm.Plan, file: Path, *, page: bool) -> None:

@@ -8,6 +8,7 @@ _WORDS = (
     (r"\b(task|corners)='(\w+)'", r"--\1 \2"),
     (r"\(?\brelaxations=\)?", "with --relax"),
     (r"\b(tool|lock|start|acceleration|velocity|duration|feed)=(?=[\s;,.)]|$)", r"--\1"),
+    (r"give force=True to write it", "export --force writes it"),
     (r"give a larger jump", "give a larger --jump"),
     (r"either a feed \[m/s\] or a duration \[s\]", "either --feed (m/s) or --duration (s)"),
     (

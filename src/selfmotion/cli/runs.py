@@ -24,7 +24,7 @@ from selfmotion.cli.stage_display import StageDisplay
 @app.command(epilog="Example: selfmotion batch cell.toml --workers 2 --out out/batch")
 def batch(
     files: Annotated[
-        list[Path], typer.Argument(help="Problem files; of a [grid], all combinations.")
+        list[Path], typer.Argument(help=r"Problem files; of a \[grid], all combinations.")
     ],
     out: Annotated[
         Path, typer.Option(help="Folder for plans and tables; a run that was killed goes on there.")

@@ -187,28 +187,27 @@ class JointLimitDistance(Cost):
 
     Parameters
     ----------
-    lower, upper : (n,)
-        Limits [rad or m], for example ``robot.lower`` and ``robot.upper``.
+    lower, upper : (n,), optional
+        Limits [rad or m]; by default those of the arm's URDF.
     mu : float
         μ ≥ 0.
     power : int
         p, even.
     """
 
-    lower: npt.ArrayLike
-    upper: npt.ArrayLike
+    lower: npt.ArrayLike | None = None
+    upper: npt.ArrayLike | None = None
     mu: float = 1.0
     power: int = 6
     name: str = "joint limits"
 
     def __post_init__(self) -> None:
-        lower, upper = (_limits(getattr(self, k), f"cost '{self.name}': {k}") for k in _BOTH)
-        if lower.shape != upper.shape or not np.all(lower < upper):
-            raise ProblemError(
-                f"cost '{self.name}': lower {shown(lower)} is not below upper {shown(upper)}"
-            )
-        object.__setattr__(self, "lower", lower)
-        object.__setattr__(self, "upper", upper)
+        for key in _BOTH:
+            if getattr(self, key) is not None:
+                given = _limits(getattr(self, key), f"cost '{self.name}': {key}")
+                object.__setattr__(self, key, given)
+        if self.lower is not None and self.upper is not None:
+            self._check_order(np.asarray(self.lower), np.asarray(self.upper))
         check_mu(self.mu, self.name)
         if as_whole(self.power, f"cost '{self.name}': power", 2, 1000) % 2:
             raise ProblemError(f"cost '{self.name}': power is {self.power}, expected 2, 4, 6, …")
@@ -220,28 +219,40 @@ class JointLimitDistance(Cost):
     def gradient(self, samples: Samples) -> Partials:
         """See `Cost.gradient`."""
         relative = self._relative(samples) ** (self.power - 1)
-        return Partials(q=self.mu * self.power * relative * self._scale[1])
+        return Partials(q=self.mu * self.power * relative * self._scale(samples.follows.robot)[1])
 
     def check(self, follows: Follows) -> None:
         """See `Cost.check`."""
         robot = follows.robot
         check_mu(self.mu, self.name)
-        if np.asarray(self.lower).shape != (robot.dof,):
+        for limits in self._range(robot):
+            if limits.shape != (robot.dof,):
+                raise ProblemError(
+                    f"cost '{self.name}': limits for {limits.shape} joints, expected ({robot.dof},)"
+                )
+        self._check_order(*self._range(robot))
+
+    def _check_order(self, lower: Array, upper: Array) -> None:
+        if lower.shape != upper.shape or not np.all(lower < upper):
             raise ProblemError(
-                f"cost '{self.name}': limits for {np.asarray(self.lower).shape} joints, "
-                f"expected ({robot.dof},)"
+                f"cost '{self.name}': lower {shown(lower)} is not below upper {shown(upper)}"
             )
 
-    @property
-    def _scale(self) -> tuple[Array, Array]:
+    def _range(self, robot: RobotModel) -> tuple[Array, Array]:
+        """Return the limits, those of the URDF where none are given."""
+        lower = robot.lower if self.lower is None else np.asarray(self.lower)
+        upper = robot.upper if self.upper is None else np.asarray(self.upper)
+        return lower, upper
+
+    def _scale(self, robot: RobotModel) -> tuple[Array, Array]:
         """Middle of the range, and 1/h (0 without limits)."""
-        lower, upper = np.asarray(self.lower), np.asarray(self.upper)
+        lower, upper = self._range(robot)
         limited = np.isfinite(lower) & np.isfinite(upper)
         lower, upper = np.where(limited, lower, -1.0), np.where(limited, upper, 1.0)
         return 0.5 * (lower + upper), np.where(limited, 2.0 / (upper - lower), 0.0)
 
     def _relative(self, samples: Samples) -> Array:
-        middle, inverse = self._scale
+        middle, inverse = self._scale(samples.follows.robot)
         return (samples.q - middle) * inverse
 
 

@@ -9,15 +9,15 @@ from selfmotion.formats.documents import (
     write_document as write_document,
 )
 from selfmotion.formats.example import example_text as example_text
+from selfmotion.formats.job import Job as Job
 from selfmotion.formats.joint_limits import read_joint_limits as read_joint_limits
+from selfmotion.formats.motion_parts import read_parts as read_parts, write_parts as write_parts
 from selfmotion.formats.motions import (
     FORMS as FORMS,
     READABLE as READABLE,
     SUFFIXES as SUFFIXES,
     read_motion as read_motion,
-    read_parts as read_parts,
     write_motion as write_motion,
-    write_parts as write_parts,
 )
 from selfmotion.formats.overrides import (
     grid_documents as grid_documents,
@@ -27,7 +27,6 @@ from selfmotion.formats.overrides import (
 from selfmotion.formats.path_files import read_path as read_path
 from selfmotion.formats.poses import pose_of as pose_of
 from selfmotion.formats.problem_file import (
-    Job as Job,
     job_of as job_of,
     read_job as read_job,
     read_problem as read_problem,
@@ -35,6 +34,11 @@ from selfmotion.formats.problem_file import (
 from selfmotion.formats.problem_parts import obstacle as obstacle
 from selfmotion.formats.problem_writing import (
     write_problem as write_problem,
+)
+from selfmotion.formats.program_files import PROGRAMS as PROGRAMS, program_miss as program_miss
+from selfmotion.formats.program_settings import (
+    ProgramSettings as ProgramSettings,
+    read_program_settings as read_program_settings,
 )
 from selfmotion.formats.samples import LinearMiss as LinearMiss, linear_miss as linear_miss
 from selfmotion.formats.seam_job import SeamJob as SeamJob, read_seam_job as read_seam_job

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from selfmotion.basics import FileFormatError
-from selfmotion.formats.models import document_model
+from selfmotion.formats.models import document_model, path_model
 
 _SECTIONS = ("path", "null_motion")
 
@@ -32,7 +32,34 @@ def checked(document: Mapping[str, Any]) -> dict[str, Any]:
         found = document_model().model_validate(raw)
     except ValidationError as error:
         raise FileFormatError(_message(error, raw)) from error
-    return {**_given(found), **switched}
+    table = {**_given(found), **switched}
+    table["path"] = _inner(table["path"], "path")
+    for k, item in enumerate(table.get("also", [])):
+        if "path" in item:
+            item["path"] = _inner(item["path"], f"also[{k}].path")
+    return table
+
+
+def _inner(path: dict[str, Any], where: str) -> dict[str, Any]:
+    """Return the table of a tool motion, those that it is made of checked like itself."""
+    found = dict(path)
+    if isinstance(found.get("path"), dict):
+        found["path"] = _checked_path(found["path"], f"{where}.path")
+    if "pieces" in found:
+        pieces = enumerate(found["pieces"])
+        found["pieces"] = [_checked_path(item, f"{where}.pieces[{k}]") for k, item in pieces]
+    return found
+
+
+def _checked_path(given: Any, where: str) -> dict[str, Any]:
+    document = {"path": given}
+    try:
+        model = path_model().model_validate(document)
+    except ValidationError as error:
+        said = _message(error, document).removeprefix("path").removeprefix(": ")
+        mark = ": " if not said.startswith(".") else ""
+        raise FileFormatError(f"{where}{mark}{said}") from error
+    return _inner(_given(model)["path"], where)
 
 
 def _given(value: Any) -> Any:

@@ -24,9 +24,8 @@ _TURNS = (
 )
 ANGLES = frozenset((*_BANDS, *_TURNS, *PER_JOINT))
 _SIZES = ("length", "radius", "size")
-LENGTHS = frozenset(
-    (*_BANDS, "amplitude", "by", "distance", "jump", "pitch", "position", "positions", *_SIZES)
-)
+_WAYS = ("amplitude", "by", "distance", "feed", "jump", "pitch", "position", "positions", "retreat")
+LENGTHS = frozenset((*_BANDS, *_WAYS, *_SIZES))
 # Tables or lists in each other; files of the trade have less than ten.
 _DEEPEST = 50
 _SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}

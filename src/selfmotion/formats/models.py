@@ -34,6 +34,7 @@ from selfmotion.formats.field_types import (
     Text,
     Whole,
 )
+from selfmotion.formats.job import GOALS
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.formats.problem_parts import FEED_BOUNDS
 from selfmotion.motion import NullMotion
@@ -42,8 +43,6 @@ from selfmotion.path import Path, TimeLaw
 from selfmotion.planning import Search
 from selfmotion.task import SE3, Damping, Relaxation, Task
 
-# What is looked for: the motion that is best by its costs, or the fastest one.
-GOALS = ("best", "fastest")
 # Kinds that no file names: what is missing of a plan, a cost that damping adds, functions (which
 # are named by module:attribute).
 _NOT_IN_FILES = {"LostCost", "OffPath", "FunctionCost"}
@@ -53,7 +52,7 @@ _PLAIN = {bool: Flag, int: Whole, float: Number, str: Text, SE3: Pose}
 _Fields = dict[str, tuple[Any, Any]]
 # Where a file says more, or says it otherwise, than the class's own signature.
 _LAWS: Any = Literal[tuple(law.value for law in TimeLaw)]
-_SHAPE: _Fields = {"frame": (Pose, None)}
+_SHAPE: _Fields = {"frame": (Pose, None), "leads": (Table, None)}
 _BOUNDS: _Fields = dict.fromkeys(FEED_BOUNDS, (Number, None))
 _WOVEN: _Fields = {"weave": (Table, None)}
 _PACED: _Fields = {
@@ -74,8 +73,9 @@ _OWN: Mapping[str, _Fields] = {
     "retimed": {"path": (Table, ...)},
     "section": {"path": (Table, ...)},
     "feed": {"path": (Table, ...), "stretches": (list[Numbers], None), **_SHAPE},
-    "joined": {"pieces": (list[Table], ...)},
-    "placed": {"path": (Table, ...)},
+    "joined": {"pieces": (list[Table], ...), **_SHAPE},
+    "dwell": {"at": (Pose, ...)},
+    "placed": {"path": (Table, ...), "frame": (Pose, ...)},
     "reversed": {"path": (Table, ...)},
     "weave": {"path": (Table, ...), **_SHAPE},
     "Relaxation": {"rows": (Names, ...), "during": (Numbers, None)},
@@ -102,14 +102,23 @@ _FOLLOW: _Fields = {
     **dict.fromkeys(("tool", "reference"), (Text, None)),
     "pose": (Pose, None),
 }
+# How a motion in parts leaves and meets the path; its other settings are the problem's.
+_IN_PARTS: _Fields = {"retreat": (Number, 0.0), "ramp": (Number, 0.5), "axis": (Numbers, None)}
+# What paths and bodies are placed with.
+_WORKPIECE: _Fields = {
+    "frame": (Pose, None),
+    **dict.fromkeys(("on", "mesh"), (Text, None)),
+    "scale": (Number, None),
+}
 # A tool motion from a file of poses.
 _PATH_FILE: _Fields = {
     "kind": (Literal["file"], ...),
     "file": (Text, ...),
-    "frame": (Pose, None),
+    **_SHAPE,
     **dict.fromkeys(("feed", "duration", "jump", "ramp"), (Number, None)),
     **dict.fromkeys(("tolerance", "corner_angle"), (Number, None)),
     "corners": (Text, None),
+    "seam": (Text, None),
     **_BOUNDS,
     **_WOVEN,
 }
@@ -128,17 +137,31 @@ def document_model() -> type[BaseModel]:
     return _document_model((*known, *(cls for _, cls in obstacle_shapes())))
 
 
+def path_model() -> type[BaseModel]:
+    """Return the model of a table whose ``path`` is a tool motion."""
+    return _path_model(tuple(Path.kinds().values()))
+
+
+@lru_cache(maxsize=1)
+def _path_model(known: tuple[type, ...]) -> type[BaseModel]:
+    return _model("Inner", {"path": (_tool_motion(), ...)})
+
+
+def _tool_motion() -> Any:
+    """Return the type of a tool motion."""
+    return _one_of({**_kinds(Path), "file": _model("file", _PATH_FILE)}.values(), "kind")
+
+
 @lru_cache(maxsize=1)
 def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
     # Made anew where a class has come to be known: it takes a tenth of a second.
     clearance = model_of(Clearance, None, _clearance_fields())
     constraints = {**_kinds(Constraint), "Clearance": _clearance_model()}
-    paths = {**_kinds(Path), "file": _model("file", _PATH_FILE)}
     costs = {**_kinds(Cost), FUNCTION: _model(FUNCTION, _FUNCTION)}
     parts: Any = dict[str, _model("RobotPart", _PART)]  # type: ignore[misc]
     of_robot: _Fields = {"parts": (parts, None), "bodies": (_shapes(), None)}
     tasks: Any = Literal[tuple(task.value for task in Task)]
-    tool_motion = _one_of(paths.values(), "kind")
+    tool_motion = _tool_motion()
     follow = _model("Follow", {**_FOLLOW, "task": (tasks, "pose"), "path": (tool_motion, None)})
     fields: dict[str, Any] = {
         "robot": (_model("Robot", {**_ROBOT, **of_robot}), ...),
@@ -151,10 +174,12 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
         "constraints": (list[_one_of(constraints.values(), "kind")], None),  # type: ignore[misc]
         "relaxations": (list[model_of(Relaxation)], None),  # type: ignore[misc]
         "collision": (clearance, None),
+        "workpiece": (_model("Workpiece", {**_WORKPIECE, "obstacles": (_shapes(), None)}), None),
         "damping": (model_of(Damping), None),
         "rest": (bool, True),
         "joint_limits": (Text, None),
         "goal": (Literal[GOALS], None),
+        "parts": (_model("InParts", _IN_PARTS), None),
         "search": (model_of(Search), None),
         "optimiser": (model_of(QuasiNewton), None),
         "tolerance": (model_of(Tolerance), None),

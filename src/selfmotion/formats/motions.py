@@ -10,7 +10,9 @@ import numpy as np
 
 from selfmotion.basics import (
     FileFormatError,
+    PlanError,
     ProblemError,
+    as_flag,
     as_path,
     read_arrays,
     shown,
@@ -19,8 +21,11 @@ from selfmotion.basics import (
     write_text,
 )
 from selfmotion.formats import ros
+from selfmotion.formats.controller_program import check_signals
 from selfmotion.formats.documents import read_document, write_document
 from selfmotion.formats.mujoco import keyframes
+from selfmotion.formats.program_files import PROGRAMS, read_program, write_program
+from selfmotion.formats.program_settings import ProgramSettings
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.formats.urscript import script
 from selfmotion.job import Program
@@ -35,6 +40,8 @@ def write_motion(
     *,
     rate: float | None = None,
     form: str | None = None,
+    settings: ProgramSettings | None = None,
+    force: bool = False,
 ) -> None:
     """Write the motion of a plan, parts, a move or a program as others read it; atomically.
 
@@ -48,6 +55,8 @@ def write_motion(
     ``moveit``              ``moveit_msgs/RobotTrajectory``
     ``mujoco``    .xml      keyframes, to include in an MJCF model made from the same URDF
     ``urscript``  .script   a stream of ``servoj``, its settings in the head
+    ``krl``       .src      KUKA: axis targets with their times in spline blocks
+    ``rapid``     .mod      ABB: axis targets with their times, rounded corners
     ============  ========  ==================================================================
 
     Parameters
@@ -58,6 +67,12 @@ def write_motion(
         Samples per second; by default those of the plan (URScript: 125).
     form : str, optional
         By default the one that has the file's suffix.
+    settings : ProgramSettings, optional
+        Of a controller's program (``urscript``, ``krl``, ``rapid``): axes, outputs, tool, load,
+        approach. Of ``krl`` and ``rapid`` it also bounds how far the controller, which passes
+        targets, may be off the motion; there are as many as that takes, and a `rate` has no effect.
+    force : bool
+        Whether a motion that is not verified is written all the same.
 
     Raises
     ------
@@ -66,95 +81,71 @@ def write_motion(
     ProblemError
         The rate gives no samples, or the arm has what the format cannot say.
     PlanError
-        A move was not found.
+        It is not verified, or a move was not found.
     """
     if not isinstance(plan, Plan | Parts | Move | Program):
         raise ProblemError(f"plan is {shown(plan)}, expected a Plan, Parts, a Move or a Program")
+    if not (settings is None or isinstance(settings, ProgramSettings)):
+        raise ProblemError(f"settings are {shown(settings)}, expected ProgramSettings")
+    path = as_path(file)
+    name = form_of(path, form)
+    check_verified(plan, path, as_flag(force, "force"))
+    if name in PROGRAMS.values():
+        if rate is not None:
+            raise ProblemError(f"{path}: rate has no effect: targets are as many as it takes")
+        write_program(plan, path, name, settings or ProgramSettings())
+        return
+    if name == "urscript":
+        _write_stream(path, plan, STREAM if rate is None else rate, settings or ProgramSettings())
+        return
     motion = plan.motion if isinstance(plan, Move) else plan.trajectory
-    path = as_path(file)
-    write, rate = _writer(path, rate, form)
-    write(path, MotionSamples.of(motion, rate), plan.robot, rate)
+    WRITERS[name](path, MotionSamples.of(motion, rate), plan.robot, rate)
 
 
-def write_parts(
-    plan: Plan, file: str | Path, *, rate: float | None = None, form: str | None = None
-) -> dict[str, Path]:
-    """Write the motion of a cell in a file for each part: part → file.
-
-    Of ``motion.yaml`` they are called ``motion.PART.yaml``. All have the same times, and each the
-    names that its joints have in the part's own robot. Parameters as in `write_motion`, which
-    writes all joints into one file.
-
-    Raises
-    ------
-    FileFormatError
-        The form is unknown, or a file cannot be written.
-    ProblemError
-        The robot has no parts, the rate gives no samples, or a part has what the format cannot say.
-    """
-    if not isinstance(plan, Plan):
-        raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
-    names = plan.robot.joint_names
-    alone = [name for name in names if "/" not in name]
-    if alone:
-        raise ProblemError(
-            f"{plan.robot.name}: joint '{alone[0]}' is of no part; only a cell of several robots "
-            f"is written part by part"
+def check_verified(plan: Plan | Parts | Move | Program, file: Path, force: bool) -> None:
+    """Raise PlanError for a motion that is not verified, unless it is forced."""
+    if isinstance(plan, Plan):
+        sound, verdict = plan.certificate.verified and not plan.altered, plan.certificate.verdict
+        verdict = plan.altered or verdict
+    else:
+        sound, verdict = plan.verified, plan.verdict
+    if not (sound or force):
+        raise PlanError(
+            f"{file}: is not written: {verdict}; give force=True to write it all the same"
         )
-    path = as_path(file)
-    write, rate = _writer(path, rate, form)
-    samples, written = MotionSamples.of(plan.trajectory, rate), {}
-    for part in dict.fromkeys(name.partition("/")[0] for name in names):
-        written[part] = path.with_name(f"{path.stem}.{part}{path.suffix}")
-        write(written[part], samples.of_part(part), plan.robot, rate)
-    return written
 
 
-def read_parts(files: Mapping[str, str | Path]) -> Trajectory:
-    """Read the motion of a cell from a file for each part, as `write_parts` returns them.
-
-    Raises
-    ------
-    FileFormatError
-        A file cannot be read, is no motion, or has other times than the first.
-    """
-    motions = {part: read_motion(file) for part, file in files.items()}
-    if not motions:
-        raise FileFormatError("there is no file of a part, expected part → file")
-    first, one = next(iter(motions.items()))
-    for part, motion in motions.items():
-        if not np.array_equal(motion.t, one.t):
-            raise FileFormatError(
-                f"{files[part]}: has {len(motion.t)} samples over {motion.duration:.6g} s, at "
-                f"other times than {files[first]} with {len(one.t)} over {one.duration:.6g} s: "
-                f"parts that move together are written together"
-            )
-    several = list(motions.values())
-    known = [motion.qdd for motion in several if motion.qdd is not None]
-    return Trajectory(
-        one.t,
-        np.hstack([motion.q for motion in several]),
-        np.hstack([motion.qd for motion in several]),
-        tuple(f"{part}/{name}" for part, motion in motions.items() for name in motion.joint_names),
-        np.hstack(known) if len(known) == len(several) else None,
-    )
-
-
-def _writer(path: Path, rate: float | None, form: str | None) -> tuple["_Writer", float | None]:
-    """Return what writes a file, and at which rate."""
+def form_of(path: Path, form: str | None) -> str:
+    """Return the form of a file."""
     name = SUFFIXES.get(path.suffix) if form is None else form
-    if name is None or name not in _WRITERS:
+    if name is None or name not in FORMS:
         known = ", ".join(f"{form} ({suffix})" for suffix, form in SUFFIXES.items())
         found = f"suffix '{path.suffix}'" if form is None else f"form '{form}'"
         raise FileFormatError(f"{path}: {found} is no format of motions: {known}, moveit")
-    return _WRITERS[name], 125.0 if name == "urscript" and rate is None else rate
+    return name
 
 
 def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
-    """Read a motion that `write_motion`, or something else, wrote: csv, npz, json, ros, moveit.
+    r"""Read a motion that `write_motion`, or something else, wrote: csv, npz, json, ros, moveit.
 
     With accelerations where the file has them; see `Trajectory`. With `degrees` all coordinates are
     taken for angles in degrees, in any format.
+
+    Of controllers' programs (``.src``, ``.mod``) those statements are read that `write_motion`
+    writes, with other numbers, spaces and names: any other line is refused, by its number.
+
+    ======  ======================================================================================
+    KRL     ``DEF``, ``END``, comments, ``BAS``, ``$BASE``, ``$TOOL``, ``$LOAD``, ``$OUT[n]``,
+            ``PTP {A1 …}``, ``PTP_SPLINE``, ``SPTP {A1 …}``, ``TIME_BLOCK`` with a ``PART`` for
+            each target, ``TRIGGER WHEN PATH = 0 DELAY = 0 DO $OUT[n]``, ``ENDSPLINE``,
+            ``WAIT SEC``
+    RAPID   ``MODULE``, ``PROC`` without parameters, comments, ``tooldata``, ``speeddata``,
+            ``MoveAbsJ [[…], […]]\NoEOffs`` with ``\T``, ``fine`` or a zone ``z…``, ``SetDO``,
+            ``WaitTime``
+    ======  ======================================================================================
+
+    The motion is the cubic spline through their targets, from rest to rest. Comments ``axes: A1 =
+    joint [deg], …``, as they are written, name the joints and say which of them slide.
 
     Raises
     ------
@@ -162,6 +153,10 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
         The file cannot be read, or is no motion; what is missing is named.
     """
     path = as_path(file)
+    if path.suffix.lower() in PROGRAMS:
+        if degrees:
+            raise FileFormatError(f"{path}: is in degrees by itself; drop degrees")
+        return _of_program(path)
     if path.suffix == ".csv":
         return Trajectory.from_csv(path, degrees=degrees)
     if path.suffix == ".npz":
@@ -169,6 +164,15 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
     document = read_document(path)
     read = _of_tables if "t" in document else ros.trajectory
     return _in_radians(read(path, document), degrees)
+
+
+def _of_program(path: Path) -> Trajectory:
+    program = read_program(path)
+    try:
+        return program.trajectory
+    # Numbers that no controller holds make splines that none follows.
+    except (ArithmeticError, ValueError, FileFormatError) as error:
+        raise FileFormatError(f"{path}: its targets are no motion: {error}") from error
 
 
 def _in_radians(motion: Trajectory, degrees: bool) -> Trajectory:
@@ -221,7 +225,19 @@ def _write_mujoco(file: Path, motion: MotionSamples, robot: RobotModel, rate: fl
 def _write_urscript(
     file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None
 ) -> None:
-    write_text(file, script(robot, motion.robot_joints, motion.q, rate or 125.0))
+    write_text(file, script(robot, motion.robot_joints, motion.q, rate or STREAM))
+
+
+def _write_stream(
+    file: Path, plan: Plan | Parts | Move | Program, rate: float, settings: ProgramSettings
+) -> None:
+    """Write URScript with all that is to be said besides the motion."""
+    motion = MotionSamples.of(plan.motion if isinstance(plan, Move) else plan.trajectory, rate)
+    happens = plan.events if isinstance(plan, Program) else ()
+    check_signals({event: seam for _, seam, event in happens}, settings)
+    events = [(int(np.searchsorted(motion.t, at - 1e-9)), event) for at, _, event in happens]
+    joints, q = motion.robot_joints, motion.q
+    write_text(file, script(plan.robot, joints, q, rate, settings, events))
 
 
 def _read_npz(file: Path) -> Trajectory:
@@ -239,8 +255,10 @@ def _of_tables(file: Path, tables: Mapping[str, Any]) -> Trajectory:
         raise FileFormatError(f"{file}: {error}") from error
 
 
+# Samples per second of a stream to an arm of Universal Robots.
+STREAM = 125.0
 _Writer = Callable[[Path, MotionSamples, RobotModel, float | None], None]
-_WRITERS: Mapping[str, _Writer] = {
+WRITERS: Mapping[str, _Writer] = {
     "csv": _write_csv,
     "npz": _write_npz,
     "json": _write_json,
@@ -257,7 +275,8 @@ SUFFIXES = {
     ".yml": "ros",
     ".xml": "mujoco",
     ".script": "urscript",
+    **PROGRAMS,
 }
-FORMS = tuple(_WRITERS)
+FORMS = (*WRITERS, *PROGRAMS.values())
 # Those that say all that a check needs.
 READABLE = ("csv", "npz", "json", "ros", "moveit")

@@ -1,34 +1,21 @@
-"""Tool motions from files: tables, arrays, and what ROS writes."""
+"""Tool motions from files: tables, arrays, what ROS writes, and programs of machine tools."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
+from typing import Any
 
-import numpy as np
-
-from selfmotion.basics import (
-    Array,
-    FileFormatError,
-    PathError,
-    as_choice,
-    as_number,
-    as_path,
-)
+from selfmotion.basics import FileFormatError, as_number, as_path, nearest
+from selfmotion.formats.cldata import read_cldata
+from selfmotion.formats.gcode import read_gcode
+from selfmotion.formats.path_building import JUMP, Pacing, path_of_rows
 from selfmotion.formats.path_rows import READERS, PoseRows
-from selfmotion.formats.poses import ORIENTATIONS
-from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints
+from selfmotion.path import Path
 
-# A coordinate beyond this [m] can only be meant in millimetres.
-_FAR = 50.0
-# An angle beyond this [rad] can only be meant in degrees.
-_ROUND = 2.0 * np.pi + 1e-6
-# Poses farther from their predecessor than this [m] are a jump, unless another length is given.
-_JUMP = 0.5
-# Rotations by more than this [rad] are a jump, too: their direction would be a guess.
-_FLIP = 2.6
-# Times this near [s] are the same.
-_MOMENT = 1e-9
-# Legs that bend by more than this [rad] make a corner, unless another angle is given.
-_BEND = np.pi / 6
+_MACHINES = {
+    **dict.fromkeys((".nc", ".ngc", ".gcode", ".tap"), read_gcode),
+    **dict.fromkeys((".apt", ".cls", ".cl"), read_cldata),
+}
+_READERS: Mapping[str, Callable[[FilePath], Mapping[str, PoseRows]]] = {**READERS, **_MACHINES}
 
 
 def read_path(
@@ -36,7 +23,7 @@ def read_path(
     *,
     feed: float | None = None,
     duration: float | None = None,
-    jump: float = _JUMP,
+    jump: float = JUMP,
     corners: str = "blend",
     tolerance: float = 1e-3,
     corner_angle: float | None = None,
@@ -45,6 +32,7 @@ def read_path(
     turn_acceleration: float | None = None,
     smoothing: float | None = None,
     within: float | None = None,
+    seam: str | None = None,
 ) -> Path:
     """Read a tool motion through poses.
 
@@ -53,11 +41,35 @@ def read_path(
                     ``qw,qx,qy,qz``, ``rx,ry,rz`` (rotation vector [rad]),
                     ``roll,pitch,yaw`` [rad], ``nx,ny,nz`` (the tool's z axis) or
                     none; ``feed`` [m/s] from a pose on, instead of ``t``; ``x_mm``,
-                    ``feed_mm`` and ``roll_deg`` are in those units
+                    ``feed_mm`` and ``roll_deg`` are in those units; ``seam`` names
+                    the seam that a pose is of, ``event`` what happens there
     .npy            (N, 4, 4) poses, or a table (N, 3) x,y,z; (N, 4) t,x,y,z;
                     (N, 7) x,y,z,qw,qx,qy,qz; (N, 8) with t first
     .yaml .json     ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``
+    .nc .ngc        G-code of up to five axes, below
+    .gcode .tap
+    .apt .cls .cl   APT, cutter location data, below
     ==============  =================================================================
+
+    Of programs of machine tools, what goes at a feed is a cut; rapids part cuts, called ``cut 1``,
+    ``cut 2``, …. Legs are straight, their corners rounded within `tolerance`, and the tool rests
+    where it goes back on itself. Positions are those of the tip. The tool's z axis points into the
+    part, against the axis of the machine: down where the file has none. About it the tool turns as
+    little as may be.
+
+    ======  ==================================================================================
+    G-code  ``G0 G1 G2 G3 G17 G20 G21 G90 G91 G94``, ``X Y Z`` in mm unless ``G20``, ``F`` by the
+            minute; the tool's axis by ``A B C``, Rz(C) Ry(B) Rx(A) z as of heads that turn, or by
+            ``I J K`` in lines. Arcs lie in the plane of X and Y, by ``I J`` from the start or
+            ``R``, as chords within 0.01 mm. ``M2 M30`` end it, other ``M`` are events; ``G40 G43.4
+            G43.5 G49 G54 G61 G64 G69 G80 G91.1``, ``N O S T H D``, ``%`` and comments are passed
+            over
+    APT     ``GOTO FROM GODLTA RAPID FEDRAT UNITS``, with ``i,j,k`` the tool's axis, feeds by the
+            minute (``MMPM``, ``IPM``); ``SPINDL COOLNT AUXFUN ARCON ARCOFF`` are events; names, the
+            cutter's shape and number (``LOADTL``, …) are passed over; ``FINI`` ends it
+    ======  ==================================================================================
+
+    Any other word or statement is refused, by its line.
 
     Parameters
     ----------
@@ -77,6 +89,8 @@ def read_path(
         As in `Waypoints`.
     turn_rate, acceleration, turn_acceleration, smoothing, within : float, optional
         Bounds of a feed, as in `Feed`.
+    seam : str, optional
+        Which of several seams or cuts of the file.
 
     Raises
     ------
@@ -85,172 +99,75 @@ def read_path(
         do not increase, a jump, other units. The line or pose is named.
     """
     path = as_path(file)
-    jump = as_number(jump, f"{path}: jump", above=0.0, error=FileFormatError)
-    for name, value in (("feed", feed), ("duration", duration)):
+    asked = _pacing(
+        path,
+        {
+            "feed": feed,
+            "duration": duration,
+            "jump": jump,
+            "corners": corners,
+            "tolerance": tolerance,
+            "corner_angle": corner_angle,
+            "turn_rate": turn_rate,
+            "acceleration": acceleration,
+            "turn_acceleration": turn_acceleration,
+            "smoothing": smoothing,
+            "within": within,
+        },
+    )
+    return path_of_rows(path, _one(path, seam), asked)
+
+
+def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Path, PoseRows]]:
+    """Read all seams or cuts of a file: name → its motion, and the rows that it is of.
+
+    Options are those of `read_path`.
+
+    Raises
+    ------
+    FileFormatError
+        As by `read_path`, or the file names no seams.
+    """
+    seams = _read(file)
+    if "" in seams:
+        raise FileFormatError(
+            f"{file}: has no column 'seam', expected one that names the seam of each row"
+        )
+    asked = _pacing(file, options)
+    return {name: (path_of_rows(file, rows, asked), rows) for name, rows in seams.items()}
+
+
+def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
+    asked = Pacing(**options)
+    as_number(asked.jump, f"{path}: jump", above=0.0, error=FileFormatError)
+    for name, value in (("feed", asked.feed), ("duration", asked.duration)):
         if value is not None:
             as_number(value, f"{path}: {name}", above=0.0, error=FileFormatError)
-    reader = READERS.get(path.suffix)
+    return asked
+
+
+def _read(path: FilePath) -> Mapping[str, PoseRows]:
+    reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise FileFormatError(
-            f"{path}: has suffix '{path.suffix}', expected one of {', '.join(READERS)}"
+            f"{path}: has suffix '{path.suffix}', expected one of {', '.join(_READERS)}"
         )
-    rows = reader(path)
-    if len(rows.positions) < 2:
-        raise FileFormatError(f"{path}: has {len(rows.positions)} poses, expected at least two")
-    _check_rows(path, rows)
-    rotations = _rotations(path, rows)
-    _check_jumps(path, rows, rotations, jump)
-    turns = _quaternions(rotations) if rows.orientation else None
-    t = _times(path, rows, feed, duration)
-    asked = {
-        "turn_rate": turn_rate,
-        "acceleration": acceleration,
-        "turn_acceleration": turn_acceleration,
-        "smoothing": smoothing,
-        "within": within,
-    }
-    bounds = {name: value for name, value in asked.items() if value is not None}
-    feeds = rows.feed if feed is None else np.full(len(rows.positions), feed)
-    if bounds and feeds is None:
-        raise FileFormatError(f"{path}: {next(iter(bounds))} has no effect without a feed")
-    try:
-        as_choice(corners, "corners", ("blend", "stop", "round"), PathError)
-        if corners == "round":
-            if feeds is None:
-                raise PathError("corners are 'round', which needs a feed [m/s]; give it")
-            legs = Polyline(rows.positions, turns, tolerance=tolerance)
-            return _at_feed(legs, legs.pose_times, feeds, bounds)
-        bend = _BEND if corner_angle is None else corner_angle
-        through = Waypoints(t, rows.positions, turns, corners=corners, corner_angle=bend)
-        through.samples([0.0])
-        if feeds is None:
-            return through
-        pieces: list[Path] = []
-        passed = t - t[0]
-        for piece in through.between_corners():
-            # From one rest to the next.
-            here = (passed >= -_MOMENT) & (passed <= piece.duration + _MOMENT)
-            pieces.append(_at_feed(piece, passed[here], feeds[here], bounds))
-            passed = passed - piece.duration
-        return pieces[0] if len(pieces) == 1 else Joined(pieces)
-    # Splines refuse times that differ, but by less than they can divide by.
-    except (PathError, ValueError) as error:
-        raise FileFormatError(f"{path}: {error}") from error
+    return reader(path)
 
 
-def _at_feed(path: Path, t: Array, feeds: Array, bounds: Mapping[str, float]) -> Feed:
-    """Return a path at the feeds (N,) that begin at its times (N,); the last one has no way."""
-    changes = 1 + np.flatnonzero(np.diff(feeds[:-1]))
-    stretches = np.stack([t[changes], feeds[changes]], axis=1) if len(changes) else None
-    return Feed(path, float(feeds[0]), stretches=stretches, **bounds)
-
-
-def _check_rows(file: FilePath, rows: PoseRows) -> None:
-    parts = [("position", rows.positions), (rows.orientation, rows.values)]
-    if rows.t is not None:
-        parts.append(("time", rows.t[:, None]))
-    for what, values in parts:
-        flat = values.reshape(len(values), -1)
-        bad = np.flatnonzero(~np.all(np.isfinite(flat), axis=1))
-        if bad.size:
-            place = rows.places[int(bad[0])]
-            raise FileFormatError(f"{file}: {place}: the {what} is not finite; mend or drop it")
-    for what, values, bound, remedy in (
-        ("position", rows.positions, _FAR, "metres; say x_mm,y_mm,z_mm if it is millimetres"),
-        ("angle", rows.values, _ROUND, "radians; say roll_deg,… or rx_deg,… if it is degrees"),
-    ):
-        if what == "angle" and rows.orientation not in ("rpy", "rotation_vector"):
-            continue
-        far = np.argwhere(np.abs(values) > bound)
-        if len(far):
-            row, column = far[0]
-            found = f"{what} {values[row, column]:.6g}"
-            raise FileFormatError(f"{file}: {rows.places[row]}: {found} is taken for {remedy}")
-    if rows.t is not None:
-        late = np.flatnonzero(np.diff(rows.t) <= 0.0)
-        if late.size:
-            row = int(late[0]) + 1
-            raise FileFormatError(
-                f"{file}: {rows.places[row]}: time {rows.t[row]:.6g} s does not come after "
-                f"{rows.t[row - 1]:.6g} s; times must increase"
-            )
-
-
-def _rotations(file: FilePath, rows: PoseRows) -> Array:
-    if not rows.orientation:
-        return np.tile(np.eye(3), (len(rows.positions), 1, 1))
-    _, rotation = ORIENTATIONS[rows.orientation]
-    found = []
-    for place, values in zip(rows.places, rows.values, strict=True):
-        try:
-            found.append(rotation(values))
-        except (ValueError, PathError) as error:
-            raise FileFormatError(f"{file}: {place}: {error}") from error
-    return np.array(found)
-
-
-def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) -> None:
-    steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
-    cosines = np.einsum("kij,kij->k", rotations[:-1], rotations[1:])
-    turns = np.arccos(np.clip(0.5 * (cosines - 1.0), -1.0, 1.0))
-    for what, amounts, bound, unit, remedy in (
-        ("jumps by", steps, jump, "m", _remedy(jump)),
-        ("turns by", turns, _FLIP, "rad", "which has no clear direction; add poses between"),
-    ):
-        far = np.flatnonzero(amounts > bound)
-        if far.size:
-            row = int(far[0]) + 1
-            raise FileFormatError(
-                f"{file}: {rows.places[row]}: the path {what} {amounts[row - 1]:.4g} {unit} from "
-                f"the pose before, {remedy}"
-            )
-
-
-def _remedy(jump: float) -> str:
-    return (
-        f"more than {jump:g} m; give a larger jump if it is meant, or name the columns x_mm,… if "
-        f"they are millimetres"
-    )
-
-
-def _times(file: FilePath, rows: PoseRows, feed: float | None, duration: float | None) -> Array:
-    given = {"feed": feed, "duration": duration}
-    named = [name for name, value in given.items() if value is not None]
-    columns = [name for name, own in (("t", rows.t), ("feed", rows.feed)) if own is not None]
-    if len(columns) > 1:
-        raise FileFormatError(f"{file}: has times and a column feed; keep one of them")
-    if columns and named:
-        what = "times" if rows.t is not None else "a column feed"
-        raise FileFormatError(f"{file}: has {what}, so that {named[0]} has no effect; drop one")
-    if rows.t is not None:
-        return rows.t
-    if rows.feed is not None:
-        bad = np.flatnonzero(~(rows.feed > 0.0) | ~np.isfinite(rows.feed))
-        if bad.size:
-            row = int(bad[0])
-            raise FileFormatError(
-                f"{file}: {rows.places[row]}: feed is {rows.feed[row]:.6g} m/s, expected a number "
-                f"above 0"
-            )
-    elif len(named) != 1:
+def _one(path: FilePath, seam: str | None) -> PoseRows:
+    """Return the rows of one seam of a file."""
+    seams = _read(path)
+    if seam is None and len(seams) == 1:
+        return next(iter(seams.values()))
+    if seam is not None and seam in seams:
+        return seams[seam]
+    names = [name for name in seams if name]
+    if seam is None:
         raise FileFormatError(
-            f"{file}: has no times; give either a feed [m/s] or a duration [s]"
-            + (", not both" if named else "")
+            f"{path}: has {len(seams)} seams or cuts, {names[0]} to {names[-1]}: choose one by "
+            f"seam = '{names[0]}', or plan all of them as a job, with [seams] and this file"
         )
-    steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
-    still = np.flatnonzero(steps == 0.0)
-    if still.size:
-        raise FileFormatError(
-            f"{file}: {rows.places[int(still[0]) + 1]}: the tool does not move from the pose "
-            f"before, which takes no time by feed or duration; give a column t"
-        )
-    if rows.feed is not None:
-        return np.append(0.0, np.cumsum(steps / rows.feed[:-1]))
-    length = np.append(0.0, np.cumsum(steps))
-    return length / feed if feed is not None else length * (float(duration or 0.0) / length[-1])
-
-
-def _quaternions(rotations: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(rotations).as_quat(scalar_first=True))
+    if not names:
+        raise FileFormatError(f"{path}: names no seams, so that seam has no effect; drop it")
+    raise FileFormatError(f"{path}: has no seam '{seam}'{nearest(seam, names)}")

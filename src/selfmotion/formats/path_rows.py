@@ -27,6 +27,8 @@ _COLUMNS: Mapping[tuple[str, ...], str] = {
 }
 
 
+# Columns of texts: which seam a row is of, and what happens at it.
+SEAM, EVENT = "seam", "event"
 _KNOWN = {"t", "feed", *_POSITION, *(name for names in _COLUMNS for name in names)}
 
 
@@ -52,6 +54,10 @@ class PoseRows:
     t : (N,) or None
     feed : (N,) or None
         From each pose on [m/s].
+    events : tuple of (int, str)
+        At which pose what happens.
+    straight : bool
+        Whether the tool goes straight from pose to pose.
     """
 
     places: Sequence[str]
@@ -60,10 +66,46 @@ class PoseRows:
     values: Array
     t: Array | None
     feed: Array | None = None
+    events: tuple[tuple[int, str], ...] = ()
+    straight: bool = False
 
 
-def _read_table(file: FilePath) -> PoseRows:
-    header, table, lines = read_rows(file)
+def read_tables(file: FilePath) -> dict[str, PoseRows]:
+    """Return the rows of a table by the names in its column ``seam``, "" where it has none."""
+    header, table, lines, texts = read_rows(file, (SEAM, EVENT))
+    whole = _of_table(file, header, table, lines, texts.get(EVENT, [""] * len(lines)))
+    if SEAM not in texts:
+        return {"": whole}
+    names = texts[SEAM]
+    blank = next((line for line, name in zip(lines, names, strict=True) if not name), None)
+    if blank is not None:
+        raise FileFormatError(f"{file}: line {blank}: names no seam")
+    return {name: _some(whole, [k for k, other in enumerate(names) if other == name])
+            for name in dict.fromkeys(names)}  # fmt: skip
+
+
+def _some(rows: PoseRows, chosen: Sequence[int]) -> PoseRows:
+    """Return some of the rows."""
+    new = {old: k for k, old in enumerate(chosen)}
+    return PoseRows(
+        [rows.places[k] for k in chosen],
+        rows.positions[chosen],
+        rows.orientation,
+        rows.values[chosen],
+        None if rows.t is None else rows.t[chosen],
+        None if rows.feed is None else rows.feed[chosen],
+        tuple((new[k], event) for k, event in rows.events if k in new),
+        rows.straight,
+    )
+
+
+def _of_table(
+    file: FilePath,
+    header: Sequence[str],
+    table: Array,
+    lines: Sequence[int],
+    events: Sequence[str],
+) -> PoseRows:
     columns = _columns(file, header, table)
     missing = [name for name in _POSITION if name not in columns]
     if missing:
@@ -92,6 +134,7 @@ def _read_table(file: FilePath) -> PoseRows:
         values,
         columns.get("t"),
         columns.get("feed"),
+        tuple((k, event) for k, event in enumerate(events) if event),
     )
 
 
@@ -105,7 +148,7 @@ def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, A
                 name, scale = title.removesuffix(suffix), factor or np.pi / 180.0
         if name not in _KNOWN:
             raise FileFormatError(
-                f"{file}: unknown column '{title}', expected t, feed, x,y,z and "
+                f"{file}: unknown column '{title}', expected t, feed, seam, event, x,y,z and "
                 f"{' or '.join(','.join(names) for names in _COLUMNS)}"
             )
         if name in columns:
@@ -173,12 +216,12 @@ def _stamp(file: FilePath, place: str, given: Mapping[str, Any]) -> float | None
         ) from None
 
 
-READERS: Mapping[str, Callable[[FilePath], PoseRows]] = {
-    ".csv": _read_table,
-    ".txt": _read_table,
-    ".tsv": _read_table,
-    ".npy": _read_array,
-    ".yaml": _read_ros,
-    ".yml": _read_ros,
-    ".json": _read_ros,
+READERS: Mapping[str, Callable[[FilePath], Mapping[str, PoseRows]]] = {
+    ".csv": read_tables,
+    ".txt": read_tables,
+    ".tsv": read_tables,
+    ".npy": lambda file: {"": _read_array(file)},
+    ".yaml": lambda file: {"": _read_ros(file)},
+    ".yml": lambda file: {"": _read_ros(file)},
+    ".json": lambda file: {"": _read_ros(file)},
 }

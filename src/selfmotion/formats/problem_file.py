@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from selfmotion.basics import (
     Array,
@@ -22,71 +22,16 @@ from selfmotion.costs import Cost, FunctionCost
 from selfmotion.follow import Follow
 from selfmotion.formats.code import FUNCTION, name_kinds
 from selfmotion.formats.documents import PER_JOINT, in_si, read_document
+from selfmotion.formats.job import Job
 from selfmotion.formats.joint_limits import read_joint_limits
 from selfmotion.formats.problem_parts import obstacle, path_of, start_of
+from selfmotion.formats.workpiece import placed_table
 from selfmotion.motion import NullMotion
-from selfmotion.optimise import LineSearch, Optimizer, QuasiNewton
-from selfmotion.planning import Fastest, Search, fastest, plan
+from selfmotion.optimise import LineSearch, QuasiNewton
+from selfmotion.planning import Search
 from selfmotion.problem import Problem
-from selfmotion.result import Plan
 from selfmotion.robot import NAMED_ARMS, NAMED_PARTS, RobotModel, load_robot
 from selfmotion.task import Damping, Relaxation, Task
-
-if TYPE_CHECKING:
-    pass
-
-
-@dataclass(frozen=True, eq=False)
-class Job:
-    """What a problem file says: a problem, and how to plan it.
-
-    Attributes
-    ----------
-    problem : Problem
-    search : Search or None
-    optimizer : Optimizer or None
-    tolerance : Tolerance or None
-    max_evaluations : int or None
-        See `plan`.
-    outputs : tuple of Path
-        Files to write.
-    goal : {"best", "fastest"}
-        Whether `plan` looks for the motion that is best by its costs, or for the `fastest` one.
-    """
-
-    problem: Problem
-    search: Search | None = None
-    optimizer: Optimizer | None = None
-    tolerance: Tolerance | None = None
-    max_evaluations: int | None = None
-    outputs: tuple[FilePath, ...] = ()
-    goal: str = "best"
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What `plan` is given besides the problem."""
-        names = ("search", "optimizer", "tolerance", "max_evaluations")
-        return {name: getattr(self, name) for name in names}
-
-    def plan(self, **options: Any) -> Plan:
-        """Plan it; `options` are further ones of `plan`, or of `fastest` where that is the goal."""
-        if self.goal == "fastest":
-            return self.fastest(**options).plan
-        return plan(self.problem, **self.settings, **options)
-
-    def fastest(self, **options: Any) -> Fastest:
-        """Return its fastest motion; `options` are further ones of `fastest`.
-
-        Raises
-        ------
-        ProblemError
-            The file has settings of an optimiser, which `fastest` has not.
-        """
-        for name in ("optimizer", "max_evaluations"):
-            if getattr(self, name) is not None:
-                said = {"optimizer": "optimiser"}.get(name, name)
-                raise ProblemError(f"{said}: has no effect on the fastest motion; leave it out")
-        return fastest(self.problem, search=self.search, tolerance=self.tolerance, **options)
 
 
 def read_problem(file: str | FilePath, *, allow_code: bool = False) -> Problem:
@@ -132,7 +77,7 @@ def job_of(
     with _named(file, ""):
         raw = in_si(document)
         functions = name_kinds(raw, FilePath() if file is None else file.parent, allow_code)
-        table = checked(raw)
+        table = placed_table(checked(raw))
         return _Reader(
             file, table, functions, _degrees_per_joint(document), {} if memory is None else memory
         ).job()
@@ -320,7 +265,8 @@ class _Reader:
         if "max_evaluations" in table:
             found["max_evaluations"] = table["max_evaluations"]
         outputs = tuple(self._beside(name) for name in table.get("outputs", ()))
-        return {**found, "outputs": outputs, "goal": table.get("goal", "best")}
+        found |= {"outputs": outputs, "goal": table.get("goal", "best")}
+        return found | {"parts": table.get("parts", {})}
 
     def _beside(self, name: str) -> FilePath:
         return FilePath(name) if self.file is None else self.file.parent / name

@@ -16,7 +16,17 @@ from selfmotion.basics import (
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import ORIENTATIONS
-from selfmotion.path import Circle, Feed, Line, Path, Placed, Spiral, Weave, section_at_rest
+from selfmotion.path import (
+    Circle,
+    Feed,
+    Line,
+    Path,
+    Placed,
+    Spiral,
+    Weave,
+    section_at_rest,
+    with_leads,
+)
 from selfmotion.robot import NAMED_ARMS, RobotModel
 from selfmotion.task import Task
 
@@ -39,7 +49,7 @@ def path_of(
     values = dict(given)
     kind = values.get("kind")
     frame = None if kind == Placed.kind else values.pop("frame", None)
-    weave = values.pop("weave", None)
+    weave, leads = values.pop("weave", None), values.pop("leads", None)
     shape = kind in _SHAPES
     if shape and "start" not in values:
         if start is None:
@@ -71,10 +81,47 @@ def path_of(
         case "spiral":
             path = Spiral(**{key: value for key, value in values.items() if key != "kind"})
         case _:
-            path = _restored(values)
+            inner = lambda table: path_of(table, robot, start, beside)  # noqa: E731  # of this arm
+            path = _restored(_with_inner(values, inner))
     path = path if feed is None else Feed(path, feed, **bounds)
     path = path if weave is None else woven(path, weave)
+    path = path if leads is None else _with_leads(path, leads)
     return path if frame is None else Placed(path, frame)
+
+
+def _with_leads(path: Path, values: Mapping[str, Any]) -> Path:
+    _check_keys(values, "leads", ("length", "duration"), ("axis",))
+    return with_leads(path, **values)
+
+
+def woven(path: Path, values: Mapping[str, Any]) -> Path:
+    """Return a path along which the tool swings, as a file says it."""
+    _check_keys(values, "weave", ("amplitude", "pitch"), ("axis", "dwell"))
+    return Weave(path, **values)
+
+
+def _check_keys(
+    values: Mapping[str, Any], name: str, needed: Sequence[str], others: Sequence[str]
+) -> None:
+    for key in values:
+        if key not in (*needed, *others):
+            expected = ", ".join((*needed, *others))
+            raise ProblemError(f"{name}.{key}: unknown key, expected {expected}")
+    for key in needed:
+        if key not in values:
+            raise ProblemError(f"{name}.{key}: is missing")
+
+
+def _with_inner(
+    values: dict[str, Any], read: Callable[[Mapping[str, Any]], Path]
+) -> dict[str, Any]:
+    """Return the table of a path with the paths that it is made of in place of their tables."""
+    found = dict(values)
+    if "path" in found:
+        found["path"] = read(found["path"])
+    if "pieces" in found:
+        found["pieces"] = [read(item) for item in found["pieces"]]
+    return found
 
 
 def obstacle(values: Mapping[str, Any], beside: Callable[[str], FilePath]) -> Any:
@@ -112,7 +159,8 @@ def _restored(values: Mapping[str, Any]) -> Path:
     """Return a path of tables of numbers, such as a plan's file has; ProblemError for others."""
     try:
         with np.errstate(invalid="raise", over="raise"):
-            path: Path = restore(Path, values)
+            made_of = {"path", "pieces"} & set(values)
+            path: Path = _made(values) if made_of else restore(Path, values)
             path.samples([0.0, 0.5 * path.duration, path.duration])
     except (ArithmeticError, IndexError, TypeError, ValueError) as error:
         reason = " ".join(str(error).split())
@@ -120,15 +168,11 @@ def _restored(values: Mapping[str, Any]) -> Path:
     return path
 
 
-def woven(path: Path, values: Mapping[str, Any]) -> Path:
-    """Return a path along which the tool swings, as a file says it."""
-    known = ("amplitude", "pitch", "axis", "dwell")
-    wrong = [name for name in values if name not in known]
-    missing = [name for name in known[:2] if name not in values]
-    if wrong or missing:
-        what = f"'{wrong[0]}' is unknown" if wrong else f"'{missing[0]}' is missing"
-        raise ProblemError(f"weave: {what}, expected amplitude, pitch and perhaps axis, dwell")
-    return Weave(path, **values)
+def _made(values: Mapping[str, Any]) -> Path:
+    """Return a path that is made of others."""
+    given = {key: value for key, value in values.items() if key != "kind"}
+    path: Path = Path.kinds()[values["kind"]](**given)
+    return path
 
 
 def _circle(values: dict[str, Any]) -> Path:

@@ -1,10 +1,16 @@
 """From a problem back to its file."""
 
+import dataclasses
+import os
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
+
 from selfmotion.basics import FileFormatError, ProblemError, Saved, as_path, shown
 from selfmotion.formats.documents import write_document
+from selfmotion.formats.job import Job
+from selfmotion.optimise import QuasiNewton
 from selfmotion.problem import Problem, check_problem, problem_to_dict
 from selfmotion.robot import (
     NAMED_ARMS,
@@ -18,18 +24,57 @@ from selfmotion.robot import (
 )
 
 
-def write_problem(problem: Problem, file: str | FilePath) -> None:
+def write_problem(problem: Problem | Job, file: str | FilePath) -> None:
     """Write a problem as TOML or JSON that `read_problem` turns into the same problem.
+
+    Of a `Job` the settings of the search, its goal and outputs are written as well: `read_job`
+    turns the file into the same job.
 
     Raises
     ------
     ProblemError
-        It holds a function, which a file cannot carry, or an arm that is in no URDF file.
+        It holds a function, which a file cannot carry, or an arm that is in no URDF file; or a
+        search begins with a generator of random numbers, or with an optimiser of one's own.
     FileFormatError
         The file cannot be written.
     """
-    check_problem(problem)
-    write_document(as_path(file), problem_table(problem))
+    path = as_path(file)
+    if not isinstance(problem, Job):
+        check_problem(problem)
+        write_document(path, problem_table(problem))
+        return
+    # Plain keys stand before the first table.
+    table = {**_settings(problem, path), **problem_table(problem.problem)}
+    write_document(path, dict(sorted(table.items(), key=lambda item: isinstance(item[1], dict))))
+
+
+def _settings(job: Job, file: FilePath) -> dict[str, Any]:
+    """Return the keys that say how a job is planned."""
+    table: dict[str, Any] = {}
+    if job.goal != "best":
+        table["goal"] = job.goal
+    if job.outputs:
+        folder = file.parent.resolve()
+        table["outputs"] = [os.path.relpath(name.resolve(), folder) for name in job.outputs]
+    if job.max_evaluations is not None:
+        table["max_evaluations"] = job.max_evaluations
+    if job.parts:
+        table["parts"] = {key: _plain(value) for key, value in job.parts.items()}
+    if job.search is not None and not isinstance(job.search.rng, int):
+        raise ProblemError("search: rng is a generator, which a file cannot carry; give a number")
+    if not isinstance(job.optimizer, QuasiNewton | None):
+        raise ProblemError(
+            f"optimizer: {type(job.optimizer).__name__} is no QuasiNewton, which a file can carry"
+        )
+    named = {"search": job.search, "tolerance": job.tolerance, "optimiser": job.optimizer}
+    for name, value in named.items():
+        if value is not None:
+            table[name] = _without_none(dataclasses.asdict(value))
+    return table
+
+
+def _plain(value: Any) -> Any:
+    return np.asarray(value).tolist()
 
 
 def problem_table(problem: Problem) -> dict[str, Any]:

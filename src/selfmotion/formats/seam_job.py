@@ -1,6 +1,5 @@
 """From a file of many seams to a job."""
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -9,10 +8,13 @@ from typing import Any
 from selfmotion.basics import FileFormatError, SelfmotionError, as_path, nearest
 from selfmotion.constraints import Clearance
 from selfmotion.formats.documents import in_si, read_document
-from selfmotion.formats.path_files import read_path
+from selfmotion.formats.job import Job
+from selfmotion.formats.path_building import times_of_events
+from selfmotion.formats.path_files import read_seams
 from selfmotion.formats.poses import pose_of
-from selfmotion.formats.problem_file import Job, job_of
-from selfmotion.formats.problem_parts import obstacle, start_of, woven
+from selfmotion.formats.problem_file import job_of
+from selfmotion.formats.problem_parts import FEED_BOUNDS, obstacle, start_of, woven
+from selfmotion.formats.workpiece import NAME, placed_body, standing
 from selfmotion.job import Program, Seam, plan_job
 from selfmotion.path import Path, Placed, section_at_rest
 from selfmotion.problem import NO_OVERLAP
@@ -22,9 +24,9 @@ from selfmotion.robot import RobotModel
 _JOB = ("start", "end", "order", "branches", "seconds_per_cost", "deadline", "rng")
 _SEAM = ("name", "either_way", "after", "after_any", "wait", "events", "leaves", "may_meet")
 _OF_PROBLEM = ("path", "task", "costs", "constraints", "relaxations")
-_TABLE = ("file", "frame", "ramp", "weave", "feed", "duration", "jump", "corners", "tolerance")
-# What stands for the motion of all seams while what they share is read.
-_COLUMN = "seam"
+_PLACED = ("file", "frame", "ramp", "weave")
+_PACED = ("feed", "duration", "jump", "corners", "tolerance", "corner_angle", *FEED_BOUNDS)
+_TABLE = (*_PLACED, *_PACED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,9 @@ def read_seam_job(file: str | FilePath, *, allow_code: bool = False) -> SeamJob:
     those of a problem file (`read_job`), and hold for all seams. ``[job]`` has the settings of
     `plan_job`. Seams are a list ``[[seams]]``, each with a ``name``, a ``path``, and what a `Seam`
     may say besides; or one table ``[seams]`` that names a ``file`` of poses with a column ``seam``,
-    as `read_path` reads them, with a ``feed`` or ``duration``, and what else all of them have.
+    as `read_path` reads them, with a ``feed`` or ``duration``, and what else all of them have. That
+    may be a program of a machine tool, whose cuts are seams. Rows with an ``event``, and cuts, are
+    made one way only, unless ``either_way = true`` is said.
 
     Parameters
     ----------
@@ -101,6 +105,7 @@ class _Reader:
         # The arm and what all keep, read with any motion at all.
         self.first = self._read({"path": _ANY}, "seams")
         self.shared = list(self.first.problem.constraints)
+        self._standing = standing(shared)
 
     def of_list(self, given: Any) -> list[Seam]:
         """Return the seam of an entry of [[seams]]."""
@@ -124,17 +129,25 @@ class _Reader:
         except (SelfmotionError, ValueError) as error:
             raise FileFormatError(f"{self._file}: seams: frame: {error}") from error
         table = self._file.parent / values["file"]
-        options = {key: values[key] for key in _TABLE[4:] if key in values}
+        options = {key: values[key] for key in _PACED if key in values}
         rest = {key: value for key, value in given.items() if key not in _TABLE}
         found = []
-        for name, path in _paths(table, options).items():
+        for name, (path, rows) in read_seams(table, options).items():
             if "ramp" in values:
                 path = section_at_rest(path, ramp=values["ramp"])
+            own = {**rest, "name": name}
+            events = times_of_events(path, rows)
             if "weave" in values:
                 path = woven(path, values["weave"])
-            if frame is not None:
-                path = Placed(path, frame)
-            found.append(self._seam({**rest, "name": name}, path, f"seams, '{name}'"))
+            if events:
+                own["events"] = [*events, *rest.get("events", [])]
+            if events or rows.straight:
+                # What happens where, and how a machine cuts, is meant one way.
+                own.setdefault("either_way", False)
+            place = self._standing[0] if frame is None else self._standing[0] * frame
+            if frame is not None or NAME in self._shared:
+                path = Placed(path, place)
+            found.append(self._seam(own, path, f"seams, '{name}'"))
         return found
 
     def settings(self, given: Any) -> dict[str, Any]:
@@ -163,10 +176,7 @@ class _Reader:
         besides = list(problem.constraints)[len(whole) :] if constraints else []
         values = {key: value for key, value in in_si(given).items() if key in _SEAM}
         try:
-            leaves = [
-                obstacle(in_si(item), lambda name: self._file.parent / name)
-                for item in values.pop("leaves", [])
-            ]
+            leaves = [self._left(in_si(item)) for item in values.pop("leaves", [])]
             return Seam(
                 path=problem.path if path is None else path,
                 task=problem.task,
@@ -178,6 +188,12 @@ class _Reader:
             )
         except (SelfmotionError, TypeError) as error:
             raise FileFormatError(f"{self._file}: {where}: {error}") from error
+
+    def _left(self, values: Mapping[str, Any]) -> Any:
+        """Return a body that a seam leaves, where the workpiece stands if there is one."""
+        if NAME in self._shared:
+            values = placed_body(values, *self._standing)
+        return obstacle(values, lambda name: self._file.parent / name)
 
     def _read(self, own: Mapping[str, Any], where: str) -> Job:
         document = {**self._shared, **own}
@@ -204,45 +220,3 @@ _ANY = {
     "by": [0.0, 0.0, 0.01],
     "duration": 1.0,
 }
-
-
-def _paths(file: FilePath, options: Mapping[str, Any]) -> dict[str, Path]:
-    """Return the tool motions of a table with a column ``seam``, by its names."""
-    try:
-        lines = file.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{file}: cannot be read: {error}") from error
-    rows = [k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")]
-    if not rows:
-        raise FileFormatError(f"{file}: is empty, expected a header line and rows")
-    mark = max(",;\t", key=lines[rows[0]].count)
-    header = [name.strip().strip('"') for name in lines[rows[0]].split(mark)]
-    if _COLUMN not in header:
-        raise FileFormatError(
-            f"{file}: has no column '{_COLUMN}', expected one that names the seam of each row; "
-            f"the header is {','.join(header)}"
-        )
-    at = header.index(_COLUMN)
-    cells = {k: lines[k].split(mark) for k in rows}
-    names = {k: each[at].strip() if at < len(each) else "" for k, each in cells.items()}
-    found: dict[str, Path] = {}
-    for name in dict.fromkeys(names[k] for k in rows[1:]):
-        # Rows of other seams become comments, so that lines keep their numbers.
-        own = [
-            mark.join(cells[k][:at] + cells[k][at + 1 :])
-            if k == rows[0] or names.get(k) == name
-            else "#"
-            for k in range(len(lines))
-        ]
-        found[name] = _read_one(file, "\n".join(own), options)
-    return found
-
-
-def _read_one(file: FilePath, text: str, options: Mapping[str, Any]) -> Path:
-    with tempfile.TemporaryDirectory() as folder:
-        part = FilePath(folder, file.name)
-        part.write_text(text, encoding="utf-8")
-        try:
-            return read_path(part, **options)
-        except FileFormatError as error:
-            raise FileFormatError(str(error).replace(str(part), str(file))) from error

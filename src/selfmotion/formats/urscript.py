@@ -1,19 +1,37 @@
-"""URScript for arms of Universal Robots: a stream of ``servoj`` at a fixed rate."""
+"""URScript for arms of Universal Robots: a stream of ``servoj`` at a fixed rate.
+
+After Universal Robots' script manual (e-Series, 5.11): ``set_tcp`` is the tool's pose in the
+flange as position [m] and rotation vector [rad], ``movej`` goes to the start at a joint speed and
+acceleration [rad/s, rad/s²], ``set_standard_digital_out`` switches an output.
+"""
 
 from collections.abc import Sequence
 
 from selfmotion.basics import Array, ProblemError
+from selfmotion.formats.program_axes import tool_from_flange
+from selfmotion.formats.program_settings import ProgramSettings
 from selfmotion.robot import RobotModel
+from selfmotion.task import log3
 
 # servoj smooths by looking ahead [s]: the default of the manual.
 _LOOK_AHEAD = 0.1
 # It follows with this gain: the default of the manual.
 _GAIN = 300
 _JOINTS = 6
+# What `approach` is a share of: joints of these arms turn by π rad/s at least; movej's own default
+# acceleration [rad/s²].
+_FASTEST, _ACCELERATION = 3.14, 1.4
 
 
-def script(robot: RobotModel, joints: Sequence[str], q: Array, rate: float) -> str:
-    """Return a program that moves to the start and then streams the samples.
+def script(
+    robot: RobotModel,
+    joints: Sequence[str],
+    q: Array,
+    rate: float,
+    settings: ProgramSettings | None = None,
+    events: Sequence[tuple[int, str]] = (),
+) -> str:
+    """Return a program that moves to the start, slowly, and then streams the samples.
 
     Parameters
     ----------
@@ -24,12 +42,17 @@ def script(robot: RobotModel, joints: Sequence[str], q: Array, rate: float) -> s
         [rad]
     rate : float
         [Hz]
+    settings : ProgramSettings, optional
+        Flange, load, outputs, and how fast to the start.
+    events : sequence of (int, str)
+        Before which sample what happens.
 
     Raises
     ------
     ProblemError
-        The arm has other joints.
+        The arm has other joints, or an event no output.
     """
+    asked = ProgramSettings() if settings is None else settings
     slides = [name for name in joints if robot.is_prismatic(name)]
     if len(joints) != _JOINTS or slides:
         raise ProblemError(
@@ -37,19 +60,46 @@ def script(robot: RobotModel, joints: Sequence[str], q: Array, rate: float) -> s
             f"{len(joints)} joints" + (f", of which '{slides[0]}' slides" if slides else "")
         )
     period = repr(1.0 / rate)
+    center = ", ".join(f"{value:.6g}" for value in asked.center)
+    speed, push = asked.approach * _FASTEST, asked.approach * _ACCELERATION
     lines = [
         f"# {robot.name}: {len(q)} setpoints, joints {', '.join(joints)} [rad].",
         f"# servoj at {rate:g} Hz (t = {period} s), lookahead_time = {_LOOK_AHEAD} s, "
         f"gain = {_GAIN}:",
         f"# the arm follows about {_LOOK_AHEAD} s late, and rounds what is faster than that.",
         "def selfmotion():",
-        f"  movej({_vector(q[0])})",
+        *_tool(robot, joints, asked),
+        *([] if asked.mass is None else [f"  set_payload({asked.mass:.6g}, [{center}])"]),
+        f"  movej({_vector(q[0])}, a={push:.4g}, v={speed:.4g})",
     ]
-    for row in q:
+    switched = {k: [name for at, name in events if at == k] for k, _ in events}
+    for k, row in enumerate(q):
+        lines += [f"  {_event(name, asked)}" for name in switched.get(k, ())]
         lines.append(
             f"  servoj({_vector(row)}, t={period}, lookahead_time={_LOOK_AHEAD}, gain={_GAIN})"
         )
     return "\n".join([*lines, "  stopj(2.0)", "end", ""])
+
+
+def _tool(robot: RobotModel, joints: Sequence[str], settings: ProgramSettings) -> list[str]:
+    """Return where the tool is; of one of a cell's arms nothing, as its tool may be another's."""
+    if len(joints) < robot.dof:
+        return []
+    tool = tool_from_flange(robot, settings)
+    place = [*tool.translation.tolist(), *log3(tool.rotation).tolist()]
+    return [f"  set_tcp(p[{', '.join(f'{value + 0.0:.9f}' for value in place)}])"]
+
+
+def _event(event: str, settings: ProgramSettings) -> str:
+    signal = settings.signals[event]
+    if signal is None:
+        return f"# event: {' '.join(event.split())}"
+    output, value = signal
+    if not isinstance(output, int):
+        raise ProblemError(
+            f"signals: '{event}' switches {output!r}; outputs of Universal Robots are numbers"
+        )
+    return f"set_standard_digital_out({output}, {value})"
 
 
 def _vector(values: Array) -> str:

@@ -1,6 +1,10 @@
 """The replay of a plan: one HTML file that needs no server, no network and no other file."""
 
-from selfmotion.replay.browser import render_gif as render_gif, render_png as render_png
+from selfmotion.replay.browser import (
+    check_pictures as check_pictures,
+    render_gif as render_gif,
+    render_png as render_png,
+)
 from selfmotion.replay.figure import figure as figure
 from selfmotion.replay.page import (
     notebook_html as notebook_html,

@@ -113,23 +113,37 @@ def _shot(page: Any, t: float, whole_page: bool) -> bytes:
     return picture
 
 
+def check_pictures() -> None:
+    """Raise RenderError where pictures cannot be drawn, before anything else is done."""
+    with _playwright() as playwright:
+        _find_browser(playwright)
+
+
 @contextmanager
-def _opened(
-    html: str, size: tuple[int, int], layers: Sequence[str], whole_page: bool, dark: bool
-) -> Iterator[Any]:
-    """Open a page in a browser of its own, which is gone afterwards."""
+def _playwright() -> Iterator[Any]:
     try:
-        from playwright.sync_api import Error, sync_playwright
+        from playwright.sync_api import sync_playwright
     except ImportError:
         raise RenderError(
             "pictures need Playwright and a Chromium browser: pip install playwright, then "
             "`playwright install chromium` or your system's chromium package"
         ) from None
+    with sync_playwright() as playwright:
+        yield playwright
+
+
+@contextmanager
+def _opened(
+    html: str, size: tuple[int, int], layers: Sequence[str], whole_page: bool, dark: bool
+) -> Iterator[Any]:
+    """Open a page in a browser of its own, which is gone afterwards."""
     # Only the superuser's Chromium refuses its sandbox.
     sandbox = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
-    try:
-        # Chromium leaves its socket's folder behind when it is stopped: give it one that goes.
-        with TemporaryDirectory(prefix="sm") as folder, sync_playwright() as playwright:
+    # Chromium leaves its socket's folder behind when it is stopped: give it one that goes.
+    with TemporaryDirectory(prefix="sm") as folder, _playwright() as playwright:
+        from playwright.sync_api import Error
+
+        try:
             browser = playwright.chromium.launch(
                 executable_path=_find_browser(playwright),
                 args=_SOFTWARE + sandbox,
@@ -147,8 +161,8 @@ def _opened(
                 yield page
             finally:
                 browser.close()
-    except Error as error:
-        raise RenderError(f"the browser could not draw the replay: {error}") from error
+        except Error as error:
+            raise RenderError(f"the browser could not draw the replay: {error}") from error
 
 
 _PREPARE = """({ layers, wholePage }) => {

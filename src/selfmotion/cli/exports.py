@@ -1,0 +1,157 @@
+"""The command that writes motions for controllers and simulators."""
+
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+import selfmotion as sm
+from selfmotion import formats
+from selfmotion.cli import jobs, options
+from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, terminal
+
+_Made = sm.Plan | sm.Parts | sm.Program
+
+
+@app.command(
+    epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500; or: --out weld.src"
+)
+def export(
+    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, a .program or .parts.")],
+    out: Annotated[
+        list[Path],
+        typer.Option(
+            help="File: .csv, .npz, .json, .yaml (ROS 2 JointTrajectory), .xml (MuJoCo keyframes), "
+            ".script (URScript), .src (KUKA), .mod (ABB). Repeatable."
+        ),
+    ],
+    rate: Annotated[
+        float | None, typer.Option(help="Samples per second; by default the plan's own.")
+    ] = None,
+    form: Annotated[
+        str | None,
+        typer.Option("--format", help=f"Whatever the suffix: {', '.join(formats.FORMS)}."),
+    ] = None,
+    parts: Annotated[
+        bool, typer.Option("--parts", help="Of a cell a file for each part as well, in step.")
+    ] = False,
+    settings: Annotated[
+        Path | None,
+        typer.Option(
+            help="File with what a controller's program says besides: deviation, axes, signals, "
+            "flange, mass, center, approach (TOML)."
+        ),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Write a motion that is not verified, too.")
+    ] = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Write a plan's motion for controllers and simulators, and check what was written."""
+    if rate is not None and all(_is_program(target, form) for target in out):
+        raise sm.ProblemError("--rate has no effect on programs: targets are as many as it takes")
+    asked = None if settings is None else sm.read_program_settings(settings)
+    made: _Made
+    if file.suffix == jobs.PROGRAM:
+        options.refuse({"parts": parts or None}, file, "a program's motion is")
+        made = sm.load_program(file)
+        _check_verified(made, made.verified, made.verdict, force, as_json)
+    elif file.suffix == jobs.PARTS:
+        options.refuse({"parts": parts or None}, file, "the motion of parts is")
+        made = sm.load_parts(file)
+        _check_verified(made, made.verified, made.verdict, force, as_json)
+    else:
+        made = sm.load_plan(file)
+        sound = made.certificate.verified
+        _check_verified(made, sound, made.certificate.verdict, force, as_json)
+    verdicts: dict[str, str] = {}
+    sound = True
+    for target in out:
+        given: dict[str, Any] = {"form": form, "force": force}
+        if not _is_program(target, form):
+            given["rate"] = rate
+        together: dict[str, Path] = {}
+        if parts and isinstance(made, sm.Plan):
+            together = sm.write_parts(made, target, **given)
+        sm.write_motion(made, target, settings=asked, **given)
+        kept, verdicts[str(target)] = _read_back(made, target, form)
+        sound &= kept
+        if together:
+            names = ", ".join(map(str, together.values()))
+            verdicts[names] = ""
+            if _is_readable(target, form) and isinstance(made, sm.Plan):
+                kept, verdicts[names] = _judged(made, sm.read_parts(together))
+                sound &= kept
+    _finish(made, rate, verdicts, sound, as_json)
+
+
+def _check_verified(made: _Made, sound: bool, verdict: str, force: bool, as_json: bool) -> None:
+    """End with one line where a motion is not verified, and not forced."""
+    if sound or force:
+        return
+    if as_json:
+        terminal.print_json(data={"verified": False, "written": {}, "verdict": verdict})
+    else:
+        text = f"nothing is written: {verdict}; --force writes it all the same"
+        terminal.print(text, markup=False, soft_wrap=True)
+    raise typer.Exit(NOT_VERIFIED)
+
+
+def _is_program(target: Path, form: str | None) -> bool:
+    return (form or formats.SUFFIXES.get(target.suffix)) in formats.PROGRAMS.values()
+
+
+def _is_readable(target: Path, form: str | None) -> bool:
+    return form in formats.READABLE or (form is None and target.suffix not in (".xml", ".script"))
+
+
+def _read_back(made: _Made, target: Path, form: str | None) -> tuple[bool, str]:
+    """Return whether what was written is still the motion, and what there is to say."""
+    if _is_program(target, form) and target.suffix in formats.PROGRAMS:
+        count, stated, found = formats.program_miss(made, target)
+        text = (
+            f"read back: {count} targets, between which the tool is at most "
+            f"{1e3 * found.position:.3g} mm and {found.rotation:.2g} rad off the plan "
+            f"({1e3 * stated.position:.3g} mm are stated in the file)"
+        )
+        # The file states nine digits.
+        return found.position <= stated.position + 1e-9 and _verified(made), text
+    if not isinstance(made, sm.Plan):
+        return made.verified, made.verdict
+    if not _is_readable(target, form):
+        return made.certificate.verified, ""
+    return _judged(made, sm.read_motion(target))
+
+
+def _verified(made: _Made) -> bool:
+    return made.certificate.verified if isinstance(made, sm.Plan) else made.verified
+
+
+def _judged(plan: sm.Plan, motion: sm.Trajectory) -> tuple[bool, str]:
+    found = plan.problem.certify(motion, plan.tolerance, plan.report.ending)
+    return found.verified and not plan.altered, f"read back: {found.verdict}"
+
+
+def _finish(
+    made: _Made, rate: float | None, verdicts: dict[str, str], sound: bool, as_json: bool
+) -> NoReturn:
+    """Print what was written, and end."""
+    sampled = [name for name in verdicts if Path(name).suffix not in formats.PROGRAMS]
+    miss = None
+    if sampled and isinstance(made, sm.Plan):
+        miss = formats.linear_miss(made, rate)
+    if as_json:
+        data: dict[str, Any] = {"verified": sound, "written": verdicts}
+        terminal.print_json(data=data if miss is None else data | {"linear_miss": miss._asdict()})
+        raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)
+    for name, verdict in verdicts.items():
+        terminal.print(f"wrote {name}{verdict and '; '}{verdict}", markup=False, soft_wrap=True)
+    if miss is not None:
+        terminal.print(
+            f"joined by straight lines, the samples stay within {miss.position:.2g} m and "
+            f"{miss.rotation:.2g} rad of the motion; --rate {miss.rate:.0f} keeps the plan's "
+            f"tolerance",
+            markup=False,
+            soft_wrap=True,
+        )
+    raise typer.Exit(VERIFIED if sound else NOT_VERIFIED)

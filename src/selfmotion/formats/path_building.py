@@ -1,0 +1,272 @@
+"""From rows of poses to a tool motion."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from selfmotion.basics import Array, FileFormatError, PathError, as_choice
+from selfmotion.formats.path_rows import PoseRows
+from selfmotion.formats.poses import ORIENTATIONS
+from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints
+
+# A coordinate beyond this [m] can only be meant in millimetres.
+_FAR = 50.0
+# An angle beyond this [rad] can only be meant in degrees.
+_ROUND = 2.0 * np.pi + 1e-6
+# Poses farther from their predecessor than this [m] are a jump, unless another length is given.
+JUMP = 0.5
+# Rotations by more than this [rad] are a jump, too: their direction would be a guess.
+_FLIP = 2.6
+# Times this near [s] are the same.
+_MOMENT = 1e-9
+# Legs that bend by more than this [rad] make a corner, unless another angle is given.
+_BEND = np.pi / 6
+# Legs that go back by less than this of the way they came turn round.
+_BACK = 1e-3
+# Times at which a path is looked at for when it passes its rows, at least, and for each of them.
+_LOOKS, _EACH = 2000, 20
+
+
+@dataclass(frozen=True)
+class Pacing:
+    """How a table is followed; see `read_path`."""
+
+    feed: float | None = None
+    duration: float | None = None
+    jump: float = JUMP
+    corners: str = "blend"
+    tolerance: float = 1e-3
+    corner_angle: float | None = None
+    turn_rate: float | None = None
+    acceleration: float | None = None
+    turn_acceleration: float | None = None
+    smoothing: float | None = None
+    within: float | None = None
+
+    @property
+    def bounds(self) -> dict[str, float]:
+        """What bounds a feed, where it is given."""
+        names = ("turn_rate", "acceleration", "turn_acceleration", "smoothing", "within")
+        given = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in given.items() if value is not None}
+
+
+def path_of_rows(path: FilePath, rows: PoseRows, asked: Pacing) -> Path:
+    """Return the tool motion of rows of poses of a file; see `read_path`.
+
+    Raises
+    ------
+    FileFormatError
+        A row cannot be used; the line or pose is named.
+    """
+    if len(rows.positions) < 2:
+        raise FileFormatError(f"{path}: has {len(rows.positions)} poses, expected at least two")
+    _check_rows(path, rows)
+    rotations = _rotations(path, rows)
+    _check_jumps(path, rows, rotations, asked.jump)
+    turns = _quaternions(rotations) if rows.orientation else None
+    feed, duration, bounds = asked.feed, asked.duration, asked.bounds
+    try:
+        as_choice(asked.corners, "corners", ("blend", "stop", "round"), PathError)
+        if rows.straight:
+            return _of_cut(path, rows, turns, asked)
+        t = _times(path, rows, feed, duration)
+        feeds = rows.feed if feed is None else np.full(len(rows.positions), feed)
+        if bounds and feeds is None:
+            raise PathError(f"{next(iter(bounds))} has no effect without a feed")
+        if asked.corners == "round":
+            if feeds is None:
+                raise PathError("corners are 'round', which needs a feed [m/s]; give it")
+            legs = Polyline(rows.positions, turns, tolerance=asked.tolerance)
+            return _at_feed(legs, legs.pose_times, feeds, bounds)
+        return _through(t, rows, turns, feeds, asked)
+    # Splines refuse times that differ, but by less than they can divide by.
+    except (PathError, ValueError) as error:
+        raise FileFormatError(f"{path}: {error}") from error
+
+
+def _through(
+    t: Array, rows: PoseRows, turns: Array | None, feeds: Array | None, asked: Pacing
+) -> Path:
+    """Return a smooth path through poses."""
+    bend = _BEND if asked.corner_angle is None else asked.corner_angle
+    through = Waypoints(t, rows.positions, turns, corners=asked.corners, corner_angle=bend)
+    through.samples([0.0])
+    if feeds is None:
+        return through
+    pieces: list[Path] = []
+    passed = t - t[0]
+    for piece in through.between_corners():
+        # From one rest to the next.
+        here = (passed >= -_MOMENT) & (passed <= piece.duration + _MOMENT)
+        pieces.append(_at_feed(piece, passed[here], feeds[here], asked.bounds))
+        passed = passed - piece.duration
+    return pieces[0] if len(pieces) == 1 else Joined(pieces)
+
+
+def _of_cut(file: FilePath, rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
+    """Return the straight legs of a machine's cut, which rests where it goes back on itself."""
+    if asked.duration is not None:
+        raise PathError("cuts have feeds, so that duration has no effect; drop it")
+    feeds = rows.feed if asked.feed is None else np.full(len(rows.positions), asked.feed)
+    if feeds is None:
+        raise PathError("the program says no feed (F, FEDRAT); give a feed [m/s]")
+    legs = np.diff(rows.positions, axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        cosines = (legs[:-1] * legs[1:]).sum(axis=1) / (lengths[:-1] * lengths[1:])
+    back = 1 + np.flatnonzero(cosines < _BACK - 1.0)
+    if asked.corners == "stop":
+        bend = _BEND if asked.corner_angle is None else asked.corner_angle
+        back = 1 + np.flatnonzero(cosines < np.cos(bend))
+    pieces: list[Path] = []
+    for first, last in pairwise([0, *back.tolist(), len(legs)]):
+        part = slice(first, last + 1)
+        own = None if turns is None else turns[part]
+        piece = Polyline(rows.positions[part], own, tolerance=asked.tolerance)
+        pieces.append(_at_feed(piece, piece.pose_times, feeds[part], asked.bounds))
+    return pieces[0] if len(pieces) == 1 else Joined(pieces)
+
+
+def times_of_events(path: Path, rows: PoseRows) -> list[tuple[str, float]]:
+    """Return what happens when along a path [s]: as it passes the poses of the rows' events.
+
+    A pose is passed where the path, of about as much of its length as the poses before, is nearest.
+    """
+    if not rows.events:
+        return []
+    t = np.linspace(0.0, path.duration, max(_LOOKS, _EACH * len(rows.positions)))
+    places = path.samples(t).translation
+    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+    chords = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
+    shares = np.append(0.0, np.cumsum(chords)) * (way[-1] / max(float(chords.sum()), _MOMENT))
+    found = []
+    for k, event in rows.events:
+        early, late = shares[max(k - 1, 0)], shares[min(k + 1, len(shares) - 1)]
+        near = np.flatnonzero((way >= early) & (way <= late))
+        away = np.linalg.norm(places[near] - rows.positions[k], axis=1)
+        at = float(t[near[int(away.argmin())]]) if len(near) else 0.0
+        ends = {0: 0.0, len(shares) - 1: path.duration}
+        found.append((event, float(ends.get(k, at))))
+    return found
+
+
+def _at_feed(path: Path, t: Array, feeds: Array, bounds: Mapping[str, float]) -> Feed:
+    """Return a path at the feeds (N,) that begin at its times (N,); the last one has no way."""
+    changes = 1 + np.flatnonzero(np.diff(feeds[:-1]))
+    stretches = np.stack([t[changes], feeds[changes]], axis=1) if len(changes) else None
+    return Feed(path, float(feeds[0]), stretches=stretches, **bounds)
+
+
+def _check_rows(file: FilePath, rows: PoseRows) -> None:
+    parts = [("position", rows.positions), (rows.orientation, rows.values)]
+    if rows.t is not None:
+        parts.append(("time", rows.t[:, None]))
+    for what, values in parts:
+        flat = values.reshape(len(values), -1)
+        bad = np.flatnonzero(~np.all(np.isfinite(flat), axis=1))
+        if bad.size:
+            place = rows.places[int(bad[0])]
+            raise FileFormatError(f"{file}: {place}: the {what} is not finite; mend or drop it")
+    for what, values, bound, remedy in (
+        ("position", rows.positions, _FAR, "metres; say x_mm,y_mm,z_mm if it is millimetres"),
+        ("angle", rows.values, _ROUND, "radians; say roll_deg,… or rx_deg,… if it is degrees"),
+    ):
+        if what == "angle" and rows.orientation not in ("rpy", "rotation_vector"):
+            continue
+        far = np.argwhere(np.abs(values) > bound)
+        if len(far):
+            row, column = far[0]
+            found = f"{what} {values[row, column]:.6g}"
+            raise FileFormatError(f"{file}: {rows.places[row]}: {found} is taken for {remedy}")
+    if rows.t is not None:
+        late = np.flatnonzero(np.diff(rows.t) <= 0.0)
+        if late.size:
+            row = int(late[0]) + 1
+            raise FileFormatError(
+                f"{file}: {rows.places[row]}: time {rows.t[row]:.6g} s does not come after "
+                f"{rows.t[row - 1]:.6g} s; times must increase"
+            )
+
+
+def _rotations(file: FilePath, rows: PoseRows) -> Array:
+    if not rows.orientation:
+        return np.tile(np.eye(3), (len(rows.positions), 1, 1))
+    _, rotation = ORIENTATIONS[rows.orientation]
+    found = []
+    for place, values in zip(rows.places, rows.values, strict=True):
+        try:
+            found.append(rotation(values))
+        except (ValueError, PathError) as error:
+            raise FileFormatError(f"{file}: {place}: {error}") from error
+    return np.array(found)
+
+
+def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) -> None:
+    steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
+    cosines = np.einsum("kij,kij->k", rotations[:-1], rotations[1:])
+    turns = np.arccos(np.clip(0.5 * (cosines - 1.0), -1.0, 1.0))
+    for what, amounts, bound, unit, remedy in (
+        ("jumps by", steps, jump, "m", _remedy(jump)),
+        ("turns by", turns, _FLIP, "rad", "which has no clear direction; add poses between"),
+    ):
+        far = np.flatnonzero(amounts > bound)
+        if far.size:
+            row = int(far[0]) + 1
+            raise FileFormatError(
+                f"{file}: {rows.places[row]}: the path {what} {amounts[row - 1]:.4g} {unit} from "
+                f"the pose before, {remedy}"
+            )
+
+
+def _remedy(jump: float) -> str:
+    return (
+        f"more than {jump:g} m; give a larger jump if it is meant, or name the columns x_mm,… if "
+        f"they are millimetres"
+    )
+
+
+def _times(file: FilePath, rows: PoseRows, feed: float | None, duration: float | None) -> Array:
+    given = {"feed": feed, "duration": duration}
+    named = [name for name, value in given.items() if value is not None]
+    columns = [name for name, own in (("t", rows.t), ("feed", rows.feed)) if own is not None]
+    if len(columns) > 1:
+        raise FileFormatError(f"{file}: has times and a column feed; keep one of them")
+    if columns and named:
+        what = "times" if rows.t is not None else "a column feed"
+        raise FileFormatError(f"{file}: has {what}, so that {named[0]} has no effect; drop one")
+    if rows.t is not None:
+        return rows.t
+    if rows.feed is not None:
+        bad = np.flatnonzero(~(rows.feed > 0.0) | ~np.isfinite(rows.feed))
+        if bad.size:
+            row = int(bad[0])
+            raise FileFormatError(
+                f"{file}: {rows.places[row]}: feed is {rows.feed[row]:.6g} m/s, expected a number "
+                f"above 0"
+            )
+    elif len(named) != 1:
+        raise FileFormatError(
+            f"{file}: has no times; give either a feed [m/s] or a duration [s]"
+            + (", not both" if named else "")
+        )
+    steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
+    still = np.flatnonzero(steps == 0.0)
+    if still.size:
+        raise FileFormatError(
+            f"{file}: {rows.places[int(still[0]) + 1]}: the tool does not move from the pose "
+            f"before, which takes no time by feed or duration; give a column t"
+        )
+    if rows.feed is not None:
+        return np.append(0.0, np.cumsum(steps / rows.feed[:-1]))
+    length = np.append(0.0, np.cumsum(steps))
+    return length / feed if feed is not None else length * (float(duration or 0.0) / length[-1])
+
+
+def _quaternions(rotations: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(rotations).as_quat(scalar_first=True))

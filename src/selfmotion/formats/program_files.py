@@ -1,0 +1,55 @@
+"""Programs of controllers as files: which suffix is which language."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path as FilePath
+
+from selfmotion.basics import FileFormatError
+from selfmotion.formats.controller_program import ControllerProgram, Draft, drafted
+from selfmotion.formats.krl import KrlReader, write_krl
+from selfmotion.formats.program_lines import ProgramReader
+from selfmotion.formats.program_settings import ProgramSettings
+from selfmotion.formats.rapid import RapidReader, write_rapid
+from selfmotion.formats.targets import Miss
+from selfmotion.job import Program
+from selfmotion.result import Move, Parts, Plan
+
+_WRITERS: Mapping[str, Callable[[FilePath, Draft], None]] = {
+    "krl": write_krl,
+    "rapid": write_rapid,
+}
+_READERS: Mapping[str, type[ProgramReader]] = {".src": KrlReader, ".mod": RapidReader}
+PROGRAMS = {".src": "krl", ".mod": "rapid"}
+
+
+def write_program(
+    plan: Plan | Parts | Move | Program, file: FilePath, form: str, settings: ProgramSettings
+) -> None:
+    """Write a motion as a program of a controller; see `write_motion`."""
+    verdict = plan.certificate.verdict if isinstance(plan, Plan) else plan.verdict
+    _WRITERS[form](file, drafted(plan, file.stem, settings, verdict))
+
+
+def read_program(file: FilePath) -> ControllerProgram:
+    """Read a program of a controller, by its suffix.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or says what is not read; the line is named.
+    """
+    return _READERS[file.suffix.lower()](file).program()
+
+
+def program_miss(plan: Plan | Parts | Move | Program, file: FilePath) -> tuple[int, Miss, Miss]:
+    """Return what a program file holds: targets, the deviation it states, and what it is.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or is of another motion.
+    """
+    found = read_program(file)
+    try:
+        return found.targets, found.miss, found.miss_of(plan)
+    except FileFormatError as error:
+        raise FileFormatError(f"{file}: {error}") from error

@@ -1,0 +1,216 @@
+"""Programs of controllers, read line by line by the grammar of the subset that is written."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Any, ClassVar
+
+import numpy as np
+
+from selfmotion.basics import FileFormatError
+from selfmotion.formats.controller_program import ControllerProgram
+from selfmotion.formats.program_axes import Axis
+from selfmotion.formats.targets import Miss, Stretch
+
+# A file of a controller has less than so many bytes, lines less than so many characters, numbers
+# less than that.
+_BYTES, _LINE, _LARGEST = 50_000_000, 2000, 1e7
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(E[+-]?[0-9]{1,3})?", re.IGNORECASE)
+
+
+@dataclass
+class Row:
+    """A stretch while it is read: where it begins, its targets [deg or mm], times between [s]."""
+
+    name: str
+    q: list[list[float]]
+    seconds: list[float]
+
+
+class Lines:
+    """The lines of a program, read one after the other, and what its comments say.
+
+    Parameters
+    ----------
+    file : path
+    comment : str
+        What a comment begins with.
+    """
+
+    def __init__(self, file: FilePath, comment: str) -> None:
+        self._file, self._mark = file, comment
+        try:
+            content = file.read_bytes()
+        except OSError as error:
+            raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
+        if len(content) > _BYTES:
+            raise FileFormatError(f"{file}: has {len(content)} bytes, expected {_BYTES} at most")
+        try:
+            self._lines = content.decode("utf-8-sig").splitlines()
+        except UnicodeDecodeError as error:
+            raise FileFormatError(f"{file}: is no text: {error}") from error
+        self.number = 0
+        self.notes: list[str] = []
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield what is no comment, without spaces around it."""
+        for number, line in enumerate(self._lines, 1):
+            self.number = number
+            text = line.strip()
+            if len(text) > _LINE:
+                raise self.fault(f"has {len(text)} characters, expected {_LINE} at most")
+            if text.startswith(self._mark):
+                note = text[len(self._mark) :].strip()
+                if note.startswith(".. ") and self.notes:
+                    self.notes[-1] += note[2:]
+                else:
+                    self.notes.append(note)
+            elif text:
+                yield text
+
+    def fault(self, what: str) -> FileFormatError:
+        """Return an error about the line that was read last."""
+        return FileFormatError(f"{self._file}: line {self.number}: {what}")
+
+    def number_of(self, text: str) -> float:
+        """Return a number that controllers can hold."""
+        found = text.strip()
+        if not _NUMBER.fullmatch(found) or len(found) > 40 or not abs(float(found)) < 1e10:
+            raise self.fault(f"'{found[:40]}' is no number that is meant")
+        return float(found)
+
+    def coordinate(self, text: str) -> float:
+        """Return a coordinate in degrees or mm, as it is."""
+        value = self.number_of(text)
+        if abs(value) > _LARGEST:
+            raise self.fault(f"coordinate {value:g} is beyond all that is meant")
+        return value
+
+    def duration(self, text: str) -> float:
+        """Return a time [s] that is above 0."""
+        found = self.number_of(text)
+        if not 0.0 < found < _LARGEST:
+            raise self.fault(f"time is {found:g} s, expected a number above 0")
+        return found
+
+    def step(self) -> str:
+        """Return the seam or move that the last comment about one names."""
+        steps = [note.removeprefix("step: ") for note in self.notes if note.startswith("step: ")]
+        return steps[-1] if steps else ""
+
+    def _joints(self) -> dict[str, tuple[str, bool]]:
+        """Return what comments say of axes: axis → its joint, and whether that slides."""
+        said = next((note for note in self.notes if note.startswith("axes: ")), "axes: ")
+        joints: dict[str, tuple[str, bool]] = {}
+        for item in said.removeprefix("axes: ").split(", "):
+            found = re.fullmatch(r"([AE][1-6]) = (\S+) \[(mm|deg)\]", item)
+            if found:
+                joints[found[1]] = found[2], found[3] == "mm"
+        names = [joint for joint, _ in joints.values()]
+        if len(set(names)) < len(names):
+            raise FileFormatError(f"{self._file}: two axes are the same joint: {said[:200]}")
+        return joints
+
+    def miss(self) -> Miss:
+        """Return the deviation that the comments state, or one without bounds."""
+        for note in self.notes:
+            found = re.fullmatch(
+                r"deviation: ([\d.]+) mm, ([\d.]+) rad, joints ([\d.]+)", note[:200]
+            )
+            if found:
+                position, rotation, joint = (self.number_of(text) for text in found.groups())
+                return Miss(1e-3 * position, rotation, joint)
+        return Miss(np.inf, np.inf, np.inf)
+
+    def program(
+        self, name: str, present: Sequence[str], rows: Sequence["Row"]
+    ) -> ControllerProgram:
+        """Return the program of rows of targets.
+
+        Raises
+        ------
+        FileFormatError
+            Something is missing.
+        """
+        if not name:
+            raise FileFormatError(f"{self._file}: has no beginning of a program")
+        said = self._joints()
+        # Robots of fewer axes have numbers in the places of those they lack.
+        kept = [k for k, axis in enumerate(present) if axis in said or not said]
+        axes = tuple(Axis(present[k], *said.get(present[k], (present[k], False))) for k in kept)
+        if not axes:
+            raise FileFormatError(f"{self._file}: has no axes of those that its comments name")
+        stretches = []
+        for row in rows:
+            q = np.array(row.q, dtype=np.float64)[:, kept]
+            scale = [1e-3 if axis.slides else np.pi / 180.0 for axis in axes]
+            t = np.round(np.append(0.0, np.cumsum(row.seconds)), 6)
+            stretches.append(Stretch(row.name, t, q * scale))
+        if not stretches:
+            raise FileFormatError(f"{self._file}: has no targets with times")
+        return ControllerProgram(name, axes, tuple(stretches), self.miss())
+
+
+class ProgramReader:
+    """Reads a program line by line; `state` says where it is.
+
+    Attributes
+    ----------
+    grammar : tuple of (states, pattern, method)
+        What is read: in which states, a pattern of the whole line, and the method that takes its
+        groups. All else is refused.
+    comment, last : str
+        What a comment begins with, and what ends the file.
+    """
+
+    grammar: ClassVar[tuple[tuple[tuple[str, ...], str, Any], ...]] = ()
+    comment, last = "", ""
+
+    def __init__(self, file: FilePath) -> None:
+        self.lines = Lines(file, self.comment)
+        self.name, self.state = "", "before"
+        self.present: list[str] = []
+        self.rows: list[Row] = []
+        self.at: list[float] = []
+
+    def program(self) -> ControllerProgram:
+        """Read all of it.
+
+        Raises
+        ------
+        FileFormatError
+            A line is none of those that are read, or something is missing.
+        """
+        for line in self.lines:
+            text = " ".join(line.split())
+            for states, pattern, method in self.grammar:
+                found = re.fullmatch(pattern, text, re.IGNORECASE) if self.state in states else None
+                if found:
+                    method(self, found.groups())
+                    break
+            else:
+                raise self.lines.fault(f"'{text[:60]}' is not read: see read_motion for what is")
+        if self.state != "after":
+            raise self.lines.fault(f"is the last one, expected {self.last}")
+        return self.lines.program(self.name, self.present, self.rows)
+
+    def skip(self, _: Sequence[str]) -> None:
+        """Take a line that says nothing of the motion."""
+
+    def end(self, _: Sequence[str]) -> None:
+        """End the module."""
+        self.state = "after"
+
+    def wait(self, given: Sequence[str]) -> None:
+        """Take a rest."""
+        seconds = self.lines.duration(given[0])
+        self.rows.append(Row(self.lines.step(), [self.at, self.at], [seconds]))
+
+    def same_axes(self, present: list[str]) -> None:
+        """Refuse a target with other axes than those before."""
+        self.present = self.present or present
+        if present != self.present:
+            raise self.lines.fault(
+                f"has axes {', '.join(present)}, expected {', '.join(self.present)}"
+            )

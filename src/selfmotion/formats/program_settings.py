@@ -1,0 +1,137 @@
+"""What a controller's program says besides the motion."""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Any
+
+from selfmotion.basics import (
+    FileFormatError,
+    ProblemError,
+    SelfmotionError,
+    as_number,
+    as_numbers,
+    as_path,
+    nearest,
+    shown,
+)
+from selfmotion.certificate import Tolerance
+from selfmotion.formats.documents import in_si, read_document
+
+# Where an output of a signal is, and what it becomes.
+Signal = tuple[str | int, bool]
+_DEVIATION = Tolerance(1e-4, 1e-3)
+AXES = tuple(f"{kind}{number}" for kind in "AE" for number in range(1, 7))
+
+
+@dataclass(frozen=True)
+class ProgramSettings:
+    """What a program for a controller says besides the motion.
+
+    Parameters
+    ----------
+    deviation : Tolerance
+        How far what the controller makes of the targets may be off the motion: the tool's position
+        [m] and rotation [rad], and each joint by that angle or length as well. Targets are as many
+        as that takes.
+    axes : mapping
+        Joint → axis: ``"A1"`` to ``"A6"`` of the robot, ``"E1"`` to ``"E6"`` for others. By
+        default joints that slide, and those of a cell's smaller parts, are others; of an arm with
+        seven the third one is E1, as KUKA's LBR and ABB's IRB 14000 count; the rest in order.
+    signals : mapping
+        Event → output and value, such as ``{"arc on": ("doArc", True)}``; KUKA's and Universal
+        Robots' outputs are numbers. None for an event that is a comment only.
+    flange : str, optional
+        The link that is the controller's flange, from which it counts the tool's place; by default
+        ``flange`` or ``tool0`` where the tool rides on the same link, else that link itself.
+    mass : float, optional
+        Of what the flange carries [kg]; by default nothing is said of it, and the controller goes
+        on with the load that it has (ABB: with that of ``tool0``).
+    center : (3,)
+        Its centre of mass from the flange [m].
+    approach : float
+        How fast the arm goes to the start: of the fastest that its joints may (KUKA, Universal
+        Robots) or of 500 mm/s and 100 °/s (ABB).
+
+    Raises
+    ------
+    ProblemError
+        A value is not what it should be.
+    """
+
+    deviation: Tolerance = _DEVIATION
+    axes: Mapping[str, str] = field(default_factory=dict)
+    signals: Mapping[str, Signal | None] = field(default_factory=dict)
+    flange: str | None = None
+    mass: float | None = None
+    center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    approach: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.deviation, Tolerance):
+            found = shown(self.deviation)
+            raise ProblemError(f"deviation is {found}, expected a Tolerance, in m and rad")
+        for name in ("axes", "signals"):
+            if not isinstance(getattr(self, name), Mapping):
+                raise ProblemError(f"{name} is {shown(getattr(self, name))}, expected a mapping")
+        for joint, axis in self.axes.items():
+            if axis not in AXES:
+                raise ProblemError(
+                    f"axes: '{joint}' is axis {shown(axis)}, expected one of A1 to A6, E1 to E6"
+                )
+        signals = {event: _signal(event, given) for event, given in self.signals.items()}
+        object.__setattr__(self, "signals", signals)
+        if self.flange is not None and not isinstance(self.flange, str):
+            raise ProblemError(f"flange is {shown(self.flange)}, expected the name of a link")
+        if self.mass is not None:
+            object.__setattr__(self, "mass", as_number(self.mass, "mass", above=0.0))
+        center = as_numbers(self.center, "center", "3 finite numbers [m]", (3,))
+        object.__setattr__(self, "center", tuple(center.tolist()))
+        approach = as_number(self.approach, "approach", above=0.0, most=1.0)
+        object.__setattr__(self, "approach", approach)
+
+
+def read_program_settings(file: str | FilePath) -> ProgramSettings:
+    """Read the settings of a controller's program: TOML or JSON, keys as in `ProgramSettings`.
+
+    ``deviation`` is a table with ``position`` (or ``position_mm``) and ``rotation`` (or
+    ``rotation_deg``); a signal is a list of an output and true or false.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or says something else; file and key are named.
+    """
+    path = as_path(file)
+    values: dict[str, Any] = in_si(read_document(path))
+    known = [item.name for item in dataclasses.fields(ProgramSettings)]
+    for key in values:
+        if key not in known:
+            raise FileFormatError(
+                f"{path}: unknown key '{key}'{nearest(key, known)}; expected {', '.join(known)}"
+            )
+    try:
+        if "deviation" in values:
+            given = values["deviation"]
+            if not isinstance(given, dict) or set(given) - {"position", "rotation"}:
+                raise ProblemError("deviation: expected a table of position and rotation")
+            values["deviation"] = Tolerance(**{**dataclasses.asdict(_DEVIATION), **given})
+        return ProgramSettings(**values)
+    except SelfmotionError as error:
+        raise FileFormatError(f"{path}: {error}") from error
+
+
+def _signal(event: object, given: object) -> Signal | None:
+    if given is None:
+        return None
+    if isinstance(given, list | tuple) and len(given) == 2:
+        output, value = given
+        named = isinstance(output, str) and output.isascii() and output.isidentifier()
+        numbered = isinstance(output, int) and not isinstance(output, bool) and 0 <= output < 8192
+        if isinstance(value, bool) and (named or numbered):
+            return output, value
+    raise ProblemError(
+        f"signals: '{event}' is {shown(given)}, expected an output (its name or number) and "
+        f"whether it becomes true"
+    )

@@ -1,0 +1,248 @@
+"""Programs of machine tools in: what they say of a tool is where the path takes it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.formats.cldata import read_cldata
+from selfmotion.formats.gcode import read_gcode
+
+# A plunge, a slot with an arc of 20 mm and a tilted end, a retract; and another cut.
+GCODE = """%
+O1001 (SLOT)
+N10 G21 G90 G94 G17 G54 G43.4 H1
+N20 T1 M6
+N30 G0 X0 Y0 Z50 S8000 M3
+N40 Z5
+N50 G1 Z-2 F600 M8
+N60 X40 F1200
+N70 G3 X60 Y20 I0 J20
+N80 G1 Y50 B15
+N90 Z5 ; out
+M9
+N100 G0 Z50 B0
+N110 X100 Y0
+G91
+G1 Z-20 X10
+Y30
+G90 G0 Z50
+M30
+anything after the end
+"""
+CLDATA = """PARTNO/SLOT
+UNITS/MM
+LOADTL/1 $$ a ball
+FROM/0,0,50
+SPINDL/8000,RPM,CLW
+RAPID
+GOTO/0,0,5
+FEDRAT/600,MMPM
+GOTO/0,0,-2,0,0,1
+FEDRAT/1200,MMPM
+COOLNT/ON
+GOTO/40,0,-2
+GOTO/40,50,-2,$
+  0.258819045,0,0.965925826
+GOTO/40,50,5
+RAPID
+GOTO/100,0,50,0,0,1
+GODLTA/10,0,-20
+GODLTA/0,30,0
+FINI
+"""
+# What rounded corners and chords of arcs may be off [m].
+CORNER, CHORD = 1.01e-3, 1.1e-5
+
+
+def written(folder: Path, name: str, text: str) -> Path:
+    (folder / name).write_text(text)
+    return folder / name
+
+
+def test_cuts_are_what_is_between_rapids(tmp_path: Path) -> None:
+    cuts = read_gcode(written(tmp_path, "slot.nc", GCODE))
+    assert list(cuts) == ["cut 1", "cut 2"]
+    first, second = cuts.values()
+    np.testing.assert_allclose(first.positions[:3], [[0, 0, 5e-3], [0, 0, -2e-3], [0.04, 0, -2e-3]])
+    assert first.places[:3] == ["line 7", "line 7", "line 8"]
+    assert first.feed is not None
+    # From a pose on, 600 and 1200 mm/min.
+    np.testing.assert_allclose(first.feed[:3], [0.01, 0.02, 0.02])
+    assert [event for _, event in first.events] == ["M6", "M3", "M8", "M9"]
+    np.testing.assert_allclose(
+        second.positions, [[0.1, 0, 0.05], [0.11, 0, 0.03], [0.11, 0.03, 0.03]]
+    )
+    arc = first.positions[3:-2]
+    away = np.linalg.norm(arc[:, :2] - [0.04, 0.02], axis=1)
+    np.testing.assert_allclose(away, 0.02, atol=1e-12)
+    middles = 0.5 * (arc[1:] + arc[:-1])
+    assert np.abs(np.linalg.norm(middles[:, :2] - [0.04, 0.02], axis=1) - 0.02).max() < CHORD
+    # Into the part: against the axis of the machine.
+    np.testing.assert_allclose(first.values[0][:, 2], [0, 0, -1], atol=1e-12)
+    tilted = np.array([np.sin(np.radians(15)), 0, np.cos(np.radians(15))])
+    np.testing.assert_allclose(first.values[-1][:, 2], -tilted, atol=1e-12)
+    for turn in first.values:
+        np.testing.assert_allclose(turn.T @ turn, np.eye(3), atol=1e-12)
+        assert np.linalg.det(turn) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("by_radius", "by_centre"),
+    [
+        ("G2 X50 Y-20 R20", "G2 X50 Y-20 I0 J-20"),
+        ("G3 X50 Y-20 R20", "G3 X50 Y-20 I20 J0"),
+        ("G2 X50 Y-20 R-20", "G2 X50 Y-20 I20 J0"),
+        ("G3 X50 Y20 Z3 R20", "G3 X50 Y20 Z3 I0 J20"),
+    ],
+)
+def test_arcs_by_radius_and_by_centre_agree(tmp_path: Path, by_radius: str, by_centre: str) -> None:
+    start = "G0 X30 Y0 Z0\nF600\n"
+    one = read_gcode(written(tmp_path, "a.nc", start + by_radius))["cut 1"].positions
+    other = read_gcode(written(tmp_path, "b.nc", start + by_centre))["cut 1"].positions
+    np.testing.assert_allclose(one, other, atol=1e-12)
+    # Clockwise bends to the right.
+    legs = np.diff(one[:, :2], axis=0)
+    bends = legs[:-1, 0] * legs[1:, 1] - legs[:-1, 1] * legs[1:, 0]
+    assert (bends < 0.0).all() == by_radius.startswith("G2")
+
+
+def test_both_languages_say_the_same(tmp_path: Path) -> None:
+    lines = GCODE.replace("N70 G3 X60 Y20 I0 J20\nN80 G1 Y50 B15", "N80 G1 X40 Y50 B15")
+    one = list(read_gcode(written(tmp_path, "slot.nc", lines)).values())
+    other = list(read_cldata(written(tmp_path, "slot.apt", CLDATA)).values())
+    assert len(one) == len(other) == 2
+    for mine, theirs in zip(one, other, strict=True):
+        np.testing.assert_allclose(mine.positions, theirs.positions, atol=1e-12)
+        np.testing.assert_allclose(mine.values, theirs.values, atol=1e-9)
+    assert one[0].feed is not None
+    np.testing.assert_allclose(one[0].feed, other[0].feed)
+    inches = CLDATA.replace("UNITS/MM", "UNITS/INCHES").replace(",MMPM", ",IPM")
+    large = list(read_cldata(written(tmp_path, "inch.apt", inches)).values())
+    np.testing.assert_allclose(large[0].positions, 25.4 * other[0].positions)
+
+
+@pytest.mark.parametrize("name", ["slot.nc", "slot.apt"])
+def test_the_path_goes_along_the_legs_at_the_feeds(tmp_path: Path, name: str) -> None:
+    file = written(tmp_path, name, GCODE if name.endswith("nc") else CLDATA)
+    rows = (read_gcode if name.endswith("nc") else read_cldata)(file)["cut 1"]
+    path = sm.read_path(file, seam="cut 1")
+    t = np.linspace(0.0, path.duration, 4001)
+    samples = path.samples(t)
+    legs = list(zip(rows.positions[:-1], rows.positions[1:], strict=True))
+
+    def away(point: np.ndarray) -> float:
+        found = []
+        for begin, end in legs:
+            leg = end - begin
+            share = np.clip((point - begin) @ leg / (leg @ leg), 0.0, 1.0)
+            found.append(float(np.linalg.norm(begin + share * leg - point)))
+        return min(found)
+
+    assert max(away(point) for point in samples.translation[::10]) < CORNER
+    np.testing.assert_allclose(samples.translation[[0, -1]], rows.positions[[0, -1]], atol=1e-9)
+    speeds = np.linalg.norm(samples.twist[:, :3], axis=1)
+    assert speeds.max() == pytest.approx(0.02, rel=0.02)
+    for end in (0, -1):
+        assert np.abs(samples.twist[end]).max() < 1e-9
+
+
+def test_a_cut_that_goes_back_rests_there(tmp_path: Path) -> None:
+    text = "G0 X0 Y0 Z5\nG1 Z-5 F600\nZ5\nX10\n"
+    path = sm.read_path(written(tmp_path, "peck.nc", text))
+    times = np.linspace(0.0, path.duration, 5001)
+    samples = path.samples(times)
+    lowest = int(samples.translation[:, 2].argmin())
+    assert samples.translation[lowest, 2] == pytest.approx(-5e-3, abs=1e-6)
+    assert np.linalg.norm(samples.twist[lowest, :3]) < 1e-3
+
+
+def test_tables_name_seams_and_events(tmp_path: Path) -> None:
+    rows = ["seam,x,y,z,feed,event"]
+    rows += [f"left,{0.02 * k},0,0,0.05,{'arc on' if k == 1 else ''}" for k in range(5)]
+    rows += [f"right,{0.02 * k},0.1,0,0.05,{'arc off' if k == 4 else ''}" for k in range(5)]
+    file = written(tmp_path, "seams.csv", "\n".join(rows) + "\n")
+    path = sm.read_path(file, seam="right")
+    np.testing.assert_allclose(path.pose(0.0).translation, [0, 0.1, 0], atol=1e-12)
+    with pytest.raises(sm.FileFormatError, match="has 2 seams or cuts, left to right: choose one"):
+        sm.read_path(file)
+    with pytest.raises(sm.FileFormatError, match="has no seam 'middle'"):
+        sm.read_path(file, seam="middle")
+    job = tmp_path / "job.toml"
+    job.write_text('task = "position"\n[robot]\nname = "panda"\n[seams]\nfile = "seams.csv"\n')
+    left, right = sm.read_seam_job(job).seams
+    ((name, at),) = left.events
+    assert name == "arc on"
+    np.testing.assert_allclose(left.path.pose(at).translation, [0.02, 0, 0], atol=1e-4)
+    assert not left.either_way
+    assert right.events == (("arc off", right.path.duration),)
+
+
+def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
+    written(tmp_path, "slot.nc", GCODE)
+    job = tmp_path / "job.toml"
+    job.write_text(
+        'task = "pointing"\n[robot]\nname = "panda"\n[seams]\nfile = "slot.nc"\n'
+        "frame = { position = [0.4, 0, 0.3] }\ntolerance = 0.0005\n"
+    )
+    first, second = sm.read_seam_job(job).seams
+    assert (first.name, second.name) == ("cut 1", "cut 2")
+    assert [name for name, _ in first.events] == ["M6", "M3", "M8", "M9"]
+    assert [at for name, at in first.events if name in ("M6", "M9")] == [0.0, first.path.duration]
+    np.testing.assert_allclose(first.path.pose(0.0).translation, [0.4, 0.0, 0.305], atol=1e-9)
+    np.testing.assert_allclose(first.path.pose(0.0).rotation[:, 2], [0, 0, -1], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("G18", "G18 is not read"),
+        ("G93", "G93 is not read"),
+        ("G1 U4", "word 'U4' is not read"),
+        ("G1 X#101", "'X#101' is not read"),
+        ("G1 X1 X2", "word X is there twice"),
+        ("G1 X1 F0", "expected a feed above 0"),
+        ("G2 X1 Y1 R0.1", "no arc of radius"),
+        ("G2 X1 Y1 I7 J0", "from its centre"),
+        ("G1 X1 I1 J0", "a tool axis is I, J and K, all three"),
+        ("G1 X9999999", "farther than anything is"),
+        ("G28 X0", "G28 is not read"),
+    ],
+)
+def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -> None:
+    text = GCODE.replace("N90 Z5 ; out", line)
+    with pytest.raises(sm.FileFormatError, match=rf"slot\.nc: line 11: .*{said}"):
+        sm.read_path(written(tmp_path, "slot.nc", text), seam="cut 1")
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("CIRCLE/1,2,3,0,0,1,5", "statement 'CIRCLE' is not read"),
+        ("CYCLE/DRILL,5", "statement 'CYCLE' is not read"),
+        ("GOTO/1,2", "GOTO has 2 numbers"),
+        ("GOTO/1,2,x", "'X' is no number"),
+        ("GOTO/1,2,3,0,0,0", "has no direction"),
+        ("FEDRAT/100,MMPR", "expected a feed, and MMPM or IPM"),
+        ("UNITS/FEET", "expected MM or INCHES"),
+        ("?", "is not read"),
+    ],
+)
+def test_other_statements_are_refused_by_line(tmp_path: Path, line: str, said: str) -> None:
+    text = CLDATA.replace("GOTO/40,50,5", line)
+    with pytest.raises(sm.FileFormatError, match=rf"slot\.apt: line 15: .*{said}"):
+        sm.read_path(written(tmp_path, "slot.apt", text), seam="cut 1")
+
+
+def test_a_program_without_feeds_or_cuts_says_so(tmp_path: Path) -> None:
+    file = written(tmp_path, "a.nc", "G0 X0 Y0 Z0\nG1 X10\n")
+    with pytest.raises(sm.FileFormatError, match="says no feed"):
+        sm.read_path(file)
+    assert sm.read_path(file, feed=0.02).duration > 0.5
+    with pytest.raises(sm.FileFormatError, match="duration has no effect"):
+        sm.read_path(file, duration=2.0)
+    with pytest.raises(sm.FileFormatError, match="has no cut"):
+        sm.read_path(written(tmp_path, "b.nc", "G0 X0 Y0 Z0\nX3\n"))
+    with pytest.raises(sm.FileFormatError, match="cuts, and X is not known yet"):
+        sm.read_path(written(tmp_path, "c.nc", "G1 Y3 F100\n"))

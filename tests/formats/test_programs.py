@@ -1,0 +1,300 @@
+"""Programs of controllers: what is stated of them holds, whichever way the targets are joined."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.formats import program_miss
+from support.arms import PANDA_HOME, robot_named
+from support.shell import invoke
+
+SIGNALS = {"arc on": (7, True), "arc off": (7, False)}
+NAMED = {"arc on": ("doArc", True), "arc off": ("doArc", False)}
+FILES = ("weld.src", "weld.mod")
+# The worst of the tool's error lies between the times at which the writer looks.
+FINER = 1.02
+# Each stretch is longer or shorter by half a digit of time, at some rad/s.
+LATE = 2e-5
+
+
+@pytest.fixture(scope="module")
+def plan() -> sm.Plan:
+    panda = robot_named("panda")
+    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
+    return sm.plan(sm.Problem(panda, circle, start=PANDA_HOME, collision=None)).require()
+
+
+@pytest.fixture(scope="module")
+def program() -> sm.Program:
+    """Two seams of a UR5, with an arc, moves and a wait."""
+    ur5 = robot_named("ur5")
+    start = ur5.dexterous_configuration("pointing")
+    first = ur5.pose(start)
+    seams = []
+    for k, side in enumerate((0.0, 0.06)):
+        begin, end = first.copy(), first.copy()
+        begin.translation = first.translation + np.array([0.0, side, 0.0])
+        end.translation = begin.translation + np.array([0.0, 0.0, 0.05])
+        events = [("arc on", 0.0), ("arc off", 0.7)]
+        path = sm.Line(begin, end, 1.0)
+        seams.append(sm.Seam(f"seam {k}", path, "pointing", wait=0.5 * (1 - k), events=events))
+    made = sm.plan_job(ur5, seams, start=start, order="given", branches=1, clearance=None)
+    return made.require()
+
+
+def settings(file: str, deviation: float = 2e-4) -> sm.ProgramSettings:
+    signals = SIGNALS if file.endswith(".src") else NAMED
+    return sm.ProgramSettings(sm.Tolerance(deviation, 10 * deviation), signals=signals, mass=3.0)
+
+
+def krl_targets(text: str) -> tuple[list[list[float]], list[float]]:
+    """By KSS 8.3 SI: parts share the time of their block in proportion."""
+    code = "\n".join(line for line in text.splitlines() if not line.strip().startswith(";"))
+    axes = ["A1", "A2", "A3", "A4", "A5", "A6", "E1"]
+    begin = re.search(r"PTP (\{A1.*\})", code)
+    assert begin is not None
+
+    def values(aggregate: str) -> list[float]:
+        found = dict(re.findall(r"([AE]\d) (\S+?)[,}]", aggregate))
+        return [float(found[name]) for name in axes if name in found]
+
+    targets, times = [values(begin[1])], [0.0]
+    for block in re.findall(r"PTP_SPLINE(.*?)ENDSPLINE|WAIT SEC (\S+)", code, re.DOTALL):
+        if block[1]:
+            targets.append(targets[-1])
+            times.append(times[-1] + float(block[1]))
+            continue
+        parts = [float(part) for part in re.findall(r"PART = (\S+)", block[0])]
+        (whole,) = re.findall(r"TIME_BLOCK END = (\S+)", block[0])
+        targets += [values(found) for found in re.findall(r"SPTP (\{.*\})", block[0])]
+        times += [times[-1] + t * float(whole) / sum(parts) for t in np.cumsum(parts).tolist()]
+    return targets, times
+
+
+def rapid_targets(text: str) -> tuple[list[list[float]], list[float]]:
+    """By ABB's manual: \\T is the time of each motion [s], 9E9 is no axis."""
+    targets: list[list[float]] = []
+    times: list[float] = []
+    for line in text.splitlines():
+        move = re.match(r"\s+MoveAbsJ \[\[(.*?)\], \[(.*?)\]\]\\NoEOffs, \w+(?:\\T:=(\S+))?,", line)
+        wait = re.match(r"\s+WaitTime (\S+);", line)
+        if move:
+            row = [float(value) for value in f"{move[1]}, {move[2]}".split(",")]
+            targets.append([value for value in row if value < 8.9e9])
+            times.append((times[-1] if times else 0.0) + float(move[3] or 0.0))
+        elif wait:
+            targets.append(targets[-1])
+            times.append(times[-1] + float(wait[1]))
+    return targets, times
+
+
+def joined(file: Path, names: tuple[str, ...], seventh: int | None) -> tuple[Array, Array]:
+    """Return times and targets [rad] in the robot's order, by the makers' definitions."""
+    parse = krl_targets if file.suffix == ".src" else rapid_targets
+    targets, times = parse(file.read_text())
+    q = np.radians(targets)
+    order = list(range(len(names)))
+    if seventh is not None:
+        order = [*order[:seventh], len(names) - 1, *order[seventh : len(names) - 1]]
+    return np.array(times), q[:, order]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_deviation_that_is_stated_holds(plan: sm.Plan, tmp_path: Path, name: str) -> None:
+    file, counts = tmp_path / name, []
+    for deviation in (1e-3, 1e-4):
+        sm.write_motion(plan, file, settings=settings(name, deviation))
+        count, stated, found = program_miss(plan, file)
+        counts.append(count)
+        # KUKA's LBR and ABB's IRB 14000 count the third of seven joints apart.
+        t, q = joined(file, plan.robot.joint_names, seventh=2)
+        assert len(t) == count + 1
+        assert t[-1] == pytest.approx(plan.trajectory.duration, abs=1e-5)
+        times = np.linspace(0.0, 0.999999 * t[-1], 4001)
+        exact = plan.trajectory(times)
+        lines = np.stack([np.interp(times, t, column) for column in q.T], axis=1)
+        smooth = CubicSpline(t, q, bc_type="clamped")(times)
+        place = plan.robot.chain.along
+        for way in (lines, smooth):
+            off = np.linalg.norm(place(way)[2] - place(exact)[2], axis=1).max()
+            assert off <= FINER * stated.position
+        assert found.position <= stated.position <= deviation
+        # And it is used: fewer targets would not do.
+        assert stated.position > 0.4 * deviation
+    # The error of straight lines goes with the square of their length.
+    assert 2.5 < counts[1] / counts[0] < 4.0
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_what_is_read_is_what_was_written(plan: sm.Plan, tmp_path: Path, name: str) -> None:
+    file = tmp_path / name
+    sm.write_motion(plan, file, settings=settings(name))
+    again = sm.read_motion(file).of_joints(plan.robot.joint_names)
+    t, q = joined(file, plan.robot.joint_names, seventh=2)
+    np.testing.assert_allclose(again.t, t, atol=1e-9)
+    np.testing.assert_allclose(again.q, q, atol=1e-12)
+    within = sm.Tolerance(2e-4, 2e-3)
+    assert plan.problem.certify(again, within).position_error.value < within.position
+    # Another number, and the file is no longer what it states.
+    text = file.read_text()
+    middle = text.index("SPTP" if name.endswith("src") else "MoveAbsJ", len(text) // 2)
+    moved = re.sub(
+        r"(\d)\.(\d)", lambda m: f"{m[1]}.{(int(m[2]) + 5) % 10}", text[middle:], count=1
+    )
+    file.write_text(text[:middle] + moved)
+    _, stated, found = program_miss(plan, file)
+    assert found.position > 2.0 * stated.position
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_job_keeps_its_seams_events_and_waits(
+    program: sm.Program, tmp_path: Path, name: str
+) -> None:
+    file = tmp_path / name
+    sm.write_motion(program, file, settings=settings(name))
+    text = file.read_text()
+    for step in program.steps:
+        assert f"step: {step.name.replace('→', '->')}" in text
+    t, q = joined(file, program.robot.joint_names, seventh=None)
+    np.testing.assert_allclose(q, program.trajectory(np.minimum(t, program.duration)), atol=LATE)
+    motion = sm.read_motion(file)
+    assert motion.duration == pytest.approx(program.duration, abs=1e-4)
+    count, stated, found = program_miss(program, file)
+    assert found.position <= stated.position <= 2e-4
+    assert count < len(program.trajectory.t)
+    switched = r"\$OUT\[7\] = (TRUE|FALSE)" if name.endswith("src") else "SetDO doArc, ([01]);"
+    assert re.findall(switched, text) == (["TRUE", "FALSE"] if "src" in name else ["1", "0"]) * 2
+    # An output is switched at the target that is reached at its time.
+    marks = [match.start() for match in re.finditer(switched, text)]
+    for mark, (at, _, event) in zip(marks, program.events, strict=True):
+        before = len(re.findall(r"SPTP|MoveAbsJ.*\\T|WAIT SEC|WaitTime", text[:mark]))
+        ahead = event == "arc off" and name.endswith("src")
+        assert t[before + ahead] == pytest.approx(at, abs=1e-4)
+
+
+def test_urscript_knows_tool_load_and_outputs(program: sm.Program, tmp_path: Path) -> None:
+    file = tmp_path / "weld.script"
+    sm.write_motion(program, file, settings=settings("weld.src"))
+    lines = file.read_text().splitlines()
+    head = [line for line in lines if "servoj(" not in line]
+    assert any(line.startswith("  set_tcp(p[0.0") for line in head)
+    assert "  set_payload(3, [0, 0, 0])" in head
+    assert any(re.match(r"  movej\(\[.*\], a=0.14, v=0.314\)", line) for line in head)
+    outputs = [k for k, line in enumerate(lines) if "set_standard_digital_out(7" in line]
+    assert [lines[k].endswith("True)") for k in outputs] == [True, False] * 2
+    stream = [sum("servoj(" in line for line in lines[:k]) for k in outputs]
+    np.testing.assert_allclose(stream, [125.0 * at for at, _, _ in program.events], atol=1.0)
+
+
+def test_other_axes_are_in_mm_and_counted_apart(tmp_path: Path) -> None:
+    tiago = robot_named("tiago")
+    first = tiago.dexterous_configuration()
+    last = first + np.array([0.1, *[0.2] * 7])
+    move = sm.move(tiago, first, last, clearance=None).require()
+    sm.write_motion(move, tmp_path / "lift.mod")
+    text = (tmp_path / "lift.mod").read_text()
+    assert "E2 = torso_lift_joint [mm]" in text
+    (begin,) = re.findall(r"MoveAbsJ \[\[.*?\], \[(.*?)\]\]", text)[:1]
+    slide = begin.split(", ")[1]
+    assert float(slide) == pytest.approx(1e3 * first[0], abs=1e-4)
+    again = sm.read_motion(tmp_path / "lift.mod").of_joints(tiago.joint_names)
+    np.testing.assert_allclose(again.q[-1], last, atol=1e-6)
+    axes = {name: f"A{k}" for k, name in enumerate(tiago.joint_names[1:7], 1)}
+    axes |= {tiago.joint_names[7]: "E1", tiago.joint_names[0]: "E3"}
+    sm.write_motion(move, tmp_path / "lift.src", settings=sm.ProgramSettings(axes=axes))
+    assert "E3" in (tmp_path / "lift.src").read_text()
+    for wrong, said in (
+        ({"torso_lift_joint": "A1"}, "joint 'arm_1_joint' has no axis"),
+        (axes | {"torso_lift_joint": "E1"}, "two joints are axis E1"),
+        ({**axes, "torso_lift_joint": "A1", "arm_1_joint": "E3"}, "'torso_lift_joint' slides"),
+        (axes | {"nose": "E4"}, "'nose' is none of its joints"),
+    ):
+        asked = sm.ProgramSettings(axes=wrong)
+        with pytest.raises(sm.ProblemError, match=said):
+            sm.write_motion(move, tmp_path / "lift.src", settings=asked)
+
+
+def test_what_is_not_verified_is_written_only_when_forced(
+    plan: sm.Plan, program: sm.Program, tmp_path: Path
+) -> None:
+    from dataclasses import replace
+
+    broken = replace(plan, altered="somebody changed it")
+    unmade = replace(program, missing={"third": "out of reach"})
+    for made in (broken, unmade):
+        for name in (*FILES, "weld.csv"):
+            file = tmp_path / name
+            with pytest.raises(sm.PlanError, match=r"is not written: .*force=True"):
+                sm.write_motion(made, file, settings=settings(name))
+            assert not file.exists()
+            sm.write_motion(made, file, settings=settings(name), force=True)
+            assert file.exists()
+            file.unlink()
+    unmade.save(tmp_path / "a.program")
+    asked = ("export", tmp_path / "a.program", "--out", tmp_path / "a.csv")
+    code, text = invoke(*asked)
+    assert code == 1
+    assert "nothing is written: not verified: seam 'third' is not made" in text
+    assert text.count("\n") == 1
+    code, text = invoke(*asked, "--force")
+    assert code == 1
+    assert (tmp_path / "a.csv").exists()
+
+
+def test_the_shell_writes_programs_and_confirms_them(program: sm.Program, tmp_path: Path) -> None:
+    program.save(tmp_path / "a.program")
+    (tmp_path / "kuka.toml").write_text(
+        "mass = 3\ncenter_mm = [0, 0, 60]\napproach = 0.05\ndeviation = { position_mm = 0.2 }\n"
+        '[signals]\n"arc on" = [7, true]\n"arc off" = [7, false]\n'
+    )
+    asked = ("export", tmp_path / "a.program", "--out", tmp_path / "weld.src")
+    code, text = invoke(*asked, "--settings", tmp_path / "kuka.toml")
+    assert code == 0, text
+    assert re.search(r"read back: \d+ targets, between which the tool is at most 0\.\d+ mm", text)
+    assert "CM {X 0.0000, Y 0.0000, Z 60.0000" in (tmp_path / "weld.src").read_text()
+    with pytest.raises(sm.ProblemError, match="event 'arc on' has no signal"):
+        invoke(*asked)
+    with pytest.raises(sm.ProblemError, match="--rate has no effect"):
+        invoke(*asked, "--rate", "100")
+    (tmp_path / "kuka.toml").write_text("mas = 3\n")
+    with pytest.raises(sm.FileFormatError, match=r"unknown key 'mas'.*nearest: 'mass'"):
+        invoke(*asked, "--settings", tmp_path / "kuka.toml")
+
+
+def test_lines_that_are_not_written_are_refused_by_number(plan: sm.Plan, tmp_path: Path) -> None:
+    for name, line, said in (
+        ("weld.src", "  LIN {X 0, Y 0, Z 0}", "'LIN {X 0, Y 0, Z 0}' is not read"),
+        ("weld.src", "    SPTP {A1 0, A1 3}", "axis A1 is there twice|no TIME_BLOCK PART"),
+        ("weld.src", "    TIME_BLOCK PART = -1", "there is no target before|above 0"),
+        ("weld.mod", "    MoveL p1, v100, fine, tool0;", "'MoveL p1, v100, fine, tool0;'"),
+        ("weld.mod", "    WaitTime 1;", "rest where it does not stop"),
+    ):
+        file = tmp_path / name
+        sm.write_motion(plan, file, settings=settings(name))
+        lines = file.read_text().splitlines()
+        at = len(lines) // 2
+        while not re.match(r"\s+(SPTP|MoveAbsJ)", lines[at]):
+            at += 1
+        file.write_text("\n".join([*lines[:at], line, *lines[at:]]))
+        with pytest.raises(sm.FileFormatError, match=rf"{name}: line {at + 1}: .*({said})"):
+            sm.read_motion(file)
+        file.write_text("\n".join(lines[:at]))
+        with pytest.raises(sm.FileFormatError, match="is the last one, expected END"):
+            sm.read_motion(file)
+
+
+def test_modules_are_called_as_controllers_allow(plan: sm.Plan, tmp_path: Path) -> None:
+    for name in ("2weld.src", "we ld.mod", f"{'w' * 25}.src", f"{'w' * 29}.mod", "wéld.src"):
+        with pytest.raises(sm.FileFormatError, match="is no name: expected a letter"):
+            sm.write_motion(plan, tmp_path / name)
+    for name in (f"{'w' * 24}.src", f"{'w' * 28}.mod"):
+        sm.write_motion(plan, tmp_path / name)
+        text = (tmp_path / name).read_text()
+        assert max(len(word) for word in re.findall(r"\b[A-Za-z]\w*", text)) <= 32
+        assert text.isascii()
+        assert max(map(len, text.splitlines())) < 250

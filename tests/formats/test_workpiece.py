@@ -1,0 +1,166 @@
+"""A workpiece in a file: what belongs to it moves with it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.task import SE3, rpy
+
+BODIES = """
+obstacles = [
+  { shape = "box", name = "clamp", position = [0, 0.1, 0], rpy = [0, 0, 1], size_mm = [99, 9, 9] },
+  { shape = "sphere", name = "pin", position_mm = [10, 20, -50], radius_mm = 5 },
+]
+"""
+FRAMED = """
+task = "pointing"
+{more}
+[robot]
+name = "panda"
+{reference}
+[workpiece]
+frame = {{ position = [{x}, 0.1, 0.2], rpy_deg = [170, {tilt}, 40] }}
+{on}
+{bodies}
+{path}
+"""
+PATHS = {
+    "line": '[path]\nkind = "line"\nfeed = 0.05\nby = [0.1, 0, 0]\n'
+    "start = { position = [0, 0, 0] }",
+    "circle in a frame": '[path]\nkind = "circle"\nradius = 0.05\nduration = 3\n'
+    "start = { position = [0, 0.02, 0] }\n"
+    "frame = { position = [0.01, 0, 0], rpy_deg = [0, 0, 90] }",
+    "polyline": '[path]\nkind = "feed"\nfeed = 0.05\n'
+    'path = { kind = "polyline", positions = [[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0]], '
+    "quaternions = [[1, 0, 0, 0], [1, 0, 0, 0], [1, 0, 0, 0]] }",
+    "placed": '[path]\nkind = "placed"\nframe = { position = [0, 0, 0.01] }\n'
+    'path = { kind = "line", start = { position = [0, 0, 0] }, end = { position = [0.1, 0, 0] }, '
+    "duration = 2 }",
+    "file": '[path]\nkind = "file"\nfile = "seam.csv"\nfeed = 0.05',
+}
+
+
+def problem(folder: Path, path: str, x: float, tilt: float, **more: str) -> sm.Problem:
+    (folder / "seam.csv").write_text(
+        "x,y,z,nx,ny,nz\n0,0,0,0,0,1\n0.1,0,0,0,0,1\n0.2,0.1,0,0,0,1\n"
+    )
+    given = {"more": "", "reference": "", "on": "", "bodies": BODIES, **more}
+    text = FRAMED.format(x=x, tilt=tilt, path=PATHS[path], **given)
+    (folder / "cell.toml").write_text(text)
+    return sm.read_problem(folder / "cell.toml")
+
+
+def stands(x: float, tilt: float) -> SE3:
+    angles = np.radians([170.0, tilt, 40.0])
+    return SE3(rpy.rpyToMatrix(angles), np.array([x, 0.1, 0.2]))
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_moving_the_workpiece_moves_all_that_belongs_to_it(tmp_path: Path, path: str) -> None:
+    here, there = (problem(tmp_path, path, *at) for at in ((0.4, 10.0), (0.55, -5.0)))
+    moved = stands(0.55, -5.0) * stands(0.4, 10.0).inverse()
+    for t in np.linspace(0.0, here.path.duration, 7):
+        wanted = moved * here.path.pose(t)
+        np.testing.assert_allclose(there.path.pose(t).homogeneous, wanted.homogeneous, atol=1e-12)
+    bodies = [item.collision.obstacles for item in (here, there) if item.collision is not None]
+    assert [body.name for body in bodies[0]] == ["clamp", "pin"]
+    for one, other in zip(*bodies, strict=True):
+        np.testing.assert_allclose(
+            other.pose.homogeneous, (moved * one.pose).homogeneous, atol=1e-12
+        )
+    # Without a workpiece the file says the same by numbers in the world.
+    sm.write_problem(here, tmp_path / "again.toml")
+    again = sm.read_problem(tmp_path / "again.toml")
+    np.testing.assert_allclose(
+        again.path.pose(1.0).homogeneous, here.path.pose(1.0).homogeneous, atol=1e-12
+    )
+    assert again.collision is not None
+    for one, other in zip(bodies[0], again.collision.obstacles, strict=True):
+        np.testing.assert_allclose(other.pose.homogeneous, one.pose.homogeneous, atol=1e-12)
+
+
+def test_bodies_join_the_clearance_that_there_is(tmp_path: Path) -> None:
+    more = (
+        'constraints = [{ kind = "Clearance", distance_mm = 4, '
+        'obstacles = [{ shape = "sphere", name = "lamp", position = [0, 0, 2], radius = 0.1 }] }]'
+    )
+    found = problem(tmp_path, "line", 0.4, 0.0, more=more)
+    (clearance,) = (item for item in found.constraints if isinstance(item, sm.Clearance))
+    assert [body.name for body in clearance.obstacles] == ["lamp", "clamp", "pin"]
+    assert clearance.distance == 0.004
+    lamp = clearance.obstacles[0]
+    np.testing.assert_array_equal(lamp.pose.translation, [0.0, 0.0, 2.0])
+
+
+def test_its_mesh_is_a_body(tmp_path: Path) -> None:
+    import trimesh
+
+    trimesh.creation.box((100.0, 50.0, 10.0)).export(tmp_path / "part.stl")
+    mesh = 'mesh = "part.stl"\nscale = 0.001'
+    found = problem(tmp_path, "line", 0.4, 0.0, bodies=mesh)
+    assert found.collision is not None
+    (body,) = found.collision.obstacles
+    assert (body.name, body.file, body.scale) == ("workpiece", tmp_path / "part.stl", 0.001)
+    np.testing.assert_allclose(body.pose.homogeneous, stands(0.4, 0.0).homogeneous, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"on": 'on = "plate"'}, "expected robot.reference = 'plate'"),
+        ({"on": "scale = 2.0"}, "scale has no effect without a mesh"),
+        ({"more": "collision = false"}, "has bodies, but collision is false"),
+        ({"bodies": BODIES.replace("radius_mm = 5", 'radius_mm = 5, frame = "panda_link3"')},
+         "obstacle 'pin' rides on 'panda_link3'"),
+        ({"on": "fram = 3"}, "workpiece.fram: unknown key, did you mean 'frame'"),
+    ],
+)  # fmt: skip
+def test_what_has_no_meaning_is_refused(tmp_path: Path, more: dict[str, str], said: str) -> None:
+    with pytest.raises(sm.FileFormatError, match=said):
+        problem(tmp_path, "line", 0.4, 0.0, **more)
+
+
+def test_a_shape_needs_its_place_in_the_workpiece(tmp_path: Path) -> None:
+    problem(tmp_path, "line", 0.4, 0.0)
+    text = (tmp_path / "cell.toml").read_text().replace("start = { position = [0, 0, 0] }", "")
+    (tmp_path / "cell.toml").write_text(text)
+    with pytest.raises(sm.FileFormatError, match=r"path\.start is missing"):
+        sm.read_problem(tmp_path / "cell.toml")
+
+
+@pytest.mark.parametrize("listed", [False, True])
+def test_seams_of_a_job_move_with_it_and_so_does_what_they_leave(
+    tmp_path: Path, listed: bool
+) -> None:
+    rows = ("one,0,0", "one,0.1,0", "two,0,0.1", "two,0.1,0.1")
+    table = ["seam,x,y,z,nx,ny,nz", *(f"{row},0,0,0,1" for row in rows), ""]
+    (tmp_path / "seams.csv").write_text("\n".join(table))
+    leaves = 'leaves = [{ shape = "sphere", name = "bead", position = [0, 0, 0], radius = 0.01 }]'
+    given = '[seams]\nfile = "seams.csv"\nfeed = 0.05\nframe = { position = [0.01, 0, 0] }\n'
+    if listed:
+        given = (
+            f'[[seams]]\nname = "one"\n{leaves}\n[seams.path]\nkind = "file"\nfile = "seams.csv"\n'
+            'seam = "one"\nfeed = 0.05\nframe = { position = [0.01, 0, 0] }\n'
+        )
+    found = []
+    for x, tilt in ((0.4, 10.0), (0.55, -5.0)):
+        frame = f"frame = {{ position = [{x}, 0.1, 0.2], rpy_deg = [170, {tilt}, 40] }}\n"
+        text = f'task = "pointing"\n[robot]\nname = "panda"\n[workpiece]\n{frame}{BODIES}\n{given}'
+        (tmp_path / "job.toml").write_text(text)
+        found.append(sm.read_seam_job(tmp_path / "job.toml"))
+    here, there = found
+    moved = stands(0.55, -5.0) * stands(0.4, 10.0).inverse()
+    for one, other in zip(here.seams, there.seams, strict=True):
+        for t in (0.0, 1.0, one.path.duration):
+            wanted = moved * one.path.pose(t)
+            np.testing.assert_allclose(
+                other.path.pose(t).homogeneous, wanted.homogeneous, atol=1e-12
+            )
+        for body, again in zip(one.leaves, other.leaves, strict=True):
+            np.testing.assert_allclose(
+                again.pose.homogeneous, (moved * body.pose).homogeneous, atol=1e-12
+            )
+        assert len(one.leaves) == listed
+    assert [body.name for body in here.settings["clearance"].obstacles] == ["clamp", "pin"]
