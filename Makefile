@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-fastest bench-feeds bench-job bench-moves bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-first bench-fastest bench-feeds bench-job bench-moves bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -39,6 +39,9 @@ bench-batch: $(READY)  ## two processes against one, and what a plan costs besid
 
 bench-starts: $(READY)  ## free starts against the best of everything tried, 60 paths
 	$(BIN)/python benchmarks/starts.py
+
+bench-first: $(READY)  ## the first plan on a machine; what compiles after a warm-up
+	$(BIN)/python benchmarks/first_plan.py
 
 bench-fastest: $(READY)  ## 60 paces against linear programmes; the fastest motions of 20 paths, against retimed plans
 	$(BIN)/python benchmarks/paces.py

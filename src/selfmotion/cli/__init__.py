@@ -6,5 +6,6 @@ from selfmotion.cli import (
     jobs as jobs,
     paces as paces,
     runs as runs,
+    warm_up as warm_up,
 )
 from selfmotion.cli.app import app as app, main as main
