@@ -163,7 +163,7 @@ class TwistPath(Path, kind="twist"):
 
     def _twist(self, t: Array) -> Array:
         k, s = self._local(t)
-        basis = chebyshev.chebvander(s, self._coefficients.shape[1] - 1)
+        basis = _chebyshev(s, self._coefficients.shape[1])
         twist: Array = np.einsum("kd,kdi->ki", basis, self._coefficients[k])
         return twist
 
@@ -171,7 +171,7 @@ class TwistPath(Path, kind="twist"):
         """See `Path.evaluate`."""
         k, s = self._local(t)
         integrals, offsets = self._displacements
-        basis = chebyshev.chebvander(s, integrals.shape[1] - 1)
+        basis = _chebyshev(s, integrals.shape[1])
         position = self._start.translation + offsets[k]
         position = position + np.einsum("kd,kdi->ki", basis, integrals[k])
         return PathSamples(t, position, self._rotation(t), self._twist(t))
@@ -204,6 +204,12 @@ class TwistPath(Path, kind="twist"):
             "breaks": self._breaks.tolist(),
             "coefficients": self._coefficients.tolist(),
         }
+
+
+def _chebyshev(s: Array, count: int) -> Array:
+    """Return T_j(s) for j below count, (K, count): cos(j arccos s), at once for all j."""
+    angles = np.arccos(np.clip(s, -1.0, 1.0))
+    return np.asarray(np.cos(angles[:, None] * np.arange(float(count))))
 
 
 def _resolve(
