@@ -28,13 +28,14 @@ from selfmotion.planning.deadline import Deadline, TimedCounts
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import Finished, finish
 from selfmotion.planning.largest_part import LargestPart, largest_part
+from selfmotion.planning.refusal import looked_at, no_way
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import DAMPED_EVALUATIONS, PART_EVALUATIONS
 from selfmotion.planning.warm_start import check_warm_start
 from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Gap, Plan, Report
-from selfmotion.search import SPACING, Reach, SequenceGuide, reachable
+from selfmotion.search import SPACING, Obstruction, Reach, SequenceGuide, reachable
 
 # After these no other way is tried.
 _ENDED = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
@@ -154,9 +155,12 @@ class _Settings(NamedTuple):
 
 
 def _plan(problem: Problem, effort: Effort, search: Search, settings: _Settings) -> Plan:
-    found = _Planning(problem, effort, search, settings).plan()
+    free = problem.given_start is None and settings.guide is None and settings.warm_start is None
+    blocked = looked_at(problem, search, settings.progress) if free else None
+    found = _Planning(problem, effort, search, settings, blocked).plan()
     # Few motions take an arm into itself: the others need not wait for distances.
-    if not _overlaps(found) or found.report.status in _ENDED:
+    hopeless = blocked is not None or found.report.status in _ENDED
+    if not _overlaps(found) or hopeless:
         return found
     efforts = [(replace(effort, apart=True), search)]
     if problem.given_start is None and search.mode == "auto":
@@ -224,7 +228,9 @@ class _Planning:
         effort: Effort,
         search: Search,
         settings: _Settings,
+        blocked: Obstruction | None = None,
     ) -> None:
+        self._blocked = blocked
         self._problem, self._effort, self._search = problem, effort, search
         self._tolerance, self._progress = settings.tolerance, settings.progress
         self._deadline = settings.deadline
@@ -243,6 +249,8 @@ class _Planning:
     def plan(self) -> Plan:
         """Return the plan of the whole path, or of the largest part of it."""
         candidates = self._candidates
+        if self._blocked is not None and not self._blocked.is_met:
+            return self._up_to(self._blocked)
         try:
             best = candidates.run()
             shorter = self._shorter(best)
@@ -276,6 +284,13 @@ class _Planning:
         except KeyboardInterrupt:
             best.end(Status.INTERRUPTED)
             return self._gather(whole, finished, None)
+
+    def _up_to(self, blocked: Obstruction) -> Plan:
+        """Return the plan of what comes before a pose that is out of reach."""
+        shorter = self._part(blocked.time)
+        if shorter is None:
+            raise no_way(self._problem, blocked)
+        return shorter
 
     def _met(self, best: Session) -> Session:
         """Return a session of another null motion where one meets more of the constraints."""

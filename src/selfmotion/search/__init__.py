@@ -8,8 +8,10 @@ from selfmotion.search.curves import (
 from selfmotion.search.guides import (
     SequenceGuide as SequenceGuide,
     guides as guides,
+    guides_near as guides_near,
     has_curves as has_curves,
 )
+from selfmotion.search.obstruction import Obstruction as Obstruction, obstruction as obstruction
 from selfmotion.search.reach import Reach as Reach, reachable as reachable
 from selfmotion.search.sequences import (
     Sequence as Sequence,
