@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from selfmotion.basics import InverseKinematicsError, NoSequenceError, Progress, SelfmotionError
+from selfmotion.basics import InverseKinematicsError, NoSequenceError, SelfmotionError
 from selfmotion.planning.search import Search
 from selfmotion.problem import Problem
 from selfmotion.search import Obstruction, obstruction
 
 
-def looked_at(problem: Problem, search: Search, progress: Progress) -> Obstruction | None:
+def looked_at(problem: Problem, search: Search) -> Obstruction | None:
     """Return a pose that the arm cannot be at; None where it can be at all that were looked at.
 
     Or where it goes on all the same: damped motions leave their path, and what only keeps the arm
@@ -23,7 +23,6 @@ def looked_at(problem: Problem, search: Search, progress: Progress) -> Obstructi
     """
     if problem.damping is not None:
         return None
-    progress("reach", 1, 1)
     blocked = obstruction(problem, np.random.default_rng(search.rng))
     if blocked is None:
         return None
@@ -49,7 +48,7 @@ def no_way(problem: Problem, blocked: Obstruction) -> SelfmotionError:
         return InverseKinematicsError(
             f"{robot.name}: no configuration within the limits puts '{robot.tool}' at "
             f"{np.round(pose.translation, 4).tolist()} m for task '{problem.task.value}', where "
-            f"the path begins: {blocked.reason}{blocked.help}",
+            f"the path begins: {blocked.reason}; move the pose into the workspace{blocked.help}",
             position_miss=position,
             rotation_miss=rotation,
         )

@@ -20,6 +20,7 @@ from selfmotion.search.sequences import (
 from selfmotion.search.settings import SPACING as SPACING
 from selfmotion.search.starts import (
     Admits as Admits,
+    carried as carried,
     spread as spread,
     start_candidates as start_candidates,
 )

@@ -8,7 +8,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.problem import Problem
 from selfmotion.search.remedies import remedies
-from selfmotion.search.settings import AT_LIMIT, COARSE_POSES, LOOKED_AT, STRETCHED
+from selfmotion.search.settings import AT_LIMIT, COARSE_POSES, MOST_LOOKED_AT, STRETCHED
 from selfmotion.search.single_poses import Found, SinglePoses
 
 
@@ -73,8 +73,8 @@ class Obstruction:
 
 def _roomiest(poses: SinglePoses, met: Array) -> str:
     """Return what is met at the configuration (of K, n) that bodies are least near to."""
-    room, worst, asked = max((poses.room(q) for q in met[:LOOKED_AT]), key=lambda each: each[0])
-    del room
+    # The last ones were moved aside from what they met.
+    _, worst, asked = max((poses.room(q) for q in met[-MOST_LOOKED_AT:]), key=lambda each: each[0])
     return (
         f"at best '{worst.first}' and '{worst.second}' are {1e3 * worst.value:.3g} mm apart "
         f"(wanted: {1e3 * asked:.3g} mm)"
@@ -86,7 +86,7 @@ def obstruction(
 ) -> Obstruction | None:
     """Return a pose of the path that no configuration was found for; None where there is none.
 
-    Poses all along the path, those first that are farthest from the others. A
+    Poses all along the path, the first, then those that are farthest from the others. A
     pose is given up when thousands of tries lead nowhere: Newton's method from all over the
     limits, with deviations all over the bands of relaxed rows; where self-motions are curves,
     these as a whole; and what met bodies least, moved aside.
@@ -113,12 +113,14 @@ def obstruction(
 
 
 def _worst_first(problem: Problem, times: Array) -> list[float]:
-    """Return times [s], of the poses farthest from the middle of all first: the ends of the path.
+    """Return times [s], after the first of the poses farthest from the middle of all.
 
-    What is too far, too near or in the way is mostly so there.
+    Where the path cannot be begun, no part of it can be planned; else, what is too far, too near or
+    in the way is mostly so at an end.
     """
     places = problem.path.samples(times).translation
     away = np.linalg.norm(places - places.mean(axis=0), axis=1)
+    away[0] = np.inf
     return [float(t) for t in times[np.argsort(-away, kind="stable")]]
 
 

@@ -69,7 +69,8 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
     rows = tuple(row for row in rows if row in prescribed)
     if not rows:
         return None
-    band, here = np.inf, [ROW_NAMES.index(row) for row in rows]
+    band = FARTHEST if rows[0] in POSITION_ROWS else np.pi
+    here = [ROW_NAMES.index(row) for row in rows]
     best: Array | None = None
     q = poses.some(t, REMEDY_SEEDS)
     away = np.zeros((len(q), 6))

@@ -18,11 +18,16 @@ from selfmotion.search.settings import (
     CLIMBERS,
     CLIMBS,
     CLOSE,
+    MORE_APPROACHED,
     MORE_SEEDS,
+    MOST_LOOKED_AT,
     NEARLY,
     SEEDS,
     SPACING,
     TRACING_SEEDS,
+    WALK_STEPS,
+    WALKERS,
+    WALKS,
 )
 from selfmotion.search.starts import spread
 
@@ -124,15 +129,18 @@ class SinglePoses:
         met = np.concatenate([before.met, far])
         if len(free):
             return Found(free, met, tries)
-        if not len(met):
-            q = self._by_damped_steps(t)
-            return Found(q[self.bounds.keep(q)], q, tries + APPROACHED)
-        for more in (self._along_curves(t), self._climbed(t, met)):
-            free = more[self.bounds.keep(more)]
+        slowly = self._by_damped_steps(t)
+        tries += MORE_APPROACHED
+        free, met = slowly[self.bounds.keep(slowly)], np.concatenate([met, slowly])
+        if len(free) or not len(met):
+            return Found(free, met, tries)
+        for more in (self._along_curves, self._wandered, self._climbed):
+            q = more(t, met)
+            free, met = q[self.bounds.keep(q)], np.concatenate([met, q])
+            tries += len(q)
             if len(free):
-                return Found(free, met, tries + len(more))
-            tries += len(more)
-        return Found(met[:0], met, tries)
+                break
+        return Found(free, met, tries)
 
     def _reached(self, t: float, seeds: Array, *, far: bool = False) -> Array:
         """Return what Newton's method makes of seeds (K, n) for the pose at t, (K', n)."""
@@ -141,13 +149,13 @@ class SinglePoses:
         return np.asarray(found[arrived])
 
     def _by_damped_steps(self, t: float) -> Array:
-        """Return what the slower method finds, which comes to stretched poses, too, (K, n)."""
-        q, misses = self.nearest(t)
+        """Return what the slower method finds, which comes to limits and edges, (K, n)."""
+        q, misses = self.nearest(t, MORE_APPROACHED)
         return np.asarray(q[misses.sum(axis=1) < NEARLY])
 
-    def nearest(self, t: float) -> tuple[Array, Array]:
+    def nearest(self, t: float, count: int = APPROACHED) -> tuple[Array, Array]:
         """Return configurations as near to a pose as limits let them (K, n), misses [m, rad]."""
-        seeds = np.array(list(spread(self.robot, APPROACHED, self._rng)))
+        seeds = np.array(list(spread(self.robot, count, self._rng)))
         away = self.allowed.anywhere(len(seeds), t, self._rng)
         q, _, misses = self.allowed.approach(seeds, t, away)
         order = np.argsort(misses.sum(axis=1), kind="stable")
@@ -160,7 +168,7 @@ class SinglePoses:
         noise = self._rng.normal(size=near.shape) * np.tile(CLOSE, count)[: len(near), None]
         return np.concatenate([near + noise / self.robot.joint_weights, self._seeds])
 
-    def _along_curves(self, t: float) -> Array:
+    def _along_curves(self, t: float, met: Array) -> Array:
         """Return samples of all self-motions of a pose, where these are curves, (K, n)."""
         if self.follows.redundancy != 1 or self.allowed.relaxed(t):
             return np.empty((0, self.robot.dof))
@@ -171,9 +179,26 @@ class SinglePoses:
         every = np.concatenate([np.empty((0, self.robot.dof)), *samples])
         return self.bounds.representative(every)
 
+    def _wandered(self, t: float, met: Array) -> Array:
+        """Return configurations that random walks along the self-motions lead to, (K, n).
+
+        From anywhere Newton's method may lead to few of them only, where limits are near.
+        """
+        known = met
+        for _ in range(WALKS):
+            here = known[self._rng.integers(len(known), size=WALKERS)]
+            size = self._rng.choice(WALK_STEPS, size=(WALKERS, 1))
+            away = self._rng.normal(size=here.shape) * size / self.robot.joint_weights
+            found, _, arrived = self.allowed.project(here + away, t)
+            known = np.concatenate([known, found[arrived]])
+            if self.bounds.keep(found[arrived]).any():
+                break
+        return np.asarray(known[len(met) :])
+
     def _climbed(self, t: float, met: Array) -> Array:
         """Return configurations that are less near to bodies than those that were found, (K, n)."""
-        best = met[np.argsort([-self.room(q)[0] for q in met[: 4 * CLIMBERS]])[:CLIMBERS]]
+        some = met[:: -(-len(met) // MOST_LOOKED_AT)]
+        best = some[np.argsort([-self.room(q)[0] for q in some])[:CLIMBERS]]
         room = np.array([self.room(q)[0] for q in best])
         for size in CLIMBS:
             away = self._rng.normal(scale=size, size=best.shape) / self.robot.joint_weights
