@@ -26,14 +26,7 @@ from selfmotion.planning.settings import DEARER, FIRST_EVALUATIONS, SECOND_EFFOR
 from selfmotion.planning.warm_start import start_of
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
-from selfmotion.search import (
-    Admits,
-    Reach,
-    SequenceGuide,
-    guides,
-    guides_near,
-    start_candidates,
-)
+from selfmotion.search import Admits, Reach, SequenceGuide, guides, guides_near, start_candidates
 
 _Searched = Callable[[Problem, np.random.Generator | int, Progress], list[SequenceGuide]]
 

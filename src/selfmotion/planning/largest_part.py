@@ -17,6 +17,7 @@ from selfmotion.planning.settings import (
     FOLLOWED_STEPS,
     FREE_END_AGREEMENT,
     FREE_FOLLOWED_STEPS,
+    FREE_PROBES,
     LEAST_PART,
     OFF_PATH,
     PART_FINALISTS,
@@ -129,9 +130,10 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
     arrived: _Attempt | None = None
     edge: _Attempt | None = None
     low, high = 0.0, failed.problem.path.duration
-    agreement = FREE_END_AGREEMENT if problem.given_start is None else END_AGREEMENT
+    free = problem.given_start is None
+    agreement = FREE_END_AGREEMENT if free else END_AGREEMENT
     back = agreement
-    for _ in range(PROBES):
+    for _ in range(FREE_PROBES if free else PROBES):
         if arrived is None:
             # What was kept until then is a good guess; where it is not, further and further back.
             probe = max(min(failed.kept_until, high * (1.0 - back)), 0.5 * high)

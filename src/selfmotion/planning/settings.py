@@ -48,7 +48,7 @@ DEARER = 1.25
 # Steps of the rough motions.
 ROUGH_STEPS = 12
 # Heats: so many starts at most, optimised with so many evaluations of the cost more.
-HEATS = ((16, 8), (6, 8))
+HEATS = ((16, 5), (4, 8))
 # Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
 # rule; rough optima this near are the same.
 ONE_VALLEY = 0.6
@@ -70,8 +70,9 @@ EDGE_MARGIN = 1e-4
 END_AGREEMENT = 1e-3
 FREE_END_AGREEMENT = 4e-3
 LEAST_PART = 1e-2
-# Ends that are tried, at most.
+# Ends that are tried, at most; and where the start is free.
 PROBES = 16
+FREE_PROBES = 5
 # Motions that are optimised, of all that are followed; these with so many steps, until they are off
 # the path by this share of its extent.
 PART_FINALISTS = 3

@@ -21,6 +21,7 @@ from selfmotion.search.settings import (
     MOST,
     PATH_LOOKS,
     REFINED,
+    SEARCHES,
     SMOOTHING,
     STRIDE,
     TURN,
@@ -96,7 +97,14 @@ def guides_near(
     waypoints = NearPath(
         problem.follows, problem.relaxations, problem.pinned, t, asked.lower, asked.upper
     )
-    found = _sampled(problem, waypoints, t, _options(problem, t, rng, progress))
+    generator = np.random.default_rng(rng)
+    for number in range(1, SEARCHES + 1):
+        try:
+            found = _sampled(problem, waypoints, t, _options(problem, t, generator, progress))
+            break
+        except NoSequenceError:
+            if number == SEARCHES:
+                raise
     near = [_near(problem, waypoints, sequence) for sequence in found]
     kept = [guide for guide in near if guide is not None]
     if not kept:

@@ -27,7 +27,7 @@ class Obstruction:
     found : Found
         What there is at the pose.
     times : (K,)
-        When else it was looked [s].
+        When to look again, if something is changed, this time first [s].
     """
 
     time: float
@@ -101,13 +101,15 @@ def obstruction(
     poses = SinglePoses(problem, rng, relaxed=relaxed)
     times = np.linspace(0.0, problem.path.duration, COARSE_POSES)
     known: dict[float, Array] = {}
-    for t in _worst_first(problem, times):
+    order = _worst_first(problem, times)
+    for t in order:
         near = min(known, key=lambda other: abs(other - t), default=None)
         found = poses.look(t, np.empty((0, problem.robot.dof)) if near is None else known[near])
         if not len(found.free):
             found = poses.look_closely(t, found)
         if not len(found.free):
-            return Obstruction(t, len(found.met) > 0, poses, found, times)
+            again = np.array([t, *(other for other in order if other != t)])
+            return Obstruction(t, len(found.met) > 0, poses, found, again)
         known[t] = found.free
     return None
 

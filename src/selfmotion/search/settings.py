@@ -144,6 +144,9 @@ AT_LIMIT = 1e-3
 # --- relaxed rows
 # The search uses this share of a band: the spline that follows its motion needs some of the rest.
 WITHIN_BAND = 0.998
+# Tries around the samples that a chain reaches, at least, and searches from other seeds before
+# nothing counts as found.
+FEWEST_STRAYS, SEARCHES = 320, 3
 
 # --- single poses
 # The slower method brings so many seeds nearer, in so many iterations each; and so many where a
@@ -165,4 +168,4 @@ REMEDY_SEEDS, CLOSE = 8, (0.0, 0.03, 0.1, 0.3)
 SHRINKS, SHRUNK = 6, 0.75
 # A path is moved so often, each time a bit farther than needed at the pose where nothing was found,
 # and no farther than this [m].
-MOVE_TRIES, OVERSHOOT, FARTHEST = 6, 0.05, 0.5
+MOVE_TRIES, OVERSHOOT, FARTHEST = 4, 0.05, 0.5

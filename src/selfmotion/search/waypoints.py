@@ -11,6 +11,7 @@ from selfmotion.follow import Follows
 from selfmotion.robot import RobotModel
 from selfmotion.search.allowed import Allowed
 from selfmotion.search.manifold import Manifold
+from selfmotion.search.settings import FEWEST_STRAYS
 from selfmotion.task import Relaxation
 
 
@@ -24,6 +25,10 @@ class Waypoints(Protocol):
     @property
     def count(self) -> int:
         """W."""
+
+    @property
+    def fewest_strays(self) -> int:
+        """So many tries at least around the samples that a chain reaches, however few these are."""
 
     def project(self, q: Array, i: int, *, far: bool = False) -> tuple[Array, Flags]:
         """Return what Newton's method makes of q (K, n) at waypoint i, and where it arrives."""
@@ -53,6 +58,7 @@ class OnPath:
     def __init__(self, follows: Follows, t: Array, lower: Array, upper: Array) -> None:
         self._follows, self._manifold = follows, Manifold(follows, lower, upper)
         self._targets, self.robot, self.count = follows.targets(t), follows.robot, len(t)
+        self.fewest_strays = 0
 
     def project(self, q: Array, i: int, *, far: bool = False) -> tuple[Array, Flags]:
         """See `Waypoints.project`."""
@@ -93,6 +99,8 @@ class NearPath:
         self.allowed = Allowed(follows, relaxations, pinned, lower, upper)
         self._follows, self.t = follows, t
         self.robot, self.count = follows.robot, len(t)
+        # With deviations there are more directions in which to stray.
+        self.fewest_strays = FEWEST_STRAYS
         # Where a pose is looked for from anywhere, deviations are anywhere, too.
         self._rng = np.random.default_rng(0)
 
