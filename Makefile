@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+# What is imported by many processes is compiled to bytecode once.
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-places bench-fastest bench-job bench-moves bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job arms mutants memory acceptance distances study clean
 

@@ -9,7 +9,11 @@ from selfmotion.basics import Array
 from support.arms import CASES, PANDA_HOME, robot_named, short_line, start_of
 
 # Files that take longest, each by itself.
-LONGEST = {"test_site", "test_readme", "test_study", "test_acceptance", "test_replanner"}
+LONGEST = (
+    *("test_site", "test_study", "test_readme", "test_browser", "test_generated", "test_newton"),
+    *("test_interruption", "test_retiming", "test_cells", "test_gap", "test_replanner"),
+    *("test_app", "test_deviation", "test_pictures", "test_acceptance", "test_spoiled_files"),
+)
 
 
 @pytest.fixture(params=sorted({name for name, _ in CASES}))
@@ -46,4 +50,5 @@ def panda_circle(panda: sm.RobotModel) -> Callable[[str], sm.Problem]:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the files that take longest, so that no worker is left alone with one."""
-    items.sort(key=lambda item: item.path.stem not in LONGEST)
+    place = {name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path.stem, len(place)))

@@ -161,6 +161,26 @@ def test_a_program_that_was_changed_is_not_verified(program, tmp_path) -> None:
     assert not_verified(tmp_path / "spoiled.program")
 
 
+def test_what_was_put_in_afterwards_is_judged_anew(program) -> None:
+    number = next(k for k, step in enumerate(program.steps) if not step.is_seam)
+    step = program.steps[number]
+
+    def with_step(**changes) -> sm.Program:
+        steps = list(program.steps)
+        steps[number] = replace(step, **changes)
+        return replace(program, steps=tuple(steps))
+
+    assert with_step().verified
+    motion = step.motion
+    hurried = replace(motion, t=0.2 * motion.t, qd=5.0 * motion.qd, qdd=25.0 * np.array(motion.qdd))
+    assert not replace(step.made, trajectory=hurried).verified
+    assert "times its limit" in with_step(made=replace(step.made, trajectory=hurried)).verdict
+    late = with_step(events=(("on", 2.0 * motion.duration),))
+    assert "event 'on'" in late.verdict
+    other = replace(program, robot=robot_named("xarm7"))
+    assert "of another arm than" in other.verdict
+
+
 def test_a_job_that_is_ended_anywhere_goes_on_to_the_same_program(program, tmp_path) -> None:
     panda, seams = robot_named("panda"), row_of_seams()
     for end in (1, 4):

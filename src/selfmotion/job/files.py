@@ -2,13 +2,14 @@
 
 import hashlib
 import json
+import math
 import re
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import FileFormatError, as_path, write_text
+from selfmotion.basics import FileFormatError, SelfmotionError, as_path, write_text
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.job.program import Program, Step
 from selfmotion.result import Move, Plan, load_move, read_bundle, read_plan, write_bundle
@@ -47,7 +48,9 @@ def load_program(file: str | Path) -> Program:
         steps = tuple(_step(values, item) for values, item in pairs)
         missing = {str(name): str(why) for name, why in description["missing"].items()}
         notes, bound = tuple(map(str, description["notes"])), float(description["bound"])
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        if not math.isfinite(bound):
+            raise ValueError(f"bound is {bound}, not finite")
+    except (SelfmotionError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise FileFormatError(f"{path}: is a damaged program: {error!r}") from error
     if changed:
         missing[path.name] = "the file was changed after the program was written"
@@ -130,7 +133,7 @@ class Shelf:
             return None
         try:
             if kept["trouble"]:
-                return replace(missing, trouble=str(kept["trouble"]))
+                return replace(missing, reason=str(kept["trouble"]))
             return load_move(file.with_suffix(".npz"), known=self._known)
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None

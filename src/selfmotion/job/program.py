@@ -17,6 +17,8 @@ from selfmotion.robot import RobotModel
 # From one step to the next configurations may differ by rounding [rad or m], velocities and
 # accelerations by what rest may be off.
 _JOINT, _REST, _PUSH = 1e-9, 1e-6, 1e-4
+# Events may be outside their step by rounding [s].
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +180,14 @@ class Program:
     @cached_property
     def failures(self) -> tuple[str, ...]:
         """What speaks against it; empty for a verified one."""
+        strangers = [
+            f"'{step.name}' is of another arm than {self.robot.name}, of {step.made.robot.name}"
+            for step in self.steps
+            if step.made.robot.urdf.sha256 != self.robot.urdf.sha256
+            or step.made.robot.joint_names != self.robot.joint_names
+        ]
+        if strangers:
+            return tuple(strangers)
         return tuple(
             [
                 *(f"seam '{name}' is not made: {why}" for name, why in self.missing.items()),
@@ -185,6 +195,7 @@ class Program:
                 *(step.trouble for step in self.steps if step.trouble),
                 *self._gaps(),
                 *self._left_out(),
+                *self._beyond(),
             ]
         )
 
@@ -211,6 +222,14 @@ class Program:
             if met:
                 yield f"'{step.name}' is not judged against '{met[0]}', which stands there by then"
             standing |= {item.name: step.name for item in step.leaves}
+
+    def _beyond(self) -> Iterator[str]:
+        """Yield events that are not while their step lasts."""
+        for step in self.steps:
+            lasts = _duration(step)
+            for event, at in step.events:
+                if not -_ROUNDING <= at <= lasts + _ROUNDING:
+                    yield f"event '{event}' of '{step.name}' is at {at:.6g} s of {lasts:.6g} s"
 
     def require(self) -> "Program":
         """Return the program itself if all of it is verified.

@@ -249,7 +249,7 @@ def _move_here(task: _Task) -> Move:
 
 def _missing(task: _Task, trouble: str) -> Move:
     robot, constraints = task["arm"]
-    return Move.missing(robot, constraints, trouble)
+    return Move(robot, tuple(constraints), None, trouble)
 
 
 def _plans_asked(task: _Task) -> dict[str, Any]:

@@ -157,12 +157,13 @@ class NodeConditions:
     def orders(self, samples: CheckedSamples) -> Ints:
         """Return the highest derivative of q that each condition depends on, (C,)."""
         found = [np.zeros(0, dtype=np.int64)]
-        for item, own in zip(self.constraints, self._counts, strict=True):
+        for item in self.constraints:
+            known = linearised(item, samples, self._units)
+            own = known.count // (2 * len(self.spline.t) - 1)
             if isinstance(item, BoundClearance):
                 found.append(np.zeros(own, dtype=np.int64))
                 continue
             # At all points: a square of what is 0, as at rest, has no slope.
-            known = linearised(item, samples, self._units)
             rows = known.picked(self._units, np.arange(known.count))
             does = np.any(rows.reshape(-1, own, 4, rows.shape[1] // 4) != 0.0, axis=(0, 3))
             does[:, 0] = True

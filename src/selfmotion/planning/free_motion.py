@@ -137,7 +137,7 @@ class FreeMotions:
         return np.clip(q, lower + _ulps(lower), upper - _ulps(upper))
 
     def _missing(self, trouble: str) -> Move:
-        return Move.missing(self.robot, self.constraints, trouble)
+        return Move(self.robot, self.constraints, None, trouble)
 
     def _blocked(self, ends: Sequence[Array]) -> str:
         """Return what is wrong with an end already, "" for nothing."""
@@ -242,7 +242,7 @@ class FreeMotions:
         for slower in SLOWER_FACTOR ** np.arange(SLOWER_TRIES):
             t, names = slower * motion.t, self.robot.joint_names
             whole = Trajectory(t, q, qd / slower, names, faster / slower**2)
-            found = Move.judged(self.robot, self.constraints, whole)
+            found = Move(self.robot, self.constraints, whole)
             if not any(not item.kept and item.of_pace for item in found.findings):
                 break
         return found

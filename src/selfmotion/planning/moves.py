@@ -62,12 +62,12 @@ class Mover:
             away, back = (self._lead(q, self._retreat) for q in (first, last))
         except SelfmotionError as error:
             trouble = f"the tool cannot retreat along its axis: {error}"
-            return Move.missing(self._free.robot, self._free.constraints, trouble)
+            return Move(self._free.robot, self._free.constraints, None, trouble)
         between = self._free.between(away.q[-1], back.q[-1])
         if between.trajectory is None:
             return between
         whole = joined_motions([away, between.trajectory, reversed_motion(back)])
-        return Move.judged(self._free.robot, self._free.constraints, whole)
+        return Move(self._free.robot, self._free.constraints, whole)
 
     def _lead(self, q: Array, retreat: Retreat) -> Trajectory:
         """Return the motion of the tool away from where q has it; SelfmotionError for none."""

@@ -236,7 +236,7 @@ class _Planner:
             pairs.append((plans[-1], plans[0]))
         if not all(plan.certificate.verified for plan in plans):
             trouble = "not looked for, since a part is not verified"
-            missing = Move.missing(self._problem.robot, (), trouble)
+            missing = Move(self._problem.robot, (), None, trouble)
             return tuple(missing for _ in pairs)
         ends = [(one.trajectory.q[-1], other.trajectory.q[0]) for one, other in pairs]
         return tuple(self._mover.move(*each) for each in ends)

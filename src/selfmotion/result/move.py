@@ -1,8 +1,9 @@
 """A joint motion from one configuration to another, and its file."""
 
 import dataclasses
-from collections.abc import MutableMapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import MutableMapping
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -38,38 +39,33 @@ class Move:
         What it has to keep at all times.
     trajectory : Trajectory or None
         None where none was found.
-    findings : tuple of Finding
-        What the requirements on limits and clearances say of it; each judges all times.
-    trouble : str
-        What is wrong with it, or why none was found; "" where all is kept.
+    reason : str
+        Why none was found, or what else speaks against it: a file that was changed.
     """
 
     robot: RobotModel
     constraints: tuple[Constraint, ...]
     trajectory: Trajectory | None
-    findings: tuple[Finding, ...] = ()
-    trouble: str = ""
-
-    @classmethod
-    def judged(
-        cls, robot: RobotModel, constraints: Sequence[Constraint], trajectory: Trajectory
-    ) -> "Move":
-        """Return a motion with what all that is required says of it, at all times."""
-        found = cls(robot, tuple(constraints), trajectory)
-        finished = FinishedMotion(robot, trajectory)
-        findings = tuple(item.judge(finished) for item in found.requirements)
-        trouble = "; ".join(item.text for item in findings if not item.kept)
-        return replace(found, findings=findings, trouble=trouble)
-
-    @classmethod
-    def missing(cls, robot: RobotModel, constraints: Sequence[Constraint], trouble: str) -> "Move":
-        """Return that no motion was found, and why."""
-        return cls(robot, tuple(constraints), None, (), trouble)
+    reason: str = ""
 
     def __repr__(self) -> str:
         """Return two lines: how long it takes, and the verdict."""
         found = "none found" if self.trajectory is None else f"{self.trajectory.duration:.6g} s"
         return f"Move({self.robot.name}, {found})\n  {self.verdict}"
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """What each requirement says of it; each judges all times. Found when it is asked for."""
+        if self.trajectory is None:
+            return ()
+        finished = FinishedMotion(self.robot, self.trajectory)
+        return tuple(item.judge(finished) for item in self.requirements)
+
+    @property
+    def trouble(self) -> str:
+        """What is wrong with it, or why none was found; "" where all is kept."""
+        broken = [item.text for item in self.findings if not item.kept]
+        return "; ".join(filter(None, (self.reason, *broken)))
 
     @property
     def verified(self) -> bool:
@@ -156,13 +152,13 @@ def load_move(file: str | FilePath, *, known: MutableMapping[str, Any] | None = 
     try:
         robot, constraints = arm_and_constraints(description, {} if known is None else known)
         motion = trajectory_of(arrays, tuple(description["joint_names"]))
-        found = Move.judged(robot, constraints, motion)
+        reason = f"{path.name} was changed after the move was written: its digest differs"
+        move = Move(robot, constraints, motion, reason if altered else "")
+        # Judged here, where a damaged file can be told from a fault of ours.
+        _ = move.findings
     except SelfmotionError as error:
         raise FileFormatError(f"{path}: is a damaged move: {error}") from error
     # Any number or key of a damaged file may be any other, and fail anywhere.
     except Exception as error:
         raise FileFormatError(f"{path}: is no move, or a damaged one: {error!r}") from error
-    if altered:
-        trouble = f"{path.name} was changed after the move was written: its digest differs"
-        found = replace(found, trouble="; ".join(filter(None, (trouble, found.trouble))))
-    return found
+    return move
