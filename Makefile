@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # What is imported by many processes is compiled to bytecode once.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-first bench-fastest bench-feeds bench-job bench-moves bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job arms mutants memory acceptance distances study clean
+.PHONY: demo test lint format bench bench-constrained bench-remaining bench-batch bench-peers bench-starts bench-places bench-first bench-fastest bench-feeds bench-job bench-moves bench-latency docs errors suite suite-made fuzz fuzz-tasks fuzz-cells fuzz-certificate fuzz-deceptions fuzz-generated fuzz-realtime fuzz-files fuzz-job arms mutants memory acceptance distances study clean
 
 demo: $(READY)  ## plan, check and replay the paper's planar arm and a Panda, into out/
 	$(BIN)/selfmotion demo --out out
@@ -42,6 +42,9 @@ bench-starts: $(READY)  ## free starts against the best of everything tried, 60 
 
 bench-first: $(READY)  ## the first plan on a machine; what compiles after a warm-up
 	$(BIN)/python benchmarks/first_plan.py
+
+bench-places: $(READY)  ## a seam at 300 places around three arms, each 'no' held against an exhaustive search
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/places.py
 
 bench-fastest: $(READY)  ## 60 paces against linear programmes; the fastest motions of 20 paths, against retimed plans
 	$(BIN)/python benchmarks/paces.py

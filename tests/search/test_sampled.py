@@ -9,6 +9,7 @@ from selfmotion.basics.errors import NoSequenceError
 from selfmotion.follow import Follows
 from selfmotion.search.manifold import Manifold
 from selfmotion.search.sampled import sampled_sequences
+from selfmotion.search.waypoints import OnPath
 from support.arms import robot_named
 from support.followed import standing
 from support.paths import line_of
@@ -25,7 +26,9 @@ def searched(robot: sm.RobotModel, path: sm.Path, **options: object) -> list[sm.
         "count": 2,
     }
     t = np.linspace(0.0, path.duration, 21)
-    return sampled_sequences(Follows.of(robot, path, sm.Task.POSITION), t, **(values | options))
+    follows = Follows.of(robot, path, sm.Task.POSITION)
+    waypoints = OnPath(follows, t, robot.lower, robot.upper)
+    return sampled_sequences(waypoints, t, **(values | options))
 
 
 def test_sequences_follow_the_path_keep_all_and_are_as_long_as_they_say() -> None:

@@ -12,6 +12,7 @@ from selfmotion.engine.still import (
     MOST_HALVINGS as MOST_HALVINGS,
     Guide as Guide,
     StillMotion as StillMotion,
+    deviation_of as deviation_of,
     rough_still_motion as rough_still_motion,
     settled_still_motion as settled_still_motion,
 )

@@ -20,11 +20,18 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.engine.turns import (
+    SMALL,
+    exponentials,
+    left,
+    left_derivative,
+    left_matrices,
+    skew,
+    turn,
+)
 from selfmotion.path import Path, PathSamples
 from selfmotion.task import Relaxation
 
-# Below this angle the closed forms lose digits and their series serve.
-_SMALL = 5e-2
 _DEGREE = 3
 
 
@@ -67,6 +74,8 @@ class Deviation:
         time of the path, as it does at all other ends of windows.
     rests : (bool, bool)
         Whether only its first two derivatives vanish there, so that the tool rests.
+    around : (size,), optional
+        The deviation of c = 0; by default none.
 
     Attributes
     ----------
@@ -83,6 +92,7 @@ class Deviation:
         t: Array,
         pinned: tuple[bool, bool],
         rests: tuple[bool, bool] = (False, False),
+        around: Array | None = None,
     ) -> None:
         self._path, self._t = path, t
         self._groups = [_group(item, path.duration, t, pinned, rests) for item in relaxations]
@@ -90,6 +100,7 @@ class Deviation:
         self.size = sum(group.size for group in self._groups)
         banded = [np.full(group.size, np.isfinite(group.band)) for group in self._groups]
         self.banded = np.concatenate([np.zeros(0, dtype=bool), *banded])
+        self._around = np.zeros(self.size) if around is None else around
 
     @cached_property
     def _nominal(self) -> PathSamples:
@@ -101,8 +112,8 @@ class Deviation:
         rows, rates = self._rows(self._bent(c))
         rotation, twist = nominal.rotation, nominal.twist.copy()
         twist[:, :3] += self._to_world(rows[:, :3], rates[:, :3])
-        turned = rotation @ _exponentials(rows[:, 3:])
-        twist[:, 3:] += _turn(rotation, _left(rows[:, 3:], rates[:, 3:]))
+        turned = rotation @ exponentials(rows[:, 3:])
+        twist[:, 3:] += turn(rotation, left(rows[:, 3:], rates[:, 3:]))
         translation = nominal.translation + self._shift(rows[:, :3])
         return PathSamples(nominal.t, translation, turned, twist)
 
@@ -132,17 +143,35 @@ class Deviation:
         result = np.zeros((stages, 12, self.size))
         result[:, 0:3] = self._shift(by_rows[:, :3])
         result[:, 6:9] = self._to_world(by_rows[:, :3], by_rates[:, :3])
-        jacobian = _left_matrices(rows[:, 3:])
+        jacobian = left_matrices(rows[:, 3:])
         result[:, 3:6] = rotation @ jacobian @ by_rows[:, 3:]
-        turning = _left_derivative(rows[:, 3:], rates[:, 3:]) @ by_rows[:, 3:]
+        turning = left_derivative(rows[:, 3:], rates[:, 3:]) @ by_rows[:, 3:]
         result[:, 9:12] = rotation @ (turning + jacobian @ by_rates[:, 3:])
         return result
 
+    def nearest(self, rows: Array) -> Array:
+        """Return c (size,) whose deviations are nearest to some rows (S, 6), which are in band."""
+        found: list[Array] = [np.zeros(0)]
+        for group in self._groups:
+            delta = rows[:, group.indices]
+            s = delta
+            if np.isfinite(group.band):
+                share = np.linalg.norm(delta, axis=1)[:, None] / group.band
+                s = (
+                    delta
+                    * np.arcsin(np.clip(share, 0.0, 1.0))
+                    / np.maximum(group.band * share, np.finfo(float).tiny)
+                )
+            found.append(
+                np.asarray(np.linalg.lstsq(group.values, s)[0].T.ravel(), dtype=np.float64)
+            )
+        return np.concatenate(found) - self._around
+
     def _bent(self, c: Array) -> list[_Bent]:
         """Return the groups' splines and what the sine makes of them."""
-        bent, first = [], 0
+        bent, first, total = [], 0, self._around + c
         for group in self._groups:
-            part = c[first : first + group.size].reshape(len(group.indices), -1)
+            part = total[first : first + group.size].reshape(len(group.indices), -1)
             first += group.size
             s, sd = group.values @ part.T, group.rates @ part.T
             bent.append(_Bent(s, sd, *_squash(s, group.band), np.einsum("si,si->s", s, sd)))
@@ -158,14 +187,14 @@ class Deviation:
 
     def _shift(self, delta: Array) -> Array:
         """Return Q δ for δ (S, 3) or (S, 3, k)."""
-        return _turn(self._nominal.rotation, delta) if self._in_tool_axes else delta
+        return turn(self._nominal.rotation, delta) if self._in_tool_axes else delta
 
     def _to_world(self, delta: Array, rate: Array) -> Array:
         """Return Q δ̇ + Q̇ δ, Q̇ = [ω]× Q in tool axes."""
         if not self._in_tool_axes:
             return rate
-        spin = _skew(self._nominal.twist[:, 3:])
-        return self._shift(rate) + _turn(spin, self._shift(delta))
+        spin = skew(self._nominal.twist[:, 3:])
+        return self._shift(rate) + turn(spin, self._shift(delta))
 
 
 def _group(
@@ -214,7 +243,7 @@ def _squash(s: Array, band: float) -> tuple[Array, Array, Array]:
 
 def _sine_series(u: Array) -> tuple[Array, Array, Array]:
     """Return f = sin u / u, f'/u and (f'/u)'/u."""
-    small = np.abs(u) < _SMALL
+    small = np.abs(u) < SMALL
     safe = np.where(small, 1.0, u)
     sine, cosine = np.sin(safe), np.cos(safe)
     first = np.where(small, 1.0 - u**2 / 6.0 + u**4 / 120.0, sine / safe)
@@ -227,69 +256,3 @@ def _sine_series(u: Array) -> tuple[Array, Array, Array]:
         (3.0 * sine - 3.0 * safe * cosine - safe**2 * sine) / safe**5,
     )
     return first, second, third
-
-
-def _exponentials(vectors: Array) -> Array:
-    """Return exp([δ]×) for rotation vectors (S, 3), (S, 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_rotvec(vectors).as_matrix())
-
-
-def _left_weights(vectors: Array) -> tuple[Array, Array, Array, Array]:
-    """Return a = (1 - cos θ)/θ², b = (θ - sin θ)/θ³, a'/θ and b'/θ at θ = |δ|."""
-    angle = np.linalg.norm(vectors, axis=1)
-    small = angle < _SMALL
-    safe = np.where(small, 1.0, angle)
-    sine, cosine = np.sin(safe), np.cos(safe)
-    a = np.where(small, 0.5 - angle**2 / 24.0 + angle**4 / 720.0, (1.0 - cosine) / safe**2)
-    b = np.where(small, 1.0 / 6.0 - angle**2 / 120.0 + angle**4 / 5040.0, (safe - sine) / safe**3)
-    by_a = np.where(
-        small,
-        -1.0 / 12.0 + angle**2 / 180.0 - angle**4 / 6720.0,
-        (safe * sine - 2.0 * (1.0 - cosine)) / safe**4,
-    )
-    by_b = np.where(
-        small,
-        -1.0 / 60.0 + angle**2 / 1260.0 - angle**4 / 60480.0,
-        (3.0 * sine - 2.0 * safe - safe * cosine) / safe**5,
-    )
-    return a, b, by_a, by_b
-
-
-def _left_matrices(vectors: Array) -> Array:
-    """Return Jl(δ) = I + a [δ]× + b [δ]×², (S, 3, 3)."""
-    a, b, _, _ = _left_weights(vectors)
-    skew = _skew(vectors)
-    return np.asarray(np.eye(3) + a[:, None, None] * skew + b[:, None, None] * skew @ skew)
-
-
-def _left(vectors: Array, rates: Array) -> Array:
-    """Return Jl(δ) δ̇: the angular velocity of exp([δ]×), (S, 3)."""
-    return _turn(_left_matrices(vectors), rates)
-
-
-def _left_derivative(vectors: Array, rates: Array) -> Array:
-    """Return ∂(Jl(δ) v)/∂δ at v = δ̇, (S, 3, 3)."""
-    a, b, by_a, by_b = _left_weights(vectors)
-    delta, v = _skew(vectors), _skew(rates)
-    once = _turn(delta, rates)
-    twice = _turn(delta, once)
-    gradient = by_a[:, None] * once + by_b[:, None] * twice
-    # ∂(δ×v) = -[v]× ∂δ and ∂(δ×(δ×v)) = -([δ×v]× + [δ]×[v]×) ∂δ.
-    direct = -a[:, None, None] * v - b[:, None, None] * (_skew(once) + delta @ v)
-    return np.asarray(direct + gradient[:, :, None] * vectors[:, None, :])
-
-
-def _skew(vectors: Array) -> Array:
-    """Return [v]× for vectors (S, 3), (S, 3, 3)."""
-    x, y, z = vectors.T
-    zero = np.zeros_like(x)
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
-
-
-def _turn(matrices: Array, vectors: Array) -> Array:
-    """Return the products of matrices (S, 3, 3) and vectors (S, 3) or columns (S, 3, k)."""
-    if vectors.ndim == 2:
-        return np.asarray(np.einsum("sij,sj->si", matrices, vectors))
-    return np.asarray(matrices @ vectors)

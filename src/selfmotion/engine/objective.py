@@ -13,7 +13,7 @@ from selfmotion.engine.counts import Counts
 from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart, Start
-from selfmotion.engine.still import StillMotion
+from selfmotion.engine.still import StillMotion, deviation_of
 from selfmotion.motion import Grid, NullMotion, NullMotionTable, Trajectory
 from selfmotion.optimise import Residuals, Rows
 from selfmotion.problem import Problem
@@ -142,7 +142,7 @@ class Objective:
             table,
             problem.all_costs,
             start,
-            Deviation(problem.path, problem.relaxations, t, problem.pinned, problem.rests),
+            deviation_of(problem, t, still.deviation),
             Conditions(constraints, grid),
             Counts() if counts is None else counts,
         )

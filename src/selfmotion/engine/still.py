@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError
+from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.frame import TransportedFrame
 from selfmotion.engine.rollout import Rollout
 from selfmotion.motion import Grid
@@ -39,6 +40,8 @@ class StillMotion:
     grid : Grid
     guide : Guide or None
         The null motion that stands for x = 0; None for none.
+    deviation : Array or None
+        That of the tool from its path, as `Deviation` has it; None for none.
     q, qd : (N + 1, n)
         At the nodes.
     jacobians : (N + 1, m, n)
@@ -59,6 +62,7 @@ class StillMotion:
     problem: Problem
     grid: Grid
     guide: Guide | None
+    deviation: Array | None
     q: Array
     qd: Array
     jacobians: Array
@@ -70,11 +74,18 @@ class StillMotion:
 
     @classmethod
     def on(
-        cls, problem: Problem, configuration: Array, grid: Grid, guide: Guide | None = None
+        cls,
+        problem: Problem,
+        configuration: Array,
+        grid: Grid,
+        guide: Guide | None = None,
+        deviation: Array | None = None,
     ) -> "StillMotion":
         """Integrate from a start configuration (n,) on one grid."""
         rollout = Rollout(problem.follows, grid, damping=problem.damping_law)
         t = grid.stage_times
+        if deviation is not None:
+            rollout.aim(deviation_of(problem, t).target(deviation))
         idle = np.zeros((len(t), problem.robot.dof))
         own = idle if guide is None else problem.brought_to_rest(t, guide(t))
         broken = rollout.run(configuration, own)
@@ -89,6 +100,7 @@ class StillMotion:
             problem,
             grid,
             guide,
+            deviation,
             samples.q[nodes],
             samples.qd[nodes],
             samples.task_jacobian[nodes],
@@ -137,6 +149,13 @@ class StillMotion:
         return TransportedFrame(self.grid.nodes, self.jacobians)
 
 
+def deviation_of(problem: Problem, t: Array, around: Array | None = None) -> Deviation:
+    """Return the deviation that a problem allows at times t (S,), around that of x = 0."""
+    return Deviation(
+        problem.path, problem.relaxations, t, problem.pinned, problem.rests, around=around
+    )
+
+
 def _extents(rollout: Rollout) -> Array:
     """Return how far the paths go [m], for the rows of positions, and 1 for the others, (m,)."""
     extents = [max(float(np.ptp(path, axis=0).max()), _SHORTEST) for path in rollout.targets]
@@ -166,7 +185,10 @@ def rough_still_motion(
 
 
 def settled_still_motion(
-    problem: Problem, configuration: Array, guide: Guide | None = None
+    problem: Problem,
+    configuration: Array,
+    guide: Guide | None = None,
+    deviation: Array | None = None,
 ) -> tuple[StillMotion, int]:
     """Return the motion at x = 0 on the coarsest grid on which it stays near the path.
 
@@ -189,7 +211,7 @@ def settled_still_motion(
     troubles: list[tuple[float, float]] = []
     evaluations = 0
     for _ in range(MOST_HALVINGS):
-        still = StillMotion.on(problem, configuration, grid, guide)
+        still = StillMotion.on(problem, configuration, grid, guide, deviation)
         evaluations += still.jacobian_evaluations
         settled = _settled(still, coarse)
         if still.broken is None and settled:

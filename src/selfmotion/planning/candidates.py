@@ -19,13 +19,16 @@ from selfmotion.motion import Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.heats import Heats
+from selfmotion.planning.refusal import leaves_path
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import DEARER, FIRST_EVALUATIONS, SECOND_EFFORT
 from selfmotion.planning.warm_start import start_of
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
-from selfmotion.search import Admits, Reach, SequenceGuide, guides, start_candidates
+from selfmotion.search import Admits, Reach, SequenceGuide, guides, guides_near, start_candidates
+
+_Searched = Callable[[Problem, np.random.Generator | int, Progress], list[SequenceGuide]]
 
 
 class _CutShortError(Exception):
@@ -115,7 +118,8 @@ class Candidates:
                 f"compare: the global search needs redundancy 1, but {problem.robot.name} has "
                 f"{redundancy} for task '{problem.task.value}'"
             )
-        starts = start is None and (search.mode != "global" or not can_search)
+        off = start is None and leaves_path(problem, search)
+        starts = start is None and (search.mode != "global" or not can_search) and not off
         rng = np.random.default_rng(search.rng)
         if self._guide is not None:
             self._follow(self._guide)
@@ -135,8 +139,10 @@ class Candidates:
         if self._is_out_of_reach():
             return
         chosen = start is None and search.mode != "local"
-        if can_search and (search.compare or (chosen and self._fell_short)):
-            self._try_sequences(chosen)
+        if can_search and not off and (search.compare or (chosen and self._fell_short)):
+            self._try_sequences(guides, chosen)
+        if problem.relaxations and self._fell_short and (chosen or off):
+            self._try_sequences(guides_near, True)
         # Where the search knows that nothing follows the path, more starts do not help.
         if starts and self._fell_short and not self.notes:
             more = SECOND_EFFORT
@@ -216,10 +222,10 @@ class Candidates:
                 self._failure = error
         return sorted(sessions, key=Session.merit)
 
-    def _try_sequences(self, chosen: bool) -> None:
+    def _try_sequences(self, searched: _Searched, chosen: bool) -> None:
         """Optimise from the best sequences over all self-motions."""
         try:
-            self.sequences = guides(self._problem, self._settings.rng, self._progress)
+            self.sequences = searched(self._problem, self._settings.rng, self._progress)
         except NoSequenceError as error:
             self._failure = error
             self.notes.append(f"global search: {error}")
@@ -227,7 +233,9 @@ class Candidates:
         for number, guide in enumerate(self.sequences, 1):
             self._progress("refining sequence", number, len(self.sequences))
             try:
-                session = self._begin(guide.start, free=True, guide=guide)
+                session = self._begin(
+                    guide.start, free=True, guide=guide, deviation=guide.deviation
+                )
             except BreakdownError as error:
                 self._failure = error
                 continue

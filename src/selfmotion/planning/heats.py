@@ -14,6 +14,7 @@ from selfmotion.basics import Array, BreakdownError, Progress
 from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.promise import most_promising
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import HEATS, HOPELESS, ONE_VALLEY, ROUGH_STEPS, SAME_OPTIMUM
 from selfmotion.problem import Problem
@@ -49,14 +50,15 @@ class Heats:
         # A path of many waypoints is crossed in strides: what is rough needs not stop at each.
         knots = problem.knots if len(problem.knots) <= steps else problem.knots[[0, -1]]
         grid = Grid.aligned(knots, steps)
-        for number, start in enumerate(starts, 1):
-            self._progress("start", number, len(starts))
+        first_heat = max(HEATS[0][0], finalists)
+        promising = most_promising(problem, starts, grid, self._apart)[:first_heat]
+        for number, start in enumerate(promising, 1):
+            self._progress("start", number, len(promising))
             try:
                 session = Session.begin(problem, self._effort, start, free=True, grid=grid)
             except BreakdownError:
                 continue
             self._note(session)
-        self._put_valleys_first()
         for heat, (most, evaluations) in enumerate(HEATS, 1):
             del self._merits[max(most, finalists) :]
             running = [session for _, session in self._merits]
@@ -88,18 +90,6 @@ class Heats:
         if np.isfinite(merit):
             self._merits.append((merit, session))
             self._merits.sort(key=lambda pair: pair[0])
-
-    def _put_valleys_first(self) -> None:
-        """Let those come last that are near a better one: the start will move there by itself."""
-        valleys: list[tuple[float, Session]] = []
-        slopes: list[tuple[float, Session]] = []
-        motions: list[Array] = []
-        for pair in self._merits:
-            motion = pair[1].nodes
-            alone = all(self._apart(motion, other) > ONE_VALLEY for other in motions)
-            (valleys if alone else slopes).append(pair)
-            motions.append(motion)
-        self._merits = valleys + slopes
 
     def _drop(self) -> None:
         """Drop what became the same as a better one, and what costs much more than the best."""

@@ -15,9 +15,13 @@ from selfmotion.planning.settings import (
     EDGE_MARGIN,
     END_AGREEMENT,
     FOLLOWED_STEPS,
+    FREE_END_AGREEMENT,
+    FREE_FOLLOWED_STEPS,
+    FREE_PROBES,
     LEAST_PART,
     OFF_PATH,
     PART_FINALISTS,
+    PART_STARTS,
     PROBES,
     PUSHES,
 )
@@ -107,8 +111,10 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> LargestPart 
         return None
     first = _until(problem, goal)
     attempts = []
-    starts = _apart(first, reach.starts) if effort.apart else reach.starts
-    for candidate in _candidates(first, starts)[:PART_FINALISTS]:
+    given = problem.given_start is not None
+    few = reach.starts if given else reach.starts[:: -(-len(reach.starts) // PART_STARTS)]
+    starts = _apart(first, few) if effort.apart else few
+    for candidate in _candidates(first, starts)[: PART_FINALISTS if given else 1]:
         attempts.append(_attempt(first, candidate, effort))
         if attempts[-1].cut_short:
             return _part(problem, attempts[-1], reach, "")
@@ -124,15 +130,17 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
     arrived: _Attempt | None = None
     edge: _Attempt | None = None
     low, high = 0.0, failed.problem.path.duration
-    back = END_AGREEMENT
-    for _ in range(PROBES):
+    free = problem.given_start is None
+    agreement = FREE_END_AGREEMENT if free else END_AGREEMENT
+    back = agreement
+    for _ in range(FREE_PROBES if free else PROBES):
         if arrived is None:
             # What was kept until then is a good guess; where it is not, further and further back.
             probe = max(min(failed.kept_until, high * (1.0 - back)), 0.5 * high)
             back *= 2.0
         else:
             probe = 0.5 * (low + high)
-        if probe < LEAST_PART * problem.path.duration or high - low < END_AGREEMENT * high:
+        if probe < LEAST_PART * problem.path.duration or high - low < agreement * high:
             break
         attempt = _attempt(_until(problem, probe), failed.candidate, effort)
         if attempt.arrived_with_room or attempt.cut_short:
@@ -236,7 +244,8 @@ def _rank(problem: Problem, start: Array, guide: Guide | None) -> tuple[float, f
     The smaller, the better.
     """
     path = problem.path
-    still = StillMotion.on(problem, start, Grid.aligned(path.knots, FOLLOWED_STEPS), guide)
+    steps = FREE_FOLLOWED_STEPS if problem.given_start is None else FOLLOWED_STEPS
+    still = StillMotion.on(problem, start, Grid.aligned(path.knots, steps), guide)
     trouble = still.off_path(OFF_PATH)
     far = path.duration if trouble is None else trouble
     kept = _kept_until(problem, still.grid.nodes, still.q, still.qd)

@@ -9,6 +9,7 @@ import numpy as np
 
 from selfmotion.basics import (
     BreakdownError,
+    InverseKinematicsError,
     NoSequenceError,
     PlanError,
     ProblemError,
@@ -28,13 +29,18 @@ from selfmotion.planning.deadline import Deadline, TimedCounts
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import Finished, finish
 from selfmotion.planning.largest_part import LargestPart, largest_part
+from selfmotion.planning.refusal import looked_at, no_way
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
-from selfmotion.planning.settings import DAMPED_EVALUATIONS, PART_EVALUATIONS
+from selfmotion.planning.settings import (
+    DAMPED_EVALUATIONS,
+    FREE_PART_EVALUATIONS,
+    PART_EVALUATIONS,
+)
 from selfmotion.planning.warm_start import check_warm_start
 from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Gap, Plan, Report
-from selfmotion.search import SPACING, Reach, SequenceGuide, reachable
+from selfmotion.search import SPACING, Obstruction, Reach, SequenceGuide, reachable
 
 # After these no other way is tried.
 _ENDED = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
@@ -71,7 +77,8 @@ def plan(
     max_evaluations : int, optional
         Limit on evaluations of the cost while optimising one start; the finished motion is
         evaluated a few times more. By default none, but 400 with damping and 150 on each part of
-        the path, where limits of joint speed often cannot be met and trying would take minutes.
+        the path (30 where the start is free), where limits of joint speed often cannot be met and
+        trying would take minutes.
     deadline : float, optional
         After so many seconds the best so far has to do: no worse than x = 0, or what the search
         began with. It is judged like any other plan, which takes some time more.
@@ -154,9 +161,12 @@ class _Settings(NamedTuple):
 
 
 def _plan(problem: Problem, effort: Effort, search: Search, settings: _Settings) -> Plan:
-    found = _Planning(problem, effort, search, settings).plan()
+    free = problem.given_start is None and settings.guide is None and settings.warm_start is None
+    blocked = looked_at(problem, search) if free else None
+    found = _Planning(problem, effort, search, settings, blocked).plan()
     # Few motions take an arm into itself: the others need not wait for distances.
-    if not _overlaps(found) or found.report.status in _ENDED:
+    hopeless = blocked is not None or found.report.status in _ENDED
+    if not _overlaps(found) or hopeless:
         return found
     efforts = [(replace(effort, apart=True), search)]
     if problem.given_start is None and search.mode == "auto":
@@ -224,7 +234,9 @@ class _Planning:
         effort: Effort,
         search: Search,
         settings: _Settings,
+        blocked: Obstruction | None = None,
     ) -> None:
+        self._blocked = blocked
         self._problem, self._effort, self._search = problem, effort, search
         self._tolerance, self._progress = settings.tolerance, settings.progress
         self._deadline = settings.deadline
@@ -243,6 +255,8 @@ class _Planning:
     def plan(self) -> Plan:
         """Return the plan of the whole path, or of the largest part of it."""
         candidates = self._candidates
+        if self._blocked is not None and not self._blocked.is_met:
+            return self._up_to(self._blocked)
         try:
             best = candidates.run()
             shorter = self._shorter(best)
@@ -276,6 +290,19 @@ class _Planning:
         except KeyboardInterrupt:
             best.end(Status.INTERRUPTED)
             return self._gather(whole, finished, None)
+
+    def _up_to(self, blocked: Obstruction) -> Plan:
+        """Return the plan of what comes before a pose that is out of reach."""
+        told = blocked.help.removeprefix("; ")
+        self._candidates.notes += [told] if told else []
+        try:
+            shorter = self._part(blocked.time)
+        except InverseKinematicsError:
+            # The part would begin on the path itself, which relaxed rows only let the arm be near.
+            shorter = None
+        if shorter is None:
+            raise no_way(self._problem, blocked)
+        return shorter
 
     def _met(self, best: Session) -> Session:
         """Return a session of another null motion where one meets more of the constraints."""
@@ -330,7 +357,9 @@ class _Planning:
         """Return the plan of the largest part, looking closely at a time [s]; None for none."""
         effort = self._effort
         if effort.max_evaluations is None:
-            effort = replace(effort, max_evaluations=PART_EVALUATIONS)
+            free = self._problem.given_start is None
+            most = FREE_PART_EVALUATIONS if free else PART_EVALUATIONS
+            effort = replace(effort, max_evaluations=most)
         known = self._reach(suspect)
         self._progress("largest part", 1, 1)
         found = largest_part(self._problem, known, effort)

@@ -95,6 +95,7 @@ class Session:
         *,
         free: bool,
         guide: Guide | None = None,
+        deviation: Array | None = None,
         grid: Grid | None = None,
     ) -> "Session":
         """Integrate the motion at x = 0 from a start, and return the session around it.
@@ -109,6 +110,8 @@ class Session:
             Whether the start may move along its self-motion.
         guide : Guide, optional
             The null motion that stands for x = 0: where the search found one worth starting from.
+        deviation : (size,), optional
+            That of the tool from its path at x = 0, as `Deviation` has it, likewise.
         grid : Grid, optional
             Where a rough motion will do; by default one on which it stays near the path.
 
@@ -118,7 +121,7 @@ class Session:
             The motion at x = 0 runs into a singular pose.
         """
         if grid is None:
-            still, jacobians = settled_still_motion(problem, configuration, guide)
+            still, jacobians = settled_still_motion(problem, configuration, guide, deviation)
         else:
             still, jacobians = rough_still_motion(problem, configuration, grid)
         effort.counts.jacobians += jacobians

@@ -48,7 +48,7 @@ DEARER = 1.25
 # Steps of the rough motions.
 ROUGH_STEPS = 12
 # Heats: so many starts at most, optimised with so many evaluations of the cost more.
-HEATS = ((16, 8), (6, 8))
+HEATS = ((16, 5), (4, 8))
 # Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a
 # rule; rough optima this near are the same.
 ONE_VALLEY = 0.6
@@ -58,6 +58,9 @@ HOPELESS = 2.0
 # Evaluations of the cost that a damped motion may take, and each of many on parts of the path.
 DAMPED_EVALUATIONS = 400
 PART_EVALUATIONS = 150
+# The same where the start is free: of many, the one that gets farthest needs no more, and who tries
+# many places waits for it.
+FREE_PART_EVALUATIONS = 30
 
 # --- the largest part of a path
 # Share of the time to the edge of the workspace that is given up, since joint speeds grow without
@@ -65,13 +68,17 @@ PART_EVALUATIONS = 150
 EDGE_MARGIN = 1e-4
 # The end of the part is found to this share of it, and a part below this share of the path is none.
 END_AGREEMENT = 1e-3
+FREE_END_AGREEMENT = 4e-3
 LEAST_PART = 1e-2
-# Ends that are tried, at most.
+# Ends that are tried, at most; and where the start is free.
 PROBES = 16
+FREE_PROBES = 5
 # Motions that are optimised, of all that are followed; these with so many steps, until they are off
 # the path by this share of its extent.
 PART_FINALISTS = 3
 FOLLOWED_STEPS = 256
+# Where the start is free: of so many starts, and in so many steps, only the best one.
+PART_STARTS, FREE_FOLLOWED_STEPS = 16, 128
 OFF_PATH = 1e-2
 # Constant null motions that stand for x = 0 where that breaks down: joint angles over the path.
 PUSHES = (0.5, 2.0)

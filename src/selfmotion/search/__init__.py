@@ -8,8 +8,10 @@ from selfmotion.search.curves import (
 from selfmotion.search.guides import (
     SequenceGuide as SequenceGuide,
     guides as guides,
+    guides_near as guides_near,
     has_curves as has_curves,
 )
+from selfmotion.search.obstruction import Obstruction as Obstruction, obstruction as obstruction
 from selfmotion.search.reach import Reach as Reach, reachable as reachable
 from selfmotion.search.sequences import (
     Sequence as Sequence,
@@ -18,6 +20,7 @@ from selfmotion.search.sequences import (
 from selfmotion.search.settings import SPACING as SPACING
 from selfmotion.search.starts import (
     Admits as Admits,
+    carried as carried,
     spread as spread,
     start_candidates as start_candidates,
 )

@@ -1,12 +1,14 @@
 """Motions worth starting from, found by the global search over self-motions."""
 
 import itertools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, Progress
+from selfmotion.basics import Array, NoSequenceError, Progress
 from selfmotion.costs import PathLength
+from selfmotion.engine import deviation_of
 from selfmotion.path import Path
 from selfmotion.problem import Problem
 from selfmotion.search.measures import measure_of
@@ -19,10 +21,12 @@ from selfmotion.search.settings import (
     MOST,
     PATH_LOOKS,
     REFINED,
+    SEARCHES,
     SMOOTHING,
     STRIDE,
     TURN,
 )
+from selfmotion.search.waypoints import NearPath, OnPath, Waypoints
 from selfmotion.task import log3
 
 
@@ -34,9 +38,11 @@ class SequenceGuide:
     sequence : Sequence
     start : (n,)
         Its first configuration.
+    deviation : (size,) or None
+        How far its tool is from the path, as `Deviation` has it; None for not at all.
     """
 
-    def __init__(self, sequence: Sequence) -> None:
+    def __init__(self, sequence: Sequence, deviation: Array | None = None) -> None:
         from scipy.interpolate import make_lsq_spline
 
         t, q = sequence.t, sequence.q
@@ -44,7 +50,7 @@ class SequenceGuide:
         inner = np.append(t[:-SMOOTHING:SMOOTHING], t[-1])
         knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
         self._rate = make_lsq_spline(t, q, knots).derivative()
-        self.sequence = sequence
+        self.sequence, self.deviation = sequence, deviation
         self.start: Array = q[0]
 
     def __call__(self, t: Array) -> Array:
@@ -62,25 +68,96 @@ def guides(
     NoSequenceError
         No chain of configurations follows the path; says where it ends and why.
     """
-    follows, asked = problem.follows, problem.envelope
-    t = waypoint_times(problem)
-    step = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
-    options: dict[str, Any] = {
-        "lower": asked.lower,
-        "upper": asked.upper,
-        "largest_step": step,
+    t, asked = waypoint_times(problem), problem.envelope
+    options = _options(problem, t, rng, progress)
+    if has_curves(problem):
+        sequences = best_sequences(
+            problem.follows, t, lower=asked.lower, upper=asked.upper, **options
+        )
+    else:
+        waypoints = OnPath(problem.follows, t, asked.lower, asked.upper)
+        sequences = _sampled(problem, waypoints, t, options)
+    return [SequenceGuide(sequence) for sequence in sequences]
+
+
+def guides_near(
+    problem: Problem, rng: np.random.Generator | int | None, progress: Progress
+) -> list[SequenceGuide]:
+    """Return guides whose tool leaves the path where relaxed rows allow it.
+
+    For where nothing follows the path itself.
+
+    Raises
+    ------
+    NoSequenceError
+        No chain of configurations was found, or none whose deviation can be one of the relaxations'
+        splines.
+    """
+    t, asked = search_times(problem.path, FEWEST), problem.envelope
+    waypoints = NearPath(
+        problem.follows, problem.relaxations, problem.pinned, t, asked.lower, asked.upper
+    )
+    generator = np.random.default_rng(rng)
+    for number in range(1, SEARCHES + 1):
+        try:
+            found = _sampled(problem, waypoints, t, _options(problem, t, generator, progress))
+            break
+        except NoSequenceError:
+            if number == SEARCHES:
+                raise
+    near = [_near(problem, waypoints, sequence) for sequence in found]
+    kept = [guide for guide in near if guide is not None]
+    if not kept:
+        reason = "no spline of the relaxations' intervals (intervals=) deviates like them"
+        raise NoSequenceError(
+            f"{problem.robot.name}: {len(found)} chains are near the path, but {reason}",
+            time=0.0,
+            reason=reason,
+        )
+    return kept
+
+
+def _near(problem: Problem, waypoints: NearPath, sequence: Sequence) -> SequenceGuide | None:
+    """Return the guide whose deviation is a spline near that of a sequence; None for none."""
+    t, q = sequence.t, sequence.q
+    rows = [waypoints.allowed.deviation(x[None], float(s))[0] for s, x in zip(t, q, strict=True)]
+    deviation = deviation_of(problem, t)
+    c = deviation.nearest(np.array(rows))
+    tool, targets = deviation.target(c), problem.follows.targets(t)
+    targets[:, :3], targets[:, 3:12] = tool.translation, tool.rotation.reshape(len(t), 9)
+    there, arrived = waypoints.allowed.manifold.project(q, targets, far=True)
+    if not arrived.all():
+        return None
+    return SequenceGuide(replace(sequence, q=there), c)
+
+
+def _sampled(
+    problem: Problem, waypoints: Waypoints, t: Array, options: dict[str, Any]
+) -> list[Sequence]:
+    asked = problem.envelope
+    return sampled_sequences(
+        waypoints,
+        t,
+        lower=asked.lower,
+        upper=asked.upper,
+        weights=_weights(problem),
+        **options,
+    )
+
+
+def _options(
+    problem: Problem, t: Array, rng: np.random.Generator | int | None, progress: Progress
+) -> dict[str, Any]:
+    """Return what a search over waypoints at times t (W,) is asked besides."""
+    asked = problem.envelope
+    return {
+        "largest_step": np.minimum(asked.speed * np.diff(t)[:, None], np.pi),
         "bodies": [(model, distance + MARGIN) for model, distance in asked.bodies],
         "count": REFINED,
         "measure": measure_of(problem.follows, problem.costs, t, _weights(problem)),
         "rng": 0 if rng is None else rng,
         "progress": progress,
     }
-    if has_curves(problem):
-        sequences = best_sequences(follows, t, **options)
-    else:
-        weights = _weights(problem)
-        sequences = sampled_sequences(follows, t, weights=weights, **options)
-    return [SequenceGuide(sequence) for sequence in sequences]
 
 
 def has_curves(problem: Problem) -> bool:

@@ -7,11 +7,8 @@ import numpy as np
 
 from selfmotion.basics import Array, NoSequenceError, Progress, silent
 from selfmotion.collision import CollisionModel
-from selfmotion.engine import carried_bases
-from selfmotion.follow import Follows
 from selfmotion.search import edges
 from selfmotion.search.chains import best_chains, diverse_chains
-from selfmotion.search.manifold import Manifold
 from selfmotion.search.measures import Length, Measure
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sequences import Sequence, connected, ranked
@@ -29,6 +26,7 @@ from selfmotion.search.settings import (
     STRAYS,
 )
 from selfmotion.search.starts import spread
+from selfmotion.search.waypoints import Waypoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,24 +35,20 @@ class SampledLayers:
 
     Attributes
     ----------
-    manifold : Manifold
-    x : (W, 12)
-        The tool at the waypoints.
+    waypoints : Waypoints
     bounds : Admissible
     layers : list of (K, n)
         Free samples, sorted by the first joint.
     """
 
-    manifold: Manifold
-    x: Array
+    waypoints: Waypoints
     bounds: Admissible
     layers: list[Array]
 
     @classmethod
     def of(
         cls,
-        follows: Follows,
-        t: Array,
+        waypoints: Waypoints,
         limits: tuple[Array, Array],
         bodies: tuple[tuple[CollisionModel, float], ...],
         largest_step: Array,
@@ -63,11 +57,10 @@ class SampledLayers:
         progress: Progress,
     ) -> "SampledLayers":
         """Return those of a task that leaves any redundancy; see `sampled_sequences`."""
-        manifold = Manifold(follows, *limits)
-        bounds = Admissible(*limits, manifold.revolute, bodies)
-        x, generator = follows.targets(t), np.random.default_rng(rng)
-        layers = _layers(manifold, bounds, x, largest_step, weights, generator, progress)
-        return cls(manifold, x, bounds, layers)
+        bounds = Admissible(*limits, waypoints.robot.is_revolute, bodies)
+        generator = np.random.default_rng(rng)
+        layers = _layers(waypoints, bounds, largest_step, weights, generator, progress)
+        return cls(waypoints, bounds, layers)
 
     def why_blocked(self, i: int) -> str:
         """Return why no chain reaches waypoint i."""
@@ -80,7 +73,7 @@ class SampledLayers:
 
 
 def sampled_sequences(
-    follows: Follows,
+    waypoints: Waypoints,
     t: Array,
     *,
     lower: Array,
@@ -103,9 +96,9 @@ def sampled_sequences(
 
     Parameters
     ----------
-    follows : Follows
+    waypoints : Waypoints
     t : (W,)
-        Times of the waypoints [s].
+        Their times [s].
     lower, upper : (n,)
         Joint limits [rad or m].
     largest_step : (W - 1, n)
@@ -132,7 +125,7 @@ def sampled_sequences(
         No chain exists among the samples; tells the waypoint at which the last one ends.
     """
     nodes = SampledLayers.of(
-        follows, t, (lower, upper), tuple(bodies), largest_step, weights, rng, progress
+        waypoints, (lower, upper), tuple(bodies), largest_step, weights, rng, progress
     )
     bounds, layers, turning = nodes.bounds, nodes.layers, nodes.bounds.turning
     length = Length(weights)
@@ -141,7 +134,7 @@ def sampled_sequences(
         time = float(t[chains.blocked])
         reason = nodes.why_blocked(chains.blocked)
         raise NoSequenceError(
-            f"{follows.robot.name}: no motion along the path passes t = {time:.6g} s: {reason}",
+            f"{waypoints.robot.name}: no motion along the path passes t = {time:.6g} s: {reason}",
             time=time,
             reason=reason,
         )
@@ -154,14 +147,13 @@ def sampled_sequences(
     rough = [connected(layers, chain, turning) for chain in found]
     for number, q in enumerate(rough):
         progress("search: shortening sequence", number + 1, len(rough))
-        rough[number] = _shortened(nodes.manifold, bounds, nodes.x, q, largest_step, measure)
+        rough[number] = _shortened(waypoints, bounds, q, largest_step, measure)
     return ranked(t, rough, turning, weights, measure)
 
 
 def _layers(
-    manifold: Manifold,
+    waypoints: Waypoints,
     bounds: Admissible,
-    x: Array,
     largest_step: Array,
     weights: Array,
     rng: np.random.Generator,
@@ -172,19 +164,20 @@ def _layers(
     Those of smooth motions; what follows from samples that a chain reaches, without self-motion;
     and what is near that: so there is a way around where smooth motions end.
     """
-    smooth = _smooth_motions(manifold, bounds, x, rng, progress)
+    smooth = _smooth_motions(waypoints, bounds, rng, progress)
     turning = bounds.turning
     layers, cost = [_sorted(smooth[0][bounds.keep(smooth[0])])], np.empty(0)
-    for i in range(1, len(x)):
-        progress("search: what is free at waypoint", i + 1, len(x))
+    for i in range(1, waypoints.count):
+        progress("search: what is free at waypoint", i + 1, waypoints.count)
         before = layers[-1]
         cost = np.zeros(len(before)) if i == 1 else cost
         parents = _spread_out(before[np.isfinite(cost)], cost[np.isfinite(cost)], PARENTS)
-        strays = np.repeat(parents, STRAYS, axis=0)
+        each = max(STRAYS, -(-waypoints.fewest_strays // max(len(parents), 1)))
+        strays = np.repeat(parents, each, axis=0)
         away = rng.normal(scale=STRAYED, size=strays.shape) / weights
         step = 0.5 * largest_step[i - 1]
         guesses = np.concatenate([parents, strays + np.clip(away, -step, step)])
-        q, arrived = manifold.project(guesses, x[i])
+        q, arrived = waypoints.project(guesses, i)
         q = np.concatenate([q[arrived], smooth[i]])
         layers.append(_sorted(q[bounds.keep(q)]))
         cost, _ = Length(weights).extended(
@@ -197,22 +190,23 @@ def _layers(
 
 
 def _smooth_motions(
-    manifold: Manifold, bounds: Admissible, x: Array, rng: np.random.Generator, progress: Progress
+    waypoints: Waypoints, bounds: Admissible, rng: np.random.Generator, progress: Progress
 ) -> list[Array]:
     """Return at all waypoints where motions with constant null motions are, each (K, n)."""
-    dof, last = manifold.robot.dof, len(x) - 1
-    nodes = [[np.empty((0, dof))] for _ in x]
+    dof, last = waypoints.robot.dof, waypoints.count - 1
+    nodes = [[np.empty((0, dof))] for _ in range(waypoints.count)]
     stations = np.unique(np.linspace(0, last, BEGINNINGS).round().astype(int))
     for number, station in enumerate(stations.tolist(), 1):
         progress("search: motions from waypoint", number, len(stations))
-        begun = _starts(manifold, bounds, x[station], rng)
+        begun = _starts(waypoints, bounds, station, rng)
         drift = rng.normal(scale=DRIFT / max(last, 1), size=begun.shape)
         drift[::2] = 0.0
         nodes[station].append(begun)
         for direction in (1, -1):
             q, slope = begun, direction * drift
-            for i in range(station + direction, len(x) if direction > 0 else -1, direction):
-                q, arrived = manifold.project(q + slope, x[i])
+            end = waypoints.count if direction > 0 else -1
+            for i in range(station + direction, end, direction):
+                q, arrived = waypoints.project(q + slope, i)
                 q, slope = q[arrived], slope[arrived]
                 nodes[i].append(q)
     return [np.concatenate(parts) for parts in nodes]
@@ -229,20 +223,19 @@ def _sorted(q: Array) -> Array:
 
 
 def _starts(
-    manifold: Manifold, bounds: Admissible, target: Array, rng: np.random.Generator
+    waypoints: Waypoints, bounds: Admissible, station: int, rng: np.random.Generator
 ) -> Array:
     """Return configurations within the limits, free where there are such, (K, n)."""
-    seeds = np.array(list(spread(manifold.robot, BEGINNING_SEEDS, rng)))
-    q, arrived = manifold.project(seeds, target, far=True)
+    seeds = np.array(list(spread(waypoints.robot, BEGINNING_SEEDS, rng)))
+    q, arrived = waypoints.project(seeds, station, far=True)
     q = q[arrived]
     free = bounds.keep(q)
     return np.concatenate([q[free], q[~free]])[:BEGUN]
 
 
 def _shortened(
-    manifold: Manifold,
+    waypoints: Waypoints,
     bounds: Admissible,
-    x: Array,
     q: Array,
     largest_step: Array,
     measure: Measure,
@@ -252,7 +245,7 @@ def _shortened(
     cost = measure.of(q)
     for ring in RINGS:
         for _ in range(RING_ROUNDS):
-            layers = _around(manifold, bounds, x, q, ring)
+            layers = _around(waypoints, bounds, q, ring)
             chains = best_chains(layers, largest_step, fixed, measure)
             before, cost = cost, float(chains.cost[-1].min())
             chain = chains.back(len(q) - 1, int(np.argmin(chains.cost[-1])))
@@ -262,18 +255,18 @@ def _shortened(
     return q
 
 
-def _around(manifold: Manifold, bounds: Admissible, x: Array, q: Array, ring: float) -> list[Array]:
+def _around(waypoints: Waypoints, bounds: Admissible, q: Array, ring: float) -> list[Array]:
     """Return q (W, n) and the free samples around it at each waypoint, each (K, n).
 
     At one and two times `ring` to both sides along each axis of a basis of the null space that is
     carried along q: so a chain can move aside as a whole, without zigzag.
     """
-    basis = carried_bases(manifold.follows, q)
+    basis = waypoints.bases(q)
     offsets = ring * np.array([-2.0, -1.0, 1.0, 2.0])
     moves = np.einsum("wnr,k->wrkn", basis, offsets).reshape(len(q), -1, q.shape[1])
     guesses = q[:, None] + moves
     flat = guesses.reshape(-1, q.shape[1])
-    found, arrived = manifold.project(flat, np.repeat(x, moves.shape[1], axis=0))
+    found, arrived = waypoints.project_each(flat, np.repeat(np.arange(len(q)), moves.shape[1]))
     # Far corrections lead elsewhere.
     arrived &= np.linalg.norm(found - flat, axis=1) < 1.5 * ring
     arrived[arrived] = bounds.keep(found[arrived])

@@ -130,9 +130,8 @@ SEEDS = 24
 BISECTIONS = 16
 # Before a pose counts as out of reach, so many seeds more are tried, and a slower method from some:
 # poses at joint limits are missed from 24. How far poses are out of reach is looked at for so many.
-MORE_SEEDS = 600
-RESTARTS = 12
-LOOKS = 12
+MORE_SEEDS = 300
+LOOKS = 6
 # Who gets so near [m + rad] counts as there.
 NEARLY = 1e-5
 # Poses about a time of trouble, in shares of the path's duration.
@@ -141,3 +140,32 @@ ABOUT = (-1e-3, 0.0, 1e-3, 4e-3)
 # a joint this near to its limit [rad or m] as at it.
 STRETCHED = 0.1
 AT_LIMIT = 1e-3
+
+# --- relaxed rows
+# The search uses this share of a band: the spline that follows its motion needs some of the rest.
+WITHIN_BAND = 0.998
+# Tries around the samples that a chain reaches, at least, and searches from other seeds before
+# nothing counts as found.
+FEWEST_STRAYS, SEARCHES = 320, 3
+
+# --- single poses
+# The slower method brings so many seeds nearer, in so many iterations each; and so many where a
+# pose would be given up: near limits it arrives from a third of them, Newton's from one in 300.
+APPROACHED, MORE_APPROACHED, ITERATIONS = 48, 400, 60
+# Of those that meet something, so many are looked at, and so many of these, which meet the least,
+# moved aside at random, by less and less [rad].
+MOST_LOOKED_AT, CLIMBERS = 80, 8
+# Random walks along the self-motions, so many at a time, so often, in steps of these sizes [rad].
+WALKERS, WALKS, WALK_STEPS = 64, 12, (0.1, 0.3, 0.8)
+CLIMBS = (0.3, 0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02, 0.02)
+# Poses along a path at which to look before anything else.
+COARSE_POSES = 9
+
+# --- remedies: what would help
+# Seeds for each: so many of the nearest configurations, each so far off [rad], and some others;
+# rounds in which a deviation has to be this share of the least before.
+REMEDY_SEEDS, CLOSE = 8, (0.0, 0.03, 0.1, 0.3)
+SHRINKS, SHRUNK = 6, 0.75
+# A path is moved so often, each time a bit farther than needed at the pose where nothing was found,
+# and no farther than this [m].
+MOVE_TRIES, OVERSHOOT, FARTHEST = 4, 0.05, 0.5

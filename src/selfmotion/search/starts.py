@@ -118,6 +118,22 @@ def _scattered(
     return found
 
 
+def carried(follows: Follows, starts: Array, t: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Return the motions from starts (K, n) that follow the path without self-motion, (K, N, n).
+
+    From each of the times t (N,) [s] to the next by Newton's method, limits not regarded; and from
+    which starts that is possible, (K,).
+    """
+    free = np.full(follows.robot.dof, np.inf)
+    manifold = Manifold(follows, -free, free)
+    motions, going = [starts], np.ones(len(starts), dtype=bool)
+    for target in follows.targets(t)[1:]:
+        q, arrived = manifold.project(motions[-1], target)
+        going &= arrived
+        motions.append(q)
+    return np.stack(motions, axis=1), going
+
+
 def spread(robot: RobotModel, count: int, rng: np.random.Generator) -> Iterator[Array]:
     """Yield configurations that fill the limits evenly.
 

@@ -14,6 +14,7 @@ from selfmotion.search.nodes import Admissible
 from selfmotion.search.sampled import SampledLayers
 from selfmotion.search.sequences import CurveLayers, connected
 from selfmotion.search.settings import BREAK, MARGIN
+from selfmotion.search.waypoints import OnPath
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +72,12 @@ class Stretches:
         steps = np.minimum(asked.speed * np.diff(t)[:, None], np.pi)
         bodies = tuple((model, distance + MARGIN) for model, distance in asked.bodies)
         limits, weights = (asked.lower, asked.upper), problem.robot.joint_weights
-        where = (problem.follows, t, limits, bodies)
         if has_curves(problem):
-            curves = CurveLayers.of(*where, rng, progress)
+            curves = CurveLayers.of(problem.follows, t, limits, bodies, rng, progress)
             found = cls(problem, t, curves, curves.bounds, steps, curves.samples)
         else:
-            samples = SampledLayers.of(*where, steps, weights, rng, progress)
+            where = OnPath(problem.follows, t, *limits)
+            samples = SampledLayers.of(where, limits, bodies, steps, weights, rng, progress)
             found = cls(problem, t, samples, samples.bounds, steps, samples.layers)
         found._pin_ends()
         found._check()

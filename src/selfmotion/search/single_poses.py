@@ -1,0 +1,218 @@
+"""Whether the arm can be at single poses of a path at all: limits, bodies, relaxed rows."""
+
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.collision import Closest
+from selfmotion.problem import Problem
+from selfmotion.robot import RobotModel
+from selfmotion.search.allowed import Allowed
+from selfmotion.search.curves import SelfMotion
+from selfmotion.search.nodes import Admissible
+from selfmotion.search.settings import (
+    APPROACHED,
+    BRANCHES,
+    CLIMBERS,
+    CLIMBS,
+    CLOSE,
+    MORE_APPROACHED,
+    MORE_SEEDS,
+    MOST_LOOKED_AT,
+    NEARLY,
+    SEEDS,
+    SPACING,
+    TRACING_SEEDS,
+    WALK_STEPS,
+    WALKERS,
+    WALKS,
+)
+from selfmotion.search.starts import spread
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Configurations at one pose.
+
+    Attributes
+    ----------
+    free : (K, n)
+        Within the limits, and clear of bodies.
+    met : (K', n)
+        Within the limits, but not clear; looked for only while none was free.
+    tries : int
+        From so many configurations it was tried to get there.
+    """
+
+    free: Array
+    met: Array
+    tries: int
+
+
+class SinglePoses:
+    """Inverse kinematics of single poses, within limits, clear of bodies, rows relaxed.
+
+    Parameters
+    ----------
+    problem : Problem
+    rng : Generator
+        Shifts the seeds.
+    clear : bool
+        Whether bodies have to keep their distances.
+    relaxed : bool
+        Whether relaxed rows need not be kept.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        rng: np.random.Generator,
+        *,
+        clear: bool = True,
+        relaxed: bool = True,
+    ) -> None:
+        asked = problem.asked_envelope
+        self.problem, self._rng = problem, rng
+        self.robot: RobotModel = asked.arm(problem.robot)
+        self.follows = problem.follows.for_robot(self.robot)
+        relaxations = problem.relaxations if relaxed else ()
+        self.allowed = Allowed(self.follows, relaxations, problem.pinned, asked.lower, asked.upper)
+        self.bounds = Admissible(
+            asked.lower, asked.upper, self.robot.is_revolute, asked.bodies if clear else ()
+        )
+        self._seeds = np.array(list(spread(self.robot, SEEDS, rng)))
+
+    def shifted(self, shift: Array) -> "SinglePoses":
+        """Return that of the path moved by so much (3,) [m], among the same bodies."""
+        other = copy(self)
+        other.allowed = self.allowed.shifted(shift)
+        return other
+
+    def with_limits(self, lower: Array, upper: Array) -> "SinglePoses":
+        """Return that of an arm with other limits (n,)."""
+        other = copy(self)
+        other.allowed = self.allowed.with_limits(lower, upper)
+        other.bounds = replace(self.bounds, lower=lower, upper=upper)
+        return other
+
+    def first_blocked(self, times: Array) -> float | None:
+        """Return the first of some times [s] at whose poses nothing is found by a quick look."""
+        known = np.empty((0, self.robot.dof))
+        for t in times.tolist():
+            found = self.look(t, known)
+            if not len(found.free):
+                q = self._by_damped_steps(t)
+                found = replace(found, free=q[self.bounds.keep(q)])
+            if not len(found.free):
+                return float(t)
+            known = found.free
+        return None
+
+    def look(self, t: float, known: Array) -> Found:
+        """Return what is found at t [s] from configurations nearby (K, n), and from anywhere."""
+        near = self._reached(t, known[:BRANCHES])
+        free = near[self.bounds.keep(near)]
+        if len(free):
+            return Found(free, near[:0], len(known[:BRANCHES]))
+        far = self._reached(t, self._seeds, far=True)
+        free = far[self.bounds.keep(far)]
+        return Found(free, np.concatenate([near, far]), len(known[:BRANCHES]) + len(self._seeds))
+
+    def look_closely(self, t: float, before: Found) -> Found:
+        """Return what is found by everything that is known, where a look found nothing free."""
+        seeds = np.array(list(spread(self.robot, MORE_SEEDS, self._rng)))
+        far = self._reached(t, seeds, far=True)
+        tries = before.tries + len(seeds)
+        free = far[self.bounds.keep(far)]
+        met = np.concatenate([before.met, far])
+        if len(free):
+            return Found(free, met, tries)
+        slowly = self._by_damped_steps(t)
+        tries += MORE_APPROACHED
+        free, met = slowly[self.bounds.keep(slowly)], np.concatenate([met, slowly])
+        if len(free) or not len(met):
+            return Found(free, met, tries)
+        for more in (self._along_curves, self._wandered, self._climbed):
+            q = more(t, met)
+            free, met = q[self.bounds.keep(q)], np.concatenate([met, q])
+            tries += len(q)
+            if len(free):
+                break
+        return Found(free, met, tries)
+
+    def _reached(self, t: float, seeds: Array, *, far: bool = False) -> Array:
+        """Return what Newton's method makes of seeds (K, n) for the pose at t, (K', n)."""
+        away = self.allowed.anywhere(len(seeds), t, self._rng) if far and len(seeds) else None
+        found, _, arrived = self.allowed.project(seeds, t, far=far, deviation=away)
+        return np.asarray(found[arrived])
+
+    def _by_damped_steps(self, t: float) -> Array:
+        """Return what the slower method finds, which comes to limits and edges, (K, n)."""
+        q, misses = self.nearest(t, MORE_APPROACHED)
+        return np.asarray(q[misses.sum(axis=1) < NEARLY])
+
+    def nearest(self, t: float, count: int = APPROACHED) -> tuple[Array, Array]:
+        """Return configurations as near to a pose as limits let them (K, n), misses [m, rad]."""
+        seeds = np.array(list(spread(self.robot, count, self._rng)))
+        away = self.allowed.anywhere(len(seeds), t, self._rng)
+        q, _, misses = self.allowed.approach(seeds, t, away)
+        order = np.argsort(misses.sum(axis=1), kind="stable")
+        return q[order], misses[order]
+
+    def some(self, t: float, count: int) -> Array:
+        """Return seeds (K, n) from which something may be found near the pose at t [s]."""
+        q, _ = self.nearest(t)
+        near = np.repeat(q[:count], len(CLOSE), axis=0)
+        noise = self._rng.normal(size=near.shape) * np.tile(CLOSE, count)[: len(near), None]
+        return np.concatenate([near + noise / self.robot.joint_weights, self._seeds])
+
+    def _along_curves(self, t: float, met: Array) -> Array:
+        """Return samples of all self-motions of a pose, where these are curves, (K, n)."""
+        if self.follows.redundancy != 1 or self.allowed.relaxed(t):
+            return np.empty((0, self.robot.dof))
+        motion = SelfMotion(self.follows, SPACING)
+        target = self.allowed.target(t)
+        seeds = spread(self.robot, TRACING_SEEDS, self._rng)
+        samples = [curve.q for curve in motion.curves(target, seeds).curves]
+        every = np.concatenate([np.empty((0, self.robot.dof)), *samples])
+        return self.bounds.representative(every)
+
+    def _wandered(self, t: float, met: Array) -> Array:
+        """Return configurations that random walks along the self-motions lead to, (K, n).
+
+        From anywhere Newton's method may lead to few of them only, where limits are near.
+        """
+        known = met
+        for _ in range(WALKS):
+            here = known[self._rng.integers(len(known), size=WALKERS)]
+            size = self._rng.choice(WALK_STEPS, size=(WALKERS, 1))
+            away = self._rng.normal(size=here.shape) * size / self.robot.joint_weights
+            found, _, arrived = self.allowed.project(here + away, t)
+            known = np.concatenate([known, found[arrived]])
+            if self.bounds.keep(found[arrived]).any():
+                break
+        return np.asarray(known[len(met) :])
+
+    def _climbed(self, t: float, met: Array) -> Array:
+        """Return configurations that are less near to bodies than those that were found, (K, n)."""
+        some = met[:: -(-len(met) // MOST_LOOKED_AT)]
+        best = some[np.argsort([-self.room(q)[0] for q in some])[:CLIMBERS]]
+        room = np.array([self.room(q)[0] for q in best])
+        for size in CLIMBS:
+            away = self._rng.normal(scale=size, size=best.shape) / self.robot.joint_weights
+            found, _, arrived = self.allowed.project(best + away, t)
+            for k in np.flatnonzero(arrived):
+                here = self.room(found[k])[0]
+                if here > room[k]:
+                    best[k], room[k] = found[k], here
+            if room.max() > 0.0:
+                break
+        return best
+
+    def room(self, q: Array) -> tuple[float, Closest, float]:
+        """Return what bodies have beyond what is asked at q (n,) [m], the worst pair, and that."""
+        each = [(model.distance(q), asked) for model, asked in self.bounds.bodies]
+        rooms = ((closest.value - asked, closest, asked) for closest, asked in each)
+        return min(rooms, key=lambda found: found[0])

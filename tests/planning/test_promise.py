@@ -1,0 +1,41 @@
+"""Which starts are looked at more closely: all are there, unlike ones first."""
+
+import numpy as np
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.motion import Grid
+from selfmotion.planning.promise import most_promising
+from selfmotion.planning.settings import ONE_VALLEY
+from selfmotion.search import carried, start_candidates
+from support.arms import robot_named
+from support.paths import line_of
+
+# Newton's method ends where a correction is below 1e-6, which leaves its square.
+ON_PATH = 1e-9
+
+
+def apart(motion: Array, other: Array) -> float:
+    return float(np.abs(motion - other).max())
+
+
+def test_carried_motions_follow_the_path_and_unlike_ones_come_first() -> None:
+    robot = robot_named("panda")
+    problem = sm.Problem(robot, line_of(robot, "pose"))
+    grid = Grid.aligned(problem.knots, 12)
+    starts = start_candidates(problem.follows, 24, np.random.default_rng(0))
+    ranked = most_promising(problem, starts, grid, apart)
+    assert sorted(map(tuple, ranked)) == sorted(map(tuple, starts))
+    motions, arrived = carried(problem.follows, np.array(ranked), grid.nodes)
+    assert arrived.any()
+    for motion in motions[arrived]:
+        for t, q in zip(grid.nodes, motion, strict=True):
+            assert max(sm.Task.POSE.miss(problem.path.pose(float(t)), robot.pose(q))) < ON_PATH
+    # Where the first one comes that is near one before, only such or impassable ones follow.
+    alone = [
+        bool(arrived[k])
+        and all(apart(motions[k], motions[i]) > ONE_VALLEY for i in range(k) if arrived[i])
+        for k in range(len(ranked))
+    ]
+    assert alone == sorted(alone, reverse=True)
+    assert alone[0]
