@@ -159,4 +159,3 @@ def test_a_goal_says_what_is_looked_for() -> None:
         parts.plan()
     with pytest.raises(sm.ProblemError, match="search: has no effect on a motion in parts"):
         dataclasses.replace(parts, search=sm.Search()).in_parts()
-    assert parts.in_parts().verified

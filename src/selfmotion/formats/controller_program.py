@@ -111,7 +111,7 @@ class Draft:
 
     def signal(self, event: str) -> Signal | None:
         """Return what an event switches."""
-        return self.settings.signals[event]
+        return self.settings.signal(event)
 
 
 def drafted(
@@ -141,7 +141,7 @@ def drafted(
 def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
     """Refuse events (event → seam) of which nothing says what they switch."""
     for event, seam in seams.items():
-        if event not in settings.signals:
+        if not settings.knows(event):
             raise ProblemError(
                 f"seam '{seam}': event '{event}' has no signal; name the output that it switches, "
                 f"signals = {{'{event}': (output, True)}}, or None for a comment"

@@ -1,7 +1,7 @@
 """A problem and how to plan it, as a file says it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -33,7 +33,7 @@ class Job:
     goal : {"best", "retimed", "fastest", "parts"}
         What `plan` looks for: the motion that is best by its costs, that at its fastest pace
         (`retime`), or the `fastest` one. Of parts (`plan_in_parts`) it is `in_parts`.
-    parts : mapping
+    parts : mapping, optional
         Of parts: ``retreat``, ``axis`` and ``ramp`` of `plan_in_parts`.
     """
 
@@ -44,7 +44,7 @@ class Job:
     max_evaluations: int | None = None
     outputs: tuple[FilePath, ...] = ()
     goal: str = "best"
-    parts: Mapping[str, Any] = field(default_factory=dict)
+    parts: Mapping[str, Any] | None = None
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -87,7 +87,7 @@ class Job:
             The file has settings of a search or an optimiser, which `plan_in_parts` has not.
         """
         self._refuse(("search", "optimizer", "max_evaluations"), "a motion in parts")
-        given = {**self.parts, "tolerance": self.tolerance, **options}
+        given = {**(self.parts or {}), "tolerance": self.tolerance, **options}
         return plan_in_parts(self.problem, **given)
 
     def _refuse(self, names: tuple[str, ...], what: str) -> None:

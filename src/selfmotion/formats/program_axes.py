@@ -40,7 +40,7 @@ def axes_of(robot: RobotModel, settings: ProgramSettings) -> tuple[Axis, ...]:
     ProblemError
         Joints and axes do not fit; a mapping that would is asked for.
     """
-    names = dict(settings.axes) or _usual(robot)
+    names = dict(settings.axes or {}) or _usual(robot)
     for joint in robot.joint_names:
         if joint not in names:
             raise ProblemError(f"{robot.name}: axes: joint '{joint}' has no axis; give all joints")

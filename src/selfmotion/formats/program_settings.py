@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -35,11 +35,11 @@ class ProgramSettings:
         How far what the controller makes of the targets may be off the motion: the tool's position
         [m] and rotation [rad], and each joint by that angle or length as well. Targets are as many
         as that takes.
-    axes : mapping
+    axes : mapping, optional
         Joint → axis: ``"A1"`` to ``"A6"`` of the robot, ``"E1"`` to ``"E6"`` for others. By
         default joints that slide, and those of a cell's smaller parts, are others; of an arm with
         seven the third one is E1, as KUKA's LBR and ABB's IRB 14000 count; the rest in order.
-    signals : mapping
+    signals : mapping, optional
         Event → output and value, such as ``{"arc on": ("doArc", True)}``; KUKA's and Universal
         Robots' outputs are numbers. None for an event that is a comment only.
     flange : str, optional
@@ -61,8 +61,8 @@ class ProgramSettings:
     """
 
     deviation: Tolerance = _DEVIATION
-    axes: Mapping[str, str] = field(default_factory=dict)
-    signals: Mapping[str, Signal | None] = field(default_factory=dict)
+    axes: Mapping[str, str] | None = None
+    signals: Mapping[str, Signal | None] | None = None
     flange: str | None = None
     mass: float | None = None
     center: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -73,14 +73,17 @@ class ProgramSettings:
             found = shown(self.deviation)
             raise ProblemError(f"deviation is {found}, expected a Tolerance, in m and rad")
         for name in ("axes", "signals"):
+            if getattr(self, name) is None:
+                continue
             if not isinstance(getattr(self, name), Mapping):
                 raise ProblemError(f"{name} is {shown(getattr(self, name))}, expected a mapping")
-        for joint, axis in self.axes.items():
+        for joint, axis in (self.axes or {}).items():
             if axis not in AXES:
                 raise ProblemError(
                     f"axes: '{joint}' is axis {shown(axis)}, expected one of A1 to A6, E1 to E6"
                 )
-        signals = {event: _signal(event, given) for event, given in self.signals.items()}
+        given = self.signals or {}
+        signals = {event: _signal(event, value) for event, value in given.items()}
         object.__setattr__(self, "signals", signals)
         if self.flange is not None and not isinstance(self.flange, str):
             raise ProblemError(f"flange is {shown(self.flange)}, expected the name of a link")
@@ -90,6 +93,14 @@ class ProgramSettings:
         object.__setattr__(self, "center", tuple(center.tolist()))
         approach = as_number(self.approach, "approach", above=0.0, most=1.0)
         object.__setattr__(self, "approach", approach)
+
+    def signal(self, event: str) -> Signal | None:
+        """Return what an event switches, None for nothing; KeyError where nothing is said of it."""
+        return (self.signals or {})[event]
+
+    def knows(self, event: str) -> bool:
+        """Whether it is said what an event switches."""
+        return event in (self.signals or {})
 
 
 def read_program_settings(file: str | FilePath) -> ProgramSettings:

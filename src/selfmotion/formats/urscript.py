@@ -91,7 +91,7 @@ def _tool(robot: RobotModel, joints: Sequence[str], settings: ProgramSettings) -
 
 
 def _event(event: str, settings: ProgramSettings) -> str:
-    signal = settings.signals[event]
+    signal = settings.signal(event)
     if signal is None:
         return f"# event: {' '.join(event.split())}"
     output, value = signal
