@@ -290,5 +290,7 @@ def test_our_own_keep_the_laws_that_users_are_given(problem: sm.Problem) -> None
 
 
 def test_an_unknown_kind_lists_the_known_ones() -> None:
-    with pytest.raises(sm.FileFormatError, match=r"path kind is 'spiral'.*circle.*line.*waypoints"):
-        restore(sm.Path, {"kind": "spiral"})
+    with pytest.raises(
+        sm.FileFormatError, match=r"path kind is 'corkscrew'.*circle.*line.*waypoints"
+    ):
+        restore(sm.Path, {"kind": "corkscrew"})
