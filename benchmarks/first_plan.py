@@ -70,7 +70,9 @@ def main() -> int:
         for file in sorted((ROOT / "examples").glob("*.py")):
             if file.stem in LEFT_OUT:
                 continue
-            _, printed = run(["-c", COUNTED, f"{folder}/examples/{file.name}"], cache, folder)
+            _, printed = run(
+                ["-c", COUNTED, f"{folder}/examples/{file.name}"], cache, f"{folder}/examples"
+            )
             count = int(printed.rsplit(":", 1)[1])
             late += count
             if count:

@@ -104,5 +104,8 @@ def test_a_problem_file_begins_from_a_plan(tmp_path: Path) -> None:
     assert invoke("plan", file, "--out", first)[0] == 0
     assert invoke("plan", file, "--from", first, "--out", second)[0] == 0
     cold, warm = sm.load_plan(first).report, sm.load_plan(second).report
-    assert len(warm.history) < len(cold.history)
+    # It begins where the other one ended: nine tenths of what there is to save are saved.
+    saved = cold.initial_cost - cold.cost
+    assert warm.history[0].cost < cold.cost + 0.1 * saved
+    assert len(warm.history) <= len(cold.history)
     assert warm.cost == pytest.approx(cold.cost, rel=AGREEMENT)

@@ -375,6 +375,10 @@ def test_a_telephone_shows_it_whole(open_page, files, scheme):
         box = page.locator(part).bounding_box()
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= 390
+    # Nothing of the verdict is cut.
+    heights = "[verdict.scrollHeight, verdict.clientHeight]"
+    whole, shown = page.evaluate(heights)
+    assert whole <= shown + 1
     text, ground = page.evaluate("""() => {
       const style = getComputedStyle(document.body);
       return [style.color, style.backgroundColor].map((c) => Number(c.match(/\\d+/)[0]));

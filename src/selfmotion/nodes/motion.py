@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -90,9 +92,10 @@ class NodeGrid:
 
         None where a node does not come onto its manifold, or a given start is not that of it.
         """
-        return self._near(trajectory(self.t), trajectory(self.t, 1))
+        return self.near(trajectory(self.t), trajectory(self.t, 1))
 
-    def _near(self, q: Array, qd: Array) -> "NodeMotion | None":
+    def near(self, q: Array, qd: Array) -> "NodeMotion | None":
+        """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇, or None."""
         found = self.manifolds.charts(q, qd)
         if found is None:
             return None
@@ -111,7 +114,7 @@ class NodeGrid:
         share = np.minimum(np.append(0.0, np.diff(self.t)) / time, 1.0)
         if follow(start, wanted, share, own.targets, own.chains, own.layout, q) >= 0:
             return None
-        return self._near(q, np.asarray(np.gradient(q, self.t, axis=0)))
+        return self.near(q, np.asarray(np.gradient(q, self.t, axis=0)))
 
     @property
     def _rates(self) -> Ints:
@@ -207,6 +210,25 @@ class NodeMotion:
     def epsilon(self) -> Array:
         """The null motion ε at the nodes, (N + 1, n)."""
         return np.asarray((self.charts.bases @ self.nu[:, :, None])[:, :, 0])
+
+    def smoothed(self) -> "NodeMotion | None":
+        """Return the motion through the same nodes, as fast there as a spline through them.
+
+        Where few nodes are, the velocities that are best by the samples of the cost waver about
+        those of a smooth motion through the same nodes, which differ by next to nothing in cost.
+        None where a node does not come onto its manifold.
+        """
+        from scipy.interpolate import CubicSpline
+
+        t, q, qd = self.grid.t, self.place.q, self.place.qd.copy()
+        # Where the path is only C², so is the motion.
+        ends = np.searchsorted(t, self.grid.problem.knots)
+        for first, last in pairwise(ends.tolist()):
+            if last - first > 1:
+                part = slice(first, last + 1)
+                sides: Any = ((1, qd[first]), (1, qd[last]))
+                qd[part] = CubicSpline(t[part], q[part], bc_type=sides)(t[part], 1)
+        return self.grid.near(q, qd)
 
     def recentred(self) -> "NodeMotion | None":
         """Return the same motion, with charts around it; None where rounding forbids."""

@@ -137,7 +137,7 @@ class NodeDescent:
                 # That is on the path, also between the nodes.
                 broken = finer.motion.broken()
                 if not broken.any():
-                    return finer
+                    return finer.smoothed()
                 each = broken.reshape(-1, 2).any(axis=1)
                 where = np.convolve(each, np.ones(3), "same") > 0.0
             finer = standing.refined(where)

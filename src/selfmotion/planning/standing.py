@@ -61,6 +61,16 @@ class Standing:
         motion = self.motion
         return Evaluation(self.coefficients, motion.exact_terms, motion.trajectory, damped=False)
 
+    def smoothed(self) -> "Standing":
+        """Return it with smooth velocities, where these cost no more and keep the conditions."""
+        motion = self.motion.smoothed()
+        dearer = motion is None or not motion.exact_cost <= self.cost
+        return (
+            self
+            if motion is None or dearer or motion.broken().any()
+            else replace(self, motion=motion)
+        )
+
     def refined(self, where: Flags | None = None) -> "Standing":
         """Return it with more nodes, in the middle of each interval or of some (N,)."""
         t = self.motion.grid.t

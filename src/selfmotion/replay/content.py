@@ -8,7 +8,7 @@ from selfmotion.follow import BoundFollow
 from selfmotion.replay import links, obstacles, scene, shapes
 from selfmotion.replay.clearance import ClearanceCurve, clearance_curve
 from selfmotion.replay.facts import describe, table
-from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames
+from selfmotion.replay.motion import Curves, KeyFrames, curves, key_frames, torque_limits
 from selfmotion.replay.payload import Json, Payload
 from selfmotion.replay.whole import Whole
 from selfmotion.result import Plan
@@ -225,8 +225,11 @@ def _curves(plan: Plan, sampled: Curves, payload: Payload) -> Json:
         "t": payload.array(sampled.t),
         "q": payload.array(sampled.q),
         "qd": payload.array(sampled.qd),
+        "qdd": payload.array(sampled.qdd),
         "manipulability": payload.array(sampled.manipulability),
     }
+    if sampled.torque is not None:
+        drawn["torque"] = payload.array(sampled.torque)
     if np.any(plan.task.rows < 3):
         drawn["position"] = payload.array(sampled.position_error)
     if np.any(plan.task.rows >= 3):
@@ -243,7 +246,8 @@ def _clearance(curve: ClearanceCurve, payload: Payload) -> Json:
 
 
 def _joints(plan: Plan) -> list[Json]:
-    robot = plan.robot
+    robot, asked = plan.robot, torque_limits(plan)
+    effort = robot.effort_limit if asked is None else asked.of(robot)
     return [
         {
             "name": name,
@@ -252,6 +256,8 @@ def _joints(plan: Plan) -> list[Json]:
             "lower": _finite(robot.lower[k]),
             "upper": _finite(robot.upper[k]),
             "speed": _finite(robot.velocity_limit[k]),
+            "acceleration": _finite(robot.acceleration_limit[k]),
+            "effort": _finite(effort[k]),
         }
         for k, name in enumerate(robot.joint_names)
     ]

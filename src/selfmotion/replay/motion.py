@@ -7,6 +7,7 @@ import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d
 
 from selfmotion.basics import Array
+from selfmotion.constraints import JointTorqueLimits
 from selfmotion.follow import BoundFollow
 from selfmotion.motion import Trajectory
 from selfmotion.result import Plan
@@ -122,8 +123,10 @@ class Curves:
     ----------
     t : (M,)
         Times from the start of the motion [s].
-    q, qd : (M, n)
-        Joint coordinates [rad or m] and velocities [rad/s or m/s].
+    q, qd, qdd : (M, n)
+        Joint coordinates [rad or m], velocities [rad/s or m/s] and accelerations [rad/s² or m/s²].
+    torque : (M, n) or None
+        Joint torques [Nm or N]; None where the plan was not asked to limit them.
     manipulability : (M,)
         √det(JJᵀ) of the rows the task prescribes, in SI units.
     position_error, rotation_error : (M,)
@@ -143,6 +146,8 @@ class Curves:
     t: Array
     q: Array
     qd: Array
+    qdd: Array
+    torque: Array | None
     manipulability: Array
     position_error: Array
     rotation_error: Array
@@ -158,6 +163,12 @@ class Curves:
         return np.asarray(turned + self.carrier[:, :3, 3])
 
 
+def torque_limits(plan: Plan) -> JointTorqueLimits | None:
+    """Return what a plan was asked about torques, with what the tool holds; None for nothing."""
+    asked = (item for item in plan.problem.constraints if isinstance(item, JointTorqueLimits))
+    return next(asked, None)
+
+
 def curves(
     plan: Plan,
     trajectory: Trajectory,
@@ -170,7 +181,8 @@ def curves(
     base, world = chain.base_placement, chain.to_base()
     times = np.linspace(0.0, trajectory.duration, points)
     clock = _clock(trajectory, times)
-    q = trajectory(clock)
+    q, qd, qdd = (trajectory(clock, order) for order in range(3))
+    asked = torque_limits(plan)
     target, carrier = follow.path.samples(clock), np.empty((points, 4, 4))
     manipulability, ellipsoid = np.empty(points), np.empty((points, 3, 3))
     errors, tool, rotation = np.empty((points, 2)), np.empty((points, 3)), np.empty((points, 3, 3))
@@ -189,7 +201,9 @@ def curves(
     return Curves(
         t=times,
         q=q,
-        qd=trajectory(clock, 1),
+        qd=qd,
+        qdd=qdd,
+        torque=None if asked is None else asked.quantity(plan.robot).values(q, qd, qdd),
         manipulability=manipulability,
         position_error=maximum_filter1d(errors[:, 0], window),
         rotation_error=maximum_filter1d(errors[:, 1], window),

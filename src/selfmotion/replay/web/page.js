@@ -274,10 +274,14 @@ function plotSpecs({ joints }, { curves, start, clearance, steps }) {
     ...("rotation" in curves ? [{ name: "rotation [rad]", values: curves.rotation, color: COLORS[3] }] : [])];
   const { t } = curves;
   const note = "dashed: limits";
+  const within = (title, unit, table, limit) => ({ title, unit, t, note,
+    curves: perJoint(table, (j) => (j[limit] === null ? null : -j[limit]), (j) => j[limit]) });
+  const per = (power) => unit.replaceAll(/rad|m/g, `$&/s${power}`);
   return [
     { title: "Joint positions q", unit, t, note, curves: perJoint(curves.q, (j) => j.lower, (j) => j.upper) },
-    { title: "Joint velocities q̇", unit: unit.replaceAll(/rad|m/g, "$&/s"), t, note,
-      curves: perJoint(curves.qd, (j) => (j.speed === null ? null : -j.speed), (j) => j.speed) },
+    within("Joint velocities q̇", per(""), curves.qd, "speed"),
+    within("Joint accelerations q̈", per("²"), curves.qdd, "acceleration"),
+    ...("torque" in curves ? [within("Joint torques", unit.replaceAll(/rad|m/g, (u) => (u === "m" ? "N" : "Nm")), curves.torque, "effort")] : []),
     { title: "Manipulability √det(JJᵀ)", unit: "", t, zero: true, curves: both("manipulability") },
     // Of several steps each has a path of its own, or none.
     ...(steps.length ? [] : [{ title: "Path error", unit: "", t, log: true, floor: 1e-16, curves: errors }]),
