@@ -208,6 +208,9 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
         ("G1 X1 I1 J0", "a tool axis is I, J and K, all three"),
         ("G1 X9999999", "farther than anything is"),
         ("G28 X0", "G28 is not read"),
+        ("G1 X10 R3", "R is read of arcs only"),
+        ("M98", "subprograms are not read"),
+        ("G0 G1 X4", "G0 and G1 are in one line"),
     ],
 )
 def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -> None:
@@ -246,3 +249,55 @@ def test_a_program_without_feeds_or_cuts_says_so(tmp_path: Path) -> None:
         sm.read_path(written(tmp_path, "b.nc", "G0 X0 Y0 Z0\nX3\n"))
     with pytest.raises(sm.FileFormatError, match="cuts, and X is not known yet"):
         sm.read_path(written(tmp_path, "c.nc", "G1 Y3 F100\n"))
+
+
+SWITCHED = """%
+G21 G90 G0 X0 Y0 Z20
+M3
+G1 Z20 F900
+G0 Z5
+G1 Z0 F900
+X30
+G0 Z20
+M9
+G0 X0 Y-60
+M8
+G1 Z0
+X30
+G0 Z20
+M5
+M30
+%
+G1 X400
+"""
+
+
+def test_nothing_that_is_switched_is_lost_or_late(tmp_path: Path) -> None:
+    """What stops is at the end of the cut before, also after the last; what starts at the next."""
+    table = 'file = "slot.nc"\nframe = {position = [0.45, 0, 0.3]}\n'
+    written(tmp_path, "slot.nc", SWITCHED)
+    job = written(
+        tmp_path, "slot.toml", f'task = "pointing"\nrobot.name = "panda"\n[seams]\n{table}'
+    )
+    first, second = sm.read_seam_job(job).seams
+    assert first.events[0] == ("M3", 0.0)
+    assert [name for name, _ in first.events] == ["M3", "M9"]
+    assert first.events[1][1] == pytest.approx(first.path.duration)
+    assert second.events[0] == ("M8", 0.0)
+    assert second.events[1] == ("M5", pytest.approx(second.path.duration))
+    # What is switched on by one cut is on in the next: they keep their order.
+    assert list(second.after) == [first.name]
+    assert not first.either_way
+
+
+def test_a_list_of_seams_loses_no_events(tmp_path: Path) -> None:
+    written(tmp_path, "slot.nc", SWITCHED)
+    path = '[seams.path]\nkind = "file"\nfile = "slot.nc"\n'
+    text = f'task = "pointing"\nrobot.name = "panda"\n[[seams]]\nname = "a"\nEVENTS{path}'
+    one = SWITCHED.replace("G0 X0 Y-60", "M30")
+    written(tmp_path, "slot.nc", one)
+    file = written(tmp_path, "job.toml", text.replace("EVENTS", ""))
+    with pytest.raises(sm.FileFormatError, match=r"slot\.nc has events"):
+        sm.read_seam_job(file)
+    told = written(tmp_path, "job.toml", text.replace("EVENTS", "events = []\n"))
+    assert not sm.read_seam_job(told).seams[0].events

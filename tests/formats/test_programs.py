@@ -10,6 +10,8 @@ from scipy.interpolate import CubicSpline
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.formats import program_miss
+from selfmotion.formats.program_axes import tool_from_flange
+from selfmotion.job.program import Step
 from support.arms import PANDA_HOME, robot_named
 from support.shell import invoke
 
@@ -298,3 +300,33 @@ def test_modules_are_called_as_controllers_allow(plan: sm.Plan, tmp_path: Path) 
         assert max(len(word) for word in re.findall(r"\b[A-Za-z]\w*", text)) <= 32
         assert text.isascii()
         assert max(map(len, text.splitlines())) < 250
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-9, 1e-6, 2e-5])
+def test_events_near_each_other_and_the_ends_are_all_written(
+    plan: sm.Plan, tmp_path: Path, apart: float
+) -> None:
+    last = plan.trajectory.duration
+    pairs = ((0.5, 0.5 + apart), (min(apart, 1e-6), last - apart), (0.0, last + 5e-10))
+    for number, (on, off) in enumerate(pairs):
+        step = Step("a", plan, events=(("arc on", on), ("arc off", off)))
+        file = tmp_path / f"weld{number}.src"
+        made = sm.Program(plan.robot, (step,), {})
+        assert made.verified
+        sm.write_motion(made, file, settings=settings("weld.src"))
+        assert file.read_text().count("$OUT[7]") == 2
+        sm.read_motion(file)
+
+
+@pytest.mark.parametrize("name", ["for.src", "Loop.src", "test.mod", "proc.mod"])
+def test_words_of_a_language_name_no_module(plan: sm.Plan, tmp_path: Path, name: str) -> None:
+    with pytest.raises(sm.FileFormatError, match="is a word of the controller's language"):
+        sm.write_motion(plan, tmp_path / name)
+
+
+def test_the_tool_of_an_arm_in_a_cell_is_that_of_the_arm_alone() -> None:
+    alone = sm.load_robot("ur5", tool="tool0")
+    cell = sm.load_robot({"arm": "ur5", "other": "z1"}, base={"other": np.eye(4)}, tool="arm/tool0")
+    for robot in (alone, cell):
+        at = tool_from_flange(robot, sm.ProgramSettings())
+        np.testing.assert_allclose(at.homogeneous, np.eye(4), atol=1e-9)

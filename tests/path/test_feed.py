@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
 from selfmotion import testing
+from selfmotion.basics import restore
 from support.arms import PANDA_HOME
 from support.paths import polygon
 from support.shell import complaint
@@ -274,3 +275,11 @@ def test_a_slower_feed_is_the_same_motion_in_more_time() -> None:
     assert [item.asked for item in slower.feeds] == [item.asked / 1.7 for item in feed.feeds]
     with pytest.raises(sm.PathError, match="factor"):
         feed.slower(0.0)
+
+
+def test_a_stretch_from_the_start_is_kept_by_files_and_slower_feeds() -> None:
+    line = sm.Line(pin.SE3.Identity(), pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0])), 1.0)
+    feed = sm.Feed(line, 0.05, stretches=[[0.0, 0.02]])
+    again = restore(sm.Path, feed.to_dict())
+    assert again.duration == feed.duration
+    assert feed.slower(2.0).duration == pytest.approx(2.0 * feed.duration)

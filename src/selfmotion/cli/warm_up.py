@@ -14,6 +14,7 @@ from selfmotion.basics import read_only
 from selfmotion.cli.app import app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.collision.kernels import winding_number
+from selfmotion.task import SE3
 
 
 @app.command("warm-up", epilog="Example: selfmotion warm-up")
@@ -75,12 +76,28 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
         "relaxed rows",
         plan(replace(given, task="pose", relaxations=[sm.Relaxation(("rx", "ry"), 0.1)])),
     )
+    tilted = replace(free, task="pose", relaxations=[sm.Relaxation(("rx", "ry"), 0.1)])
+    yield "relaxed rows from anywhere", plan(tilted)
+    away = sm.Line(arm.pose(home), _far(arm.pose(home)), 2.0)
+    yield "what is out of reach", lambda: _refused(replace(tilted, path=away))
     yield "damping", plan(replace(given, damping=sm.Damping()))
     yield "a global search", plan(free, search=sm.Search(mode="global"))
     yield "self-motion curves", plan(replace(free, task="pose"), search=sm.Search(mode="global"))
     yield "several tips and moving frames", plan(_carried())
     yield "moves", lambda: sm.move(arm, home, home + 0.3, clearance=box)
     yield "a replanner", lambda: realtime.warm_up(realtime.Replanner(arm, "position"))
+
+
+def _refused(problem: sm.Problem) -> str:
+    try:
+        return sm.plan(problem).certificate.verdict
+    except sm.SelfmotionError as error:
+        return str(error)
+
+
+def _far(pose: SE3) -> SE3:
+    """Return a pose that no Panda reaches."""
+    return SE3(pose.rotation, pose.translation + np.array([1.5, 0.0, 0.0]))
 
 
 def _carried() -> sm.Problem:

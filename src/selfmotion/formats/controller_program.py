@@ -1,7 +1,7 @@
 """A joint motion as programs of robot controllers say it, whichever language they speak."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path as FilePath
@@ -187,8 +187,8 @@ def folded(text: str, width: int = 100) -> list[str]:
     return lines
 
 
-def module_name(file: FilePath, most: int) -> str:
-    """Return the name that a file's module has to have.
+def module_name(file: FilePath, most: int, reserved: Sequence[str]) -> str:
+    """Return the name that a file's module has to have; words of its language are none.
 
     Raises
     ------
@@ -200,5 +200,10 @@ def module_name(file: FilePath, most: int) -> str:
         raise FileFormatError(
             f"{file}: the module is called as the file is, and '{name}' is no name: expected a "
             f"letter, then letters, digits and _, {most} at most"
+        )
+    if name.upper() in reserved:
+        raise FileFormatError(
+            f"{file}: the module is called as the file is, and '{name}' is a word of the "
+            f"controller's language; call the file otherwise"
         )
     return name

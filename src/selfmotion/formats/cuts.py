@@ -14,6 +14,8 @@ from selfmotion.formats.poses import from_normal
 # A file of a machine tool has less than so many bytes, a cut less than so many poses; nothing is
 # farther away than this [m].
 _BYTES, _POSES, _FAR = 200_000_000, 1_000_000, 1e3
+# What stops something: after a cut it belongs to that.
+_STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF")
 # Poses nearer than this [m, and of their axes] are the same.
 _SAME = 1e-9
 # Axes apart from their opposite by less than this have no shortest way.
@@ -51,6 +53,10 @@ class Cut:
         self.positions.append(position)
         self.axes.append(axis)
         self.feeds.append(feed)
+
+    def ends(self, event: str) -> None:
+        """Note what happens at its end."""
+        self.events.append((len(self.places) - 1, event))
 
     def rows(self) -> PoseRows:
         """Return the poses, the tool's z axis against the axes, turned as little as may be."""
@@ -134,6 +140,10 @@ class Machine:
     def rapid(self, position: Array, axis: Array) -> None:
         """Go somewhere without cutting, which ends a cut."""
         self._check(position)
+        if self._open is not None and len(self._open.places) < 2:
+            # It went nowhere, but what happened there did.
+            self.cuts.remove(self._open)
+            self._next = [*(event for _, event in self._open.events), *self._next]
         self._open = None
         self.position, self.axis = position, axis
 
@@ -157,8 +167,13 @@ class Machine:
         self.position, self.axis = position, axis
 
     def happens(self, event: str) -> None:
-        """Note what happens: where the tool is in a cut, or else where the next one begins."""
-        if self._open is None:
+        """Note what happens: where the tool is in a cut, or else where the next one begins.
+
+        What stops something between two cuts happens at the end of the one before.
+        """
+        if self._open is None and event in _STOPS and self.cuts and not self._next:
+            self.cuts[-1].ends(event)
+        elif self._open is None:
             self._next.append(event)
         else:
             self._open.events.append((len(self._open.places) - 1, event))
@@ -170,6 +185,10 @@ class Machine:
     def seams(self) -> Mapping[str, PoseRows]:
         """Return the cuts as rows of poses, by names."""
         moved = [cut for cut in self.cuts if len(cut.places) > 1]
+        left = [event for cut in self.cuts if len(cut.places) < 2 for _, event in cut.events]
+        for event in (*left, *self._next) if moved else ():
+            moved[-1].ends(event)
+        self._next = []
         if not moved:
             raise FileFormatError(f"{self.file}: has no cut: no motion at a feed")
         return {f"cut {number}": cut.rows() for number, cut in enumerate(moved, 1)}

@@ -54,6 +54,7 @@ class _Reader:
     def __init__(self, file: FilePath) -> None:
         self.machine = Machine(file)
         self._unit, self._absolute, self._motion = _MM, True, 0
+        self._begun = False
         self._turns: dict[str, float] = {}
 
     def take(self, line: str) -> bool:
@@ -64,7 +65,11 @@ class _Reader:
         text = (
             re.sub(r"\([^()]*\)", " ", line.upper()).partition(";")[0].strip().lstrip("/").strip()
         )
-        if not text or text == "%":
+        if text == "%":
+            # The second one ends the tape.
+            self._begun, ended = True, self._begun
+            return ended
+        if not text:
             return False
         words, at = list[tuple[str, str]](), 0
         while at < len(text):
@@ -87,8 +92,13 @@ class _Reader:
             if len(value) > 30:
                 raise machine.fault(f"{letter} has {len(value)} digits; no machine reads them")
             values[letter] = float(value)
+        moving = [code for code in codes if code in _MOTIONS]
+        if len(moving) > 1:
+            raise machine.fault(f"{moving[0]} and {moving[1]} are in one line")
         for code in codes:
             self._mode(code)
+        if "R" in values and self._motion < 2:
+            raise machine.fault("R is read of arcs only (G2, G3)")
         self._move(values)
         return any(code in _ENDS for code in codes)
 
@@ -104,6 +114,8 @@ class _Reader:
                 self._motion = _MOTIONS[code]
             case _ if code in _NOTHING or code in _ENDS:
                 pass
+            case "M98" | "M99":
+                raise self.machine.fault(f"{code}: subprograms are not read; write them out")
             case _ if code.startswith("M"):
                 self.machine.happens(code)
             case _:

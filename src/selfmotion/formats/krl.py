@@ -25,6 +25,21 @@ from selfmotion.formats.program_settings import AXES
 from selfmotion.formats.targets import TIME_DIGITS, Stretch
 from selfmotion.task import SE3, rpy
 
+# What no module may be called.
+# fmt: off
+_WORDS = (
+    "AND", "ANIN", "ANOUT", "AXIS", "B_AND", "B_EXOR", "B_NOT", "B_OR", "BOOL", "BRAKE", "CASE",
+    "CCD_OFF", "CCD_ON", "CHAR", "CIRC", "CIRC_REL", "CONFIRM", "CONST", "CONTINUE", "DECL",
+    "DEF", "DEFAULT", "DEFDAT", "DEFFCT", "DELAY", "DIGIN", "DIGOUT", "DO", "E6AXIS", "E6POS",
+    "ELSE", "END", "ENDDAT", "ENDFCT", "ENDFOR", "ENDIF", "ENDLOOP", "ENDSPLINE", "ENDSWITCH",
+    "ENDWHILE", "ENUM", "EXIT", "EXOR", "EXT", "EXTFCT", "FALSE", "FOR", "FRAME", "GLOBAL",
+    "GOTO", "HALT", "IF", "IMPORT", "INT", "INTERRUPT", "IS", "LIN", "LIN_REL", "LOOP", "MAXIMUM",
+    "MINIMUM", "NOT", "OFF", "ON", "OR", "POS", "PRIO", "PTP", "PTP_REL", "PTP_SPLINE", "PUBLIC",
+    "REAL", "REPEAT", "RESUME", "RETURN", "SCIRC", "SEC", "SIGNAL", "SLIN", "SPL", "SPLINE",
+    "SPTP", "STRUC", "SWITCH", "THEN", "TIME_BLOCK", "TO", "TRIGGER", "TRUE", "UNTIL", "WAIT",
+    "WHEN", "WHILE",
+)
+# fmt: on
 # Characters in a name.
 NAME = 24
 _AXIS = r"[AE][1-6]\s+[^,{}]+"
@@ -35,7 +50,7 @@ _ABOVE = 1e-4
 def write_krl(file: FilePath, draft: Draft) -> None:
     """Write a program as a module that a KR C4 or C5 selects."""
     program = draft.program
-    name = module_name(file, NAME)
+    name = module_name(file, NAME, _WORDS)
     percent = f"{100.0 * draft.settings.approach:g}"
     first = program.stretches[0]
     lines = [
@@ -50,6 +65,8 @@ def write_krl(file: FilePath, draft: Draft) -> None:
         f"  BAS(#VEL_PTP, {percent})",
         f"  BAS(#ACC_PTP, {percent})",
         f"  PTP {_aggregate(first, 0, program)}",
+        "  BAS(#VEL_PTP, 100)",
+        "  BAS(#ACC_PTP, 100)",
     ]
     for stretch in program.stretches:
         lines += ["", f"  ; step: {plain(stretch.name)}", *_block(draft, stretch)]
@@ -195,7 +212,7 @@ _IN_BODY = ("head", "body")
 KrlReader.grammar = (
     (("before",), r"&(?:ACCESS|REL|PARAM|COMMENT)\b.*", KrlReader.skip),
     (("before",), rf"DEF ([A-Z]\w{{0,{NAME - 1}}}) ?\( ?\)", KrlReader.begin),
-    (("head",), r"BAS ?\( ?#\w+ ?, ?[\d.]+ ?\)", KrlReader.skip),
+    (("head", "body"), r"BAS ?\( ?#\w+ ?, ?[\d.]+ ?\)", KrlReader.skip),
     (("head",), rf"\$(?:BASE|TOOL) ?= ?\{{{_ANY}\}}", KrlReader.skip),
     (("head",), rf"\$LOAD ?= ?\{{{_ANY}\{{{_ANY}\}}{_ANY}\{{{_ANY}\}}{_ANY}\}}", KrlReader.skip),
     (("head",), rf"PTP {_TARGET}", KrlReader.go),

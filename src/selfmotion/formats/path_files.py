@@ -115,7 +115,7 @@ def read_path(
             "within": within,
         },
     )
-    return path_of_rows(path, _one(path, seam), asked)
+    return path_of_rows(path, one_seam(path, seam), asked)
 
 
 def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Path, PoseRows]]:
@@ -155,7 +155,7 @@ def _read(path: FilePath) -> Mapping[str, PoseRows]:
     return reader(path)
 
 
-def _one(path: FilePath, seam: str | None) -> PoseRows:
+def one_seam(path: FilePath, seam: str | None) -> PoseRows:
     """Return the rows of one seam of a file."""
     seams = _read(path)
     if seam is None and len(seams) == 1:

@@ -11,7 +11,8 @@ from selfmotion.task import SE3
 # Of an arm with seven joints the third is the one that six-axis controllers count apart.
 _SEVENTH = 2
 _ROBOT = 6
-_FLANGES = ("flange", "tool0")
+# By the conventions of ROS-Industrial `tool0` is the tool that is all zeros.
+_FLANGES = ("tool0", "flange")
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,10 @@ def tool_from_flange(robot: RobotModel, settings: ProgramSettings) -> SE3:
                 f"{robot.name}: flange '{settings.flange}' does not move with tool '{robot.tool}'"
             )
         return place.inverse() * tool
-    for link in _FLANGES:
+    # In a cell, that of the part which carries the tool.
+    part = robot.tool.rpartition("/")[0]
+    for name in _FLANGES:
+        link = f"{part}/{name}" if part else name
         if link in robot.urdf.links:
             other, place = robot.carrier_of(link)
             if other == carrier:

@@ -27,6 +27,18 @@ from selfmotion.task import SE3, Quaternion
 
 # Characters in a name, those of the procedure included.
 NAME = 32
+# What no module may be called.
+# fmt: off
+_WORDS = (
+    "ALIAS", "AND", "BACKWARD", "BOOL", "CASE", "CONNECT", "CONST", "DEFAULT", "DIV", "DO",
+    "DNUM", "ELSE", "ELSEIF", "ENDFOR", "ENDFUNC", "ENDIF", "ENDMODULE", "ENDPROC", "ENDRECORD",
+    "ENDTEST", "ENDTRAP", "ENDWHILE", "ERROR", "EXIT", "FALSE", "FOR", "FROM", "FUNC", "GOTO",
+    "IF", "INOUT", "LOCAL", "MOD", "MODULE", "NOSTEPIN", "NOT", "NOVIEW", "NUM", "OR", "PERS",
+    "PROC", "RAISE", "READONLY", "RECORD", "RETRY", "RETURN", "STEP", "STRING", "SYSMODULE",
+    "TEST", "THEN", "TO", "TRAP", "TRUE", "TRYNEXT", "UNDO", "UNTIL", "VAR", "VIEWONLY", "WHILE",
+    "WITH", "XOR",
+)
+# fmt: on
 _PROCEDURE = "_run"
 # What stands for an axis that is not there, and from where on numbers mean that.
 _ABSENT, _ABSENT_FROM = "9E9", 8.9e9
@@ -39,7 +51,7 @@ _BARE = 0.001, 0.001
 def write_rapid(file: FilePath, draft: Draft) -> None:
     """Write a program as a module that an IRC5 or OmniCore loads."""
     program = draft.program
-    name = module_name(file, NAME - len(_PROCEDURE))
+    name = module_name(file, NAME - len(_PROCEDURE), _WORDS)
     _check_robot_axes(draft)
     share = draft.settings.approach
     speed = ", ".join(f"{share * value:g}" for value in (_FASTEST, _TURNING, _FASTEST, _TURNING))

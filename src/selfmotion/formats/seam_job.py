@@ -10,7 +10,7 @@ from selfmotion.constraints import Clearance
 from selfmotion.formats.documents import in_si, read_document
 from selfmotion.formats.job import Job
 from selfmotion.formats.path_building import times_of_events
-from selfmotion.formats.path_files import read_seams
+from selfmotion.formats.path_files import one_seam, read_seams
 from selfmotion.formats.poses import pose_of
 from selfmotion.formats.problem_file import job_of
 from selfmotion.formats.problem_parts import FEED_BOUNDS, obstacle, start_of, woven
@@ -116,7 +116,19 @@ class _Reader:
         self._check(given, (*_SEAM, *_OF_PROBLEM), where)
         if "path" not in given:
             raise FileFormatError(f"{self._file}: {where}: path is missing")
+        path = given["path"]
+        if isinstance(path, Mapping) and path.get("kind") == "file" and "events" not in given:
+            self._refuse_events(path, where)
         return [self._seam(given, None, where)]
+
+    def _refuse_events(self, path: Mapping[str, Any], where: str) -> None:
+        """Raise FileFormatError for events in the file of a path, which would be lost."""
+        file = self._file.parent / str(path.get("file", ""))
+        if file.is_file() and one_seam(file, path.get("seam")).events:
+            raise FileFormatError(
+                f"{self._file}: {where}: {file.name} has events, which are kept of a table [seams] "
+                f"with that file; or say here when they are, events = [] for none"
+            )
 
     def of_table(self, given: Mapping[str, Any]) -> list[Seam]:
         """Return the seams of a file with a column ``seam``."""
@@ -131,8 +143,10 @@ class _Reader:
         table = self._file.parent / values["file"]
         options = {key: values[key] for key in _PACED if key in values}
         rest = {key: value for key, value in given.items() if key not in _TABLE}
-        found = []
-        for name, (path, rows) in read_seams(table, options).items():
+        found, seams = list[Seam](), read_seams(table, options)
+        # What a machine switches stays switched in the cuts that follow: they keep their order.
+        switched = any(rows.straight and rows.events for _, rows in seams.values())
+        for name, (path, rows) in seams.items():
             if "ramp" in values:
                 path = section_at_rest(path, ramp=values["ramp"])
             own = {**rest, "name": name}
@@ -144,6 +158,8 @@ class _Reader:
             if events or rows.straight:
                 # What happens where, and how a machine cuts, is meant one way.
                 own.setdefault("either_way", False)
+            if switched and found:
+                own.setdefault("after", [found[-1].name])
             place = self._standing[0] if frame is None else self._standing[0] * frame
             if frame is not None or NAME in self._shared:
                 path = Placed(path, place)

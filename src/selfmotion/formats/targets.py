@@ -182,13 +182,13 @@ def _thinned(
 ) -> tuple[Stretch, Miss]:
     """Return the targets from one time to another, and how far they are off."""
     motion = piece.motion
-    begins = first == motion.t[0]
+    begins, ends = first == motion.t[0], last == motion.t[-1]
     events = [
         (motion.t[0] + at, name)
         for at, name in piece.events
-        if first < motion.t[0] + at <= last or (begins and at == 0.0)
+        if (begins or first < motion.t[0] + at) and (ends or motion.t[0] + at <= last)
     ]
-    fixed = np.unique([first, *(at for at, _ in events), last])
+    fixed = _apart(first, last, [at for at, _ in events])
     still = bool(np.abs(motion(last) - motion(first)).max() < 1e-9) and _rests(motion, first, last)
     more = 1.0
     for _ in range(_TRIES):
@@ -211,6 +211,15 @@ def _thinned(
         f"'{piece.name}' is off by {1e3 * miss.position:.3g} mm and {miss.rotation:.3g} rad by "
         f"rounding alone; allow more than {allowed}"
     )
+
+
+def _apart(first: float, last: float, times: Sequence[float]) -> Array:
+    """Return first, last and times between them, but for those that are written as the same."""
+    least, found = 2.0 * 10.0**-TIME_DIGITS, [first]
+    for t in sorted(times):
+        if found[-1] + least < t < last - least:
+            found.append(t)
+    return np.array([*found, last])
 
 
 def _rests(motion: Trajectory, first: float, last: float) -> bool:

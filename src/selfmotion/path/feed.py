@@ -137,6 +137,7 @@ class Feed(_Derived, kind="feed"):
                 f"{self._path.duration:.6g} s, and feeds above 0"
             )
         if len(table) and table[0, 0] == 0.0:
+            self._own_feed = float(table[0, 1])
             return table
         return read_only(np.vstack([[0.0, self._own_feed], table]))
 

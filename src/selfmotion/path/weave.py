@@ -144,7 +144,9 @@ class Weave(_Derived, kind="weave"):
             return None
         count = self._count
         inner = count.series(middle, half)
-        reach = np.maximum(series.after_first(inner), np.finfo(float).tiny)
+        reach = series.after_first(inner)
+        # Where the seam rests, nothing swings.
+        reach = np.where(reach > 1e-12, reach, 1.0)
         outer = self._swing_series(count(middle), reach)
         beside = series.product(known.rotation, series.composed(outer, inner / reach))
         return PathSeries(known.translation + beside, known.rotation)

@@ -26,8 +26,10 @@ def remedies(poses: SinglePoses, t: float, times: Array) -> list[str]:
     found = []
     shift = nearest_place(poses, times)
     if shift is not None:
-        told = ", ".join(f"{1e3 * x:.0f}" for x in shift)
-        found.append(f"the path moved by {1e3 * np.linalg.norm(shift):.0f} mm ([{told}])")
+        # Rounded away from where the path is: what is told has to suffice.
+        far = np.copysign(np.ceil(1e4 * np.abs(shift) - 1e-3) / 10.0, shift) + 0.0
+        told = ", ".join(f"{x:.4g}" for x in far)
+        found.append(f"the path moved by {np.linalg.norm(far):.3g} mm ([{told}])")
     turn = least_deviation(poses, t, _ROTATION_ROWS)
     if turn is not None:
         found.append(f"the tool turned by {np.degrees(np.linalg.norm(turn)):.1f}° there")
