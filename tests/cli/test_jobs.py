@@ -115,3 +115,10 @@ def test_what_is_wrong_with_a_job_file_is_said_by_key(text, said, tmp_path) -> N
 
 def test_bad_targets_are_refused_before_anything_is_planned(table) -> None:
     assert ".timetable.csv" in complaint("job", table, "--out", "frame.docx")
+    # What an event switches is asked for at once as well.
+    table.write_text(JOB + LISTED)
+    assert "event 'on' has no signal" in complaint("job", table, "--out", "frame.src")
+    settings = table.with_name("cell.toml")
+    settings.write_text("[signals]\noff = [1, true]\n")
+    said = complaint("job", table, "--out", "frame.src", "--settings", settings)
+    assert "event 'on' has no signal" in said

@@ -318,6 +318,15 @@ def test_events_near_each_other_and_the_ends_are_all_written(
         sm.read_motion(file)
 
 
+@pytest.mark.parametrize(("form", "name"), [("krl", "a.txt"), ("csv", "a.src"), ("rapid", "a.src")])
+def test_programs_have_the_suffix_of_their_controller(
+    plan: sm.Plan, tmp_path: Path, form: str, name: str
+) -> None:
+    with pytest.raises(sm.FileFormatError, match="is written with"):
+        sm.write_motion(plan, tmp_path / name, form=form)
+    assert not (tmp_path / name).exists()
+
+
 @pytest.mark.parametrize("name", ["for.src", "Loop.src", "test.mod", "proc.mod"])
 def test_words_of_a_language_name_no_module(plan: sm.Plan, tmp_path: Path, name: str) -> None:
     with pytest.raises(sm.FileFormatError, match="is a word of the controller's language"):

@@ -35,13 +35,7 @@ def export(
     parts: Annotated[
         bool, typer.Option("--parts", help="Of a cell a file for each part as well, in step.")
     ] = False,
-    settings: Annotated[
-        Path | None,
-        typer.Option(
-            help="File with what a controller's program says besides: deviation, axes, signals, "
-            "flange, mass, center, approach (TOML)."
-        ),
-    ] = None,
+    settings: options.SettingsOption = None,
     force: Annotated[
         bool, typer.Option("--force", help="Write a motion that is not verified, too.")
     ] = False,

@@ -36,6 +36,7 @@ def job(
     dask: Annotated[
         str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
     ] = None,
+    settings: options.SettingsOption = None,
     allow_code: options.AllowCodeOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -46,6 +47,11 @@ def job(
     for target in wanted:
         _check(target)
     work = sm.read_seam_job(file, allow_code=allow_code)
+    asked = None if settings is None else sm.read_program_settings(settings)
+    if any(target.suffix in (*formats.PROGRAMS, ".script") for target in wanted):
+        # Before anything is planned.
+        happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
+        formats.check_signals(happens, asked or sm.ProgramSettings())
     kept = folder or Path("out") / f"{file.stem}.job"
     here: Any = processes(workers) if workers > 1 else nullcontext()
     try:
@@ -59,7 +65,7 @@ def job(
         if not program.verified and outputs.is_motion(target) and not _is_timetable(target):
             outputs.tell_left_out(target, terminal, quiet=as_json)
             continue
-        write_program(program, target)
+        write_program(program, target, asked)
         if not as_json:
             terminal.print(f"wrote {target}", markup=False, soft_wrap=True)
     raise typer.Exit(VERIFIED if program.verified else NOT_VERIFIED)
@@ -78,7 +84,9 @@ def _is_timetable(file: Path) -> bool:
     return file.name.endswith(TIMETABLE)
 
 
-def write_program(program: sm.Program, file: Path) -> None:
+def write_program(
+    program: sm.Program, file: Path, settings: sm.ProgramSettings | None = None
+) -> None:
     """Write a program as what the name of a file says."""
     if file.suffix == PROGRAM:
         program.save(file)
@@ -89,7 +97,7 @@ def write_program(program: sm.Program, file: Path) -> None:
 
         write_replay(program, file)
     else:
-        sm.write_motion(program, file)
+        sm.write_motion(program, file, settings=settings)
 
 
 def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:

@@ -129,6 +129,13 @@ SetOption = Annotated[
         "--set", help="KEY=VALUE of the problem file, such as path.duration=6. Repeatable."
     ),
 ]
+SettingsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="File with what a controller's program says besides: deviation, axes, signals, "
+        "flange, mass, center, approach (TOML)."
+    ),
+]
 AllowCodeOption = Annotated[
     bool, typer.Option("--allow-code", help="Import what the file names as module:attribute.")
 ]

@@ -17,7 +17,8 @@ class JointReversals(Cost):
     u_i = q̈_i v / (v² + q̇_i²) is the rate of atan(q̇_i / v), which goes from -π/2 to π/2 where a
     joint turns round from speeds far above v: the integral of G is about w for each reversal, and
     half of that for each joint that begins or ends at rest. Gears have their play there, and
-    polished surfaces their marks. `Plan.reversals` counts them.
+    polished surfaces their marks. It belongs beside another cost, such as `JointVelocity`: alone it
+    has many optima, and takes long. `Plan.reversals` counts what is left.
 
     Parameters
     ----------

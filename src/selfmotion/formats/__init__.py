@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from selfmotion.formats.controller_program import check_signals as check_signals
 from selfmotion.formats.documents import (
     in_si as in_si,
     read_document as read_document,

@@ -117,11 +117,16 @@ def check_verified(plan: Plan | Parts | Move | Program, file: Path, force: bool)
 
 def form_of(path: Path, form: str | None) -> str:
     """Return the form of a file."""
+    own = path.suffix in PROGRAMS
     name = SUFFIXES.get(path.suffix) if form is None else form
     if name is None or name not in FORMS:
         known = ", ".join(f"{form} ({suffix})" for suffix, form in SUFFIXES.items())
         found = f"suffix '{path.suffix}'" if form is None else f"form '{form}'"
         raise FileFormatError(f"{path}: {found} is no format of motions: {known}, moveit")
+    if PROGRAMS.get(path.suffix, name) != name or (name in PROGRAMS.values() and not own):
+        # Controllers, and what reads their programs, go by the suffix.
+        suffix = next((end for end, each in PROGRAMS.items() if each == name), "another suffix")
+        raise FileFormatError(f"{path}: form '{name}' is written with {suffix}")
     return name
 
 
