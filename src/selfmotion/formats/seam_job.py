@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
-from selfmotion.basics import FileFormatError, SelfmotionError, as_path, nearest
+from selfmotion.basics import FileFormatError, SelfmotionError, as_path, nearest, shown
 from selfmotion.constraints import Clearance
 from selfmotion.formats.documents import in_si, read_document
 from selfmotion.formats.job import Job
@@ -80,6 +80,8 @@ def read_seam_job(file: str | FilePath, *, allow_code: bool = False) -> SeamJob:
             f"{path}: expected seams, a list [[seams]] or a table [seams] with a file, and no path "
             f"beside them"
         )
+    if not isinstance(document.get(NAME, {}), Mapping):
+        raise FileFormatError(f"{path}: {NAME}: expected a table [{NAME}]")
     reader = _Reader(path, document, allow_code, {})
     entries = [reader.of_table(given)] if isinstance(given, dict) else map(reader.of_list, given)
     seams = [seam for several in entries for seam in several]
@@ -227,8 +229,21 @@ class _Reader:
                     f"{self._file}: {where}: unknown key '{key}'{nearest(key, known)}; expected "
                     f"{', '.join(known)}"
                 )
+            kind, what = _KINDS.get(plain, (object, ""))
+            if not isinstance(given[key], kind):
+                raise FileFormatError(
+                    f"{self._file}: {where}: {key} is {shown(given[key])}, expected {what}"
+                )
+        if not all(isinstance(item, Mapping) for item in given.get("leaves", ())):
+            raise FileFormatError(f"{self._file}: {where}: leaves: expected tables of bodies")
 
 
+# What is neither read by a model nor by what it is handed to.
+_KINDS: Mapping[str, tuple[type, str]] = {
+    "file": (str, "the name of a file"),
+    "weave": (Mapping, "a table with amplitude and pitch"),
+    **dict.fromkeys(("events", "leaves", "constraints", "costs", "relaxations"), (list, "a list")),
+}
 # A motion that any arm's tool may have, so that what seams share can be read.
 _ANY = {
     "kind": "line",
