@@ -9,6 +9,7 @@ from numba.core import event
 
 import selfmotion as sm
 from selfmotion import realtime
+from selfmotion.cli.warm_up import Compiled
 from selfmotion.realtime import Replanner
 from support.arms import PANDA_HOME
 from support.loops import closed_loop
@@ -19,15 +20,6 @@ from support.loops import closed_loop
 def test_after_warming_up_nothing_is_compiled_and_no_memory_grows(
     panda: sm.RobotModel, slow_circle: sm.Circle
 ) -> None:
-    class Compiled(event.Listener):  # type: ignore[misc]
-        count = 0
-
-        def on_start(self, event: object) -> None:
-            self.count += 1
-
-        def on_end(self, event: object) -> None:
-            pass
-
     replanner = Replanner(panda, "position")
     realtime.warm_up(replanner)
     listener = Compiled()

@@ -112,9 +112,10 @@ def possible_feeds(feeds: Sequence[FeedReached], findings: Sequence[Finding]) ->
     if not (feeds and 1.0 < factor < np.inf and all(item.of_pace for item in broken)):
         return ()
     asked = max(item.found.asked for item in feeds)
-    slower = asked / _rounded_down(asked / factor)
+    feed = _rounded_down(asked / factor)
+    slower = asked / feed
     return (
-        f"the arm keeps its limits at a feed of {asked / slower:g} m/s, accelerations of the path "
+        f"the arm keeps its limits at a feed of {feed:g} m/s, accelerations of the path "
         f"being {slower**2:.3g} times smaller and its smoothing {slower:.3g} times longer: "
         f"Feed.slower({_rounded_up(slower)})",
     )

@@ -49,15 +49,12 @@ def export(
     if file.suffix == jobs.PROGRAM:
         options.refuse({"parts": parts or None}, file, "a program's motion is")
         made = sm.load_program(file)
-        _check_verified(made, made.verified, made.verdict, force, as_json)
     elif file.suffix == jobs.PARTS:
         options.refuse({"parts": parts or None}, file, "the motion of parts is")
         made = sm.load_parts(file)
-        _check_verified(made, made.verified, made.verdict, force, as_json)
     else:
         made = sm.load_plan(file)
-        sound = made.certificate.verified
-        _check_verified(made, sound, made.certificate.verdict, force, as_json)
+    _check_verified(made, force, as_json)
     verdicts: dict[str, str] = {}
     sound = True
     for target in out:
@@ -79,10 +76,11 @@ def export(
     _finish(made, rate, verdicts, sound, as_json)
 
 
-def _check_verified(made: _Made, sound: bool, verdict: str, force: bool, as_json: bool) -> None:
+def _check_verified(made: _Made, force: bool, as_json: bool) -> None:
     """End with one line where a motion is not verified, and not forced."""
-    if sound or force:
+    if _verified(made) or force:
         return
+    verdict = made.certificate.verdict if isinstance(made, sm.Plan) else made.verdict
     if as_json:
         terminal.print_json(data={"verified": False, "written": {}, "verdict": verdict})
     else:

@@ -230,9 +230,10 @@ def _task_of(arm: RobotModel) -> Task:
 def _places(arm: RobotModel, on_plate: bool) -> tuple[str, str]:
     """Return where two seams begin, as a file says it."""
     if on_plate:
-        return tuple(
+        one, two = (
             f"{{ position = [0.0, {y}, 0.03], rpy_deg = [180, 0, 0] }}" for y in (-0.05, 0.05)
-        )  # type: ignore[return-value]  # two of them
+        )
+        return one, two
     first = arm.pose(arm.dexterous_configuration(_task_of(arm)))
     second = SE3(first)
     second.translation = first.translation + np.array([0.0, _APART, 0.0])

@@ -1,6 +1,7 @@
 """What the tables of a problem file describe: tool motions, obstacles, starts."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
@@ -81,7 +82,7 @@ def path_of(
         case "spiral":
             path = Spiral(**{key: value for key, value in values.items() if key != "kind"})
         case _:
-            inner = lambda table: path_of(table, robot, start, beside)  # noqa: E731  # of this arm
+            inner = partial(path_of, robot=robot, start=start, beside=beside)
             path = _restored(_with_inner(values, inner))
     path = path if feed is None else Feed(path, feed, **bounds)
     path = path if weave is None else woven(path, weave)

@@ -196,6 +196,30 @@ class _Derived(Path):
         return cls(**{**values, "path": restore(Path, values["path"])})
 
 
+class _InStep(_Derived):
+    """One that is elsewhere than the original, but at the same times."""
+
+    @property
+    def knots(self) -> Array:
+        """See `Path.knots`."""
+        return self._path.knots
+
+    @property
+    def marks(self) -> Array:
+        """See `Path.marks`."""
+        return self._path.marks
+
+    @property
+    def rounded(self) -> Array:
+        """See `Path.rounded`."""
+        return self._path.rounded
+
+    @property
+    def feeds(self) -> tuple[FeedKept, ...]:
+        """See `Path.feeds`."""
+        return self._path.feeds
+
+
 def path_series(path: Path, middle: Array, half: Array) -> PathSeries | None:
     """Return `Path.series`, but None where a class derived from ours moves otherwise than ours."""
     moving = ("evaluate", "samples", "knots", "marks")

@@ -10,16 +10,15 @@ from selfmotion.path.base import (
     Path,
     PathSamples,
     PathSeries,
-    _Derived,
+    _InStep,
     check_path,
     path_pose,
     path_series,
 )
-from selfmotion.path.feed_kept import FeedKept
 from selfmotion.task import SE3
 
 
-class Placed(_Derived, kind="placed"):
+class Placed(_InStep, kind="placed"):
     """A path in a frame that stands somewhere in the world.
 
     Parameters
@@ -34,26 +33,6 @@ class Placed(_Derived, kind="placed"):
         self._path = check_path(path, "placed path")
         self._frame = path_pose(frame, "placed path: frame")
         self.duration = path.duration
-
-    @property
-    def knots(self) -> Array:
-        """See `Path.knots`."""
-        return self._path.knots
-
-    @property
-    def marks(self) -> Array:
-        """See `Path.marks`."""
-        return self._path.marks
-
-    @property
-    def rounded(self) -> Array:
-        """See `Path.rounded`."""
-        return self._path.rounded
-
-    @property
-    def feeds(self) -> tuple[FeedKept, ...]:
-        """See `Path.feeds`."""
-        return self._path.feeds
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, PathError, as_flag, as_number, read_only, series
+from selfmotion.basics import Array, PathError, as_number, series
 from selfmotion.path.base import (
     Path,
     PathSamples,
@@ -15,8 +15,8 @@ from selfmotion.path.base import (
     check_vector,
     path_pose,
     rotations_about,
-    unit,
 )
+from selfmotion.path.round import Round
 from selfmotion.path.time_law import TimeLaw
 from selfmotion.task import SE3, log3
 
@@ -74,7 +74,7 @@ class Line(Path, kind="line"):
 
 
 @dataclass(frozen=True, eq=False)
-class Circle(Path, kind="circle"):
+class Circle(Round, kind="circle"):
     """A circle, or an arc, about an axis.
 
     Parameters
@@ -104,17 +104,7 @@ class Circle(Path, kind="circle"):
     time_law: TimeLaw | str = TimeLaw.MINIMUM_JERK
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", path_pose(self.start, "circle: start"))
-        object.__setattr__(self, "center", check_vector(self.center, "circle: center"))
-        normal = check_vector(self.normal, "circle: normal")
-        if not np.any(normal):
-            raise PathError("circle: normal is zero, expected the direction of the axis")
-        object.__setattr__(self, "normal", read_only(unit(normal)))
-        object.__setattr__(self, "duration", check_duration(self.duration))
-        object.__setattr__(self, "time_law", TimeLaw.of(self.time_law))
-        turns = as_number(self.turns, "circle: turns", least=-1e6, most=1e6, error=PathError)
-        object.__setattr__(self, "turns", turns)
-        as_flag(self.turn_tool, "circle: turn_tool", PathError)
+        super().__post_init__()
         if self.radius < 1e-9:
             raise PathError("circle: the tool starts on the axis, so the radius is zero")
 
@@ -151,10 +141,6 @@ class Circle(Path, kind="circle"):
     def _arm(self) -> Array:
         return np.asarray(self.start.translation - self.center)
 
-    def at_constant_speed(self) -> "Circle":
-        """See `Path.at_constant_speed`."""
-        return replace(self, time_law=TimeLaw.CONSTANT)
-
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
         s, speed = TimeLaw.of(self.time_law)(t / self.duration)
@@ -162,18 +148,11 @@ class Circle(Path, kind="circle"):
         turned = rotations_about(self.normal, angle * s)
         arms = turned @ self._arm
         omega = (angle / self.duration * speed)[:, None] * self.normal
-        if self.turn_tool:
-            rotation, angular = turned @ self.start.rotation, omega
-        else:
-            rotation = np.tile(self.start.rotation, (len(t), 1, 1))
-            angular = np.zeros_like(omega)
+        rotation, angular = self._oriented(turned, omega)
         twist = np.hstack([np.cross(omega, arms), angular])
         return PathSamples(t, self.center + arms, rotation, twist)
 
     def series(self, middle: Array, half: Array) -> PathSeries:
         """See `Path.series`."""
-        law, last = TimeLaw.of(self.time_law), self.duration
-        way = 2.0 * np.pi * abs(self.turns) * law.series(middle / last, half / last)
-        round_axis = series.exponential(way)
-        still = series.constant(1.0, way)
-        return PathSeries(self.radius * round_axis, round_axis if self.turn_tool else still)
+        round_axis = series.exponential(2.0 * np.pi * abs(self.turns) * self._way(middle, half))
+        return self._with_tool(self.radius * round_axis, round_axis)

@@ -1,20 +1,17 @@
 """Spirals in a plane, helices, and what is both."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, PathError, as_flag, as_number, read_only, series
+from selfmotion.basics import Array, PathError, as_number, series
 from selfmotion.path.base import (
-    Path,
     PathSamples,
     PathSeries,
-    check_duration,
-    check_vector,
-    path_pose,
     rotations_about,
     unit,
 )
+from selfmotion.path.round import Round
 from selfmotion.path.time_law import TimeLaw
 from selfmotion.task import SE3
 
@@ -23,7 +20,7 @@ _ON_AXIS = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Spiral(Path, kind="spiral"):
+class Spiral(Round, kind="spiral"):
     """A spiral of Archimedes about an axis, or a helix: each turn is as far from the one before.
 
     Polishing, clearing a pocket, printing a round. At a feed: ``Feed(Spiral(…), 0.05)``.
@@ -61,20 +58,12 @@ class Spiral(Path, kind="spiral"):
     time_law: TimeLaw | str = TimeLaw.MINIMUM_JERK
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", path_pose(self.start, "spiral: start"))
-        object.__setattr__(self, "center", check_vector(self.center, "spiral: center"))
-        normal = check_vector(self.normal, "spiral: normal")
-        if not np.any(normal):
-            raise PathError("spiral: normal is zero, expected the direction of the axis")
-        object.__setattr__(self, "normal", read_only(unit(normal)))
-        object.__setattr__(self, "duration", check_duration(self.duration))
-        object.__setattr__(self, "time_law", TimeLaw.of(self.time_law))
-        for name, least in (("turns", -1e6), ("radius", 0.0), ("rise", -1e3)):
+        super().__post_init__()
+        for name, least in (("radius", 0.0), ("rise", -1e3)):
             number = as_number(
                 getattr(self, name), f"spiral: {name}", least=least, most=1e6, error=PathError
             )
             object.__setattr__(self, name, number)
-        as_flag(self.turn_tool, "spiral: turn_tool", PathError)
         if max(self.start_radius, self.radius) < _ON_AXIS and abs(self.rise) < _ON_AXIS:
             raise PathError("spiral: it starts and ends on the axis and does not rise: no way")
 
@@ -96,10 +85,6 @@ class Spiral(Path, kind="spiral"):
         other = np.eye(3)[np.argmin(np.abs(self.normal))]
         return unit(other - self.normal * (self.normal @ other))
 
-    def at_constant_speed(self) -> "Spiral":
-        """See `Path.at_constant_speed`: it goes round evenly."""
-        return replace(self, time_law=TimeLaw.CONSTANT)
-
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
         s, speed = TimeLaw.of(self.time_law)(t / self.duration)
@@ -112,20 +97,14 @@ class Spiral(Path, kind="spiral"):
         foot = self.start.translation - self._away
         per_way = angle * np.cross(self.normal, arms) + grown * outward + self.rise * self.normal
         rate = (speed / self.duration)[:, None]
-        omega = angle * self.normal * rate if self.turn_tool else np.zeros_like(arms)
-        rotation = (
-            turned @ self.start.rotation
-            if self.turn_tool
-            else np.tile(self.start.rotation, (len(t), 1, 1))
-        )
+        rotation, omega = self._oriented(turned, angle * self.normal * rate)
         return PathSamples(t, foot + arms + rises, rotation, np.hstack([per_way * rate, omega]))
 
     def series(self, middle: Array, half: Array) -> PathSeries:
         """See `Path.series`."""
-        way = TimeLaw.of(self.time_law).series(middle / self.duration, half / self.duration)
+        way = self._way(middle, half)
         round_axis = series.exponential(2.0 * np.pi * abs(self.turns) * way)
         away = abs(self.radius - self.start_radius) * way
         away[0] = max(self.radius, self.start_radius)
         place = series.product(round_axis, away) + abs(self.rise) * way
-        still = series.constant(1.0, way)
-        return PathSeries(place, round_axis if self.turn_tool else still)
+        return self._with_tool(place, round_axis)

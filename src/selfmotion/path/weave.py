@@ -11,13 +11,12 @@ from selfmotion.path.base import (
     Path,
     PathSamples,
     PathSeries,
-    _Derived,
+    _InStep,
     check_path,
     check_vector,
     path_series,
     unit,
 )
-from selfmotion.path.feed_kept import FeedKept
 from selfmotion.path.pace import Pace, times_when
 
 # The length of the seam is measured about so often, and from mark to mark.
@@ -31,7 +30,7 @@ _WIDEST = 0.5
 _STEP = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 
 
-class Weave(_Derived, kind="weave"):
+class Weave(_InStep, kind="weave"):
     """A path along which the tool swings from side to side, as welders do.
 
     At the time t the tool is beside the path by y(ψ(t)) along an axis of its own frame, with the
@@ -96,11 +95,6 @@ class Weave(_Derived, kind="weave"):
         """How many times the tool goes there and back."""
         return round(float(self._lengths[1][-1]) / self._pitch)
 
-    @property
-    def knots(self) -> Array:
-        """See `Path.knots`: those of the seam."""
-        return self._path.knots
-
     @cached_property
     def marks(self) -> Array:
         """See `Path.marks`: also where the shape of the swing goes on by another formula."""
@@ -116,16 +110,6 @@ class Weave(_Derived, kind="weave"):
         # Of two within rounding one is enough, the last one being the end.
         apart = np.append(np.diff(found) > 1e-12 * self.duration, True)
         return read_only(np.append(0.0, found[apart & (found > 1e-12 * self.duration)]))
-
-    @property
-    def rounded(self) -> Array:
-        """See `Path.rounded`."""
-        return self._path.rounded
-
-    @property
-    def feeds(self) -> tuple[FeedKept, ...]:
-        """See `Path.feeds`: those along the seam."""
-        return self._path.feeds
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""

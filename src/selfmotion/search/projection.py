@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, kernel
+from selfmotion.basics import Array, Flags, called, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels import (
     cholesky,
@@ -61,6 +61,17 @@ def correct(
     return float(length)
 
 
+@called
+def stopped(q: Array, lower: Array, upper: Array, held: Flags) -> bool:
+    """Put joints (n,) that are beyond a limit onto it and note that; return whether none was."""
+    inside = True
+    for j in range(len(q)):
+        if q[j] < lower[j] or q[j] > upper[j]:
+            q[j] = min(max(q[j], lower[j]), upper[j])
+            held[j], inside = True, False
+    return inside
+
+
 @kernel
 def project_all(
     q: Array,
@@ -89,11 +100,7 @@ def project_all(
             held[j] = False
         length = np.inf
         for _ in range(steps):
-            inside = True
-            for j in range(n):
-                if q[k, j] < lower[j] or q[k, j] > upper[j]:
-                    q[k, j] = min(max(q[k, j], lower[j]), upper[j])
-                    held[j], inside = True, False
+            inside = stopped(q[k], lower, upper, held)
             if inside and length < CONVERGED:
                 arrived[k] = True
                 break

@@ -12,7 +12,7 @@ from selfmotion.basics import Array, Flags, Ints, called, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels import cholesky, errors_and_rows, gram, rows_of, solve_cholesky
 from selfmotion.robot import ChainArrays, place_tips
-from selfmotion.search.projection import CONVERGED, correct
+from selfmotion.search.projection import CONVERGED, correct, stopped
 
 # Below this angle [rad] the closed forms of a rotation lose digits and their series serve.
 _SMALL = 1e-3
@@ -52,11 +52,7 @@ def project_relaxed(
         arrived[k], held[:], bound[:] = False, False, False
         length, delta = np.inf, deviation[k]
         for _ in range(steps):
-            inside = True
-            for j in range(n):
-                if q[k, j] < lower[j] or q[k, j] > upper[j]:
-                    q[k, j] = min(max(q[k, j], lower[j]), upper[j])
-                    held[j], inside = True, False
+            inside = stopped(q[k], lower, upper, held)
             inside = put_back(delta, groups, bands, bound) and inside
             if inside and length < CONVERGED:
                 arrived[k] = True
