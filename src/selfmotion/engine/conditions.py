@@ -21,6 +21,9 @@ from selfmotion.optimise import Residuals, Rows
 # A constraint whose violation, squared and integrated, is above this counts as much as ten times
 # the cost.
 _NOTICED = 2e-3
+# A condition binds where its price is above this share of what it is at most: interior points leave
+# a little everywhere.
+_BINDS = 1e-3
 
 
 class Conditions:
@@ -85,7 +88,7 @@ class Conditions:
 
         What would save less than `least` is left out.
         """
-        found: dict[tuple[str, str], tuple[float, npt.NDArray[np.bool_]]] = {}
+        found: dict[tuple[str, str], tuple[float, Array]] = {}
         first = 0
         for item in self.constraints:
             shape = item.residual(samples).shape
@@ -93,12 +96,13 @@ class Conditions:
             first += prices.size
             for column in np.flatnonzero(prices.any(axis=0)):
                 amount, words = easing_of(item, int(column))
-                saving, binds = found.get((item.name, words), (0.0, np.zeros(shape[0], np.bool_)))
+                saving, price = found.get((item.name, words), (0.0, np.zeros(shape[0])))
                 saving += amount * float(prices[:, column].sum())
-                found[item.name, words] = saving, binds | (prices[:, column] > 0.0)
+                found[item.name, words] = saving, np.maximum(price, prices[:, column])
+        times = samples.sampling.node_times
         kept = [
-            Binding(name, words, saving, _spans(binds, samples.sampling.node_times))
-            for (name, words), (saving, binds) in found.items()
+            Binding(name, words, saving, _spans(price > _BINDS * price.max(), times))
+            for (name, words), (saving, price) in found.items()
             if saving >= least
         ]
         return tuple(sorted(kept, key=lambda item: -item.saving))
