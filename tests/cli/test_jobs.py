@@ -86,6 +86,15 @@ def test_a_job_from_the_shell_is_written_read_and_exported(tmp_path) -> None:
     code, text = invoke("export", whole, "--out", tmp_path / "b.csv", "--rate", "100")
     assert code == 0, text
     assert len(sm.read_motion(tmp_path / "b.csv").t) == int(program.duration * 100) + 2
+    # A single move as well, by a suffix in whichever case.
+    move = next(step.made for step in program.steps if isinstance(step.made, sm.Move))
+    saved, written = tmp_path / "go.npz", tmp_path / "GO.SRC"
+    move.save(saved)
+    code, text = invoke("export", saved, "--out", written)
+    assert code == 0, text
+    assert sm.read_motion(written).duration == pytest.approx(move.motion.duration, abs=1e-3)
+    with pytest.raises(sm.FileFormatError, match="is a move, not a plan"):
+        sm.load_plan(saved)
 
 
 @pytest.mark.parametrize(

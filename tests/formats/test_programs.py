@@ -191,6 +191,10 @@ def test_urscript_knows_tool_load_and_outputs(program: sm.Program, tmp_path: Pat
     assert [lines[k].endswith("True)") for k in outputs] == [True, False] * 2
     stream = [sum("servoj(" in line for line in lines[:k]) for k in outputs]
     np.testing.assert_allclose(stream, [125.0 * at for at, _, _ in program.events], atol=1.0)
+    # These arms have eight.
+    beyond = sm.ProgramSettings(signals=dict.fromkeys(SIGNALS, (8, True)))
+    with pytest.raises(sm.ProblemError, match="from 0 to 7"):
+        sm.write_motion(program, file, settings=beyond)
 
 
 def test_other_axes_are_in_mm_and_counted_apart(tmp_path: Path) -> None:

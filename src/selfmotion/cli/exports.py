@@ -9,15 +9,18 @@ import selfmotion as sm
 from selfmotion import formats
 from selfmotion.cli import jobs, options
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, terminal
+from selfmotion.result import is_move
 
-_Made = sm.Plan | sm.Parts | sm.Program
+_Made = sm.Plan | sm.Parts | sm.Move | sm.Program
 
 
 @app.command(
     epilog="Example: selfmotion export plan.npz --out motion.yaml --rate 500; or: --out weld.src"
 )
 def export(
-    file: Annotated[Path, typer.Argument(help="A plan saved as .npz, a .program or .parts.")],
+    file: Annotated[
+        Path, typer.Argument(help="A plan or a move saved as .npz, a .program or .parts.")
+    ],
     out: Annotated[
         list[Path],
         typer.Option(
@@ -52,6 +55,9 @@ def export(
     elif file.suffix == jobs.PARTS:
         options.refuse({"parts": parts or None}, file, "the motion of parts is")
         made = sm.load_parts(file)
+    elif is_move(file):
+        options.refuse({"parts": parts or None}, file, "a move is")
+        made = sm.load_move(file)
     else:
         made = sm.load_plan(file)
     _check_verified(made, force, as_json)
@@ -90,16 +96,18 @@ def _check_verified(made: _Made, force: bool, as_json: bool) -> None:
 
 
 def _is_program(target: Path, form: str | None) -> bool:
-    return (form or formats.SUFFIXES.get(target.suffix)) in formats.PROGRAMS.values()
+    return (form or formats.SUFFIXES.get(target.suffix.lower())) in formats.PROGRAMS.values()
 
 
 def _is_readable(target: Path, form: str | None) -> bool:
-    return form in formats.READABLE or (form is None and target.suffix not in (".xml", ".script"))
+    return form in formats.READABLE or (
+        form is None and target.suffix.lower() not in (".xml", ".script")
+    )
 
 
 def _read_back(made: _Made, target: Path, form: str | None) -> tuple[bool, str]:
     """Return whether what was written is still the motion, and what there is to say."""
-    if _is_program(target, form) and target.suffix in formats.PROGRAMS:
+    if _is_program(target, form) and target.suffix.lower() in formats.PROGRAMS:
         count, stated, found = formats.program_miss(made, target)
         text = (
             f"read back: {count} targets, between which the tool is at most "
@@ -128,7 +136,7 @@ def _finish(
     made: _Made, rate: float | None, verdicts: dict[str, str], sound: bool, as_json: bool
 ) -> NoReturn:
     """Print what was written, and end."""
-    sampled = [name for name in verdicts if Path(name).suffix not in formats.PROGRAMS]
+    sampled = [name for name in verdicts if Path(name).suffix.lower() not in formats.PROGRAMS]
     miss = None
     if sampled and isinstance(made, sm.Plan):
         miss = formats.linear_miss(made, rate)

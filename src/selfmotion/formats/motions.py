@@ -117,13 +117,14 @@ def check_verified(plan: Plan | Parts | Move | Program, file: Path, force: bool)
 
 def form_of(path: Path, form: str | None) -> str:
     """Return the form of a file."""
-    own = path.suffix in PROGRAMS
-    name = SUFFIXES.get(path.suffix) if form is None else form
+    ending = path.suffix.lower()
+    own = ending in PROGRAMS
+    name = SUFFIXES.get(ending) if form is None else form
     if name is None or name not in FORMS:
         known = ", ".join(f"{form} ({suffix})" for suffix, form in SUFFIXES.items())
         found = f"suffix '{path.suffix}'" if form is None else f"form '{form}'"
         raise FileFormatError(f"{path}: {found} is no format of motions: {known}, moveit")
-    if PROGRAMS.get(path.suffix, name) != name or (name in PROGRAMS.values() and not own):
+    if PROGRAMS.get(ending, name) != name or (name in PROGRAMS.values() and not own):
         # Controllers, and what reads their programs, go by the suffix.
         suffix = next((end for end, each in PROGRAMS.items() if each == name), "another suffix")
         raise FileFormatError(f"{path}: form '{name}' is written with {suffix}")
@@ -162,9 +163,9 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
         if degrees:
             raise FileFormatError(f"{path}: is in degrees by itself; drop degrees")
         return _of_program(path)
-    if path.suffix == ".csv":
+    if path.suffix.lower() == ".csv":
         return Trajectory.from_csv(path, degrees=degrees)
-    if path.suffix == ".npz":
+    if path.suffix.lower() == ".npz":
         return _in_radians(_read_npz(path), degrees)
     document = read_document(path)
     read = _of_tables if "t" in document else ros.trajectory

@@ -15,6 +15,8 @@ from selfmotion.task import log3
 
 # servoj smooths by looking ahead [s]: the default of the manual.
 _LOOK_AHEAD = 0.1
+# Standard digital outputs are 0 to this one.
+_LAST_OUTPUT = 7
 # It follows with this gain: the default of the manual.
 _GAIN = 300
 _JOINTS = 6
@@ -95,9 +97,10 @@ def _event(event: str, settings: ProgramSettings) -> str:
     if signal is None:
         return f"# event: {' '.join(event.split())}"
     output, value = signal
-    if not isinstance(output, int):
+    if not isinstance(output, int) or output > _LAST_OUTPUT:
         raise ProblemError(
-            f"signals: '{event}' switches {output!r}; outputs of Universal Robots are numbers"
+            f"signals: '{event}' switches {output!r}; standard outputs of Universal Robots are "
+            f"numbers from 0 to {_LAST_OUTPUT}"
         )
     return f"set_standard_digital_out({output}, {value})"
 

@@ -13,6 +13,9 @@ from selfmotion.problem import Problem
 from selfmotion.result import Plan
 from selfmotion.task import Relaxation, Task
 
+# Names are columns of tables, and words of files and pages [characters].
+_LONGEST_NAME = 200
+
 
 @dataclass(frozen=True, eq=False)
 class Seam:
@@ -71,6 +74,11 @@ class Seam:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.strip():
             raise ProblemError(f"seam: name is {shown(self.name)}, expected a text")
+        if len(self.name) > _LONGEST_NAME:
+            raise ProblemError(
+                f"seam: name '{self.name[:20]}…' has {len(self.name)} characters, expected at most "
+                f"{_LONGEST_NAME}"
+            )
         what = f"seam '{self.name}'"
         if not isinstance(self.path, Path):
             raise ProblemError(f"{what}: path is {shown(self.path)}, expected a Path (Line, …)")

@@ -2,7 +2,7 @@
 
 from selfmotion.result.bundle import read_bundle as read_bundle, write_bundle as write_bundle
 from selfmotion.result.limits_used import LimitsUsed as LimitsUsed
-from selfmotion.result.move import Move as Move, load_move as load_move
+from selfmotion.result.move import Move as Move, is_move as is_move, load_move as load_move
 from selfmotion.result.moves_pace import paced as paced
 from selfmotion.result.parts import Parts as Parts, load_parts as load_parts
 from selfmotion.result.plan import (

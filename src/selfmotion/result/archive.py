@@ -121,6 +121,10 @@ def _check_format(file: FilePath, description: Mapping[str, Any]) -> None:
     found = description.get("format")
     if found == FORMAT:
         return
+    if "move" in description:
+        raise FileFormatError(
+            f"{file}: is a move, not a plan: load_move reads it, and `selfmotion export`"
+        )
     if isinstance(found, int) and found > FORMAT:
         raise FileFormatError(
             f"{file}: has format {found}, this version of selfmotion reads format {FORMAT}; "

@@ -130,6 +130,17 @@ class Move:
         write_archive(as_path(file), description, arrays)
 
 
+def is_move(file: str | FilePath) -> bool:
+    """Whether a ``.npz`` file is one that `Move.save` wrote.
+
+    Raises
+    ------
+    FileFormatError
+        The file is missing, or neither a move nor a plan.
+    """
+    return "move" in read_archive(as_path(file))[0]
+
+
 def load_move(file: str | FilePath, *, known: MutableMapping[str, Any] | None = None) -> Move:
     """Read a move that `Move.save` wrote, and judge it anew.
 
