@@ -15,6 +15,7 @@ from selfmotion.constraints.conditions import (
     linearised as linearised,
 )
 from selfmotion.constraints.ends import (
+    BoundEnd as BoundEnd,
     ClosedPath as ClosedPath,
     EndAcceleration as EndAcceleration,
     EndConfiguration as EndConfiguration,

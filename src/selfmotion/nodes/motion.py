@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, read_only
-from selfmotion.constraints import BoundConstraint
+from selfmotion.constraints import BoundConstraint, BoundEnd
 from selfmotion.costs import Partials
 from selfmotion.engine import Counts
 from selfmotion.motion import Trajectory
 from selfmotion.nodes.charts import Charts, Manifolds, Place
 from selfmotion.nodes.conditions import NodeConditions
+from selfmotion.nodes.ends import NodeEnds
 from selfmotion.nodes.hermite import Hermite, HermiteSamples, QuinticSamples
 from selfmotion.nodes.kernels import follow
 from selfmotion.nodes.objective import NodeCost
@@ -34,7 +35,7 @@ class NodeGrid:
     t : (N + 1,)
         Times of the nodes [s].
     constraints : sequence of BoundConstraint
-        Conditions at each node, h ≤ 0.
+        Conditions at each node, h ≤ 0, and at the ends, c = 0.
     free : bool
         Whether the start may move along its self-motion.
     counts : Counts
@@ -48,6 +49,7 @@ class NodeGrid:
     manifolds : Manifolds
     cost : NodeCost
     conditions : NodeConditions
+    ends : NodeEnds
     continuity : Continuity or None
     held : (k,)
         Numbers of the coordinates w (N + 1, 2r), in one row, that stay as they are.
@@ -69,7 +71,11 @@ class NodeGrid:
         self.continuity = Continuity(problem, self.spline) if continuous else None
         smoothing = smoothing_at_rest(problem, self.spline)
         self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
-        self.conditions = NodeConditions(self.spline, constraints, follows.robot.dof)
+        ends = [item for item in constraints if isinstance(item, BoundEnd)]
+        self.ends = NodeEnds(ends)
+        others = [item for item in constraints if not item.equality]
+        self.conditions = NodeConditions(self.spline, others, follows.robot.dof)
+        self._constraints = tuple(constraints)
         r = follows.robot.dof - follows.dimension
         held: list[Ints] = [] if free else [np.arange(r)]
         rests = problem.rests
@@ -93,11 +99,10 @@ class NodeGrid:
         return self._other(self.t, continuous=True)
 
     def _other(self, t: Array, *, continuous: bool) -> "NodeGrid":
-        constraints = self.conditions.constraints
         return NodeGrid(
             self.problem,
             t,
-            constraints,
+            self._constraints,
             free=self.free,
             counts=self.counts,
             continuous=continuous,
@@ -234,6 +239,11 @@ class NodeMotion:
         """The conditions, (N + 1, C)."""
         return self.grid.conditions.residuals(self.samples.checked)
 
+    @cached_property
+    def c(self) -> Array:
+        """What is off at the ends, (E,)."""
+        return self.grid.ends.residuals(self.samples)
+
     @property
     def wanted(self) -> Array:
         """The conditions as Newton's method is to keep them, (N + 1, C).
@@ -273,7 +283,7 @@ class NodeMotion:
         found = self.grid.motion(charts, nu)
         if found is not None:
             # Costs and conditions are those of the same motion.
-            names = [name for name in ("terms", "aim", "h") if name in self.__dict__]
+            names = [name for name in ("terms", "aim", "h", "c") if name in self.__dict__]
             found.__dict__.update({name: self.__dict__[name] for name in names})
         return found
 

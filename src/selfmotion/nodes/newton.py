@@ -41,6 +41,8 @@ _KNOWN_FIRST, _KNOWN_SLACK = 1e-4, 1e-3
 _SOLVED, _FALL, _POWER = 10.0, 0.2, 1.5
 # Conditions are met to this [units of h].
 _MET = 1e-7
+# What is asked of the ends is met to this [rad, rad/s].
+_MET_ENDS = 1e-9
 # So many steps in turn, each this short a share of Newton's, lead nowhere.
 _STUCK, _TINY = 5, 0.02
 # Iterations after which the method is given up: it needs ten, thirty where limits bind.
@@ -80,12 +82,15 @@ class Optimum:
     status : Status
     promised : float
         By how much another step would lower the cost.
+    end_prices : (E,)
+        Of what is asked of the ends.
     """
 
     motion: NodeMotion
     prices: Array
     status: Status
     promised: float
+    end_prices: Array
 
 
 def minimise(begin: NodeMotion, columns: Ints, told: Told, prices: Array | None = None) -> Optimum:
@@ -108,6 +113,36 @@ def minimise(begin: NodeMotion, columns: Ints, told: Told, prices: Array | None 
     return solver.optimum(Status.MAX_ITERATIONS)
 
 
+class _Ends(NamedTuple):
+    """What is off at the ends, (E,), and its derivatives by the first and the last node.
+
+    Attributes
+    ----------
+    c : (E,)
+    rows : (E, 2, 2r)
+    """
+
+    c: Array
+    rows: Array
+
+    def columns(self, count: int) -> Array:
+        """Return the derivatives by all coordinates, (K s, E)."""
+        found = np.zeros((count, self.rows.shape[2], len(self.c)))
+        found[[0, -1]] = np.moveaxis(self.rows, 0, 2)
+        return found.reshape(count * self.rows.shape[2], len(self.c))
+
+    def met_by(self, solved: Array) -> tuple[Array, Array]:
+        """Return the step that meets them to first order, and their prices.
+
+        For the step that knows nothing of them and what each of them moves, side by side.
+        """
+        step, moved = solved[:, 0], solved[:, 1:]
+        turned = self.columns(len(solved) // self.rows.shape[2]).T
+        # Least squares: what is held may be asked for as well.
+        prices = np.asarray(np.linalg.lstsq(turned @ moved, turned @ step + self.c)[0], float)
+        return step - moved @ prices, prices
+
+
 class _Solver:
     """The state of Newton's method: a motion, slacks, prices and the barrier."""
 
@@ -126,12 +161,13 @@ class _Solver:
             self._slacks = np.maximum(-h, self._barrier / self._prices)
         self._penalty, self._promised, self._length = 0.0, np.inf, 0.0
         self._tiny, self._shift = 0, 0.0
+        self._end_prices = np.zeros(begin.grid.ends.count)
 
     def optimum(self, status: Status) -> Optimum:
         """Return where it is now."""
         prices = np.zeros_like(self.motion.h)
         prices[:, self._columns] = self._prices
-        return Optimum(self.motion, prices, status, self._promised)
+        return Optimum(self.motion, prices, status, self._promised, self._end_prices)
 
     def advance(self, told: Told) -> Status | None:
         """Take a step; return how the method ended, if it did."""
@@ -153,16 +189,21 @@ class _Solver:
             prices = np.zeros_like(motion.h)
             prices[:, self._columns] = self._prices
             by_prices = slopes + motion.grid.conditions.pulled(motion.samples.checked, prices)
+        ends = _Ends(motion.c, motion.grid.ends.rows(around.changes))
+        if len(motion.c):
+            by_prices = by_prices + motion.grid.ends.pulled(self._end_prices, len(slopes))
+            ends.rows.reshape(len(motion.c), -1)[:, self._held_ends] = 0.0
         curved = around.curvature(by_prices)
         intervals = motion.grid.cost.curvature(motion.samples, motion.partials, around.changes)
         gap = motion.wanted[:, self._columns] + self._slacks
         while True:
-            step = self._step(gradient, curved, intervals, by_jumps, rows, gap)
+            step = self._step(gradient, curved, intervals, by_jumps, rows, gap, ends)
             if step is None:
                 return Status.GRADIENT
             by_slack, by_price = self._others(rows, gap, step)
             size = max(abs(motion.aim), np.finfo(float).tiny)
             met = np.abs(gap).max(initial=0.0) <= _MET
+            met &= bool(np.abs(motion.c).max(initial=0.0) <= _MET_ENDS)
             last = not self._columns.size or self._barrier <= self._least
             agrees = _AGREES_BOUND if self._columns.size else _AGREES
             if self._promised <= agrees * size and met and last:
@@ -203,6 +244,7 @@ class _Solver:
         by_jumps: Array,
         rows: Array,
         gap: Array,
+        ends: "_Ends",
     ) -> Array | None:
         """Return Newton's step of the coordinates, (N + 1, 2r)."""
         count, size = gradient.shape
@@ -222,11 +264,13 @@ class _Solver:
                 matrix.add_triples(near)
             matrix.add_diagonal(shift)
             matrix.hold(self.motion.grid.held)
-            step = matrix.solve(-right)
-            if step is not None and np.abs(step.reshape(count, 2, -1)[:, 0]).max() <= _TRUSTED:
-                self._shift = shift
-                self._promised = float(-right @ step)
-                return step.reshape(count, size)
+            solved = matrix.solve(np.column_stack([-right, ends.columns(count)]))
+            if solved is not None:
+                step, prices = ends.met_by(solved)
+                if np.abs(step.reshape(count, 2, -1)[:, 0]).max() <= _TRUSTED:
+                    self._shift, self._end_prices = shift, prices
+                    self._promised = float(-(right + ends.columns(count) @ prices) @ step)
+                    return step.reshape(count, size)
             shift = max(_MORE * shift, _SHIFT * largest, _LESS * self._shift)
         return None
 
@@ -244,7 +288,7 @@ class _Solver:
     ) -> Status | None:
         """Go along a step as far as it does what it promises."""
         motion, r = self.motion, step.shape[1] // 2
-        off = float(np.abs(gap).sum())
+        off = float(np.abs(gap).sum() + np.abs(motion.c).sum())
         slope = float((gradient * step).sum()) - self._barrier * float(
             (by_slack / self._slacks).sum()
         )
@@ -276,7 +320,7 @@ class _Solver:
                     self._tiny = self._tiny + 1 if length < _TINY else 0
                     return None
             length *= 0.5
-        if self._columns.size:
+        if self._columns.size or len(self._end_prices):
             return Status.INFEASIBLE
         # What a good step promises and none does is no rounding: the gradient is wrong.
         precise = self._promised <= _ROUNDING * max(abs(motion.aim), np.finfo(float).tiny)
@@ -284,7 +328,15 @@ class _Solver:
 
     def _merit(self, motion: NodeMotion, slacks: Array, gap: Array) -> float:
         barrier = self._barrier * float(np.log(slacks).sum())
-        return motion.aim - barrier + self._penalty * float(np.abs(gap).sum())
+        off = float(np.abs(gap).sum() + np.abs(motion.c).sum())
+        return motion.aim - barrier + self._penalty * off
+
+    @property
+    def _held_ends(self) -> Ints:
+        """Which of the coordinates of the first and the last node stay, of (2, 2r) in one row."""
+        held, size = self.motion.grid.held, 2 * self.motion.nu.shape[1]
+        last = size * (len(self.motion.nu) - 2)
+        return np.concatenate([held[held < size], held[held >= last + size] - last])
 
 
 def _longest(values: Array, step: Array) -> float:

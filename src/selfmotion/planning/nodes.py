@@ -8,11 +8,12 @@ from selfmotion.basics import Array, Flags, Ints
 from selfmotion.constraints import BoundConstraint
 from selfmotion.engine import Conditions
 from selfmotion.motion import FreeNullMotion, Grid, Trajectory
-from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
+from selfmotion.nodes import NodeEnds, NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, QuasiNewton, Status
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.settings import (
     COST_AGREEMENT,
+    ENDS_MET,
     FEWEST_WITH_ACCELERATIONS,
     LEAST_SAVING,
     MOST_NODES,
@@ -42,7 +43,7 @@ def takes(problem: Problem, effort: Effort, constraints: Sequence[BoundConstrain
         and not problem.relaxations
         and problem.follows.redundancy == dof - problem.follows.dimension > 0
         and max(orders, default=0) < 3
-        and not any(item.equality for item in constraints)
+        and all(NodeEnds.takes(item) for item in constraints if item.equality)
     )
 
 
@@ -181,7 +182,8 @@ class NodeDescent:
 
     def _kept(self, optimum: Optimum, columns: Ints = _NO_COLUMNS) -> Standing | None:
         """Return the optimum if it is one, and keeps all conditions."""
-        none = optimum.status is Status.GRADIENT or _broken(optimum.motion).any()
+        motion = optimum.motion
+        none = optimum.status is Status.GRADIENT or not _meets(motion) or _broken(motion).any()
         return None if none else self._standing(optimum, columns)
 
     def _from_free(self, freely: Optimum, dearest: float) -> Standing | None:
@@ -211,6 +213,8 @@ class NodeDescent:
         while self._ended is None and optimum.status in _ARRIVED:
             motion = optimum.motion
             broken = _broken(motion)
+            if not _meets(motion):
+                return None
             if not broken.any():
                 return self._standing(optimum, columns)
             if broken[columns].any():
@@ -247,7 +251,7 @@ class NodeDescent:
             evaluations=effort.counts.evaluations,
         )
         self.history.append(iteration)
-        if (motion.h <= motion.grid.conditions.tolerances).all():
+        if _meets(motion) and (motion.h <= motion.grid.conditions.tolerances).all():
             none = np.zeros_like(motion.h)
             self.latest = Standing(motion, Status.STOPPED, _NO_COLUMNS, none, (), np.inf)
         if effort.callback is not None and effort.callback(iteration):
@@ -263,8 +267,13 @@ class NodeDescent:
         arrived = optimum.status if optimum.status in _ARRIVED else Status.PRECISION
         status = self._ended or arrived
         least = LEAST_SAVING * abs(motion.cost)
-        conditions = Conditions(motion.grid.conditions.constraints, Grid(motion.grid.t))
-        each = [part.ravel() for part in motion.grid.conditions.by_constraint(optimum.prices)]
+        grid = motion.grid
+        inner = iter(grid.conditions.by_constraint(optimum.prices))
+        ends = grid.ends.by_item(optimum.end_prices)
+        each = [
+            ends[id(item)] if item.equality else next(inner).ravel() for item in self._constraints
+        ]
+        conditions = Conditions(self._constraints, Grid(grid.t))
         active = conditions.active(
             motion.samples.checked, np.concatenate([np.zeros(0), *each]), least
         )
@@ -288,6 +297,11 @@ def _broken(motion: NodeMotion) -> Flags:
     """Return which columns of the conditions are not kept, (C,)."""
     # Written so that NaN is not.
     return np.asarray(~(motion.h <= motion.grid.conditions.tolerances).all(axis=0))
+
+
+def _meets(motion: NodeMotion) -> bool:
+    """Whether the ends are what is asked for."""
+    return bool(np.abs(motion.c).max(initial=0.0) <= ENDS_MET)
 
 
 def _near(motion: NodeMotion) -> Flags:

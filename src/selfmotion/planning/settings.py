@@ -25,6 +25,8 @@ NODE_ROUNDS = 8
 # Where limits of acceleration bind, that takes some sixty evaluations of the cost; who has fewer
 # than this goes another way.
 FEWEST_WITH_ACCELERATIONS = 100
+# What is asked of the ends is met to this [rad, rad/s].
+ENDS_MET = 1e-8
 # Conditions that are nearer than this to being broken [units of h] count with those that are.
 NEARLY = 0.02
 # Where the motion at x = 0 does not lead to what keeps the conditions: the self-motion goes towards
