@@ -241,6 +241,7 @@ class Candidates:
                 continue
             if begun and self._hopeless(guide, session, begun[0]):
                 continue
+            session.take_chain(guide)
             # What happens to it first tells which one is worth the rest.
             self._try(session, chosen=chosen, evaluations=FIRST_EVALUATIONS)
             begun = sorted([*begun, session], key=Session.score)

@@ -41,6 +41,10 @@ FINER = 4
 # --- starts and sequences (candidates, heats)
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 SECOND_EFFORT = 4
+# The shortest chain of a sequence becomes a motion of so many times its waypoints, with more where
+# it does not keep the conditions between them, so often.
+FINER_CHAIN = 3
+CHAIN_ROUNDS = 4
 # Evaluations of the cost with which each sequence is optimised at first; only the best goes on.
 FIRST_EVALUATIONS = 16
 # Sequences are not worth refining when dearer by this factor than one that keeps all constraints.

@@ -7,9 +7,11 @@ from selfmotion.search.curves import (
 )
 from selfmotion.search.guides import (
     SequenceGuide as SequenceGuide,
+    asks_length as asks_length,
     guides as guides,
     guides_near as guides_near,
     has_curves as has_curves,
+    shortest_along as shortest_along,
 )
 from selfmotion.search.obstruction import Obstruction as Obstruction, obstruction as obstruction
 from selfmotion.search.reach import Reach as Reach, reachable as reachable

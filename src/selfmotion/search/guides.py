@@ -11,12 +11,15 @@ from selfmotion.costs import PathLength
 from selfmotion.engine import deviation_of
 from selfmotion.path import Path
 from selfmotion.problem import Problem
-from selfmotion.search.measures import measure_of
+from selfmotion.search.measures import Length, measure_of
+from selfmotion.search.nodes import Admissible
 from selfmotion.search.sampled import sampled_sequences
 from selfmotion.search.sequences import Sequence, best_sequences
 from selfmotion.search.settings import (
+    CHAIN_EDGE,
     FEWEST,
     FEWEST_OF_CURVES,
+    LAST_SMOOTHINGS,
     MARGIN,
     MOST,
     PATH_LOOKS,
@@ -26,6 +29,7 @@ from selfmotion.search.settings import (
     STRIDE,
     TURN,
 )
+from selfmotion.search.shortest import Shortest
 from selfmotion.search.waypoints import NearPath, OnPath, Waypoints
 from selfmotion.task import log3
 
@@ -78,6 +82,32 @@ def guides(
         waypoints = OnPath(problem.follows, t, asked.lower, asked.upper)
         sequences = _sampled(problem, waypoints, t, options)
     return [SequenceGuide(sequence) for sequence in sequences]
+
+
+def shortest_along(problem: Problem, t: Array, q: Array, where: Array) -> Array | None:
+    """Return the shortest configurations at times `where` (K,) near those q (W, n) at t, (K, n).
+
+    None where one between two others does not come onto the path or meets something.
+    """
+    weights, asked = _weights(problem), problem.envelope
+    edge = np.minimum(CHAIN_EDGE, 1e-2 * (asked.upper - asked.lower))
+    limits = asked.lower + edge, asked.upper - edge
+    waypoints = OnPath(problem.follows, where, *limits)
+    near = np.column_stack([np.interp(where, t, joint) for joint in q.T])
+    here, arrived = waypoints.project_each(near, np.arange(len(where)))
+    if not arrived.all():
+        return None
+    bodies = tuple((model, distance + MARGIN) for model, distance in asked.bodies)
+    bounds = Admissible(*limits, problem.robot.is_revolute, bodies)
+    largest = np.minimum(asked.speed * np.diff(where)[:, None], np.pi)
+    here = Shortest(waypoints, bounds, largest, weights).near(here, LAST_SMOOTHINGS)
+    return here if bounds.keep(here).all() else None
+
+
+def asks_length(problem: Problem) -> bool:
+    """Whether sequences are chosen by their length."""
+    t, weights = np.array([0.0, problem.path.duration]), _weights(problem)
+    return isinstance(measure_of(problem.follows, problem.costs, t, weights), Length)
 
 
 def guides_near(
