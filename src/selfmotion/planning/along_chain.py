@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Flags
 from selfmotion.constraints import BoundConstraint
 from selfmotion.motion import Grid
 from selfmotion.nodes import NodeGrid, NodeMotion
@@ -14,11 +14,13 @@ from selfmotion.planning.nodes import takes
 from selfmotion.planning.settings import CHAIN_ROUNDS, FINER_CHAIN
 from selfmotion.planning.standing import Standing
 from selfmotion.problem import Problem
-from selfmotion.search import SequenceGuide, asks_length, shortest_along
+from selfmotion.search import LAST_SMOOTHINGS, SequenceGuide, asks_length, shortest_along
 
 # What a joint at rest takes of a velocity that is lacking, where the fastest takes 1; and where all
 # are as slow as this [rad/s or m/s], none is.
 _LEAST, _STILL = 1e-2, 1e-9
+# Limits are looked at so often between two nodes.
+_LOOKS = 16
 
 
 def along_chain(
@@ -37,8 +39,10 @@ def along_chain(
         return None
     t, q = guide.sequence.t, guide.sequence.q
     finer = Grid.aligned(problem.knots, FINER_CHAIN * len(t))
-    for _ in range(CHAIN_ROUNDS):
-        found = shortest_along(problem, t, q, finer.nodes)
+    for number in range(CHAIN_ROUNDS):
+        # A few nodes more change little.
+        stages = LAST_SMOOTHINGS[2:] if number else LAST_SMOOTHINGS
+        found = shortest_along(problem, t, q, finer.nodes, stages)
         if found is None:
             return None
         t, q = finer.nodes, found
@@ -46,13 +50,22 @@ def along_chain(
         motion = _through(grid, q)
         if motion is None:
             return None
-        broken = motion.broken()
+        broken = motion.broken() | _beyond_limits(motion)
         if not broken.any():
             off = abs(motion.exact_cost - motion.cost)
             none = np.zeros(0, dtype=np.int64)
             return Standing(motion, Status.PRECISION, none, np.zeros_like(motion.h), (), off)
         finer = finer.halved(np.convolve(broken, np.ones(3), "same") > 0.0)
     return None
+
+
+def _beyond_limits(motion: NodeMotion) -> Flags:
+    """Return on which intervals a joint passes a limit, also for a moment, (N,)."""
+    asked, t = motion.grid.problem.envelope, motion.grid.t
+    looks = (t[:-1, None] + np.diff(t)[:, None] * np.arange(_LOOKS) / _LOOKS).ravel()
+    q, qd = motion.trajectory(looks), motion.trajectory(looks, 1)
+    beyond = (q < asked.lower) | (q > asked.upper) | (np.abs(qd) > asked.speed)
+    return np.asarray(beyond.reshape(len(t) - 1, -1).any(axis=1))
 
 
 def _through(grid: NodeGrid, q: Array) -> NodeMotion | None:

@@ -242,6 +242,8 @@ class Candidates:
             if begun and self._hopeless(guide, session, begun[0]):
                 continue
             session.take_chain(guide)
+            if begun and begun[0].of_chain and not session.of_chain:
+                continue
             # What happens to it first tells which one is worth the rest.
             self._try(session, chosen=chosen, evaluations=FIRST_EVALUATIONS)
             begun = sorted([*begun, session], key=Session.score)

@@ -67,6 +67,8 @@ class Session:
         What kept it from a lower cost.
     remaining : float or None
         What any other one could still save, as far as is known [cost].
+    of_chain : bool
+        Whether what stands is a chain of the search, at its optimum.
     """
 
     def __init__(
@@ -84,7 +86,7 @@ class Session:
         self._tried: NullMotion | None = None
         self._standing: Standing | None = None
         self._tried_nodes = False
-        self._arrived = False
+        self.of_chain = False
         self._warm: Plan | None = None
         self.violations: tuple[str, ...] = ()
         self.active: tuple[Binding, ...] = ()
@@ -229,7 +231,7 @@ class Session:
         """Let the shortest chain near a sequence stand, if it will do: nothing is left to gain."""
         constraints = self._objective.constraints.constraints
         self._standing = along_chain(self._still.problem, self._effort, guide, constraints)
-        self._arrived = self._standing is not None
+        self.of_chain = self._standing is not None
 
     def adopt(self, plan: Plan) -> None:
         """Begin at a plan's motion instead of x = 0, unless that would be worse."""
@@ -272,7 +274,7 @@ class Session:
             So many of the cost, for a rough optimum; by default what `Effort` allows.
         """
         self._evaluations = evaluations
-        if self._arrived or (evaluations is None and self._take_nodes()):
+        if self.of_chain or (evaluations is None and self._take_nodes()):
             return
         if self._warm is not None:
             warm, self._warm = self._warm, None
@@ -322,13 +324,13 @@ class Session:
 
     def leave_nodes(self) -> None:
         """Go on without nodes, from the motion that they began with."""
-        self._standing, self._tried_nodes, self._arrived = None, True, False
+        self._standing, self._tried_nodes, self.of_chain = None, True, False
         self.minimize()
 
     def _settle_nodes(self) -> None:
         """Go on until more nodes change the cost no more."""
         standing = self._standing
-        if standing is not None and self._ended is None and not self._arrived:
+        if standing is not None and self._ended is None and not self.of_chain:
             self._by_nodes(lambda descent: descent.settled(standing))
 
     def _by_nodes(self, search: Callable[[NodeDescent], Standing | None]) -> None:

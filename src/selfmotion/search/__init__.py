@@ -19,7 +19,7 @@ from selfmotion.search.sequences import (
     Sequence as Sequence,
     best_sequences as best_sequences,
 )
-from selfmotion.search.settings import SPACING as SPACING
+from selfmotion.search.settings import LAST_SMOOTHINGS as LAST_SMOOTHINGS, SPACING as SPACING
 from selfmotion.search.starts import (
     Admits as Admits,
     carried as carried,

@@ -1,6 +1,7 @@
 """Motions worth starting from, found by the global search over self-motions."""
 
 import itertools
+from collections import abc
 from dataclasses import replace
 from typing import Any
 
@@ -17,9 +18,9 @@ from selfmotion.search.sampled import sampled_sequences
 from selfmotion.search.sequences import Sequence, best_sequences
 from selfmotion.search.settings import (
     CHAIN_EDGE,
+    CHAIN_SPEED,
     FEWEST,
     FEWEST_OF_CURVES,
-    LAST_SMOOTHINGS,
     MARGIN,
     MOST,
     PATH_LOOKS,
@@ -84,10 +85,13 @@ def guides(
     return [SequenceGuide(sequence) for sequence in sequences]
 
 
-def shortest_along(problem: Problem, t: Array, q: Array, where: Array) -> Array | None:
+def shortest_along(
+    problem: Problem, t: Array, q: Array, where: Array, smoothings: abc.Sequence[float]
+) -> Array | None:
     """Return the shortest configurations at times `where` (K,) near those q (W, n) at t, (K, n).
 
-    None where one between two others does not come onto the path or meets something.
+    In stages with these δ, see `Shortest.near`. None where one between two others does not come
+    onto the path or meets something.
     """
     weights, asked = _weights(problem), problem.envelope
     edge = np.minimum(CHAIN_EDGE, 1e-2 * (asked.upper - asked.lower))
@@ -99,8 +103,8 @@ def shortest_along(problem: Problem, t: Array, q: Array, where: Array) -> Array 
         return None
     bodies = tuple((model, distance + MARGIN) for model, distance in asked.bodies)
     bounds = Admissible(*limits, problem.robot.is_revolute, bodies)
-    largest = np.minimum(asked.speed * np.diff(where)[:, None], np.pi)
-    here = Shortest(waypoints, bounds, largest, weights).near(here, LAST_SMOOTHINGS)
+    largest = np.minimum(CHAIN_SPEED * asked.speed * np.diff(where)[:, None], np.pi)
+    here = Shortest(waypoints, bounds, largest, weights).near(here, smoothings)
     return here if bounds.keep(here).all() else None
 
 

@@ -21,6 +21,7 @@ from selfmotion.search.settings import (
     BODIES_STIFF,
     FARTHEST,
     FIRST_FARTHEST,
+    FURTHER,
     LIMITS_HELD,
     NEAR_BODIES,
     SHORTENING_GAIN,
@@ -68,7 +69,7 @@ class Shortest:
         """
         self._free = self._bounds.keep(q)
         self._watched = ~self._free
-        best, here, reach = q, q, FIRST_FARTHEST
+        best, here, reach, free = q, q, FIRST_FARTHEST, self._free.sum()
         mean = self._length(q) / max(np.diff(q, axis=0).size, 1)
         for smoothing in smoothings:
             blocked = np.zeros(len(q), dtype=bool)
@@ -78,9 +79,8 @@ class Shortest:
                 if after is None:
                     break
                 here = after.q
-                known, self._free = self._free, self._bounds.keep(here)
-                if self._free.sum() > known.sum() or self._better(best, here):
-                    best = here
+                if self._free.sum() > free or self._better(best, here):
+                    best, free = here, self._free.sum()
                 if after.merit > (1.0 - SHORTENING_GAIN) * before.merit:
                     break
         return best
@@ -103,11 +103,13 @@ class Shortest:
         every, step = np.arange(len(before.q)), self._step(before, blocked)
         for _ in range(_TRIES):
             longest = float(np.abs(step).max())
-            moved = min(longest, reach)
+            moved = min(FURTHER * longest, reach)
             guess = before.q + (moved / longest if longest > 0.0 else 0.0) * step
             q, arrived = self._waypoints.project_each(guess, every)
             arrived &= np.abs(q - guess).max(axis=1) < max(reach, AT_LIMIT)
-            arrived[arrived & self._free] = self._bounds.keep(q[arrived & self._free])
+            free = arrived.copy()
+            free[arrived] = self._bounds.keep(q[arrived])
+            arrived &= free | ~self._free
             if not (arrived | blocked).all():
                 self._watched |= ~arrived
                 blocked |= ~arrived
@@ -115,6 +117,7 @@ class Shortest:
                 continue
             after = self._state(np.where(arrived[:, None], q, before.q), before.smoothing)
             if after.merit < before.merit:
+                self._free = np.where(arrived, free, self._free)
                 return after, min(FARTHEST, max(reach, 2.0 * moved))
             reach = _SHORTER * moved
         return None, reach
