@@ -13,6 +13,7 @@ from selfmotion.search.guides import (
     has_curves as has_curves,
     shortest_along as shortest_along,
 )
+from selfmotion.search.manifold import Manifold as Manifold
 from selfmotion.search.obstruction import Obstruction as Obstruction, obstruction as obstruction
 from selfmotion.search.reach import Reach as Reach, reachable as reachable
 from selfmotion.search.sequences import (
