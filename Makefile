@@ -131,5 +131,6 @@ acceptance: $(READY)  ## 200 random plans, driven at 1 kHz by what the makers pu
 distances: $(READY)  ## 100,000 distances of bodies of all kinds, judged without GJK
 	$(BIN)/python benchmarks/distances.py
 
-bench-peers: $(READY)  ## placo and Drake on the same path, in environments of their own
+bench-peers: $(READY)  ## other tools on the same paths and cells, in environments of their own
 	$(BIN)/python benchmarks/peers/run_peers.py
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/peers/run_cells.py

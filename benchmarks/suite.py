@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -38,6 +38,8 @@ STEP_SHARE = 0.995
 METRE = 10.0
 # Evaluations of the cost that are spent on one motion: more would gain tenths of a percent.
 EVALUATIONS = 40
+# Intervals of the spline that is tried where the default null motion leads to nothing verified.
+INTERVALS = 40
 
 
 @dataclass(frozen=True)
@@ -155,19 +157,22 @@ def plan(problem: PathProblem, seed: int, progress: Progress) -> tuple[sm.Plan, 
         constraints.append(sm.Clearance(problem.obstacles, CLEARANCE, disabled=problem.disabled))
     weights = [METRE if robot.is_prismatic(name) else 1.0 for name in robot.joint_names]
     length = sm.PathLength(smoothing=0.005 / slower, joint_weights=weights)
-    found = sm.plan(
-        sm.Problem(
-            robot,
-            sm.Waypoints.from_poses(times, poses),
-            problem.task,
-            null_motion=sm.BSplineNullMotion(40),
-            costs=[length],
-            constraints=constraints,
-        ),
-        search=sm.Search(mode="global", rng=seed),
-        max_evaluations=EVALUATIONS,
-        progress=progress,
+    asked = sm.Problem(
+        robot,
+        sm.Waypoints.from_poses(times, poses),
+        problem.task,
+        costs=[length],
+        constraints=constraints,
     )
+    for null_motion in (asked.null_motion, sm.BSplineNullMotion(INTERVALS)):
+        found = sm.plan(
+            replace(asked, null_motion=null_motion),
+            search=sm.Search(mode="global", rng=seed),
+            max_evaluations=EVALUATIONS,
+            progress=progress,
+        )
+        if found.certificate.verified:
+            break
     # A motion along a part of the path is none along the path.
     found = found.require() if found.report.ending else found
     return found, found.trajectory(times)

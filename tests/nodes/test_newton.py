@@ -8,8 +8,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.costs import Partials, Samples
 from selfmotion.nodes import Step, minimise
-from selfmotion.nodes.banded import Banded
-from selfmotion.optimise import Status
+from selfmotion.optimise import Banded, Status
 from support.arms import PANDA_HOME, Case
 from support.nodes import nodes_of, problem_of
 

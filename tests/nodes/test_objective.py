@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.nodes.banded import Banded
 from selfmotion.nodes.objective import Around, scattered
+from selfmotion.optimise import Banded
 from selfmotion.robot import has_masses
 from support.arms import Case
 from support.nodes import centred, moved, nodes_of, problem_of, random_step

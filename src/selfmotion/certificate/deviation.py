@@ -43,23 +43,25 @@ def smallest_singular_values(follows: Follows, q: Array) -> Array:
 
 def jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
     """Return Jacobians (K, 6, n) of the tip and its orientations, in the base's axes."""
-    model, data, tip, base = chain.model, chain.model.createData(), chain.tip, chain.base
-    jacobian, rotation = np.empty((len(q), 6, model.nv)), np.empty((len(q), 3, 3))
+    model, data = chain.model, chain.model.createData()
+    frames = [chain.tip] if chain.base == WORLD else [chain.tip, chain.base]
+    world = np.empty((len(frames), len(q), 6, model.nv))
+    turns, places = np.empty((len(frames), len(q), 3, 3)), np.empty((len(frames), len(q), 3))
     for k, configuration in enumerate(q):
         pin.computeJointJacobians(model, data, configuration)
-        pose = pin.updateFramePlacement(model, data, tip)
-        own = pin.getFrameJacobian(model, data, tip, _AXES).reshape(6, -1)
-        if base == WORLD:
-            jacobian[k], rotation[k] = own, pose.rotation
-            continue
-        frame = pin.updateFramePlacement(model, data, base)
-        other = pin.getFrameJacobian(model, data, base, _AXES).reshape(6, -1)
-        apart, turn = pose.translation - frame.translation, frame.rotation.T
-        moving = other[:3] + np.cross(other[3:].T, apart).T
-        jacobian[k, :3] = turn @ (own[:3] - moving)
-        jacobian[k, 3:] = turn @ (own[3:] - other[3:])
-        rotation[k] = turn @ pose.rotation
-    return jacobian, rotation
+        for f, frame in enumerate(frames):
+            pose = pin.updateFramePlacement(model, data, frame)
+            world[f, k] = pin.getFrameJacobian(model, data, frame, _AXES).reshape(6, -1)
+            turns[f, k], places[f, k] = pose.rotation, pose.translation
+    if chain.base == WORLD:
+        return world[0], turns[0]
+    own, other = world
+    apart, turned = places[0] - places[1], turns[1].transpose(0, 2, 1)
+    moving = other[:, :3] + np.cross(other[:, 3:], apart[:, :, None], axis=1)
+    jacobian = np.concatenate(
+        [turned @ (own[:, :3] - moving), turned @ (own[:, 3:] - other[:, 3:])], 1
+    )
+    return jacobian, turned @ turns[0]
 
 
 def poses(chain: Chain, q: Array) -> tuple[Array, Array]:

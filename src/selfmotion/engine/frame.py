@@ -46,4 +46,4 @@ def transport(jacobians: Array) -> Array:
 
 def carried_bases(follows: Follows, q: Array) -> Array:
     """Return null-space bases along a motion (N, n), (N, n, r), each turned to the last one."""
-    return transport(np.array([follows.jacobian(here) for here in q]))
+    return transport(follows.jacobians(q))

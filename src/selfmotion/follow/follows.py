@@ -117,6 +117,14 @@ class Follows:
         """Return the prescribed rows of all Jacobians at q (n,), (m, n); q is not checked."""
         return np.concatenate([item.jacobian(q) for item in self.items])
 
+    def jacobians(self, q: Array) -> Array:
+        """Return the same at many configurations (K, n), (K, m, n)."""
+        rows = []
+        for item in self.items:
+            jacobian, rotation, _ = item.chain.along(q)
+            rows.append(item.task.select_along(jacobian, rotation))
+        return np.concatenate(rows, axis=1)
+
     def null_basis(self, q: Array) -> Array:
         """Return an orthonormal basis of the self-motion's directions at q (n,), (n, r)."""
         return null_space(self.jacobian(q))

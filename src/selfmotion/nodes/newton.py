@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array, Ints
-from selfmotion.nodes.banded import Banded
 from selfmotion.nodes.conditions import spread
 from selfmotion.nodes.motion import NodeMotion
 from selfmotion.nodes.objective import Around, scattered
-from selfmotion.optimise import Status
+from selfmotion.optimise import Banded, Status
 
 # The cost is right to this share of itself once a step promises no more; where conditions count.
 _AGREES, _AGREES_BOUND = 1e-8, 1e-6

@@ -22,7 +22,7 @@ from selfmotion.planning.heats import Heats
 from selfmotion.planning.refusal import leaves_path
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
-from selfmotion.planning.settings import DEARER, FIRST_EVALUATIONS, SECOND_EFFORT
+from selfmotion.planning.settings import DEARER, DEARER_CHAIN, FIRST_EVALUATIONS, SECOND_EFFORT
 from selfmotion.planning.warm_start import start_of
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
@@ -241,6 +241,9 @@ class Candidates:
                 continue
             if begun and self._hopeless(guide, session, begun[0]):
                 continue
+            session.take_chain(guide)
+            if begun and begun[0].of_chain and not session.of_chain:
+                continue
             # What happens to it first tells which one is worth the rest.
             self._try(session, chosen=chosen, evaluations=FIRST_EVALUATIONS)
             begun = sorted([*begun, session], key=Session.score)
@@ -257,7 +260,8 @@ class Candidates:
         if best.violations:
             return False
         least = self.sequences[0].sequence.cost
-        dearer = guide.sequence.cost > least + (DEARER - 1.0) * abs(least)
+        share = DEARER_CHAIN if best.of_chain else DEARER
+        dearer = guide.sequence.cost > least + (share - 1.0) * abs(least)
         return dearer and session.merit() > best.score()[1]
 
     def _try(

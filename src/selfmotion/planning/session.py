@@ -21,6 +21,7 @@ from selfmotion.engine import (
 )
 from selfmotion.motion import Grid, NodeNullMotion, NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Minimum, Status
+from selfmotion.planning.along_chain import along_chain
 from selfmotion.planning.closing import closed
 from selfmotion.planning.descent import Descent, breaks
 from selfmotion.planning.effort import Effort
@@ -38,6 +39,7 @@ from selfmotion.planning.standing import Standing
 from selfmotion.planning.warm_start import coefficients_of, slower
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
+from selfmotion.search import SequenceGuide
 
 # After these there is nothing to go on from.
 _ADRIFT = (Status.UNBOUNDED, Status.GRADIENT)
@@ -65,6 +67,8 @@ class Session:
         What kept it from a lower cost.
     remaining : float or None
         What any other one could still save, as far as is known [cost].
+    of_chain : bool
+        Whether what stands is a chain of the search, at its optimum.
     """
 
     def __init__(
@@ -82,6 +86,7 @@ class Session:
         self._tried: NullMotion | None = None
         self._standing: Standing | None = None
         self._tried_nodes = False
+        self.of_chain = False
         self._warm: Plan | None = None
         self.violations: tuple[str, ...] = ()
         self.active: tuple[Binding, ...] = ()
@@ -222,6 +227,12 @@ class Session:
         """Return whether constraints are violated, then the cost: the smaller, the better."""
         return bool(self.violations), self._cost()
 
+    def take_chain(self, guide: SequenceGuide) -> None:
+        """Let the shortest chain near a sequence stand, if it will do: nothing is left to gain."""
+        constraints = self._objective.constraints.constraints
+        self._standing = along_chain(self._still.problem, self._effort, guide, constraints)
+        self.of_chain = self._standing is not None
+
     def adopt(self, plan: Plan) -> None:
         """Begin at a plan's motion instead of x = 0, unless that would be worse."""
         self._warm = plan
@@ -263,7 +274,7 @@ class Session:
             So many of the cost, for a rough optimum; by default what `Effort` allows.
         """
         self._evaluations = evaluations
-        if evaluations is None and self._take_nodes():
+        if self.of_chain or (evaluations is None and self._take_nodes()):
             return
         if self._warm is not None:
             warm, self._warm = self._warm, None
@@ -313,13 +324,13 @@ class Session:
 
     def leave_nodes(self) -> None:
         """Go on without nodes, from the motion that they began with."""
-        self._standing, self._tried_nodes = None, True
+        self._standing, self._tried_nodes, self.of_chain = None, True, False
         self.minimize()
 
     def _settle_nodes(self) -> None:
         """Go on until more nodes change the cost no more."""
         standing = self._standing
-        if standing is not None and self._ended is None:
+        if standing is not None and self._ended is None and not self.of_chain:
             self._by_nodes(lambda descent: descent.settled(standing))
 
     def _by_nodes(self, search: Callable[[NodeDescent], Standing | None]) -> None:

@@ -48,10 +48,16 @@ FINER = 4
 # --- starts and sequences (candidates, heats)
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 SECOND_EFFORT = 4
+# The shortest chain of a sequence becomes a motion of so many times its waypoints, with more where
+# it does not keep the conditions between them, so often.
+FINER_CHAIN = 3
+CHAIN_ROUNDS = 4
 # Evaluations of the cost with which each sequence is optimised at first; only the best goes on.
 FIRST_EVALUATIONS = 16
 # Sequences are not worth refining when dearer by this factor than one that keeps all constraints.
 DEARER = 1.25
+# The same where that is the chain of a sequence itself, on which optimising gains next to nothing.
+DEARER_CHAIN = 1.01
 # Steps of the rough motions.
 ROUGH_STEPS = 12
 # Heats: so many starts at most, optimised with so many evaluations of the cost more.

@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, shown
+from selfmotion.basics import Array, InverseKinematicsError, ProblemError, shown
 from selfmotion.motion import NullMotionTable, Trajectory
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
 from selfmotion.robot import null_space
+from selfmotion.search import Manifold
 
 
 def check_warm_start(plan: object, problem: Problem) -> None:
@@ -22,14 +23,27 @@ def check_warm_start(plan: object, problem: Problem) -> None:
 
 
 def start_of(plan: Plan, problem: Problem) -> Array:
-    """Return the configuration (n,) near a plan's first one that is on the start of the path.
+    """Return the configuration (n,) near a plan's first one that is on the start of all paths.
 
     Raises
     ------
     InverseKinematicsError
         There is none.
     """
-    seed = plan.trajectory.q[0]
+    seed, follows, robot = plan.trajectory.q[0], problem.follows, problem.robot
+    if len(follows.items) > 1:
+        manifold = Manifold(follows, robot.lower, robot.upper)
+        q, arrived = manifold.project(seed[None], follows.targets(np.zeros(1)), far=True)
+        if not arrived[0]:
+            misses = np.array([item.miss(item.path.pose(0.0), q[0]) for item in follows.items])
+            position, rotation = misses.max(axis=0)
+            raise InverseKinematicsError(
+                f"{robot.name}: from the start of warm_start no configuration was found in which "
+                f"all frames are where their paths begin",
+                position_miss=float(position),
+                rotation_miss=float(rotation),
+            )
+        return np.asarray(q[0])
     return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task, seed)
 
 
@@ -63,8 +77,7 @@ def coefficients_of(
     # A plan of a part of its path ends earlier.
     theirs = np.minimum(t * pace, trajectory.t[-1])
     q, qd = trajectory(theirs), pace * trajectory(theirs, 1)
-    jacobians = np.array([problem.follows.jacobian(each) for each in q])
-    null = np.swapaxes(null_space(jacobians), 1, 2)
+    null = np.swapaxes(null_space(problem.follows.jacobians(q)), 1, 2)
     acting = null @ table.matrix()
     wanted = np.einsum("srn,sn->sr", null, qd)
     if not wanted.size:

@@ -7,17 +7,20 @@ from selfmotion.search.curves import (
 )
 from selfmotion.search.guides import (
     SequenceGuide as SequenceGuide,
+    asks_length as asks_length,
     guides as guides,
     guides_near as guides_near,
     has_curves as has_curves,
+    shortest_along as shortest_along,
 )
+from selfmotion.search.manifold import Manifold as Manifold
 from selfmotion.search.obstruction import Obstruction as Obstruction, obstruction as obstruction
 from selfmotion.search.reach import Reach as Reach, reachable as reachable
 from selfmotion.search.sequences import (
     Sequence as Sequence,
     best_sequences as best_sequences,
 )
-from selfmotion.search.settings import SPACING as SPACING
+from selfmotion.search.settings import LAST_SMOOTHINGS as LAST_SMOOTHINGS, SPACING as SPACING
 from selfmotion.search.starts import (
     Admits as Admits,
     carried as carried,

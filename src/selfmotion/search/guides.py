@@ -1,6 +1,7 @@
 """Motions worth starting from, found by the global search over self-motions."""
 
 import itertools
+from collections import abc
 from dataclasses import replace
 from typing import Any
 
@@ -11,10 +12,13 @@ from selfmotion.costs import PathLength
 from selfmotion.engine import deviation_of
 from selfmotion.path import Path
 from selfmotion.problem import Problem
-from selfmotion.search.measures import measure_of
+from selfmotion.search.measures import Length, measure_of
+from selfmotion.search.nodes import Admissible
 from selfmotion.search.sampled import sampled_sequences
 from selfmotion.search.sequences import Sequence, best_sequences
 from selfmotion.search.settings import (
+    CHAIN_EDGE,
+    CHAIN_SPEED,
     FEWEST,
     FEWEST_OF_CURVES,
     MARGIN,
@@ -26,6 +30,7 @@ from selfmotion.search.settings import (
     STRIDE,
     TURN,
 )
+from selfmotion.search.shortest import Shortest
 from selfmotion.search.waypoints import NearPath, OnPath, Waypoints
 from selfmotion.task import log3
 
@@ -78,6 +83,35 @@ def guides(
         waypoints = OnPath(problem.follows, t, asked.lower, asked.upper)
         sequences = _sampled(problem, waypoints, t, options)
     return [SequenceGuide(sequence) for sequence in sequences]
+
+
+def shortest_along(
+    problem: Problem, t: Array, q: Array, where: Array, smoothings: abc.Sequence[float]
+) -> Array | None:
+    """Return the shortest configurations at times `where` (K,) near those q (W, n) at t, (K, n).
+
+    In stages with these δ, see `Shortest.near`. None where one between two others does not come
+    onto the path or meets something.
+    """
+    weights, asked = _weights(problem), problem.envelope
+    edge = np.minimum(CHAIN_EDGE, 1e-2 * (asked.upper - asked.lower))
+    limits = asked.lower + edge, asked.upper - edge
+    waypoints = OnPath(problem.follows, where, *limits)
+    near = np.column_stack([np.interp(where, t, joint) for joint in q.T])
+    here, arrived = waypoints.project_each(near, np.arange(len(where)))
+    if not arrived.all():
+        return None
+    bodies = tuple((model, distance + MARGIN) for model, distance in asked.bodies)
+    bounds = Admissible(*limits, problem.robot.is_revolute, bodies)
+    largest = np.minimum(CHAIN_SPEED * asked.speed * np.diff(where)[:, None], np.pi)
+    here = Shortest(waypoints, bounds, largest, weights).near(here, smoothings)
+    return here if bounds.keep(here).all() else None
+
+
+def asks_length(problem: Problem) -> bool:
+    """Whether sequences are chosen by their length."""
+    t, weights = np.array([0.0, problem.path.duration]), _weights(problem)
+    return isinstance(measure_of(problem.follows, problem.costs, t, weights), Length)
 
 
 def guides_near(

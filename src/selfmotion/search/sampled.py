@@ -25,6 +25,7 @@ from selfmotion.search.settings import (
     STRAYED,
     STRAYS,
 )
+from selfmotion.search.shortest import Shortest
 from selfmotion.search.starts import spread
 from selfmotion.search.waypoints import Waypoints
 
@@ -241,6 +242,8 @@ def _shortened(
     measure: Measure,
 ) -> Array:
     """Return a better chain near q (W, n), never a worse one."""
+    if isinstance(measure, Length):
+        return Shortest(waypoints, bounds, largest_step, measure.weights).near(q)
     fixed = np.zeros(q.shape[1], dtype=bool)
     cost = measure.of(q)
     for ring in RINGS:

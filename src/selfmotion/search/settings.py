@@ -61,6 +61,26 @@ RINGS = (0.3, 0.1, 0.03, 0.01)
 RING_ROUNDS = 5
 RING_GAIN = 5e-3
 
+# --- shortest: chains of samples moved to where they are shortest
+# δ, one stage after the other, as multiples of the chain's mean step; rounds of each at most, and
+# the gain below which a stage ends.
+SMOOTHINGS = (10.0, 3.0, 1.0, 0.3, 0.1)
+SHORTENING_ROUNDS = 20
+SHORTENING_GAIN = 3e-4
+# Rounds go so many times as far as their quadratics say, which are never below what they stand for.
+FURTHER = 1.6
+# No joint moves farther in a round than this [rad or m], and in the first one.
+FARTHEST, FIRST_FARTHEST = 1.0, 0.5
+# Joints as near to a limit as this [rad or m] stay there if they would leave it; rounds of that.
+AT_LIMIT = 0.02
+LIMITS_HELD = 4
+# Steps are kept below this share of the largest; more counts as length times this [1/rad].
+STEP_KEPT = 0.97
+STEPS_STIFF = 30.0
+# Bodies are kept apart by so much more than asked for [m]; less counts as length times this [1/m²].
+NEAR_BODIES = 1e-4
+BODIES_STIFF = 1e6
+
 # --- chains: dynamic programming over the nodes
 # Steps faster than this many times the mean speed of the shortest chain are changes from sample to
 # sample, which the finished motion spreads over more time.
@@ -107,6 +127,11 @@ MOST = 400
 PATH_LOOKS = 2000
 # What the sequences keep beyond the clearance asked for, since they are only checked at waypoints.
 MARGIN = 2.5e-4
+# Where the best chain itself is made the motion, it moves aside in the stages with the least δ, so
+# far from limits [rad or m] and at this share of the largest speeds: between waypoints it bulges.
+CHAIN_EDGE = 5e-4
+CHAIN_SPEED = 0.95
+LAST_SMOOTHINGS = (3.0, 1.0, 0.3, 0.1, 0.03)
 # The jagged chain of samples is smoothed by a spline with this many of them per interval.
 SMOOTHING = 3
 

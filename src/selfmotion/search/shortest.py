@@ -1,0 +1,235 @@
+"""Chains that move aside to where they are shortest, by reweighted least squares.
+
+The length Σ w|Δq| of a chain, smoothed to Σ √((wΔq)² + δ²) - δ, is never above the quadratic with
+the same value and slope whose curvature is w²/√((wΔq)² + δ²) (E. Weiszfeld, "Sur le point pour
+lequel la somme des distances de n points donnés est minimum", Tohoku Math. J. 43, 1937). Its
+minimum over how far each configuration moves along its self-motion is one block-tridiagonal system;
+δ becomes smaller from stage to stage.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints
+from selfmotion.collision import ClearanceModel, CollisionModel
+from selfmotion.optimise import Banded
+from selfmotion.search.nodes import Admissible
+from selfmotion.search.settings import (
+    AT_LIMIT,
+    BODIES_STIFF,
+    FARTHEST,
+    FIRST_FARTHEST,
+    FURTHER,
+    LIMITS_HELD,
+    NEAR_BODIES,
+    SHORTENING_GAIN,
+    SHORTENING_ROUNDS,
+    SMOOTHINGS,
+    STEP_KEPT,
+    STEPS_STIFF,
+)
+from selfmotion.search.waypoints import Waypoints
+
+# Of directions along which nothing changes.
+_DAMPING = 1e-3
+# A joint that is held at its limit.
+_HELD = 1e6
+# Shorter steps are tried so often, each by this factor.
+_TRIES, _SHORTER = 5, 0.4
+
+
+class Shortest:
+    """Looks for the shortest chains near others, on the same waypoints.
+
+    Parameters
+    ----------
+    waypoints : Waypoints
+    bounds : Admissible
+        What each configuration has to keep.
+    largest_step : (W - 1, n)
+        No joint may move more from one waypoint to the next [rad or m].
+    weights : (n,)
+        w.
+    """
+
+    def __init__(
+        self, waypoints: Waypoints, bounds: Admissible, largest_step: Array, weights: Array
+    ) -> None:
+        self._waypoints, self._bounds, self._weights = waypoints, bounds, weights
+        self._largest, self._kept = largest_step, STEP_KEPT * largest_step
+        self._models: list[tuple[ClearanceModel, float]] | None = None
+
+    def near(self, q: Array, smoothings: Sequence[float] = SMOOTHINGS) -> Array:
+        """Return a shorter chain near q (W, n), which keeps all that q keeps; else q itself.
+
+        In stages with these δ, as multiples of the mean step of q. Configurations of q that meet
+        something are led away from it where they can be, whatever the length.
+        """
+        self._free = self._bounds.keep(q)
+        self._watched = ~self._free
+        best, here, reach, free = q, q, FIRST_FARTHEST, self._free.sum()
+        mean = self._length(q) / max(np.diff(q, axis=0).size, 1)
+        for smoothing in smoothings:
+            blocked = np.zeros(len(q), dtype=bool)
+            for _ in range(SHORTENING_ROUNDS):
+                before = self._state(here, smoothing * mean)
+                after, reach = self._moved(before, blocked, reach)
+                if after is None:
+                    break
+                here = after.q
+                if self._free.sum() > free or self._better(best, here):
+                    best, free = here, self._free.sum()
+                if after.merit > (1.0 - SHORTENING_GAIN) * before.merit:
+                    break
+        return best
+
+    def _better(self, best: Array, q: Array) -> bool:
+        allowed = bool((np.abs(np.diff(q, axis=0)) <= self._largest).all())
+        return allowed and self._length(q) < self._length(best)
+
+    def _length(self, q: Array) -> float:
+        return float((np.abs(np.diff(q, axis=0)) * self._weights).sum())
+
+    def _moved(
+        self, before: "_State", blocked: Flags, reach: float
+    ) -> tuple["_State | None", float]:
+        """Return a better chain, no joint of which has moved farther than `reach`, and the next.
+
+        Configurations that would meet something stay where they are, are `blocked` (W,) from now
+        on, and watched; the others are asked again.
+        """
+        every, step = np.arange(len(before.q)), self._step(before, blocked)
+        for _ in range(_TRIES):
+            longest = float(np.abs(step).max())
+            moved = min(FURTHER * longest, reach)
+            guess = before.q + (moved / longest if longest > 0.0 else 0.0) * step
+            q, arrived = self._waypoints.project_each(guess, every)
+            arrived &= np.abs(q - guess).max(axis=1) < max(reach, AT_LIMIT)
+            free = arrived.copy()
+            free[arrived] = self._bounds.keep(q[arrived])
+            arrived &= free | ~self._free
+            if not (arrived | blocked).all():
+                self._watched |= ~arrived
+                blocked |= ~arrived
+                step = self._step(before, blocked)
+                continue
+            after = self._state(np.where(arrived[:, None], q, before.q), before.smoothing)
+            if after.merit < before.merit:
+                self._free = np.where(arrived, free, self._free)
+                return after, min(FARTHEST, max(reach, 2.0 * moved))
+            reach = _SHORTER * moved
+        return None, reach
+
+    def _state(self, q: Array, smoothing: float) -> "_State":
+        """Return how long a chain is, smoothed, and by how much it breaks what is watched."""
+        steps = np.diff(q, axis=0)
+        lengths = np.hypot(self._weights * steps, smoothing)
+        over = np.maximum(np.abs(steps) - self._kept, 0.0) * self._weights
+        rows, lack, slopes = self._lacking(q)
+        merit = (lengths - smoothing).sum() + 0.5 * STEPS_STIFF * (over**2).sum()
+        merit += 0.5 * BODIES_STIFF * (lack**2).sum()
+        return _State(q, smoothing, steps, lengths, over, rows, lack, slopes, float(merit))
+
+    def _lacking(self, q: Array) -> tuple[Ints, Array, Array]:
+        """Return what watched configurations lack of their distances [m], (L,), and ∂/∂q, (L, n).
+
+        With the waypoints at which.
+        """
+        watched = np.flatnonzero(self._watched)
+        found = [(watched[:0], np.empty(0), np.empty((0, q.shape[1])))]
+        for model, wanted in self._smooth_models() if len(watched) else ():
+            now = model.clearances(q[watched])
+            lack = wanted - now.values[now.rows, now.columns]
+            near = lack > 0.0
+            found.append((watched[now.rows[near]], lack[near], now.slopes[near]))
+        rows, lacks, slopes = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return rows, lacks, slopes
+
+    def _smooth_models(self) -> list[tuple[ClearanceModel, float]]:
+        if self._models is None:
+            self._models = [_smooth(model, distance) for model, distance in self._bounds.bodies]
+        return self._models
+
+    def _step(self, state: "_State", blocked: Flags) -> Array:
+        """Return how far each configuration should move, (W, n): the least of the quadratics.
+
+        Those that are `blocked` (W,) stay where they are, and joints that would leave their limits
+        at these; the others are asked again.
+        """
+        bases = self._waypoints.bases(state.q)
+        slope, curvature = state.slope(self._weights), state.curvature(self._weights)
+        own = np.zeros_like(state.q)
+        own[:-1] += curvature
+        own[1:] += curvature
+        held = np.repeat(blocked[:, None], state.q.shape[1], axis=1)
+        step = np.zeros_like(state.q)
+        for _ in range(LIMITS_HELD):
+            step = _least(bases, slope, own + _HELD * held, curvature, state)
+            leaving = self._leaving(state.q, step) & ~held
+            if not leaving.any():
+                break
+            held |= leaving
+        return step
+
+    def _leaving(self, q: Array, step: Array) -> Flags:
+        """Return which joints that are near a limit would pass it, (W, n)."""
+        lower, upper, ahead = self._bounds.lower, self._bounds.upper, q + step
+        above = (ahead > upper) & (q > upper - AT_LIMIT)
+        below = (ahead < lower) & (q < lower + AT_LIMIT)
+        return np.asarray(above | below)
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """A chain q (W, n), its steps (W - 1, n), and what it lacks of distances between bodies."""
+
+    q: Array
+    smoothing: float
+    steps: Array
+    lengths: Array
+    over: Array
+    rows: Ints
+    lack: Array
+    slopes: Array
+    merit: float
+
+    def slope(self, weights: Array) -> Array:
+        """Return the merit's slope by each configuration, (W, n)."""
+        pull = weights**2 * self.steps / self.lengths
+        pull += STEPS_STIFF * weights * self.over * np.sign(self.steps)
+        slope = np.zeros_like(self.q)
+        slope[:-1] -= pull
+        slope[1:] += pull
+        np.add.at(slope, self.rows, -BODIES_STIFF * self.lack[:, None] * self.slopes)
+        return slope
+
+    def curvature(self, weights: Array) -> Array:
+        """Return that of each step, (W - 1, n)."""
+        return np.asarray(weights**2 * (1.0 / self.lengths + STEPS_STIFF * (self.over > 0.0)))
+
+
+def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State) -> Array:
+    """Return the least of a quadratic along the bases (W, n, d), (W, n).
+
+    `own` (W, n) and `between` (W - 1, n) are the curvatures of each configuration and of steps.
+    """
+    count, _, size = bases.shape
+    turned = bases.transpose(0, 2, 1)
+    blocks = turned @ (own[:, :, None] * bases) + _DAMPING * np.eye(size)
+    along = np.einsum("ln,lnd->ld", state.slopes, bases[state.rows])
+    np.add.at(blocks, state.rows, BODIES_STIFF * along[:, :, None] * along[:, None, :])
+    matrix = Banded(count, size, 1)
+    matrix.add(0, 0, blocks)
+    matrix.add(1, 0, -(turned[:-1] @ (between[:, :, None] * bases[1:])))
+    moves = matrix.solve(-np.einsum("wn,wnd->wd", slope, bases).ravel())
+    if moves is None:
+        return np.zeros_like(slope)
+    return np.asarray(np.einsum("wnd,wd->wn", bases, moves.reshape(count, size)))
+
+
+def _smooth(model: CollisionModel, distance: float) -> tuple[ClearanceModel, float]:
+    """Return the distances that have slopes, and what is wanted of them [m]."""
+    wanted = distance + NEAR_BODIES
+    return ClearanceModel(model, wanted), wanted

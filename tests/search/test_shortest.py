@@ -1,0 +1,87 @@
+"""Chains moved to where they are shortest: on the path, within all that they kept, at a minimum."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.follow import Follows
+from selfmotion.search.nodes import Admissible
+from selfmotion.search.shortest import Shortest
+from selfmotion.search.waypoints import OnPath
+from support.arms import robot_named
+from support.paths import line_of
+
+COUNT = 41
+# Newton's method ends at the square of this; what moving aside may still gain of a length at the
+# last δ, a tenth of the mean step.
+ON_PATH, GAIN = 1e-9, 5e-3
+
+
+class Chain:
+    """A jagged chain of an arm whose tool goes along a line."""
+
+    def __init__(self, name: str) -> None:
+        self.robot = robot = robot_named(name)
+        self.path = line_of(robot, "position")
+        self.t = np.linspace(0.0, self.path.duration, COUNT)
+        follows = Follows.of(robot, self.path, sm.Task.POSITION)
+        self.waypoints = OnPath(follows, self.t, robot.lower, robot.upper)
+        q = np.array(robot.inverse_kinematics(self.path.pose(0.0), task="position"))[None]
+        rng, found = np.random.default_rng(0), []
+        for i in range(COUNT):
+            guess = q + rng.normal(scale=0.05, size=q.shape)
+            q, arrived = self.waypoints.project(guess, i, far=True)
+            assert arrived.all()
+            found.append(q[0])
+        self.q = np.array(found)
+
+    def kept(self, *bodies: tuple[sm.CollisionModel, float]) -> Admissible:
+        """Return what its configurations have to keep."""
+        return Admissible(self.robot.lower, self.robot.upper, self.robot.is_revolute, bodies)
+
+    def shortest(self, kept: Admissible) -> Array:
+        """Return what comes of it."""
+        steps = np.full((COUNT - 1, self.robot.dof), 0.5)
+        return Shortest(self.waypoints, kept, steps, self.robot.joint_weights).near(self.q)
+
+    def length(self, q: Array) -> float:
+        return float((np.abs(np.diff(q, axis=0)) * self.robot.joint_weights).sum())
+
+
+@pytest.mark.parametrize("name", ["panda", "xarm7", "ur5"])
+def test_chains_become_shorter_on_their_path_until_nothing_shortens_them(name: str) -> None:
+    chain = Chain(name)
+    shorter = chain.shortest(chain.kept())
+    assert chain.length(shorter) < 0.7 * chain.length(chain.q)
+    for t, q in zip(chain.t, shorter, strict=True):
+        pose = chain.path.pose(float(t))
+        assert max(sm.Task.POSITION.miss(pose, chain.robot.pose(q))) < ON_PATH
+    assert chain.kept().keep(shorter).all()
+    # Wherever it is pushed along the self-motion, all of it or a stretch, that is no gain.
+    rng, bases = np.random.default_rng(1), chain.waypoints.bases(shorter)
+    every = np.arange(COUNT)
+    for _ in range(40):
+        first, last = np.sort(rng.integers(0, COUNT, 2))
+        z = rng.normal(size=bases.shape[2]) * rng.choice([1e-2, 1e-3])
+        away = np.zeros_like(shorter)
+        away[first : last + 1] = bases[first : last + 1] @ z
+        moved, arrived = chain.waypoints.project_each(shorter + away, every)
+        assert arrived.all()
+        assert chain.length(moved) > (1.0 - GAIN) * chain.length(shorter)
+
+
+def test_it_goes_round_what_the_chain_kept_clear_of() -> None:
+    chain = Chain("panda")
+    free = chain.shortest(chain.kept())
+    elbow = chain.robot.chain_to("panda_link4", None)
+    apart = [elbow.place(q).translation for q in (chain.q[COUNT // 2], free[COUNT // 2])]
+    away = (apart[1] - apart[0]) / np.linalg.norm(apart[1] - apart[0])
+    model = sm.CollisionModel(chain.robot, [sm.Sphere("ball", apart[1] + 0.13 * away, 0.05)])
+    kept = chain.kept((model, 1e-3))
+    # A ball that the shortest chain of all meets, and the given one does not.
+    assert kept.keep(chain.q).all()
+    assert not kept.keep(free).all()
+    shorter = chain.shortest(kept)
+    assert kept.keep(shorter).all()
+    assert chain.length(shorter) < 0.8 * chain.length(chain.q)
