@@ -15,8 +15,12 @@ from scipy.sparse import coo_array, csr_array, vstack
 from selfmotion.basics import Array
 from selfmotion.motion import Trajectory
 
+# HiGHS gives up on a programme after so many seconds.
+PATIENCE = 60.0
 # Samples of the joint path, equally far apart, through which its spline goes.
 SAMPLES = 12_000
+# Where a path turns by more than so many times the median, nodes are no closer.
+TURN = 30.0
 # How many times as large b may become in each programme, and as small; the last ones are careful.
 TRUST = (30.0, 30.0, 9.0, 9.0, 9.0, 4.0, 4.0, 4.0, 2.0, 2.0, 2.0, 1.5, 1.5)
 # A programme that gains less than this share is the last but those that are careful.
@@ -42,6 +46,8 @@ def gridded(motion: Trajectory, count: int, power: float) -> tuple[Array, Array,
     grid = np.where(x < 0.0, graded, 1.0 - graded)
     share = (grid - grid[0]) / (grid[-1] - grid[0])
     turn = np.linalg.norm(path(way, 2), axis=1)
+    # At a rest a spline's second derivatives are rounding.
+    turn = np.minimum(turn, TURN * np.median(turn))
     turned = np.append(0.0, np.cumsum(0.5 * (turn[1:] + turn[:-1]) * np.diff(way)))
     s = np.interp(share, 0.5 * (way / way[-1] + turned / turned[-1]), way)
     return s, path(s, 1), path(s, 2), path(s, 3)
@@ -93,9 +99,14 @@ def time_of(s: Array, b: Array) -> float:
 def largest(gradient: Array, rows: csr_array, right: Array, least: Array, most: Array) -> Array:
     """Return the b that maximises a gradient's product within rows and bounds."""
     found = linprog(
-        -gradient, A_ub=rows, b_ub=right, bounds=np.column_stack([least, most]), method="highs"
+        -gradient,
+        A_ub=rows,
+        b_ub=right,
+        bounds=np.column_stack([least, most]),
+        method="highs-ds",
+        options={"time_limit": PATIENCE},
     )
-    if found.x is None:
+    if found.status != 0:
         raise RuntimeError(f"HiGHS: {found.message}")
     return np.asarray(found.x)
 

@@ -24,7 +24,7 @@ from selfmotion.result.pace_rows import PaceLimits
 from selfmotion.result.pacing import Ends, along, fastest_pace
 
 # Intervals of the grids without limits of the jerk and with them.
-GRID, GRID_OF_JERKS = 3000, 1600
+GRID, GRID_OF_JERKS = 3000, 1000
 # How much longer than the optimum a pace may be, likewise.
 LONGER, LONGER_BY_JERKS = 1.02, 1.05
 
@@ -120,7 +120,11 @@ def main() -> int:
         seconds = time.process_time() - began
         fast = along(pace, motion)
         kept, busy = checked(fast, limits)
-        best = optimum(motion, limits)
+        try:
+            best = optimum(motion, limits)
+        except RuntimeError as error:
+            print(f"{kind:<9} {len(fast.t):7} {fast.duration:9.3f} not judged: {error}", flush=True)
+            continue
         rows.append((fast.duration / best, busy, kept, seconds))
         print(
             f"{kind:<9} {len(fast.t):7} {fast.duration:9.3f} {best:12.3f} "
