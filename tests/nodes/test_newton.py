@@ -103,6 +103,28 @@ def test_limits_of_speed_are_kept_at_all_times(
     assert plan.report.cost <= 1.0005 * spline.report.cost
 
 
+@pytest.mark.parametrize("rest", [False, True])
+@pytest.mark.parametrize(("joint", "share"), [(0, 0.8), (5, 0.9), (6, 0.85)])
+def test_limits_of_acceleration_are_kept_at_all_times(
+    panda: sm.RobotModel, joint: int, share: float, rest: bool
+) -> None:
+    """As those of speed; where such a limit begins to bind, accelerations would rather jump."""
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    free = sm.plan(sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(), rest=rest))
+    most = np.abs(free.trajectory.qdd).max(axis=0)
+    limit = np.where(np.arange(7) == joint, share * most, np.inf)
+    limits = sm.JointAccelerationLimits(limit)
+    problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(limits,), rest=rest)
+    plan = sm.plan(problem)
+    assert plan.certificate.verified
+    assert isinstance(plan.report.null_motion, sm.NodeNullMotion)
+    t = np.linspace(0.0, path.duration, 20001)
+    assert (np.abs(plan.trajectory(t, 2)) <= limit).all()
+    assert plan.report.cost > free.report.cost
+    spline = sm.plan(replace(problem, null_motion=sm.BSplineNullMotion(32)))
+    assert plan.report.cost <= 1.0005 * spline.report.cost
+
+
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
 def test_at_limits_prices_tell_what_the_limits_cost(panda: sm.RobotModel, share: float) -> None:
     """The first-order conditions, and dF/dlimit by planning with another limit."""
@@ -123,9 +145,9 @@ def test_at_limits_prices_tell_what_the_limits_cost(panda: sm.RobotModel, share:
     bound, eased = optimum(here), optimum(here + 1e-4)
     assert bound.status is Status.CONVERGED
     assert (bound.prices >= 0.0).all()
-    assert bound.motion.h.max() <= 1e-6
+    assert bound.motion.wanted.max() <= 1e-6
     # What does not bind costs nothing.
-    assert np.abs(bound.prices * bound.motion.h).sum() <= 1e-5 * bound.motion.cost
+    assert np.abs(bound.prices * bound.motion.wanted).sum() <= 1e-5 * bound.motion.cost
     assert bound.motion.cost > free.motion.cost
     saved = bound.motion.cost - eased.motion.cost
     assert saved == pytest.approx(1e-4 * bound.prices.sum(), rel=0.05)

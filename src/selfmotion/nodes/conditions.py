@@ -11,7 +11,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.constraints import BoundClearance, BoundConstraint, NodeTangents, linearised
 from selfmotion.costs import Samples
-from selfmotion.nodes.hermite import CheckedSamples, Hermite
+from selfmotion.nodes.hermite import CheckedSamples, Hermite, weighted
 
 # There is no interval after the last node: its conditions are kept by this much.
 _NONE = -1e3
@@ -67,18 +67,13 @@ class NearTangents(_ByOrder):
             table[::2, :, own] = changes[:, order]
         else:
             shares = spline.shares[order - 2]
-            table[::2, :, own] = _weighted(shares[:, 1], changes)
-            table[2::2, :, before] = _weighted(shares[1:, 0], changes[:-1])
-            table[:-2:2, :, after] = _weighted(shares[:-1, 2], changes[1:])
+            table[::2, :, own] = weighted(shares[:, 1], changes)
+            table[2::2, :, before] = weighted(shares[1:, 0], changes[:-1])
+            table[:-2:2, :, after] = weighted(shares[:-1, 2], changes[1:])
         middle = spline.between[order]
-        table[1::2, :, own] = _weighted(middle[:, :2], changes[:-1])
-        table[1::2, :, after] = _weighted(middle[:, 2:], changes[1:])
+        table[1::2, :, own] = weighted(middle[:, :2], changes[:-1])
+        table[1::2, :, after] = weighted(middle[:, 2:], changes[1:])
         return table
-
-
-def _weighted(shares: Array, changes: Array) -> Array:
-    """Return Σ_a shares (K, 2) · changes (K, 2, n, d), (K, n, d)."""
-    return np.asarray(np.einsum("ka,kani->kni", shares, changes))
 
 
 class UnitTangents(_ByOrder):

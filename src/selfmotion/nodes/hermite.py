@@ -90,11 +90,12 @@ class Hermite:
         """How q, q̇, q̈ and the jerk between two nodes follow from both ends, (N, 4) each.
 
         In the middle; but of q̇, a parabola, the control point of its Bernstein form: together with
-        its ends it says how fast the motion is at most.
+        its ends it says how fast the motion is at most. And of q̈, a line, its right end: its left
+        one is said at the node.
         """
-        q, qd, qdd, qddd = (table[:, _MIDDLE] for table in self.bases)
+        q, qd, _, qddd = (table[:, _MIDDLE] for table in self.bases)
         ends = np.array([0.0, 1.0, 0.0, 1.0])
-        return q, 2.0 * qd - 0.5 * ends, qdd, qddd
+        return q, 2.0 * qd - 0.5 * ends, self.at_ends(2)[0], qddd
 
     @cached_property
     def weights(self) -> Array:
@@ -105,22 +106,19 @@ class Hermite:
     def shares(self) -> tuple[Array, Array]:
         """How q̈ and the jerk at a node follow from q and q̇ near it, (N + 1, 3, 2) each.
 
-        At the node before, at itself and at the next one: the mean of what the intervals on both
-        sides say; at the ends there is one.
+        At the node before, at itself and at the next one: as the interval says that begins there;
+        at the last node that which ends.
         """
-        count = len(self.t)
-        half = np.full((count, 1, 1), 0.5)
-        half[[0, -1]] = 1.0
         found = []
         for order in (2, 3):
-            right, left = (rows.reshape(-1, 2, 2) for rows in self._at_ends(order))
-            shares = np.zeros((count, 3, 2))
-            shares[1:, :2] += half[1:] * right
-            shares[:-1, 1:] += half[:-1] * left
+            right, left = (rows.reshape(-1, 2, 2) for rows in self.at_ends(order))
+            shares = np.zeros((len(self.t), 3, 2))
+            shares[:-1, 1:] = left
+            shares[-1, :2] = right[-1]
             found.append(shares)
         return found[0], found[1]
 
-    def _at_ends(self, order: int) -> tuple[Array, Array]:
+    def at_ends(self, order: int) -> tuple[Array, Array]:
         """How q̈ (2) or the jerk (3) at an interval's right and left end follow from both."""
         h = self.steps
         powers = np.stack([1.0 / h**order, 1.0 / h ** (order - 1)] * 2, axis=1)
@@ -132,7 +130,7 @@ class Hermite:
 
         For q and q̇ at both ends of each, (N, 4, n); where there is no interval, the other's.
         """
-        right, left = (np.einsum("ka,kan->kn", rows, ends) for rows in self._at_ends(2))
+        right, left = (np.einsum("ka,kan->kn", rows, ends) for rows in self.at_ends(2))
         return np.concatenate([left[:1], right]), np.concatenate([left, right[-1:]])
 
     def at_nodes(self, order: int, q: Array, qd: Array) -> Array:
@@ -282,3 +280,8 @@ class QuinticSamples(_WithRates):
 
     def _of_order(self, order: int) -> Array:
         return np.asarray(self._trajectory(self.t, order))
+
+
+def weighted(shares: Array, changes: Array) -> Array:
+    """Return Σ_a shares (K, 2) · changes (K, 2, n, d), (K, n, d)."""
+    return np.asarray(np.einsum("ka,kani->kni", shares, changes))

@@ -10,20 +10,16 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, read_only
 from selfmotion.constraints import BoundConstraint
-from selfmotion.costs import JointVelocity, Partials
-from selfmotion.costs.base import weight_matrix
+from selfmotion.costs import Partials
 from selfmotion.engine import Counts
 from selfmotion.motion import Trajectory
 from selfmotion.nodes.charts import Charts, Manifolds, Place
 from selfmotion.nodes.conditions import NodeConditions
 from selfmotion.nodes.hermite import Hermite, HermiteSamples, QuinticSamples
 from selfmotion.nodes.kernels import follow
-from selfmotion.nodes.objective import NodeCost, Smoothing
+from selfmotion.nodes.objective import NodeCost
+from selfmotion.nodes.smoothness import Continuity, smoothing_at_rest
 from selfmotion.problem import Problem
-
-# An arm that rests takes about this share of the duration to start and to stop its self-motion;
-# that is asked for over so many times as long.
-_STARTING, _NEAR_REST = 0.02, 4.0
 
 # A limit binds between two nodes where it is this near [units of h].
 _ALONG = 1e-5
@@ -43,6 +39,8 @@ class NodeGrid:
         Whether the start may move along its self-motion.
     counts : Counts
         Where work is added up.
+    continuous : bool
+        Whether accelerations are kept from jumping at the nodes.
 
     Attributes
     ----------
@@ -50,6 +48,7 @@ class NodeGrid:
     manifolds : Manifolds
     cost : NodeCost
     conditions : NodeConditions
+    continuity : Continuity or None
     held : (k,)
         Numbers of the coordinates w (N + 1, 2r), in one row, that stay as they are.
     """
@@ -62,11 +61,13 @@ class NodeGrid:
         *,
         free: bool,
         counts: Counts,
+        continuous: bool = False,
     ) -> None:
         self.problem, self.free, self.counts = problem, free, counts
         follows = problem.follows
         self.spline, self.manifolds = Hermite(t), Manifolds(follows, t)
-        smoothing = _smoothing(problem, self.spline)
+        self.continuity = Continuity(problem, self.spline) if continuous else None
+        smoothing = smoothing_at_rest(problem, self.spline)
         self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
         self.conditions = NodeConditions(self.spline, constraints, follows.robot.dof)
         r = follows.robot.dof - follows.dimension
@@ -84,8 +85,23 @@ class NodeGrid:
 
     def on(self, t: Array) -> "NodeGrid":
         """Return the same on other nodes."""
+        return self._other(t, continuous=self.continuity is not None)
+
+    @property
+    def continuous(self) -> "NodeGrid":
+        """The same with accelerations that are kept from jumping."""
+        return self._other(self.t, continuous=True)
+
+    def _other(self, t: Array, *, continuous: bool) -> "NodeGrid":
         constraints = self.conditions.constraints
-        return NodeGrid(self.problem, t, constraints, free=self.free, counts=self.counts)
+        return NodeGrid(
+            self.problem,
+            t,
+            constraints,
+            free=self.free,
+            counts=self.counts,
+            continuous=continuous,
+        )
 
     def motion_near(self, trajectory: Trajectory) -> "NodeMotion | None":
         """Return the motion whose nodes are those nearest to another one's.
@@ -181,6 +197,15 @@ class NodeMotion:
         """On which intervals a condition binds, (N,)."""
         return np.asarray(np.any(self.h[:-1, self.h.shape[1] // 2 :] > -_ALONG, axis=1))
 
+    @property
+    def ends_of_limits(self) -> Flags:
+        """Near which intervals a limit of accelerations begins or ends to bind, (N,)."""
+        changes = np.zeros(len(self.along) + 3, dtype=np.bool_)
+        if self.grid.continuity is not None:
+            changes[2:-2] = self.along[1:] != self.along[:-1]
+        # Two intervals before, and two after.
+        return changes[:-3] | changes[1:-2] | changes[2:-1] | changes[3:]
+
     def broken(self) -> Flags:
         """Return on which intervals `trajectory` does not keep the conditions, (N,)."""
         over = self.grid.conditions.over(self.exact)[:-1] > 0.0
@@ -194,7 +219,10 @@ class NodeMotion:
     @cached_property
     def aim(self) -> float:
         """What is minimised: F and what keeps the motion smooth."""
-        return self.cost + self.grid.cost.roughness(self.samples)
+        rough, continuity = self.grid.cost.roughness(self.samples), self.grid.continuity
+        if continuity is not None:
+            rough += 0.5 * float(np.sum(continuity.jumps(self.samples) ** 2))
+        return self.cost + rough
 
     @cached_property
     def partials(self) -> tuple[Partials, ...]:
@@ -205,6 +233,14 @@ class NodeMotion:
     def h(self) -> Array:
         """The conditions, (N + 1, C)."""
         return self.grid.conditions.residuals(self.samples.checked)
+
+    @property
+    def wanted(self) -> Array:
+        """The conditions as Newton's method is to keep them, (N + 1, C).
+
+        Half of what they may be beyond is for what is between the nodes.
+        """
+        return self.h - 0.5 * self.grid.conditions.tolerances
 
     @property
     def epsilon(self) -> Array:
@@ -250,10 +286,10 @@ class NodeMotion:
         """
         problem, t, place = self.grid.problem, self.grid.t, self.place
         qdd = self.grid.manifolds.accelerations(place.q, place.qd)
-        near = np.gradient(place.qd, t, axis=0, edge_order=2)
         along = self.along
         before, after = np.append(False, along), np.append(along, False)
         sides = self.grid.spline.accelerations(self.samples.ends)
+        near = 0.5 * (sides[0] + sides[1])
         for which, side in zip((before & ~after, after & ~before), sides, strict=True):
             near[which] = side[which]
         bases = self.charts.bases
@@ -266,19 +302,7 @@ class NodeMotion:
 
     def on(self, grid: NodeGrid) -> "NodeMotion | None":
         """Return the motion on other nodes."""
-        return grid.motion_near(self.trajectory)
+        from scipy.interpolate import CubicHermiteSpline
 
-
-def _smoothing(problem: Problem, spline: Hermite) -> Smoothing | None:
-    """Return what makes the self-motion start and stop as the arm does where it rests."""
-    orders = [order for cost in problem.all_costs for order in cost.curvature(problem.robot.dof)]
-    if not any(problem.rests) or max(orders, default=0) > 1:
-        return None
-    duration, t = problem.path.duration, spline.sampling.t[:-1].reshape(-1, 4)
-    starting = _STARTING * duration
-    near = np.zeros_like(t, dtype=bool)
-    for rest, end in zip(problem.rests, (0.0, duration), strict=True):
-        near |= rest & (np.abs(t - end) <= _NEAR_REST * starting)
-    usual = JointVelocity.usual(problem.robot)
-    weight = weight_matrix(np.asarray(usual.weight), problem.robot.dof)
-    return Smoothing(np.where(near, starting**2, 0.0), weight)
+        spline = CubicHermiteSpline(self.grid.t, self.place.q, self.place.qd)
+        return grid.near(spline(grid.t), spline(grid.t, 1))

@@ -113,7 +113,7 @@ class _Solver:
 
     def __init__(self, begin: NodeMotion, columns: Ints, prices: Array | None) -> None:
         self.motion, self._columns = begin, columns
-        h = begin.h[:, columns]
+        h = begin.wanted[:, columns]
         each = max(abs(begin.aim), np.finfo(float).tiny) / max(h.size, 1)
         self._least = _LAST * each
         if prices is None:
@@ -142,6 +142,8 @@ class _Solver:
             return Status.GRADIENT
         slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
         gradient = motion.charts.pulled(motion.place, slopes[:, 0], slopes[:, 1])
+        jumps, by_jumps = self._jumps(around)
+        gradient += spread((by_jumps @ jumps[:, :, None])[:, :, 0])
         gradient.reshape(-1)[motion.grid.held] = 0.0
         if told(Step(motion, float(np.linalg.norm(gradient)), self._length)):
             return Status.STOPPED
@@ -153,9 +155,9 @@ class _Solver:
             by_prices = slopes + motion.grid.conditions.pulled(motion.samples.checked, prices)
         curved = around.curvature(by_prices)
         intervals = motion.grid.cost.curvature(motion.samples, motion.partials, around.changes)
-        gap = motion.h[:, self._columns] + self._slacks
+        gap = motion.wanted[:, self._columns] + self._slacks
         while True:
-            step = self._step(gradient, curved, intervals, rows, gap)
+            step = self._step(gradient, curved, intervals, by_jumps, rows, gap)
             if step is None:
                 return Status.GRADIENT
             by_slack, by_price = self._others(rows, gap, step)
@@ -178,6 +180,15 @@ class _Solver:
         motion = self.motion
         return motion.grid.conditions.rows(motion.samples.checked, around.changes, self._columns)
 
+    def _jumps(self, around: Around) -> tuple[Array, Array]:
+        """Return what jumps of q̈ weigh, (N + 1, j), and its derivatives by w, (N + 1, 6r, j)."""
+        motion, (count, _, _, size) = self.motion, around.changes.shape
+        continuity = motion.grid.continuity
+        if continuity is None:
+            return np.zeros((count, 0)), np.zeros((count, 3 * size, 0))
+        tangents = continuity.tangents(around.changes)
+        return continuity.jumps(motion.samples), np.swapaxes(tangents, 1, 2)
+
     def _solved(self, gap: Array) -> bool:
         """Whether the problem with the present barrier is solved well enough."""
         off = np.abs(self._slacks * self._prices - self._barrier).max(initial=0.0)
@@ -185,7 +196,13 @@ class _Solver:
         return bool(self._promised <= allowed and off <= allowed and np.abs(gap).max() <= 1e-2)
 
     def _step(
-        self, gradient: Array, curved: Array, intervals: Array, rows: Array, gap: Array
+        self,
+        gradient: Array,
+        curved: Array,
+        intervals: Array,
+        by_jumps: Array,
+        rows: Array,
+        gap: Array,
     ) -> Array | None:
         """Return Newton's step of the coordinates, (N + 1, 2r)."""
         count, size = gradient.shape
@@ -194,13 +211,14 @@ class _Solver:
         pressure = (self._barrier / self._slacks + ratio * gap)[:, :, None]
         right = (gradient + spread((turned @ pressure)[:, :, 0])).ravel()
         right[self.motion.grid.held] = 0.0
-        near = turned @ (ratio[:, :, None] * rows)
+        near = turned @ (ratio[:, :, None] * rows) + by_jumps @ np.swapaxes(by_jumps, 1, 2)
+        wide = bool(rows.shape[1] or by_jumps.shape[2])
         shift, largest = 0.0, float(np.abs(curved).max() + np.abs(intervals).max())
         while shift <= 1e6 * largest:
-            matrix = Banded(count, size, 2 if rows.shape[1] else 1)
+            matrix = Banded(count, size, 2 if wide else 1)
             matrix.add(0, 0, curved)
             matrix.add_pairs(0, intervals)
-            if rows.shape[1]:
+            if wide:
                 matrix.add_triples(near)
             matrix.add_diagonal(shift)
             matrix.hold(self.motion.grid.held)
@@ -242,7 +260,7 @@ class _Solver:
             place = motion.charts.at(length * step[:, :r], nu)
             if place is not None:
                 new = motion.grid.at(motion.charts, nu, place)
-                h = new.h[:, self._columns]
+                h = new.wanted[:, self._columns]
                 slacks = np.maximum(self._slacks + length * by_slack, -h)
                 gained = merit - self._merit(new, slacks, h + slacks)
                 # Written so that NaN is no gain; what is below rounding is none to look for.

@@ -22,6 +22,7 @@ from selfmotion.costs import Cost, Partials, Samples
 from selfmotion.follow import Follows
 from selfmotion.nodes.charts import Charts, Place, orthonormal
 from selfmotion.nodes.hermite import Hermite, HermiteSamples, PlacedLater
+from selfmotion.nodes.smoothness import Smoothing
 
 # Differences along a manifold are taken this far to both sides [rad or m]: their error is about
 # its square, and rounding's is 1e-12 over it.
@@ -30,22 +31,6 @@ _REACH = 1e-4
 # of a matrix that need not be exact.
 _NEAR = 1e-6
 _NAMES = ("q", "qd", "qdd", "qddd")
-
-
-@dataclass(frozen=True, eq=False)
-class Smoothing:
-    """What keeps a motion from starting and stopping at once: ½ ∫ b(t) q̈ᵀWq̈ dt.
-
-    Attributes
-    ----------
-    shares : (N, 4)
-        b at the samples [s²].
-    weight : (n, n)
-        W.
-    """
-
-    shares: Array
-    weight: Array
 
 
 class NodeCost:

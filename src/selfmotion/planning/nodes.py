@@ -13,10 +13,12 @@ from selfmotion.optimise import Iteration, QuasiNewton, Status
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.settings import (
     COST_AGREEMENT,
+    FEWEST_WITH_ACCELERATIONS,
     LEAST_SAVING,
     MOST_NODES,
     NEARLY,
     NODE_AGREEMENT,
+    NODE_ROUNDS,
     SHORT_STEP,
     TOWARDS_MIDDLE,
 )
@@ -115,7 +117,7 @@ class NodeDescent:
         if not self._free and (orders[broken] == 0).any():
             best = self._towards_middle(grid, freely.motion)
         dearest = np.inf if best is None else best.cost
-        found = None if self._ended else self._bound(freely, _NO_COLUMNS, dearest)
+        found = None if self._ended else self._from_free(freely, dearest)
         return min((one for one in (best, found) if one), key=_cost_of, default=None)
 
     def again(self, standing: Standing) -> Standing | None:
@@ -128,7 +130,10 @@ class NodeDescent:
 
         With one more between each two, put onto the path.
         """
-        while self._ended is None and 2 * standing.steps <= MOST_NODES * len(self._problem.knots):
+        dearest, most = np.inf, MOST_NODES * len(self._problem.knots)
+        for _ in range(NODE_ROUNDS):
+            if self._ended is not None or 2 * standing.steps > most:
+                break
             motion = standing.motion
             off = abs(motion.exact_cost - motion.cost)
             where = None
@@ -136,12 +141,14 @@ class NodeDescent:
                 finer = standing.refined()
                 # That is on the path, also between the nodes.
                 broken = finer.motion.broken()
-                if not broken.any():
+                ends = motion.ends_of_limits
+                if not broken.any() and not (ends.any() and self._saves(motion, dearest)):
                     return finer.smoothed()
+                dearest = motion.cost
                 each = broken.reshape(-1, 2).any(axis=1)
-                where = np.convolve(each, np.ones(3), "same") > 0.0
+                where = np.convolve(each, np.ones(3), "same") > 0.0 if each.any() else ends
             finer = standing.refined(where)
-            if where is not None:
+            if where is not None and broken.any():
                 # A limit begins or ends to bind there: that wants to be known well.
                 finer = finer.refined(np.repeat(where, 1 + where))
             found = self.again(finer)
@@ -149,6 +156,10 @@ class NodeDescent:
                 break
             standing = found
         return standing
+
+    def _saves(self, motion: NodeMotion, before: float) -> bool:
+        """Whether more nodes where limits begin and end to bind may lower the cost."""
+        return before - motion.cost > COST_AGREEMENT * abs(motion.cost)
 
     def _towards_middle(self, grid: NodeGrid, known: NodeMotion) -> Standing | None:
         """Return what is best near motions whose self-motion goes towards the limits' middle.
@@ -173,6 +184,25 @@ class NodeDescent:
         none = optimum.status is Status.GRADIENT or _broken(optimum.motion).any()
         return None if none else self._standing(optimum, columns)
 
+    def _from_free(self, freely: Optimum, dearest: float) -> Standing | None:
+        """Return the optimum that keeps all conditions, from one that keeps none."""
+        motion = freely.motion
+        conditions = motion.grid.conditions
+        orders = conditions.orders(motion.samples.checked)
+        if (orders[_broken(motion)] < 2).all():
+            return self._bound(freely, _NO_COLUMNS, dearest)
+        most = self._effort.max_evaluations
+        if most is not None and most < FEWEST_WITH_ACCELERATIONS:
+            return None
+        smooth = motion.grid.continuous.near(motion.place.q, motion.place.qd)
+        if smooth is None:
+            return None
+        motion = self._minimise(smooth, _NO_COLUMNS, dearest).motion
+        # One such limit leads to the next: all count at once.
+        every = (orders == 2) & ~conditions.of_bodies()
+        columns = np.flatnonzero(every | _broken(motion) | _near(motion))
+        return self._bound(self._minimise(motion, columns, dearest), columns, dearest)
+
     def _bound(self, optimum: Optimum, columns: Ints, dearest: float = np.inf) -> Standing | None:
         """Return the optimum that keeps all conditions, from one that keeps some columns of them.
 
@@ -185,8 +215,7 @@ class NodeDescent:
                 return self._standing(optimum, columns)
             if broken[columns].any():
                 return None
-            near = (motion.h > -NEARLY).any(axis=0)
-            columns = np.union1d(columns, np.flatnonzero(broken | near))
+            columns = np.union1d(columns, np.flatnonzero(broken | _near(motion)))
             if _too_much(motion, columns):
                 return None
             optimum = self._minimise(motion, columns, dearest)
@@ -247,18 +276,23 @@ class NodeDescent:
 def _too_much(motion: NodeMotion, columns: Ints | Flags) -> bool:
     """Whether some of the conditions are not for nodes.
 
-    Along a limit of acceleration, jerks jump: beyond quintics on few nodes. Distances of bodies
-    bend too much between the few bodies that count for interior points.
+    Along a limit of jerk, what quintics on few nodes do jumps. Distances of bodies bend too much
+    between the few bodies that count for interior points.
     """
     conditions = motion.grid.conditions
     orders = conditions.orders(motion.samples.checked)
-    return bool((orders[columns] > 1).any() or conditions.of_bodies()[columns].any())
+    return bool((orders[columns] > 2).any() or conditions.of_bodies()[columns].any())
 
 
 def _broken(motion: NodeMotion) -> Flags:
     """Return which columns of the conditions are not kept, (C,)."""
     # Written so that NaN is not.
     return np.asarray(~(motion.h <= motion.grid.conditions.tolerances).all(axis=0))
+
+
+def _near(motion: NodeMotion) -> Flags:
+    """Return which columns of the conditions are nearly broken, (C,)."""
+    return np.asarray((motion.h > -NEARLY).any(axis=0))
 
 
 def _cost_of(standing: Standing) -> float:

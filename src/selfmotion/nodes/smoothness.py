@@ -1,0 +1,97 @@
+"""What keeps a motion of nodes smooth: at its ends where the arm rests, and at its nodes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.costs import JointVelocity
+from selfmotion.costs.base import weight_matrix
+from selfmotion.nodes.hermite import Hermite, HermiteSamples, weighted
+from selfmotion.problem import Problem
+
+# An arm that rests takes about this share of the duration to start and to stop its self-motion;
+# that is asked for over so many times as long.
+_STARTING, _NEAR_REST = 0.02, 4.0
+# w is this many times the cube of an interval's length: so strong that little is left of jumps,
+# and so weak that Newton's method takes no more steps.
+_STRENGTH = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothing:
+    """What keeps a motion from starting and stopping at once: ½ ∫ b(t) q̈ᵀWq̈ dt.
+
+    Attributes
+    ----------
+    shares : (N, 4)
+        b at the samples [s²].
+    weight : (n, n)
+        W.
+    """
+
+    shares: Array
+    weight: Array
+
+
+def smoothing_at_rest(problem: Problem, spline: Hermite) -> Smoothing | None:
+    """Return what makes the self-motion start and stop as the arm does where it rests."""
+    orders = [order for cost in problem.all_costs for order in cost.curvature(problem.robot.dof)]
+    if not any(problem.rests) or max(orders, default=0) > 1:
+        return None
+    duration, t = problem.path.duration, spline.sampling.t[:-1].reshape(-1, 4)
+    starting = _STARTING * duration
+    near = np.zeros_like(t, dtype=bool)
+    for rest, end in zip(problem.rests, (0.0, duration), strict=True):
+        near |= rest & (np.abs(t - end) <= _NEAR_REST * starting)
+    usual = JointVelocity.usual(problem.robot)
+    weight = weight_matrix(np.asarray(usual.weight), problem.robot.dof)
+    return Smoothing(np.where(near, starting**2, 0.0), weight)
+
+
+class Continuity:
+    """The jumps of q̈ at the nodes, weighed so that half their squares add up to what they cost.
+
+    A cubic Hermite spline's q̈ may jump at its nodes. Where limits of acceleration bind, the best
+    motion makes use of that, and an arm's, whose q̈ cannot jump, goes beyond the limits there:
+    ½ Σ w_k jump_kᵀ W jump_k keeps it from that.
+
+    Parameters
+    ----------
+    problem : Problem
+        At its knots accelerations may jump; where its arm rests, they begin and end at 0.
+    spline : Hermite
+    """
+
+    def __init__(self, problem: Problem, spline: Hermite) -> None:
+        self._spline = spline
+        shorter = np.minimum(spline.steps[1:], spline.steps[:-1])
+        weights = np.zeros(len(spline.t))
+        weights[1:-1] = _STRENGTH * shorter**3
+        weights[np.isin(spline.t, problem.knots)] = 0.0
+        for node, order in zip((0, -1), problem.rest_orders, strict=True):
+            if order > 1:
+                weights[node] = _STRENGTH * spline.steps[node] ** 3
+        usual = JointVelocity.usual(problem.robot)
+        root = np.linalg.cholesky(weight_matrix(np.asarray(usual.weight), problem.robot.dof))
+        self._scales = np.sqrt(weights)[:, None, None] * root.T
+
+    def jumps(self, samples: HermiteSamples) -> Array:
+        """Return the weighed jumps, (N + 1, n)."""
+        before, after = self._spline.accelerations(samples.ends)
+        before[0] = after[-1] = 0.0
+        return np.asarray((self._scales @ (before - after)[:, :, None])[:, :, 0])
+
+    def tangents(self, changes: Array) -> Array:
+        """Return their derivatives by w of each node's neighbours and its own, (N + 1, n, 6r).
+
+        `changes` (N + 1, 2, n, 2r) is ∂(q, q̇)/∂w of the nodes.
+        """
+        count, _, n, size = changes.shape
+        near = np.zeros((count, n, 3 * size))
+        before, after = self._spline.at_ends(2)
+        near[1:, :, :size] = weighted(before[:, :2], changes[:-1])
+        near[1:, :, size : 2 * size] = weighted(before[:, 2:], changes[1:])
+        near[:-1, :, size : 2 * size] -= weighted(after[:, :2], changes[:-1])
+        near[:-1, :, 2 * size :] = weighted(-after[:, 2:], changes[1:])
+        return np.asarray(self._scales @ near)
