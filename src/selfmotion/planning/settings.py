@@ -22,8 +22,8 @@ RISES = 2
 MOST_NODES = 1024
 # More of them are put in so often, at most, where limits begin and end to bind.
 NODE_ROUNDS = 8
-# Where limits of acceleration bind, that takes some sixty evaluations of the cost; who has fewer than
-# this goes another way.
+# Where limits of acceleration bind, that takes some sixty evaluations of the cost; who has fewer
+# than this goes another way.
 FEWEST_WITH_ACCELERATIONS = 100
 # Conditions that are nearer than this to being broken [units of h] count with those that are.
 NEARLY = 0.02
