@@ -34,7 +34,7 @@ _AIM, _KEPT, _NEAR = 0.999, 0.9998, 1.0003
 # A step takes at most this share of the room that there is.
 _LEAST_ROOM = 0.8
 # A knot is added where a limit is passed by this share, unless knots are so near [s].
-_ROUGH, _NEAREST = 1.002, 6e-4
+_ROUGH, _NEAREST = 1.002, 2e-4
 # With limits of the jerk likewise where at some time no limit is used by this share: within an
 # interval the jerk cannot follow what the path asks for.
 _IDLE = 0.8
