@@ -160,6 +160,10 @@ BRANCH_TRIES = 4
 BRANCH_EVALUATIONS = 60
 SAME_ENDS = 0.2
 
+# --- what is left to save
+# It is estimated on so many steps at most: what it takes in memory grows with them.
+MOST_ESTIMATED = 2048
+
 # --- the fastest motion
 # Rounds end when one gains less than this share, or after so many.
 ROUND_GAIN = 2e-3
