@@ -48,6 +48,7 @@ bench-places: $(READY)  ## a seam at 300 places around three arms, each 'no' hel
 
 bench-fastest: $(READY)  ## 60 paces against linear programmes; the fastest motions of 20 paths, against retimed plans
 	$(BIN)/python benchmarks/paces.py
+	$(BIN)/python benchmarks/paces.py --jerk 100
 	$(BIN)/python benchmarks/fastest.py
 
 bench-feeds: $(READY)  ## 200 random feeds: kept where verified, and possible ones named elsewhere

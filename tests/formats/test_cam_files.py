@@ -179,6 +179,26 @@ def test_tables_name_seams_and_events(tmp_path: Path) -> None:
     assert right.events == (("arc off", right.path.duration),)
 
 
+def test_events_of_dense_poses_after_corners_come_at_their_poses(tmp_path: Path) -> None:
+    """Rounded corners are shorter than the legs: places along the way are not shares of legs."""
+    points = [(5e-4 * k, 0.0) for k in range(120)]
+    points += [(points[-1][0], 5e-4 * k) for k in range(1, 120)]
+    points += [(points[-1][0] + 5e-4 * k, points[-1][1]) for k in range(1, 120)]
+    rows = ["seam,x,y,z,event"] + [
+        f"one,{x:.4f},{y:.4f},0,{'arc on' if k == 300 else ''}" for k, (x, y) in enumerate(points)
+    ]
+    written(tmp_path, "seams.csv", "\n".join(rows) + "\n")
+    job = tmp_path / "job.toml"
+    job.write_text(
+        'task = "position"\n[robot]\nname = "panda"\n[seams]\nfile = "seams.csv"\n'
+        'feed = 0.05\ncorners = "round"\ntolerance = 0.01\n'
+    )
+    (seam,) = sm.read_seam_job(job).seams
+    ((_, at),) = seam.events
+    place = seam.path.pose(at).translation[:2]
+    np.testing.assert_allclose(place, points[300], atol=1e-6)
+
+
 def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
     written(tmp_path, "slot.nc", GCODE)
     job = tmp_path / "job.toml"
@@ -226,6 +246,7 @@ def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -
         ("CYCLE/DRILL,5", "statement 'CYCLE' is not read"),
         ("GOTO/1,2", "GOTO has 2 numbers"),
         ("GOTO/1,2,x", "'X' is no number"),
+        ("MODE/INCR", "MODE/INCR: places by differences are not read"),
         ("GOTO/1,2,3,0,0,0", "has no direction"),
         ("FEDRAT/100,MMPR", "expected a feed, and MMPM or IPM"),
         ("UNITS/FEET", "expected MM or INCHES"),

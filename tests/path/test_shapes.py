@@ -55,3 +55,6 @@ def test_a_spiral_from_its_middle_at_a_feed() -> None:
     assert feed.duration == pytest.approx(length / 0.05, rel=0.02)
     with pytest.raises(sm.PathError, match="no way"):
         sm.Spiral(start, start.translation, (0.0, 0.0, 1.0), 1.0, turns=4.0, radius=0.0)
+    center = start.translation + np.array([0.1, 0.0, 0.0])
+    with pytest.raises(sm.PathError, match="turns is 0, radius that of the start"):
+        sm.Spiral(start, center, (0.0, 0.0, 1.0), 1.0, turns=0.0, radius=0.1)

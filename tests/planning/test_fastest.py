@@ -9,11 +9,14 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.planning.kept_costs import KeptCosts
 from support.arms import PANDA_HOME, robot_named
 
 # What the fastest motion uses of a limit somewhere at all times but where the jerk takes over, by
 # the number of samples.
 BUSY = 0.6
+# A cost that is kept, and to which share two integrals of it agree.
+KEPT, SAME = 1.005, 1e-4
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +89,28 @@ def test_it_is_no_slower_than_the_motion_that_is_best_by_the_costs(found: sm.Fas
     assert slow.limits_used.busy < 0.1
 
 
+def test_costs_are_kept_at_the_time_law_of_the_path() -> None:
+    """No cheaper than asked, no slower than retiming; what nothing costs is named."""
+    problem = slow_line()
+    best, cost = sm.plan(problem), sm.JointVelocity()
+    kept = KeptCosts.of(problem, {cost.kind: KEPT})
+
+    def twice(stage: str, done: int, total: int) -> None:
+        if stage == "fastest" and done == 2:
+            raise KeyboardInterrupt
+
+    found = sm.fastest(problem, keep={cost.kind: KEPT}, progress=twice)
+    assert kept.values(best) == pytest.approx(best.report.cost, rel=SAME)
+    assert kept.values(found.plan) <= KEPT * best.report.cost * (1.0 + SAME)
+    assert found.duration <= found.retimed
+    # At another pace the same joint path costs the same.
+    assert kept.values(sm.retime(best)) == pytest.approx(best.report.cost, rel=SAME)
+    with pytest.raises(sm.ProblemError, match="no cost 'PathLength', but JointVelocity"):
+        sm.fastest(problem, keep={"PathLength": 1.1})
+    with pytest.raises(sm.ProblemError, match="keep: JointVelocity"):
+        sm.fastest(problem, keep={"JointVelocity": 0.9})
+
+
 def test_an_interruption_and_a_deadline_keep_the_best_so_far(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -125,6 +150,9 @@ def test_a_file_may_ask_for_the_fastest_motion(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     assert job.plan(progress=interrupting).path.duration < 1.0
+    kept = dataclasses.replace(job, keep={"JointVelocity": 1.1})
+    sm.write_problem(kept, file)
+    assert sm.read_job(file).keep == kept.keep
     file.write_text(f'goal = "fastest"\nmax_evaluations = 3\n{text}', encoding="utf-8")
     with pytest.raises(sm.ProblemError, match="max_evaluations: has no effect on the fastest"):
         sm.read_job(file).plan()

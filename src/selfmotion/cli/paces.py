@@ -33,6 +33,10 @@ def fastest(
     deadline: Annotated[
         float | None, typer.Option(help="After so many seconds the best so far has to do.")
     ] = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KIND=FACTOR", help="A cost may be so many times the best one's."),
+    ] = None,
     settings: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
     out: options.OutOption = None,
@@ -48,6 +52,8 @@ def fastest(
     job = documents.of_file(Path(problem), settings or [], allow_code)
     outputs.check_suffixes([*job.outputs, *(out or [])])
     given = dict(zip(("acceleration", "velocity"), _limits(acceleration, velocity), strict=True))
+    if keep:
+        given["keep"] = dict(_factor(text) for text in keep)
     found = fastest_with_progress(job, deadline=deadline, **given)
     if not as_json:
         stages.print(
@@ -57,6 +63,16 @@ def fastest(
             soft_wrap=True,
         )
     outputs.finish(found.plan, [*job.outputs, *(out or [])], html, as_json)
+
+
+def _factor(text: str) -> tuple[str, float]:
+    kind, _, factor = text.partition("=")
+    try:
+        return kind, float(factor)
+    except ValueError:
+        raise sm.ProblemError(
+            f"--keep {text}: expected a cost and a factor, such as JointVelocity=1.1"
+        ) from None
 
 
 def _limits(acceleration: str | None, velocity: str | None) -> tuple[Any, ...]:

@@ -71,6 +71,7 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     tool = sm.ToolLimits(speed=0.2, acceleration=5.0)
     yield "the tool", plan(replace(given, constraints=[*given.constraints, tool]))
     yield "singular poses", plan(replace(given, costs=[sm.InverseManipulability(0.01)]))
+    yield "paces", lambda: sm.retime(sm.plan(given))
     yield "accelerations", plan(replace(given, costs=[sm.JointAcceleration()]))
     yield (
         "relaxed rows",

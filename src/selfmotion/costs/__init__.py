@@ -36,4 +36,5 @@ from selfmotion.costs.samples import (
     Samples as Samples,
     TipSamples as TipSamples,
 )
+from selfmotion.costs.scaled import Scaled as Scaled
 from selfmotion.costs.towards import Towards as Towards

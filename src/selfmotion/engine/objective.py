@@ -18,6 +18,9 @@ from selfmotion.motion import Grid, NullMotion, NullMotionTable, Trajectory
 from selfmotion.optimise import Residuals, Rows
 from selfmotion.problem import Problem
 
+# Samples whose tangents are weighed together.
+_LOT = 4096
+
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
@@ -270,23 +273,30 @@ class Objective:
         nodes = by_qd[sampling.nodes].reshape(len(sampling.nodes), -1)
         for curvature in curvatures:
             for order, weight in curvature.items():
-                if order == ERROR:
-                    tangent = self._error_tangent(x, by_q)
-                elif order > 1:
-                    operator = sampling.differentiation(order - 1)
-                    tangent = (operator @ nodes).reshape(by_qd.shape)
-                else:
-                    tangent = by_q if order == 0 else by_qd
-                # Near singular poses tangents may be beyond all numbers: see `inverse_metric`.
-                with np.errstate(over="ignore", invalid="ignore"):
-                    weighted = sampling.weights[:, None, None] * (weight @ tangent)
-                    metric += tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size)
+                error = self._error_tangent(x, by_q) if order == ERROR else None
+                for first in range(0, len(by_q), _LOT):
+                    lot = slice(first, first + _LOT)
+                    if error is not None:
+                        tangent = error[lot]
+                    elif order > 1:
+                        operator = sampling.differentiation(order - 1)
+                        tangent = (operator[lot] @ nodes).reshape(by_qd[lot].shape)
+                    else:
+                        tangent = by_q[lot] if order == 0 else by_qd[lot]
+                    metric += self._weighted(tangent, weight, sampling.weights[lot])
         if self._deviation.size:
             # sin s bends as much as it rises: without it, steps would go round many times.
             slope = np.abs(self.parts(self.gradient(x))[2]) * self._deviation.banded
             last = self.size - len(slope)
             metric[last:, last:] += np.diag(slope)
         return metric
+
+    def _weighted(self, tangent: Array, weight: Array, times: Array) -> Array:
+        """Return Σ times tangentᵀ W tangent over samples, (size, size)."""
+        # Near singular poses tangents may be beyond all numbers: see `inverse_metric`.
+        with np.errstate(over="ignore", invalid="ignore"):
+            weighted = times[:, None, None] * (weight @ tangent)
+            return np.asarray(tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size))
 
     def node_tangents(self, x: Array) -> NodeTangents:
         """Return how the motion at the nodes changes with the decision vector, at x."""

@@ -81,6 +81,10 @@ class _Reader:
                 if len(given) != 1 or given[0] not in _UNITS:
                     raise machine.fault(f"UNITS/{rest[:40]}: expected MM or INCHES")
                 self._unit = _UNITS[given[0]]
+            case "MODE" if "INCR" in given:
+                raise machine.fault(
+                    "MODE/INCR: places by differences are not read; write MODE/ABSOL"
+                )
             case _ if word in _EVENTS:
                 machine.happens(f"{word}/{','.join(given)}" if given else word)
             case _ if word in _ENDS:

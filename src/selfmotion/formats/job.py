@@ -35,6 +35,8 @@ class Job:
         (`retime`), or the `fastest` one. Of parts (`plan_in_parts`) it is `in_parts`.
     parts : mapping, optional
         Of parts: ``retreat``, ``axis`` and ``ramp`` of `plan_in_parts`.
+    keep : mapping, optional
+        Costs that the fastest motion keeps; see `fastest`.
     """
 
     problem: Problem
@@ -45,6 +47,7 @@ class Job:
     outputs: tuple[FilePath, ...] = ()
     goal: str = "best"
     parts: Mapping[str, Any] | None = None
+    keep: Mapping[str, float] | None = None
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -76,7 +79,8 @@ class Job:
             The file has settings of an optimiser, which `fastest` has not.
         """
         self._refuse(("optimizer", "max_evaluations"), "the fastest motion")
-        return fastest(self.problem, search=self.search, tolerance=self.tolerance, **options)
+        asked = {"keep": self.keep, "search": self.search, "tolerance": self.tolerance, **options}
+        return fastest(self.problem, **asked)
 
     def in_parts(self, **options: Any) -> Parts:
         """Return its motion in the fewest parts; `options` are further ones of `plan_in_parts`.

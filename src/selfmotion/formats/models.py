@@ -179,6 +179,7 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
         "rest": (bool, True),
         "joint_limits": (Text, None),
         "goal": (Literal[GOALS], None),
+        "keep": (dict[str, float], None),
         "parts": (_model("InParts", _IN_PARTS), None),
         "search": (model_of(Search), None),
         "optimiser": (model_of(QuasiNewton), None),

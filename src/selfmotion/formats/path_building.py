@@ -26,8 +26,6 @@ _MOMENT = 1e-9
 _BEND = np.pi / 6
 # Legs that go back by less than this of the way they came turn round.
 _BACK = 1e-3
-# Times at which a path is looked at for when it passes its rows, at least, and for each of them.
-_LOOKS, _EACH = 2000, 20
 
 
 @dataclass(frozen=True)
@@ -129,29 +127,6 @@ def _of_cut(file: FilePath, rows: PoseRows, turns: Array | None, asked: Pacing) 
         piece = Polyline(rows.positions[part], own, tolerance=asked.tolerance)
         pieces.append(_at_feed(piece, piece.pose_times, feeds[part], asked.bounds))
     return pieces[0] if len(pieces) == 1 else Joined(pieces)
-
-
-def times_of_events(path: Path, rows: PoseRows) -> list[tuple[str, float]]:
-    """Return what happens when along a path [s]: as it passes the poses of the rows' events.
-
-    A pose is passed where the path, of about as much of its length as the poses before, is nearest.
-    """
-    if not rows.events:
-        return []
-    t = np.linspace(0.0, path.duration, max(_LOOKS, _EACH * len(rows.positions)))
-    places = path.samples(t).translation
-    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
-    chords = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
-    shares = np.append(0.0, np.cumsum(chords)) * (way[-1] / max(float(chords.sum()), _MOMENT))
-    found = []
-    for k, event in rows.events:
-        early, late = shares[max(k - 1, 0)], shares[min(k + 1, len(shares) - 1)]
-        near = np.flatnonzero((way >= early) & (way <= late))
-        away = np.linalg.norm(places[near] - rows.positions[k], axis=1)
-        at = float(t[near[int(away.argmin())]]) if len(near) else 0.0
-        ends = {0: 0.0, len(shares) - 1: path.duration}
-        found.append((event, float(ends.get(k, at))))
-    return found
 
 
 def _at_feed(path: Path, t: Array, feeds: Array, bounds: Mapping[str, float]) -> Feed:

@@ -266,7 +266,7 @@ class _Reader:
             found["max_evaluations"] = table["max_evaluations"]
         outputs = tuple(self._beside(name) for name in table.get("outputs", ()))
         found |= {"outputs": outputs, "goal": table.get("goal", "best")}
-        return found | {"parts": table.get("parts")}
+        return found | {"parts": table.get("parts"), "keep": table.get("keep")}
 
     def _beside(self, name: str) -> FilePath:
         return FilePath(name) if self.file is None else self.file.parent / name

@@ -60,6 +60,8 @@ def _settings(job: Job, file: FilePath) -> dict[str, Any]:
         table["max_evaluations"] = job.max_evaluations
     if job.parts:
         table["parts"] = {key: _plain(value) for key, value in job.parts.items()}
+    if job.keep:
+        table["keep"] = {key: float(factor) for key, factor in job.keep.items()}
     if job.search is not None and not isinstance(job.search.rng, int):
         raise ProblemError("search: rng is a generator, which a file cannot carry; give a number")
     if not isinstance(job.optimizer, QuasiNewton | None):

@@ -9,7 +9,7 @@ from selfmotion.basics import FileFormatError, SelfmotionError, as_path, nearest
 from selfmotion.constraints import Clearance
 from selfmotion.formats.documents import in_si, read_document
 from selfmotion.formats.job import Job
-from selfmotion.formats.path_building import times_of_events
+from selfmotion.formats.path_events import times_of_events
 from selfmotion.formats.path_files import one_seam, read_seams
 from selfmotion.formats.poses import pose_of
 from selfmotion.formats.problem_file import job_of

@@ -165,10 +165,19 @@ class Feed(_Derived, kind="feed"):
         return _apart(np.concatenate(inner), self.duration)
 
     def _moved(self, wanted: Array) -> Array:
-        """Return when times of the original are passed."""
+        """Return when times of the original are passed, from first to last, and rests."""
+        passed = self.when(wanted)[1:-1]
+        return _apart(np.concatenate([passed, self.rest_times]), self.duration)
+
+    def when(self, wanted: Array) -> Array:
+        """Return when times (K,) of the original are passed [s]."""
         ends = np.zeros(len(wanted)), np.full(len(wanted), self.duration)
-        passed = times_when(lambda t: self.pace(t)[0], wanted, *ends)
-        return _apart(np.concatenate([passed[1:-1], self.rest_times]), self.duration)
+        return times_when(lambda t: self.pace(t)[0], wanted, *ends)
+
+    @property
+    def original(self) -> Path:
+        """The path at its own pace."""
+        return self._path
 
     def pace(self, t: Array) -> tuple[Array, Array]:
         """Return the original's time σ and dσ/dt at times `t` (K,)."""

@@ -66,6 +66,12 @@ class Spiral(Round, kind="spiral"):
             object.__setattr__(self, name, number)
         if max(self.start_radius, self.radius) < _ON_AXIS and abs(self.rise) < _ON_AXIS:
             raise PathError("spiral: it starts and ends on the axis and does not rise: no way")
+        still = abs(self.turns) < _ON_AXIS and abs(self.rise) < _ON_AXIS
+        if still and abs(self.radius - self.start_radius) < _ON_AXIS:
+            raise PathError(
+                "spiral: turns is 0, radius that of the start and rise 0: no way; say how far it "
+                "goes round, or Dwell to stay"
+            )
 
     @property
     def start_radius(self) -> float:

@@ -1,7 +1,7 @@
 """The fastest motion along a path: pace and null motion, each in its turn."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -21,9 +21,18 @@ from selfmotion.costs import LimitUse
 from selfmotion.optimise import Status
 from selfmotion.path import Path, Retimed
 from selfmotion.planning.deadline import Deadline
+from selfmotion.planning.kept_costs import KeptCosts
 from selfmotion.planning.run import plan
 from selfmotion.planning.search import Search
-from selfmotion.planning.settings import COARSE, DEGREE, POWER, ROUND_GAIN, ROUNDS
+from selfmotion.planning.settings import (
+    COARSE,
+    DEGREE,
+    KEPT_GROWTH,
+    KEPT_WEIGHT,
+    POWER,
+    ROUND_GAIN,
+    ROUNDS,
+)
 from selfmotion.problem import Problem, check_problem
 from selfmotion.result import Plan, rate_limits, retime
 
@@ -69,6 +78,7 @@ def fastest(
     acceleration: npt.ArrayLike | None = None,
     velocity: npt.ArrayLike | None = None,
     *,
+    keep: Mapping[str, float] | None = None,
     search: Search | None = None,
     tolerance: Tolerance | None = None,
     deadline: float | None = None,
@@ -89,6 +99,11 @@ def fastest(
         Limits [rad/s² or m/s²]; by default those of the arm's maker.
     velocity : (n,) or float, optional
         Limits [rad/s or m/s]; by default those that the problem asks for, or the URDF's.
+    keep : mapping of str to float, optional
+        How many times as much a cost of the problem, by its kind or name, may be as that of the
+        motion which is best by all costs: ``{"JointVelocity": 1.1}``. What is compared is the cost
+        of the joint path at the time law of the problem's own path, since any motion costs more in
+        less time.
     search : Search, optional
         See `plan`.
     tolerance : Tolerance, optional
@@ -103,7 +118,7 @@ def fastest(
     Raises
     ------
     ProblemError
-        No limits of acceleration are given or known.
+        No limits of acceleration are given or known; the problem has no such cost to keep.
     PlanError
         No motion that was found keeps all limits at any pace, or none was found in time; says the
         last verdict.
@@ -111,7 +126,8 @@ def fastest(
         The interruption came before there was a motion.
     """
     check_problem(problem)
-    rounds = _Rounds(problem, *rate_limits(problem, acceleration, velocity))
+    kept = KeptCosts.of(problem, {} if keep is None else keep)
+    rounds = _Rounds(problem, *rate_limits(problem, acceleration, velocity), kept)
     clock = Deadline(np.inf)
     if deadline is not None:
         clock = Deadline.after(as_number(deadline, "deadline", above=0.0))
@@ -165,10 +181,12 @@ class _Rounds:
     problem : Problem
     v, a : (n,)
         Limits of velocity and acceleration.
+    kept : KeptCosts
     """
 
-    def __init__(self, problem: Problem, v: Array, a: Array) -> None:
+    def __init__(self, problem: Problem, v: Array, a: Array, kept: KeptCosts) -> None:
         self._problem, self._v, self._a = problem, v, a
+        self._kept, self._bounds = kept, np.full(len(kept.costs), np.inf)
         geometric = tuple(item for item in problem.constraints if not item.of_pace)
         self._free = replace(problem, constraints=geometric)
         self.best: Plan | None = None
@@ -183,38 +201,49 @@ class _Rounds:
             # At no pace can it be followed to its end.
             self.verdict = planned.certificate.verdict
             return
+        costs = self._kept.values(planned)
+        self._bounds = self._kept.bounds(costs)
         found = self._taken("costs", planned)
         still = replace(planned, trajectory=planned.initial_trajectory)
         self._taken("x = 0", still)
         if planned.report.status in _CUT:
             raise KeyboardInterrupt
-        use = replace(self._free, costs=(LimitUse(self._v, self._a, POWER),))
+        use, weight = LimitUse(self._v, self._a, POWER), 0.0
         pace: Pace = _own
         for number in range(ROUNDS):
             options.progress("fastest", number, ROUNDS)
             before = self._duration
-            planned = options.plan(replace(use, **use.along(pace)))
+            weighted = self._kept.weighted(costs, weight * self._duration) if weight else ()
+            asked = replace(self._free, costs=(use, *weighted))
+            planned = options.plan(replace(asked, **asked.along(pace)))
             self.verdict = planned.certificate.verdict
             if planned.certificate.on_path and not planned.report.ending:
                 found = self._taken("rounds", planned)
             if planned.report.status in _CUT:
                 raise KeyboardInterrupt
             self.times.append(self._duration)
-            if number and self._duration > (1.0 - ROUND_GAIN) * before:
+            kept = self._keeps(planned)
+            if number and kept and self._duration > (1.0 - ROUND_GAIN) * before:
                 return
+            # Costs that are passed count more in the next round.
+            weight = weight if kept else max(KEPT_WEIGHT, KEPT_GROWTH * weight)
             pace = _stand_in(self._problem.path, planned.path, found.path)
 
     @property
     def _duration(self) -> float:
         return np.inf if self.best is None else self.best.path.duration
 
+    def _keeps(self, planned: Plan) -> bool:
+        """Return whether a motion's joint path costs no more than it may."""
+        return bool(np.all(self._kept.values(planned) <= self._bounds))
+
     def _taken(self, name: str, planned: Plan) -> Plan:
-        """Return a motion at its fastest; it is the best so far where none is faster."""
+        """Return a motion at its fastest: the best so far if none is faster and costs are kept."""
         found = _at_its_fastest(planned, self._problem, self._v, self._a)
         self.verdict = found.certificate.verdict
         if found.certificate.verified:
             self.retimed[name] = found.path.duration
-            if found.path.duration < self._duration:
+            if found.path.duration < self._duration and self._keeps(planned):
                 self.best = found
         return found
 

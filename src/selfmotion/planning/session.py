@@ -30,6 +30,7 @@ from selfmotion.planning.settings import (
     ALIKE,
     COST_AGREEMENT,
     LEAST_SAVING,
+    MOST_ESTIMATED,
     RISE,
     RISES,
     ROUGH_AGREEMENT,
@@ -514,6 +515,9 @@ class Session:
         spline = finest(problem.follows.redundancy)
         # More than a step for each interval makes no better estimate.
         grid = self._objective.grid.with_steps(spline.intervals)
+        if grid.steps > MOST_ESTIMATED:
+            # It is in memory for each number of the spline.
+            grid = Grid.aligned(problem.knots, MOST_ESTIMATED)
         same = grid is self._objective.grid
         objective = self._objective if same else self._on(grid)
         z, x, c = objective.parts(self._x)

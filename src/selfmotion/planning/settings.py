@@ -168,10 +168,16 @@ BRANCH_TRIES = 4
 BRANCH_EVALUATIONS = 60
 SAME_ENDS = 0.2
 
+# --- what is left to save
+# It is estimated on so many steps at most: what it takes in memory grows with them.
+MOST_ESTIMATED = 2048
+
 # --- the fastest motion
 # Rounds end when one gains less than this share, or after so many.
 ROUND_GAIN = 2e-3
 ROUNDS = 8
+# Costs that are to be kept and are not count as so many times the motion's time, then more.
+KEPT_WEIGHT, KEPT_GROWTH = 0.05, 4.0
 # The power of the cost: the larger, the nearer to the largest share, and the harder to minimise.
 POWER = 16.0
 # Intervals of the pace at which a round plans, and its degree.

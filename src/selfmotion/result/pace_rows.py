@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags
+from selfmotion.basics import Array
 from selfmotion.certificate import Quantity
 from selfmotion.motion import Trajectory
 from selfmotion.optimise import BandedRows
@@ -26,9 +26,7 @@ from selfmotion.path import Pace
 from selfmotion.result.squares import Squares, basis
 
 # The square of a rate is at least this share of what it was.
-_LEAST = 1e-6
-# And at most so much of it, unless more is asked for: at rest little else bounds it.
-_MOST = 500.0
+LEAST = 1e-6
 # Where in an interval limits are measured: its beginning and its end, from inside, and between.
 PLACES = np.clip(0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 9)), 1e-6, 1.0 - 1e-6)
 _NOTHING = 1e-150
@@ -74,15 +72,19 @@ class PaceLimits:
         free = np.full(len(self.jerk), np.inf)
         return PaceLimits(self.speed, self.acceleration, free, self.quantities)
 
-    def shares(self, motion: Trajectory) -> list[Array]:
-        """Return what of each limit is used, a table (I, n or m) of all intervals for each.
+    def shares(self, motion: Trajectory) -> tuple[list[Array], Array]:
+        """Return what of each limit is used in intervals, and of some limit at all their times.
 
-        Of q̇, q̈, the jerk and the quantities, in this order; 0 where there is no limit.
+        The most in each of all intervals, a table (I, n or m) for q̇, q̈, the jerk and the
+        quantities, in this order, 0 where there is no limit; and (I,) what some limit or other is
+        used by at least.
         """
         steps = np.diff(motion.t)
         at = np.minimum(motion.t[:-1, None] + steps[:, None] * PLACES, motion.t[-1]).ravel()
         used = self.shares_at(motion, at)
-        return [table.reshape(len(steps), len(PLACES), -1).max(axis=1) for table in used]
+        some = np.max([table.max(axis=1, initial=0.0) for table in used], axis=0)
+        most = [table.reshape(len(steps), len(PLACES), -1).max(axis=1) for table in used]
+        return most, some.reshape(len(steps), len(PLACES)).min(axis=1)
 
     def shares_at(self, motion: Trajectory, t: Array) -> list[Array]:
         """Return what of each limit is used at times (K,), a table (K, n or m) for each."""
@@ -171,8 +173,6 @@ def rows_of(
     limits: PaceLimits,
     room: Sequence[Array],
     near: Squares,
-    most: float,
-    fixed: Flags,
 ) -> BandedRows:
     """Return what limits allow of b, a spline over the same knots as one that it is near.
 
@@ -185,10 +185,6 @@ def rows_of(
         Which share of each limit may be used, in the order of `PaceLimits.shares`.
     near : Squares
         Around which what is not linear is replaced by its tangent.
-    most : float
-        How many times the coefficients of that b's may be.
-    fixed : (K + 2,) bool
-        Coefficients that stay as they are, whatever they are.
     """
     t = near.knots
     table, limits = _Table(len(t) - 1), limits.with_length()
@@ -197,12 +193,6 @@ def rows_of(
     for side, share in enumerate(SHARES.tolist()):
         value, slope, bend = (part[:, :, None] for part in basis(t, share))
         first, second, third = (order[side] for order in states.orders)
-        own = np.zeros_like(value)
-        own[side] = 1.0
-        part = slice(side, len(near.c) - 2 + side)
-        free = ~fixed[part, None]
-        upper = np.minimum(most * near.c[part, None], _MOST) + 2.0 * _LEAST
-        table.add(own, np.where(free, _LEAST, -np.inf), np.where(free, upper, np.inf))
         fastest = (limits.speed * room[0] / np.maximum(np.abs(first), _NOTHING)) ** 2
         table.add(value, -np.inf, fastest.min(axis=1, keepdims=True))
         some = np.isfinite(limits.acceleration)
@@ -210,7 +200,7 @@ def rows_of(
         table.add(bent, -room[1][:, some], room[1][:, some])
         some = np.isfinite(limits.jerk)
         if some.any():
-            b = np.maximum(near.inside(share), _LEAST)[:, None]
+            b = np.maximum(near.inside(share), LEAST)[:, None]
             surge = (third * value + 1.5 * second * slope + 0.5 * first * bend)[:, :, some]
             surge *= np.sqrt(b) / (limits.jerk[some] * room[2][:, some])
             for sign in (1.0, -1.0):
@@ -247,7 +237,7 @@ def _add_quantity(
     """
     first, second = (states.at_knots(order)[:, :-1] for order in (1, 2))
     b, change = (near.at_knots(order)[:, None] for order in (0, 1))
-    root = np.sqrt(np.maximum(b, _LEAST))
+    root = np.sqrt(np.maximum(b, LEAST))
     state = states.q, root * first, second * b + 0.5 * first * change
     found, (_, *by) = item.away(*state), item.derivatives(*state)
     by_value = by_slope = np.zeros_like(found)

@@ -16,18 +16,28 @@ from selfmotion.basics import Array, Flags, PlanError
 from selfmotion.motion import Trajectory, slowdown_of
 from selfmotion.optimise import banded_optimum
 from selfmotion.path import Pace, times_when
-from selfmotion.result.pace_rows import PaceLimits, States, rows_of
+from selfmotion.result.pace_rows import LEAST, PaceLimits, States, rows_of
 from selfmotion.result.pace_start import of_constant_speed, smooth
 from selfmotion.result.squares import Squares
 
 # How much faster a pace may become in each of the first steps, and in the others: squared.
 _FIRST, _OTHERS = (50.0, 50.0, 9.0), 9.0
+# Nor more than by this, squared: at rest little else bounds it.
+_MOST = 500.0
+# With limits of the jerk tangents hold near a pace only: so many begin anew with the one before,
+# which becomes so much faster or slower at most, squared; and so much in the steps after them.
+_BASES, _BY_JERKS, _BY_JERKS_LATER = 3, 4.0, 2.0
 # Steps from there, until one gains less than this share; knots are added in the first ones.
 _MOST_STEPS, _ADDING, _GAIN = 12, 7, 5e-4
 # What of limits is aimed at, what is left as it is, and what is near enough.
 _AIM, _KEPT, _NEAR = 0.999, 0.9998, 1.0003
+# A step takes at most this share of the room that there is.
+_LEAST_ROOM = 0.8
 # A knot is added where a limit is passed by this share, unless knots are so near [s].
-_ROUGH, _NEAREST = 1.002, 6e-4
+_ROUGH, _NEAREST = 1.002, 2e-4
+# With limits of the jerk likewise where at some time no limit is used by this share: within an
+# interval the jerk cannot follow what the path asks for.
+_IDLE = 0.8
 # A jump of this share of a limit has a knot of its own.
 _JUMP = 0.02
 # Gaps of the linear programmes, as shares: while the pace is rough, and then.
@@ -73,6 +83,13 @@ def fastest_pace(motion: Trajectory, limits: PaceLimits, ends: Ends, step: float
         room = _all_room(len(pace.t) - 1, rough)
         pace = _changed(pace, _improved(pace, motion, rough, room, near, ends, most, _ROUGH_GAP))
     jerk = bool(np.isfinite(limits.jerk).any())
+    for _ in range(_BASES if jerk else 0):
+        # Tangents hold near a pace, so that the next one begins anew from there.
+        pace = _scaled(smooth(pace, step, jerk), motion, limits)
+        near, room = Squares.constant(pace.t, 1.0), _all_room(len(pace.t) - 1, limits)
+        pace = _changed(
+            pace, _improved(pace, motion, limits, room, near, ends, _BY_JERKS, _ROUGH_GAP)
+        )
     pace = _scaled(smooth(pace, step, jerk), motion, limits)
     return _settled(pace, motion, limits, ends)
 
@@ -92,10 +109,12 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
     best, before = ((np.inf, np.inf), base), base.t[-1]
     near = Squares.constant(_knots(base, motion, limits), 1.0)
     room = _all_room(len(near.knots) - 1, limits)
+    jerk = bool(np.isfinite(limits.jerk).any())
+    most = _BY_JERKS_LATER if jerk else _OTHERS
     for number in range(_MOST_STEPS):
-        near = _improved(base, motion, limits, room, near, ends, _OTHERS, _GAP)
+        near = _improved(base, motion, limits, room, near, ends, most, _GAP)
         pace = _changed(base, near)
-        used = limits.shares(along(pace, motion))
+        used, least = limits.shares(along(pace, motion))
         kept = _scaled(pace, motion, limits, least=1.0)
         over = np.max([table.max(axis=1) for table in used], axis=0)
         # A motion that passes what no slower pace surely keeps stands back.
@@ -106,7 +125,8 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
         if over.max() < _NEAR and passed <= _KEPT and abs(before / pace.t[-1] - 1.0) < _GAIN:
             break
         before = pace.t[-1]
-        cut = _to_cut(over, pace) if number < _ADDING else np.zeros(len(over), dtype=bool)
+        idle = least < _IDLE if jerk else np.zeros(len(over), dtype=bool)
+        cut = _to_cut(over, idle, pace) if number < _ADDING else np.zeros(len(over), dtype=bool)
         # A limit that is passed where a knot is added is looked at again before there is less room.
         room = [
             np.repeat(own * _less(table, cut), 1 + cut, axis=0)
@@ -143,12 +163,13 @@ def _knots(base: Pace, motion: Trajectory, limits: PaceLimits) -> Array:
 
 
 def _less(used: Array, cut: Flags) -> Array:
-    return np.where(cut[:, None] | (used <= _KEPT), 1.0, _AIM / np.maximum(used, _AIM))
+    less = np.maximum(_AIM / np.maximum(used, _AIM), _LEAST_ROOM)
+    return np.where(cut[:, None] | (used <= _KEPT), 1.0, less)
 
 
-def _to_cut(over: Array, pace: Pace) -> Flags:
+def _to_cut(over: Array, idle: Flags, pace: Pace) -> Flags:
     """Return which intervals are too long for what happens in them or beside them."""
-    passed = np.concatenate([[False], over > _ROUGH, [False]])
+    passed = np.concatenate([[False], (over > _ROUGH) | idle, [False]])
     near = passed[:-2] | passed[1:-1] | passed[2:]
     return np.asarray(near & (np.diff(pace.t) > _NEAREST))
 
@@ -184,12 +205,19 @@ def _improved(
             _keep(start, fixed, end, base, knots)
         elif _starts(states, end, jerk):
             start[end], fixed[end] = 0.0, True
-    rows = rows_of(states, limits, room, near, most, fixed)
+    rows = rows_of(states, limits, room, near)
     # To first order the time falls with half the integral of b by b^(3/2).
     widths = np.diff(np.concatenate([[knots[0]] * 2, knots, [knots[-1]] * 2]))
     weights = np.convolve(widths, np.ones(3), mode="full")[2:-2] / 3.0
     gradient = weights * np.maximum(near.c, 1e-4) ** -1.5
-    found, _ = banded_optimum(gradient, rows, start, fixed, gap)
+    upper = np.minimum(most * near.c, _MOST) + 2.0 * LEAST
+    upper = np.where(fixed, start, upper)
+    # Where a pace may not be much slower either, none can be within the room that is left.
+    for lower in ([near.c / most] if jerk else []) + [0.0 * near.c]:
+        least = np.where(fixed, start, np.maximum(lower, LEAST))
+        found, reached = banded_optimum(gradient, rows, start, least, upper, gap)
+        if reached:
+            break
     return Squares(knots, found)
 
 

@@ -1,0 +1,248 @@
+"""Compiled steps of an interior point whose rows touch three neighbouring unknowns.
+
+Maximise g·c within rows a·c ≤ limit; see `optimise.banded`.
+"""
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints, called, kernel
+
+# Rows are met to this share of their limits, or to this where they are smaller than 1.
+MET = 1e-7
+_STEPS = 200
+# Prices of steep rows round: where so little of the gap is left they have to pay no more exactly
+# than this.
+_LITTLE, _ROUNDED = 1e-2, 1e3
+# Share of the way to the boundary that a step goes.
+_TO_BOUNDARY = 0.99
+# A product of slack and price is at least this share of their mean; steps are shortened for that.
+_NEAR, _SHORTER, _TRIES = 1e-3, 0.7, 12
+# Shorter steps lead nowhere.
+_STUCK = 1e-8
+# Stands on the diagonal for an unknown that stays, and rounding on that of the others.
+_STAYS, _ROUNDING = 1e200, 1e-14
+
+
+@kernel
+def interior_optimum(
+    gradient: Array,
+    free: Flags,
+    matrix: Array,
+    place: Ints,
+    limit: Array,
+    start: Array,
+    gap: float,
+) -> tuple[Array, bool]:
+    """Return the optimum c (N,), found from near it, and whether it was reached.
+
+    Parameters
+    ----------
+    gradient : (N,)
+    free : (N,) bool
+        Unknowns that do not stay as they are.
+    matrix : (R, 3)
+    place : (R,) int
+        The first unknown that a row touches.
+    limit : (R,)
+    start : (N,)
+    gap : float
+        What may be missing, as a share of g·c.
+    """
+    count, size, c = len(limit), len(gradient), start.copy()
+    value = 0.0
+    for k in range(size):
+        value += abs(gradient[k]) * max(abs(c[k]), 1.0)
+    slack, price = np.empty(count), np.empty(count)
+    for r in range(count):
+        room = limit[r] - _product(matrix, place, c, r)
+        slack[r] = max(room, 1e-2 * max(abs(limit[r]), 1.0))
+        price[r] = value / count / slack[r]
+    missed, ds, dz = np.empty(count), np.empty(count), np.empty(count)
+    band, paid, dc = np.empty((3, size)), np.empty(size), np.empty(size)
+    for _ in range(_STEPS):
+        products, met = _measure(c, matrix, place, limit, slack, price, missed, band, paid)
+        reached, left = 0.0, 0.0
+        for k in range(size):
+            reached += gradient[k] * c[k]
+            if free[k]:
+                # What prices do not pay for may be missing as well.
+                left += abs((gradient[k] - paid[k]) * c[k])
+        share = gap * max(abs(reached), MET * value)
+        paid_for = left <= share or (products <= _LITTLE * share and left <= _ROUNDED * share)
+        if met <= MET and products <= share and paid_for:
+            return c, True
+        if not _factored(band, free):
+            break
+        mu = products / count
+        _direct(0.0, 0.0, gradient, free, matrix, place, slack, price, missed, ds, dz, band, dc)
+        primal, dual = _longest(matrix, place, dc, slack, price, missed, ds, dz, 0.0, 0.0, 1.0)
+        after, _ = _products(slack, price, ds, dz, primal, dual)
+        centre = mu * min((after / count / mu) ** 3, 1.0)
+        _direct(centre, 1.0, gradient, free, matrix, place, slack, price, missed, ds, dz, band, dc)
+        primal, dual = _longest(
+            matrix, place, dc, slack, price, missed, ds, dz, centre, 1.0, _TO_BOUNDARY
+        )
+        for _ in range(_TRIES):
+            after, least = _products(slack, price, ds, dz, primal, dual)
+            if least >= _NEAR * after / count:
+                break
+            primal, dual = _SHORTER * primal, _SHORTER * dual
+        for k in range(size):
+            c[k] += primal * dc[k]
+        for r in range(count):
+            slack[r] += primal * ds[r]
+            price[r] += dual * dz[r]
+        if primal < _STUCK:
+            break
+    return c, False
+
+
+@called
+def _product(matrix: Array, place: Ints, c: Array, r: int) -> float:
+    k = place[r]
+    found: float = matrix[r, 0] * c[k] + matrix[r, 1] * c[k + 1] + matrix[r, 2] * c[k + 2]
+    return found
+
+
+@called
+def _measure(
+    c: Array,
+    matrix: Array,
+    place: Ints,
+    limit: Array,
+    slack: Array,
+    price: Array,
+    missed: Array,
+    band: Array,
+    paid: Array,
+) -> tuple[float, float]:
+    """Fill what rows miss, the normal matrix (3, N) and what prices pay; return Σ s z, the most."""
+    band[:], paid[:] = 0.0, 0.0
+    products, met = 0.0, 0.0
+    for r in range(len(limit)):
+        k = place[r]
+        missed[r] = slack[r] - limit[r] + _product(matrix, place, c, r)
+        met = max(met, abs(missed[r]) / max(abs(limit[r]), 1.0))
+        products += slack[r] * price[r]
+        ratio = price[r] / slack[r]
+        for a in range(3):
+            weighted = ratio * matrix[r, a]
+            paid[k + a] += price[r] * matrix[r, a]
+            for b in range(a, 3):
+                band[b - a, k + a] += weighted * matrix[r, b]
+    return products, met
+
+
+@called
+def _factored(band: Array, free: Flags) -> bool:
+    """Replace a pentadiagonal matrix by its factors L D Lᵀ: D, and L below; whether there are."""
+    size = band.shape[1]
+    for k in range(size):
+        pivot = band[0, k] * (1.0 + _ROUNDING) if free[k] else _STAYS
+        if k > 0:
+            pivot -= band[1, k - 1] ** 2 * band[0, k - 1]
+        if k > 1:
+            pivot -= band[2, k - 2] ** 2 * band[0, k - 2]
+        if not pivot > 0.0:
+            return False
+        band[0, k] = pivot
+        if k > 0:
+            band[1, k] -= band[2, k - 1] * band[1, k - 1] * band[0, k - 1]
+        band[1, k] /= pivot
+        band[2, k] /= pivot
+    return True
+
+
+@called
+def _solve(band: Array, right: Array) -> None:
+    """Replace a right side by the solution, by factors of the matrix."""
+    size = len(right)
+    for k in range(1, size):
+        right[k] -= band[1, k - 1] * right[k - 1]
+        if k > 1:
+            right[k] -= band[2, k - 2] * right[k - 2]
+    for k in range(size - 1, -1, -1):
+        right[k] /= band[0, k]
+        if k + 1 < size:
+            right[k] -= band[1, k] * right[k + 1]
+        if k + 2 < size:
+            right[k] -= band[2, k] * right[k + 2]
+
+
+@called
+def _direct(
+    centre: float,
+    second: float,
+    gradient: Array,
+    free: Flags,
+    matrix: Array,
+    place: Ints,
+    slack: Array,
+    price: Array,
+    missed: Array,
+    ds: Array,
+    dz: Array,
+    band: Array,
+    dc: Array,
+) -> None:
+    """Fill how unknowns change towards products of `centre`, by factors of the normal matrix."""
+    dc[:] = gradient
+    for r in range(len(slack)):
+        wanted = centre
+        if second > 0.0:
+            wanted -= ds[r] * dz[r]
+        # What the price becomes where c stays.
+        becomes = (price[r] * missed[r] + wanted) / slack[r]
+        k = place[r]
+        for a in range(3):
+            dc[k + a] -= becomes * matrix[r, a]
+    for k in range(len(dc)):
+        if not free[k]:
+            dc[k] = 0.0
+    _solve(band, dc)
+    for k in range(len(dc)):
+        if not free[k]:
+            dc[k] = 0.0
+
+
+@called
+def _longest(
+    matrix: Array,
+    place: Ints,
+    dc: Array,
+    slack: Array,
+    price: Array,
+    missed: Array,
+    ds: Array,
+    dz: Array,
+    centre: float,
+    second: float,
+    share: float,
+) -> tuple[float, float]:
+    """Fill the changes of slacks and prices; return how far they may go, at most the whole way."""
+    falls, drops = 0.0, 0.0
+    for r in range(len(slack)):
+        wanted = centre
+        if second > 0.0:
+            wanted -= ds[r] * dz[r]
+        change = _product(matrix, place, dc, r)
+        ds[r] = -missed[r] - change
+        dz[r] = (price[r] * (missed[r] + change) + wanted) / slack[r] - price[r]
+        falls = min(falls, ds[r] / slack[r])
+        drops = min(drops, dz[r] / price[r])
+    primal = 1.0 if -falls <= share else -share / falls
+    dual = 1.0 if -drops <= share else -share / drops
+    return primal, dual
+
+
+@called
+def _products(
+    slack: Array, price: Array, ds: Array, dz: Array, primal: float, dual: float
+) -> tuple[float, float]:
+    """Return the sum and the least of the products after a step."""
+    total, least = 0.0, np.inf
+    for r in range(len(slack)):
+        product = (slack[r] + primal * ds[r]) * (price[r] + dual * dz[r])
+        total += product
+        least = min(least, product)
+    return total, least
