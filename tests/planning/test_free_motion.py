@@ -132,7 +132,7 @@ def test_a_saved_move_is_the_same_and_a_changed_one_is_not_verified(tmp_path) ->
     again = sm.load_move(tmp_path / "move.npz").require()
     np.testing.assert_array_equal(again.motion.q, move.motion.q)
     assert again.verdict == move.verdict
-    with pytest.raises(sm.FileFormatError, match="is no plan"):
+    with pytest.raises(sm.FileFormatError, match="is a move, not a plan"):
         sm.load_plan(tmp_path / "move.npz")
     from selfmotion.basics import read_archive, write_archive
 

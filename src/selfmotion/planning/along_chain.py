@@ -37,6 +37,9 @@ def along_chain(
     """
     if not takes(problem, effort, constraints) or not asks_length(problem):
         return None
+    if any(item.equality for item in constraints):
+        # The search's sequences know nothing of given ends.
+        return None
     t, q = guide.sequence.t, guide.sequence.q
     finer = Grid.aligned(problem.knots, FINER_CHAIN * len(t))
     for number in range(CHAIN_ROUNDS):

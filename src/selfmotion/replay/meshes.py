@@ -5,7 +5,9 @@ extent off: 4 µm for a link of half a metre) and triangles that refer to them. 
 file is kept unless the caller sets a budget.
 """
 
+import os
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,8 @@ from scipy.sparse.csgraph import connected_components
 from selfmotion.basics import Array, RobotError
 
 _GRID = 65535
+# So many mesh files are kept in memory: those of a few arms.
+_KEPT = 64
 # Edges sharper than this are drawn as edges, flatter ones as part of a smooth surface.
 _CREASE = np.cos(np.radians(35.0))
 
@@ -138,19 +142,40 @@ def read_meshes(
     RobotError
         Neither has triangles for the file.
     """
-    parts = _read_with_trimesh(path) or _triangles_of_coal(loaded, scale)
-    if not parts:
+    found = _drawn(path, *_state(path))
+    if not found:
+        found = _made(_triangles_of_coal(loaded, scale))
+    if not found:
         raise RobotError(
             f"{owner}: no triangles in mesh file {path}; export it again as .stl, .dae or .obj"
         )
-    return [
+    return list(found)
+
+
+def _state(path: str) -> tuple[int, int]:
+    """Return what of a file is other when it was written anew: its time and size."""
+    try:
+        known = os.stat(path)
+    except OSError:
+        return 0, 0
+    return known.st_mtime_ns, known.st_size
+
+
+@lru_cache(maxsize=_KEPT)
+def _drawn(path: str, time: int, size: int) -> tuple[DrawnMesh, ...]:
+    """Return what trimesh reads of a file: once, since many pages show the same arm."""
+    return _made(_read_with_trimesh(path))
+
+
+def _made(parts: "dict[Color | None, list[_Triangles]]") -> tuple[DrawnMesh, ...]:
+    return tuple(
         make_mesh(
             np.concatenate([vertices for vertices, _ in group]),
             np.concatenate([faces + offset for (_, faces), offset in _with_offsets(group)]),
             color,
         )
         for color, group in parts.items()
-    ]
+    )
 
 
 _Triangles = tuple[Array, npt.NDArray[np.int64]]
