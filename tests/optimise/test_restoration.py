@@ -114,14 +114,24 @@ def test_a_first_step_without_a_cost_is_short() -> None:
     assert np.abs(history[1].x).max() == pytest.approx(0.9 * 2e-3)
 
 
-@pytest.mark.parametrize("spoiled", ["gradient", "metric"])
-def test_a_restoration_goes_nowhere_without_derivatives(spoiled: str) -> None:
+def test_a_restoration_goes_nowhere_without_a_gradient() -> None:
     function, start = bowl(), np.array([-1.0, 2.0])
-    whole = getattr(function, spoiled)
-    setattr(function, spoiled, lambda x: np.full_like(whole(x), np.nan))
+    whole = function.gradient
+    function.gradient = lambda x: np.full_like(whole(x), np.nan)
     with np.errstate(invalid="ignore"):
         x, status = restored(function, start, 1.0, np.inf, lambda step: None)
     assert status is None
+    np.testing.assert_array_equal(x, start)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_restoration_ends_where_the_metric_is_no_number(value: float) -> None:
+    """Without a warning: that of a motion in an instant is infinite."""
+    function, start = bowl(), np.array([-1.0, 2.0])
+    whole = function.metric
+    function.metric = lambda x: np.full_like(whole(x), value)
+    x, status = restored(function, start, 1.0, np.inf, lambda step: None)
+    assert status is Status.INFEASIBLE
     np.testing.assert_array_equal(x, start)
 
 

@@ -92,6 +92,9 @@ def restored(
         return x, None
     penalised = _Penalised(function, weight * _usual_weight(function, x))
     ground = function.metric(x)
+    if not np.isfinite(ground).all():
+        # A motion in an instant has derivatives beyond all numbers: nothing leads out of it.
+        return x, Status.INFEASIBLE
     ground += _REGULAR * np.trace(ground) * np.eye(len(x))
     most = min(limit, function.evaluations + _EVALUATIONS)
     value, damping = penalised.value(x), _DAMPING

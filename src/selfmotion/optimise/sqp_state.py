@@ -290,7 +290,9 @@ class Minimisation:
 
     def _record(self, update: str, step: float) -> bool:
         here, count = self._here, self._function.evaluations
-        size = float(np.linalg.norm(np.linalg.solve(self._scale.T, self._gradient)))
+        # Of a motion in an instant it is beyond all numbers.
+        with np.errstate(over="ignore", invalid="ignore"):
+            size = float(np.linalg.norm(np.linalg.solve(self._scale.T, self._gradient)))
         return self._note(Iteration(read_only(here.x), here.cost, size, update, step, count))
 
     def _note(self, iteration: Iteration) -> bool:
