@@ -81,25 +81,34 @@ def test_other_costs_take_few_iterations(case: Case, free: bool) -> None:
         assert slopes[-1] <= 0.2 * slopes[-2]
 
 
-@pytest.mark.parametrize(("joint", "share"), [(0, 0.7), (1, 0.95), (3, 0.95), (5, 0.85)])
-def test_limits_of_speed_are_kept_at_all_times(
-    panda: sm.RobotModel, joint: int, share: float
-) -> None:
-    """The optimum is found on nodes, is verified, and no dearer than that of splines."""
+def check_kept(panda: sm.RobotModel, limits, order: int, joint: int, share: float, rest: bool):
+    """The optimum is found on nodes, is verified, and no dearer than that of splines.
+
+    Returns the plan, times, and how fast the joint is at them as a share of its limit.
+    """
     path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    free = sm.plan(sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(), rest=False))
-    fastest = np.abs(free.trajectory.qd).max(axis=0)
-    limit = np.where(np.arange(7) == joint, share * fastest, np.inf)
-    limits = sm.JointVelocityLimits(limit)
-    problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(limits,), rest=False)
+    free = sm.plan(sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(), rest=rest))
+    most = np.abs((free.trajectory.qd, free.trajectory.qdd)[order - 1]).max(axis=0)
+    limit = np.where(np.arange(7) == joint, share * most, np.inf)
+    constraints = (limits(limit),)
+    problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=constraints, rest=rest)
     plan = sm.plan(problem)
     assert plan.certificate.verified
     assert isinstance(plan.report.null_motion, sm.NodeNullMotion)
     t = np.linspace(0.0, path.duration, 20001)
-    assert (np.abs(plan.trajectory(t, 1)) <= limit).all()
+    rates = np.abs(plan.trajectory(t, order))
+    assert (rates <= limit).all()
     assert plan.report.cost > free.report.cost
     spline = sm.plan(replace(problem, null_motion=sm.BSplineNullMotion(32)))
     assert plan.report.cost <= 1.0005 * spline.report.cost
+    return plan, t, rates[:, joint] / limit[joint]
+
+
+@pytest.mark.parametrize(("joint", "share"), [(0, 0.7), (1, 0.95), (3, 0.95), (5, 0.85)])
+def test_limits_of_speed_are_kept_at_all_times(
+    panda: sm.RobotModel, joint: int, share: float
+) -> None:
+    check_kept(panda, sm.JointVelocityLimits, 1, joint, share, rest=False)
 
 
 @pytest.mark.parametrize("rest", [False, True])
@@ -107,27 +116,13 @@ def test_limits_of_speed_are_kept_at_all_times(
 def test_limits_of_acceleration_are_kept_at_all_times(
     panda: sm.RobotModel, joint: int, share: float, rest: bool
 ) -> None:
-    """As those of speed; where such a limit begins to bind, accelerations would rather jump."""
-    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
-    free = sm.plan(sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(), rest=rest))
-    most = np.abs(free.trajectory.qdd).max(axis=0)
-    limit = np.where(np.arange(7) == joint, share * most, np.inf)
-    limits = sm.JointAccelerationLimits(limit)
-    problem = sm.Problem(panda, path, "pose", PANDA_HOME, constraints=(limits,), rest=rest)
-    plan = sm.plan(problem)
-    assert plan.certificate.verified
-    assert isinstance(plan.report.null_motion, sm.NodeNullMotion)
-    t = np.linspace(0.0, path.duration, 20001)
-    rates = np.abs(plan.trajectory(t, 2))
-    assert (rates <= limit).all()
+    """Where such a limit begins to bind, accelerations would rather jump."""
+    plan, t, used = check_kept(panda, sm.JointAccelerationLimits, 2, joint, share, rest=rest)
     # Where a limit is said to bind it is used: all but its margin, next to the ends less.
     (binding,) = plan.report.active
     for first, last in binding.spans:
-        assert last - first < 0.5 * path.duration
-        assert np.median(rates[(t >= first) & (t <= last), joint]) >= 0.985 * limit[joint]
-    assert plan.report.cost > free.report.cost
-    spline = sm.plan(replace(problem, null_motion=sm.BSplineNullMotion(32)))
-    assert plan.report.cost <= 1.0005 * spline.report.cost
+        assert last - first < 0.5 * plan.path.duration
+        assert np.median(used[(t >= first) & (t <= last)]) >= 0.985
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])

@@ -1,6 +1,6 @@
 """A cost that counts more, or less."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from selfmotion.basics import Array
 from selfmotion.costs.base import Cost, Partials
@@ -20,11 +20,10 @@ class Scaled(Cost):
 
     cost: Cost
     factor: float
+    name: str = field(init=False)
 
-    @property
-    def name(self) -> str:  # type: ignore[override]
-        """That of the other cost."""
-        return self.cost.name
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", self.cost.name)
 
     def value(self, samples: Samples) -> Array:
         """See `Cost.value`."""

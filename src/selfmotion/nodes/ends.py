@@ -1,14 +1,40 @@
 """What is asked of the first and the last node: c(w_0, w_N) = 0."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Ints
 from selfmotion.constraints import BoundEnd
 from selfmotion.nodes.hermite import HermiteSamples
 
 _FIRST, _LAST = 0, 1
+
+
+class Border(NamedTuple):
+    """What is off at the ends, and how it changes with all coordinates.
+
+    Attributes
+    ----------
+    c : (E,)
+    columns : (K s, E)
+        ∂c/∂w, turned round.
+    """
+
+    c: Array
+    columns: Array
+
+    def met_by(self, solved: Array) -> tuple[Array, Array]:
+        """Return the step that meets them to first order, and their prices.
+
+        For the step that knows nothing of them and what each of them moves, side by side.
+        """
+        step, moved = solved[:, 0], solved[:, 1:]
+        turned = self.columns.T
+        # Least squares: what is held may be asked for as well.
+        prices = np.asarray(np.linalg.lstsq(turned @ moved, turned @ step + self.c)[0], float)
+        return step - moved @ prices, prices
 
 
 class NodeEnds:
@@ -45,6 +71,15 @@ class NodeEnds:
         ends = changes[[0, -1]]
         none = np.zeros((0, 2, changes.shape[3]))
         return np.concatenate([none, *(_over(self._signed(item), ends) for item in self._items)])
+
+    def border(self, c: Array, changes: Array, held: Ints) -> Border:
+        """Return what is off, c (E,), with its derivatives; nothing moves what is `held`."""
+        count, _, _, size = changes.shape
+        by_node = np.zeros((count, size, self.count))
+        by_node[[0, -1]] = np.moveaxis(self.rows(changes), 0, 2)
+        columns = by_node.reshape(count * size, self.count)
+        columns[held] = 0.0
+        return Border(c, columns)
 
     def pulled(self, prices: Array, count: int) -> Array:
         """Return Σ prices (E,) · ∂c/∂(q, q̇) of the nodes, (count, 2, n)."""

@@ -244,6 +244,11 @@ class NodeMotion:
         """What is off at the ends, (E,)."""
         return self.grid.ends.residuals(self.samples)
 
+    @cached_property
+    def orders(self) -> Ints:
+        """The highest derivative of q that each condition depends on, (C,)."""
+        return self.grid.conditions.orders(self.samples.checked)
+
     @property
     def wanted(self) -> Array:
         """The conditions as Newton's method is to keep them, (N + 1, C).
@@ -283,7 +288,7 @@ class NodeMotion:
         found = self.grid.motion(charts, nu)
         if found is not None:
             # Costs and conditions are those of the same motion.
-            names = [name for name in ("terms", "aim", "h", "c") if name in self.__dict__]
+            names = [name for name in ("terms", "aim", "h", "c", "orders") if name in self.__dict__]
             found.__dict__.update({name: self.__dict__[name] for name in names})
         return found
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.nodes.conditions import spread
+from selfmotion.nodes.ends import Border
 from selfmotion.nodes.motion import NodeMotion
 from selfmotion.nodes.objective import Around, scattered
 from selfmotion.optimise import Banded, Status
@@ -112,36 +113,6 @@ def minimise(begin: NodeMotion, columns: Ints, told: Told, prices: Array | None 
     return solver.optimum(Status.MAX_ITERATIONS)
 
 
-class _Ends(NamedTuple):
-    """What is off at the ends, (E,), and its derivatives by the first and the last node.
-
-    Attributes
-    ----------
-    c : (E,)
-    rows : (E, 2, 2r)
-    """
-
-    c: Array
-    rows: Array
-
-    def columns(self, count: int) -> Array:
-        """Return the derivatives by all coordinates, (K s, E)."""
-        found = np.zeros((count, self.rows.shape[2], len(self.c)))
-        found[[0, -1]] = np.moveaxis(self.rows, 0, 2)
-        return found.reshape(count * self.rows.shape[2], len(self.c))
-
-    def met_by(self, solved: Array) -> tuple[Array, Array]:
-        """Return the step that meets them to first order, and their prices.
-
-        For the step that knows nothing of them and what each of them moves, side by side.
-        """
-        step, moved = solved[:, 0], solved[:, 1:]
-        turned = self.columns(len(solved) // self.rows.shape[2]).T
-        # Least squares: what is held may be asked for as well.
-        prices = np.asarray(np.linalg.lstsq(turned @ moved, turned @ step + self.c)[0], float)
-        return step - moved @ prices, prices
-
-
 class _Solver:
     """The state of Newton's method: a motion, slacks, prices and the barrier."""
 
@@ -188,10 +159,9 @@ class _Solver:
             prices = np.zeros_like(motion.h)
             prices[:, self._columns] = self._prices
             by_prices = slopes + motion.grid.conditions.pulled(motion.samples.checked, prices)
-        ends = _Ends(motion.c, motion.grid.ends.rows(around.changes))
+        ends = motion.grid.ends.border(motion.c, around.changes, motion.grid.held)
         if len(motion.c):
             by_prices = by_prices + motion.grid.ends.pulled(self._end_prices, len(slopes))
-            ends.rows.reshape(len(motion.c), -1)[:, self._held_ends] = 0.0
         curved = around.curvature(by_prices)
         intervals = motion.grid.cost.curvature(motion.samples, motion.partials, around.changes)
         gap = motion.wanted[:, self._columns] + self._slacks
@@ -243,7 +213,7 @@ class _Solver:
         by_jumps: Array,
         rows: Array,
         gap: Array,
-        ends: "_Ends",
+        ends: Border,
     ) -> Array | None:
         """Return Newton's step of the coordinates, (N + 1, 2r)."""
         count, size = gradient.shape
@@ -263,12 +233,12 @@ class _Solver:
                 matrix.add_triples(near)
             matrix.add_diagonal(shift)
             matrix.hold(self.motion.grid.held)
-            solved = matrix.solve(np.column_stack([-right, ends.columns(count)]))
+            solved = matrix.solve(np.column_stack([-right, ends.columns]))
             if solved is not None:
                 step, prices = ends.met_by(solved)
                 if np.abs(step.reshape(count, 2, -1)[:, 0]).max() <= _TRUSTED:
                     self._shift, self._end_prices = shift, prices
-                    self._promised = float(-(right + ends.columns(count) @ prices) @ step)
+                    self._promised = float(-(right + ends.columns @ prices) @ step)
                     return step.reshape(count, size)
             shift = max(_MORE * shift, _SHIFT * largest, _LESS * self._shift)
         return None
@@ -329,13 +299,6 @@ class _Solver:
         barrier = self._barrier * float(np.log(slacks).sum())
         off = float(np.abs(gap).sum() + np.abs(motion.c).sum())
         return motion.aim - barrier + self._penalty * off
-
-    @property
-    def _held_ends(self) -> Ints:
-        """Which of the coordinates of the first and the last node stay, of (2, 2r) in one row."""
-        held, size = self.motion.grid.held, 2 * self.motion.nu.shape[1]
-        last = size * (len(self.motion.nu) - 2)
-        return np.concatenate([held[held < size], held[held >= last + size] - last])
 
 
 def _longest(values: Array, step: Array) -> float:

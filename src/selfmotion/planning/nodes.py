@@ -112,10 +112,9 @@ class NodeDescent:
         if best is not None or self._ended is not None:
             return best
         broken = _broken(freely.motion)
-        orders = grid.conditions.orders(freely.motion.samples.checked)
         if _too_much(freely.motion, broken):
             return None
-        if not self._free and (orders[broken] == 0).any():
+        if not self._free and (freely.motion.orders[broken] == 0).any():
             best = self._towards_middle(grid, freely.motion)
         dearest = np.inf if best is None else best.cost
         found = None if self._ended else self._from_free(freely, dearest)
@@ -189,8 +188,7 @@ class NodeDescent:
     def _from_free(self, freely: Optimum, dearest: float) -> Standing | None:
         """Return the optimum that keeps all conditions, from one that keeps none."""
         motion = freely.motion
-        conditions = motion.grid.conditions
-        orders = conditions.orders(motion.samples.checked)
+        orders = motion.orders
         if (orders[_broken(motion)] < 2).all():
             return self._bound(freely, _NO_COLUMNS, dearest)
         most = self._effort.max_evaluations
@@ -201,7 +199,7 @@ class NodeDescent:
             return None
         motion = self._minimise(smooth, _NO_COLUMNS, dearest).motion
         # One such limit leads to the next: all count at once.
-        every = (orders == 2) & ~conditions.of_bodies()
+        every = (orders == 2) & ~motion.grid.conditions.of_bodies()
         columns = np.flatnonzero(every | _broken(motion) | _near(motion))
         return self._bound(self._minimise(motion, columns, dearest), columns, dearest)
 
@@ -288,9 +286,8 @@ def _too_much(motion: NodeMotion, columns: Ints | Flags) -> bool:
     Along a limit of jerk, what quintics on few nodes do jumps. Distances of bodies bend too much
     between the few bodies that count for interior points.
     """
-    conditions = motion.grid.conditions
-    orders = conditions.orders(motion.samples.checked)
-    return bool((orders[columns] > 2).any() or conditions.of_bodies()[columns].any())
+    of_bodies = motion.grid.conditions.of_bodies()
+    return bool((motion.orders[columns] > 2).any() or of_bodies[columns].any())
 
 
 def _broken(motion: NodeMotion) -> Flags:
