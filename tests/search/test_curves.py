@@ -85,3 +85,23 @@ def test_one_curve_where_elbow_up_and_down_meet(arm: sm.RobotModel) -> None:
     assert curves[0].q[:, 1].min() < -0.1 < 0.1 < curves[0].q[:, 1].max()
     # No joint makes a full turn.
     assert np.abs(curves[0].q[-1] - curves[0].q[0]).max() < 1e-12
+
+
+def test_points_of_curves_are_found_where_they_were_asked_for(arm: sm.RobotModel) -> None:
+    """Of all curves at once, by turns added; and what is beside them is on none."""
+    motion = SelfMotion(standing(arm, sm.Task.PLANAR), 0.05)
+    target = Follows.of(arm, sm.Line(level(1.2, 1.6), level(1.3, 1.6), 1.0), "planar").targets(
+        np.array([0.0])
+    )[0]
+    rng = np.random.default_rng(1)
+    found = motion.curves(target, rng.uniform(-3.0, 3.0, (30, 3)))
+    number = rng.integers(len(found.curves), size=50)
+    lengths = np.array([curve.length for curve in found.curves])
+    arc = rng.uniform(0.01, 0.99, 50) * lengths[number]
+    q = found.at(number, arc)
+    turned = q + 2.0 * np.pi * rng.integers(-1, 2, q.shape)
+    where, along = found.locate(turned)
+    np.testing.assert_array_equal(where, number)
+    np.testing.assert_allclose(along, arc, atol=1e-9)
+    assert np.all(found.locate(q + np.array([0.0, 0.3, 0.0]))[0] == -1)
+    assert np.all(found.locate(q + 1e-3)[0] == number)

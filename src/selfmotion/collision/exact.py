@@ -309,10 +309,12 @@ class CollisionModel:
         near = np.flatnonzero(bounds < margin)
         if not near.size:
             return False
+        # What is deepest inside decides first, as a rule.
+        near = near[np.argsort(bounds[near])]
         places = self.hulls.place(q)
         open_ = []
-        for pair in near.tolist():
-            hulls = self.hulls.distance(pair, bounds[pair])
+        for pair, bound in zip(near.tolist(), bounds[near].tolist(), strict=True):
+            hulls = self.hulls.distance(pair, bound)
             if hulls < margin:
                 if self._meshes.hulls_decide[pair]:
                     return True

@@ -5,7 +5,7 @@ import numpy as np
 from selfmotion.basics import InverseKinematicsError, NoSequenceError, SelfmotionError
 from selfmotion.planning.search import Search
 from selfmotion.problem import Problem
-from selfmotion.search import Obstruction, obstruction
+from selfmotion.search import Obstruction, SinglePoses, obstruction
 
 
 def looked_at(problem: Problem, search: Search) -> Obstruction | None:
@@ -38,6 +38,15 @@ def leaves_path(problem: Problem, search: Search) -> bool:
     if not problem.relaxations or problem.damping is not None:
         return False
     return obstruction(problem, np.random.default_rng(search.rng), relaxed=False) is not None
+
+
+def begins_off_path(problem: Problem, search: Search) -> bool:
+    """Whether rows are relaxed, and nothing was found that is on the path itself at its start."""
+    if not problem.relaxations:
+        return False
+    rng = np.random.default_rng(search.rng)
+    poses = SinglePoses(problem, rng, clear=False, relaxed=False)
+    return poses.first_blocked(np.zeros(1)) is not None
 
 
 def no_way(problem: Problem, blocked: Obstruction) -> SelfmotionError:

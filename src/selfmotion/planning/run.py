@@ -29,7 +29,7 @@ from selfmotion.planning.deadline import Deadline, TimedCounts
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import Finished, finish
 from selfmotion.planning.largest_part import LargestPart, largest_part
-from selfmotion.planning.refusal import looked_at, no_way
+from selfmotion.planning.refusal import begins_off_path, looked_at, no_way
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import (
@@ -295,10 +295,11 @@ class _Planning:
         """Return the plan of what comes before a pose that is out of reach."""
         told = blocked.help.removeprefix("; ")
         self._candidates.notes += [told] if told else []
+        # A part would begin on the path itself, which relaxed rows only let the arm be near.
+        off = begins_off_path(self._problem, self._search)
         try:
-            shorter = self._part(blocked.time)
+            shorter = None if off else self._part(blocked.time)
         except InverseKinematicsError:
-            # The part would begin on the path itself, which relaxed rows only let the arm be near.
             shorter = None
         if shorter is None:
             raise no_way(self._problem, blocked)

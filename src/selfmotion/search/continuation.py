@@ -171,3 +171,15 @@ def locate(
         if total < best_square:
             best, best_share, best_square = i, share, total
     return best, best_share, np.sqrt(best_square)
+
+
+@kernel
+def locate_all(
+    q: Array, samples: Array, curve: Ints, revolute: Flags, near: float
+) -> tuple[Ints, Array, Array]:
+    """Return the nearest segment to each of q (K, n); see `locate`."""
+    segments, shares = np.empty(len(q), dtype=np.int64), np.empty(len(q))
+    distances = np.empty(len(q))
+    for k in range(len(q)):
+        segments[k], shares[k], distances[k] = locate(q[k], samples, curve, revolute, near)
+    return segments, shares, distances

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, Progress, read_only, silent
+from selfmotion.basics import Array, Ints, Progress, read_only, silent
 from selfmotion.follow import Follows
 from selfmotion.search import continuation
 from selfmotion.search.manifold import Manifold
@@ -43,12 +43,6 @@ class Curve:
         """Arc length of the whole curve."""
         return float(self.arc[-1])
 
-    def at(self, arc: Array) -> Array:
-        """Return the polyline's points at arc lengths (K,), (K, n)."""
-        i = np.clip(np.searchsorted(self.arc, arc), 1, len(self.arc) - 1)
-        share = (arc - self.arc[i - 1]) / (self.arc[i] - self.arc[i - 1])
-        return np.asarray(self.q[i - 1] + share[:, None] * (self.q[i] - self.q[i - 1]))
-
 
 class CurveSet:
     """The curves found for one pose of the tool."""
@@ -59,6 +53,7 @@ class CurveSet:
         # Segments are at most 1.2 spacings long.
         self._near = 1.5 * spacing + ON_CURVE
         self._samples = np.empty((0, len(revolute)))
+        self._arcs = np.empty(0)
         self._curve = np.empty(0, dtype=np.intp)
         self._first: list[int] = []
 
@@ -68,21 +63,35 @@ class CurveSet:
         self._first.append(len(self._samples))
         self.curves.append(curve)
         self._samples = np.vstack([self._samples, curve.q])
+        self._arcs = np.concatenate([self._arcs, curve.arc])
         self._curve = np.concatenate([self._curve, index])
 
-    def locate(self, q: Array) -> tuple[int, float] | None:
-        """Return the curve that q is on and the arc length there; None when it is on no curve."""
-        if not self.curves:
-            return None
-        i, share, distance = continuation.locate(
+    def locate(self, q: Array) -> tuple[Ints, Array]:
+        """Return the curves that q (K, n) are on, -1 for none, and the arc lengths there, (K,)."""
+        if not self.curves or not len(q):
+            return np.full(len(q), -1), np.zeros(len(q))
+        i, share, distance = continuation.locate_all(
             q, self._samples, self._curve, self._revolute, self._near
         )
-        if not distance < ON_CURVE:
-            return None
-        index = int(self._curve[i])
-        i -= self._first[index]
-        arc = self.curves[index].arc
-        return index, float(arc[i] + share * (arc[i + 1] - arc[i]))
+        found = distance < ON_CURVE
+        # Of what is on no curve any segment will do.
+        i = np.where(found, i, 0)
+        arc = self._arcs[i] + share * (self._arcs[i + 1] - self._arcs[i])
+        return np.where(found, self._curve[i], -1), arc
+
+    def at(self, curve: Ints, arc: Array) -> Array:
+        """Return the points of the polylines of curves (K,) at arc lengths (K,), (K, n)."""
+        starts = np.array(self._first)
+        # Arc lengths of all curves, one after the other.
+        ends = np.cumsum([each.length + 1.0 for each in self.curves])
+        before = np.concatenate([[0.0], ends[:-1]])
+        along = self._arcs + before[self._curve]
+        last = np.append(starts[1:], len(self._arcs)) - 1
+        i = np.searchsorted(along, arc + before[curve])
+        i = np.clip(i, starts[curve] + 1, last[curve])
+        share = (arc - self._arcs[i - 1]) / (self._arcs[i] - self._arcs[i - 1])
+        first = self._samples[i - 1]
+        return np.asarray(first + share[:, None] * (self._samples[i] - first))
 
     def seeds(self) -> Iterable[Array]:
         """Yield configurations from which to find these curves at a pose nearby."""
@@ -169,12 +178,14 @@ class SelfMotion:
         before = len(found.curves)
         given = np.array(list(seeds)).reshape(-1, self.robot.dof)
         projected, arrived = self.project_all(given, target, far=far)
-        for q in projected[arrived]:
-            if found.locate(q) is not None:
-                continue
-            curve = self.trace(q, target)
+        left = projected[arrived]
+        left = left[found.locate(left)[0] < 0]
+        while len(left):
+            curve = self.trace(left[0], target)
+            left = left[1:]
             if curve is not None:
                 found.add(curve)
+                left = left[found.locate(left)[0] < 0]
         return len(found.curves) > before
 
     def _walk(self, start: Array, tangent: Array, target: Array) -> tuple[Array, bool]:

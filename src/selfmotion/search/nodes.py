@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Flags, Ints
 from selfmotion.collision import CollisionModel
-from selfmotion.search.curves import Curve, CurveSet, SelfMotion
+from selfmotion.search.curves import CurveSet, SelfMotion
 from selfmotion.search.settings import BORDER, MERGED, SURELY_OUTSIDE
 
 _TURN = 2.0 * np.pi
@@ -144,62 +144,90 @@ def place_nodes(
     spacing : float
         Largest gap in the configuration norm.
     """
-    located: list[list[tuple[float, Array]]] = [[] for _ in curves.curves]
-    for q in carried:
-        place = curves.locate(q)
-        if place is not None:
-            located[place[0]].append((place[1], q))
-    nodes = [np.empty((0, motion.robot.dof))]
-    for curve, found in zip(curves.curves, located, strict=True):
-        sampler = _CurveSampler(motion, target, curve, bounds, spacing)
-        nodes += sampler.nodes(sorted(found, key=lambda item: item[0]))
-    return np.vstack(nodes)
+    if not curves.curves:
+        return np.empty((0, motion.robot.dof))
+    sampler = _Sampler(motion, target, curves, bounds, spacing)
+    return np.vstack(sampler.nodes(carried))
 
 
 @dataclass(frozen=True, eq=False)
-class _CurveSampler:
-    """Samples one curve between and at carried samples."""
+class _Sampler:
+    """Samples the curves of one waypoint between and at carried samples, all at once."""
 
     motion: SelfMotion
     target: Array
-    curve: Curve
+    curves: CurveSet
     bounds: Admissible
     spacing: float
 
-    def nodes(self, carried: Sequence[tuple[float, Array]]) -> list[Array]:
-        """Return the free samples in pieces (K, n); `carried` is sorted by arc length."""
-        kept: list[tuple[float, Array]] = []
-        for arc, q in carried:
-            if not kept or arc - kept[-1][0] > MERGED * self.spacing:
-                kept.append((arc, q))
-        gaps = _between([arc for arc, _ in kept], self.curve.length, self.spacing)
-        arcs = np.concatenate([[arc for arc, _ in kept], gaps])
-        q = np.vstack([*[q for _, q in kept], self.curve.at(gaps)])
+    def nodes(self, carried: Array) -> list[Array]:
+        """Return the free samples in pieces (K, n)."""
+        on, places = self.curves.locate(carried)
+        numbers: list[Ints] = []
+        arcs: list[Array] = []
+        rows: list[Ints] = []
+        for k, curve in enumerate(self.curves.curves):
+            here = np.flatnonzero(on == k)
+            here = here[np.argsort(places[here], kind="stable")]
+            kept = here[_thinned(places[here], MERGED * self.spacing)]
+            gaps = _between(places[kept].tolist(), curve.length, self.spacing)
+            arcs += [places[kept], gaps]
+            rows += [kept, np.full(len(gaps), -1)]
+            numbers.append(np.full(len(kept) + len(gaps), k))
+        number, row = np.concatenate(numbers), np.concatenate(rows)
+        arc = np.concatenate(arcs)
+        fresh = row < 0
+        q = np.empty((len(row), self.motion.robot.dof))
+        q[~fresh], q[fresh] = carried[row[~fresh]], self.curves.at(number[fresh], arc[fresh])
         near = np.all(self.bounds.excess(q) < SURELY_OUTSIDE, axis=1)
-        fresh = np.flatnonzero(near[len(kept) :]) + len(kept)
-        q[fresh], near[fresh] = self.motion.project_all(q[fresh], self.target)
+        new = np.flatnonzero(near & fresh)
+        q[new], near[new] = self.motion.project_all(q[new], self.target)
         free = near.copy()
         free[near] = self.bounds.free(q[near])
-        order = np.argsort(arcs, kind="stable")
-        return [q[free], *self._borders(arcs[order], free[order])]
+        return [q[free], *self._borders(number, arc, free)]
 
-    def _borders(self, arcs: Array, free: npt.NDArray[np.bool_]) -> list[Array]:
-        """Return free samples (1, n) nearer to where the curve begins or ends to be free."""
-        nodes: list[Array] = []
-        if self.curve.closed:
-            arcs, free = np.append(arcs, arcs[0] + self.curve.length), np.append(free, free[0])
-        for i in np.flatnonzero(free[1:] != free[:-1]):
-            inside, outside = (arcs[i], arcs[i + 1]) if free[i] else (arcs[i + 1], arcs[i])
-            while abs(outside - inside) > BORDER * self.spacing:
-                middle = 0.5 * (inside + outside)
-                guess = self.curve.at(np.array([middle % self.curve.length]))[0]
-                q = self.motion.project(guess, self.target)
-                if q is not None and self.bounds.free(q[None])[0]:
-                    nodes.append(q[None])
-                    inside = middle
-                else:
-                    outside = middle
-        return nodes
+    def _borders(self, number: Ints, arc: Array, free: Flags) -> list[Array]:
+        """Return free samples (K, n) nearer to where curves begin or end to be free."""
+        on, inside, outside = _changes(number, arc, free, self.curves)
+        lengths = np.array([curve.length for curve in self.curves.curves])
+        found: list[Array] = []
+        while True:
+            wide = np.abs(outside - inside) > BORDER * self.spacing
+            on, inside, outside = on[wide], inside[wide], outside[wide]
+            if not len(on):
+                return found
+            middle = 0.5 * (inside + outside)
+            guess = self.curves.at(on, middle % lengths[on])
+            q, free = self.motion.project_all(guess, self.target)
+            free[free] = self.bounds.free(q[free])
+            found.append(q[free])
+            inside, outside = np.where(free, middle, inside), np.where(free, outside, middle)
+
+
+def _changes(number: Ints, arc: Array, free: Flags, curves: CurveSet) -> tuple[Ints, Array, Array]:
+    """Return where neighbours along a curve are free and not: its number, and both arc lengths."""
+    on: list[Ints] = []
+    inside, outside = [], []
+    for k, curve in enumerate(curves.curves):
+        here = np.flatnonzero(number == k)
+        here = here[np.argsort(arc[here], kind="stable")]
+        arcs, kept = arc[here], free[here]
+        if curve.closed and len(here):
+            arcs, kept = np.append(arcs, arcs[0] + curve.length), np.append(kept, kept[0])
+        i = np.flatnonzero(kept[1:] != kept[:-1])
+        on.append(np.full(len(i), k))
+        inside.append(np.where(kept[i], arcs[i], arcs[i + 1]))
+        outside.append(np.where(kept[i], arcs[i + 1], arcs[i]))
+    return np.concatenate(on), np.concatenate(inside), np.concatenate(outside)
+
+
+def _thinned(arcs: Array, apart: float) -> list[int]:
+    """Return which of sorted arc lengths (K,) to keep: those farther from the last one kept."""
+    kept: list[int] = []
+    for k, arc in enumerate(arcs.tolist()):
+        if not kept or arc - arcs[kept[-1]] > apart:
+            kept.append(k)
+    return kept
 
 
 def _between(arcs: Sequence[float], length: float, spacing: float) -> Array:

@@ -64,7 +64,7 @@ class Obstruction:
             f"{cause(poses, q[0])}: the nearest misses it by {1e3 * position:.3g} mm{turned}"
         )
 
-    @property
+    @cached_property
     def help(self) -> str:
         """What would help, each by itself; "" for nothing that is known."""
         found = remedies(self.poses, self.time, self.times)

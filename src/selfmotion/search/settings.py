@@ -177,6 +177,9 @@ FEWEST_STRAYS, SEARCHES = 320, 3
 # The slower method brings so many seeds nearer, in so many iterations each; and so many where a
 # pose would be given up: near limits it arrives from a third of them, Newton's from one in 300.
 APPROACHED, MORE_APPROACHED, ITERATIONS = 48, 400, 60
+# For what is only proposed, so many do; and steps that gain less than this share of what is left,
+# so often in turn, are the last ones: what arrives gains nearly all of it in each.
+ROUGHLY_APPROACHED, LITTLE_GAIN, LITTLE_GAINS = 120, 1e-3, 5
 # Of those that meet something, so many are looked at, and so many of these, which meet the least,
 # moved aside at random, by less and less [rad].
 MOST_LOOKED_AT, CLIMBERS = 80, 8

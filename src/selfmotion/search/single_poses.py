@@ -22,6 +22,7 @@ from selfmotion.search.settings import (
     MORE_SEEDS,
     MOST_LOOKED_AT,
     NEARLY,
+    ROUGHLY_APPROACHED,
     SEEDS,
     SPACING,
     TRACING_SEEDS,
@@ -103,7 +104,7 @@ class SinglePoses:
         for t in times.tolist():
             found = self.look(t, known)
             if not len(found.free):
-                q = self._by_damped_steps(t)
+                q = self._by_damped_steps(t, ROUGHLY_APPROACHED)
                 found = replace(found, free=q[self.bounds.keep(q)])
             if not len(found.free):
                 return float(t)
@@ -129,7 +130,7 @@ class SinglePoses:
         met = np.concatenate([before.met, far])
         if len(free):
             return Found(free, met, tries)
-        slowly = self._by_damped_steps(t)
+        slowly = self._by_damped_steps(t, MORE_APPROACHED)
         tries += MORE_APPROACHED
         free, met = slowly[self.bounds.keep(slowly)], np.concatenate([met, slowly])
         if len(free) or not len(met):
@@ -148,9 +149,9 @@ class SinglePoses:
         found, _, arrived = self.allowed.project(seeds, t, far=far, deviation=away)
         return np.asarray(found[arrived])
 
-    def _by_damped_steps(self, t: float) -> Array:
+    def _by_damped_steps(self, t: float, count: int) -> Array:
         """Return what the slower method finds, which comes to limits and edges, (K, n)."""
-        q, misses = self.nearest(t, MORE_APPROACHED)
+        q, misses = self.nearest(t, count)
         return np.asarray(q[misses.sum(axis=1) < NEARLY])
 
     def nearest(self, t: float, count: int = APPROACHED) -> tuple[Array, Array]:

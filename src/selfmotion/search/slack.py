@@ -13,6 +13,7 @@ from selfmotion.basics.layout import Layout
 from selfmotion.kernels import cholesky, errors_and_rows, gram, rows_of, solve_cholesky
 from selfmotion.robot import ChainArrays, place_tips
 from selfmotion.search.projection import CONVERGED, correct, stopped
+from selfmotion.search.settings import LITTLE_GAIN, LITTLE_GAINS
 
 # Below this angle [rad] the closed forms of a rotation lose digits and their series serve.
 _SMALL = 1e-3
@@ -103,7 +104,7 @@ def approach_all(
     jacobian, factor, steep = np.empty((m, n + 6)), np.empty((m, m)), np.empty((m, n + 6))
     trial, delta, bound = np.empty(n), np.empty(6), np.zeros(6, dtype=np.bool_)
     for k in range(len(q)):
-        damping, best = 1e-3, np.inf
+        damping, best, idle = 1e-3, np.inf, 0
         trial[:], delta[:] = q[k], deviation[k]
         for _ in range(iterations):
             for j in range(n):
@@ -119,6 +120,7 @@ def approach_all(
             for i in range(m):
                 size += step[i] ** 2
             if size < best:
+                idle = idle + 1 if size > (1.0 - LITTLE_GAIN) * best else 0
                 best, damping = size, max(0.1 * damping, 1e-14)
                 error[:], jacobian[:], q[k], deviation[k] = step, steep, trial, delta
                 hold(q[k], lower, upper, error, jacobian)
@@ -126,7 +128,7 @@ def approach_all(
                 damping *= 10.0
                 if damping > 1e6:
                     break
-            if best < NOTHING_LEFT**2:
+            if best < NOTHING_LEFT**2 or idle == LITTLE_GAINS:
                 break
             gram(jacobian, factor)
             for i in range(m):
