@@ -217,7 +217,8 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("G18", "G18 is not read"),
+        ("G18", "G18 is not read: page 'Files' of the docs"),
+        ("G43 H1", r"G43 is not read: .* write G43\.4"),
         ("G93", "G93 is not read"),
         ("G1 U4", "word 'U4' is not read"),
         ("G1 X#101", "'X#101' is not read"),
