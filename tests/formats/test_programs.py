@@ -309,8 +309,13 @@ def test_the_shell_writes_programs_and_confirms_them(program: sm.Program, tmp_pa
     assert code == 0, text
     assert re.search(r"read back: \d+ targets, between which the tool is at most 0\.\d+ mm", text)
     assert "CM {X 0.0000, Y 0.0000, Z 60.0000" in (tmp_path / "weld.src").read_text()
-    with pytest.raises(sm.ProblemError, match="event 'arc on' has no signal"):
+    with pytest.raises(
+        sm.ProblemError, match=r"'arc on' has no signal; .*--settings .*\[signals\]"
+    ):
         invoke(*asked)
+    (tmp_path / "quiet.toml").write_text('[signals]\n"arc on" = false\n"arc off" = false\n')
+    assert invoke(*asked, "--settings", tmp_path / "quiet.toml")[0] == 0
+    assert "; event: arc on" in (tmp_path / "weld.src").read_text()
     with pytest.raises(sm.ProblemError, match="--rate has no effect"):
         invoke(*asked, "--rate", "100")
     (tmp_path / "kuka.toml").write_text("mas = 3\n")

@@ -113,6 +113,19 @@ Text = _checked(str, "a text", {"type": "string"})
 Table = _checked(Mapping, "a table", {"type": "object"})
 
 
+def _keys(*names: str) -> dict[str, Any]:
+    """Return the schema of a table whose own reader refuses other keys."""
+    keys: dict[str, Any] = {name: {"type": "number"} for name in names}
+    keys["axis"] = _TRIPLE
+    return {"type": "object", "properties": keys, "additionalProperties": False}
+
+
+Leads = _checked(Mapping, "a table", _keys("length", "duration"))
+
+
+Weave = _checked(Mapping, "a table", _keys("amplitude", "pitch", "dwell"))
+
+
 Numbers = Annotated[Any, PlainValidator(_numbers), WithJsonSchema(_ANY_NUMBERS)]
 
 

@@ -21,10 +21,10 @@ from selfmotion.collision import Obstacle, obstacle_shapes
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost
 from selfmotion.formats.code import FUNCTION
-from selfmotion.formats.documents import ANGLES, LENGTHS
 from selfmotion.formats.field_types import (
     Coordinates,
     Flag,
+    Leads,
     Names,
     Number,
     Numbers,
@@ -32,6 +32,7 @@ from selfmotion.formats.field_types import (
     Start,
     Table,
     Text,
+    Weave,
     Whole,
 )
 from selfmotion.formats.job import GOALS
@@ -52,9 +53,9 @@ _PLAIN = {bool: Flag, int: Whole, float: Number, str: Text, SE3: Pose}
 _Fields = dict[str, tuple[Any, Any]]
 # Where a file says more, or says it otherwise, than the class's own signature.
 _LAWS: Any = Literal[tuple(law.value for law in TimeLaw)]
-_SHAPE: _Fields = {"frame": (Pose, None), "leads": (Table, None)}
+_SHAPE: _Fields = {"frame": (Pose, None), "leads": (Leads, None)}
 _BOUNDS: _Fields = dict.fromkeys(FEED_BOUNDS, (Number, None))
-_WOVEN: _Fields = {"weave": (Table, None)}
+_WOVEN: _Fields = {"weave": (Weave, None)}
 _PACED: _Fields = {
     **{"duration": (Number, None), "feed": (Number, None)},
     **_BOUNDS,
@@ -189,21 +190,6 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
         "grid": (Table, None),
     }
     return _model("Problem", fields, "A planning problem.")
-
-
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of problem files, for editors."""
-    schema = document_model().model_json_schema()
-    for table in (schema, *schema["$defs"].values()):
-        keys = table.get("properties", {})
-        for suffix, names in (("_deg", ANGLES), ("_mm", LENGTHS)):
-            for name in sorted(names & set(keys)):
-                keys[name + suffix] = keys[name]
-                if name in table.get("required", []):
-                    table["required"].remove(name)
-    for name in ("collision", "damping"):
-        schema["properties"][name] = {"anyOf": [{"type": "boolean"}, schema["properties"][name]]}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
 def model_of(

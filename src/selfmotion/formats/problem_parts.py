@@ -86,11 +86,12 @@ def path_of(
             path = _restored(_with_inner(values, inner))
     path = path if feed is None else Feed(path, feed, **bounds)
     path = path if weave is None else woven(path, weave)
-    path = path if leads is None else _with_leads(path, leads)
+    path = path if leads is None else led(path, leads)
     return path if frame is None else Placed(path, frame)
 
 
-def _with_leads(path: Path, values: Mapping[str, Any]) -> Path:
+def led(path: Path, values: Mapping[str, Any]) -> Path:
+    """Return a path with a lead-in and a lead-out, as a file says it."""
     _check_keys(values, "leads", ("length", "duration"), ("axis",))
     return with_leads(path, **values)
 
