@@ -197,8 +197,9 @@ def _with_settings(
 ) -> sm.Job:
     for text in settings:
         set_key(document, *parse_setting(text))
+    job = job_of(document, file, allow_code=allow_code)
     _tell_left_out(document, file)
-    return job_of(document, file, allow_code=allow_code)
+    return job
 
 
 def _tell_left_out(document: dict[str, Any], file: Path | None) -> None:

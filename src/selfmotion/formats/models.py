@@ -22,6 +22,7 @@ from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost
 from selfmotion.formats.code import FUNCTION
 from selfmotion.formats.field_types import (
+    Axis,
     Coordinates,
     Flag,
     Leads,
@@ -81,6 +82,7 @@ _OWN: Mapping[str, _Fields] = {
     "weave": {"path": (Table, ...), **_SHAPE},
     "Relaxation": {"rows": (Names, ...), "during": (Numbers, None)},
     "Search": {"rng": (Whole, 0)},
+    "Tilt": {"axis": (Axis, "z")},
 }  # fmt: skip
 _WHOLLY_OWN = {"twist"}
 
