@@ -1,6 +1,6 @@
 """Re-checks a finished trajectory by forward kinematics; shares no code with the rollout."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -109,7 +109,7 @@ def certify(
             *_cut_short(ending, follows, trajectory, checks, tolerance),
             *(text for check in checks for text in _off_path(check, tolerance, damped)),
             *(text for check in checks for text in _undecided(check)),
-            *(item.text for item in findings if not item.kept),
+            *_told(findings),
             *possible_feeds(feeds, findings),
         ),
         covers=tuple(dict.fromkeys(["path", *(what for item in wanted for what in item.covers)])),
@@ -119,6 +119,12 @@ def certify(
         notes=() if all(check.proved for check in checks) else (_MEASURED,),
         others=tuple((check.position, check.rotation) for check in checks[1:]),
     )
+
+
+def _told(findings: Sequence[Finding]) -> Iterator[str]:
+    """Yield what is not kept: first what no slower motion would mend."""
+    for of_pace in (False, True):
+        yield from (item.text for item in findings if not item.kept and item.of_pace is of_pace)
 
 
 def _check_arguments(robot: RobotModel, path: Path, trajectory: Trajectory, ending: str) -> None:

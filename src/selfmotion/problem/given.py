@@ -109,8 +109,9 @@ def check_start(follows: Follows, start: Array) -> None:
             beyond = _beyond(follows.robot, start)
             raise StartError(
                 f"{follows.robot.name}: the start configuration {beyond}puts "
-                f"'{item.chain.tip_name}' {position:.3g} m and {rotation:.3g} rad off the start of the path; leave it "
-                f"out, or take robot.inverse_kinematics(path.pose(0.0), task, seed=start)",
+                f"'{item.chain.tip_name}' {position:.3g} m and {rotation:.3g} rad off the start of "
+                f"the path; leave it out, or take "
+                f"robot.inverse_kinematics(path.pose(0.0), task, seed=start)",
                 position_miss=position,
                 rotation_miss=rotation,
             )
