@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from selfmotion.basics import Array, Saved
 from selfmotion.certificate import Tolerance
-from selfmotion.collision import Obstacle, obstacle_shapes
+from selfmotion.collision import Mesh, Obstacle, obstacle_shapes
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost
 from selfmotion.formats.code import FUNCTION
@@ -245,7 +245,8 @@ def _placed(cls: type[Obstacle]) -> _Fields:
     fields: _Fields = {}
     for item in dataclasses.fields(cls):
         if item.name == "pose":
-            fields |= {"position": (Numbers, ...), **orientations}
+            # Meshes have a place of their own.
+            fields |= {"position": (Numbers, None if cls is Mesh else ...), **orientations}
         else:
             default = ... if item.default is dataclasses.MISSING else item.default
             kind = Text if item.name == "file" else _type_of(item.type)
