@@ -19,6 +19,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.batch import BatchProgress, Item, grid_items, plan_items, run
+from selfmotion.cli.runs import is_answered
 from support.arms import PANDA_HOME, robot_named
 from support.places import TESTS
 from support.shell import complaint, invoke
@@ -302,3 +303,13 @@ def test_names_sort_as_they_are_numbered(grid: Path) -> None:
     assert names == sorted(names)
     assert len({item.key for item in grid_items(grid)}) == len(names) == 12
     assert all(isinstance(item, Item) for item in grid_items(grid))
+
+
+def test_of_each_file_some_combination_has_to_be_verified() -> None:
+    def made() -> sm.Job:
+        raise sm.ProblemError("is not planned here")
+
+    one, other = ([Item(f"{file}-{k}", made, {}) for k in range(3)] for file in "ab")
+    assert is_answered([one, other], {"a-2", "b-0"})
+    assert not is_answered([one, other], {"a-0", "a-1", "a-2"})
+    assert not is_answered([one], set())

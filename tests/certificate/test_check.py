@@ -101,6 +101,36 @@ def test_a_verdict_names_each_fault_and_what_was_looked_at() -> None:
     assert ended.failures == ("it stops here",)
 
 
+@pytest.mark.parametrize("apart", [-9e-5, -1e-6, 1e-6, 9e-5, -2e-4, 2e-4])
+@pytest.mark.parametrize("speed", [0.0, 0.02, 1.0])
+def test_a_motion_whose_times_are_rounded_is_judged_by_where_it_ends(
+    apart: float, speed: float
+) -> None:
+    """Within 0.1 ms of the path's duration, if what lasts longer stays within the tolerance."""
+    panda = robot_named("panda")
+    begin = panda.pose(PANDA_HOME)
+    end = begin.copy()
+    end.translation = begin.translation + np.array([0.0, speed, 0.0])
+    path = sm.Line(begin, end, 1.0, time_law="constant") if speed else sm.Dwell(begin, 1.0)
+    q = PANDA_HOME
+    motion = sm.Trajectory([0.0, 1.0 + apart], [q, q], np.zeros((2, 7)), panda.joint_names)
+    # The arm stands, off the path by the whole way, which is allowed, and some more.
+    for more in (1e-6, 1e-5):
+        within = sm.Tolerance(speed + more, 1e-6)
+        found = sm.certify(panda, path, "pose", motion, within)
+        # What lasts longer is the arm, which stands, or the path, off by all of the way then.
+        assert any("lasts" in text for text in found.failures) == (abs(apart) > 1e-4)
+    # It goes: by its last moments it is farther away than is allowed.
+    t = np.array([0.0, 1.0 + apart])
+    rate = np.tile([0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], (2, 1))
+    gone = sm.Trajectory(t, q + t[:, None] * rate, rate, panda.joint_names)
+    long = sm.certify(panda, path, "pose", gone, sm.Tolerance(2.0, 0.5 + 1e-7))
+    late = [text for text in long.failures if "lasts" in text]
+    assert bool(late) == (apart > 1e-7 or abs(apart) > 1e-4)
+    if late:
+        assert f"{abs(apart):.2g} s too {'long' if apart > 0 else 'short'}" in late[0]
+
+
 @pytest.mark.parametrize(("most", "times"), [(1000, 11), (11, 6), (6, 6), (5, 4)])
 def test_of_long_motions_fewer_poses_are_looked_at_for_singular_ones(
     most: int, times: int, monkeypatch: pytest.MonkeyPatch

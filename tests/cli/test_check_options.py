@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import selfmotion as sm
 from selfmotion.cli import app, commands
+from selfmotion.formats import example_text
 from support.arms import robot_named
 from support.shell import complaint
 
@@ -42,6 +43,25 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_what_is_the_plans_own_is_refused(plan: Path, options: list[str]) -> None:
     said = complaint("check", plan, *options)
     assert f"{options[0]} is the plan's own" in said
+
+
+def test_what_is_not_judged_is_said_in_words_of_the_shell(tmp_path: Path) -> None:
+    job = tmp_path / "three.toml"
+    job.write_text(example_text("panda", job, job=True))
+    motion = tmp_path / "a.csv"
+    motion.write_text("t,a\n0,0\n1,0\n")
+    (tmp_path / "fast.script").write_text("def selfmotion():\nend\n")
+    (tmp_path / "bad.mod").write_text("MODULE bad\n  MoveL p1;\nENDMODULE\n")
+    for asked in (("plan", job), ("check", motion, "--robot", job)):
+        said = complaint(*asked)
+        assert f"{job}: has seams, so that it is a job: `selfmotion job` plans it" in said
+    for name, words in (
+        ("fast.script", "is no motion that is read, though it is written: expected .csv,"),
+        ("bad.mod", "line 2: 'MoveL p1;' is not read: page 'Files' of the docs lists what is"),
+        ("a.doc", "is no motion that is read: expected .csv, "),
+    ):
+        with pytest.raises(sm.FileFormatError, match=words):
+            sm.read_motion(tmp_path / name)
 
 
 @pytest.mark.parametrize(

@@ -113,8 +113,9 @@ def test_limits_and_obstacles_of_a_motion(plan: sm.Plan, seam: Path, tmp_path: P
         ("t,a,a_velocity,b\n0,1,1,1\n1,1,1,1\n", "velocities are given for all joints or for none"),
         ("t,a\n0,1\n0,2\n", "does not come after"),
         ("t,a\n0,1\n1,nan\n", "is not finite"),
-        ("t,a\n0,1\n1,x\n", "line 3: could not convert"),
-        ("t,a\n0,1\n1,1_0\n", "line 3: could not convert"),
+        ("t,a\n0,1\n1,x\n", "line 3: a: is 'x', expected a number"),
+        ("t,a\n0,1\n1,\n", "line 3: a: is empty, expected a number"),
+        ("t,a\n0,1\n1,1_0\n", "line 3: a: is '1_0'"),
         ("", "is empty"),
     ],
 )

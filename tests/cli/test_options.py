@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.cli.options import relaxation
 from support.arms import PANDA_HOME
 from support.shell import complaint, invoke
 
@@ -131,3 +132,20 @@ def test_a_plan_is_written_in_any_format(tmp_path: Path, name: str) -> None:
 )
 def test_what_is_wrong_is_one_line(options: tuple[str, str], said: str) -> None:
     assert said in complaint("plan", "panda", "--circle", "0.1", *options)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--path", "a.csv", "--frame", "0,0,0,0,0,90"], "--frame has an angle of 90 rad"),
+        (["--circle", "0.1", "--relax", "rx,ry=10"], "a band of 10 rad is more than a turn"),
+        (["--circle", "0.1", "--relax", "rx,ry"], ""),
+    ],
+)
+def test_angles_beyond_a_turn_are_meant_in_degrees(options: list[str], said: str) -> None:
+    if said:
+        text = complaint("plan", "panda", *options)
+        assert said in text
+        assert "in degrees?" in text
+    else:
+        assert relaxation(options[-1]).band == np.inf

@@ -179,6 +179,30 @@ def test_tables_name_seams_and_events(tmp_path: Path) -> None:
     assert right.events == (("arc off", right.path.duration),)
 
 
+@pytest.mark.parametrize("listed", [False, True])
+@pytest.mark.parametrize("ramp", ["", "ramp = 0.3\n"])
+@pytest.mark.parametrize("leads", ["", "leads = { length_mm = 30, duration = 0.7 }\n"])
+def test_events_come_at_their_poses_after_ramps_and_leads(
+    leads: str, ramp: str, listed: bool, tmp_path: Path
+) -> None:
+    rows = ["seam,x,y,z,feed,event"]
+    said = {1: "arc on; gas on", 4: "arc off;"}
+    rows += [f"left,{0.02 * k},0,0,0.05,{said.get(k, '')}" for k in range(6)]
+    written(tmp_path, "seams.csv", "\n".join(rows) + "\n")
+    text = 'task = "position"\nrobot.name = "panda"\nworkpiece.frame.position = [0, 1, 0]\n'
+    options = f'file = "seams.csv"\n{ramp}{leads}'
+    one = '[[seams]]\nname = "left"\n[seams.path]\nkind = "file"\nseam = "left"\n'
+    (seam,) = sm.read_seam_job(
+        written(tmp_path, "job.toml", text + (one if listed else "[seams]\n") + options)
+    ).seams
+    assert [name for name, _ in seam.events] == ["arc on", "gas on", "arc off"]
+    for k, (_, at) in zip((1, 1, 4), seam.events, strict=True):
+        place = seam.path.pose(at).translation
+        np.testing.assert_allclose(place, [0.02 * k, 1, 0], atol=1e-4 if ramp else 1e-6)
+    lead = seam.path.pose(0.0).translation[2]
+    assert lead == pytest.approx(-0.03 if leads else 0.0, abs=1e-9)
+
+
 def test_events_of_dense_poses_after_corners_come_at_their_poses(tmp_path: Path) -> None:
     """Rounded corners are shorter than the legs: places along the way are not shares of legs."""
     points = [(5e-4 * k, 0.0) for k in range(120)]
@@ -217,7 +241,8 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("G18", "G18 is not read"),
+        ("G18", "G18 is not read: page 'Files' of the docs"),
+        ("G43 H1", r"G43 is not read: .* write G43\.4"),
         ("G93", "G93 is not read"),
         ("G1 U4", "word 'U4' is not read"),
         ("G1 X#101", "'X#101' is not read"),
@@ -318,7 +343,12 @@ def test_a_list_of_seams_loses_no_events(tmp_path: Path) -> None:
     one = SWITCHED.replace("G0 X0 Y-60", "M30")
     written(tmp_path, "slot.nc", one)
     file = written(tmp_path, "job.toml", text.replace("EVENTS", ""))
-    with pytest.raises(sm.FileFormatError, match=r"slot\.nc has events"):
-        sm.read_seam_job(file)
+    (seam,) = sm.read_seam_job(file).seams
+    whole = written(
+        tmp_path, "whole.toml", 'task="pointing"\nrobot.name="panda"\nseams.file="slot.nc"\n'
+    )
+    assert seam.events == sm.read_seam_job(whole).seams[0].events
+    assert seam.events
+    assert not seam.either_way
     told = written(tmp_path, "job.toml", text.replace("EVENTS", "events = []\n"))
     assert not sm.read_seam_job(told).seams[0].events

@@ -368,6 +368,24 @@ def test_export_writes_parts_and_judges_them_together(carried: sm.Plan, tmp_path
     assert all(verdict.startswith("read back: verified") for verdict in written.values())
 
 
+def test_programs_have_no_parts_and_other_files_beside_them_do(
+    carried: sm.Plan, tmp_path: Path
+) -> None:
+    carried.save(tmp_path / "plan.npz")
+    program, motion = tmp_path / "m.src", tmp_path / "m.yaml"
+    asked = ("export", tmp_path / "plan.npz", "--parts", "--out")
+    with pytest.raises(sm.ProblemError, match="--parts has no effect on programs"):
+        invoke(*asked, program)
+    assert invoke(*asked, motion, "--out", tmp_path / "m.csv")[0] == 0
+    assert (tmp_path / "m.left.yaml").exists()
+    assert (tmp_path / "m.right.csv").exists()
+    # Two arms of six joints or more are no program of one controller: all the rest is there.
+    if carried.robot.dof <= 12:
+        assert invoke(*asked, program, "--out", motion)[0] == 0
+        assert program.exists()
+        assert not (tmp_path / "m.left.src").exists()
+
+
 def test_straight_lines_are_judged_at_every_hand(carried: sm.Plan) -> None:
     """The hand that only holds on is off as well, and may be the one that is off most."""
     from selfmotion.formats import linear_miss

@@ -336,3 +336,31 @@ def test_a_seam_is_woven_as_a_file_says(tmp_path: Path) -> None:
             sm.FileFormatError, match=r"path: weave\.(pich: unknown|pitch: is missing)"
         ):
             sm.read_problem(file)
+
+
+def test_the_axis_of_a_tilt_is_a_letter_or_numbers(tmp_path: Path) -> None:
+    head = 'task = "position"\nstart = "home"\nrobot.name = "panda"\n'
+    head += 'path = { kind = "line", by = [0, 0.1, 0], duration = 2 }\n[[constraints]]\n'
+    for axis, said in (('"z"', "z"), ("[0, 0, 1]", [0, 0, 1])):
+        text = f'kind = "Tilt"\nframe = "panda_hand"\nwithin_deg = 9\naxis = {axis}\n'
+        (tilt,) = sm.read_problem(written(tmp_path, head + text)).constraints
+        assert isinstance(tilt, sm.Tilt)
+        assert tilt.axis == said
+    with pytest.raises(sm.FileFormatError, match=r"axis: is 'w', expected x, y, z or three"):
+        sm.read_problem(written(tmp_path, head + text.replace("[0, 0, 1]", '"w"')))
+
+
+def test_up_to_three_faults_are_told_and_the_nearest_key(tmp_path: Path) -> None:
+    head = 'task = "position"\nrobot.name = "panda"\n'
+    head += 'path = { kind = "line", by = [0, 0.1, 0], duration = 2 }\n'
+    wrong = '[[constraints]]\nkind = "JointVelocityLimits"\nlimit_degs = 300\n'
+    with pytest.raises(
+        sm.FileFormatError, match="limit_degs: unknown key, did you mean 'limit_deg'"
+    ):
+        sm.read_problem(written(tmp_path, head + wrong))
+    for count in (1, 2, 3, 4):
+        lines = "".join(f"zzz{k} = 1\n" for k in range(count))
+        with pytest.raises(sm.FileFormatError) as caught:
+            sm.read_problem(written(tmp_path, lines + head))
+        assert str(caught.value).count("unknown key") == min(count, 3)
+        assert ("and 1 more" in str(caught.value)) == (count == 4)

@@ -179,6 +179,50 @@ def test_a_job_keeps_its_seams_events_and_waits(
         assert t[before + ahead] == pytest.approx(at, abs=1e-4)
 
 
+@pytest.fixture(scope="module")
+def cornered() -> sm.Plan:
+    """Return a motion of an arm that rests for an instant, at 1 s of 2."""
+    ur5 = robot_named("ur5")
+    start = ur5.dexterous_configuration("pointing")
+    begin = ur5.pose(start)
+    corner, end = begin.copy(), begin.copy()
+    corner.translation = begin.translation - np.array([0.0, 0.0, 0.04])
+    end.translation = corner.translation + np.array([0.0, 0.05, 0.0])
+    path = sm.Joined([sm.Line(begin, corner, 1.0), sm.Line(corner, end, 1.0)])
+    return sm.plan(sm.Problem(ur5, path, "pointing", start, collision=None)).require()
+
+
+@pytest.mark.parametrize("at", [1.0, 1.0 + 1e-12, 1.0 - 1e-12, 0.6])
+def test_where_the_arm_rests_controllers_stop(cornered: sm.Plan, tmp_path: Path, at: float) -> None:
+    rests = float(np.abs(cornered.trajectory(at, 1)).max()) < 1e-6
+    assert rests == (at != 0.6)
+    step = Step("a", cornered, events=(("arc on", at), ("arc off", cornered.trajectory.duration)))
+    made = sm.Program(cornered.robot, (step,), {})
+    abb, kuka = tmp_path / "weld.mod", tmp_path / "weld.src"
+    sm.write_motion(made, abb, settings=settings(abb.name))
+    lines = [line.strip() for line in abb.read_text().splitlines()]
+    before = lines[lines.index("SetDO doArc, 1;") - 1]
+    if before.startswith("! step"):
+        before = lines[lines.index("SetDO doArc, 1;") - 3]
+    assert ("fine" in before) == rests
+    # A stop in the middle, whatever happens there, besides the first target and the last.
+    assert sum("fine" in line for line in lines) == 3
+    sm.write_motion(made, kuka, settings=settings(kuka.name))
+    text = kuka.read_text()
+    assert text.count("PTP_SPLINE") == 2
+    first = text.split("ENDSPLINE")[0]
+    _, times = krl_targets(first + "ENDSPLINE")
+    assert times[-1] == pytest.approx(1.0, abs=LATE)
+    if rests:
+        # At the very end of a block, or between the two.
+        after = text.index("$OUT[7] = TRUE")
+        assert first.count("SPTP", after) <= 1
+        assert after < text.rindex("PTP_SPLINE")
+    for file in (abb, kuka):
+        _, stated, found = program_miss(made, file)
+        assert found.position <= stated.position <= 2e-4
+
+
 def test_urscript_knows_tool_load_and_outputs(program: sm.Program, tmp_path: Path) -> None:
     file = tmp_path / "weld.script"
     sm.write_motion(program, file, settings=settings("weld.src"))
@@ -190,7 +234,9 @@ def test_urscript_knows_tool_load_and_outputs(program: sm.Program, tmp_path: Pat
     outputs = [k for k, line in enumerate(lines) if "set_standard_digital_out(7" in line]
     assert [lines[k].endswith("True)") for k in outputs] == [True, False] * 2
     stream = [sum("servoj(" in line for line in lines[:k]) for k in outputs]
-    np.testing.assert_allclose(stream, [125.0 * at for at, _, _ in program.events], atol=1.0)
+    # The arm follows 0.1 s late: its outputs are switched when it is there.
+    late = [125.0 * (at + 0.1) for at, _, _ in program.events]
+    np.testing.assert_allclose(stream, late, atol=1.0)
     # These arms have eight.
     beyond = sm.ProgramSettings(signals=dict.fromkeys(SIGNALS, (8, True)))
     with pytest.raises(sm.ProblemError, match="from 0 to 7"):
@@ -263,8 +309,13 @@ def test_the_shell_writes_programs_and_confirms_them(program: sm.Program, tmp_pa
     assert code == 0, text
     assert re.search(r"read back: \d+ targets, between which the tool is at most 0\.\d+ mm", text)
     assert "CM {X 0.0000, Y 0.0000, Z 60.0000" in (tmp_path / "weld.src").read_text()
-    with pytest.raises(sm.ProblemError, match="event 'arc on' has no signal"):
+    with pytest.raises(
+        sm.ProblemError, match=r"'arc on' has no signal; .*--settings .*\[signals\]"
+    ):
         invoke(*asked)
+    (tmp_path / "quiet.toml").write_text('[signals]\n"arc on" = false\n"arc off" = false\n')
+    assert invoke(*asked, "--settings", tmp_path / "quiet.toml")[0] == 0
+    assert "; event: arc on" in (tmp_path / "weld.src").read_text()
     with pytest.raises(sm.ProblemError, match="--rate has no effect"):
         invoke(*asked, "--rate", "100")
     (tmp_path / "kuka.toml").write_text("mas = 3\n")

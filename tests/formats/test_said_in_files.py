@@ -12,7 +12,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.collision import obstacle_shapes
 from selfmotion.formats import json_schema
-from selfmotion.formats.seam_job import _JOB, _OF_PROBLEM, _SEAM
+from selfmotion.formats.seam_job import JOB, OF_PROBLEM, SEAM
 from support.arms import robot_named
 
 SCHEMA = json_schema()
@@ -87,8 +87,8 @@ def tables() -> list[tuple[str, Callable[..., Any], set[str]]]:
         ("Circle.around", sm.Circle.around, keys_of("circle") | {"options"}),
         ("read_path", sm.read_path, path_file),
         ("load_robot", sm.load_robot, keys_of("Robot") | keys_of("RobotPart")),
-        ("plan_job", sm.plan_job, {*_JOB}),
-        ("Seam", sm.Seam, {*_SEAM, *_OF_PROBLEM}),
+        ("plan_job", sm.plan_job, {*JOB}),
+        ("Seam", sm.Seam, {*SEAM, *OF_PROBLEM}),
     ]
     families = (sm.Cost, sm.Constraint, sm.NullMotion, sm.Path)
     for family in families:

@@ -94,6 +94,25 @@ def test_bodies_join_the_clearance_that_there_is(tmp_path: Path) -> None:
     np.testing.assert_array_equal(lamp.pose.translation, [0.0, 0.0, 2.0])
 
 
+def test_meshes_stand_where_their_coordinates_say(tmp_path: Path) -> None:
+    import trimesh
+
+    trimesh.creation.box((0.1, 0.05, 0.01)).export(tmp_path / "part.stl")
+    mesh = '{ shape = "mesh", name = "part", file = "part.stl"PLACE }'
+    more = 'constraints = [{ kind = "Clearance", obstacles = [MESH] }]'
+    poses = []
+    for place in ("", ", position = [0, 0, 0]"):
+        text = more.replace("MESH", mesh.replace("PLACE", place))
+        found = problem(tmp_path, "line", 0.4, 0.0, more=text)
+        (clearance,) = (item for item in found.constraints if isinstance(item, sm.Clearance))
+        poses.append(clearance.obstacles[0].pose.homogeneous)
+    np.testing.assert_array_equal(*poses)
+    np.testing.assert_array_equal(poses[0], np.eye(4))
+    box = more.replace("MESH", '{ shape = "box", name = "b", size = [1, 1, 1] }')
+    with pytest.raises(sm.FileFormatError, match="position"):
+        problem(tmp_path, "line", 0.4, 0.0, more=box)
+
+
 def test_its_mesh_is_a_body(tmp_path: Path) -> None:
     import trimesh
 

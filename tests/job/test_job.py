@@ -219,8 +219,10 @@ def test_bad_jobs_are_refused() -> None:
     with pytest.raises(sm.ProblemError, match="one way only"):
         replace(seams[0], constraints=[sm.EndConfiguration(HOME)])
     far = seam("far", [2.0, 0.0, 0.3], [2.1, 0.0, 0.3])
-    with pytest.raises(sm.PlanError, match="no seam has a motion"):
-        sm.plan_job(panda, [far], branches=1)
+    farther = seam("farther", [3.0, 0.0, 0.3], [3.1, 0.0, 0.3])
+    # A seam a line.
+    with pytest.raises(sm.PlanError, match=r"no seam has a motion:\n  'far': .*\n  'farther': "):
+        sm.plan_job(panda, [far, farther], branches=1)
 
 
 def test_other_processes_come_to_the_same_program() -> None:

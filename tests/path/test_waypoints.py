@@ -61,7 +61,7 @@ def test_csv_is_read(tmp_path: Path) -> None:
     [
         ("", "is empty"),
         ("t,x,y\n0,0,0\n", "the header is t,x,y"),
-        ("t,x,y,z\n0,0,0,0\n1,0,zero,0\n", "line 3: could not convert"),
+        ("t,x,y,z\n0,0,0,0\n1,0,zero,0\n", "line 3: y: is 'zero', expected a number"),
         ("t,x,y,z\n0,0,0,0\n1,0,0\n", "line 3 has 3 values"),
         ("t,x,y,z\n0,0,0,0\n", "at least two poses"),
         ("t,x,y,z\n0,0,0,0\n0,1,0,0\n", r"t\[1\] = 0.0 does not come after"),

@@ -21,6 +21,30 @@ def test_start_off_the_path_is_refused_with_the_miss(panda_circle: Circle) -> No
     assert caught.value.position_miss > 1e-4
 
 
+def test_a_start_in_degrees_names_the_joint_and_its_limits(panda_circle: Circle) -> None:
+    problem = panda_circle()
+    beyond = np.asarray(problem.start) + np.array([0, -45.0, 0, 0, 0, 0, 0])
+    said = (
+        r"'panda_joint2' at -45\.\d+ rad, beyond its limits of -1\.\d+ to 1\.\d+ rad; in degrees\?"
+    )
+    with pytest.raises(sm.StartError, match=said):
+        dataclasses.replace(problem, start=beyond)
+
+
+def test_limits_far_above_the_arms_own_are_told(panda_circle: Circle) -> None:
+    problem = panda_circle()
+    for limit, told in ((120.0, 1), (2.0, 0), ([9.0] * 6 + [180.0], 1)):
+        found = dataclasses.replace(problem, constraints=[sm.JointVelocityLimits(limit)])
+        remarks = [text for text in found.remarks if "in degrees? limit_deg" in text]
+        assert len(remarks) == told
+    assert (
+        "180 rad/s for 'panda_joint7' has no effect"
+        in dataclasses.replace(
+            problem, constraints=[sm.JointVelocityLimits([9.0] * 6 + [180.0])]
+        ).remarks[-1]
+    )
+
+
 def test_missing_start_is_found(panda_circle: Circle) -> None:
     problem = dataclasses.replace(panda_circle(), start=None)
     plan = sm.plan(problem)

@@ -188,8 +188,10 @@ def read_rows(
     """
     try:
         lines = file.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileFormatError(f"{file}: cannot be read: {error}") from error
+    except OSError as error:
+        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise FileFormatError(f"{file}: is no UTF-8 text: {error}") from error
     kept = [(k, line) for k, line in enumerate(lines, 1) if line.strip() and line[0] != "#"]
     if not kept:
         raise FileFormatError(f"{file}: is empty, expected a header line and rows of numbers")
@@ -207,19 +209,20 @@ def read_rows(
             raise FileFormatError(
                 f"{file}: line {number} has {len(cells)} values, expected {len(names)}"
             )
-        try:
-            rows.append([_number(cells[k]) for k in plain])
-            numbers.append(number)
-        except ValueError as error:
-            raise FileFormatError(f"{file}: line {number}: {error}") from error
+        rows.append([_number(cells[k], f"{file}: line {number}: {names[k]}") for k in plain])
+        numbers.append(number)
         for name, column in cells_of.items():
             column.append(cells[names.index(name)].strip().strip('"'))
     found = np.array(rows, dtype=np.float64).reshape(-1, len(plain))
     return [names[k] for k in plain], found, numbers, cells_of
 
 
-def _number(cell: str) -> float:
+def _number(cell: str, where: str) -> float:
     """Return the number in a cell; Python's 1_0 is none."""
-    if "_" in cell:
-        raise ValueError(f"could not convert string to float: {cell.strip()!r}")
-    return float(cell)
+    try:
+        if "_" not in cell:
+            return float(cell)
+    except ValueError:
+        pass
+    found = f"is '{cell.strip()[:40]}'" if cell.strip() else "is empty"
+    raise FileFormatError(f"{where}: {found}, expected a number")

@@ -1,6 +1,6 @@
 """Re-checks a finished trajectory by forward kinematics; shares no code with the rollout."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from selfmotion.certificate.limits import arm_limits
 from selfmotion.certificate.path_error import PathCheck, bound_errors
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.certificate.verdict import Certificate
-from selfmotion.follow import Follow, Follows
+from selfmotion.follow import BoundFollow, Follow, Follows
 from selfmotion.motion import Trajectory
 from selfmotion.path import Path, check_oriented
 from selfmotion.robot import RobotModel
@@ -20,6 +20,9 @@ from selfmotion.task import DampingLaw, Relaxation, Task
 
 # Of a long motion the distance from singular poses, which proves nothing, is looked at so often.
 _MOST_POSES = 50_000
+# Files write times in some digits: a motion may end so much before or after its path [s], where all
+# is within the tolerance until both have ended.
+_CLOCK = 1e-4
 # What is said of paths without bounds of their derivatives.
 _MEASURED = "the path is judged as measured between its marks: it gives no bounds (Path.series)"
 
@@ -103,10 +106,10 @@ def certify(
         tolerance=tolerance,
         findings=findings,
         failures=(
-            *_cut_short(ending, path, trajectory),
+            *_cut_short(ending, follows, trajectory, checks, tolerance),
             *(text for check in checks for text in _off_path(check, tolerance, damped)),
             *(text for check in checks for text in _undecided(check)),
-            *(item.text for item in findings if not item.kept),
+            *_told(findings),
             *possible_feeds(feeds, findings),
         ),
         covers=tuple(dict.fromkeys(["path", *(what for item in wanted for what in item.covers)])),
@@ -116,6 +119,12 @@ def certify(
         notes=() if all(check.proved for check in checks) else (_MEASURED,),
         others=tuple((check.position, check.rotation) for check in checks[1:]),
     )
+
+
+def _told(findings: Sequence[Finding]) -> Iterator[str]:
+    """Yield what is not kept: first what no slower motion would mend."""
+    for of_pace in (False, True):
+        yield from (item.text for item in findings if not item.kept and item.of_pace is of_pace)
 
 
 def _check_arguments(robot: RobotModel, path: Path, trajectory: Trajectory, ending: str) -> None:
@@ -191,12 +200,47 @@ def _undecided(check: PathCheck) -> tuple[str, ...]:
     )
 
 
-def _cut_short(ending: str, path: Path, trajectory: Trajectory) -> tuple[str, ...]:
+def _cut_short(
+    ending: str,
+    follows: Follows,
+    trajectory: Trajectory,
+    checks: Sequence[PathCheck],
+    tolerance: Tolerance,
+) -> tuple[str, ...]:
     if ending:
         return (ending,)
-    if abs(trajectory.duration - path.duration) <= 1e-9 * path.duration:
+    duration = follows.items[0].path.duration
+    apart = trajectory.duration - duration
+    if abs(apart) <= 1e-9 * duration:
         return ()
-    return (f"the motion lasts {trajectory.duration:.6g} s, the path {path.duration:.6g} s",)
+    pairs = zip(follows.items, checks, strict=True)
+    if abs(apart) <= min(_CLOCK, duration) and all(
+        _ends_within(item, trajectory, apart, found, tolerance) for item, found in pairs
+    ):
+        return ()
+    return (
+        f"the motion lasts {trajectory.duration:.6g} s, the path {duration:.6g} s: "
+        f"{abs(apart):.2g} s too {'long' if apart > 0.0 else 'short'}",
+    )
+
+
+def _ends_within(
+    item: BoundFollow, trajectory: Trajectory, apart: float, check: PathCheck, tolerance: Tolerance
+) -> bool:
+    """Whether what lasts longer, path or tip, moves on by no more than is left of a tolerance."""
+    if apart < 0.0:
+        path = item.path.samples([item.path.duration + apart, item.path.duration])
+        rotation, translation = path.rotation, path.translation
+    else:
+        _, rotation, translation = item.chain.along(trajectory(trajectory.t[-1] - [apart, 0.0]))
+    moved = float(np.linalg.norm(translation[1] - translation[0]))
+    cosine = 0.5 * (float(np.sum(rotation[0] * rotation[1])) - 1.0)
+    # The cosine of no angle may be rounded to less than 1.
+    turned = float(np.arccos(np.clip(cosine + 1e-15, -1.0, 1.0)))
+    return (
+        check.position.value + moved <= tolerance.position
+        and check.rotation.value + turned <= tolerance.rotation
+    )
 
 
 def _off_path(

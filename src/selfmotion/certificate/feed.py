@@ -55,10 +55,14 @@ class FeedReached(Requirement):
             # Written so that NaN is not kept.
             if speeds.undecided or not speeds.values[0] <= 1.0:
                 time = speeds.undecided[0][0] if speeds.undecided else float(speeds.times[0])
+                room = found.slowest * found.left_over / found.asked
+                apart = f"by {speeds.values[0] * room:.2g} m/s" if not speeds.undecided else ""
                 text = (
                     f"the feed of {found.asked:g} m/s is kept by the path, but not by "
-                    f"'{self.follow.chain.tip_name}', which moves along it faster or slower at "
-                    f"t = {time:.3f} s: relax no row along the path, or allow it more (within=)"
+                    f"'{self.follow.chain.tip_name}', which moves along it faster or slower "
+                    f"{apart and apart + ' '}at t = {time:.3f} s, where {room:.2g} m/s are left: "
+                    f"keep it nearer to the path (fewer relaxed rows, more samples or targets), or "
+                    f"allow the feed more (within=)"
                 )
                 return Finding(self.name, "path", time, found.slowest, allowed, False, text)
         else:

@@ -8,7 +8,15 @@ import typer
 
 import selfmotion as sm
 from selfmotion.cli import options
-from selfmotion.formats import grid_documents, job_of, parse_setting, read_document, set_key
+from selfmotion.cli.app import stages
+from selfmotion.formats import (
+    events_of,
+    grid_documents,
+    job_of,
+    parse_setting,
+    read_document,
+    set_key,
+)
 
 # Of problem files.
 SUFFIXES = (".toml", ".json")
@@ -189,7 +197,21 @@ def _with_settings(
 ) -> sm.Job:
     for text in settings:
         set_key(document, *parse_setting(text))
-    return job_of(document, file, allow_code=allow_code)
+    job = job_of(document, file, allow_code=allow_code)
+    _tell_left_out(document, file)
+    return job
+
+
+def _tell_left_out(document: dict[str, Any], file: Path | None) -> None:
+    """Print which events of a table or a program of a machine tool a path leaves out."""
+    path = document.get("path")
+    if not (isinstance(path, dict) and path.get("kind") == "file"):
+        return
+    events = events_of((file.parent if file else Path()) / str(path.get("file")), path.get("seam"))
+    if events:
+        verb = "are" if len(events) > 1 else "is"
+        text = f"note: {', '.join(events)} {verb} left out: `selfmotion job` keeps what happens"
+        stages.print(text, markup=False, soft_wrap=True)
 
 
 def _typed(context: typer.Context) -> list[str]:

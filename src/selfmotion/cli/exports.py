@@ -36,7 +36,11 @@ def export(
         typer.Option("--format", help=f"Whatever the suffix: {', '.join(formats.FORMS)}."),
     ] = None,
     parts: Annotated[
-        bool, typer.Option("--parts", help="Of a cell a file for each part as well, in step.")
+        bool,
+        typer.Option(
+            "--parts",
+            help="Of a cell a file for each part as well (none of programs).",
+        ),
     ] = False,
     settings: options.SettingsOption = None,
     force: Annotated[
@@ -47,6 +51,11 @@ def export(
     """Write a plan's motion for controllers and simulators, and check what was written."""
     if rate is not None and all(_is_program(target, form) for target in out):
         raise sm.ProblemError("--rate has no effect on programs: targets are as many as it takes")
+    if parts and all(_is_program(target, form) for target in out):
+        raise sm.ProblemError(
+            "--parts has no effect on programs of controllers, which move all joints of a cell; "
+            "leave it out, or give a file of another kind as well"
+        )
     asked = None if settings is None else sm.read_program_settings(settings)
     made: _Made
     if file.suffix == jobs.PROGRAM:
@@ -68,7 +77,7 @@ def export(
         if not _is_program(target, form):
             given["rate"] = rate
         together: dict[str, Path] = {}
-        if parts and isinstance(made, sm.Plan):
+        if parts and isinstance(made, sm.Plan) and not _is_program(target, form):
             together = sm.write_parts(made, target, **given)
         sm.write_motion(made, target, settings=asked, **given)
         kept, verdicts[str(target)] = _read_back(made, target, form)

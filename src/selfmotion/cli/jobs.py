@@ -48,7 +48,7 @@ def job(
         _check(target)
     work = sm.read_seam_job(file, allow_code=allow_code)
     asked = None if settings is None else sm.read_program_settings(settings)
-    if any(target.suffix in (*formats.PROGRAMS, ".script") for target in wanted):
+    if asked is not None or any(_switches(target) for target in wanted):
         # Before anything is planned.
         happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
         formats.check_signals(happens, asked or sm.ProgramSettings())
@@ -78,6 +78,11 @@ def _check(file: Path) -> None:
             f"{file}: --out writes .program, .timetable.csv, .html (a replay) or the motion "
             f"({known})"
         )
+
+
+def _switches(file: Path) -> bool:
+    """Whether a file says what events switch."""
+    return file.suffix.lower() in (*formats.PROGRAMS, ".script")
 
 
 def _is_timetable(file: Path) -> bool:

@@ -15,6 +15,9 @@ Corners = Literal["blend", "stop", "round"]
 Axis = Literal["x", "y", "z"]
 SearchMode = Literal["auto", "local", "global"]
 
+# A larger angle [rad] can only be meant in degrees.
+_TURN = 2.0 * np.pi + 1e-6
+
 ProblemArgument = Annotated[
     str,
     typer.Argument(
@@ -217,7 +220,7 @@ def relaxation(text: str) -> sm.Relaxation:
     rows, _, band = rest.partition("=")
     try:
         first, last = (float(time) for time in window.split(":")) if window else (0.0, 0.0)
-        return sm.Relaxation(
+        found = sm.Relaxation(
             tuple(rows.split(",")),
             float(band) if band else np.inf,
             (first, last) if window else None,
@@ -226,6 +229,12 @@ def relaxation(text: str) -> sm.Relaxation:
         raise sm.ProblemError(
             f"--relax is '{text}', expected ROWS[=BAND][@FROM:TO] like rx,ry=0.2 or rz@1:2.5"
         ) from None
+    if found.angular and _TURN < float(found.band) < np.inf:
+        raise sm.ProblemError(
+            f"--relax is '{text}': a band of {band} rad is more than a turn; in degrees? 10° is "
+            f"0.1745"
+        )
+    return found
 
 
 def search_of(mode: SearchMode | None, compare: bool) -> sm.Search | None:
@@ -299,6 +308,12 @@ def one_or_each(text: str, option: str) -> list[float] | float:
 def pose(text: str, option: str) -> dict[str, Any]:
     """Return a pose x,y,z,roll,pitch,yaw as files write it."""
     values = numbers(text, option, 6).tolist()
+    for angle in values[3:]:
+        if abs(angle) > _TURN:
+            raise sm.ProblemError(
+                f"{option} has an angle of {angle:g} rad, more than a turn; in degrees? Expected "
+                f"x,y,z,roll,pitch,yaw in m and rad: 90° is 1.5708"
+            )
     return {"position": values[:3], "rpy": values[3:]}
 
 

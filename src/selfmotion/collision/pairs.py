@@ -142,7 +142,7 @@ def disabled_links(srdf: str | Path) -> tuple[tuple[str, str], ...]:
     try:
         root = ElementTree.parse(srdf).getroot()
     except OSError as error:
-        raise CollisionError(f"{srdf}: SRDF cannot be read: {error}") from error
+        raise CollisionError(f"{srdf}: SRDF cannot be read: {error.strerror or error}") from error
     except ElementTree.ParseError as error:
         raise CollisionError(f"{srdf}: SRDF is not well-formed XML: {error}") from error
     if root.tag != "robot":

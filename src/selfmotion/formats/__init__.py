@@ -25,7 +25,7 @@ from selfmotion.formats.overrides import (
     parse_setting as parse_setting,
     set_key as set_key,
 )
-from selfmotion.formats.path_files import read_path as read_path
+from selfmotion.formats.path_files import events_of as events_of, read_path as read_path
 from selfmotion.formats.poses import pose_of as pose_of
 from selfmotion.formats.problem_file import (
     job_of as job_of,
@@ -46,7 +46,7 @@ from selfmotion.formats.seam_job import SeamJob as SeamJob, read_seam_job as rea
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of problem files, for editors."""
-    from selfmotion.formats import models
+    """Return the JSON Schema of problem and job files, for editors."""
+    from selfmotion.formats import schema
 
-    return models.json_schema()
+    return schema.json_schema()

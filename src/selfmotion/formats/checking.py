@@ -7,8 +7,12 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from selfmotion.basics import FileFormatError
+from selfmotion.formats.documents import ANGLES, LENGTHS
 from selfmotion.formats.models import document_model, path_model
 
+_UNITS = {"_deg": ANGLES, "_mm": LENGTHS}
+# Faults of a file that are told at once.
+_TOLD = 3
 _SECTIONS = ("path", "null_motion")
 
 
@@ -76,10 +80,9 @@ def _given(value: Any) -> Any:
 def _message(error: ValidationError, document: Mapping[str, Any]) -> str:
     # A key that is misspelt is also missing: what was written says more.
     found = sorted(error.errors(include_url=False), key=lambda item: item["type"] == "missing")
-    first = found[0]
-    where = _place(first["loc"])
-    rest = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return f"{where}: {_what(first, document)}{rest}"
+    told = dict.fromkeys(f"{_place(item['loc'])}: {_what(item, document)}" for item in found)
+    rest = f"; and {len(told) - _TOLD} more" if len(told) > _TOLD else ""
+    return "; ".join(list(told)[:_TOLD]) + rest
 
 
 def _place(location: tuple[int | str, ...]) -> str:
@@ -127,7 +130,8 @@ def _what(error: Any, document: Mapping[str, Any]) -> str:
 
 def _near(error: Any) -> str:
     known = _known_keys(error["loc"])
-    near = get_close_matches(str(error["loc"][-1]), known, 1)
+    units = [name + suffix for suffix, names in _UNITS.items() for name in known if name in names]
+    near = get_close_matches(str(error["loc"][-1]), [*known, *units], 1)
     return f", did you mean '{near[0]}'?" if near else f", expected one of: {', '.join(known)}"
 
 

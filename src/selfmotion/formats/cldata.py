@@ -67,7 +67,7 @@ class _Reader:
             return False
         found = _STATEMENT.fullmatch(text)
         if not found:
-            raise machine.fault(f"'{text[:60]}' is not read: see read_path for what is")
+            raise machine.unread(f"'{text[:60]}'")
         word, rest = found[1], found[2] or ""
         given = [item.strip() for item in rest.split(",")] if rest else []
         match word:
@@ -90,7 +90,7 @@ class _Reader:
             case _ if word in _ENDS:
                 return True
             case _ if word not in _NOTHING:
-                raise machine.fault(f"statement '{word}' is not read: see read_path for what is")
+                raise machine.unread(f"statement '{word}'")
         return False
 
     def _go(self, word: str, given: list[str]) -> None:

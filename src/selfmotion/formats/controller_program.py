@@ -143,8 +143,9 @@ def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
     for event, seam in seams.items():
         if not settings.knows(event):
             raise ProblemError(
-                f"seam '{seam}': event '{event}' has no signal; name the output that it switches, "
-                f"signals = {{'{event}': (output, True)}}, or None for a comment"
+                f"seam '{seam}': event '{event}' has no signal; say in the file of --settings what "
+                f"it switches, [signals] '{event}' = [output, true], or false for a comment only "
+                f"(ProgramSettings(signals=…))"
             )
 
 

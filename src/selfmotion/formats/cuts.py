@@ -120,6 +120,10 @@ class Machine:
         """Return an error about the line that is read."""
         return FileFormatError(f"{self.file}: line {self.number}: {what}")
 
+    def unread(self, what: str) -> FileFormatError:
+        """Return an error about something that is not read."""
+        return self.fault(f"{what} is not read: page 'Files' of the docs lists what is (read_path)")
+
     def text(self) -> str:
         """Return the file's text."""
         try:

@@ -56,6 +56,14 @@ def _pose(value: Any) -> Any:
         raise ValueError(str(error)) from error
 
 
+def _axis(value: Any) -> Any:
+    if isinstance(value, str):
+        if value not in "xyz" or len(value) != 1:
+            raise ValueError(f"is '{value}', expected x, y, z or three numbers")
+        return value
+    return _numbers(value)
+
+
 def _names(value: Any) -> Any:
     listed = [value] if isinstance(value, str) else value
     if not (isinstance(listed, list) and all(isinstance(item, str) for item in listed)):
@@ -113,7 +121,25 @@ Text = _checked(str, "a text", {"type": "string"})
 Table = _checked(Mapping, "a table", {"type": "object"})
 
 
+def _keys(*names: str) -> dict[str, Any]:
+    """Return the schema of a table whose own reader refuses other keys."""
+    keys: dict[str, Any] = {name: {"type": "number"} for name in names}
+    keys["axis"] = _TRIPLE
+    return {"type": "object", "properties": keys, "additionalProperties": False}
+
+
+Leads = _checked(Mapping, "a table", _keys("length", "duration"))
+
+
+Weave = _checked(Mapping, "a table", _keys("amplitude", "pitch", "dwell"))
+
+
 Numbers = Annotated[Any, PlainValidator(_numbers), WithJsonSchema(_ANY_NUMBERS)]
+
+
+Axis = Annotated[
+    Any, PlainValidator(_axis), WithJsonSchema({"anyOf": [{"enum": ["x", "y", "z"]}, _TRIPLE]})
+]
 
 
 Pose = Annotated[Any, PlainValidator(_pose), WithJsonSchema(_POSE)]

@@ -75,9 +75,7 @@ class _Reader:
         while at < len(text):
             found = _WORD.match(text, at)
             if not found:
-                raise machine.fault(
-                    f"'{text[at : at + 40]}' is not read: see read_path for what is"
-                )
+                raise machine.unread(f"'{text[at : at + 40]}'")
             words.append((found[1], found[2]))
             at = found.end()
         codes = [f"{letter}{float(value):g}" for letter, value in words if letter in "GM"]
@@ -86,7 +84,7 @@ class _Reader:
             if letter in "GM":
                 continue
             if letter not in _EVERY:
-                raise machine.fault(f"word '{letter}{value}' is not read: see read_path")
+                raise machine.unread(f"word '{letter}{value}'")
             if letter in values:
                 raise machine.fault(f"word {letter} is there twice")
             if len(value) > 30:
@@ -114,12 +112,19 @@ class _Reader:
                 self._motion = _MOTIONS[code]
             case _ if code in _NOTHING or code in _ENDS:
                 pass
+            case "G43":
+                raise self.machine.fault(
+                    "G43 is not read: heights of its tools' table are not known; write G43.4 where "
+                    "the program's positions are those of the tip, or leave it out"
+                )
+            case "G4":
+                raise self.machine.fault("G4 is not read: nothing waits along a cut; leave it out")
             case "M98" | "M99":
                 raise self.machine.fault(f"{code}: subprograms are not read; write them out")
             case _ if code.startswith("M"):
                 self.machine.happens(code)
             case _:
-                raise self.machine.fault(f"{code} is not read: see read_path for what is")
+                raise self.machine.unread(f"{code}")
 
     def _move(self, values: Mapping[str, float]) -> None:
         machine = self.machine

@@ -17,14 +17,15 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from selfmotion.basics import Array, Saved
 from selfmotion.certificate import Tolerance
-from selfmotion.collision import Obstacle, obstacle_shapes
+from selfmotion.collision import Mesh, Obstacle, obstacle_shapes
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost
 from selfmotion.formats.code import FUNCTION
-from selfmotion.formats.documents import ANGLES, LENGTHS
 from selfmotion.formats.field_types import (
+    Axis,
     Coordinates,
     Flag,
+    Leads,
     Names,
     Number,
     Numbers,
@@ -32,6 +33,7 @@ from selfmotion.formats.field_types import (
     Start,
     Table,
     Text,
+    Weave,
     Whole,
 )
 from selfmotion.formats.job import GOALS
@@ -52,9 +54,9 @@ _PLAIN = {bool: Flag, int: Whole, float: Number, str: Text, SE3: Pose}
 _Fields = dict[str, tuple[Any, Any]]
 # Where a file says more, or says it otherwise, than the class's own signature.
 _LAWS: Any = Literal[tuple(law.value for law in TimeLaw)]
-_SHAPE: _Fields = {"frame": (Pose, None), "leads": (Table, None)}
+_SHAPE: _Fields = {"frame": (Pose, None), "leads": (Leads, None)}
 _BOUNDS: _Fields = dict.fromkeys(FEED_BOUNDS, (Number, None))
-_WOVEN: _Fields = {"weave": (Table, None)}
+_WOVEN: _Fields = {"weave": (Weave, None)}
 _PACED: _Fields = {
     **{"duration": (Number, None), "feed": (Number, None)},
     **_BOUNDS,
@@ -80,6 +82,7 @@ _OWN: Mapping[str, _Fields] = {
     "weave": {"path": (Table, ...), **_SHAPE},
     "Relaxation": {"rows": (Names, ...), "during": (Numbers, None)},
     "Search": {"rng": (Whole, 0)},
+    "Tilt": {"axis": (Axis, "z")},
 }  # fmt: skip
 _WHOLLY_OWN = {"twist"}
 
@@ -191,21 +194,6 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
     return _model("Problem", fields, "A planning problem.")
 
 
-def json_schema() -> dict[str, Any]:
-    """Return the JSON Schema of problem files, for editors."""
-    schema = document_model().model_json_schema()
-    for table in (schema, *schema["$defs"].values()):
-        keys = table.get("properties", {})
-        for suffix, names in (("_deg", ANGLES), ("_mm", LENGTHS)):
-            for name in sorted(names & set(keys)):
-                keys[name + suffix] = keys[name]
-                if name in table.get("required", []):
-                    table["required"].remove(name)
-    for name in ("collision", "damping"):
-        schema["properties"][name] = {"anyOf": [{"type": "boolean"}, schema["properties"][name]]}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
-
-
 def model_of(
     cls: type, tag: tuple[str, str] | None = None, own: _Fields | None = None
 ) -> type[BaseModel]:
@@ -257,7 +245,8 @@ def _placed(cls: type[Obstacle]) -> _Fields:
     fields: _Fields = {}
     for item in dataclasses.fields(cls):
         if item.name == "pose":
-            fields |= {"position": (Numbers, ...), **orientations}
+            # Meshes have a place of their own.
+            fields |= {"position": (Numbers, None if cls is Mesh else ...), **orientations}
         else:
             default = ... if item.default is dataclasses.MISSING else item.default
             kind = Text if item.name == "file" else _type_of(item.type)

@@ -167,6 +167,12 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
         return Trajectory.from_csv(path, degrees=degrees)
     if path.suffix.lower() == ".npz":
         return _in_radians(_read_npz(path), degrees)
+    if path.suffix.lower() not in (".json", ".yaml", ".yml"):
+        written = ", though it is written" if path.suffix.lower() in SUFFIXES else ""
+        raise FileFormatError(
+            f"{path}: is no motion that is read{written}: expected .csv, .npz, .json, .yaml (ROS), "
+            f".src (KUKA) or .mod (ABB)"
+        )
     document = read_document(path)
     read = _of_tables if "t" in document else ros.trajectory
     return _in_radians(read(path, document), degrees)

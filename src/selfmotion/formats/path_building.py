@@ -14,6 +14,7 @@ from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints
 
 # A coordinate beyond this [m] can only be meant in millimetres.
 _FAR = 50.0
+_METRES = ("metres; say x_mm,y_mm,z_mm if it is millimetres", "metres; are its units as it says?")
 # An angle beyond this [rad] can only be meant in degrees.
 _ROUND = 2.0 * np.pi + 1e-6
 # Poses farther from their predecessor than this [m] are a jump, unless another length is given.
@@ -147,7 +148,7 @@ def _check_rows(file: FilePath, rows: PoseRows) -> None:
             place = rows.places[int(bad[0])]
             raise FileFormatError(f"{file}: {place}: the {what} is not finite; mend or drop it")
     for what, values, bound, remedy in (
-        ("position", rows.positions, _FAR, "metres; say x_mm,y_mm,z_mm if it is millimetres"),
+        ("position", rows.positions, _FAR, _METRES[rows.straight]),
         ("angle", rows.values, _ROUND, "radians; say roll_deg,… or rx_deg,… if it is degrees"),
     ):
         if what == "angle" and rows.orientation not in ("rpy", "rotation_vector"):
@@ -185,7 +186,7 @@ def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) 
     cosines = np.einsum("kij,kij->k", rotations[:-1], rotations[1:])
     turns = np.arccos(np.clip(0.5 * (cosines - 1.0), -1.0, 1.0))
     for what, amounts, bound, unit, remedy in (
-        ("jumps by", steps, jump, "m", _remedy(jump)),
+        ("jumps by", steps, jump, "m", _remedy(jump, rows.straight)),
         ("turns by", turns, _FLIP, "rad", "which has no clear direction; add poses between"),
     ):
         far = np.flatnonzero(amounts > bound)
@@ -197,7 +198,12 @@ def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) 
             )
 
 
-def _remedy(jump: float) -> str:
+def _remedy(jump: float, is_cut: bool) -> str:
+    if is_cut:
+        return (
+            f"more than {jump:g} m; give a larger jump if it is meant, or the program's own units "
+            f"(G20, UNITS/INCHES: inches; G21, UNITS/MM: mm)"
+        )
     return (
         f"more than {jump:g} m; give a larger jump if it is meant, or name the columns x_mm,… if "
         f"they are millimetres"

@@ -43,6 +43,7 @@ def read_path(
                     none; ``feed`` [m/s] from a pose on, instead of ``t``; ``x_mm``,
                     ``feed_mm`` and ``roll_deg`` are in those units; ``seam`` names
                     the seam that a pose is of, ``event`` what happens there
+                    (``arc on; gas on``: both)
     .npy            (N, 4, 4) poses, or a table (N, 3) x,y,z; (N, 4) t,x,y,z;
                     (N, 7) x,y,z,qw,qx,qy,qz; (N, 8) with t first
     .yaml .json     ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``
@@ -153,6 +154,14 @@ def _read(path: FilePath) -> Mapping[str, PoseRows]:
             f"{path}: has suffix '{path.suffix}', expected one of {', '.join(_READERS)}"
         )
     return reader(path)
+
+
+def events_of(file: FilePath, seam: str | None) -> tuple[str, ...]:
+    """Return what happens along a path of a file, each once; nothing of one that is refused."""
+    try:
+        return tuple(dict.fromkeys(event for _, event in one_seam(file, seam).events))
+    except FileFormatError:
+        return ()
 
 
 def one_seam(path: FilePath, seam: str | None) -> PoseRows:

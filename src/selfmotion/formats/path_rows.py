@@ -134,8 +134,13 @@ def _of_table(
         values,
         columns.get("t"),
         columns.get("feed"),
-        tuple((k, event) for k, event in enumerate(events) if event),
+        tuple((k, event) for k, text in enumerate(events) for event in _several(text)),
     )
+
+
+def _several(text: str) -> list[str]:
+    """Return the events of a row, with semicolons between them."""
+    return [event.strip() for event in text.split(";") if event.strip()]
 
 
 def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, Array]:

@@ -75,6 +75,11 @@ def job_of(
     from selfmotion.formats.checking import checked
 
     with _named(file, ""):
+        if "seams" in document or "job" in document:
+            raise ProblemError(
+                "has seams, so that it is a job: `selfmotion job` plans it (read_seam_job); of "
+                "motions only its own .program is judged by it: `selfmotion check a.program`"
+            )
         raw = in_si(document)
         functions = name_kinds(raw, FilePath() if file is None else file.parent, allow_code)
         table = placed_table(checked(raw))

@@ -14,7 +14,7 @@ from selfmotion.basics import (
     RobotError,
     restore,
 )
-from selfmotion.collision import obstacle_from_dict
+from selfmotion.collision import Mesh, obstacle_from_dict
 from selfmotion.formats.path_files import read_path
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.path import (
@@ -86,11 +86,12 @@ def path_of(
             path = _restored(_with_inner(values, inner))
     path = path if feed is None else Feed(path, feed, **bounds)
     path = path if weave is None else woven(path, weave)
-    path = path if leads is None else _with_leads(path, leads)
+    path = path if leads is None else led(path, leads)
     return path if frame is None else Placed(path, frame)
 
 
-def _with_leads(path: Path, values: Mapping[str, Any]) -> Path:
+def led(path: Path, values: Mapping[str, Any]) -> Path:
+    """Return a path with a lead-in and a lead-out, as a file says it."""
     _check_keys(values, "leads", ("length", "duration"), ("axis",))
     return with_leads(path, **values)
 
@@ -125,11 +126,19 @@ def _with_inner(
     return found
 
 
+def placed_if_mesh(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the table of an obstacle; meshes are where their own coordinates say, by default."""
+    given = dict(values)
+    if given.get("shape") == Mesh.shape:
+        given.setdefault("position", [0.0, 0.0, 0.0])
+    return given
+
+
 def obstacle(values: Mapping[str, Any], beside: Callable[[str], FilePath]) -> Any:
     """Return an obstacle from a table with its pose in any of the ways of `pose_of`."""
     from selfmotion.formats.poses import pose_of
 
-    given = dict(values)
+    given = placed_if_mesh(values)
     keys = [key for key in ("position", *ORIENTATIONS) if key in given]
     try:
         pose = pose_of({key: given.pop(key) for key in keys})

@@ -190,7 +190,10 @@ class ProgramReader:
                     method(self, found.groups())
                     break
             else:
-                raise self.lines.fault(f"'{text[:60]}' is not read: see read_motion for what is")
+                raise self.lines.fault(
+                    f"'{text[:60]}' is not read: page 'Files' of the docs lists what is "
+                    f"(read_motion)"
+                )
         if self.state != "after":
             raise self.lines.fault(f"is the last one, expected {self.last}")
         return self.lines.program(self.name, self.present, self.rows)

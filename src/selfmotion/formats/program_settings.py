@@ -41,7 +41,7 @@ class ProgramSettings:
         seven the third one is E1, as KUKA's LBR and ABB's IRB 14000 count; the rest in order.
     signals : mapping, optional
         Event → output and value, such as ``{"arc on": ("doArc", True)}``; KUKA's and Universal
-        Robots' outputs are numbers. None for an event that is a comment only.
+        Robots' outputs are numbers. None (in files false) for an event that is a comment only.
     flange : str, optional
         The link that is the controller's flange, from which it counts the tool's place; by default
         ``flange`` or ``tool0`` where the tool rides on the same link, else that link itself.
@@ -134,7 +134,8 @@ def read_program_settings(file: str | FilePath) -> ProgramSettings:
 
 
 def _signal(event: object, given: object) -> Signal | None:
-    if given is None:
+    # Files have no None.
+    if given is None or given is False:
         return None
     if isinstance(given, list | tuple) and len(given) == 2:
         output, value = given

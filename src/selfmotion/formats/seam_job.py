@@ -10,10 +10,10 @@ from selfmotion.constraints import Clearance
 from selfmotion.formats.documents import in_si, read_document
 from selfmotion.formats.job import Job
 from selfmotion.formats.path_events import times_of_events
-from selfmotion.formats.path_files import one_seam, read_seams
+from selfmotion.formats.path_files import one_seam, read_path, read_seams
 from selfmotion.formats.poses import pose_of
 from selfmotion.formats.problem_file import job_of
-from selfmotion.formats.problem_parts import FEED_BOUNDS, obstacle, start_of, woven
+from selfmotion.formats.problem_parts import FEED_BOUNDS, led, obstacle, start_of, woven
 from selfmotion.formats.workpiece import NAME, placed_body, standing
 from selfmotion.job import Program, Seam, plan_job
 from selfmotion.path import Path, Placed, section_at_rest
@@ -21,12 +21,12 @@ from selfmotion.problem import NO_OVERLAP
 from selfmotion.robot import RobotModel
 
 # Keys of a job, of a seam besides those of a problem, and of seams in one table.
-_JOB = ("start", "end", "order", "branches", "seconds_per_cost", "deadline", "rng")
-_SEAM = ("name", "either_way", "after", "after_any", "wait", "events", "leaves", "may_meet")
-_OF_PROBLEM = ("path", "task", "costs", "constraints", "relaxations")
-_PLACED = ("file", "frame", "ramp", "weave")
+JOB = ("start", "end", "order", "branches", "seconds_per_cost", "deadline", "rng")
+SEAM = ("name", "either_way", "after", "after_any", "wait", "events", "leaves", "may_meet")
+OF_PROBLEM = ("path", "task", "costs", "constraints", "relaxations")
+_PLACED = ("file", "frame", "ramp", "weave", "leads")
 _PACED = ("feed", "duration", "jump", "corners", "tolerance", "corner_angle", *FEED_BOUNDS)
-_TABLE = (*_PLACED, *_PACED)
+OF_TABLE = (*_PLACED, *_PACED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,26 +115,38 @@ class _Reader:
             raise FileFormatError(f"{self._file}: seams: an entry is no table, expected [[seams]]")
         name = given.get("name")
         where = f"seams, '{name}'"
-        self._check(given, (*_SEAM, *_OF_PROBLEM), where)
+        self._check(given, (*SEAM, *OF_PROBLEM), where)
         if "path" not in given:
             raise FileFormatError(f"{self._file}: {where}: path is missing")
-        path = given["path"]
+        path, own = given["path"], dict(given)
         if isinstance(path, Mapping) and path.get("kind") == "file" and "events" not in given:
-            self._refuse_events(path, where)
-        return [self._seam(given, None, where)]
+            events, straight = self._events_of(in_si(path), where)
+            own |= {"events": events} if events else {}
+            if events or straight:
+                own.setdefault("either_way", False)
+        return [self._seam(own, None, where)]
 
-    def _refuse_events(self, path: Mapping[str, Any], where: str) -> None:
-        """Raise FileFormatError for events in the file of a path, which would be lost."""
+    def _events_of(
+        self, path: Mapping[str, Any], where: str
+    ) -> tuple[list[tuple[str, float]], bool]:
+        """Return the events in the file of a path [s], and whether it is of a machine tool."""
         file = self._file.parent / str(path.get("file", ""))
-        if file.is_file() and one_seam(file, path.get("seam")).events:
-            raise FileFormatError(
-                f"{self._file}: {where}: {file.name} has events, which are kept of a table [seams] "
-                f"with that file; or say here when they are, events = [] for none"
-            )
+        if not file.is_file():
+            return [], False
+        try:
+            rows = one_seam(file, path.get("seam"))
+            if not rows.events:
+                return [], rows.straight
+            options = {key: path[key] for key in ("seam", *_PACED) if key in path}
+            timed = _ramped(read_path(file, **options), path)
+            events = times_of_events(timed, rows)
+            return _after_lead(events, path.get("leads")), rows.straight
+        except (SelfmotionError, TypeError) as error:
+            raise FileFormatError(f"{self._file}: {where}: path: {error}") from error
 
     def of_table(self, given: Mapping[str, Any]) -> list[Seam]:
         """Return the seams of a file with a column ``seam``."""
-        self._check(given, (*_SEAM[1:], *_OF_PROBLEM[1:], *_TABLE), "seams")
+        self._check(given, (*SEAM[1:], *OF_PROBLEM[1:], *OF_TABLE), "seams")
         values = in_si(given)
         if "file" not in values:
             raise FileFormatError(f"{self._file}: seams: file is missing, or a list [[seams]]")
@@ -144,17 +156,18 @@ class _Reader:
             raise FileFormatError(f"{self._file}: seams: frame: {error}") from error
         table = self._file.parent / values["file"]
         options = {key: values[key] for key in _PACED if key in values}
-        rest = {key: value for key, value in given.items() if key not in _TABLE}
+        rest = {key: value for key, value in given.items() if key not in OF_TABLE}
         found, seams = list[Seam](), read_seams(table, options)
         # What a machine switches stays switched in the cuts that follow: they keep their order.
         switched = any(rows.straight and rows.events for _, rows in seams.values())
         for name, (path, rows) in seams.items():
-            if "ramp" in values:
-                path = section_at_rest(path, ramp=values["ramp"])
+            path = _ramped(path, values)
             own = {**rest, "name": name}
-            events = times_of_events(path, rows)
+            events = _after_lead(times_of_events(path, rows), values.get("leads"))
             if "weave" in values:
                 path = woven(path, values["weave"])
+            if "leads" in values:
+                path = led(path, values["leads"])
             if events:
                 own["events"] = [*events, *rest.get("events", [])]
             if events or rows.straight:
@@ -173,7 +186,7 @@ class _Reader:
         if not isinstance(given, Mapping):
             raise FileFormatError(f"{self._file}: job: expected a table [job]")
         values = in_si(given)
-        self._check(values, _JOB, "job")
+        self._check(values, JOB, "job")
         robot, task = self.first.problem.robot, self.first.problem.task
         try:
             for name in ("start", "end"):
@@ -184,7 +197,7 @@ class _Reader:
         return values
 
     def _seam(self, given: Mapping[str, Any], path: Path | None, where: str) -> Seam:
-        own = {key: value for key, value in given.items() if key in _OF_PROBLEM}
+        own = {key: value for key, value in given.items() if key in OF_PROBLEM}
         constraints = own.pop("constraints", [])
         whole = self._shared.get("constraints", [])
         document = {"path": _ANY, **own}
@@ -192,7 +205,7 @@ class _Reader:
             document["constraints"] = [*whole, *constraints]
         problem = self._read(document, where).problem
         besides = list(problem.constraints)[len(whole) :] if constraints else []
-        values = {key: value for key, value in in_si(given).items() if key in _SEAM}
+        values = {key: value for key, value in in_si(given).items() if key in SEAM}
         try:
             leaves = [self._left(in_si(item)) for item in values.pop("leaves", [])]
             return Seam(
@@ -238,10 +251,25 @@ class _Reader:
             raise FileFormatError(f"{self._file}: {where}: leaves: expected tables of bodies")
 
 
+def _ramped(path: Path, values: Mapping[str, Any]) -> Path:
+    """Return a path that is run up to its speed, where that is asked for."""
+    return section_at_rest(path, ramp=values["ramp"]) if "ramp" in values else path
+
+
+def _after_lead(
+    events: Sequence[tuple[str, float]], leads: Mapping[str, Any] | None
+) -> list[tuple[str, float]]:
+    """Return events of a path [s] after its lead-in, whose faults are told where it is made."""
+    first = (leads or {}).get("duration", 0.0)
+    later = first if isinstance(first, int | float) else 0.0
+    return [(event, later + at) for event, at in events]
+
+
 # What is neither read by a model nor by what it is handed to.
 _KINDS: Mapping[str, tuple[type, str]] = {
     "file": (str, "the name of a file"),
     "weave": (Mapping, "a table with amplitude and pitch"),
+    "leads": (Mapping, "a table with length and duration"),
     **dict.fromkeys(("events", "leaves", "constraints", "costs", "relaxations"), (list, "a list")),
 }
 # A motion that any arm's tool may have, so that what seams share can be read.

@@ -1,6 +1,7 @@
 """Joint targets that a controller passes, and how far that takes it off the motion.
 
-A motion is cut where the arm rests for a while. Of what is left, targets are as far apart as the
+A motion is cut where the arm rests, be it for an instant: controllers stop there, and what happens
+there happens on time. Of what is left, targets are as far apart as the
 error of straight joint lines between them allows, h²|Jq̈|/8 ≤ deviation, spread over the time
 evenly in ∫ √(|Jq̈|/8) dt (de Boor, "Good approximation by splines with variable knots", 1973).
 What is left of error is then measured by forward kinematics.
@@ -26,8 +27,8 @@ from selfmotion.robot import Chain
 TIME_DIGITS, ANGLE_DIGITS, LENGTH_DIGITS = 5, 5, 4
 # The arm rests where it is as slow as this [rad or m/s] for at least so long [s].
 _REST, _WHILE = 1e-7, 0.02
-# Programs go from rest to rest: this is rest [rad or m/s].
-_SLOW = 1e-4
+# Programs go from rest to rest: this is rest [rad or m/s], and so is such a share of the fastest.
+_SLOW, _SHARE = 1e-4, 1e-3
 # Where between two targets, and how near to each, the error is looked at.
 _BETWEEN = np.array([0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875])
 # Times at which the motion's curvature is looked at, for each of its samples; targets at least
@@ -156,15 +157,15 @@ def stretches_of(
                     f"{speed.max():.3g} rad/s or m/s at t = {when:.6g} s; programs of controllers "
                     f"go from rest to rest: plan it with a ramp, or rest=True"
                 )
-        for first, last in _moving(motion):
+        for first, last in _moving(motion, [motion.t[0] + at for at, _ in piece.events]):
             stretch, miss = _thinned(piece, slides, allowed, first, last)
             worst = Miss(*map(max, worst, miss))
             found.append(stretch)
     return found, worst
 
 
-def _moving(motion: Trajectory) -> list[tuple[float, float]]:
-    """Return when motion and rest begin and end, in turn [s]."""
+def _moving(motion: Trajectory, events: Sequence[float]) -> list[tuple[float, float]]:
+    """Return when motions from rest to rest, and rests, begin and end, in turn [s]."""
     still = np.abs(motion.qd).max(axis=1) < _REST
     still[:-1] &= np.abs(np.diff(motion.q, axis=0)).max(axis=1) < 1e-9
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still[:-1], [False]]).astype(int)))
@@ -173,8 +174,29 @@ def _moving(motion: Trajectory) -> list[tuple[float, float]]:
         if motion.t[end] - motion.t[begin] >= _WHILE:
             marks += [float(motion.t[begin]), float(motion.t[end])]
     marks.append(float(motion.t[-1]))
-    marks = [mark for k, mark in enumerate(marks) if k == 0 or mark > marks[k - 1]]
+    for stop in _stops(motion, events):
+        if np.abs(stop - np.array(marks)).min() >= _WHILE and not _within(stop, marks, motion):
+            marks.append(stop)
+    marks = sorted(set(marks))
     return list(pairwise(marks))
+
+
+def _within(stop: float, marks: Sequence[float], motion: Trajectory) -> bool:
+    """Whether a time is in one of the rests that last."""
+    first, last = max(m for m in marks if m < stop), min(m for m in marks if m > stop)
+    return bool(np.abs(motion(last) - motion(first)).max() < 1e-9) and _rests(motion, first, last)
+
+
+def _stops(motion: Trajectory, events: Sequence[float]) -> list[float]:
+    """Return when the arm rests for an instant [s]: where an event is then, at that."""
+    speeds = np.abs(motion.qd).max(axis=1)
+    slow = min(_SLOW, _SHARE * float(speeds.max()))
+    inside = np.clip(events, motion.t[0], motion.t[-1]).tolist()
+    found = [at for at in inside if np.abs(motion(at, 1)).max() < slow]
+    edges = np.diff(np.concatenate([[False], speeds < slow, [False]]).astype(int))
+    for begin, end in np.flatnonzero(edges).reshape(-1, 2):
+        found.append(float(motion.t[begin + int(speeds[begin:end].argmin())]))
+    return found
 
 
 def _thinned(

@@ -47,7 +47,7 @@ def script(
     settings : ProgramSettings, optional
         Flange, load, outputs, and how fast to the start.
     events : sequence of (int, str)
-        Before which sample what happens.
+        Before which sample what happens. Outputs are switched as late as the arm follows.
 
     Raises
     ------
@@ -68,14 +68,19 @@ def script(
         f"# {robot.name}: {len(q)} setpoints, joints {', '.join(joints)} [rad].",
         f"# servoj at {rate:g} Hz (t = {period} s), lookahead_time = {_LOOK_AHEAD} s, "
         f"gain = {_GAIN}:",
-        f"# the arm follows about {_LOOK_AHEAD} s late, and rounds what is faster than that.",
+        f"# the arm follows about {_LOOK_AHEAD} s late, and rounds what is faster than that;",
+        "# outputs are switched as much later, when the arm is there.",
         "def selfmotion():",
         *_tool(robot, joints, asked),
         *([] if asked.mass is None else [f"  set_payload({asked.mass:.6g}, [{center}])"]),
         f"  movej({_vector(q[0])}, a={push:.4g}, v={speed:.4g})",
     ]
-    switched = {k: [name for at, name in events if at == k] for k, _ in events}
-    for k, row in enumerate(q):
+    late = round(_LOOK_AHEAD * rate)
+    switched = {k + late: [name for at, name in events if at == k] for k, _ in events}
+    # The last setpoint is held until the arm is where the last events are.
+    held = max([len(q), *(k + 1 for k in switched)])
+    for k in range(held):
+        row = q[min(k, len(q) - 1)]
         lines += [f"  {_event(name, asked)}" for name in switched.get(k, ())]
         lines.append(
             f"  servoj({_vector(row)}, t={period}, lookahead_time={_LOOK_AHEAD}, gain={_GAIN})"

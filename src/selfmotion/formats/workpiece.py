@@ -6,6 +6,7 @@ from typing import Any
 from selfmotion.basics import FileFormatError, ProblemError
 from selfmotion.formats.documents import in_si
 from selfmotion.formats.poses import ORIENTATIONS, pose_of
+from selfmotion.formats.problem_parts import placed_if_mesh
 from selfmotion.task import SE3
 
 # What its mesh is called.
@@ -39,7 +40,7 @@ def placed_table(table: Mapping[str, Any]) -> dict[str, Any]:
     bodies = [placed_body(item, frame, carrier) for item in piece.get("obstacles", [])]
     if "mesh" in piece:
         scale = {"scale": piece["scale"]} if "scale" in piece else {}
-        mesh = {"shape": "mesh", "name": NAME, "file": piece["mesh"], "position": [0.0] * 3}
+        mesh = {"shape": "mesh", "name": NAME, "file": piece["mesh"]}
         bodies.append(placed_body({**mesh, **scale}, frame, carrier))
     elif "scale" in piece:
         raise ProblemError("workpiece: scale has no effect without a mesh")
@@ -55,7 +56,7 @@ def placed_path(values: Mapping[str, Any], frame: SE3) -> dict[str, Any]:
 
 def placed_body(values: Mapping[str, Any], frame: SE3, carrier: str | None) -> dict[str, Any]:
     """Return the table of an obstacle that is in a frame, as one in the world or on a link."""
-    found = dict(values)
+    found = placed_if_mesh(values)
     keys = [key for key in ("position", *ORIENTATIONS) if key in found]
     try:
         pose = frame * pose_of({key: found.pop(key) for key in keys})

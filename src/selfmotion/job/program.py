@@ -105,9 +105,14 @@ class Program:
         """Return a few lines: how many seams in what order, how long, and the verdict."""
         names = " → ".join(self.order[:_SHOWN]) + (" → …" if len(self.order) > _SHOWN else "")
         return (
-            f"Program({self.robot.name}, {len(self.order)} seams, {self.duration:.6g} s, "
+            f"Program({self.robot.name}, {self._seams}, {self.duration:.6g} s, "
             f"{self.transfer_time:.6g} s of it moves)\n  {names}\n  {self.verdict}"
         )
+
+    @property
+    def _seams(self) -> str:
+        count = len(self.order)
+        return f"{count} seam{'s' * (count != 1)}"
 
     @property
     def order(self) -> tuple[str, ...]:
@@ -172,8 +177,7 @@ class Program:
         """One line: verified, or what is wrong with which seam or move."""
         if self.verified:
             return (
-                f"verified at all times: {len(self.order)} seams, and all moves in between, from "
-                f"rest to rest"
+                f"verified at all times: {self._seams}, and all moves in between, from rest to rest"
             )
         return f"not verified: {'; '.join(self.failures)}"
 
@@ -244,7 +248,7 @@ class Program:
         return self
 
     def write_timetable(self, file: str | FilePath) -> None:
-        """Write when each step begins and ends, and each event is, as CSV; atomically."""
+        """Write when each step begins and ends, and each event is [s], as CSV; atomically."""
         rows = [
             (begin, begin + _duration(step), "seam" if step.is_seam else "move", step.name)
             for begin, step in zip(self.begins, self.steps, strict=True)
@@ -252,7 +256,7 @@ class Program:
         rows += [(at, at, "event", f"{seam}: {event}") for at, seam, event in self.events]
         lines = ["begin,end,kind,name"]
         lines += [
-            f'{begin!r},{end!r},{kind},"{name.replace(chr(34), chr(34) * 2)}"'
+            f'{begin:.6f},{end:.6f},{kind},"{name.replace(chr(34), chr(34) * 2)}"'
             for begin, end, kind, name in sorted(rows)
         ]
         write_text(as_path(file), "\n".join(lines) + "\n")

@@ -126,8 +126,8 @@ def plan_job(
     work = Work(asked, shelf, executor, progress)
     ordering = Ordering(listed, work, ends, price, is_free)
     if not ordering.states:
-        reasons = "; ".join(f"'{name}': {why}" for name, why in ordering.missing.items())
-        raise PlanError(f"{robot.name}: no seam has a motion: {reasons}")
+        reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
+        raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
     return Builder(ordering, work, ends).program()
 
 

@@ -1,11 +1,12 @@
 """Whether what a problem was given is of the right kind, and agrees with the rest."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from selfmotion.basics import Array, ProblemError, StartError, shown
 from selfmotion.certificate import Requirement
-from selfmotion.constraints import Clearance, Constraint
+from selfmotion.constraints import Clearance, Constraint, JointVelocityLimits
 from selfmotion.costs import Cost
 from selfmotion.follow import Follow, Follows
 from selfmotion.motion import NullMotion
@@ -35,6 +36,8 @@ _EXAMPLES = {
     "damping": "Damping or None",
     "collision": "Clearance or None",
 }
+# Limits so many times the arm's own are in other units.
+_FAR_ABOVE = 10.0
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
 
@@ -69,15 +72,46 @@ def check_judged(constraints: Sequence[Constraint], found: Sequence[Requirement]
             )
 
 
+def _beyond(robot: RobotModel, start: Array) -> str:
+    """Return which joint of a configuration (n,) is beyond its limits, "" for none."""
+    for k, name in enumerate(robot.joint_names):
+        low, high = robot.lower[k], robot.upper[k]
+        if not low <= start[k] <= high:
+            unit, asked = ("m", "") if robot.is_prismatic(name) else ("rad", "; in degrees?")
+            return (
+                f"has joint '{name}' at {start[k]:g} {unit}, beyond its limits of {low:.4g} to "
+                f"{high:.4g} {unit}{asked}, and "
+            )
+    return ""
+
+
+def unit_remarks(robot: RobotModel, constraints: Sequence[Constraint]) -> Iterator[str]:
+    """Yield limits that are so far above the arm's own that they may be meant in degrees."""
+    for item in constraints:
+        if not isinstance(item, JointVelocityLimits) or item.limit is None or item.replace:
+            continue
+        own = replace(item, replace=True).of(robot)
+        published = item.published(robot)
+        for k, name in enumerate(robot.joint_names):
+            if own[k] > _FAR_ABOVE * published[k] and not robot.is_prismatic(name):
+                yield (
+                    f"JointVelocityLimits: {own[k]:g} rad/s for '{name}' has no effect, the arm's "
+                    f"own limit is {published[k]:.4g} rad/s; in degrees? limit_deg"
+                )
+                break
+
+
 def check_start(follows: Follows, start: Array) -> None:
     """Raise StartError where a start (n,) is off one of the paths."""
     for item in follows.items:
         position, rotation = item.miss(item.path.pose(0.0), start)
         if max(position, rotation) > _ON_PATH:
+            beyond = _beyond(follows.robot, start)
             raise StartError(
-                f"{follows.robot.name}: the start configuration puts '{item.chain.tip_name}' "
-                f"{position:.3g} m and {rotation:.3g} rad off the start of the path; leave it "
-                f"out, or take robot.inverse_kinematics(path.pose(0.0), task, seed=start)",
+                f"{follows.robot.name}: the start configuration {beyond}puts "
+                f"'{item.chain.tip_name}' {position:.3g} m and {rotation:.3g} rad off the start of "
+                f"the path; leave it out, or take "
+                f"robot.inverse_kinematics(path.pose(0.0), task, seed=start)",
                 position_miss=position,
                 rotation_miss=rotation,
             )

@@ -49,7 +49,14 @@ from selfmotion.motion import (
 )
 from selfmotion.path import Path
 from selfmotion.problem.fit import check_fit, rest_orders
-from selfmotion.problem.given import SEQUENCES, check_costs, check_judged, check_kinds, check_start
+from selfmotion.problem.given import (
+    SEQUENCES,
+    check_costs,
+    check_judged,
+    check_kinds,
+    check_start,
+    unit_remarks,
+)
 from selfmotion.problem.knots import smooth_knots
 from selfmotion.robot import RobotModel
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
@@ -327,11 +334,11 @@ class Problem:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What to know before planning: links that overlap in most configurations."""
+        """What to know before planning: links that overlap, limits that look like degrees."""
         bodies = (model for model, _ in self.envelope.bodies)
         found = (pair for model in bodies for pair in model.overlapping if pair.is_checked)
         told = (f"{pair.first} - {pair.second}: {pair.remedy}" for pair in found)
-        return tuple(dict.fromkeys(told))
+        return tuple(dict.fromkeys([*told, *unit_remarks(self.robot, self.constraints)]))
 
     def certify(
         self,
