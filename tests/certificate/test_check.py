@@ -10,7 +10,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import check
-from selfmotion.certificate.check import _because, _damped_stretches, _undecided
+from selfmotion.certificate.check import _because, _damped_stretches, _told, _undecided
 from selfmotion.certificate.deviation import smallest_singular_values
 from selfmotion.certificate.path_error import PathCheck
 from selfmotion.task import DampingLaw
@@ -254,3 +254,12 @@ def test_too_fast_plans_are_refused_with_the_factor(panda: sm.RobotModel) -> Non
 
 def test_verified_plans_pass_require(sample: sm.Plan) -> None:
     assert sample.require() is sample
+
+
+def test_what_no_slower_motion_mends_is_told_first() -> None:
+    fast, near = (
+        sm.Finding(name, "a", 0.0, 2.0, 1.0, False, name) for name in ("speeds", "clearance")
+    )
+    fast = dataclasses.replace(fast, of_pace=True, factor=1.5)
+    assert list(_told((fast, near))) == ["clearance", "speeds"]
+    assert list(_told((dataclasses.replace(near, kept=True), fast))) == ["speeds"]
