@@ -215,3 +215,21 @@ def test_refuses_wrong_shapes() -> None:
     for q in (np.zeros(6), np.zeros((2, 5)), np.full((2, 6), np.nan)):
         with pytest.raises(RobotError, match="samples have shape"):
             model.clearances(q)
+
+
+def test_pairs_of_convex_bodies_alone_are_exact(tmp_path: Path) -> None:
+    """Two walls in one mesh are not their hull; each of them is."""
+    walls = [trimesh.creation.box([0.1, 0.02, 0.1]), trimesh.creation.box([0.02, 0.1, 0.1])]
+    walls[1].apply_translation([0.3, 0.3, 0.0])
+    both = trimesh.util.concatenate(walls)
+    items = []
+    for name, mesh in (("wall", walls[0]), ("walls", both)):
+        mesh.export(tmp_path / f"{name}.stl")
+        items.append(Mesh(name, [0.6, 0.6, 0.6], tmp_path / f"{name}.stl"))
+    robot = load_robot("panda")
+    model = ClearanceModel(CollisionModel(robot, items))
+    exact = {pair: model.is_exact(column) for column, pair in enumerate(model.pairs)}
+    convex = {kept for pair, kept in exact.items() if "wall" in pair}
+    # Of the arm's own meshes some are convex, others are not.
+    assert True in convex
+    assert not any(kept for pair, kept in exact.items() if "walls" in pair)

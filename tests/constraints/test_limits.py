@@ -1,5 +1,6 @@
 """Limits of joints are kept between samples, or named where they cannot be."""
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.certificate import JointLimits
+from support.arms import robot_named, short_line
 
 Circle = Callable[..., sm.Problem]
 
@@ -82,3 +84,16 @@ def test_limits_that_do_not_bind_cost_no_evaluation(panda_circle: Circle) -> Non
     assert without.report.evaluations == within.report.evaluations
     for first, second in zip(without.report.history, within.report.history, strict=True):
         np.testing.assert_array_equal(first.x, second.x)
+
+
+def test_limits_that_nobody_knows_are_told_of() -> None:
+    """A constraint that has nothing to ask of an arm is not passed over in silence."""
+    robot = robot_named("ur10")
+    start = robot.dexterous_configuration("pointing")
+    asked = sm.JointAccelerationLimits()
+    problem = sm.Problem(robot, short_line(robot, start), "pointing", start, constraints=[asked])
+    told = [text for text in sm.plan(problem).certificate.remarks if "asked for" in text]
+    assert len(told) == 1
+    assert "joint acceleration limits" in told[0]
+    known = dataclasses.replace(problem, constraints=[sm.JointAccelerationLimits(5.0)])
+    assert not any("asked for" in text for text in sm.plan(known).certificate.remarks)

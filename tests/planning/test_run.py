@@ -11,7 +11,7 @@ import yourdfpy
 import selfmotion as sm
 from selfmotion.certificate import Extreme
 from selfmotion.optimise import Status
-from selfmotion.planning.run import _message
+from selfmotion.planning.run import _message, _status
 
 
 @pytest.mark.parametrize("on_path", [True, False])
@@ -32,6 +32,23 @@ def test_next_to_a_singular_pose_no_gradient_is_blamed(on_path: bool) -> None:
     singular = "the motion passes a singular pose near t = 1.5 s (smallest singular value 3e-07)"
     assert said.startswith(Status.GRADIENT.message if on_path else singular)
     assert said.endswith("" if on_path else "but not verified: the tool is off")
+
+
+@pytest.mark.parametrize("verified", [True, False])
+def test_what_is_verified_is_not_called_infeasible(verified: bool) -> None:
+    wrong = "clearance: the convex hulls of 'torch' and 'pipes' are -49.37 mm apart"
+    session = SimpleNamespace(status=Status.INFEASIBLE, violations=(wrong,), cut_short=False)
+    failures = () if verified else ("torch - pipes meet",)
+    certificate = SimpleNamespace(
+        on_path=True, failures=failures, verdict="", damped=(), verified=verified
+    )
+    part = SimpleNamespace(session=session, ending="")
+    finished = SimpleNamespace(certificate=certificate)
+    said = _message(part, finished, [])  # type: ignore[arg-type]
+    status = _status(session, finished)  # type: ignore[arg-type]
+    assert wrong in said
+    assert ("kept by the motion" in said) == verified
+    assert status is (Status.PRECISION if verified else Status.INFEASIBLE)
 
 
 Circle = Callable[..., sm.Problem]

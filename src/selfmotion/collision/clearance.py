@@ -137,6 +137,10 @@ class ClearanceModel:
         item = next(item for item in self._exact.obstacles if item.name == obstacle)
         self._exact.hulls.move(obstacle, place_of(item, pose, self.robot)[1])
 
+    def is_exact(self, column: int) -> bool:
+        """Whether the bodies of a pair are their own convex hulls."""
+        return self._exact.is_convex(int(self._kept[column]))
+
     @property
     def left_out(self) -> tuple[tuple[str, str], ...]:
         """The pairs that only the exact model knows."""

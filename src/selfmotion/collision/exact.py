@@ -140,6 +140,10 @@ class CollisionModel:
         """Names of the obstacles that stand in the world."""
         return frozenset(body.name for body in self._bodies if body.is_obstacle)
 
+    def is_convex(self, pair: int) -> bool:
+        """Whether both bodies of a pair are their own convex hulls."""
+        return self._meshes.hulls_decide[pair]
+
     @cached_property
     def open_meshes(self) -> tuple[str, ...]:
         """Links and obstacles with a mesh that is neither closed, nor flat, nor as its hull.

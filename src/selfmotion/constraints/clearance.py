@@ -205,8 +205,9 @@ class BoundClearance:
         """See `BoundConstraint.describe`."""
         first, second = self.model.pairs[column]
         value = self.distance + self.margin - self.residual(samples)[row, column] * _METRE
+        of_hulls = "" if self.model.is_exact(column) else "the convex hulls of "
         return (
-            f"'{first}' and '{second}' are {value * 1e3:.2f} mm apart at t = "
+            f"{of_hulls}'{first}' and '{second}' are {value * 1e3:.2f} mm apart at t = "
             f"{samples.sampling.node_times[row]:.3f} s, wanted {self.distance * 1e3:.2f} mm"
         )
 

@@ -79,7 +79,7 @@ class Tilt(Constraint):
 
         found = _Angle(
             f"tilt of '{self.frame}'",
-            (Column(self.frame, f"the tilt of '{self.frame}'", "rad"),),
+            (Column(self.frame, f"the tilt of '{self.frame}' from {_told(towards)}", "rad"),),
             values,
             derivatives,
             limit=2.0 * np.sin(0.5 * self.within),
@@ -120,3 +120,7 @@ def _direction(given: npt.ArrayLike, what: str) -> Array:
     if not length > 0.0:
         raise ProblemError(f"{what} is zero, expected a direction")
     return np.asarray(vector / length)
+
+
+def _told(direction: Array) -> str:
+    return "[" + ", ".join(f"{number:.3g}" for number in direction + 0.0) + "]"

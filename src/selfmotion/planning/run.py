@@ -401,7 +401,7 @@ class _Planning:
             steps=len(motion.trajectory.t) - 1,
             iterations=sum(iteration.step > 0.0 for iteration in session.history),
             history=tuple(session.history),
-            status=session.status,
+            status=_status(session, finished),
             message=_message(part, finished, self._candidates.notes),
             seconds=time.perf_counter() - self._began,
             gap=gap,
@@ -438,6 +438,12 @@ class _Planning:
         )
 
 
+def _status(session: Session, finished: Finished) -> Status:
+    """Return how the optimisation ended; what the certificate finds kept is not infeasible."""
+    kept = session.status is Status.INFEASIBLE and finished.certificate.verified
+    return Status.PRECISION if kept else session.status
+
+
 def _message(part: LargestPart, finished: Finished, notes: list[str]) -> str:
     """Return in words how the optimisation ended, and what came of it."""
     session, violations = part.session, part.session.violations
@@ -450,7 +456,10 @@ def _message(part: LargestPart, finished: Finished, notes: list[str]) -> str:
             f"value {least.value:.2g}), next to which its cost cannot be lowered"
         )
     parts = [said] if session.cut_short or not violations else []
-    if violations:
+    if violations and certificate.verified:
+        # Such as the clearance of bodies, whose convex hulls are planned with.
+        parts.append(f"what planning fell short of is kept by the motion: {'; '.join(violations)}")
+    elif violations:
         parts.append(f"not all constraints could be met: {'; '.join(violations)}")
     if certificate.failures and not (violations or part.ending):
         parts.append(f"but {certificate.verdict}")

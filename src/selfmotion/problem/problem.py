@@ -354,7 +354,7 @@ class Problem:
         of the path.
         """
         rests = self._rest(self.rests[0], self.rests[1] and not ending)
-        return certify(
+        found = certify(
             self.robot,
             self.path,
             self.task,
@@ -366,6 +366,17 @@ class Problem:
             damping=self.damping_law,
             ending=ending,
             progress=progress,
+        )
+        return replace(found, remarks=(*found.remarks, *self._asked_in_vain))
+
+    @property
+    def _asked_in_vain(self) -> tuple[str, ...]:
+        """What is asked for by constraints that have nothing to ask of this arm, in words."""
+        return tuple(
+            f"{item.requirement(self.robot).name}: asked for, but not kept: none are known of "
+            f"{self.robot.name}; give limit = …"
+            for item in self.constraints
+            if not item.applies(self.robot)
         )
 
     def errors_between(self, trajectory: Trajectory) -> Array:
