@@ -264,6 +264,20 @@ def test_a_fault_of_ones_own_code_is_said_and_tried_again(
     assert all(not row.error for row in again.rows)
 
 
+@pytest.mark.parametrize(("goal", "duration"), [("best", 5.0), ("fastest", 3.0)])
+def test_the_best_is_what_was_asked_for(
+    grid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, goal: str, duration: float
+) -> None:
+    """Who asked for the fastest motion does not want the cheapest, which takes longest."""
+    monkeypatch.setattr(sm.Job, "plan", lambda job, **options: sm.plan(job.problem))
+    grid.write_text(f'goal = "{goal}"\n' + GRID.replace("[0, 1]", "[0]"))
+    batch = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out")
+    assert batch.best is not None
+    assert batch.best.duration == pytest.approx(duration)
+    rows = list(csv.DictReader((tmp_path / "out" / "table.csv").read_text().splitlines()))
+    assert rows[0]["name"] == batch.best.name
+
+
 def test_tables_are_ranked_and_linked(grid: Path, tmp_path: Path) -> None:
     text = GRID.replace('"costs.1.mu" = [0, 1]', '"costs.1.mu" = [0, -1]')
     grid.write_text(text)

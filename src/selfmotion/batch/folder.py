@@ -34,6 +34,9 @@ class Row:
         Whether the error is a fault of a program rather than of the problem; such are tried again.
     verified, verdict, cost, initial_cost, duration, evaluations
         Of the plan.
+    aim : float
+        What it is ranked by, the smaller the better: the duration of what was to be the fastest
+        motion, else the cost.
     seconds : float
         Its worker's time.
     """
@@ -50,7 +53,13 @@ class Row:
     initial_cost: float = float("inf")
     duration: float = 0.0
     evaluations: int = 0
+    aim: float = float("inf")
     seconds: float = 0.0
+
+    @property
+    def rank(self) -> tuple[bool, bool, float]:
+        """Its place among others, the smaller the better: what has a plan, and a verified one."""
+        return bool(self.error), not self.verified, self.aim
 
     def plan(self) -> Plan:
         """Read the plan; FileFormatError where there is none."""
@@ -97,7 +106,7 @@ class Folder:
 
     def write_tables(self, rows: Sequence[Row], replays: int) -> None:
         """Write ``table.csv`` and ``index.html``, the best first, with replays of the best ones."""
-        ranked = sorted(rows, key=lambda row: (bool(row.error), not row.verified, row.cost))
+        ranked = sorted(rows, key=lambda row: row.rank)
         planned = [row for row in ranked if not row.error]
         links = {row.name: self._replay(row, k < replays) for k, row in enumerate(planned)}
         keys = list(dict.fromkeys(key for row in rows for key in row.settings))
@@ -144,13 +153,19 @@ def _csv(lines: Sequence[Sequence[str]]) -> str:
 
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>selfmotion batch</title>
-<style>body{{font:14px/1.4 system-ui,sans-serif;margin:2em}}table{{border-collapse:collapse}}
+<meta name="viewport" content="width=device-width,initial-scale=1">
+<style>body{{font:14px/1.4 system-ui,sans-serif;margin:1.5em}}table{{border-collapse:collapse}}
 th,td{{padding:.25em .7em;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}}
+div{{overflow-x:auto}}td:last-child{{min-width:24em}}
 </style></head><body><h1>{title}</h1>
-<table><thead><tr>{head}</tr></thead><tbody>
+<div><table><thead><tr>{head}</tr></thead><tbody>
 {body}
-</tbody></table></body></html>
+</tbody></table></div></body></html>
 """
+
+
+# What the columns of numbers are of, for people.
+_HEADS = {"duration": "duration, s", "seconds": "planned in, s"}
 
 
 def _page(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
@@ -165,6 +180,6 @@ def _page(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
     rows = ("".join(cell(k, text) for k, text in enumerate(line)) for line in lines)
     return _PAGE.format(
         title=f"{len(lines)} problems, best first",
-        head="".join(f"<th>{html.escape(name)}</th>" for name in header),
+        head="".join(f"<th>{html.escape(_HEADS.get(name, name))}</th>" for name in header),
         body="\n".join(f"<tr>{row}</tr>" for row in rows),
     )

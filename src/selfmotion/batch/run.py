@@ -68,9 +68,9 @@ class Batch:
 
     @property
     def best(self) -> Row | None:
-        """The verified plan of the lowest cost, where there is one."""
+        """The verified plan of the lowest cost, or the fastest if that was asked for; or None."""
         sound = [row for row in self.rows if row.verified]
-        return min(sound, key=lambda row: row.cost, default=None)
+        return min(sound, key=lambda row: row.rank, default=None)
 
 
 def plan_many(

@@ -171,7 +171,7 @@ def _number(value: float | None) -> str:
 
 def show_batch(batch: "Batch", console: Console) -> None:
     """Print the best of many plans, and how many there are."""
-    ranked = sorted(batch.rows, key=lambda row: (bool(row.error), not row.verified, row.cost))
+    ranked = sorted(batch.rows, key=lambda row: row.rank)
     keys = list(dict.fromkeys(key for row in ranked for key in row.settings))
     table = _table("the best of them")
     for name in ("name", *keys):
