@@ -1,13 +1,17 @@
 """Tables fit narrow terminals and logs."""
 
+import dataclasses
+import io
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 import selfmotion as sm
+from selfmotion.cli import tables
 
 SELFMOTION = Path(sys.executable).with_name("selfmotion")
 
@@ -32,3 +36,24 @@ def test_tables_fit_narrow_terminals_and_logs(tmp_path: Path, columns: int | Non
             assert verdict in printed.stdout.splitlines()
         if command[0] == "compare":
             assert "joint path, rad or m" in printed.stdout
+
+
+@pytest.mark.parametrize(
+    ("amount", "allowed", "kept", "told"),
+    [
+        (0.015, 0.0147, True, "at least"),
+        (0.014, 0.0147, False, "at least"),
+        (0.0, 1e-6, True, "at most"),
+        (0.1, 1e-6, False, "at most"),
+    ],
+)
+def test_a_limit_is_told_with_its_side(
+    amount: float, allowed: float, kept: bool, told: str
+) -> None:
+    """A feed that is kept, above what it has to be at least, does not read as a violation."""
+    found = sm.Finding("feed", "path", 1.0, amount, allowed, kept, "")
+    certificate = sm.plan(sm.sample_problem()).certificate
+    page = io.StringIO()
+    only = dataclasses.replace(certificate, findings=(*certificate.findings, found))
+    tables.show_certificate(only, {}, Console(file=page, width=120))
+    assert f"feed ({told}: {allowed:.4g})" in page.getvalue()

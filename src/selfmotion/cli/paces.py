@@ -1,5 +1,6 @@
 """The commands that change how fast motions are."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -57,12 +58,16 @@ def fastest(
     found = fastest_with_progress(job, deadline=deadline, **given)
     if not as_json:
         stages.print(
-            f"{found.duration:.4g} s; best by its costs and then retimed: {found.retimed:.4g} s, "
-            f"without self-motion: {found.pseudo_inverse:.4g} s; {found.status.message}",
+            f"{found.duration:.4g} s; best by its costs and then retimed: {_time(found.retimed)}, "
+            f"without self-motion: {_time(found.pseudo_inverse)}; {found.status.message}",
             markup=False,
             soft_wrap=True,
         )
     outputs.finish(found.plan, [*job.outputs, *(out or [])], html, as_json)
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds:.4g} s" if math.isfinite(seconds) else "keeps not all that is asked"
 
 
 def _factor(text: str) -> tuple[str, float]:

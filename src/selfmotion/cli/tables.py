@@ -107,7 +107,9 @@ def show_certificate(
         if finding.requirement not in shown:
             name, value = finding.requirement, _SHARE.format(finding.amount)
             if finding.allowed != 1.0:
-                name = f"{finding.requirement} (allowed: {finding.allowed:.4g})"
+                above = finding.kept == (finding.amount > finding.allowed)
+                side = "at least" if above else "at most"
+                name = f"{finding.requirement} ({side}: {finding.allowed:.4g})"
                 value = f"{finding.amount:.4g}"
             time = f"{finding.time:.3f} s"
             table.add_row(escape(name), value, time, escape(finding.subject))
