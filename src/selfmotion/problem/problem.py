@@ -334,11 +334,19 @@ class Problem:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What to know before planning: links that overlap, limits that look like degrees."""
+        """What to know before planning: links that overlap, limits that look wrong or are none."""
         bodies = (model for model, _ in self.envelope.bodies)
         found = (pair for model in bodies for pair in model.overlapping if pair.is_checked)
         told = (f"{pair.first} - {pair.second}: {pair.remedy}" for pair in found)
-        return tuple(dict.fromkeys([*told, *unit_remarks(self.robot, self.constraints)]))
+        vain = (
+            f"{item.requirement(self.robot).name} are asked for, but none are known of "
+            f"{self.robot.name}: give limit"
+            for item in self.constraints
+            # What nobody asked for by name is not missed.
+            if not item.applies(self.robot) and not any(item is usual for usual in KEPT)
+        )
+        limits = unit_remarks(self.robot, self.constraints)
+        return tuple(dict.fromkeys([*told, *limits, *vain]))
 
     def certify(
         self,
@@ -354,7 +362,7 @@ class Problem:
         of the path.
         """
         rests = self._rest(self.rests[0], self.rests[1] and not ending)
-        found = certify(
+        return certify(
             self.robot,
             self.path,
             self.task,
@@ -366,17 +374,6 @@ class Problem:
             damping=self.damping_law,
             ending=ending,
             progress=progress,
-        )
-        return replace(found, remarks=(*found.remarks, *self._asked_in_vain))
-
-    @property
-    def _asked_in_vain(self) -> tuple[str, ...]:
-        """What is asked for by constraints that have nothing to ask of this arm, in words."""
-        return tuple(
-            f"{item.requirement(self.robot).name}: asked for, but not kept: none are known of "
-            f"{self.robot.name}; give limit = …"
-            for item in self.constraints
-            if not item.applies(self.robot)
         )
 
     def errors_between(self, trajectory: Trajectory) -> Array:
