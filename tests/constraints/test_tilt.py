@@ -42,7 +42,7 @@ def test_a_tilt_is_kept_at_all_times_and_has_a_price(
     refused = sm.certify(
         panda, problem.path, "position", free.trajectory, requirements=[tilt.requirement(panda)]
     )
-    assert f"the tilt of '{LINK}' from [0, 0, -1] is {most:.3f}"[:-1] in refused.verdict
+    assert f"the tilt of '{LINK}' from [1, 0, 0] is {most:.3f}"[:-1] in refused.verdict
     assert f"expected at most {0.7 * most:.4g} rad" in refused.verdict
 
 

@@ -123,4 +123,4 @@ def _direction(given: npt.ArrayLike, what: str) -> Array:
 
 
 def _told(direction: Array) -> str:
-    return "[" + ", ".join(f"{number:.3g}" for number in direction + 0.0) + "]"
+    return "[" + ", ".join(f"{number:.3g}" for number in np.round(direction, 6) + 0.0) + "]"
