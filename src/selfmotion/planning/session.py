@@ -225,8 +225,11 @@ class Session:
         return cost + max(abs(cost), 1e-3) * objective.constraints.penalty(objective.samples(x))
 
     def score(self) -> tuple[bool, float]:
-        """Return whether constraints are violated, then the cost: the smaller, the better."""
-        return bool(self.violations), self._cost()
+        """Return whether constraints are violated, then the cost: the smaller, the better.
+
+        Of two that violate constraints, the one that does so less is nearer to a motion.
+        """
+        return bool(self.violations), self.merit() if self.violations else self._cost()
 
     def take_chain(self, guide: SequenceGuide) -> None:
         """Let the shortest chain near a sequence stand, if it will do: nothing is left to gain."""
@@ -464,7 +467,7 @@ class Session:
         while self.steps < self.most_steps:
             if self.status in (*_CUT_SHORT, *_ADRIFT):
                 return 0.0
-            unmet, before = self.score()
+            unmet, before = bool(self.violations), self._cost()
             self.refine()
             after = self._cost()
             error = _relative_change(before, after)
