@@ -167,6 +167,7 @@ from selfmotion.planning import (
 )
 from selfmotion.problem import Problem as Problem, sample_problem as sample_problem
 from selfmotion.result import (
+    Attempt as Attempt,
     Gap as Gap,
     LimitsUsed as LimitsUsed,
     Move as Move,

@@ -2,61 +2,54 @@
 
 import dataclasses
 from collections.abc import Callable
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yourdfpy
 
 import selfmotion as sm
-from selfmotion.certificate import Extreme
+from selfmotion.certificate import Certificate, Extreme
 from selfmotion.optimise import Status
-from selfmotion.planning.run import _message, _status
-
-
-@pytest.mark.parametrize("on_path", [True, False])
-def test_next_to_a_singular_pose_no_gradient_is_blamed(on_path: bool) -> None:
-    session = SimpleNamespace(status=Status.GRADIENT, violations=(), cut_short=False)
-    certificate = SimpleNamespace(
-        on_path=on_path,
-        failures=() if on_path else ("the tool is off",),
-        verdict="not verified: the tool is off",
-        damped=(),
-        smallest_singular_value=Extreme(3e-7, 1.5, "tool"),
-    )
-    said = _message(
-        SimpleNamespace(session=session, ending=""),  # type: ignore[arg-type]
-        SimpleNamespace(certificate=certificate),  # type: ignore[arg-type]
-        [],
-    )
-    singular = "the motion passes a singular pose near t = 1.5 s (smallest singular value 3e-07)"
-    assert said.startswith(Status.GRADIENT.message if on_path else singular)
-    assert said.endswith("" if on_path else "but not verified: the tool is off")
-
-
-@pytest.mark.parametrize("verified", [True, False])
-def test_what_is_verified_is_not_called_infeasible(verified: bool) -> None:
-    wrong = "clearance: the convex hulls of 'torch' and 'pipes' are -49.37 mm apart"
-    session = SimpleNamespace(status=Status.INFEASIBLE, violations=(wrong,), cut_short=False)
-    failures = () if verified else ("torch - pipes meet",)
-    certificate = SimpleNamespace(
-        on_path=True, failures=failures, verdict="", damped=(), verified=verified
-    )
-    part = SimpleNamespace(session=session, ending="")
-    finished = SimpleNamespace(certificate=certificate)
-    said = _message(part, finished, [])  # type: ignore[arg-type]
-    status = _status(session, finished)  # type: ignore[arg-type]
-    assert wrong in said
-    assert ("kept by the motion" in said) == verified
-    assert status is (Status.PRECISION if verified else Status.INFEASIBLE)
-
-
-Circle = Callable[..., sm.Problem]
+from selfmotion.planning.gather import message_of, status_of
 
 
 @pytest.fixture(scope="module")
 def sample() -> sm.Plan:
     return sm.plan(sm.sample_problem())
+
+
+def certified(sample: sm.Plan, *failures: str, off: float = 0.0) -> Certificate:
+    """Return a certificate of which something is wrong: the tool that far off, and what is said."""
+    certificate = sample.certificate
+    error = dataclasses.replace(certificate.position_error, value=off)
+    least = Extreme(3e-7, 1.5, "tool")
+    return dataclasses.replace(
+        certificate, failures=failures, position_error=error, smallest_singular_value=least
+    )
+
+
+@pytest.mark.parametrize("on_path", [True, False])
+def test_next_to_a_singular_pose_no_gradient_is_blamed(sample: sm.Plan, on_path: bool) -> None:
+    wrong = () if on_path else ("the tool is off",)
+    certificate = certified(sample, *wrong, off=0.0 if on_path else 1.0)
+    said = message_of(Status.GRADIENT, (), certificate)
+    singular = "the motion passes a singular pose near t = 1.5 s (smallest singular value 3e-07)"
+    assert said.startswith(Status.GRADIENT.message if on_path else singular)
+    assert ("the tool is off" in said) != on_path
+
+
+@pytest.mark.parametrize("verified", [True, False])
+def test_what_is_verified_is_not_called_infeasible(sample: sm.Plan, verified: bool) -> None:
+    wrong = "clearance: the convex hulls of 'torch' and 'pipes' are -49.37 mm apart"
+    certificate = certified(sample, *(() if verified else ("torch - pipes meet",)))
+    said = message_of(Status.INFEASIBLE, (wrong,), certificate)
+    assert wrong in said
+    assert ("kept by the motion" in said) == verified
+    status = status_of(Status.INFEASIBLE, certificate)
+    assert status is (Status.PRECISION if verified else Status.INFEASIBLE)
+
+
+Circle = Callable[..., sm.Problem]
 
 
 def test_sample_problem_without_self_motion(sample: sm.Plan) -> None:

@@ -55,6 +55,8 @@ def show(plan: Plan, console: Console) -> None:
         f"{report.seconds:.2f} s\n{report.status.value}: {report.message}",
         markup=False,
     )
+    if len(report.attempts) > _USUAL_ATTEMPTS:
+        console.print(_tried(report))
     if report.remaining is not None and report.cost:
         share = 100.0 * report.remaining / abs(report.cost)
         console.print(f"any other null motion could save about {share:.2g} % (estimate)")
@@ -67,6 +69,23 @@ def show(plan: Plan, console: Console) -> None:
         told = f"{plan.trajectory.duration:.4g} s; limits used fully {plan.limits_used}"
         console.print(told, markup=False, soft_wrap=not console.is_terminal)
     console.print(f"joints turn round: {plan.reversals}", markup=False)
+
+
+# A look at single poses, starts, and the proof: what more was tried is told.
+_USUAL_ATTEMPTS = 3
+
+
+def _tried(report: Report) -> Table:
+    """Return a line for each attempt at the plan."""
+    table = _table("what was tried")
+    table.add_column("attempt")
+    table.add_column("what stood after it", overflow="fold")
+    table.add_column("cost", justify="right", no_wrap=True)
+    table.add_column("s", justify="right", no_wrap=True)
+    for item in report.attempts:
+        cost = "" if item.cost is None else f"{item.cost:.6g}"
+        table.add_row(escape(item.name), escape(item.outcome), cost, f"{item.seconds:.2f}")
+    return table
 
 
 # For less of the time than this it is not told which limits are used.

@@ -11,8 +11,8 @@ from selfmotion.nodes import NodeGrid, NodeMotion
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.nodes import takes
+from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import CHAIN_ROUNDS, FINER_CHAIN
-from selfmotion.planning.standing import Standing
 from selfmotion.problem import Problem
 from selfmotion.search import LAST_SMOOTHINGS, SequenceGuide, asks_length, shortest_along
 
@@ -28,7 +28,7 @@ def along_chain(
     effort: Effort,
     guide: SequenceGuide,
     constraints: Sequence[BoundConstraint],
-) -> Standing | None:
+) -> MotionOnNodes | None:
     """Return the motion through the shortest chain near a sequence; None where it will not do.
 
     Where length is all that is asked for, joints rest and start again all over the path: a motion
@@ -55,9 +55,9 @@ def along_chain(
             return None
         broken = motion.broken() | _beyond_limits(motion)
         if not broken.any():
-            off = abs(motion.exact_cost - motion.cost)
             none = np.zeros(0, dtype=np.int64)
-            return Standing(motion, Status.PRECISION, none, np.zeros_like(motion.h), (), off)
+            prices = np.zeros_like(motion.h)
+            return MotionOnNodes(motion, Status.PRECISION, none, prices, (), None, is_chain=True)
         finer = finer.halved(np.convolve(broken, np.ones(3), "same") > 0.0)
     return None
 

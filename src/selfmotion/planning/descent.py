@@ -1,11 +1,15 @@
 """From a motion to the best one near it: freely as long as conditions are kept, then with them."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.engine import Objective
 from selfmotion.optimise import Iteration, Minimum, SequentialQuadratic, Status
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.settings import LEAST_SAVING
+from selfmotion.planning.standing import RolledMotion
 
 
 def breaks(objective: Objective, x: Array) -> bool:
@@ -34,29 +38,44 @@ class Descent:
         self.history: list[Iteration] = []
         self.bound = False
 
-    def minimum(
-        self,
-        objective: Objective,
-        x: Array,
-        inverse_hessian: Array | None,
-        *,
-        evaluations: int | None = None,
-        restores: bool = True,
-    ) -> Minimum:
-        """Minimise by the optimiser as long as conditions are kept; go on with them from there.
+    def descended(
+        self, rolled: RolledMotion, *, evaluations: int | None = None, restores: bool = True
+    ) -> RolledMotion:
+        """Return the minimum near a motion; what binds there, `priced` knows.
+
+        By the optimiser as long as conditions are kept; with them from there.
 
         Parameters
         ----------
-        objective : Objective
-        x : (size,)
-        inverse_hessian : (size, size), optional
-            What is known of it.
+        rolled : RolledMotion
         evaluations : int, optional
             So many of the cost; by default what `Effort` allows.
         restores : bool
             Whether to go on elsewhere where conditions cannot be met.
         """
-        limit = self._limit(evaluations)
+        objective, before = rolled.objective, rolled.minimum
+        known = None if before is None else before.inverse_hessian
+        minimum = self._minimum(objective, rolled.x, known, self._limit(evaluations), restores)
+        return replace(rolled, minimum=minimum, x=np.array(minimum.x), active=())
+
+    def priced(self, rolled: RolledMotion) -> RolledMotion:
+        """Return a minimum with what binds there."""
+        minimum = rolled.minimum
+        if minimum is None or not self.bound or minimum.status is not Status.CONVERGED:
+            return rolled
+        constraints = rolled.objective.constraints
+        samples = rolled.objective.samples(minimum.x)
+        least = LEAST_SAVING * abs(minimum.cost)
+        return replace(rolled, active=constraints.active(samples, minimum.multipliers, least))
+
+    def _minimum(
+        self,
+        objective: Objective,
+        x: Array,
+        inverse_hessian: Array | None,
+        limit: int | None,
+        restores: bool,
+    ) -> Minimum:
         if self.bound or breaks(objective, x):
             return self._bound_minimum(objective, x, inverse_hessian, limit, restores)
         effort = self._effort

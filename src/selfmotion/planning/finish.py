@@ -38,7 +38,7 @@ def finish(
     finished: Finished | None = None
     coarse: Trajectory | None = None
     misses: list[float] = []
-    roughs, first = 0, session.steps
+    roughs, first = 0, session.standing.steps
     for _ in range(MOST_HALVINGS):
         try:
             progress("checking", 1, 1)
@@ -47,7 +47,7 @@ def finish(
             roughs += rough
             # Where no evaluations are left, finer grids change nothing.
             out = session.status is Status.MAX_EVALUATIONS
-            spent = out or roughs > ROUGH_GRIDS or session.steps > FINER * first
+            spent = out or roughs > ROUGH_GRIDS or session.standing.steps > FINER * first
             if finished.certificate.on_path and (spent or not rough):
                 break
             trajectory = finished.motion.trajectory
@@ -60,7 +60,7 @@ def finish(
             misses.append(check.position_error.value + check.rotation_error.value)
             if coarse is None and len(misses) > 2 and misses[-1] > 0.5 * misses[-3]:
                 break
-            if session.steps >= session.most_steps:
+            if session.standing.steps >= session.beginning.most_steps:
                 break
             session.refine()
             if rough and not session.cut_short:
@@ -80,7 +80,7 @@ def _resolved(problem: Problem, session: Session, tolerance: Tolerance) -> Evalu
         errors = problem.errors_between(motion.trajectory) / allowed
         worst = float(errors.max())
         # Written so that NaN is no progress. Damping's error is not that of the steps.
-        stuck = not worst < FALLS * before or len(errors) > session.most_steps
+        stuck = not worst < FALLS * before or len(errors) > session.beginning.most_steps
         if motion.damped or worst <= RESOLVED or stuck:
             break
         before = worst
@@ -123,4 +123,4 @@ def _same(problem: Problem, coarse: Trajectory, fine: Trajectory, tolerance: Tol
 def _check(problem: Problem, session: Session, tolerance: Tolerance, ending: str) -> Finished:
     motion = _resolved(problem, session, tolerance)
     certificate = problem.certify(motion.trajectory, tolerance, ending)
-    return Finished(motion, session.still_motion(), certificate)
+    return Finished(motion, session.rolled.still_evaluation(), certificate)

@@ -66,14 +66,14 @@ class Heats:
             for number, session in enumerate(running, 1):
                 self._progress(f"heat {heat}", number, len(running))
                 # What lies where another one has arrived would arrive there, too.
-                here, first = session.nodes, heat == 1
+                here, first = session.rolled.nodes, heat == 1
                 if first and any(self._apart(here, other) <= ONE_VALLEY for other in optima):
                     self._forget(session)
                     continue
                 session.minimize(evaluations)
                 if session.status is Status.INTERRUPTED:
                     raise KeyboardInterrupt
-                optima.append(session.nodes)
+                optima.append(session.rolled.nodes)
                 self._forget(session)
                 self._note(session)
             self._drop()
@@ -99,7 +99,7 @@ class Heats:
             best = self._merits[0][0]
             if merit > best + (HOPELESS - 1.0) * abs(best):
                 break
-            motion = session.nodes
+            motion = session.rolled.nodes
             if all(self._apart(motion, other) > SAME_OPTIMUM for other in motions):
                 kept.append((merit, session))
                 motions.append(motion)

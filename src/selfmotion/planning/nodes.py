@@ -11,6 +11,7 @@ from selfmotion.motion import FreeNullMotion, Grid, Trajectory
 from selfmotion.nodes import NodeEnds, NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, QuasiNewton, Status
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import (
     COST_AGREEMENT,
     ENDS_MET,
@@ -23,7 +24,6 @@ from selfmotion.planning.settings import (
     SHORT_STEP,
     TOWARDS_MIDDLE,
 )
-from selfmotion.planning.standing import Standing
 from selfmotion.problem import Problem
 
 
@@ -65,7 +65,7 @@ class NodeDescent:
     Attributes
     ----------
     history : list of Iteration
-    latest : Standing or None
+    latest : MotionOnNodes or None
         The last motion on the way that keeps the conditions: what an interruption leaves.
     """
 
@@ -81,7 +81,7 @@ class NodeDescent:
         self._constraints, self._free = constraints, free
         self._first = effort.counts.evaluations
         self.history: list[Iteration] = []
-        self.latest: Standing | None = None
+        self.latest: MotionOnNodes | None = None
         self._ended: Status | None = None
 
     def grid(self, t: Array) -> NodeGrid:
@@ -90,7 +90,7 @@ class NodeDescent:
             self._problem, t, self._constraints, free=self._free, counts=self._effort.counts
         )
 
-    def near(self, trajectories: Sequence[Trajectory], t: Array) -> Standing | None:
+    def near(self, trajectories: Sequence[Trajectory], t: Array) -> MotionOnNodes | None:
         """Return the best motion near the cheapest of some, on nodes at some times.
 
         Where what is best freely breaks conditions, also near motions from its start whose
@@ -120,12 +120,12 @@ class NodeDescent:
         found = None if self._ended else self._from_free(freely, dearest)
         return min((one for one in (best, found) if one), key=_cost_of, default=None)
 
-    def again(self, standing: Standing) -> Standing | None:
+    def again(self, standing: MotionOnNodes) -> MotionOnNodes | None:
         """Return the optimum near a motion on its nodes."""
         optimum = self._minimise(standing.motion, standing.columns, prices=standing.prices)
         return self._kept(optimum, standing.columns) or self._bound(optimum, standing.columns)
 
-    def settled(self, standing: Standing) -> Standing:
+    def settled(self, standing: MotionOnNodes) -> MotionOnNodes:
         """Return the optimum on nodes so near to each other that the cost is right.
 
         With one more between each two, put onto the path.
@@ -161,7 +161,7 @@ class NodeDescent:
         """Whether more nodes where limits begin and end to bind may lower the cost."""
         return before - motion.cost > COST_AGREEMENT * abs(motion.cost)
 
-    def _towards_middle(self, grid: NodeGrid, known: NodeMotion) -> Standing | None:
+    def _towards_middle(self, grid: NodeGrid, known: NodeMotion) -> MotionOnNodes | None:
         """Return what is best near motions whose self-motion goes towards the limits' middle.
 
         Not where that is what is known already, and does not keep the conditions.
@@ -179,13 +179,13 @@ class NodeDescent:
                     return best
         return None
 
-    def _kept(self, optimum: Optimum, columns: Ints = _NO_COLUMNS) -> Standing | None:
+    def _kept(self, optimum: Optimum, columns: Ints = _NO_COLUMNS) -> MotionOnNodes | None:
         """Return the optimum if it is one, and keeps all conditions."""
         motion = optimum.motion
         none = optimum.status is Status.GRADIENT or not _meets(motion) or _broken(motion).any()
         return None if none else self._standing(optimum, columns)
 
-    def _from_free(self, freely: Optimum, dearest: float) -> Standing | None:
+    def _from_free(self, freely: Optimum, dearest: float) -> MotionOnNodes | None:
         """Return the optimum that keeps all conditions, from one that keeps none."""
         motion = freely.motion
         orders = motion.orders
@@ -203,7 +203,9 @@ class NodeDescent:
         columns = np.flatnonzero(every | _broken(motion) | _near(motion))
         return self._bound(self._minimise(motion, columns, dearest), columns, dearest)
 
-    def _bound(self, optimum: Optimum, columns: Ints, dearest: float = np.inf) -> Standing | None:
+    def _bound(
+        self, optimum: Optimum, columns: Ints, dearest: float = np.inf
+    ) -> MotionOnNodes | None:
         """Return the optimum that keeps all conditions, from one that keeps some columns of them.
 
         None where none is found, or would be dearer than that.
@@ -251,7 +253,7 @@ class NodeDescent:
         self.history.append(iteration)
         if _meets(motion) and (motion.h <= motion.grid.conditions.tolerances).all():
             none = np.zeros_like(motion.h)
-            self.latest = Standing(motion, Status.STOPPED, _NO_COLUMNS, none, (), np.inf)
+            self.latest = MotionOnNodes(motion, Status.STOPPED, _NO_COLUMNS, none, (), None)
         if effort.callback is not None and effort.callback(iteration):
             self._ended = Status.STOPPED
         most = effort.max_evaluations
@@ -259,7 +261,7 @@ class NodeDescent:
             self._ended = Status.MAX_EVALUATIONS
         return self._ended is not None
 
-    def _standing(self, optimum: Optimum, columns: Ints) -> Standing:
+    def _standing(self, optimum: Optimum, columns: Ints) -> MotionOnNodes:
         motion = optimum.motion
         # What keeps the conditions, and leads no further, is as good as it gets.
         arrived = optimum.status if optimum.status in _ARRIVED else Status.PRECISION
@@ -277,7 +279,7 @@ class NodeDescent:
         )
         off = abs(motion.exact_cost - motion.cost)
         promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
-        return Standing(motion, status, columns, optimum.prices, active, off + promised)
+        return MotionOnNodes(motion, status, columns, optimum.prices, active, off + promised)
 
 
 def _too_much(motion: NodeMotion, columns: Ints | Flags) -> bool:
@@ -306,7 +308,7 @@ def _near(motion: NodeMotion) -> Flags:
     return np.asarray((motion.h > -NEARLY).any(axis=0))
 
 
-def _cost_of(standing: Standing) -> float:
+def _cost_of(standing: MotionOnNodes) -> float:
     return standing.cost
 
 

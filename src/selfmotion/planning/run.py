@@ -1,16 +1,9 @@
 """From a problem to a plan."""
 
-import time
 from dataclasses import replace
 from math import inf
-from typing import NamedTuple
-
-import numpy as np
 
 from selfmotion.basics import (
-    BreakdownError,
-    InverseKinematicsError,
-    NoSequenceError,
     PlanError,
     ProblemError,
     Progress,
@@ -18,32 +11,22 @@ from selfmotion.basics import (
     as_number,
     as_whole,
     one_blas_thread,
-    read_only,
     shown,
     silent,
 )
 from selfmotion.certificate import Tolerance
 from selfmotion.optimise import Callback, Optimizer, QuasiNewton, Status
-from selfmotion.planning.candidates import Candidates
+from selfmotion.planning.attempts import go_through
 from selfmotion.planning.deadline import Deadline, TimedCounts
+from selfmotion.planning.draft import Draft, Known
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.finish import Finished, finish
-from selfmotion.planning.largest_part import LargestPart, largest_part
-from selfmotion.planning.refusal import begins_off_path, looked_at, no_way
+from selfmotion.planning.gather import ENDED, gathered
 from selfmotion.planning.search import Search
-from selfmotion.planning.session import Session
-from selfmotion.planning.settings import (
-    DAMPED_EVALUATIONS,
-    FREE_PART_EVALUATIONS,
-    PART_EVALUATIONS,
-)
+from selfmotion.planning.settings import DAMPED_EVALUATIONS
 from selfmotion.planning.warm_start import check_warm_start
 from selfmotion.problem import Problem, check_problem
-from selfmotion.result import Gap, Plan, Report
-from selfmotion.search import SPACING, Obstruction, Reach, SequenceGuide, reachable
-
-# After these no other way is tried.
-_ENDED = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
+from selfmotion.result import Plan
+from selfmotion.search import SequenceGuide
 
 
 def plan(
@@ -126,10 +109,11 @@ def plan(
         max_evaluations = DAMPED_EVALUATIONS
     counts = TimedCounts(deadline=clock)
     effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, counts)
-    settings = _Settings(Tolerance.of(tolerance), clock.telling(progress), warm_start, clock)
+    search, known = search or Search(), Known(plan=warm_start)
+    draft = Draft(problem, effort, search, Tolerance.of(tolerance), clock.telling(progress), known)
     try:
         with one_blas_thread():
-            return _plan(problem, effort, search or Search(), settings)
+            return _planned(draft, clock)
     except KeyboardInterrupt:
         if not clock.passed:
             raise
@@ -145,43 +129,46 @@ def plan_along(
     """Plan as `plan` does, but try a motion first that is known, near which there should be one."""
     clock = Deadline(inf)
     effort = Effort(QuasiNewton(), None, None, TimedCounts(deadline=clock))
-    settings = _Settings(tolerance, progress, None, clock, guide)
+    draft = Draft(problem, effort, Search(), tolerance, progress, Known(guide=guide))
     with one_blas_thread():
-        return _plan(problem, effort, Search(), settings)
+        return _planned(draft, clock)
 
 
-class _Settings(NamedTuple):
-    """What all attempts at one plan have in common."""
-
-    tolerance: Tolerance
-    progress: Progress
-    warm_start: Plan | None
-    deadline: Deadline
-    guide: SequenceGuide | None = None
-
-
-def _plan(problem: Problem, effort: Effort, search: Search, settings: _Settings) -> Plan:
-    free = problem.given_start is None and settings.guide is None and settings.warm_start is None
-    blocked = looked_at(problem, search) if free else None
-    found = _Planning(problem, effort, search, settings, blocked).plan()
+def _planned(draft: Draft, clock: Deadline) -> Plan:
+    """Return the plan; of the same list gone through again where the arm meets itself."""
+    go_through(draft)
+    found = gathered(draft, clock)
     # Few motions take an arm into itself: the others need not wait for distances.
-    hopeless = blocked is not None or found.report.status in _ENDED
-    if not _overlaps(found) or hopeless:
+    if not _overlaps(found) or draft.blocked is not None or found.report.status in ENDED:
         return found
-    efforts = [(replace(effort, apart=True), search)]
-    if problem.given_start is None and search.mode == "auto":
+    apart = replace(draft.effort, apart=True)
+    again = [("apart from itself", apart, draft.search)]
+    if draft.is_free and draft.search.mode == "auto":
         # Hulls that overlap by themselves tell the optimiser nothing; nodes of the search are free.
-        whole = replace(search, mode="global")
-        efforts += [(effort, whole), (replace(effort, apart=True), whole)]
-    for another, how in efforts:
+        whole = replace(draft.search, mode="global")
+        again += [("global", draft.effort, whole), ("global, apart from itself", apart, whole)]
+    known = replace(draft.known, poses=True)
+    for how, effort, search in again:
+        tried = list(found.report.attempts)
+        another = Draft(
+            draft.problem,
+            effort,
+            search,
+            draft.tolerance,
+            draft.progress,
+            known,
+            again=f"{how}: ",
+            attempts=tried,
+            began=draft.began,
+        )
         try:
-            rival = _Planning(problem, another, how, settings).plan()
+            go_through(another)
+            rival = gathered(another, clock)
         except SelfmotionError:
-            return found
+            return replace(found, report=replace(found.report, attempts=tuple(tried)))
         except KeyboardInterrupt:
-            passed = settings.deadline.passed
-            return _told(found, Status.DEADLINE if passed else Status.INTERRUPTED)
-        if rival.report.status in _ENDED:
+            return _told(found, Status.DEADLINE if clock.passed else Status.INTERRUPTED)
+        if rival.report.status in ENDED:
             return _better(found, rival)
         found = rival
         if not _overlaps(found):
@@ -221,250 +208,11 @@ def _check(problem: Problem, search: Search | None, max_evaluations: int | None)
             "search= has no effect, since the problem's start is given; leave one of them out, or "
             "ask for Search(compare=True)"
         )
+    redundancy = problem.follows.redundancy
+    if search is not None and search.compare and redundancy != 1:
+        raise ProblemError(
+            f"compare: the global search needs redundancy 1, but {problem.robot.name} has "
+            f"{redundancy} for task '{problem.task.value}'"
+        )
     if max_evaluations is not None:
         as_whole(max_evaluations, "max_evaluations", least=1, most=10**9)
-
-
-class _Planning:
-    """What the stages of one plan share."""
-
-    def __init__(
-        self,
-        problem: Problem,
-        effort: Effort,
-        search: Search,
-        settings: _Settings,
-        blocked: Obstruction | None = None,
-    ) -> None:
-        self._blocked = blocked
-        self._problem, self._effort, self._search = problem, effort, search
-        self._tolerance, self._progress = settings.tolerance, settings.progress
-        self._deadline = settings.deadline
-        self._began = time.perf_counter()
-        self._known_reach: dict[float, Reach] = {}
-        self._candidates = Candidates(
-            problem,
-            effort,
-            search,
-            settings.progress,
-            self._reach,
-            settings.warm_start,
-            settings.guide,
-        )
-
-    def plan(self) -> Plan:
-        """Return the plan of the whole path, or of the largest part of it."""
-        candidates = self._candidates
-        if self._blocked is not None and not self._blocked.is_met:
-            return self._up_to(self._blocked)
-        try:
-            best = candidates.run()
-            shorter = self._shorter(best)
-            if shorter is not None:
-                return shorter
-            best = self._met(best)
-        except (BreakdownError, NoSequenceError) as error:
-            # Chains of configurations end at obstacles and step limits as well: these stay errors.
-            blocked = isinstance(error, NoSequenceError) and not self._reach(error.time).reason
-            shorter = None if blocked else self._part(error.time)
-            if shorter is None:
-                raise
-            return shorter
-        rival_cost = self._settle(best, candidates.rival)
-        whole = LargestPart(self._problem, best, "")
-        finished = finish(self._problem, whole, self._tolerance, self._progress)
-        if best.has_nodes and not finished.certificate.verified and best.status not in _ENDED:
-            # Between nodes a limit may be passed that smooth functions keep.
-            best.leave_nodes()
-            best = self._met(best)
-            rival_cost = self._settle(best, candidates.rival)
-            whole = LargestPart(self._problem, best, "")
-            finished = finish(self._problem, whole, self._tolerance, self._progress)
-        result = self._gather(whole, finished, self._gap(rival_cost, finished))
-        if self._stands(best, finished):
-            return result
-        try:
-            suspect = finished.certificate.position_error.time
-            # Where single poses are in reach, constraints that are not met say more than a part.
-            return (self._part(suspect) if self._reach(suspect).reason else None) or result
-        except KeyboardInterrupt:
-            best.end(Status.INTERRUPTED)
-            return self._gather(whole, finished, None)
-
-    def _up_to(self, blocked: Obstruction) -> Plan:
-        """Return the plan of what comes before a pose that is out of reach."""
-        told = blocked.help.removeprefix("; ")
-        self._candidates.notes += [told] if told else []
-        # A part would begin on the path itself, which relaxed rows only let the arm be near.
-        off = begins_off_path(self._problem, self._search)
-        try:
-            shorter = None if off else self._part(blocked.time)
-        except InverseKinematicsError:
-            shorter = None
-        if shorter is None:
-            raise no_way(self._problem, blocked)
-        return shorter
-
-    def _met(self, best: Session) -> Session:
-        """Return a session of another null motion where one meets more of the constraints."""
-        if not best.violations or best.status in (*_ENDED, Status.MAX_EVALUATIONS):
-            return best
-        for detour in best.detours():
-            if detour.cut_short:
-                best.end(detour.status)
-            best = min(best, detour, key=lambda one: (bool(one.violations), one.merit()))
-            if not best.violations or best.cut_short:
-                break
-        return best
-
-    def _shorter(self, best: Session) -> Plan | None:
-        """Return the plan of the largest part where violations are because poses are out of reach.
-
-        None where there are no such: no other motion on finer grids would be better then.
-        """
-        ended = best.status in (*_ENDED, Status.MAX_EVALUATIONS)
-        if not best.violations or ended or self._problem.damping is not None:
-            return None
-        try:
-            return self._part() if self._reach().reason else None
-        except KeyboardInterrupt:
-            best.end(Status.INTERRUPTED)
-            return None
-
-    def _stands(self, best: Session, finished: Finished) -> bool:
-        """Whether a part of the path is no better answer than this motion along all of it."""
-        check = finished.certificate
-        no_more = best.cut_short or best.status is Status.MAX_EVALUATIONS
-        out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
-        # With damping the motion goes on where the path cannot be followed: so it was asked for.
-        return (check.on_path and not out_of_limits) or no_more or self._problem.damping is not None
-
-    def _reach(self, suspect: float = 0.0) -> Reach:
-        """Return how far single poses are in reach, after a closer look at a time [s].
-
-        That is left out where something is known to be beyond.
-        """
-        for known in self._known_reach.values():
-            if known.reason:
-                return known
-        if suspect not in self._known_reach:
-            self._progress("reach", 1, 1)
-            rng = np.random.default_rng(self._search.rng)
-            found = reachable(self._problem, self._search.starts, rng, suspect)
-            self._known_reach[suspect] = found
-        return self._known_reach[suspect]
-
-    def _part(self, suspect: float = 0.0) -> Plan | None:
-        """Return the plan of the largest part, looking closely at a time [s]; None for none."""
-        effort = self._effort
-        if effort.max_evaluations is None:
-            free = self._problem.given_start is None
-            most = FREE_PART_EVALUATIONS if free else PART_EVALUATIONS
-            effort = replace(effort, max_evaluations=most)
-        known = self._reach(suspect)
-        self._progress("largest part", 1, 1)
-        found = largest_part(self._problem, known, effort)
-        if found is None:
-            return None
-        self._settle(found.session, None)
-        finished = finish(self._problem, found, self._tolerance, self._progress)
-        return self._gather(found, finished, None)
-
-    def _settle(self, best: Session, rival: Session | None) -> float | None:
-        """Go on to finer grids, also with what the best one is compared with; return its cost."""
-        try:
-            self._progress("finer grid", 1, 1)
-            best.settle()
-            if rival is not None and rival is not best and not best.cut_short:
-                rival.settle()
-                if rival.cut_short:
-                    best.end(rival.status)
-                violated, cost = rival.score()
-                return None if violated else cost
-        except KeyboardInterrupt:
-            best.end(Status.INTERRUPTED)
-        return None
-
-    def _gather(self, part: LargestPart, finished: Finished, gap: Gap | None) -> Plan:
-        session, motion, still = part.session, finished.motion, finished.still
-        if self._deadline.passed and session.status is Status.INTERRUPTED:
-            session.end(Status.DEADLINE)
-        counts = session.counts
-        report = Report(
-            cost=motion.cost,
-            initial_cost=still.cost,
-            terms=motion.terms,
-            initial_terms=still.terms,
-            evaluations=counts.evaluations,
-            gradient_evaluations=counts.gradients,
-            jacobian_evaluations=counts.jacobians,
-            steps=len(motion.trajectory.t) - 1,
-            iterations=sum(iteration.step > 0.0 for iteration in session.history),
-            history=tuple(session.history),
-            status=_status(session, finished),
-            message=_message(part, finished, self._candidates.notes),
-            seconds=time.perf_counter() - self._began,
-            gap=gap,
-            ending=part.ending,
-            active=session.active,
-            null_motion=session.null_motion,
-            remaining=session.remaining,
-        )
-        return Plan(
-            problem=self._problem,
-            trajectory=motion.trajectory,
-            initial_trajectory=still.trajectory,
-            coefficients=read_only(session.coefficients),
-            report=report,
-            certificate=finished.certificate,
-        )
-
-    def _gap(self, rival_cost: float | None, finished: Finished) -> Gap | None:
-        """Compare a plan with what the global search knows; None where it knows nothing."""
-        candidates, motion = self._candidates, finished.motion
-        if not candidates.sequences:
-            return None
-        shortest = min((each.sequence for each in candidates.sequences), key=lambda s: s.length)
-        rival, weights = candidates.rival, self._problem.robot.joint_weights
-        if rival is not None and rival is candidates.best and not rival.violations:
-            rival_cost = motion.cost
-        return Gap(
-            cost=motion.cost,
-            best_cost=rival_cost,
-            length=float((weights * np.abs(np.diff(motion.trajectory(shortest.t), axis=0))).sum()),
-            best_length=shortest.length,
-            spacing=SPACING,
-            sequences=len(candidates.sequences),
-        )
-
-
-def _status(session: Session, finished: Finished) -> Status:
-    """Return how the optimisation ended; what the certificate finds kept is not infeasible."""
-    kept = session.status is Status.INFEASIBLE and finished.certificate.verified
-    return Status.PRECISION if kept else session.status
-
-
-def _message(part: LargestPart, finished: Finished, notes: list[str]) -> str:
-    """Return in words how the optimisation ended, and what came of it."""
-    session, violations = part.session, part.session.violations
-    certificate = finished.certificate
-    said = session.status.message
-    if session.status is Status.GRADIENT and not certificate.on_path:
-        least = certificate.smallest_singular_value
-        said = (
-            f"the motion passes a singular pose near t = {least.time:.4g} s (smallest singular "
-            f"value {least.value:.2g}), next to which its cost cannot be lowered"
-        )
-    parts = [said] if session.cut_short or not violations else []
-    if violations and certificate.verified:
-        # Such as the clearance of bodies, whose convex hulls are planned with.
-        parts.append(f"what planning fell short of is kept by the motion: {'; '.join(violations)}")
-    elif violations:
-        parts.append(f"not all constraints could be met: {'; '.join(violations)}")
-    if certificate.failures and not (violations or part.ending):
-        parts.append(f"but {certificate.verdict}")
-    message = "; ".join(text for text in (part.ending, *parts, *notes) if text)
-    if certificate.damped:
-        stretches = " and ".join(map(str, certificate.damped))
-        message += f"; the inverse was damped {stretches}"
-    return message

@@ -1,84 +1,222 @@
-"""A motion of nodes that stands: an optimum that keeps the conditions."""
+"""A motion that stands: all that is known of it, as one value."""
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints
+from selfmotion.basics import Array, Flags
 from selfmotion.constraints import Binding
-from selfmotion.engine import Evaluation
-from selfmotion.motion import Grid, NodeNullMotion, NullMotion
-from selfmotion.nodes import NodeMotion
-from selfmotion.optimise import Status
+from selfmotion.engine import Evaluation, Objective, Remaining, finest
+from selfmotion.motion import Grid, NodeNullMotion, NullMotion, Trajectory
+from selfmotion.optimise import Minimum, Status
+from selfmotion.planning.beginning import Beginning
+from selfmotion.planning.closing import closed
+from selfmotion.planning.settings import MOST_ESTIMATED, THINNER
+from selfmotion.planning.warm_start import coefficients_of, pace_of
+from selfmotion.result import Plan
 
 
-@dataclass(frozen=True, eq=False)
-class Standing:
-    """A motion of nodes that stands: an optimum that keeps the conditions.
-
-    Attributes
-    ----------
-    motion : NodeMotion
-    status : Status
-    columns : (c,)
-        Of the conditions: those that counted.
-    prices : (N + 1, C)
-        Of the conditions, on the nodes of the optimum.
-    active : tuple of Binding
-    remaining : float
-        What a finer grid and another step might still save [cost].
-    """
-
-    motion: NodeMotion
-    status: Status
-    columns: Ints
-    prices: Array
-    active: tuple[Binding, ...]
-    remaining: float
+class Standing(Protocol):
+    """What is asked of a motion that stands, however it was found."""
 
     @property
-    def steps(self) -> int:
-        """Intervals between the nodes."""
-        return len(self.motion.grid.t) - 1
+    def status(self) -> Status:
+        """How the last minimisation ended."""
+
+    @property
+    def violations(self) -> tuple[str, ...]:
+        """What is wrong for each constraint that it could not meet."""
+
+    @property
+    def active(self) -> tuple[Binding, ...]:
+        """What kept it from a lower cost."""
+
+    @property
+    def remaining(self) -> float | None:
+        """What any other motion could still save, as far as is known [cost]."""
 
     @property
     def null_motion(self) -> NullMotion:
-        """The null motion's functions: of its values at the nodes, for each joint."""
-        return NodeNullMotion(tuple(self.motion.grid.t / self.motion.grid.t[-1]))
+        """The parameterisation of its null motion."""
 
     @property
     def coefficients(self) -> Array:
-        """The null motion at the nodes, joint by joint."""
-        return self.motion.epsilon.T.ravel()
+        """The null motion's coefficients."""
+
+    @property
+    def steps(self) -> int:
+        """Of its grid."""
 
     @property
     def cost(self) -> float:
         """F."""
-        return self.motion.exact_cost
+
+    def merit(self) -> float:
+        """Return the cost, much larger where constraints are violated: for ranking."""
 
     def evaluation(self) -> Evaluation:
-        """Return the motion as others are."""
-        motion = self.motion
-        return Evaluation(self.coefficients, motion.exact_terms, motion.trajectory, damped=False)
+        """Return the motion with its costs."""
 
-    def smoothed(self) -> "Standing":
-        """Return it with smooth velocities, where these cost no more and keep the conditions."""
-        motion = self.motion.smoothed()
-        dearer = motion is None or not motion.exact_cost <= self.cost
-        return (
-            self
-            if motion is None or dearer or motion.broken().any()
-            else replace(self, motion=motion)
+
+def score(standing: Standing) -> tuple[bool, float]:
+    """Return whether constraints are violated, then the cost: the smaller, the better.
+
+    Of two that violate constraints, the one that does so less is nearer to a motion.
+    """
+    violated = bool(standing.violations)
+    return violated, standing.merit() if violated else standing.cost
+
+
+@dataclass(frozen=True, eq=False)
+class RolledMotion:
+    """A motion rolled out from the coefficients of its null motion.
+
+    Attributes
+    ----------
+    beginning : Beginning
+        The start that it begins at.
+    objective : Objective
+        On its grid.
+    x : (size,)
+        The decision vector.
+    null_motion : NullMotion
+    minimum : Minimum or None
+        How the last minimisation with this null motion ended; None before the first.
+    violations : tuple of str
+    active : tuple of Binding
+    remaining : float or None
+        See `Standing`.
+    """
+
+    beginning: Beginning
+    objective: Objective
+    x: Array
+    null_motion: NullMotion
+    minimum: Minimum | None = None
+    violations: tuple[str, ...] = ()
+    active: tuple[Binding, ...] = ()
+    remaining: float | None = None
+
+    @classmethod
+    def still(cls, beginning: Beginning) -> "RolledMotion":
+        """Return the motion at x = 0."""
+        objective = beginning.first()
+        return cls(beginning, objective, np.zeros(objective.size), beginning.problem.null_motion)
+
+    @property
+    def status(self) -> Status:
+        """How the last minimisation ended."""
+        return Status.STOPPED if self.minimum is None else self.minimum.status
+
+    @property
+    def coefficients(self) -> Array:
+        """The null motion's coefficients."""
+        return self.objective.parts(self.x)[1].copy()
+
+    @property
+    def steps(self) -> int:
+        """Of its grid."""
+        return self.objective.grid.steps
+
+    @property
+    def nodes(self) -> Array:
+        """The motion at the nodes of its grid, (N + 1, n)."""
+        samples = self.objective.samples(self.x)
+        return np.array(samples.q[self.objective.grid.node_stages])
+
+    @property
+    def cost(self) -> float:
+        """F."""
+        return sum(self.objective.terms(self.x).values())
+
+    def merit(self) -> float:
+        """Return the cost, much larger where constraints are violated: for ranking."""
+        objective, x = self.objective, self.x
+        cost = objective.value(x)
+        if not np.isfinite(cost):
+            return cost
+        return cost + max(abs(cost), 1e-3) * objective.constraints.penalty(objective.samples(x))
+
+    def evaluation(self) -> Evaluation:
+        """Return the motion with its costs."""
+        return self.objective.at(self.x)
+
+    def still_evaluation(self) -> Evaluation:
+        """Return the motion at x = 0 on this grid."""
+        return self.objective.at(np.zeros_like(self.x))
+
+    def judged(self) -> "RolledMotion":
+        """Return it with what is wrong for each constraint that is not met."""
+        return replace(self, violations=self.objective.violations(self.x))
+
+    def closed(self) -> "RolledMotion":
+        """Return it with what is asked of its ends met to rounding."""
+        if not self.objective.constraints.has_equalities or self.minimum is None:
+            return self
+        return replace(self, x=closed(self.objective, self.x, self.minimum.inverse_hessian))
+
+    def on(
+        self, grid: Grid, motion: NullMotion | None = None, around: Array | None = None
+    ) -> Objective:
+        """Return the objective on a grid, by default of its null motion."""
+        return self.beginning.objective(grid, motion or self.null_motion, around)
+
+    def refined(self, where: Flags | None = None) -> "RolledMotion":
+        """Return it with half the step length, everywhere or for some of the steps (N,)."""
+        return replace(self, objective=self.on(self.objective.grid.halved(where))).closed()
+
+    def with_null_motion(self, motion: NullMotion) -> "RolledMotion":
+        """Return it with another null motion that can be what the present one is."""
+        before = self.objective
+        z, x, c = before.parts(self.x)
+        grid = before.grid.with_steps(motion.fewest_steps // THINNER)
+        t, duration = grid.stage_times, self.beginning.problem.path.duration
+        own, new = (kind.functions(t, duration) for kind in (self.null_motion, motion))
+        same = np.linalg.lstsq(new, own)[0]
+        rows = x.reshape(before.null_motion.rows, own.shape[1]) @ same.T
+        return replace(
+            self,
+            x=np.concatenate([z, rows.ravel(), c]),
+            objective=self.on(grid, motion),
+            null_motion=motion,
+            minimum=None,
         )
 
-    def refined(self, where: Flags | None = None) -> "Standing":
-        """Return it with more nodes, in the middle of each interval or of some (N,)."""
-        t = self.motion.grid.t
-        finer = Grid(t).halved(where).nodes
-        motion = self.motion.on(self.motion.grid.on(finer))
-        if motion is None:
-            return self
-        # Prices are of conditions at nodes: the more there are, the less each counts.
-        near = np.searchsorted(t, finer, side="right") - 1
-        prices = self.prices[near] * (len(t) / len(finer))
-        return replace(self, motion=motion, prices=prices)
+    def resumed(self, trajectory: Trajectory) -> "RolledMotion":
+        """Return the one whose null motion is that of a motion along this path, if no worse."""
+        return self._or_along(trajectory, 1.0, self.objective, self.null_motion)
+
+    def begun_at(self, plan: Plan) -> "RolledMotion":
+        """Return the one whose null motion is that of a plan of such a problem, if no worse."""
+        motion, known = self.null_motion, plan.report.null_motion
+        if plan.problem.null_motion == motion and not isinstance(known, NodeNullMotion | None):
+            motion = known
+        grid = self.objective.grid.with_steps(max(motion.fewest_steps, plan.report.steps))
+        pace = pace_of(plan, self.beginning.problem)
+        return self._or_along(plan.trajectory, pace, self.on(grid, motion), motion)
+
+    def _or_along(
+        self, trajectory: Trajectory, pace: float, objective: Objective, motion: NullMotion
+    ) -> "RolledMotion":
+        still, t, problem = self.merit(), objective.grid.stage_times, self.beginning.problem
+        x = coefficients_of(trajectory, pace, problem, t, objective.null_motion)
+        z, _, c = objective.parts(np.zeros(objective.size))
+        other = replace(self, x=np.concatenate([z, x, c]), objective=objective, null_motion=motion)
+        return other if other.merit() <= still else self
+
+    def left(self, *, bound: bool) -> Remaining:
+        """Return what is left to save around this motion; `bound` where constraints count."""
+        problem = self.beginning.problem
+        spline = finest(problem.follows.redundancy)
+        # More than a step for each interval makes no better estimate.
+        grid = self.objective.grid.with_steps(spline.intervals)
+        if grid.steps > MOST_ESTIMATED:
+            # It is in memory for each number of the spline.
+            grid = Grid.aligned(problem.knots, MOST_ESTIMATED)
+        same = grid is self.objective.grid
+        objective = self.objective if same else self.on(grid)
+        z, x, c = objective.parts(self.x)
+        fine = self.on(grid, spline, objective.null_motion.epsilon(x))
+        none = np.zeros(fine.null_motion.size)
+        return Remaining(fine, np.concatenate([z, none, c]), bound=bound)

@@ -47,6 +47,11 @@ def start_of(plan: Plan, problem: Problem) -> Array:
     return problem.robot.inverse_kinematics(problem.path.pose(0.0), problem.task, seed)
 
 
+def pace_of(plan: Plan, problem: Problem) -> float:
+    """Return the duration of a plan's path over that of the problem's."""
+    return plan.path.duration / problem.path.duration
+
+
 def slower(trajectory: Trajectory, pace: float) -> Trajectory:
     """Return the same motion so many times as fast; `pace` is its duration over the new one."""
     qdd = None if trajectory.qdd is None else pace**2 * trajectory.qdd

@@ -11,7 +11,7 @@ from selfmotion.result.plan import (
     load_plan as load_plan,
     read_plan as read_plan,
 )
-from selfmotion.result.report import Gap as Gap, Report as Report
+from selfmotion.result.report import Attempt as Attempt, Gap as Gap, Report as Report
 from selfmotion.result.retiming import (
     rate_limits as rate_limits,
     retime as retime,

@@ -25,7 +25,7 @@ from selfmotion.motion import NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Status
 from selfmotion.problem.problem import Problem
 from selfmotion.problem.saved_problem import problem_from_dict, problem_to_dict
-from selfmotion.result.report import Gap, Report
+from selfmotion.result.report import Attempt, Gap, Report
 from selfmotion.robot import mesh_digests
 
 # Raised with every change that older versions cannot read.
@@ -167,6 +167,7 @@ def _report_to_dict(report: Report) -> dict[str, Any]:
         "status": report.status.value,
         "gap": None if report.gap is None else dataclasses.asdict(report.gap),
         "active": [dataclasses.asdict(item) for item in report.active],
+        "attempts": [dataclasses.asdict(item) for item in report.attempts],
         "null_motion": None if report.null_motion is None else report.null_motion.to_dict(),
     }
 
@@ -203,6 +204,8 @@ def _restore(
     report = dict(description["report"])
     report["status"] = Status(report["status"])
     report["gap"] = None if report["gap"] is None else Gap(**report["gap"])
+    # Plans of before it was noted have none.
+    report["attempts"] = tuple(Attempt(**item) for item in report.get("attempts", ()))
     motion = report["null_motion"]
     report["null_motion"] = None if motion is None else restore(NullMotion, motion)
     report["active"] = tuple(

@@ -55,6 +55,29 @@ class Gap:
         return self.length / self.best_length - 1.0
 
 
+@dataclass(frozen=True)
+class Attempt:
+    """One thing that was tried for a plan, and what stood after it.
+
+    Attributes
+    ----------
+    name : str
+        Such as "given start" or "global search"; the site's page "What is tried, in what order,
+        and when it ends" has all of them.
+    outcome : str
+        What stood after it, in words.
+    cost : float or None
+        F of that; None where there was no motion.
+    seconds : float
+        Wall time.
+    """
+
+    name: str
+    outcome: str
+    cost: float | None
+    seconds: float
+
+
 @dataclass(frozen=True, eq=False)
 class Report:
     """How a plan was found.
@@ -92,6 +115,8 @@ class Report:
         An estimate of what any other null motion could still take off F, the constraints kept: of
         nodes what their distance and another step leave; else by the quadratic model of F around
         the plan in a spline of up to 64 intervals. None where there is none to be had.
+    attempts : tuple of Attempt
+        What was tried, in order; empty for other works' methods.
     """
 
     cost: float
@@ -112,6 +137,7 @@ class Report:
     active: tuple[Binding, ...] = ()
     null_motion: NullMotion | None = None
     remaining: float | None = None
+    attempts: tuple[Attempt, ...] = ()
 
     def __repr__(self) -> str:
         """Return one line: costs, effort and how it ended."""

@@ -1,0 +1,272 @@
+"""What is tried, in what order, and when: the list that a plan goes through."""
+
+import time
+from collections.abc import Callable
+
+from selfmotion.basics import BreakdownError, InverseKinematicsError, NoSequenceError
+from selfmotion.optimise import Status
+from selfmotion.planning.draft import Draft
+from selfmotion.planning.refusal import begins_off_path, looked_at, no_way
+from selfmotion.planning.sequences import optimise_sequences
+from selfmotion.planning.session import Session
+from selfmotion.planning.settings import SECOND_EFFORT
+from selfmotion.planning.starts import optimise_starts
+from selfmotion.planning.warm_start import start_of
+from selfmotion.result import Attempt
+from selfmotion.search import guides, guides_near
+
+
+def go_through(draft: Draft) -> None:
+    """Try everything that applies, in order.
+
+    An interruption ends one attempt; of those after it, what applies to the best so far is done.
+
+    Raises
+    ------
+    SelfmotionError
+        There is no motion.
+    KeyboardInterrupt
+        The interruption came before there was a complete motion.
+    """
+    for name, attempt in ATTEMPTS:
+        began = time.perf_counter()
+        try:
+            tried = attempt(draft)
+        except KeyboardInterrupt:
+            draft.interrupted()
+            tried = True
+        if tried:
+            seconds = time.perf_counter() - began
+            draft.attempts.append(Attempt(draft.again + name, *_outcome(draft), seconds))
+
+
+def _outcome(draft: Draft) -> tuple[str, float | None]:
+    """Return in words what stands, and what it costs."""
+    proved, best = draft.proved, draft.best
+    if proved is not None:
+        parts = (proved.part.ending, proved.finished.certificate.verdict)
+        return "; ".join(text for text in parts if text), proved.finished.motion.cost
+    if best is not None:
+        wrong = "; ".join(best.violations)
+        said = f"not all constraints are met: {wrong}" if wrong else "all constraints are met"
+        return said, best.standing.cost
+    if draft.failure is not None:
+        return str(draft.failure), None
+    return draft.blocked.reason if draft.blocked else "nothing is in the way", None
+
+
+def _look(draft: Draft) -> bool:
+    """Look whether the arm can be at some single poses at all, where nothing is known yet."""
+    known = draft.known
+    if not draft.is_free or known.poses or known.plan is not None or known.guide is not None:
+        return False
+    draft.blocked = looked_at(draft.problem, draft.search)
+    return True
+
+
+def _plan_before_blocked_pose(draft: Draft) -> bool:
+    """Plan what comes before a pose that is out of reach."""
+    blocked = draft.blocked
+    if blocked is None or blocked.is_met:
+        return False
+    told = blocked.help.removeprefix("; ")
+    draft.notes += [told] if told else []
+    # A part would begin on the path itself, which relaxed rows only let the arm be near.
+    off = begins_off_path(draft.problem, draft.search)
+    try:
+        found = not off and draft.prove_part(blocked.time)
+    except InverseKinematicsError:
+        found = False
+    if not found:
+        raise no_way(draft.problem, blocked)
+    return True
+
+
+def _follow_guide(draft: Draft) -> bool:
+    """Optimise from a motion that is known."""
+    guide = draft.known.guide
+    if guide is None:
+        return False
+    session = draft.begin(guide.start, free=draft.is_free, guide=guide)
+    if session is not None:
+        draft.optimise(session)
+    return True
+
+
+def _begin_at_plan(draft: Draft) -> bool:
+    """Optimise from a plan of this problem or of one like it, if it leads to a motion."""
+    plan = draft.known.plan
+    if plan is None or not draft.is_free:
+        return False
+    try:
+        start = start_of(plan, draft.problem)
+    except InverseKinematicsError as error:
+        draft.failure = error
+        return True
+    session = draft.begin(start, free=True)
+    if session is not None:
+        session.adopt(plan)
+        draft.progress("warm start", 1, 1)
+        draft.optimise(session)
+    return True
+
+
+def _begin_at_start(draft: Draft) -> bool:
+    """Optimise from the start that is given."""
+    start = draft.problem.given_start
+    if start is None or not (draft.is_sought and draft.is_unmet):
+        return False
+    session = draft.begin(start, free=False)
+    if session is not None:
+        if draft.known.plan is not None:
+            session.adopt(draft.known.plan)
+        draft.optimise(session)
+    return True
+
+
+def _draw_starts(draft: Draft) -> bool:
+    """Optimise from the best of starts that are drawn."""
+    search = draft.search
+    if not (draft.is_sought and draft.takes_starts and (draft.is_unmet or search.compare)):
+        return False
+    optimise_starts(draft, search.starts, search.finalists)
+    return True
+
+
+def _search_globally(draft: Draft) -> bool:
+    """Optimise from the best chains of configurations over all self-motions."""
+    wanted = draft.search.compare or (draft.chooses_globally and draft.is_unmet)
+    can = draft.is_searchable and not draft.is_off_path and (draft.is_free or draft.best)
+    if not (draft.is_sought and wanted and can) or draft.is_out_of_reach():
+        return False
+    optimise_sequences(draft, guides, chosen=draft.chooses_globally)
+    return True
+
+
+def _search_off_path(draft: Draft) -> bool:
+    """Do so with the tool off its path, as far as rows are relaxed."""
+    can = bool(draft.problem.relaxations) and (draft.chooses_globally or draft.is_off_path)
+    if not (draft.is_sought and draft.is_unmet and can) or draft.is_out_of_reach():
+        return False
+    optimise_sequences(draft, guides_near, chosen=True)
+    return True
+
+
+def _draw_more_starts(draft: Draft) -> bool:
+    """Draw many more starts; they do not help where the search knows that nothing will."""
+    search, more = draft.search, SECOND_EFFORT
+    wanted = draft.is_unmet and not draft.notes
+    if not (draft.is_sought and draft.takes_starts and wanted) or draft.is_out_of_reach():
+        return False
+    optimise_starts(draft, more * search.starts, more * search.finalists)
+    return True
+
+
+def _plan_largest_part(draft: Draft) -> bool:
+    """Plan the part that can be followed, where there is no motion, or poses are out of reach.
+
+    No other motion on finer grids would be better then.
+    """
+    best, failure = draft.best, draft.failure
+    if best is not None:
+        spent = best.status is Status.MAX_EVALUATIONS or draft.problem.damping is not None
+        short = draft.is_sought and bool(best.violations) and not spent
+        if short and draft.reach().reason:
+            draft.prove_part()
+            return True
+        return False
+    if draft.proved is not None:
+        return False
+    if failure is None:
+        raise RuntimeError("each start leads to a motion or to an error")
+    if not isinstance(failure, BreakdownError | NoSequenceError):
+        raise failure
+    # Chains of configurations end at obstacles and step limits as well: these stay errors.
+    blocked = isinstance(failure, NoSequenceError) and not draft.reach(failure.time).reason
+    if blocked or not draft.prove_part(failure.time):
+        raise failure
+    return True
+
+
+def _take_other_null_motion(draft: Draft) -> bool:
+    """Take another null motion where one meets more of the constraints."""
+    best = draft.best
+    if best is None or not draft.is_sought or not _may_meet_more(best):
+        return False
+    _meet_more(draft, best)
+    return True
+
+
+def _may_meet_more(best: Session) -> bool:
+    spent = best.cut_short or best.status is Status.MAX_EVALUATIONS
+    return bool(best.violations) and not spent
+
+
+def _meet_more(draft: Draft, best: Session) -> None:
+    for motion in best.others():
+        other = best.by(motion)
+        if other.cut_short:
+            best.end(other.status)
+        draft.best = best = min(best, other, key=lambda one: (bool(one.violations), one.merit()))
+        if not best.violations or best.cut_short:
+            break
+
+
+def _prove(draft: Draft) -> bool:
+    """Go on to finer grids, until the certificate finds nothing wrong."""
+    if draft.best is None or draft.proved is not None:
+        return False
+    draft.prove(draft.best)
+    return True
+
+
+def _do_without_nodes(draft: Draft) -> bool:
+    """Optimise once more without nodes, where a limit is passed between them."""
+    best, proved = draft.best, draft.proved
+    if best is None or proved is None or best is not proved.part.session:
+        return False
+    if best.on_nodes is None or best.cut_short or proved.finished.certificate.verified:
+        return False
+    best.leave_nodes()
+    if _may_meet_more(best):
+        _meet_more(draft, best)
+    draft.prove(draft.best or best)
+    return True
+
+
+def _plan_part_instead(draft: Draft) -> bool:
+    """Plan the largest part where a motion along all of the path is off it, or past limits."""
+    best, proved = draft.best, draft.proved
+    if best is None or proved is None or best is not proved.part.session:
+        return False
+    check = proved.finished.certificate
+    # With damping the motion goes on where the path cannot be followed: so it was asked for.
+    no_more = best.cut_short or best.status is Status.MAX_EVALUATIONS
+    if no_more or draft.problem.damping is not None:
+        return False
+    out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
+    suspect = check.position_error.time
+    # Where single poses are in reach, constraints that are not met say more than a part.
+    if (check.on_path and not out_of_limits) or not draft.reach(suspect).reason:
+        return False
+    draft.prove_part(suspect)
+    return True
+
+
+# By name, as reports have it; each says whether it was tried.
+ATTEMPTS: tuple[tuple[str, Callable[[Draft], bool]], ...] = (
+    ("look at single poses", _look),
+    ("part before a pose out of reach", _plan_before_blocked_pose),
+    ("motion that is known", _follow_guide),
+    ("warm start", _begin_at_plan),
+    ("given start", _begin_at_start),
+    ("starts", _draw_starts),
+    ("global search", _search_globally),
+    ("search off the path", _search_off_path),
+    ("more starts", _draw_more_starts),
+    ("largest part", _plan_largest_part),
+    ("other null motions", _take_other_null_motion),
+    ("finer grids and proof", _prove),
+    ("once more without nodes", _do_without_nodes),
+    ("largest part instead", _plan_part_instead),
+)

@@ -1,0 +1,280 @@
+"""What is known of one plan while it is made."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from selfmotion.basics import Array, BreakdownError, Progress, SelfmotionError
+from selfmotion.certificate import Tolerance
+from selfmotion.engine import Guide
+from selfmotion.motion import Trajectory
+from selfmotion.optimise import Status
+from selfmotion.planning.effort import Effort
+from selfmotion.planning.finish import Finished, finish
+from selfmotion.planning.heats import Heats
+from selfmotion.planning.largest_part import LargestPart, largest_part
+from selfmotion.planning.refinement import settle
+from selfmotion.planning.refusal import leaves_path
+from selfmotion.planning.search import Search
+from selfmotion.planning.session import Session
+from selfmotion.planning.settings import FREE_PART_EVALUATIONS, PART_EVALUATIONS
+from selfmotion.problem import Problem
+from selfmotion.result import Attempt, Plan
+from selfmotion.search import Obstruction, Reach, SequenceGuide, reachable
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What is known before planning.
+
+    Attributes
+    ----------
+    plan : Plan or None
+        Of this problem or of one like it: tried first; where its motion will do, nothing else is.
+    guide : SequenceGuide or None
+        Likewise a motion that a search over the whole path has found.
+    poses : bool
+        Whether single poses were looked at already, and nothing was found in the way.
+    """
+
+    plan: Plan | None = None
+    guide: SequenceGuide | None = None
+    poses: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Proved:
+    """What the plan is made of: a motion along all of the path or a part of it, and its check.
+
+    Attributes
+    ----------
+    part : LargestPart
+    finished : Finished
+    rival_cost : float or None
+        That of the best motion from the sequences of the search, where it keeps the constraints.
+    """
+
+    part: LargestPart
+    finished: Finished
+    rival_cost: float | None = None
+
+
+@dataclass(eq=False)
+class Draft:
+    """What is known of one plan while it is made; the attempts change it.
+
+    Attributes
+    ----------
+    problem : Problem
+    effort : Effort
+        What all sessions share.
+    search : Search
+    tolerance : Tolerance
+    progress : Progress
+    known : Known
+    again : str
+        What is done differently where the list is gone through once more; "" the first time.
+    attempts : list of Attempt
+        What was tried, in order.
+    began : float
+        When, by the clock `time.perf_counter` [s].
+    blocked : Obstruction or None
+        A pose that no configuration was found for.
+    best : Session or None
+    sequences : list of SequenceGuide
+        What the global search found; empty where it was not asked for or in vain.
+    rival : Session or None
+        The best motion from these. It is not chosen where the start is given or the search local,
+        and only compared with.
+    failure : SelfmotionError or None
+        Why there is no motion, if there is none: the last reason.
+    notes : list of str
+        Why a search was in vain; what would help.
+    waiting : sequence of Session
+        Complete motions that are not optimised yet.
+    heats : Heats or None
+        Rough motions.
+    proved : Proved or None
+    """
+
+    problem: Problem
+    effort: Effort
+    search: Search
+    tolerance: Tolerance
+    progress: Progress
+    known: Known
+    again: str = ""
+    attempts: list[Attempt] = field(default_factory=list)
+    began: float = field(default_factory=time.perf_counter)
+    blocked: Obstruction | None = None
+    best: Session | None = None
+    sequences: list[SequenceGuide] = field(default_factory=list)
+    rival: Session | None = None
+    failure: SelfmotionError | None = None
+    notes: list[str] = field(default_factory=list)
+    waiting: Sequence[Session] = ()
+    heats: Heats | None = None
+    proved: Proved | None = None
+
+    def __post_init__(self) -> None:
+        self.rng = np.random.default_rng(self.search.rng)
+        self._reaches: dict[float, Reach] = {}
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the start is free."""
+        return self.problem.given_start is None
+
+    @property
+    def is_searchable(self) -> bool:
+        """Whether there is anything to search: a self-motion."""
+        return self.problem.follows.redundancy > 0
+
+    @cached_property
+    def is_off_path(self) -> bool:
+        """Whether the start is free, and relaxed rows have to be made use of."""
+        return self.is_free and leaves_path(self.problem, self.search)
+
+    @property
+    def chooses_globally(self) -> bool:
+        """Whether what the global search finds may be chosen, and is not only compared with."""
+        return self.is_free and self.search.mode != "local"
+
+    @property
+    def takes_starts(self) -> bool:
+        """Whether starts are drawn."""
+        only_global = self.search.mode == "global" and self.is_searchable
+        return self.is_free and not only_global and not self.is_off_path
+
+    @property
+    def is_sought(self) -> bool:
+        """Whether a motion is still looked for."""
+        return self.proved is None and not self.is_over
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the user wants no more."""
+        return self.best is not None and self.best.cut_short
+
+    @property
+    def is_unmet(self) -> bool:
+        """Whether no motion is known yet that keeps all constraints."""
+        return self.best is None or bool(self.best.violations)
+
+    def begin(
+        self,
+        start: Array,
+        *,
+        free: bool,
+        guide: Guide | None = None,
+        deviation: Array | None = None,
+    ) -> Session | None:
+        """Return the session of a start; None where it breaks down at once, which is noted."""
+        try:
+            return Session.begin(
+                self.problem, self.effort, start, free=free, guide=guide, deviation=deviation
+            )
+        except BreakdownError as error:
+            self.failure = error
+            return None
+
+    def resumed(self, rough: Sequence[Trajectory]) -> list[Session]:
+        """Return sessions that begin at rough motions, the best first."""
+        sessions = []
+        for motion in rough:
+            session = self.begin(motion.q[0], free=True)
+            if session is not None:
+                session.resume(motion)
+                sessions.append(session)
+        return sorted(sessions, key=Session.merit)
+
+    def optimise(
+        self, session: Session, *, chosen: bool = True, evaluations: int | None = None
+    ) -> None:
+        """Optimise a session; keep it if it is the best one and may be chosen."""
+        try:
+            session.minimize(evaluations)
+        except KeyboardInterrupt:
+            session.end(Status.INTERRUPTED)
+        if chosen:
+            self.consider(session)
+        if session.cut_short and self.best is not None:
+            self.best.end(session.status)
+
+    def consider(self, session: Session) -> None:
+        """Keep a session if it is the best one."""
+        if self.best is None or session.score() < self.best.score():
+            self.best = session
+
+    def reach(self, suspect: float = 0.0) -> Reach:
+        """Return how far single poses are in reach, after a closer look at a time [s].
+
+        That is left out where something is known to be beyond.
+        """
+        for known in self._reaches.values():
+            if known.reason:
+                return known
+        if suspect not in self._reaches:
+            self.progress("reach", 1, 1)
+            rng = np.random.default_rng(self.search.rng)
+            self._reaches[suspect] = reachable(self.problem, self.search.starts, rng, suspect)
+        return self._reaches[suspect]
+
+    def is_out_of_reach(self) -> bool:
+        """Whether no start led anywhere because the path leaves the workspace."""
+        if self.best is not None:
+            return bool(self.best.violations) and bool(self.reach().reason)
+        failure = self.failure
+        return isinstance(failure, BreakdownError) and bool(self.reach(failure.time).reason)
+
+    def prove(self, best: Session) -> None:
+        """Let the best motion be what the plan is made of, on grids that are fine enough."""
+        rival_cost = self._settle(best, self.rival)
+        whole = LargestPart(self.problem, best, "")
+        finished = finish(self.problem, whole, self.tolerance, self.progress)
+        self.proved = Proved(whole, finished, rival_cost)
+
+    def prove_part(self, suspect: float = 0.0) -> bool:
+        """Let the largest part be it, a time [s] looked at closely; return whether there is one."""
+        effort = self.effort
+        if effort.max_evaluations is None:
+            most = FREE_PART_EVALUATIONS if self.is_free else PART_EVALUATIONS
+            effort = replace(effort, max_evaluations=most)
+        known = self.reach(suspect)
+        self.progress("largest part", 1, 1)
+        found = largest_part(self.problem, known, effort)
+        if found is None:
+            return False
+        self._settle(found.session, None)
+        finished = finish(self.problem, found, self.tolerance, self.progress)
+        self.proved = Proved(found, finished)
+        return True
+
+    def _settle(self, best: Session, rival: Session | None) -> float | None:
+        """Go on to finer grids, also with what the best one is compared with; return its cost."""
+        try:
+            self.progress("finer grid", 1, 1)
+            settle(best)
+            if rival is not None and rival is not best and not best.cut_short:
+                settle(rival)
+                if rival.cut_short:
+                    best.end(rival.status)
+                violated, cost = rival.score()
+                return None if violated else cost
+        except KeyboardInterrupt:
+            best.end(Status.INTERRUPTED)
+        return None
+
+    def interrupted(self) -> None:
+        """Make the best that is known the outcome; raise KeyboardInterrupt where nothing is."""
+        if self.best is None and not self.waiting and self.heats is not None:
+            self.waiting = self.resumed(self.heats.ranked[:1])
+        for session in self.waiting if self.best is None else ():
+            session.end(Status.INTERRUPTED)
+            self.consider(session)
+        if self.best is None:
+            raise KeyboardInterrupt
+        self.best.end(Status.INTERRUPTED)

@@ -1,0 +1,126 @@
+"""From what was found to the plan, and what is said of it."""
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from selfmotion.basics import read_only
+from selfmotion.certificate import Certificate
+from selfmotion.optimise import Status
+from selfmotion.planning.deadline import Deadline
+from selfmotion.planning.draft import Draft, Proved
+from selfmotion.result import Gap, Plan, Report
+from selfmotion.search import SPACING
+
+# After these no other way is tried.
+ENDED = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
+
+
+def gathered(draft: Draft, deadline: Deadline) -> Plan:
+    """Return the plan.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        The interruptions left no time for a proof.
+    """
+    proved = draft.proved
+    if proved is None:
+        raise KeyboardInterrupt
+    part, finished = proved.part, proved.finished
+    session, motion, still = part.session, finished.motion, finished.still
+    if deadline.passed and session.status is Status.INTERRUPTED:
+        session.end(Status.DEADLINE)
+    counts, standing = session.counts, session.standing
+    report = Report(
+        cost=motion.cost,
+        initial_cost=still.cost,
+        terms=motion.terms,
+        initial_terms=still.terms,
+        evaluations=counts.evaluations,
+        gradient_evaluations=counts.gradients,
+        jacobian_evaluations=counts.jacobians,
+        steps=len(motion.trajectory.t) - 1,
+        iterations=sum(iteration.step > 0.0 for iteration in session.history),
+        history=tuple(session.history),
+        status=status_of(session.status, finished.certificate),
+        message=message_of(
+            session.status,
+            session.violations,
+            finished.certificate,
+            ending=part.ending,
+            notes=draft.notes,
+        ),
+        seconds=time.perf_counter() - draft.began,
+        gap=_gap(draft, proved),
+        ending=part.ending,
+        active=standing.active,
+        null_motion=standing.null_motion,
+        remaining=standing.remaining,
+        attempts=tuple(draft.attempts),
+    )
+    return Plan(
+        problem=draft.problem,
+        trajectory=motion.trajectory,
+        initial_trajectory=still.trajectory,
+        coefficients=read_only(standing.coefficients),
+        report=report,
+        certificate=finished.certificate,
+    )
+
+
+def _gap(draft: Draft, proved: Proved) -> Gap | None:
+    """Compare a plan with what the global search knows; None where it knows nothing."""
+    if not draft.sequences or proved.part.session is not draft.best:
+        return None
+    motion, rival, rival_cost = proved.finished.motion, draft.rival, proved.rival_cost
+    shortest = min((each.sequence for each in draft.sequences), key=lambda each: each.length)
+    weights = draft.problem.robot.joint_weights
+    if rival is not None and rival is draft.best and not rival.violations:
+        rival_cost = motion.cost
+    return Gap(
+        cost=motion.cost,
+        best_cost=rival_cost,
+        length=float((weights * np.abs(np.diff(motion.trajectory(shortest.t), axis=0))).sum()),
+        best_length=shortest.length,
+        spacing=SPACING,
+        sequences=len(draft.sequences),
+    )
+
+
+def status_of(status: Status, certificate: Certificate) -> Status:
+    """Return how the optimisation ended; what the certificate finds kept is not infeasible."""
+    kept = status is Status.INFEASIBLE and certificate.verified
+    return Status.PRECISION if kept else status
+
+
+def message_of(
+    status: Status,
+    violations: Sequence[str],
+    certificate: Certificate,
+    *,
+    ending: str = "",
+    notes: Sequence[str] = (),
+) -> str:
+    """Return in words how the optimisation ended, and what came of it."""
+    said = status.message
+    if status is Status.GRADIENT and not certificate.on_path:
+        least = certificate.smallest_singular_value
+        said = (
+            f"the motion passes a singular pose near t = {least.time:.4g} s (smallest singular "
+            f"value {least.value:.2g}), next to which its cost cannot be lowered"
+        )
+    parts = [said] if status in ENDED or not violations else []
+    if violations and certificate.verified:
+        # Such as the clearance of bodies, whose convex hulls are planned with.
+        parts.append(f"what planning fell short of is kept by the motion: {'; '.join(violations)}")
+    elif violations:
+        parts.append(f"not all constraints could be met: {'; '.join(violations)}")
+    if certificate.failures and not (violations or ending):
+        parts.append(f"but {certificate.verdict}")
+    message = "; ".join(text for text in (ending, *parts, *notes) if text)
+    if certificate.damped:
+        stretches = " and ".join(map(str, certificate.damped))
+        message += f"; the inverse was damped {stretches}"
+    return message

@@ -1,0 +1,96 @@
+"""A motion of nodes that stands: an optimum that keeps the conditions."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from selfmotion.basics import Array, Flags, Ints
+from selfmotion.constraints import Binding
+from selfmotion.engine import Evaluation
+from selfmotion.motion import Grid, NodeNullMotion, NullMotion
+from selfmotion.nodes import NodeMotion
+from selfmotion.optimise import Status
+
+
+@dataclass(frozen=True, eq=False)
+class MotionOnNodes:
+    """A motion of nodes that stands: an optimum that keeps the conditions.
+
+    Attributes
+    ----------
+    motion : NodeMotion
+    status : Status
+    columns : (c,)
+        Of the conditions: those that counted.
+    prices : (N + 1, C)
+        Of the conditions, on the nodes of the optimum.
+    active : tuple of Binding
+    remaining : float or None
+        What a finer grid and another step might still save [cost]; None where that is not known.
+    is_chain : bool
+        Whether it is a chain of the global search, which is at its optimum.
+    """
+
+    motion: NodeMotion
+    status: Status
+    columns: Ints
+    prices: Array
+    active: tuple[Binding, ...]
+    remaining: float | None
+    is_chain: bool = False
+
+    @property
+    def steps(self) -> int:
+        """Intervals between the nodes."""
+        return len(self.motion.grid.t) - 1
+
+    @property
+    def null_motion(self) -> NullMotion:
+        """The null motion's functions: of its values at the nodes, for each joint."""
+        return NodeNullMotion(tuple(self.motion.grid.t / self.motion.grid.t[-1]))
+
+    @property
+    def coefficients(self) -> Array:
+        """The null motion at the nodes, joint by joint."""
+        return self.motion.epsilon.T.ravel()
+
+    @property
+    def cost(self) -> float:
+        """F."""
+        return self.motion.exact_cost
+
+    @property
+    def violations(self) -> tuple[str, ...]:
+        """None: nothing else stands on nodes."""
+        return ()
+
+    def merit(self) -> float:
+        """Return the cost."""
+        return self.cost
+
+    def evaluation(self) -> Evaluation:
+        """Return the motion with its costs."""
+        motion = self.motion
+        return Evaluation(self.coefficients, motion.exact_terms, motion.trajectory, damped=False)
+
+    def smoothed(self) -> "MotionOnNodes":
+        """Return it with smooth velocities, where these cost no more and keep the conditions."""
+        motion = self.motion.smoothed()
+        dearer = motion is None or not motion.exact_cost <= self.cost
+        return (
+            self
+            if motion is None or dearer or motion.broken().any()
+            else replace(self, motion=motion)
+        )
+
+    def refined(self, where: Flags | None = None) -> "MotionOnNodes":
+        """Return it with more nodes, in the middle of each interval or of some (N,)."""
+        t = self.motion.grid.t
+        finer = Grid(t).halved(where).nodes
+        motion = self.motion.on(self.motion.grid.on(finer))
+        if motion is None:
+            return self
+        # Prices are of conditions at nodes: the more there are, the less each counts.
+        near = np.searchsorted(t, finer, side="right") - 1
+        prices = self.prices[near] * (len(t) / len(finer))
+        return replace(self, motion=motion, prices=prices)

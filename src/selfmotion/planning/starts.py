@@ -1,0 +1,45 @@
+"""Motions from many starts: rough ones of all, optimised ones of the best."""
+
+from collections.abc import Sequence
+
+from selfmotion.basics import Array
+from selfmotion.motion import Trajectory
+from selfmotion.planning.draft import Draft
+from selfmotion.planning.heats import Heats
+from selfmotion.planning.session import Session
+from selfmotion.search import start_candidates
+
+
+def optimise_starts(draft: Draft, starts: int, finalists: int) -> None:
+    """Draw so many starts, and optimise from the best of them; from all where they are few.
+
+    Raises
+    ------
+    InverseKinematicsError
+        None reaches the start of the path.
+    """
+    problem = draft.problem
+    arm = problem.envelope.arm(problem.robot)
+    admits = problem.envelope.admits if problem.envelope.quantities else None
+    candidates = start_candidates(problem.follows.for_robot(arm), starts, draft.rng, admits)
+    rough = _rough(draft, candidates, finalists) if len(candidates) > finalists else []
+    draft.waiting = sessions = draft.resumed(rough) if rough else _sessions(draft, candidates)
+    for number, session in enumerate(sessions, 1):
+        draft.progress("optimising start", number, len(sessions))
+        draft.optimise(session)
+        # What nothing can reach, no other start will.
+        if draft.is_over or draft.is_out_of_reach():
+            break
+    draft.waiting = ()
+
+
+def _rough(draft: Draft, candidates: list[Array], finalists: int) -> list[Trajectory]:
+    """Return the best rough motions; none where these all break down."""
+    draft.heats = Heats(draft.problem, draft.effort, draft.progress)
+    draft.heats.run(candidates, finalists)
+    return draft.heats.ranked
+
+
+def _sessions(draft: Draft, starts: Sequence[Array]) -> list[Session]:
+    begun = (draft.begin(start, free=True) for start in starts)
+    return sorted((session for session in begun if session is not None), key=Session.merit)

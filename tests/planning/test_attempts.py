@@ -1,0 +1,78 @@
+"""What was tried is reported, in the order of one list that the documentation shows."""
+
+import dataclasses
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.planning.attempts import ATTEMPTS
+
+Circle = Callable[..., sm.Problem]
+NAMES = [name for name, _ in ATTEMPTS]
+PAGE = Path(__file__).parents[2] / "docs" / "pages" / "tried.md"
+
+
+def names_of(plan: sm.Plan) -> list[str]:
+    return [item.name for item in plan.report.attempts]
+
+
+def test_the_page_shows_the_list() -> None:
+    shown = re.findall(r"^\| `([^`]+)` \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert shown[1:] == NAMES
+    assert shown[0] == "name"
+
+
+def test_a_given_start_is_the_only_one_tried(panda_circle: Circle) -> None:
+    plan = sm.plan(panda_circle())
+    assert names_of(plan) == ["given start", "finer grids and proof"]
+    first, last = plan.report.attempts
+    assert first.outcome == "all constraints are met"
+    assert first.cost == pytest.approx(plan.report.cost, rel=1e-2)
+    assert last.outcome == plan.certificate.verdict
+    assert last.cost == plan.report.cost
+    assert first.seconds + last.seconds <= plan.report.seconds
+
+
+@pytest.mark.parametrize("mode", ["auto", "local", "global"])
+def test_attempts_come_in_order(planar: sm.RobotModel, mode: str) -> None:
+    start = planar.inverse_kinematics(pin.SE3(np.eye(3), np.array([2.0, 1.0, 0.0])), "planar")
+    line = sm.Line(planar.pose(start), pin.SE3(np.eye(3), np.array([3.0, -0.5, 0.0])), 2.0)
+    plan = sm.plan(sm.Problem(planar, line, "planar"), search=sm.Search(mode=mode, starts=6))
+    tried = names_of(plan)
+    assert tried == sorted(tried, key=NAMES.index)
+    assert ("starts" in tried) == (mode != "global")
+    assert ("global search" in tried) == (mode == "global")
+
+
+def test_a_part_is_an_attempt_with_a_reason(planar: sm.RobotModel) -> None:
+    start = planar.inverse_kinematics(pin.SE3(np.eye(3), np.array([2.0, 1.0, 0.0])), "planar")
+    line = sm.Line(planar.pose(start), pin.SE3(np.eye(3), np.array([9.0, 1.0, 0.0])), 2.0)
+    plan = sm.plan(sm.Problem(planar, line, "planar", start))
+    assert plan.report.ending
+    last = plan.report.attempts[-1]
+    assert last.name.startswith("largest part")
+    assert last.outcome.startswith(plan.report.ending)
+
+
+def test_what_is_interrupted_is_an_attempt(panda_circle: Circle) -> None:
+    def progress(stage: str, done: int, total: int) -> None:
+        if stage == "finer grid":
+            raise KeyboardInterrupt
+
+    plan = sm.plan(panda_circle(), progress=progress)
+    assert plan.report.status is sm.Status.INTERRUPTED
+    assert names_of(plan) == ["given start", "finer grids and proof"]
+
+
+def test_attempts_are_saved(panda_circle: Circle, tmp_path: Path) -> None:
+    plan = sm.plan(panda_circle())
+    plan.save(tmp_path / "plan.npz")
+    assert sm.load_plan(tmp_path / "plan.npz").report.attempts == plan.report.attempts
+    none = dataclasses.replace(plan.report, attempts=())
+    dataclasses.replace(plan, report=none).save(tmp_path / "none.npz")
+    assert sm.load_plan(tmp_path / "none.npz").report.attempts == ()
