@@ -82,9 +82,15 @@ def _tried(report: Report) -> Table:
     table.add_column("what stood after it", overflow="fold")
     table.add_column("cost", justify="right", no_wrap=True)
     table.add_column("s", justify="right", no_wrap=True)
+    before = None
     for item in report.attempts:
         cost = "" if item.cost is None else f"{item.cost:.6g}"
-        table.add_row(escape(item.name), escape(item.outcome), cost, f"{item.seconds:.2f}")
+        stood = (item.outcome, item.cost)
+        first, *more = item.outcome.split("; ")
+        outcome = f"{first}; and {len(more)} more" if more else first
+        outcome = "as before" if stood == before else outcome
+        table.add_row(escape(item.name), escape(outcome), cost, f"{item.seconds:.2f}")
+        before = stood
     return table
 
 

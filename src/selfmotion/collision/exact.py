@@ -22,6 +22,8 @@ from selfmotion.robot import RobotModel
 
 # Bodies that are put in touch may overlap by this much [m]: rounding.
 _TOUCHING = 1e-6
+# Joints that differ by less than this [rad or m] place bodies alike, to rounding of distances.
+_ALIKE = 1e-9
 # What the links of an arm are called together.
 ITSELF = "the arm itself"
 _NO_PAIR = Closest(math.inf, "", "")
@@ -304,29 +306,60 @@ class CollisionModel:
         q = self.samples(q_samples)
         bounds = self.hulls.lower_bounds(q, margin)
         found = np.zeros(len(q), dtype=bool)
+        undecided: dict[int, list[tuple[int, float]]] = {}
         for row in np.flatnonzero((bounds < margin).any(axis=1)).tolist():
-            found[row] = self._meets(q[row], bounds[row], margin)
+            self.hulls.place(q[row])
+            met, left = self._by_hulls(bounds[row], margin)
+            found[row] = met
+            for hulls, pair in left:
+                undecided.setdefault(pair, []).append((row, hulls))
+        # What is deepest inside decides first, as a rule.
+        for pair, near in sorted(undecided.items(), key=lambda item: min(h for _, h in item[1])):
+            looked = [(row, hulls) for row, hulls in near if not found[row]]
+            rows = np.array([row for row, _ in looked], dtype=np.int64)
+            found[rows] = self._by_meshes(pair, q[rows], [hulls for _, hulls in looked], margin)
         return found
 
     def _meets(self, q: Array, bounds: Array, margin: float) -> bool:
         """Whether a pair is closer than the margin at q (n,), with lower bounds (P,) known."""
-        near = np.flatnonzero(bounds < margin)
-        if not near.size:
-            return False
-        # What is deepest inside decides first, as a rule.
-        near = near[np.argsort(bounds[near])]
         places = self.hulls.place(q)
-        open_ = []
+        met, left = self._by_hulls(bounds, margin)
+        return met or any(
+            self._meshes.refine(places, pair, hulls, margin) < margin for hulls, pair in left
+        )
+
+    def _by_hulls(self, bounds: Array, margin: float) -> tuple[bool, list[tuple[float, int]]]:
+        """Return whether a pair is closer than the margin, as placed; else what hulls leave open.
+
+        The distance of the hulls, and the pair; the deepest first.
+        """
+        near = np.flatnonzero(bounds < margin)
+        near = near[np.argsort(bounds[near])]
+        left = []
         for pair, bound in zip(near.tolist(), bounds[near].tolist(), strict=True):
             hulls = self.hulls.distance(pair, bound)
             if hulls < margin:
                 if self._meshes.hulls_decide[pair]:
-                    return True
-                open_.append((hulls, pair))
-        return any(
-            self._meshes.refine(places, pair, hulls, margin) < margin
-            for hulls, pair in sorted(open_)
-        )
+                    return True, []
+                left.append((hulls, pair))
+        return False, sorted(left)
+
+    def _by_meshes(
+        self, pair: int, q: Array, hulls: Sequence[float], margin: float
+    ) -> npt.NDArray[np.bool_]:
+        """Return where a pair whose hulls are closer than the margin is so itself, (K,).
+
+        Configurations (K, n) in which the bodies are alike to each other are looked at once: along
+        a self-motion it is often the same joints that rest.
+        """
+        first, second = self.moved[self._index[pair]]
+        joints = np.round(q[:, first != second] / _ALIKE)
+        _, once, which = np.unique(joints, axis=0, return_index=True, return_inverse=True)
+        closer = [
+            self._meshes.refine(self.hulls.place(q[row]), pair, hulls[row], margin) < margin
+            for row in once.tolist()
+        ]
+        return np.array(closer, dtype=bool)[which.reshape(-1)]
 
     def touching(self, q: npt.ArrayLike) -> tuple[Closest, ...]:
         """Return all pairs that overlap at `q`, the deepest first; see also `srdf_line`.

@@ -2,6 +2,9 @@
 
 from dataclasses import replace
 
+import numpy as np
+
+from selfmotion.motion import NullMotion
 from selfmotion.optimise import Status
 from selfmotion.planning.session import Session, relative_change
 from selfmotion.planning.settings import COST_AGREEMENT, RISE, RISES, ROUGH_AGREEMENT
@@ -76,8 +79,14 @@ def _enriched(session: Session) -> bool:
         return False
     rows = rolled.objective.null_motion.rows
     finer = wanted.finer(left.intervals(0.5 * enough), rows, any(problem.rests))
-    if finer in (wanted, rolled.null_motion):
+    # Only what can be what the present one is: around that, fewer functions may look enough.
+    if _functions(finer) <= _functions(rolled.null_motion):
         return False
     session.rolled = rolled.with_null_motion(finer)
     session.minimize()
     return True
+
+
+def _functions(motion: NullMotion) -> int:
+    """Return how many functions a null motion has."""
+    return int(motion.functions(np.zeros(1), 1.0).shape[1])

@@ -138,8 +138,10 @@ def _planned(draft: Draft, clock: Deadline) -> Plan:
     """Return the plan; of the same list gone through again where the arm meets itself."""
     go_through(draft)
     found = gathered(draft, clock)
-    # Few motions take an arm into itself: the others need not wait for distances.
-    if not _overlaps(found) or draft.blocked is not None or found.report.status in ENDED:
+    # Few motions take an arm into itself: the others need not wait for distances. What breaks
+    # something else as well would do so all the more where one thing more is asked.
+    alone = _overlaps(found) and len(found.certificate.failures) == 1
+    if not alone or draft.blocked is not None or found.report.status in ENDED:
         return found
     apart = replace(draft.effort, apart=True)
     again = [("apart from itself", apart, draft.search)]
