@@ -38,6 +38,7 @@ from selfmotion.basics.files import (
     write_text as write_text,
 )
 from selfmotion.basics.inputs import (
+    TURN as TURN,
     as_choice as as_choice,
     as_flag as as_flag,
     as_number as as_number,

@@ -10,6 +10,9 @@ from selfmotion.basics.errors import ProblemError
 
 _Kind = TypeVar("_Kind")
 
+# A larger angle [rad] can only be meant in degrees.
+TURN = 2.0 * np.pi + 1e-6
+
 
 def as_numbers(
     values: Any,

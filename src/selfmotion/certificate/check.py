@@ -234,9 +234,9 @@ def _ends_within(
     else:
         _, rotation, translation = item.chain.along(trajectory(trajectory.t[-1] - [apart, 0.0]))
     moved = float(np.linalg.norm(translation[1] - translation[0]))
-    cosine = 0.5 * (float(np.sum(rotation[0] * rotation[1])) - 1.0)
-    # The cosine of no angle may be rounded to less than 1.
-    turned = float(np.arccos(np.clip(cosine + 1e-15, -1.0, 1.0)))
+    # ‖R₁ − R₀‖ = √8 sin(θ/2), which knows small angles to rounding.
+    apart_by = float(np.linalg.norm(rotation[1] - rotation[0])) / np.sqrt(8.0)
+    turned = 2.0 * float(np.arcsin(min(apart_by, 1.0)))
     return (
         check.position.value + moved <= tolerance.position
         and check.rotation.value + turned <= tolerance.rotation

@@ -8,15 +8,12 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.basics import Array
+from selfmotion.basics import TURN, Array
 
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
 Corners = Literal["blend", "stop", "round"]
 Axis = Literal["x", "y", "z"]
 SearchMode = Literal["auto", "local", "global"]
-
-# A larger angle [rad] can only be meant in degrees.
-_TURN = 2.0 * np.pi + 1e-6
 
 ProblemArgument = Annotated[
     str,
@@ -229,7 +226,7 @@ def relaxation(text: str) -> sm.Relaxation:
         raise sm.ProblemError(
             f"--relax is '{text}', expected ROWS[=BAND][@FROM:TO] like rx,ry=0.2 or rz@1:2.5"
         ) from None
-    if found.angular and _TURN < float(found.band) < np.inf:
+    if found.angular and TURN < float(found.band) < np.inf:
         raise sm.ProblemError(
             f"--relax is '{text}': a band of {band} rad is more than a turn; in degrees? 10° is "
             f"0.1745"
@@ -309,7 +306,7 @@ def pose(text: str, option: str) -> dict[str, Any]:
     """Return a pose x,y,z,roll,pitch,yaw as files write it."""
     values = numbers(text, option, 6).tolist()
     for angle in values[3:]:
-        if abs(angle) > _TURN:
+        if abs(angle) > TURN:
             raise sm.ProblemError(
                 f"{option} has an angle of {angle:g} rad, more than a turn; in degrees? Expected "
                 f"x,y,z,roll,pitch,yaw in m and rad: 90° is 1.5708"

@@ -254,9 +254,7 @@ def show_claims(claims: Sequence["Claim"], console: Console) -> None:
 
 def show_program(program: Program, console: Console) -> None:
     """Print what is made when, the steps that take longest, and the verdict."""
-    table = _table(
-        f"{program.robot.name}, {len(program.order)} seam{'s' * (len(program.order) != 1)}"
-    )
+    table = _table(f"{program.robot.name}, {program.extent}")
     table.add_column("seam")
     table.add_column("way")
     for column in ("begins", "takes", "move to it"):

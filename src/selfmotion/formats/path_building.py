@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError, PathError, as_choice
+from selfmotion.basics import TURN, Array, FileFormatError, PathError, as_choice
 from selfmotion.formats.path_rows import PoseRows
 from selfmotion.formats.poses import ORIENTATIONS
 from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints
@@ -15,8 +15,6 @@ from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints
 # A coordinate beyond this [m] can only be meant in millimetres.
 _FAR = 50.0
 _METRES = ("metres; say x_mm,y_mm,z_mm if it is millimetres", "metres; are its units as it says?")
-# An angle beyond this [rad] can only be meant in degrees.
-_ROUND = 2.0 * np.pi + 1e-6
 # Poses farther from their predecessor than this [m] are a jump, unless another length is given.
 JUMP = 0.5
 # Rotations by more than this [rad] are a jump, too: their direction would be a guess.
@@ -149,7 +147,7 @@ def _check_rows(file: FilePath, rows: PoseRows) -> None:
             raise FileFormatError(f"{file}: {place}: the {what} is not finite; mend or drop it")
     for what, values, bound, remedy in (
         ("position", rows.positions, _FAR, _METRES[rows.straight]),
-        ("angle", rows.values, _ROUND, "radians; say roll_deg,… or rx_deg,… if it is degrees"),
+        ("angle", rows.values, TURN, "radians; say roll_deg,… or rx_deg,… if it is degrees"),
     ):
         if what == "angle" and rows.orientation not in ("rpy", "rotation_vector"):
             continue

@@ -105,12 +105,13 @@ class Program:
         """Return a few lines: how many seams in what order, how long, and the verdict."""
         names = " → ".join(self.order[:_SHOWN]) + (" → …" if len(self.order) > _SHOWN else "")
         return (
-            f"Program({self.robot.name}, {self._seams}, {self.duration:.6g} s, "
+            f"Program({self.robot.name}, {self.extent}, {self.duration:.6g} s, "
             f"{self.transfer_time:.6g} s of it moves)\n  {names}\n  {self.verdict}"
         )
 
     @property
-    def _seams(self) -> str:
+    def extent(self) -> str:
+        """How many seams it makes, in words."""
         count = len(self.order)
         return f"{count} seam{'s' * (count != 1)}"
 
@@ -177,7 +178,7 @@ class Program:
         """One line: verified, or what is wrong with which seam or move."""
         if self.verified:
             return (
-                f"verified at all times: {self._seams}, and all moves in between, from rest to rest"
+                f"verified at all times: {self.extent}, and all moves in between, from rest to rest"
             )
         return f"not verified: {'; '.join(self.failures)}"
 
