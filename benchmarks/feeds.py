@@ -105,7 +105,7 @@ def main() -> int:
         problem = sm.Problem(robot, feed, "position")
         try:
             plan = sm.plan(problem)
-        except sm.PlanError as error:
+        except (sm.PlanError, sm.NoSequenceError) as error:
             ends["no motion at any feed"] += 1
             print(f"  {number}: {str(error)[:100]}")
             continue
