@@ -260,3 +260,18 @@ def test_a_feed_that_the_arm_can_keep_is_named() -> None:
     found = sm.plan(sm.Problem(panda, slower, "position", PANDA_HOME)).certificate
     assert found.verified, found.verdict
     assert "Feed.slower" not in found.verdict
+
+
+def test_a_feed_is_named_that_both_path_and_arm_keep() -> None:
+    """Where bends hold the tool, and the arm is too slow even for what is left of the feed."""
+    kinova = sm.load_robot("kinova")
+    q = np.array([0.5, 2.6, 1.3, 0.4, 1.2, 0.8])
+    path = sm.Circle.around(kinova.pose(q), 0.2, 1.0, turns=0.5)
+    feed = sm.Feed(path, 1.2, acceleration=8.0)
+    refused = sm.plan(sm.Problem(kinova, feed, "position", q)).certificate
+    assert not feed.feeds[0].kept
+    named = re.search(r"ask for ([0-9.]+) m/s, then Feed\.slower\(([0-9.]+)\)", refused.verdict)
+    assert named is not None, refused.verdict
+    slower = sm.Feed(path, float(named[1]), acceleration=8.0).slower(float(named[2]))
+    found = sm.plan(sm.Problem(kinova, slower, "position", q)).certificate
+    assert found.verified, found.verdict

@@ -58,7 +58,7 @@ class FeedReached(Requirement):
             slow = f"for {found.slower:.3g} s, " if found.slower else ""
             text = (
                 f"{text}, but {slow}at t = {found.time:.3f} s it is {found.slowest:.4g} m/s, held "
-                f"by {found.held_by}: ask for {_rounded_down(found.slowest):g} m/s, or allow it "
+                f"by {found.held_by}: ask for {_reached(found):g} m/s, or allow it "
                 f"more (within=)"
             )
         return Finding(self.name, "path", found.time, found.slowest, allowed, found.kept, text)
@@ -137,21 +137,32 @@ class _Along(Bounded):
 def possible_feeds(feeds: Sequence[FeedReached], findings: Sequence[Finding]) -> tuple[str, ...]:
     """Return which feeds a motion could have whose arm is too slow for those that were asked for.
 
-    Nothing where something else is wrong, too, or no feed was asked for.
+    Nothing where something else is wrong, too, but feeds that the path itself does not keep; or no
+    feed was asked for.
     """
-    broken = [item for item in findings if not item.kept]
+    unkept = [item for item in feeds if not item.found.kept]
+    # Those of the feeds are the last.
+    by_path = [*[False] * (len(findings) - len(feeds)), *(not item.found.kept for item in feeds)]
+    pairs = zip(findings, by_path, strict=True)
+    broken = [item for item, of_path in pairs if not (item.kept or of_path)]
     factor = max((item.factor for item in broken), default=1.0)
     if not (feeds and 1.0 < factor < np.inf and all(item.of_pace for item in broken)):
         return ()
-    asked = sorted({item.found.asked for item in feeds})
+    asked = sorted({_reached(item.found) for item in feeds})
     feed = _rounded_down(asked[-1] / factor)
     slower = asked[-1] / feed
     slowest = f"feeds of {asked[0] / slower:.3g} to" if len(asked) > 1 else "a feed of"
+    first = f"ask for {', '.join(f'{each:g}' for each in asked)} m/s, then " if unkept else ""
     return (
         f"the arm keeps its limits at {slowest} {feed:g} m/s, accelerations of the path "
         f"being {slower**2:.3g} times smaller and its smoothing {slower:.3g} times longer: "
-        f"Feed.slower({_rounded_up(slower)})",
+        f"{first}Feed.slower({_rounded_up(slower)})",
     )
+
+
+def _reached(found: FeedKept) -> float:
+    """Return the feed that a path keeps, or that it would if it was asked for [m/s]."""
+    return found.asked if found.kept else _rounded_down(found.slowest)
 
 
 def _rounded_up(factor: float) -> str:
