@@ -82,14 +82,14 @@ def possible(feed: sm.Feed, verdict: str) -> sm.Feed | None:
     if re.search(r"motion ends at|apart at|beyond its limit|off the path", verdict):
         # Also wrong at any feed.
         return None
-    slower = re.search(r"Feed\.slower\(([0-9.]+)\)", verdict)
-    if slower:
-        return feed.slower(float(slower[1]))
     less = re.search(r"ask for ([0-9.e-]+) m/s", verdict)
     if less:
         values = {**feed.to_dict(), "feed": float(less[1])}
-        return sm.Feed.from_dict({key: v for key, v in values.items() if key != "kind"})
-    return None
+        feed = sm.Feed.from_dict({key: v for key, v in values.items() if key != "kind"})
+    slower = re.search(r"Feed\.slower\(([0-9.]+)\)", verdict)
+    if slower:
+        return feed.slower(float(slower[1]))
+    return feed if less else None
 
 
 def main() -> int:
@@ -105,7 +105,7 @@ def main() -> int:
         problem = sm.Problem(robot, feed, "position")
         try:
             plan = sm.plan(problem)
-        except sm.PlanError as error:
+        except (sm.PlanError, sm.NoSequenceError) as error:
             ends["no motion at any feed"] += 1
             print(f"  {number}: {str(error)[:100]}")
             continue

@@ -1,6 +1,7 @@
 """A feed that was asked for is kept, or the motion is not verified."""
 
 import re
+from itertools import pairwise
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -23,14 +24,20 @@ def saddle(feed: float, **options) -> sm.Feed:
     return sm.Feed(sm.Waypoints(a, places), feed, **options)
 
 
-def followed(path: sm.Path, folder: FilePath, hurry: float = 0.0) -> sm.Certificate:
-    """A certificate of three slides on a path, each second sample faster by a share."""
+def followed(
+    path: sm.Path,
+    folder: FilePath,
+    hurry: float = 0.0,
+    during: tuple[float, float] = (0.0, np.inf),
+) -> sm.Certificate:
+    """A certificate of three slides on a path, for a while each second sample faster by a share."""
     robot = gantry(folder)
     t = np.unique(np.append(path.marks, np.linspace(0.0, path.duration, 500)))
     t = np.append(t[:-1][np.diff(t) > 1e-6 * path.duration], path.duration)
     samples = path.samples(t)
     still = np.zeros((len(t), 1))
-    factor = 1.0 + hurry * (-1.0) ** np.arange(len(t))[:, None]
+    here = (t >= during[0]) & (t <= during[1])
+    factor = 1.0 + hurry * (here * (-1.0) ** np.arange(len(t)))[:, None]
     qd = np.hstack([samples.twist[:, :3] * factor, still])
     motion = sm.Trajectory(t, np.hstack([samples.translation, still]), qd, robot.joint_names)
     return sm.certify(robot, path, "position", motion, 10.0)
@@ -91,6 +98,78 @@ def test_the_tool_itself_keeps_the_feed(hurry: float, tmp_path: FilePath) -> Non
     assert certificate.verified is (hurry < 0.02), certificate.verdict
     if not certificate.verified:
         assert "kept by the path, but not by 'l3'" in certificate.verdict
+
+
+def of_several_feeds(kind: str) -> tuple[sm.Path, list[float]]:
+    """A path at feeds that change twice, and when."""
+    legs = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0], [0.2, 0.1, 0.0]])
+    feeds = 0.05, 0.011, 0.02
+    if kind == "joined":
+        ends = [pin.SE3(np.eye(3), leg) for leg in legs]
+        pieces = [
+            sm.Feed(sm.Line(*pair, 1.0), feed)
+            for pair, feed in zip(pairwise(ends), feeds, strict=True)
+        ]
+        return sm.Joined(pieces), np.cumsum([0.0, *(item.duration for item in pieces)]).tolist()
+    through = {
+        "corners": lambda: sm.Polyline(legs, tolerance=2e-3),
+        "spline": lambda: sm.Waypoints(np.arange(4.0), legs),
+    }
+    path = through[kind]()
+    changes = path.duration * np.array([0.3, 0.7])
+    feed = sm.Feed(path, feeds[0], stretches=np.stack([changes, feeds[1:]], axis=1))
+    return feed, [0.0, *feed.when(changes), feed.duration]
+
+
+@pytest.mark.parametrize("kind", ["corners", "spline", "joined"])
+def test_each_of_several_feeds_is_judged_where_it_is_asked_for(
+    kind: str, tmp_path: FilePath
+) -> None:
+    path, changes = of_several_feeds(kind)
+    certificate = followed(path, tmp_path)
+    assert certificate.verified, certificate.verdict
+    for k, found in enumerate(path.feeds):
+        start, end = changes[k], changes[k + 1]
+        assert found.during.ravel() == pytest.approx([start, end], abs=1e-9)
+        assert start <= found.time <= end
+        t = np.linspace(start, end, 2001)
+        # No faster at any time of its own, whatever the feeds beside it.
+        speeds = np.linalg.norm(path.samples(t).twist[:, :3], axis=1)
+        assert speeds.max() <= (1.0 + 0.1 * found.within) * found.asked
+        # What a tool does in a stretch is held against that one's feed, and no other.
+        inner = 0.7 * start + 0.3 * end, 0.3 * start + 0.7 * end
+        assert followed(path, tmp_path, 0.005, inner).verified
+        refused = followed(path, tmp_path, 0.1, inner)
+        broken = [item for item in refused.findings if not item.kept]
+        assert len(broken) == 1, refused.verdict
+        assert inner[0] <= broken[0].time <= inner[1]
+        assert f"{found.asked:g} m/s from t = {start:.3f} to {end:.3f} s" in broken[0].text
+
+
+def test_a_section_is_judged_by_the_feeds_in_it(tmp_path: FilePath) -> None:
+    path, changes = of_several_feeds("spline")
+    first, last = changes[1] + 1.0, changes[3] - 2.0
+    section = sm.Section(path, first, last)
+    assert [item.asked for item in section.feeds] == [0.011, 0.02]
+    assert all(0.0 <= item.time <= section.duration and item.kept for item in section.feeds)
+    ends = [0.0, changes[2] - first, section.duration]
+    for found, expected in zip(section.feeds, pairwise(ends), strict=True):
+        assert found.during.ravel() == pytest.approx(expected, abs=1e-9)
+    # Where it runs up no feed counts.
+    assert not sm.Section(path, 0.0, 0.01).feeds
+    back = path.feeds[1].timed(lambda t: path.duration - t)
+    assert back.during.ravel() == pytest.approx(path.duration - path.feeds[1].during[0, ::-1])
+    assert back.slowest == path.feeds[1].slowest
+
+
+def test_each_stretch_of_a_feed_has_to_reach_it() -> None:
+    line = sm.Line(pin.SE3.Identity(), pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.0])), 1.0)
+    stretches = [[0.4, 0.02], [0.6, 0.2], [0.602, 0.02]]
+    found = {item.asked: item for item in sm.Feed(line, 0.2, stretches=stretches).feeds}
+    assert found[0.02].kept
+    assert not found[0.2].kept
+    assert found[0.2].held_by == "run-up and run-down"
+    assert found[0.2].during[1, 0] <= found[0.2].time <= found[0.2].during[1, 1]
 
 
 def test_a_feed_is_proved_where_its_path_has_bounds(tmp_path: FilePath) -> None:
@@ -181,3 +260,18 @@ def test_a_feed_that_the_arm_can_keep_is_named() -> None:
     found = sm.plan(sm.Problem(panda, slower, "position", PANDA_HOME)).certificate
     assert found.verified, found.verdict
     assert "Feed.slower" not in found.verdict
+
+
+def test_a_feed_is_named_that_both_path_and_arm_keep() -> None:
+    """Where bends hold the tool, and the arm is too slow even for what is left of the feed."""
+    kinova = sm.load_robot("kinova")
+    q = np.array([0.5, 2.6, 1.3, 0.4, 1.2, 0.8])
+    path = sm.Circle.around(kinova.pose(q), 0.2, 1.0, turns=0.5)
+    feed = sm.Feed(path, 1.2, acceleration=8.0)
+    refused = sm.plan(sm.Problem(kinova, feed, "position", q)).certificate
+    assert not feed.feeds[0].kept
+    named = re.search(r"ask for ([0-9.]+) m/s, then Feed\.slower\(([0-9.]+)\)", refused.verdict)
+    assert named is not None, refused.verdict
+    slower = sm.Feed(path, float(named[1]), acceleration=8.0).slower(float(named[2]))
+    found = sm.plan(sm.Problem(kinova, slower, "position", q)).certificate
+    assert found.verified, found.verdict

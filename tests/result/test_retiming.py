@@ -185,6 +185,8 @@ def test_jerks_cost_time_and_are_kept(panda: sm.RobotModel) -> None:
         assert fast.certificate.verified, fast.certificate.verdict
         assert np.abs(fast.trajectory.extremes(3)[1]).max() <= jerk
         times.append(fast.trajectory.duration)
+        assert ("without a limit of jerk" in fast.report.message) is (jerk == np.inf)
+        assert fast.report.message.startswith(plan.report.message)
         # No slower in corners than limits ask: at nearly all times some limit is used.
         motion = fast.trajectory
         t = np.linspace(0.0, motion.duration, 5001)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, series
-from selfmotion.certificate.bounding import Bounded, Stretch, bounded
+from selfmotion.certificate.bounding import Bounded, Bounds, Stretch, bounded
 from selfmotion.certificate.deviation import jacobians
 from selfmotion.certificate.findings import Finding
 from selfmotion.certificate.path_error import smooth_between
@@ -20,7 +20,7 @@ _FINE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class FeedReached(Requirement):
-    """The tool keeps its feed, as the path does but for what the path leaves over.
+    """The tool keeps a feed while it is asked for, as the path does but for what that leaves.
 
     With v and v_d the velocities of tool and path, the tool's speed along the path is
     |v_d| + f/|v_d| with f = (v - v_d)·v_d: it keeps the feed where the path does and |f| is at most
@@ -48,31 +48,59 @@ class FeedReached(Requirement):
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: the slowest speed where the feed counts."""
         found, allowed = self.found, (1.0 - self.found.within) * self.found.asked
-        text = f"the feed of {found.asked:g} m/s is reached up to {found.reached:.4g} m/s"
+        text = f"{self._named(found.time)} is reached up to {found.reached:.4g} m/s"
         if found.kept:
-            edges = smooth_between(self.follow.path, motion.trajectory)
-            speeds = bounded(_Along(self.follow, found), motion.robot, motion.trajectory, edges)
-            # Written so that NaN is not kept.
-            if speeds.undecided or not speeds.values[0] <= 1.0:
-                time = speeds.undecided[0][0] if speeds.undecided else float(speeds.times[0])
-                room = found.slowest * found.left_over / found.asked
-                apart = f"by {speeds.values[0] * room:.2g} m/s" if not speeds.undecided else ""
-                text = (
-                    f"the feed of {found.asked:g} m/s is kept by the path, but not by "
-                    f"'{self.follow.chain.tip_name}', which moves along it faster or slower "
-                    f"{apart and apart + ' '}at t = {time:.3f} s, where {room:.2g} m/s are left: "
-                    f"keep it nearer to the path (fewer relaxed rows, more samples or targets), or "
-                    f"allow the feed more (within=)"
-                )
+            speeds = self._speeds(motion)
+            if _is_off(speeds):
+                time, text = self._off(speeds)
                 return Finding(self.name, "path", time, found.slowest, allowed, False, text)
         else:
             slow = f"for {found.slower:.3g} s, " if found.slower else ""
             text = (
                 f"{text}, but {slow}at t = {found.time:.3f} s it is {found.slowest:.4g} m/s, held "
-                f"by {found.held_by}: ask for {_rounded_down(found.slowest):g} m/s, or allow it "
+                f"by {found.held_by}: ask for {_reached(found):g} m/s, or allow it "
                 f"more (within=)"
             )
         return Finding(self.name, "path", found.time, found.slowest, allowed, found.kept, text)
+
+    def _speeds(self, motion: FinishedMotion) -> Bounds:
+        """Return what is known of the tool's speed where the feed is asked for, the worst of it."""
+        edges = smooth_between(self.follow.path, motion.trajectory)
+        along, looked = _Along(self.follow, self.found), []
+        for window in self.found.during:
+            # Where feeds change the path has marks: rounding apart these are the nearest edges.
+            first, last = (int(np.argmin(np.abs(edges - time))) for time in window)
+            if last > first:
+                part = edges[first : last + 1]
+                looked.append(bounded(along, motion.robot, motion.trajectory, part))
+        return next(filter(_is_off, looked), max(looked, key=lambda item: float(item.values[0])))
+
+    def _off(self, speeds: Bounds) -> tuple[float, str]:
+        """Return when the tool leaves the path's pace, and what is said of it."""
+        found = self.found
+        time = speeds.undecided[0][0] if speeds.undecided else float(speeds.times[0])
+        room = found.slowest * found.left_over / found.asked
+        apart = f"by {speeds.values[0] * room:.2g} m/s " if not speeds.undecided else ""
+        return time, (
+            f"{self._named(time)} is kept by the path, but not by '{self.follow.chain.tip_name}', "
+            f"which moves along it faster or slower {apart}at t = {time:.3f} s, where "
+            f"{room:.2g} m/s are left: keep it nearer to the path (fewer relaxed rows, more "
+            f"samples or targets), or allow the feed more (within=)"
+        )
+
+    def _named(self, time: float) -> str:
+        """Return the feed in words, and from when to when it is asked for near a time."""
+        during = self.found.during
+        first, last = during[int(np.argmin(np.abs(during - time).min(axis=1)))]
+        whole = len(during) == 1 and (first, last) == (0.0, self.follow.path.duration)
+        stretch = "" if whole else f" from t = {first:.3f} to {last:.3f} s"
+        return f"the feed of {self.found.asked:g} m/s{stretch}"
+
+
+def _is_off(speeds: Bounds) -> bool:
+    """Return whether a tool is, or may be, faster or slower than is left."""
+    # Written so that NaN is.
+    return bool(speeds.undecided or not speeds.values[0] <= 1.0)
 
 
 class _Along(Bounded):
@@ -109,20 +137,32 @@ class _Along(Bounded):
 def possible_feeds(feeds: Sequence[FeedReached], findings: Sequence[Finding]) -> tuple[str, ...]:
     """Return which feeds a motion could have whose arm is too slow for those that were asked for.
 
-    Nothing where something else is wrong, too, or no feed was asked for.
+    Nothing where something else is wrong, too, but feeds that the path itself does not keep; or no
+    feed was asked for.
     """
-    broken = [item for item in findings if not item.kept]
+    unkept = [item for item in feeds if not item.found.kept]
+    # Those of the feeds are the last.
+    by_path = [*[False] * (len(findings) - len(feeds)), *(not item.found.kept for item in feeds)]
+    pairs = zip(findings, by_path, strict=True)
+    broken = [item for item, of_path in pairs if not (item.kept or of_path)]
     factor = max((item.factor for item in broken), default=1.0)
     if not (feeds and 1.0 < factor < np.inf and all(item.of_pace for item in broken)):
         return ()
-    asked = max(item.found.asked for item in feeds)
-    feed = _rounded_down(asked / factor)
-    slower = asked / feed
+    asked = sorted({_reached(item.found) for item in feeds})
+    feed = _rounded_down(asked[-1] / factor)
+    slower = asked[-1] / feed
+    slowest = f"feeds of {asked[0] / slower:.3g} to" if len(asked) > 1 else "a feed of"
+    first = f"ask for {', '.join(f'{each:g}' for each in asked)} m/s, then " if unkept else ""
     return (
-        f"the arm keeps its limits at a feed of {feed:g} m/s, accelerations of the path "
+        f"the arm keeps its limits at {slowest} {feed:g} m/s, accelerations of the path "
         f"being {slower**2:.3g} times smaller and its smoothing {slower:.3g} times longer: "
-        f"Feed.slower({_rounded_up(slower)})",
+        f"{first}Feed.slower({_rounded_up(slower)})",
     )
+
+
+def _reached(found: FeedKept) -> float:
+    """Return the feed that a path keeps, or that it would if it was asked for [m/s]."""
+    return found.asked if found.kept else _rounded_down(found.slowest)
 
 
 def _rounded_up(factor: float) -> str:

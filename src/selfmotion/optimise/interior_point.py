@@ -49,27 +49,13 @@ def interior_optimum(
         What may be missing, as a share of g·c.
     """
     count, size, c = len(limit), len(gradient), start.copy()
-    value = 0.0
-    for k in range(size):
-        value += abs(gradient[k]) * max(abs(c[k]), 1.0)
     slack, price = np.empty(count), np.empty(count)
-    for r in range(count):
-        room = limit[r] - _product(matrix, place, c, r)
-        slack[r] = max(room, 1e-2 * max(abs(limit[r]), 1.0))
-        price[r] = value / count / slack[r]
+    value = _begin(gradient, matrix, place, limit, c, slack, price)
     missed, ds, dz = np.empty(count), np.empty(count), np.empty(count)
     band, paid, dc = np.empty((3, size)), np.empty(size), np.empty(size)
     for _ in range(_STEPS):
         products, met = _measure(c, matrix, place, limit, slack, price, missed, band, paid)
-        reached, left = 0.0, 0.0
-        for k in range(size):
-            reached += gradient[k] * c[k]
-            if free[k]:
-                # What prices do not pay for may be missing as well.
-                left += abs((gradient[k] - paid[k]) * c[k])
-        share = gap * max(abs(reached), MET * value)
-        paid_for = left <= share or (products <= _LITTLE * share and left <= _ROUNDED * share)
-        if met <= MET and products <= share and paid_for:
+        if met <= MET and _is_paid(gradient, free, paid, c, products, gap, value):
             return c, True
         if not _factored(band, free):
             break
@@ -82,11 +68,7 @@ def interior_optimum(
         primal, dual = _longest(
             matrix, place, dc, slack, price, missed, ds, dz, centre, 1.0, _TO_BOUNDARY
         )
-        for _ in range(_TRIES):
-            after, least = _products(slack, price, ds, dz, primal, dual)
-            if least >= _NEAR * after / count:
-                break
-            primal, dual = _SHORTER * primal, _SHORTER * dual
+        primal, dual = _balanced(slack, price, ds, dz, primal, dual)
         for k in range(size):
             c[k] += primal * dc[k]
         for r in range(count):
@@ -95,6 +77,56 @@ def interior_optimum(
         if primal < _STUCK:
             break
     return c, False
+
+
+@called
+def _begin(
+    gradient: Array,
+    matrix: Array,
+    place: Ints,
+    limit: Array,
+    c: Array,
+    slack: Array,
+    price: Array,
+) -> float:
+    """Fill slacks and prices to begin with; return about how large g·c may be."""
+    count, value = len(limit), 0.0
+    for k in range(len(gradient)):
+        value += abs(gradient[k]) * max(abs(c[k]), 1.0)
+    for r in range(count):
+        room = limit[r] - _product(matrix, place, c, r)
+        slack[r] = max(room, 1e-2 * max(abs(limit[r]), 1.0))
+        price[r] = value / count / slack[r]
+    return value
+
+
+@called
+def _is_paid(
+    gradient: Array, free: Flags, paid: Array, c: Array, products: float, gap: float, value: float
+) -> bool:
+    """Return whether no more than `gap` is missing of g·c, nor of what prices pay for."""
+    reached, left = 0.0, 0.0
+    for k in range(len(gradient)):
+        reached += gradient[k] * c[k]
+        if free[k]:
+            # What prices do not pay for may be missing as well.
+            left += abs((gradient[k] - paid[k]) * c[k])
+    share = gap * max(abs(reached), MET * value)
+    paid_for = left <= share or (products <= _LITTLE * share and left <= _ROUNDED * share)
+    return products <= share and paid_for
+
+
+@called
+def _balanced(
+    slack: Array, price: Array, ds: Array, dz: Array, primal: float, dual: float
+) -> tuple[float, float]:
+    """Return how far to go so that no product falls far below the others."""
+    for _ in range(_TRIES):
+        after, least = _products(slack, price, ds, dz, primal, dual)
+        if least >= _NEAR * after / len(slack):
+            break
+        primal, dual = _SHORTER * primal, _SHORTER * dual
+    return primal, dual
 
 
 @called

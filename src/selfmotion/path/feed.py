@@ -256,7 +256,18 @@ class Feed(_Derived, kind="feed"):
                 break
             # Where the tool all but rests, its pace changes much faster than elsewhere.
             sigma = np.union1d(sigma, middle[rough])
-        return np.union1d(self._with_crossings(sigma), self._asked[:, 0])
+        return self._with_changes(self._with_crossings(sigma))
+
+    def _with_changes(self, sigma: Array) -> Array:
+        """Return nodes, and where feeds change; however short, a stretch has one of its own."""
+        if len(self._asked) == 1:
+            return sigma
+        changes = np.append(self._asked[:, 0], self._path.duration)
+        apart = np.abs(sigma[:, None] - changes).min(axis=1)
+        inner = sigma[apart > _CLOSE * np.diff(changes).min()]
+        empty = np.diff(np.searchsorted(inner, changes)) == 0
+        between = 0.5 * (changes[:-1] + changes[1:])[empty]
+        return np.union1d(changes, np.append(inner, between))
 
     def _with_crossings(self, sigma: Array) -> Array:
         """Return nodes, and where the turn rate begins or ends to hold the tool: a kink of σ(λ)."""
@@ -353,8 +364,12 @@ class Feed(_Derived, kind="feed"):
         most = self._caps.min(axis=1)
         # What is kept half a window before and after is kept by the mean in the middle.
         lengths, reach = self._lengths, 0.5 * self._limits["smoothing"] * np.sqrt(most)
-        first = np.searchsorted(lengths, lengths - reach)
-        after = np.searchsorted(lengths, lengths + reach, side="right")
+        before = later = lengths
+        if len(self._asked) > 1:
+            # A feed changes at one node: between the two beside it the pace does, too.
+            before, later = np.append(lengths[0], lengths[:-1]), np.append(lengths[1:], lengths[-1])
+        first = np.searchsorted(lengths, before - reach)
+        after = np.searchsorted(lengths, later + reach, side="right")
         pairs = zip(first, after, strict=True)
         return np.array([k + int(np.argmin(most[k:m])) for k, m in pairs])
 
@@ -366,13 +381,22 @@ class Feed(_Derived, kind="feed"):
 
     @cached_property
     def feeds(self) -> tuple[FeedKept, ...]:
-        """See `Path.feeds`: how well its own feed is kept."""
+        """See `Path.feeds`: how well its own feeds are kept, each where it is asked for."""
         t, counts, causes, asked = self._counted
-        speeds = _sizes(self.samples(t).twist)[:, 0]
-        return tuple(
-            FeedKept.of(float(feed), self._within, t, speeds, causes, asked == feed, counts)
-            for feed in dict.fromkeys(asked.tolist())
-        )
+        speeds, lasts = _sizes(self.samples(t).twist)[:, 0], np.gradient(t)
+        begins = np.array([0.0, *self.when(self._asked[1:, 0]), self.duration])
+        during = np.stack([begins[:-1], begins[1:]], axis=1)
+        found = []
+        for feed in dict.fromkeys(self._asked[:, 1].tolist()):
+            here = asked == feed
+            found.append(
+                FeedKept(
+                    *(feed, self._within, read_only(during[self._asked[:, 1] == feed])),
+                    *(read_only(t[here]), read_only(speeds[here]), read_only(lasts[here])),
+                    *(counts[here], tuple(np.array(causes)[here].tolist())),
+                )
+            )
+        return tuple(found)
 
     @property
     def _counted(self) -> tuple[Array, Flags, list[str], Array]:

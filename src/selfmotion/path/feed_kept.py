@@ -1,18 +1,20 @@
 """How well a path at a feed keeps it: what was asked, what is reached, and what holds it."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags
+from selfmotion.basics import Array, Flags, Ints
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FeedKept:
-    """What a `Feed` makes of the feed that was asked for.
+    """What a `Feed` makes of one of the feeds that were asked for, where it was.
 
-    Stretches count but for run-up and run-down, rounded corners, and turning on the spot.
+    Stretches count but for run-up and run-down, rounded corners, and turning on the spot; each has
+    to reach it.
 
     Attributes
     ----------
@@ -20,61 +22,52 @@ class FeedKept:
         [m/s].
     within : float
         What may be missing of it, as a share.
-    reached : float
-        The largest speed [m/s].
-    slowest : float
-        The smallest speed where it counts [m/s]; where nothing does, the largest one.
-    time : float
-        When that is [s].
-    slower : float
-        For how long the tool is too slow where it counts [s].
-    held_by : str
-        What holds it there.
+    during : (W, 2)
+        From when to when it is asked for [s].
+    t, speeds : (K,)
+        Times of these [s], and how fast the tool is then [m/s].
+    lasts : (K,)
+        What time each stands for [s].
+    counts : (K,)
+        When the feed counts.
+    causes : (K,)
+        What holds the tool at each time, in words.
     """
 
     asked: float
     within: float
-    reached: float
-    slowest: float
-    time: float
-    slower: float
-    held_by: str
+    during: Array
+    t: Array = field(repr=False)
+    speeds: Array = field(repr=False)
+    lasts: Array = field(repr=False)
+    counts: Flags = field(repr=False)
+    causes: tuple[str, ...] = field(repr=False)
 
-    @classmethod
-    def of(
-        cls,
-        asked: float,
-        within: float,
-        t: Array,
-        speeds: Array,
-        causes: Sequence[str],
-        here: Flags,
-        counts: Flags,
-    ) -> "FeedKept":
-        """Return how well a feed is kept.
+    @property
+    def reached(self) -> float:
+        """The largest speed [m/s]."""
+        return float(np.max(self.speeds))
 
-        Parameters
-        ----------
-        asked, within : float
-        t, speeds : (K,)
-            Times [s], and how fast the tool is then [m/s].
-        causes : sequence of str
-            What holds it at each time.
-        here, counts : (K,)
-            When this feed is asked for, and when a feed counts.
-        """
-        fastest = float(np.max(speeds[here]))
-        counted = counts & here
-        if not counted.any():
-            # Too short to run up and down.
-            at = float(t[int(np.argmax(np.where(here, speeds, -np.inf)))])
-            return cls(asked, within, fastest, fastest, at, 0.0, "run-up and run-down")
-        slow = (speeds < (1.0 - within) * asked) & counted
-        worst = int(np.argmin(np.where(counted, speeds, np.inf)))
-        lasts = float(np.gradient(t) @ slow)
-        return cls(
-            asked, within, fastest, float(speeds[worst]), float(t[worst]), lasts, causes[worst]
-        )
+    @property
+    def slowest(self) -> float:
+        """The smallest speed where it counts [m/s]; of a stretch where none does, the largest."""
+        return float(self.speeds[self._worst])
+
+    @property
+    def time(self) -> float:
+        """When that is [s]."""
+        return float(self.t[self._worst])
+
+    @property
+    def slower(self) -> float:
+        """For how long the tool is too slow where it counts [s]."""
+        slow = (self.speeds < (1.0 - self.within) * self.asked) & self.counts
+        return float(self.lasts @ slow)
+
+    @property
+    def held_by(self) -> str:
+        """What holds it where it is slowest."""
+        return self.causes[self._worst] if self.counts[self._worst] else "run-up and run-down"
 
     @property
     def kept(self) -> bool:
@@ -87,6 +80,43 @@ class FeedKept:
         most = max((1.0 + self.within) * self.asked, self.reached)
         return max(min(most - self.reached, self.slowest - (1.0 - self.within) * self.asked), 0.0)
 
+    @cached_property
+    def _worst(self) -> int:
+        """The slowest time where it counts; of a stretch where none does, its fastest one."""
+        chosen = []
+        for own in range(len(self.during)):
+            here = self._stretch == own
+            if (self.counts & here).any():
+                chosen.append(int(np.argmin(np.where(self.counts & here, self.speeds, np.inf))))
+            elif here.any():
+                # Too short to run up and down.
+                chosen.append(int(np.argmax(np.where(here, self.speeds, -np.inf))))
+        return min(chosen, key=lambda k: float(self.speeds[k]))
+
+    @cached_property
+    def _stretch(self) -> Ints:
+        """In which stretch each time lies, (K,)."""
+        return np.maximum(np.searchsorted(self.during[:, 0], self.t, side="right") - 1, 0)
+
+    def timed(self, when: Callable[[Array], Array]) -> "FeedKept":
+        """Return the same at other times, given by a function of those here."""
+        during = np.sort(when(self.during.ravel()).reshape(-1, 2), axis=1)
+        return replace(self, during=during[np.argsort(during[:, 0])], t=when(self.t))
+
     def later(self, seconds: float) -> "FeedKept":
         """Return the same, begun later."""
-        return replace(self, time=self.time + seconds)
+        return self.timed(lambda t: t + seconds)
+
+    def between(self, first: float, last: float) -> "FeedKept | None":
+        """Return it from one time to another [s]; None where it does not count in between."""
+        inside = (self.t >= first) & (self.t <= last)
+        if inside.all():
+            return self
+        counted = np.unique(self._stretch[self.counts & inside])
+        if not len(counted):
+            return None
+        rows = inside & np.isin(self._stretch, counted)
+        chosen = {name: getattr(self, name)[rows] for name in ("t", "speeds", "lasts", "counts")}
+        causes = tuple(np.array(self.causes)[rows].tolist())
+        during = np.clip(self.during[counted], first, last)
+        return replace(self, during=during, **chosen, causes=causes)

@@ -1,6 +1,5 @@
 """A tool motion the other way round."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -52,8 +51,7 @@ class Reversed(_Derived, kind="reversed"):
     @property
     def feeds(self) -> tuple[FeedKept, ...]:
         """See `Path.feeds`."""
-        feeds = self._path.feeds
-        return tuple(replace(item, time=self.duration - item.time) for item in feeds)
+        return tuple(item.timed(lambda t: self.duration - t) for item in self._path.feeds)
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""

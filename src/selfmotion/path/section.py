@@ -74,8 +74,9 @@ class Section(_Derived, kind="section"):
 
     @property
     def feeds(self) -> tuple[FeedKept, ...]:
-        """See `Path.feeds`: those of the whole."""
-        return tuple(item.later(-self._first) for item in self._path.feeds)
+        """See `Path.feeds`: those that count in the stretch."""
+        found = (item.between(self._first, self._last) for item in self._path.feeds)
+        return tuple(item.later(-self._first) for item in found if item)
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import (
+    Array,
     BreakdownError,
     InverseKinematicsError,
     NoSequenceError,
@@ -25,7 +26,7 @@ from selfmotion.planning.moves import Mover, Retreat, between_parts
 from selfmotion.planning.part_problem import asked_of_part, relaxed_along
 from selfmotion.planning.run import plan, plan_along
 from selfmotion.planning.search import Search
-from selfmotion.planning.settings import ATTEMPTS, ELSEWHERE, GUIDE_SAMPLES
+from selfmotion.planning.settings import ATTEMPTS, ELSEWHERE, GUIDE_SAMPLES, MISSED_CUTS
 from selfmotion.problem import Problem, check_problem, rest_orders
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.search import (
@@ -54,9 +55,9 @@ def plan_in_parts(
     """Plan a path in the fewest parts, with changes of configuration in between.
 
     The global search looks for the fewest chains of configurations that together follow the path,
-    and among these for the shortest. Where one will do, or the samples of the search are too few to
-    tell, `plan` comes first, and its plan is the only part if it is verified. Else each chain
-    becomes a plan. At a cut the tool comes to rest
+    and among these for the shortest, none of which has a step that no motion takes. Where one will
+    do, or the samples of the search may have missed that, `plan` comes first, and its plan is the
+    only part if it is verified. Else each chain becomes a plan. At a cut the tool comes to rest
     on the path and goes on from there in another configuration. The move to that is a joint motion
     from rest to rest that keeps what the problem asks of all times, judged like a plan: straight,
     or by a few stops where that meets something.
@@ -103,18 +104,22 @@ def plan_in_parts(
     ramp = as_number(ramp, "ramp", above=0.0)
     random_numbers(rng)
     tolerance = Tolerance.of(tolerance)
-    # Samples of curves tell whether parts are needed; those of larger spaces may have missed a way.
-    knows = has_curves(problem)
-    if not knows:
+    # Samples of curves tell whether parts are needed; those of larger spaces may miss a way or two.
+    missed = 0 if has_curves(problem) else MISSED_CUTS
+    refused, chains = None, []
+    try:
+        stretches = Stretches.of(problem, rng, progress)
+        chains = stretches.fewest(set())
+    except NoSequenceError as error:
+        if not missed:
+            raise
+        refused = error
+    if len(chains) <= 1 + missed:
         whole = _whole(problem, rng, tolerance, progress)
         if whole is not None:
             return Parts(problem, (whole,))
-    stretches = Stretches.of(problem, rng, progress)
-    chains = stretches.fewest(set())
-    if knows and len(chains) == 1:
-        whole = _whole(problem, rng, tolerance, progress)
-        if whole is not None:
-            return Parts(problem, (whole,))
+    if refused is not None:
+        raise refused
     planner = _Planner(problem, stretches, retreats, ramp, rng, tolerance, progress)
     return _best_of(planner, stretches, chains)
 
@@ -207,6 +212,8 @@ class _Planner:
         generator = np.random.default_rng(rng)
         self._mover = Mover(between_parts(problem), retreat, generator, progress)
         self.failure: SelfmotionError = PlanError("no part was planned")
+        # Other chains have many parts in common.
+        self._known: dict[tuple[int, bytes], Plan] = {}
         self._turning = np.isinf(problem.robot.lower) & np.isinf(problem.robot.upper)
 
     def plan(self, chains: list[Stretch]) -> tuple[Parts | None, set[int]]:
@@ -250,12 +257,18 @@ class _Planner:
 
     def _part(self, stretch: Stretch, before: Plan | None) -> Plan:
         """Return the plan along a stretch that follows another one's plan."""
-        problem = self._part_problem(stretch)
         t, q = stretch.t, stretch.q
-        if isinstance(problem.path, Retimed):
-            t = problem.path.when(t - t[0])
         if before is not None:
             q = turned_towards(q, before.trajectory.q[-1], self._turning)
+        key = stretch.first, q.tobytes()
+        if key not in self._known:
+            self._known[key] = self._planned(self._part_problem(stretch), t, q)
+        return self._known[key]
+
+    def _planned(self, problem: Problem, t: Array, q: Array) -> Plan:
+        """Return the plan along a chain q (W, n) at the path's times t (W,)."""
+        if isinstance(problem.path, Retimed):
+            t = problem.path.when(t - t[0])
         if len(t) < GUIDE_SAMPLES:
             t, few = np.linspace(0.0, problem.path.duration, GUIDE_SAMPLES), t
             q = np.stack([np.interp(t, few, joint) for joint in q.T], axis=1)

@@ -97,6 +97,9 @@ OFF_PATH = 1e-2
 PUSHES = (0.5, 2.0)
 
 # --- parts (parts)
+# Where samples do not tell for sure how many parts are needed, a single motion is looked for before
+# as many cuts.
+MISSED_CUTS = 1
 # Other cuts are tried where parts could not be planned, so often; they are so far away at least, as
 # a share of the path's waypoints.
 ATTEMPTS = 4

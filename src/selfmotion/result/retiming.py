@@ -8,12 +8,21 @@ from operator import and_
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, ProblemError, one_blas_thread, per_joint, read_only, shown
+from selfmotion.basics import (
+    Array,
+    Ints,
+    ProblemError,
+    one_blas_thread,
+    per_joint,
+    read_only,
+    shown,
+)
 from selfmotion.constraints import (
     Constraint,
     JointAccelerationLimits,
     JointVelocityLimits,
 )
+from selfmotion.motion import Trajectory
 from selfmotion.path import Pace, Retimed
 from selfmotion.problem import Problem
 from selfmotion.result.limits_used import quantities_of_pace
@@ -24,6 +33,8 @@ from selfmotion.task import Relaxation
 
 # Time between two samples of the new motion [s]: the first that keeps the plan's tolerance.
 _STEPS = (4e-3, 2e-3, 1e-3)
+# Accelerations that jump from one side to the other this often, of all joints, are told of.
+_OFTEN = 12
 
 
 def slowdown(plan: Plan, acceleration: npt.ArrayLike | None = None) -> float:
@@ -58,7 +69,7 @@ def retime(
     plan was asked to keep, by linear programmes in the square of the pace (`result.pacing`). Where
     the problem says how fast the arm begins or ends, it does so. The geometric path of joints and
     tool stays; the tool motion becomes a `Retimed` one, the certificate is made anew, the report
-    stays.
+    stays, but for a remark where no jerk is limited and accelerations often change at once.
 
     Parameters
     ----------
@@ -89,7 +100,29 @@ def retime(
         result = _retimed(plan, wanted, pace)
         if result.certificate.on_path:
             break
-    return result
+    return _with_remark(result, kept.acceleration, kept.jerk)
+
+
+def _with_remark(plan: Plan, acceleration: Array, jerk: Array) -> Plan:
+    """Return a plan whose report says so where accelerations jump to and fro."""
+    swings = _swings(plan.trajectory, acceleration)[~np.isfinite(jerk)].sum()
+    if swings < _OFTEN:
+        return plan
+    told = (
+        f"without a limit of jerk, accelerations change {swings} times from one side to the other "
+        f"at once; where that shakes the arm, ask for JointJerkLimits(…)"
+    )
+    return replace(plan, report=replace(plan.report, message=f"{plan.report.message}; {told}"))
+
+
+def _swings(motion: Trajectory, limit: Array) -> Ints:
+    """Return how often each joint's acceleration goes from half its limit to minus that, or back.
+
+    As seen at the samples.
+    """
+    sides = np.sign(motion(motion.t, 2)) * (np.abs(motion(motion.t, 2)) >= 0.5 * limit)
+    each = (side[side != 0.0] for side in sides.T)
+    return np.array([np.count_nonzero(np.diff(side)) for side in each])
 
 
 def _ends(plan: Plan) -> Ends:

@@ -143,7 +143,7 @@ class RunningCost(Measure):
     ) -> tuple[Array, Ints]:
         """See `Measure.extended`."""
         steps = self.steps(k, before, after, step, turning)
-        return _cheapest(steps.first, steps.second, steps.price, cost, len(after))
+        return cheapest(steps.first, steps.second, steps.price, cost, len(after))
 
     def steps(self, k: int, before: Array, after: Array, step: Array, turning: Flags) -> "_Steps":
         """Return the steps that are short enough from waypoint k to the next; see `extended`."""
@@ -242,9 +242,10 @@ def _note(known: dict[Any, Any], key: Any, value: Any, most: int) -> None:
     known[key] = value
 
 
-def _cheapest(
+def cheapest(
     first: Ints, second: Ints, price: Array, cost: Array, count: int
 ) -> tuple[Array, Ints]:
+    """Return what `Measure.extended` does, of pairs of nodes (P,), (P,) and the price of each."""
     reach, source = np.full(count, np.inf), np.full(count, -1, dtype=np.intp)
     edges.cheapest(first, second, price, cost, reach, source)
     return reach, source
@@ -262,7 +263,7 @@ class Backwards(Measure):
         """See `Measure.extended`."""
         last = len(self.measure.t) - 2
         steps = self.measure.steps(last - k, after, before, step, turning)
-        return _cheapest(steps.second, steps.first, steps.price, cost, len(after))
+        return cheapest(steps.second, steps.first, steps.price, cost, len(after))
 
     def of(self, q: Array) -> float:
         """See `Measure.of`."""

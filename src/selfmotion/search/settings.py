@@ -197,3 +197,10 @@ SHRINKS, SHRUNK = 6, 0.75
 # A path is moved so often, each time a bit farther than needed at the pose where nothing was found,
 # and no farther than this [m].
 MOVE_TRIES, OVERSHOOT, FARTHEST = 4, 0.05, 0.5
+
+# --- jumps: steps of chains that no motion takes
+# A step is put onto the path in so many places, less one. What an arm can follow has no part that
+# is more than this share of it, nor farther than this [rad or m].
+JUMP_LOOKS, JUMP_SHARE, LEAST_JUMP = 8, 0.4, 0.05
+# Chains are looked for again without the jumps they have, so often.
+JUMP_ROUNDS = 12

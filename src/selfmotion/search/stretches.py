@@ -9,11 +9,12 @@ from selfmotion.basics import Array, Flags, Ints, NoSequenceError, Progress, sil
 from selfmotion.problem import Problem
 from selfmotion.search.chains import best_chains, unturned
 from selfmotion.search.guides import has_curves, waypoint_times
+from selfmotion.search.jumps import Jumps
 from selfmotion.search.measures import Length
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.sampled import SampledLayers
 from selfmotion.search.sequences import CurveLayers, connected
-from selfmotion.search.settings import BREAK, MARGIN
+from selfmotion.search.settings import BREAK, JUMP_ROUNDS, MARGIN
 from selfmotion.search.waypoints import OnPath
 
 
@@ -56,6 +57,7 @@ class Stretches:
     _bounds: Admissible
     _steps: Array
     _samples: list[Array]
+    _jumps: Jumps
 
     @classmethod
     def of(
@@ -74,11 +76,15 @@ class Stretches:
         limits, weights = (asked.lower, asked.upper), problem.robot.joint_weights
         if has_curves(problem):
             curves = CurveLayers.of(problem.follows, t, limits, bodies, rng, progress)
-            found = cls(problem, t, curves, curves.bounds, steps, curves.samples)
+            found = cls(
+                problem, t, curves, curves.bounds, steps, curves.samples, Jumps(problem, t, steps)
+            )
         else:
             where = OnPath(problem.follows, t, *limits)
             samples = SampledLayers.of(where, limits, bodies, steps, weights, rng, progress)
-            found = cls(problem, t, samples, samples.bounds, steps, samples.layers)
+            found = cls(
+                problem, t, samples, samples.bounds, steps, samples.layers, Jumps(problem, t, steps)
+            )
         found._pin_ends()
         found._check()
         return found
@@ -87,7 +93,7 @@ class Stretches:
         """Return the fewest chains that follow the path one after the other, the shortest such.
 
         Each begins in the pose in which the one before it ends, in another configuration; the ways
-        to these count as well.
+        to these count as well. None has a step that no motion takes, as far as is known.
 
         Parameters
         ----------
@@ -99,6 +105,14 @@ class Stretches:
         NoSequenceError
             No chains, however many, follow the path; tells the time and why.
         """
+        for _ in range(JUMP_ROUNDS):
+            found = self._found(forbidden)
+            if not self._jumps.note([(item.first, item.q) for item in found]):
+                break
+        return found
+
+    def _found(self, forbidden: set[int]) -> list[Stretch]:
+        """Return the fewest chains without the jumps that are known; see `fewest`."""
         bounds = self._bounds
         # Joints with room for several turns turn without end at first: see `best_sequences`.
         relaxed = bounds.without_turns()
@@ -167,7 +181,7 @@ class Stretches:
         # From which node of its own waypoint a node is changed to; itself where it is not.
         changes: list[Ints] = [np.arange(len(cost))]
         for i, (before, after) in enumerate(itertools.pairwise(layers), 1):
-            cost, parent = length.extended(i - 1, before, cost, after, self._steps[i - 1], turning)
+            cost, parent = self._jumps.extended(i - 1, length, before, cost, after, turning)
             if not np.any(np.isfinite(cost)):
                 self._refuse(i, self._why(i, before, after, bounds))
             parents.append(parent)
