@@ -5,6 +5,7 @@ from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -22,9 +23,21 @@ BESIDE = (
     *(f"arms/{f.name}" for f in DOCS.glob("arms/*")),
 )
 GALLERY = (
-    "weld_seam", "two_arms", "weld_positioner", "weld_torch", "part_in_hand", "painting",
-    "own_obstacle", "rail", "closed_loop", "ur5_pointing",
+    "weld_seam", "weld_corner", "two_arms", "weld_positioner", "weld_torch", "part_in_hand",
+    "painting", "weld_frame", "in_parts", "own_obstacle", "rail", "closed_loop", "ur5_pointing",
 )  # fmt: skip
+# What is played at the top of a how-to: the example that it is about.
+PLAYED = {
+    "seam": "weld_seam",
+    "obstacles": "weld_corner",
+    "closed": "closed_loop",
+    "start": "ur5_pointing",
+    "limits": "painting",
+    "job": "weld_frame",
+    "parts": "in_parts",
+    "cells": "weld_positioner",
+    "own": "own_obstacle",
+}
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
@@ -48,6 +61,16 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for name, content in made.items():
         files.append(File.generated(config, name, content=content))
     return files
+
+
+def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
+    """Play the example that a how-to is about, below what it begins with."""
+    name = PLAYED.get(Path(page.file.src_uri).stem, "")
+    if not (page.file.src_uri.startswith("howto/") and name):
+        return markdown
+    title, first, rest = markdown.split("\n\n", 2)
+    caption = f"[{name}.py](../examples.md#{name}py)"
+    return "\n\n".join([title, first, _replay(name, "../"), caption, rest])
 
 
 def examples_page(ran: dict[str, shown.Shown]) -> str:
@@ -87,10 +110,9 @@ def gallery_page(ran: dict[str, shown.Shown]) -> str:
     return "\n\n".join(parts)
 
 
-def _replay(name: str) -> str:
-    return (
-        f'<iframe class="replay" loading="lazy" title="{name}" src="replays/{name}.html"></iframe>'
-    )
+def _replay(name: str, root: str = "") -> str:
+    address = f"{root}replays/{name}.html"
+    return f'<iframe class="replay" loading="lazy" title="{name}" src="{address}"></iframe>'
 
 
 def _fenced(text: str, language: str, title: str = "") -> str:

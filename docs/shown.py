@@ -20,8 +20,9 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 GROUPS = {
     "Jobs": (
         "quickstart", "weld_seam", "deburring", "painting", "closed_loop", "ur5_pointing", "rail",
-        "weld_positioner", "weld_torch", "part_in_hand", "two_arms", "own_arm", "relaxed_rows",
-        "in_parts", "weld_frame", "print_frame", "deburr_holes", "retiming", "warm_start",
+        "weld_corner", "weld_positioner", "weld_torch", "part_in_hand", "two_arms", "own_arm",
+        "relaxed_rows", "in_parts", "weld_frame", "print_frame", "deburr_holes", "retiming",
+        "warm_start",
     ),
     "To and from other programs": (
         "ros2_handover", "foreign_motion", "placement_map", "dask_cluster",
@@ -33,6 +34,7 @@ GROUPS = {
     ),
     "The paper": ("study_joint_speeds", "study_other_works", "study_surging"),
 }  # fmt: skip
+_PLAYED = (sm.Plan, sm.Program, sm.Parts)
 SHELL = "plan examples/cell.toml"
 
 
@@ -44,14 +46,14 @@ class Shown:
     ----------
     name : str
     code, output : str
-    plan : Plan or None
+    plan : Plan, Program, Parts or None
         The last one it made.
     """
 
     name: str
     code: str
     output: str
-    plan: sm.Plan | None
+    plan: sm.Plan | sm.Program | sm.Parts | None
 
     @property
     def title(self) -> str:
@@ -88,10 +90,9 @@ def _run(name: str) -> Shown:
     file, printed = EXAMPLES / f"{name}.py", io.StringIO()
     with redirect_stdout(printed):
         made = runpy.run_path(str(file), run_name="__main__")
-    plan = made.get("plan")
-    return Shown(
-        name, file.read_text(), printed.getvalue(), plan if isinstance(plan, sm.Plan) else None
-    )
+    named = (made.get(name) for name in ("plan", "program", "parts"))
+    plan = next((item for item in named if isinstance(item, _PLAYED)), None)
+    return Shown(name, file.read_text(), printed.getvalue(), plan)
 
 
 @contextmanager

@@ -40,7 +40,7 @@ name = "then"
 after = ["there"]
 either_way = false
 task = "position"
-constraints = [{ kind = "Tilt", frame = "panda_hand_tcp", within_deg = 20 }]
+constraints = [{ kind = "Tilt", frame = "panda_hand_tcp", within_deg = 20, towards = [0, 0, -1] }]
 [seams.path]
 kind = "line"
 duration = 1.0

@@ -52,8 +52,10 @@ def test_a_limit_is_told_with_its_side(
 ) -> None:
     """A feed that is kept, above what it has to be at least, does not read as a violation."""
     found = sm.Finding("feed", "path", 1.0, amount, allowed, kept, "")
-    certificate = sm.plan(sm.sample_problem()).certificate
-    page = io.StringIO()
+    plan = sm.plan(sm.sample_problem())
+    certificate, page = plan.certificate, io.StringIO()
     only = dataclasses.replace(certificate, findings=(*certificate.findings, found))
-    tables.show_certificate(only, {}, Console(file=page, width=120))
+    tables.show_certificate(only, {}, plan.robot, Console(file=page, width=120))
+    # Its joints turn, all of them.
+    assert "rad or m" not in page.getvalue()
     assert f"feed ({told}: {allowed:.4g})" in page.getvalue()

@@ -4,14 +4,17 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import selfmotion as sm
 from selfmotion import realtime, replay, testing
 from support.doors import named
+from support.layouts import WIDTHS, chromium, faults
 from support.places import ROOT
 
 EXAMPLES = sorted(file.stem for file in (ROOT / "examples").glob("*.py"))
@@ -82,6 +85,38 @@ def test_equations_are_drawn_by_the_browser(site: Path) -> None:
     text = (site / "method.html").read_text()
     assert text.count('<math display="block"') + text.count('display="block"') >= 10
     assert "$" not in re.sub(r"<(script|style).*?</\1>", "", text, flags=re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
+
+
+def test_search_finds_pages_from_a_folder(site: Path, browser: Any) -> None:
+    page, asked = browser.new_page(viewport={"width": 1400, "height": 900}), []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto((site / "index.html").as_uri())
+    page.keyboard.press("/")
+    page.keyboard.type("positioner")
+    page.wait_for_selector(".md-search-result__item")
+    found = page.locator(".md-search-result__item").all_inner_texts()
+    assert any("positioner" in text for text in found)
+    assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in asked)
+    page.close()
+
+
+def test_pages_are_seen_whole(site: Path, browser: Any) -> None:
+    """What is read stays within the page; replays, too. Their insides have tests of their own."""
+    page = browser.new_page()
+    page.route("**/replays/*.html", lambda route: route.fulfill(body="a replay"))
+    for name in ("gallery", "index", "howto/follow", "method", "api/plan"):
+        page.goto((site / f"{name}.html").as_uri())
+        for width in WIDTHS:
+            texts = ("article h1", "article h2", "article p", "article img")
+            boxes = ("iframe.replay", "article h1", "article h2")
+            assert faults(page, texts, boxes, width) == [], (name, width)
+    page.close()
 
 
 def test_every_public_name_is_on_one_page_of_the_api(site: Path) -> None:

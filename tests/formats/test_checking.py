@@ -88,7 +88,7 @@ def test_what_is_an_angle_or_a_length_may_be_in_degrees_or_millimetres(name: str
 
 
 def test_a_tilt_in_degrees_is_the_one_in_radians(tmp_path: Path) -> None:
-    tilt = '[[constraints]]\nkind = "Tilt"\nframe = "panda_link4"\n'
+    tilt = '[[constraints]]\nkind = "Tilt"\nframe = "panda_link4"\ntowards = [0, 0, -1]\n'
     for key, value in (("within_deg", 170.0), ("within", float(np.radians(170.0)))):
         problem = sm.read_problem(written(tmp_path, f"{CELL}\n{tilt}{key} = {value!r}\n"))
         assert problem.constraints[-1].within == pytest.approx(np.radians(170.0), rel=1e-15)

@@ -343,6 +343,9 @@ def test_the_axis_of_a_tilt_is_a_letter_or_numbers(tmp_path: Path) -> None:
     head += 'path = { kind = "line", by = [0, 0.1, 0], duration = 2 }\n[[constraints]]\n'
     for axis, said in (('"z"', "z"), ("[0, 0, 1]", [0, 0, 1])):
         text = f'kind = "Tilt"\nframe = "panda_hand"\nwithin_deg = 9\naxis = {axis}\n'
+        with pytest.raises(sm.FileFormatError, match=r"towards.* is missing"):
+            sm.read_problem(written(tmp_path, head + text))
+        text += "towards = [0, 0, -1]\n"
         (tilt,) = sm.read_problem(written(tmp_path, head + text)).constraints
         assert isinstance(tilt, sm.Tilt)
         assert tilt.axis == said

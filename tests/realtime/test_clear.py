@@ -133,14 +133,40 @@ def test_all_clearances_are_kept() -> None:
     replanner.step(t, *state, path, {"ball": pin.SE3.Identity(), "far": pin.SE3.Identity()})
 
 
-def test_a_cell_as_one_mesh_is_refused(tmp_path: Path) -> None:
-    """Its hull holds the arm, so that a hook in it would be none."""
-    panda = robot_named("panda")
-    parts = [trimesh.creation.icosphere(radius=0.005).apply_translation([0.3, 0.3, 0.6])]
+def cell_with_a_hook(panda: sm.RobotModel, file: Path) -> sm.Clearance:
+    """Four posts far off, and a hook ahead of the tool, in one mesh: its hull holds the arm."""
+    ahead = panda.pose(PANDA_HOME).translation + np.array([0.0, 0.15, 0.0])
+    parts = [trimesh.creation.icosphere(radius=0.02, subdivisions=1).apply_translation(ahead)]
     for x, y in ((1.5, -1.5), (-1.5, 1.5), (-1.5, -1.5), (1.5, 1.5)):
         post = trimesh.creation.box((0.02, 0.02, 4.0))
         parts.append(post.apply_translation([x, y, 0.5]))
-    trimesh.util.concatenate(parts).export(tmp_path / "cell.stl")
-    cell = sm.Clearance([sm.Mesh("cell", [0.0] * 3, tmp_path / "cell.stl")], 0.01)
+    trimesh.util.concatenate(parts).export(file)
+    return sm.Clearance([sm.Mesh("cell", [0.0] * 3, file)], 0.01)
+
+
+def test_in_a_cell_as_one_mesh_the_arm_stops_before_a_hook(tmp_path: Path) -> None:
+    panda = robot_named("panda")
+    cell = cell_with_a_hook(panda, tmp_path / "cell.stl")
+    replanner = sm.Replanner(panda, "position", constraints=[*LIMITS, cell])
+    first = panda.pose(PANDA_HOME)
+    last = pin.SE3(first.rotation, first.translation + np.array([0.0, 0.3, 0.0]))
+    t, q, qd, least = 0.0, PANDA_HOME, np.zeros(7), np.inf
+    exact = sm.CollisionModel(panda, cell.obstacles)
+    with_cell = [k for k, pair in enumerate(exact.pairs) if "cell" in pair]
+    for _ in range(120):
+        segment = replanner.step(t, q, qd, sm.Line(first, last, 2.0))
+        t += replanner.period
+        q, qd = (each[segment.index(t)] for each in (segment.q, segment.qd))
+        least = min(least, float(exact.distances(q[None])[0, with_cell].min()))
+    assert 0.0 < least < 0.05
+
+
+def test_an_open_cell_as_one_mesh_is_refused(tmp_path: Path) -> None:
+    """It cannot be taken apart, and its hull holds the arm, so that a hook in it would be none."""
+    panda = robot_named("panda")
+    cell = cell_with_a_hook(panda, tmp_path / "cell.stl")
+    mesh = trimesh.load(tmp_path / "cell.stl")
+    mesh.update_faces(np.arange(len(mesh.faces)) > 0)
+    mesh.export(tmp_path / "cell.stl")
     with pytest.raises(sm.ProblemError, match=r"convex hulls, and that of 'cell' always contains"):
         sm.Replanner(panda, "position", constraints=[*LIMITS, cell])

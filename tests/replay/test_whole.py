@@ -6,25 +6,12 @@ import pytest
 import selfmotion as sm
 from selfmotion.replay import replay_html
 from selfmotion.replay.whole import Whole
-from selfmotion.task import SE3
-from support.arms import robot_named
-
-AHEAD = np.array([0.1, 0.0, 0.0])
-HOME = np.array(sm.NAMED_ARMS["panda"].home)
+from support.replay_plans import two_seams
 
 
 @pytest.fixture(scope="module")
 def program() -> sm.Program:
-    down = np.diag([1.0, -1.0, -1.0])
-    ends = [np.array([0.4, y, 0.3]) for y in (-0.1, 0.1)]
-    seams = [
-        sm.Seam(f"seam {k}", sm.Line(SE3(down, end), SE3(down, end + AHEAD), 1.0), "pointing")
-        for k, end in enumerate(ends)
-    ]
-    post = sm.Sphere("post", [0.8, 0.0, 0.2], 0.05)
-    return sm.plan_job(
-        robot_named("panda"), seams, start=HOME, branches=1, clearance=sm.Clearance([post], 5e-3)
-    ).require()
+    return two_seams()
 
 
 def test_the_steps_of_a_page_are_those_of_the_program(program) -> None:

@@ -27,6 +27,24 @@ def arm_plan(name: str) -> sm.Plan:
     return sm.plan(sm.Problem(robot, path, task, start))
 
 
+@cache
+def two_seams() -> sm.Program:
+    """A job of a Panda: two short seams beside a post, and the moves between."""
+    down = np.diag([1.0, -1.0, -1.0])
+    ends = [np.array([0.4, y, 0.3]) for y in (-0.1, 0.1)]
+    ahead = np.array([0.1, 0.0, 0.0])
+    seams = [
+        sm.Seam(
+            f"seam {k}", sm.Line(pin.SE3(down, end), pin.SE3(down, end + ahead), 1.0), "pointing"
+        )
+        for k, end in enumerate(ends)
+    ]
+    clearance = sm.Clearance([sm.Sphere("post", [0.8, 0.0, 0.2], 0.05)], 5e-3)
+    home = np.array(sm.NAMED_ARMS["panda"].home)
+    job = sm.plan_job(sm.load_robot("panda"), seams, start=home, branches=1, clearance=clearance)
+    return job.require()
+
+
 def shelf_plan() -> sm.Plan:
     """Panda's circle with one obstacle of each shape around it, none of them on it."""
     plan = arm_plan("panda")

@@ -177,7 +177,7 @@ def test_limits_that_cannot_be_meant_are_refused(panda: sm.RobotModel) -> None:
         sm.JointVelocityLimits(-np.ones(7)).requirement(panda)
     with pytest.raises(sm.ProblemError, match="limits are in radians"):
         sm.JointPositionLimits(np.full(7, -170.0), np.full(7, 170.0)).requirement(panda)
-    with pytest.raises(sm.RobotError, match="'panda_joint1' at 99 rad or m, beyond its limits"):
+    with pytest.raises(sm.RobotError, match="'panda_joint1' at 99 rad, beyond its limits"):
         sm.load_robot("panda", lock={"panda_joint1": 99.0})
     path, q = still(panda)
     q[0] += 2.0 * np.pi

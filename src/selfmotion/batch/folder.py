@@ -156,11 +156,14 @@ _PAGE = """<!doctype html>
 <meta name="viewport" content="width=device-width,initial-scale=1">
 <style>body{{font:14px/1.4 system-ui,sans-serif;margin:1.5em}}table{{border-collapse:collapse}}
 th,td{{padding:.25em .7em;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}}
-div{{overflow-x:auto}}td:last-child{{min-width:24em}}
+td{{overflow-wrap:anywhere}}td:last-child{{min-width:16em}}
+@media(max-width:1000px){{body{{margin:1em}}thead{{display:none}}tr{{display:block;padding:.6em 0}}
+td{{display:flex;gap:1em;padding:.1em 0;border:0}}td:empty{{display:none}}
+td::before{{content:attr(data-name);flex:0 0 8em;color:#666}}tr{{border-bottom:1px solid #ddd}}}}
 </style></head><body><h1>{title}</h1>
-<div><table><thead><tr>{head}</tr></thead><tbody>
+<table><thead><tr>{head}</tr></thead><tbody>
 {body}
-</tbody></table></div></body></html>
+</tbody></table></body></html>
 """
 
 
@@ -175,7 +178,8 @@ def _page(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
         safe = html.escape(text)
         address = urllib.parse.quote(text)
         shown = f'<a href="{address}">{header[k]}</a>' if k in linked and text else safe
-        return f"<td>{shown}</td>"
+        name = html.escape(_HEADS.get(header[k], header[k]))
+        return f'<td data-name="{name}">{shown}</td>'
 
     rows = ("".join(cell(k, text) for k, text in enumerate(line)) for line in lines)
     return _PAGE.format(

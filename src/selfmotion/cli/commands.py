@@ -169,11 +169,11 @@ def check(
     with StageDisplay(stages) as display:
         if file.suffix == ".npz":
             options.refuse(own | {"robot": robot, "degrees": degrees or None}, file, "the plan's")
-            certificate, near = _of_plan(file, within, judged, display.stage)
+            certificate, near, arm = _of_plan(file, within, judged, display.stage)
         elif robot is not None and Path(robot).suffix in documents.SUFFIXES:
             options.refuse(own, robot, "the problem's")
             motion = sm.read_motion(file, degrees=degrees)
-            certificate, near = _of_problem(robot, motion, within, judged, display.stage)
+            certificate, near, arm = _of_problem(robot, motion, within, judged, display.stage)
         else:
             if robot is None or path is None:
                 raise sm.ProblemError(
@@ -194,20 +194,20 @@ def check(
     if as_json:
         terminal.print_json(data=json_tables.certificate_json(certificate, near))
     else:
-        tables.show_certificate(certificate, near, terminal)
+        tables.show_certificate(certificate, near, arm, terminal)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
 
 
 def _of_plan(
     file: Path, within: sm.Tolerance | None, judged: tuple[Any, ...], progress: Progress
-) -> tuple[sm.Certificate, _Near]:
-    """Return the certificate of a plan, by what else is asked as well, and how near bodies come."""
+) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
+    """Return the certificate of a plan, how near bodies come, and the arm."""
     plan = sm.load_plan(file, progress=progress)
     besides = options.requirements(plan.robot, *judged)
     near = _approaches(plan.robot, plan.trajectory, (*plan.requirements, *besides))
     if within is None and not any(judged):
-        return plan.certificate, near
-    return plan.check(within, besides, progress=progress), near
+        return plan.certificate, near, plan.robot
+    return plan.check(within, besides, progress=progress), near, plan.robot
 
 
 def _of_problem(
@@ -216,14 +216,14 @@ def _of_problem(
     within: sm.Tolerance | None,
     judged: tuple[Any, ...],
     progress: Progress,
-) -> tuple[sm.Certificate, _Near]:
+) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
     """Return the same of a motion by all that a problem file asks, and what else is."""
     job = sm.read_job(file)
     besides = options.requirements(job.problem.robot, *judged)
     within = within or job.tolerance
     certificate = job.problem.certify(motion, within, besides=besides, progress=progress)
     near = _approaches(job.problem.robot, motion, (*job.problem.requirements, *besides))
-    return certificate, near
+    return certificate, near, job.problem.robot
 
 
 def _approaches(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import selfmotion as sm
+from selfmotion import realtime
 from selfmotion.cli import json_tables, options, outputs, tables
 from selfmotion.cli.app import (
     NOT_VERIFIED,
@@ -129,6 +130,53 @@ def track(
     for file in tracking.write(record, result, out):
         terminal.print(f"wrote {file}", markup=False)
     raise typer.Exit(VERIFIED if kept else NOT_VERIFIED)
+
+
+@app.command(epilog="Example: selfmotion follow cell.toml --listen 127.0.0.1:5005")
+def follow(
+    file: Annotated[Path, typer.Argument(help="A problem file: arm, path, costs, constraints.")],
+    listen: Annotated[
+        str, typer.Option(help="host:port to wait for states at.")
+    ] = "127.0.0.1:5005",
+    horizon: Annotated[float, typer.Option(help="Planned ahead (s).", min=0.1)] = 2.0,
+    period: Annotated[float, typer.Option(help="Between states (s).", min=1e-3)] = 0.01,
+    cycle: Annotated[float, typer.Option(help="Between set-points (s).", min=1e-4)] = 1e-3,
+    latency: Annotated[
+        float,
+        typer.Option(help="From a state's measurement until its segment is obeyed (s).", min=0.0),
+    ] = 0.0,
+    silence: Annotated[
+        float, typer.Option(help="End without a state for so long (s).", min=0.1)
+    ] = 5.0,
+    seconds: Annotated[float, typer.Option(help="End after so long (s).", min=0.1)] = float("inf"),
+    allow_code: options.AllowCodeOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Follow a path in a closed loop with a controller: states come by UDP, set-points go back.
+
+    A state is t, q, q̇ as doubles; the answer a row t, q, q̇, q̈ for each cycle, which ends at rest
+    in case that the next one is late. The path begins with the first state; an empty datagram ends
+    it. Exit code 0 if every segment was planned.
+    """
+    from selfmotion.cli import following
+
+    problem = sm.read_problem(file, allow_code=allow_code)
+    asked = {"horizon": horizon, "period": period, "cycle": cycle, "latency": latency}
+    replanner = following.replanner_of(problem, **asked)
+    with following.listening(listen) as port:
+        # Nothing compiles once the arm moves.
+        sm.warm_up(replanner)
+        stages.print(f"waits for states at {listen}", markup=False)
+        link = following.Link(port, problem.path, problem.robot.dof, silence, seconds)
+        try:
+            realtime.follow(replanner, link.read, link.write, lead=latency)
+        except KeyboardInterrupt:
+            link.ended = "stopped"
+    if as_json:
+        terminal.print_json(data=link.summary)
+    else:
+        following.show(link, terminal)
+    raise typer.Exit(VERIFIED if link.is_followed else NOT_VERIFIED)
 
 
 @app.command(epilog="Example: selfmotion study --out out/study")

@@ -64,7 +64,7 @@ def show(plan: Plan, console: Console) -> None:
         console.print(_prices(report))
     if report.gap is not None:
         console.print(_distance(report.gap))
-    show_certificate(plan.certificate, plan.approaches, console)
+    show_certificate(plan.certificate, plan.approaches, plan.robot, console)
     if plan.limits_used.busy > _SELDOM:
         told = f"{plan.trajectory.duration:.4g} s; limits used fully {plan.limits_used}"
         console.print(told, markup=False, soft_wrap=not console.is_terminal)
@@ -101,9 +101,13 @@ _SHARE = "{:.1%} of its limit"
 
 
 def show_certificate(
-    certificate: Certificate, approaches: Mapping[str, Extreme], console: Console
+    certificate: Certificate,
+    approaches: Mapping[str, Extreme],
+    robot: RobotModel,
+    console: Console,
 ) -> None:
     """Print what forward kinematics found, how near each body comes, and the verdict."""
+    nearest = {certificate.limit_margin.name} & set(robot.joint_names)
     title = f"checked at all times, with {certificate.samples} poses"
     table = _table(title)
     table.add_column("worst")
@@ -114,7 +118,7 @@ def show_certificate(
     rows = (
         ("position error", certificate.position_error, "{:.2e} m"),
         ("rotation error", certificate.rotation_error, "{:.2e} rad"),
-        ("margin to joint limits", certificate.limit_margin, "{:.4g} rad or m"),
+        ("margin to joint limits", certificate.limit_margin, f"{{:.4g}} {robot.unit_of(*nearest)}"),
         ("speed", certificate.velocity_ratio, _SHARE),
         ("smallest singular value", certificate.smallest_singular_value, "{:.4g}"),
         ("acceleration", certificate.acceleration_ratio, _SHARE),
@@ -142,7 +146,7 @@ def show_certificate(
         unit = "rad" if "r" in worst.name else "m"
         value, time = f"{worst.value:.4g} {unit}", f"{worst.time:.3f} s"
         table.add_row(f"relaxed {worst.name}", value, time, "off the path, as allowed")
-    table.add_row("from end to start", f"{certificate.closure:.4g} rad or m", "", "")
+    table.add_row("from end to start", f"{certificate.closure:.4g} {robot.unit_of()}", "", "")
     console.print(table)
     for remark in certificate.remarks:
         console.print(remark, style="dim", markup=False, soft_wrap=not console.is_terminal)

@@ -9,7 +9,7 @@ from selfmotion.basics import Array
 from selfmotion.collision.bodies import place_of
 from selfmotion.collision.distances import Ints
 from selfmotion.collision.exact import CollisionModel
-from selfmotion.collision.overlaps import SAMPLES
+from selfmotion.collision.overlaps import SAMPLES, hull_overlaps
 from selfmotion.task import SE3
 
 # The share of sampled configurations in which hulls of links that meet elsewhere may overlap alone.
@@ -69,11 +69,12 @@ class Clearances:
 class ClearanceModel:
     """Signed distances of the bodies' convex hulls, with derivatives.
 
-    The distance of two hulls (GJK, and minus the depth by EPA where they overlap) is never more
-    than that of the bodies. It is differentiable but where the closest points jump. From `near`
-    on it is levelled off: with s = d - near and w = `width`, it is near + s - s²/(2w), and
-    near + w/2 from s = w on. Pairs that are farther than that cost no more than a look at the
-    boxes around them.
+    An obstacle that is a mesh with hollows is taken apart: each of the convex pieces that contain
+    it (`Solid.pieces`) is a body here. The distance of two hulls (GJK, and minus the depth by EPA
+    where they overlap) is never more than that of the bodies. It is differentiable but where the
+    closest points jump. From `near` on it is levelled off: with s = d - near and w = `width`, it is
+    near + s - s²/(2w), and near + w/2 from s = w on. Pairs that are farther than that cost no more
+    than a look at the boxes around them.
 
     Parameters
     ----------
@@ -87,7 +88,7 @@ class ClearanceModel:
     Attributes
     ----------
     pairs : tuple of (str, str)
-        Names for the P columns of `Clearances.values`; a link of several pieces appears repeatedly.
+        Names for the P columns of `Clearances.values`; a body of several pieces appears repeatedly.
 
     Notes
     -----
@@ -101,9 +102,10 @@ class ClearanceModel:
 
     def __init__(self, exact: CollisionModel, near: float = 0.02, width: float = 0.02) -> None:
         self.robot, self._exact, self._near, self._width = exact.robot, exact, near, width
+        self._hulls, self._of = exact.in_pieces()
         self._kept = self._useful()
-        self.pairs = tuple(exact.pairs[i] for i in self._kept)
-        first, second = exact.hulls.pairs[self._kept].T
+        self.pairs = tuple(exact.pairs[i] for i in self._of[self._kept])
+        first, second = exact.hulls.pairs[self._of[self._kept]].T
         moved = exact.moved.astype(np.float64)
         # Which joints move the first body, less those that move the second.
         self._sides = moved[first] - moved[second]
@@ -117,7 +119,7 @@ class ClearanceModel:
             The shape is not (K, n), or a number is not finite.
         """
         q = self._exact.samples(q_samples)
-        hulls, reach = self._exact.hulls, self._near + self._width
+        hulls, reach = self._hulls, self._near + self._width
         values = hulls.lower_bounds(q, reach)[:, self._kept]
         rows, columns = np.nonzero(values < reach)
         contacts = hulls.contacts(q, rows, self._kept[columns], values[rows, columns])
@@ -135,16 +137,16 @@ class ClearanceModel:
         The meshes of `exact` stay where they are: it is not for measuring any more.
         """
         item = next(item for item in self._exact.obstacles if item.name == obstacle)
-        self._exact.hulls.move(obstacle, place_of(item, pose, self.robot)[1])
+        self._hulls.move(obstacle, place_of(item, pose, self.robot)[1])
 
     def is_exact(self, column: int) -> bool:
         """Whether the bodies of a pair are their own convex hulls."""
-        return self._exact.is_convex(int(self._kept[column]))
+        return self._exact.is_convex(int(self._of[self._kept[column]]))
 
     @property
     def left_out(self) -> tuple[tuple[str, str], ...]:
-        """The pairs that only the exact model knows."""
-        kept = set(self._kept.tolist())
+        """The pairs of bodies of which no piece is looked at here: only the exact model knows."""
+        kept = set(self._of[self._kept].tolist())
         return tuple(pair for k, pair in enumerate(self._exact.pairs) if k not in kept)
 
     def _useful(self) -> Ints:
@@ -152,4 +154,11 @@ class ClearanceModel:
         exact = self._exact
         met, alone = exact.overlap_counts()
         allowed = np.where(met > 0, _FALSE_ALARMS * SAMPLES, 0.0)
-        return np.flatnonzero(np.where(exact.to_world, alone < SAMPLES, alone <= allowed))
+        allowed = np.where(exact.to_world, SAMPLES - 1.0, allowed)
+        kept = (alone <= allowed)[self._of]
+        # Pieces of a body overlap less often than its hull.
+        parted = np.bincount(self._of, minlength=len(exact.pairs)) > 1
+        open_ = np.flatnonzero(~kept & parted[self._of])
+        often = hull_overlaps(self.robot, self._hulls, open_)
+        kept[open_] = often <= (met * ~exact.to_world + allowed)[self._of[open_]]
+        return np.flatnonzero(kept)

@@ -110,11 +110,12 @@ class HullDistances:
 
     def move(self, obstacle: str, place: pin.SE3) -> None:
         """Put an obstacle somewhere else in the frame of the joint that carries it."""
-        index = next(i for i, body in enumerate(self._bodies) if body.name == obstacle)
-        body = replace(self._bodies[index], place=place)
-        self._bodies = (*self._bodies[:index], body, *self._bodies[index + 1 :])
-        self._model.geometryObjects[index].placement = place
-        self._boxes.move(index, body)
+        for index, body in enumerate(self._bodies):
+            if body.name == obstacle:
+                body = replace(body, place=place)
+                self._bodies = (*self._bodies[:index], body, *self._bodies[index + 1 :])
+                self._model.geometryObjects[index].placement = place
+                self._boxes.move(index, body)
 
     def place(self, q: Array) -> Any:
         """Place the hulls at q (n,), and return their placements in world axes, by body."""

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -145,6 +146,35 @@ class CollisionModel:
     def is_convex(self, pair: int) -> bool:
         """Whether both bodies of a pair are their own convex hulls."""
         return self._meshes.hulls_decide[pair]
+
+    def in_pieces(self) -> tuple[HullDistances, Ints]:
+        """Return distances of hulls, obstacles in convex pieces, and which pair each is of, (Q,).
+
+        Links are not taken apart: those of arms are made convex as a rule. Where no obstacle is,
+        these are `hulls`.
+        """
+        names = {item.name for item in self.obstacles}
+        paired = set(self._index.ravel().tolist())
+        cut = [
+            body.solid.pieces if body.name in names and b in paired else (body.solid,)
+            for b, body in enumerate(self._bodies)
+        ]
+        if all(len(solids) == 1 for solids in cut):
+            return self.hulls, np.arange(len(self.pairs))
+        first = np.cumsum([0, *map(len, cut)])
+        bodies = [
+            replace(body, solid=solid)
+            for body, solids in zip(self._bodies, cut, strict=True)
+            for solid in solids
+        ]
+        found = [
+            (pair, first[i] + k, first[j] + m)
+            for pair, (i, j) in enumerate(self._index.tolist())
+            for k in range(len(cut[i]))
+            for m in range(len(cut[j]))
+        ]
+        of, *index = np.array(found, dtype=np.int64).T
+        return HullDistances(self.robot, bodies, np.stack(index, axis=1)), of
 
     @cached_property
     def open_meshes(self) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
 """How often bodies overlap in sampled configurations, and how often their convex hulls alone do."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -71,15 +72,30 @@ def count_overlaps(
 
     Both (P,), and zero but for the pairs `among` them.
     """
+    met, alone = (np.zeros(len(hulls.pairs), dtype=np.int64) for _ in range(2))
+    for places, pair, distance in _near(robot, hulls, among):
+        bodies = meshes.overlaps(places, pair, distance)
+        met[pair] += bodies
+        alone[pair] += distance <= 0.0 and not bodies
+    return met, alone
+
+
+def hull_overlaps(robot: RobotModel, hulls: HullDistances, among: Ints) -> Ints:
+    """Return in how many of 500 configurations the hulls of the pairs `among` overlap, (A,)."""
+    counts = np.zeros(len(hulls.pairs), dtype=np.int64)
+    for _, pair, distance in _near(robot, hulls, among):
+        counts[pair] += distance <= 0.0
+    return np.asarray(counts[among])
+
+
+def _near(robot: RobotModel, hulls: HullDistances, among: Ints) -> Iterator[tuple[Any, int, float]]:
+    """Yield pairs whose boxes overlap, with placements and hulls' distances: 500 configurations."""
+    if not len(among):
+        return
     rng = np.random.default_rng(0)
     lower, upper = robot.finite_limits()
     q = rng.uniform(lower, upper, (SAMPLES, robot.dof))
-    met, alone = (np.zeros(len(hulls.pairs), dtype=np.int64) for _ in range(2))
     for row, bounds in enumerate(hulls.lower_bounds(q, 0.0)):
         places = hulls.place(q[row])
         for pair in among[bounds[among] <= 0.0].tolist():
-            distance = hulls.distance(pair, bounds[pair])
-            bodies = meshes.overlaps(places, pair, distance)
-            met[pair] += bodies
-            alone[pair] += distance <= 0.0 and not bodies
-    return met, alone
+            yield places, pair, hulls.distance(pair, bounds[pair])

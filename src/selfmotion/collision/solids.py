@@ -19,6 +19,15 @@ _LARGEST = 1e4
 _FLAT = 1e-7
 # What the hull of a flat mesh reaches beyond it to both sides [m].
 _HALF_THICKNESS = 1e-6
+# What counts as being in a piece [share of the size], and how many points are looked for at most.
+_INSIDE, _LOOKED_FOR = 1e-6, 20_000
+# What is farther outside of all pieces than this was no sliver [share of the size].
+_SLIVER = 1e-2
+# Meshes → their pieces, of the last ones: each model of a cell asks anew.
+_cut: "dict[tuple[bytes, bytes], tuple[Solid, ...]]" = {}
+_MOST_CUT = 32
+# coal takes no corner of a hull with 255 neighbours or more.
+_NEIGHBOURS = 250
 
 
 class Solid:
@@ -50,6 +59,7 @@ class Solid:
 
     def __init__(self, geometry: Any, label: str) -> None:
         self.geometry, self.is_mesh = geometry, isinstance(geometry, coal.BVHModelBase)
+        self._label = label
         self.is_flat, self.hull = False, geometry
         if self.is_mesh:
             self._check_mesh(label)
@@ -115,6 +125,46 @@ class Solid:
         volume = abs(self.hull.computeVolume())
         own = abs(self.geometry.computeVolume())
         return bool(not self.is_flat and abs(volume - own) <= _CONVEX * volume)
+
+    @cached_property
+    def pieces(self) -> "tuple[Solid, ...]":
+        """Convex solids that together contain it: itself where it is convex, or cannot be cut.
+
+        Its corners and the middles of its triangles (20,000 of these points at most are looked at)
+        are in the pieces, to a millionth of its size.
+        """
+        if self.is_convex or self.is_flat or not self.is_closed:
+            return (self,)
+        key = self._corners.tobytes(), self._welded.tobytes()
+        if key not in _cut:
+            _cut[key] = self._cover()
+            while len(_cut) > _MOST_CUT:
+                del _cut[next(iter(_cut))]
+        return _cut[key] or (self,)
+
+    def _cover(self) -> "tuple[Solid, ...]":
+        """Return `pieces`; none where they do not contain it."""
+        from selfmotion.collision.decomposition import convex_pieces
+
+        points = np.concatenate([self._corners, self._triangles.mean(axis=1)])
+        points = points[:: -(-len(points) // _LOOKED_FOR)]
+        size = float(np.ptp(self._corners, axis=0).max())
+        pieces = list(convex_pieces(self._corners, self._welded))
+        try:
+            hulls = [_hull_of(_thickened(piece, self._label)[1], self._label) for piece in pieces]
+            outside, nearest = _outside([planes for _, planes in hulls], points)
+            missing = outside > _INSIDE * size
+            # Slivers may be lost by rounding: the next piece takes their corners.
+            for k in np.unique(nearest[missing & (outside < _SLIVER * size)]).tolist():
+                grown = np.concatenate([pieces[k], points[missing & (nearest == k)]])
+                hulls[k] = _hull_of(_thickened(grown, self._label)[1], self._label)
+        except CollisionError:
+            # A piece that is a needle.
+            return ()
+        outside, _ = _outside([planes for _, planes in hulls], points)
+        if np.any(outside > _INSIDE * size):
+            return ()
+        return tuple(Solid(hull, self._label) for hull, _ in hulls)
 
     @cached_property
     def is_closed(self) -> bool:
@@ -186,6 +236,16 @@ class Solid:
         return points[first], index.reshape(-1)
 
 
+def _outside(solids: list[Array], points: Array) -> tuple[Array, Indices]:
+    """Return how far points (K, 3) are beyond the planes of the nearest convex solid, and which."""
+    least, nearest = np.full(len(points), np.inf), np.zeros(len(points), dtype=np.int64)
+    for k, planes in enumerate(solids):
+        beyond = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        nearest[beyond < least] = k
+        least = np.minimum(least, beyond)
+    return least, nearest
+
+
 def _thickened(points: Array, label: str) -> tuple[bool, Array]:
     """Return whether points (V, 3) are in one plane, and they, or else copies to both sides."""
     _, extents, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
@@ -207,6 +267,9 @@ def _hull_of(points: Array, label: str) -> tuple[Any, Array]:
 
     try:
         hull = ConvexHull(points)
+        if np.bincount(hull.simplices.ravel()).max() > _NEIGHBOURS:
+            # A flat side with many corners is a fan round one of them, but not when joggled.
+            hull = ConvexHull(points, qhull_options="QJ")
     except QhullError as error:
         raise CollisionError(f"{label}: its mesh has no convex hull: {error}") from error
     index = np.zeros(len(points), dtype=np.int64)

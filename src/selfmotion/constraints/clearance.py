@@ -32,7 +32,8 @@ class Clearance(Constraint):
     """The arm, and what rides on it, keep a distance from obstacles and from each other.
 
     An obstacle with a `frame` rides on that link, like another link that is fixed to it. While
-    optimising, bodies are their convex hulls; the certificate measures the meshes themselves.
+    optimising, links are their convex hulls and obstacles with hollows convex pieces that contain
+    them; the certificate measures the meshes themselves.
     Obstacles of the world are not checked against the immovable base: no motion changes that
     distance, and an arm bolted to a table touches it.
 

@@ -219,6 +219,7 @@ class BoundLimits:
     order: int
     joints: npt.NDArray[np.intp]
     joint_names: tuple[str, ...]
+    units: tuple[str, ...]
     lower: Array
     upper: Array
     scale: Array
@@ -232,7 +233,9 @@ class BoundLimits:
         joints = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
         scale = np.ones(len(joints)) if order == 0 else upper[joints]
         names = tuple(robot.joint_names[k] for k in joints)
-        return cls(limits.name, order, joints, names, lower[joints], upper[joints], scale, margin)
+        units = tuple(map(robot.unit_of, names))
+        sides = lower[joints], upper[joints]
+        return cls(limits.name, order, joints, names, units, *sides, scale, margin)
 
     @property
     def tolerance(self) -> float:
@@ -267,11 +270,12 @@ class BoundLimits:
 
     def easing(self, column: int) -> tuple[float, str]:
         """See `easing_of`: 2 % of a rate, on both sides; 0.01 rad or m of a position."""
-        joint = f"joint '{self.joint_names[column % len(self.joints)]}'"
+        number = column % len(self.joints)
+        joint = f"joint '{self.joint_names[number]}'"
         if self.order > 0:
             return 0.02, f"2 % more {_QUANTITIES[self.order]} for {joint}"
         side = "upper" if column < len(self.joints) else "lower"
-        return 0.01, f"0.01 rad or m more at the {side} limit of {joint}"
+        return 0.01, f"0.01 {self.units[number]} more at the {side} limit of {joint}"
 
     def describe(self, samples: Samples, row: int, column: int) -> str:
         """See `BoundConstraint.describe`."""

@@ -29,7 +29,7 @@ class Tilt(Constraint):
     within : float
         The largest angle [rad], less than π.
     towards : (3,)
-        In world axes; downwards by default.
+        In world axes; downwards by default, in files to be said.
     margin : float
         Share of the angle which is aimed to be left unused; at least half of it is.
     """

@@ -82,7 +82,8 @@ _OWN: Mapping[str, _Fields] = {
     "weave": {"path": (Table, ...), **_SHAPE},
     "Relaxation": {"rows": (Names, ...), "during": (Numbers, None)},
     "Search": {"rng": (Whole, 0)},
-    "Tilt": {"axis": (Axis, "z")},
+    # A file does not show a default: down suits a torch, and is upside down for a table.
+    "Tilt": {"axis": (Axis, "z"), "towards": (Numbers, ...)},
 }  # fmt: skip
 _WHOLLY_OWN = {"twist"}
 

@@ -45,19 +45,15 @@ def write_motion(
 ) -> None:
     """Write the motion of a plan, parts, a move or a program as others read it; atomically.
 
-    ============  ========  ==================================================================
-    form          suffix    what
-    ============  ========  ==================================================================
-    ``csv``       .csv      ``t``, a column per joint, ``NAME_velocity``, ``NAME_acceleration``
-    ``npz``       .npz      arrays ``t``, ``q``, ``qd``, ``qdd``, ``joint_names``
-    ``json``      .json     the same as lists
-    ``ros``       .yaml     ROS 2 ``trajectory_msgs/JointTrajectory``
-    ``moveit``              ``moveit_msgs/RobotTrajectory``
-    ``mujoco``    .xml      keyframes, to include in an MJCF model made from the same URDF
-    ``urscript``  .script   a stream of ``servoj``, its settings in the head
-    ``krl``       .src      KUKA: axis targets with their times in spline blocks
-    ``rapid``     .mod      ABB: axis targets with their times, rounded corners
-    ============  ========  ==================================================================
+    - ``csv`` (``.csv``): ``t``, a column per joint, ``NAME_velocity``, ``NAME_acceleration``
+    - ``npz`` (``.npz``): arrays ``t``, ``q``, ``qd``, ``qdd``, ``joint_names``
+    - ``json`` (``.json``): the same as lists
+    - ``ros`` (``.yaml``): ROS 2 ``trajectory_msgs/JointTrajectory``
+    - ``moveit``: ``moveit_msgs/RobotTrajectory``
+    - ``mujoco`` (``.xml``): keyframes, to include in an MJCF model made from the same URDF
+    - ``urscript`` (``.script``): a stream of ``servoj``, its settings in the head
+    - ``krl`` (``.src``): KUKA: axis targets with their times in spline blocks
+    - ``rapid`` (``.mod``): ABB: axis targets with their times, rounded corners
 
     Parameters
     ----------
@@ -140,15 +136,12 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
     Of controllers' programs (``.src``, ``.mod``) those statements are read that `write_motion`
     writes, with other numbers, spaces and names: any other line is refused, by its number.
 
-    ======  ======================================================================================
-    KRL     ``DEF``, ``END``, comments, ``BAS``, ``$BASE``, ``$TOOL``, ``$LOAD``, ``$OUT[n]``,
-            ``PTP {A1 …}``, ``PTP_SPLINE``, ``SPTP {A1 …}``, ``TIME_BLOCK`` with a ``PART`` for
-            each target, ``TRIGGER WHEN PATH = 0 DELAY = 0 DO $OUT[n]``, ``ENDSPLINE``,
-            ``WAIT SEC``
-    RAPID   ``MODULE``, ``PROC`` without parameters, comments, ``tooldata``, ``speeddata``,
-            ``MoveAbsJ [[…], […]]\NoEOffs`` with ``\T``, ``fine`` or a zone ``z…``, ``SetDO``,
-            ``WaitTime``
-    ======  ======================================================================================
+    - KRL: ``DEF``, ``END``, comments, ``BAS``, ``$BASE``, ``$TOOL``, ``$LOAD``, ``$OUT[n]``,
+      ``PTP {A1 …}``, ``PTP_SPLINE``, ``SPTP {A1 …}``, ``TIME_BLOCK`` with a ``PART`` for each
+      target, ``TRIGGER WHEN PATH = 0 DELAY = 0 DO $OUT[n]``, ``ENDSPLINE``, ``WAIT SEC``
+    - RAPID: ``MODULE``, ``PROC`` without parameters, comments, ``tooldata``, ``speeddata``,
+      ``MoveAbsJ [[…], […]]\NoEOffs`` with ``\T``, ``fine`` or a zone ``z…``, ``SetDO``,
+      ``WaitTime``
 
     The motion is the cubic spline through their targets, from rest to rest. Comments ``axes: A1 =
     joint [deg], …``, as they are written, name the joints and say which of them slide.

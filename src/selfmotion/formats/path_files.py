@@ -36,21 +36,16 @@ def read_path(
 ) -> Path:
     """Read a tool motion through poses.
 
-    ==============  =================================================================
-    .csv .txt .tsv  columns in any order: ``t`` [s], ``x,y,z`` [m], and one of
-                    ``qw,qx,qy,qz``, ``rx,ry,rz`` (rotation vector [rad]),
-                    ``roll,pitch,yaw`` [rad], ``nx,ny,nz`` (the tool's z axis) or
-                    none; ``feed`` [m/s] from a pose on, instead of ``t``; ``x_mm``,
-                    ``feed_mm`` and ``roll_deg`` are in those units; ``seam`` names
-                    the seam that a pose is of, ``event`` what happens there
-                    (``arc on; gas on``: both)
-    .npy            (N, 4, 4) poses, or a table (N, 3) x,y,z; (N, 4) t,x,y,z;
-                    (N, 7) x,y,z,qw,qx,qy,qz; (N, 8) with t first
-    .yaml .json     ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``
-    .nc .ngc        G-code of up to five axes, below
-    .gcode .tap
-    .apt .cls .cl   APT, cutter location data, below
-    ==============  =================================================================
+    - ``.csv .txt .tsv``: columns in any order: ``t`` [s], ``x,y,z`` [m], and one of
+      ``qw,qx,qy,qz``, ``rx,ry,rz`` (rotation vector [rad]), ``roll,pitch,yaw`` [rad],
+      ``nx,ny,nz`` (the tool's z axis) or none; ``feed`` [m/s] from a pose on, instead of ``t``;
+      ``x_mm``, ``feed_mm`` and ``roll_deg`` are in those units; ``seam`` names the seam that a
+      pose is of, ``event`` what happens there (``arc on; gas on``: both)
+    - ``.npy``: (N, 4, 4) poses, or a table (N, 3) x,y,z; (N, 4) t,x,y,z; (N, 7)
+      x,y,z,qw,qx,qy,qz; (N, 8) with t first
+    - ``.yaml .json``: ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``
+    - ``.nc .ngc .gcode .tap``: G-code of up to five axes, below
+    - ``.apt .cls .cl``: APT, cutter location data, below
 
     Of programs of machine tools, what goes at a feed is a cut; rapids part cuts, called ``cut 1``,
     ``cut 2``, …. Legs are straight, their corners rounded within `tolerance`, and the tool rests
@@ -58,17 +53,14 @@ def read_path(
     part, against the axis of the machine: down where the file has none. About it the tool turns as
     little as may be.
 
-    ======  ==================================================================================
-    G-code  ``G0 G1 G2 G3 G17 G20 G21 G90 G91 G94``, ``X Y Z`` in mm unless ``G20``, ``F`` by the
-            minute; the tool's axis by ``A B C``, Rz(C) Ry(B) Rx(A) z as of heads that turn, or by
-            ``I J K`` in lines. Arcs lie in the plane of X and Y, by ``I J`` from the start or
-            ``R``, as chords within 0.01 mm. ``M2 M30`` end it, other ``M`` are events; ``G40 G43.4
-            G43.5 G49 G54 G61 G64 G69 G80 G91.1``, ``N O S T H D``, ``%`` and comments are passed
-            over
-    APT     ``GOTO FROM GODLTA RAPID FEDRAT UNITS``, with ``i,j,k`` the tool's axis, feeds by the
-            minute (``MMPM``, ``IPM``); ``SPINDL COOLNT AUXFUN ARCON ARCOFF`` are events; names, the
-            cutter's shape and number (``LOADTL``, …) are passed over; ``FINI`` ends it
-    ======  ==================================================================================
+    - G-code: ``G0 G1 G2 G3 G17 G20 G21 G90 G91 G94``, ``X Y Z`` in mm unless ``G20``, ``F`` by
+      the minute; the tool's axis by ``A B C``, Rz(C) Ry(B) Rx(A) z as of heads that turn, or by
+      ``I J K`` in lines. Arcs lie in the plane of X and Y, by ``I J`` from the start or ``R``,
+      as chords within 0.01 mm. ``M2 M30`` end it, other ``M`` are events; ``G40 G43.4 G43.5 G49
+      G54 G61 G64 G69 G80 G91.1``, ``N O S T H D``, ``%`` and comments are passed over
+    - APT: ``GOTO FROM GODLTA RAPID FEDRAT UNITS``, with ``i,j,k`` the tool's axis, feeds by the
+      minute (``MMPM``, ``IPM``); ``SPINDL COOLNT AUXFUN ARCON ARCOFF`` are events; names, the
+      cutter's shape and number (``LOADTL``, …) are passed over; ``FINI`` ends it
 
     Any other word or statement is refused, by its line.
 

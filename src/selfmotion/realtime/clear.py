@@ -15,7 +15,8 @@ from selfmotion.task import SE3, as_pose
 class Surroundings:
     """Keeps the arm apart from itself and from obstacles, wherever these are by now.
 
-    While a plan is made they are taken to stay there. Bodies are their convex hulls.
+    While a plan is made they are taken to stay there. Links are their convex hulls, and so are
+    obstacles, or convex pieces that contain them.
 
     Parameters
     ----------
@@ -45,8 +46,8 @@ class Surroundings:
                 if obstacle in standing:
                     raise ProblemError(
                         f"{robot.name}: while the arm moves obstacles are their convex hulls, and "
-                        f"that of '{obstacle}' always contains '{link}': give its parts as "
-                        f"obstacles of their own"
+                        f"that of '{obstacle}' always contains '{link}': close its mesh, which is "
+                        f"then taken apart, or give its parts as obstacles of their own"
                     )
         self.blocked, self.message = False, ""
 

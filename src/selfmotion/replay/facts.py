@@ -26,7 +26,9 @@ def facts(plan: Plan) -> dict[str, Cell]:
         tip = bound.chain.tip_name
         rows[f"position error of {tip}, worst"] = _extreme(position, "m")
         rows[f"rotation error of {tip}, worst"] = _extreme(rotation, "rad")
-    rows["margin to a joint limit, least"] = _extreme(certificate.limit_margin, "rad or m")
+    nearest, robot = certificate.limit_margin, plan.robot
+    unit = robot.unit_of(*({nearest.name} & set(robot.joint_names)))
+    rows["margin to a joint limit, least"] = _extreme(nearest, unit)
     fastest = certificate.velocity_ratio
     rows["speed, most"] = _extreme(replace(fastest, value=100.0 * fastest.value), "% of its limit")
     used, *which = str(plan.limits_used).split(": ", 1)
@@ -36,7 +38,7 @@ def facts(plan: Plan) -> dict[str, Cell]:
     for name, near in plan.approaches.items():
         rows[f"closest to {name}"] = _extreme(near, "m")
     rows["smallest singular value"] = _extreme(certificate.smallest_singular_value, "")
-    rows["from end to start"] = (f"{certificate.closure:.3g} rad or m", "")
+    rows["from end to start"] = (f"{certificate.closure:.3g} {robot.unit_of()}", "")
     rows["checked at"] = (f"{certificate.samples} times", "by forward kinematics")
     rows["duration"] = (f"{plan.trajectory.duration:.4g} s", "")
     tasks = " and ".join(item.task.value for item in follows.items)

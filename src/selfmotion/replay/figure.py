@@ -32,8 +32,7 @@ def figure(plan: Plan) -> "Figure":
     drawing = Figure(figsize=(10, 6.5), layout="constrained")
     drawing.suptitle(f"{robot.name}, {plan.task.value} task: {plan.certificate.verdict}")
     (positions, velocities), (manipulability, errors) = drawing.subplots(2, 2, sharex=True)
-    prismatic = [robot.is_prismatic(name) for name in robot.joint_names]
-    unit = "rad" if not any(prismatic) else "m" if all(prismatic) else "rad or m"
+    unit = robot.unit_of()
     _per_joint(positions, shown.t, shown.q, robot.joint_names, robot.lower, robot.upper)
     positions.set_ylabel(f"q [{unit}]")
     positions.legend(fontsize="x-small", ncols=2)

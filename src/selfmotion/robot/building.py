@@ -151,8 +151,9 @@ def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:
         upper = model.upperPositionLimit[joint.idx_q] + _BESIDE
         if not lower <= value <= upper:
             raise RobotError(
-                f"{urdf.source}: lock holds joint '{name}' at {value:.6g} rad or m, beyond its "
-                f"limits {lower:.6g} to {upper:.6g}"
+                f"{urdf.source}: lock holds joint '{name}' at {value:.6g} "
+                f"{'m' if urdf.joints[name].kind == 'prismatic' else 'rad'}, beyond its limits "
+                f"{lower:.6g} to {upper:.6g}"
             )
 
 

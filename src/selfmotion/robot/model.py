@@ -128,6 +128,11 @@ class RobotModel:
         """Whether a joint's coordinate is a length [m]."""
         return self.urdf.joints[joint].kind == "prismatic"
 
+    def unit_of(self, *joints: str) -> str:
+        """Return the unit of joints' coordinates, by default of all: rad, m, or rad or m."""
+        found = {"m" if self.is_prismatic(name) else "rad" for name in joints or self.joint_names}
+        return found.pop() if len(found) == 1 else "rad or m"
+
     @property
     def reach(self) -> float:
         """How far from its root the tool can be at most [m]: an upper bound, link by link."""

@@ -31,8 +31,9 @@ class Page {
     this.plan = this.content.plans[number];
     this.number = number;
     get("time").max = this.duration;
-    get("description").textContent = this.plan.description;
-    get("verdict").textContent = get("verdict").title = this.plan.verdict;
+    // The verdict stands above the scene: not twice.
+    get("description").textContent = this.plan.description.replace(this.plan.verdict, "").trim();
+    get("verdict").textContent = this.plan.verdict;
     get("verdict").classList.toggle("verified", this.plan.verified);
     [...get("choice").children].forEach((button, k) => button.setAttribute("aria-pressed", k === number));
     for (const cell of document.querySelectorAll("[data-plan]")) {

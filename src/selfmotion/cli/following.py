@@ -1,0 +1,183 @@
+"""What `selfmotion follow` does: states of an arm come by UDP, and segments go back."""
+
+import socket
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from select import select
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import selfmotion as sm
+from selfmotion import realtime
+from selfmotion.basics import Array
+
+# What a datagram holds at most, and how long one is waited for at a time [s].
+_LARGEST, _LOOK = 65_507, 0.2
+_FLOAT = np.dtype("<f8")
+
+
+@dataclass(eq=False)
+class Link:
+    """States in, segments out, as datagrams of little-endian doubles.
+
+    A state is [t, q, q̇]; the path begins with the first one. A segment is a row [t, q, q̇, q̈] for
+    each cycle, in the clock of the states. An empty datagram ends it. Segments go to where the
+    first state came from; what comes from elsewhere, is of another length, or older than the last
+    state, is left out. Of several states that wait the newest counts.
+
+    Parameters
+    ----------
+    port : socket
+        Bound.
+    path : Path
+    dof : int
+    silence : float
+        Without a state for so long, it ends [s]; for the first one it waits without end.
+    seconds : float
+        From the first state on, it ends after so long [s].
+    """
+
+    port: socket.socket
+    path: sm.Path
+    dof: int
+    silence: float
+    seconds: float
+    flags: Counter[str] = field(default_factory=Counter)
+    reasons: Counter[str] = field(default_factory=Counter)
+    took: list[float] = field(default_factory=list)
+    error: Array = field(default_factory=lambda: np.zeros(2))
+    left_out: int = 0
+    ended: str = ""
+    _peer: Any = None
+    _first: float = 0.0
+    _last: float = -np.inf
+    _since: float = 0.0
+
+    def read(self) -> realtime.State | None:
+        """Wait for the next state; None where it is over."""
+        waited = time.monotonic()
+        while True:
+            data = self._newest()
+            if data is None:
+                if self._peer is not None and time.monotonic() - waited > self.silence:
+                    self.ended = f"no state for {self.silence:g} s"
+                    return None
+                continue
+            if not data:
+                self.ended = "the controller ended it"
+                return None
+            numbers = np.frombuffer(data, dtype=_FLOAT).astype(np.float64)
+            if self._last == -np.inf:
+                self._first = float(numbers[0])
+            t = float(numbers[0]) - self._first
+            if t > self.seconds:
+                self.ended = f"{self.seconds:g} s are over"
+                return None
+            self._last, self._since = float(numbers[0]), time.perf_counter()
+            return realtime.State(t, numbers[1 : 1 + self.dof], numbers[1 + self.dof :], self.path)
+
+    def write(self, segment: realtime.Segment) -> None:
+        """Send a segment, and note what became of it."""
+        rows = np.column_stack([segment.t + self._first, segment.q, segment.qd, segment.qdd])
+        data = rows.astype(_FLOAT).tobytes()
+        if len(data) > _LARGEST:
+            raise sm.ProblemError(
+                f"a segment of {len(rows)} cycles takes {len(data)} bytes, more than a datagram "
+                f"holds ({_LARGEST}): give a longer --cycle"
+            )
+        self.port.sendto(data, self._peer)
+        self.took.append(time.perf_counter() - self._since)
+        self.flags[segment.flag.value] += 1
+        self.reasons.update(segment.reasons)
+        self.error = np.maximum(self.error, segment.tool_error)
+
+    def _newest(self) -> bytes | None:
+        """Return the newest state or the end; None where nothing came for a while."""
+        found: bytes | None = None
+        wait = _LOOK
+        while found != b"" and select([self.port], [], [], wait)[0]:
+            later = self._sound(*self.port.recvfrom(65_536))
+            found, wait = found if later is None else later, 0.0
+        return found
+
+    def _sound(self, data: bytes, sender: Any) -> bytes | None:
+        """Return a datagram of the controller's that is one; None for all others."""
+        wanted = (1 + 2 * self.dof) * _FLOAT.itemsize
+        foreign = self._peer is not None and sender != self._peer
+        fits = len(data) == wanted or (not data and self._peer is not None)
+        if foreign or not fits or (data and not self._is_later(data)):
+            self.left_out += 1
+            return None
+        self._peer = sender
+        return data
+
+    def _is_later(self, data: bytes) -> bool:
+        t = float(np.frombuffer(data, dtype=_FLOAT, count=1)[0])
+        return bool(np.isfinite(t) and t > self._last)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """What came of it, for programs."""
+        return {
+            "ended": self.ended,
+            "segments": dict(self.flags),
+            "reasons": dict(self.reasons),
+            "states left out": self.left_out,
+            "largest position error": float(self.error[0]),
+            "largest rotation error": float(self.error[1]),
+            "longest step": max(self.took, default=0.0),
+            "median step": float(np.median(self.took)) if self.took else 0.0,
+        }
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether there was a segment, and each was planned."""
+        return set(self.flags) == {realtime.Flag.PLANNED.value}
+
+
+@contextmanager
+def listening(address: str) -> Iterator[socket.socket]:
+    """Yield a socket that is bound to host:port; ProblemError where that cannot be."""
+    host, colon, port = address.rpartition(":")
+    if not (colon and host and port.isdecimal() and int(port) < 65_536):
+        raise sm.ProblemError(f"--listen is '{address}', expected host:port like 127.0.0.1:5005")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
+        try:
+            made.bind((host, int(port)))
+        except OSError as error:
+            raise sm.ProblemError(f"--listen {address}: {error.strerror or error}") from error
+        yield made
+
+
+def replanner_of(problem: sm.Problem, **options: Any) -> sm.Replanner:
+    """Return the replanner of a problem; ProblemError for what is not followed while moving."""
+    if problem.also:
+        raise sm.ProblemError("while the arm moves one frame follows a path: leave 'also' out")
+    if problem.relaxations:
+        raise sm.ProblemError("while the arm moves no row is relaxed: leave 'relaxations' out")
+    return sm.Replanner(problem.robot, problem.task, problem.costs, problem.constraints, **options)
+
+
+def show(link: Link, console: Console) -> None:
+    """Print what came of it."""
+    found = link.summary
+    table = Table(show_header=False, box=None)
+    table.add_row("ended", link.ended)
+    counts = ", ".join(f"{count} {name}" for name, count in link.flags.items())
+    table.add_row("segments", counts or "none")
+    for reason, count in link.reasons.items():
+        table.add_row("", f"{count} times: {reason}")
+    if link.left_out:
+        table.add_row("datagrams left out", str(link.left_out))
+    if link.took:
+        median, longest = 1e3 * found["median step"], 1e3 * found["longest step"]
+        table.add_row("a step takes", f"{median:.2f} ms in the median, {longest:.2f} ms at most")
+        metres, angle = found["largest position error"], found["largest rotation error"]
+        table.add_row("off the path, as measured", f"at most {metres:.2g} m and {angle:.2g} rad")
+    console.print(table)

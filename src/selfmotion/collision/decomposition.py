@@ -1,0 +1,211 @@
+"""Convex pieces that together contain a mesh: what is planned with in place of its hull.
+
+The solid is cut along planes of its own faces, which for what is made of bars and plates gives
+these back, and otherwise through the middle; pieces whose common hull holds hardly more than they
+do are joined again. Cutting and hulls are Manifold's, which keeps solids closed (E. Lalish,
+"Manifold", https://github.com/elalish/manifold); cutting along planes until what hulls add is
+little, and joining, is the way of X. Wei et al., "Approximate convex decomposition for 3D meshes
+with collision-aware concavity and tree search", SIGGRAPH 2022.
+"""
+
+import heapq
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array
+
+# No more pieces than this are planned with: each is a pair with each link.
+MOST = 32
+# A piece is cut while its hull adds more than this share of the whole hull's volume ...
+_EXCESS = 2e-3
+# ... and two are joined where their common hull adds less than this.
+_JOINED = 5e-4
+# Planes of so many of its faces are tried for each cut, among so many of the largest; one only of
+# parts of more triangles than this, which take long to cut.
+_TRIED, _LARGEST, _FINE = 6, 100, 3000
+# Faces whose normals and places differ by less are of one plane [rad, share of the size].
+_SAME_NORMAL, _SAME_PLACE = 0.05, 0.01
+# A face cuts a solid if that reaches so far to both of its sides [share of the size].
+_CUTS = 2e-3
+# Meshes of more triangles are not cut: it takes half a minute already.
+_MOST_TRIANGLES = 100_000
+# Joined are pieces with one of so many whose middles are nearest.
+_NEIGHBOURS = 10
+# Two smaller remainders are preferred to a large one that counts as much.
+_PREFERENCE = 0.75
+# Faces are cut along unless a cut through the middle leaves so much less.
+_MIDDLE = 1.3
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A closed part of the solid, or what several parts were joined to: their hull."""
+
+    solid: Any
+
+    @cached_property
+    def hull(self) -> Any:
+        return self.solid.hull()
+
+    @cached_property
+    def size(self) -> float:
+        """The volume of its hull."""
+        return float(self.hull.volume())
+
+    @cached_property
+    def excess(self) -> float:
+        """What its hull adds to its volume."""
+        return max(self.size - float(self.solid.volume()), 0.0)
+
+    @cached_property
+    def middle(self) -> Array:
+        """The middle of the box around it, (3,)."""
+        return np.asarray(np.reshape(self.hull.bounding_box(), (2, 3)).mean(axis=0))
+
+
+def convex_pieces(corners: Array, faces: npt.NDArray[np.int64]) -> tuple[Array, ...]:
+    """Return the corners (V, 3) of at most `MOST` convex pieces that together contain a mesh.
+
+    Empty where the mesh is not closed, or has more than 100,000 triangles.
+
+    Parameters
+    ----------
+    corners : (V, 3)
+    faces : (T, 3)
+        Indices of corners; which way round is for the whole mesh to decide.
+    """
+    import manifold3d
+
+    if len(faces) > _MOST_TRIANGLES:
+        return ()
+    shells = _shells(faces)
+    # Shells that touch share no corners.
+    index = shells[:, None] * len(corners) + faces
+    used, index = np.unique(index, return_inverse=True)
+    triangles = corners[faces]
+    # Six times the volume.
+    volume = np.einsum("ti,ti->", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2]))
+    turned = np.ascontiguousarray(index.reshape(-1, 3)[:, :: 1 if volume > 0.0 else -1])
+    mesh = manifold3d.Mesh64(np.array(corners[used % len(corners)]), turned.astype(np.uint64))
+    solid = manifold3d.Manifold(mesh)
+    if solid.status() != manifold3d.Error.NoError or solid.is_empty():
+        return ()
+    whole = float(solid.hull().volume())
+    parts = _joined(_cut(solid, whole), whole)
+    return tuple(np.array(part.hull.to_mesh64().vert_properties[:, :3]) for part in parts)
+
+
+def _shells(faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Return which closed surface each triangle is of, (T,).
+
+    Surfaces hang together by edges of two triangles; solids that touch may have edges in common.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    _, index, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    by_edge = np.argsort(index.reshape(-1), kind="stable")
+    pairs = by_edge[counts[index.reshape(-1)[by_edge]] == 2].reshape(-1, 2) % len(faces)
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(faces),) * 2)
+    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
+
+
+def _cut(solid: Any, whole: float) -> list[_Part]:
+    """Return parts of a solid, whose hull has the volume `whole`, that are nearly convex."""
+    order = itertools.count()
+    queue = [(-part.excess, next(order), part) for part in _connected(solid)]
+    heapq.heapify(queue)
+    # What is cut finely is joined again: there may be more than in the end.
+    while len(queue) < 2 * MOST and -queue[0][0] > _EXCESS * whole:
+        _, _, worst = heapq.heappop(queue)
+        for part in _best_cut(worst):
+            heapq.heappush(queue, (-part.excess, next(order), part))
+    return [part for _, _, part in sorted(queue, key=lambda item: item[1])]
+
+
+def _best_cut(part: _Part) -> list[_Part]:
+    """Return what a part falls into by the plane after which hulls add least."""
+    cuts: list[tuple[float, int, list[_Part]]] = []
+    for normal, offset, weight in _planes(part):
+        sides = part.solid.split_by_plane(normal.tolist(), offset)
+        found = [piece for side in sides for piece in _connected(side)]
+        left = sum(piece.excess**_PREFERENCE for piece in found)
+        cuts.append((weight * left, len(cuts), found))
+    return min(cuts)[2]
+
+
+def _connected(solid: Any) -> list[_Part]:
+    """Return the parts of a solid that do not hang together; all as one where one is a cavity."""
+    found = solid.decompose()
+    if any(part.volume() < 0.0 for part in found):
+        found = [solid]
+    return [_Part(part) for part in found if part.volume() > 0.0]
+
+
+def _planes(part: _Part) -> Iterator[tuple[Array, float, float]]:
+    """Yield normals, offsets and weights of planes to cut a part along.
+
+    Those of its faces and through its middle; what hulls add after a cut counts by the weight.
+    """
+    mesh = part.solid.to_mesh64()
+    triangles = mesh.vert_properties[mesh.tri_verts.astype(np.int64), :3]
+    crossed = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    areas = np.linalg.norm(crossed, axis=1)
+    real = areas > 1e-12 * areas.max()
+    normals, areas = crossed[real] / areas[real, None], areas[real]
+    # A plane is the same seen from behind.
+    largest = np.abs(normals).argmax(axis=1)
+    normals = normals * np.sign(normals[np.arange(len(normals)), largest])[:, None]
+    offsets = np.einsum("ti,ti->t", normals, triangles[real, 0])
+    outline = part.hull.to_mesh64().vert_properties[:, :3]
+    size = float(np.ptp(outline, axis=0).max())
+    keys = np.round(np.column_stack([normals / _SAME_NORMAL, offsets / (_SAME_PLACE * size)]))
+    _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    weights = np.bincount(index.reshape(-1), areas)
+    widest = np.argsort(-weights, kind="stable")[:_LARGEST]
+    first, weights = first[widest], weights[widest]
+    heights = outline @ normals[first].T - offsets[first]
+    depths = np.minimum(heights.max(axis=0), -heights.min(axis=0))
+    is_fine = len(triangles) > _FINE
+    best = np.argsort(-weights * depths, kind="stable")[: 1 if is_fine else _TRIED]
+    for k in best[depths[best] > _CUTS * size].tolist():
+        yield normals[first[k]], float(offsets[first[k]]), 1.0
+    lengthwise = np.argsort(-np.ptp(outline, axis=0), kind="stable")
+    for axis in lengthwise[: 1 if is_fine else 3].tolist():
+        yield np.eye(3)[axis], float(part.middle[axis]), _MIDDLE
+
+
+def _joined(parts: list[_Part], whole: float) -> list[_Part]:
+    """Return parts, some joined: where that adds little, and until there are at most `MOST`."""
+    alive, order = dict(enumerate(parts)), itertools.count(len(parts))
+    costs: dict[tuple[int, int], tuple[float, _Part]] = {}
+
+    def weigh(i: int) -> None:
+        others = [j for j in alive if j != i]
+        away = [float(np.linalg.norm(alive[j].middle - alive[i].middle)) for j in others]
+        for _, j in sorted(zip(away, others, strict=True))[:_NEIGHBOURS]:
+            pair = min(i, j), max(i, j)
+            if pair not in costs:
+                both = _Part(alive[i].hull.batch_hull([alive[i].hull, alive[j].hull]))
+                costs[pair] = both.size - alive[i].size - alive[j].size, both
+
+    for i in alive:
+        weigh(i)
+    while costs:
+        (i, j), (added, both) = min(costs.items(), key=lambda item: (item[1][0], item[0]))
+        if added > _JOINED * whole and len(alive) <= MOST:
+            break
+        del alive[i], alive[j]
+        for pair in [pair for pair in costs if {i, j} & set(pair)]:
+            del costs[pair]
+        new = next(order)
+        alive[new] = both
+        weigh(new)
+    return list(alive.values())

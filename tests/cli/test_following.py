@@ -1,0 +1,126 @@
+"""A path followed in a closed loop by the command, with a simulated controller over a socket."""
+
+import json
+import socket
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from support.arms import PANDA_HOME, robot_named
+from support.shell import complaint, invoke
+
+# What the tool is off its path: the middle rule's error over cycles of 1 ms.
+TRACKED = 1e-5
+PERIOD, STEPS = 0.01, 60
+
+CELL = """
+task = "pose"
+start = [{start}]
+robot.name = "panda"
+
+[path]
+kind = "circle"
+radius = 0.05
+normal = [1, 0, 0]
+duration = 3.0
+
+[[constraints]]
+kind = "JointVelocityLimits"
+"""
+
+
+def written(folder: Path) -> Path:
+    file = folder / "cell.toml"
+    file.write_text(CELL.format(start=", ".join(map(repr, PANDA_HOME.tolist()))))
+    return file
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+        port.bind(("127.0.0.1", 0))
+        return int(port.getsockname()[1])
+
+
+class Controller(threading.Thread):
+    """Plays segments, and tells its state once a period, from a clock of its own."""
+
+    def __init__(self, port: int, steps: int = STEPS, ends: bool = True) -> None:
+        super().__init__(daemon=True)
+        self.there, self.steps, self.ends = ("127.0.0.1", port), steps, ends
+        self.clock, self.q, self.qd = 1000.0, PANDA_HOME, np.zeros(7)
+        self.passed: list[tuple[float, np.ndarray]] = []
+
+    def run(self) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
+            # Until somebody listens.
+            own.settimeout(0.1)
+            for _ in range(self.steps):
+                rows = self._answer(own)
+                now = rows[np.argmin(np.abs(rows[:, 0] - self.clock - PERIOD))]
+                self.clock, self.q, self.qd = now[0], now[1:8], now[8:15]
+                self.passed.append((self.clock - 1000.0, self.q))
+                # What is no state changes nothing, wherever it comes from.
+                own.sendto(b"nonsense", self.there)
+            if self.ends:
+                own.sendto(b"", self.there)
+
+    def _answer(self, own: socket.socket) -> np.ndarray:
+        own.settimeout(0.1)
+        while True:
+            state = np.concatenate([[self.clock], self.q, self.qd])
+            own.sendto(state.tobytes(), self.there)
+            try:
+                return np.frombuffer(own.recv(65_536)).reshape(-1, 22)
+            except TimeoutError:
+                own.settimeout(1.0)
+
+
+def test_the_arm_follows_the_path_of_the_file(tmp_path: Path) -> None:
+    file, port = written(tmp_path), free_port()
+    controller = Controller(port)
+    controller.start()
+    code, shown = invoke("follow", file, "--listen", f"127.0.0.1:{port}", "--json")
+    controller.join(10.0)
+    path, robot = sm.read_problem(file).path, robot_named("panda")
+    for t, q in controller.passed:
+        miss = sm.Task.POSE.miss(path.pose(t), robot.pose(q))
+        assert max(miss) < TRACKED
+    # It moved.
+    assert np.abs(controller.q - PANDA_HOME).max() > 0.01
+    found = json.loads(shown)
+    assert code == 0
+    assert found["ended"] == "the controller ended it"
+    assert found["segments"] == {"planned": STEPS}
+    assert found["states left out"] >= STEPS - 1
+    assert found["largest position error"] < TRACKED
+
+
+def test_a_controller_that_is_silent_ends_it(tmp_path: Path) -> None:
+    file, port = written(tmp_path), free_port()
+    Controller(port, steps=3, ends=False).start()
+    address = f"127.0.0.1:{port}"
+    code, shown = invoke("follow", file, "--listen", address, "--silence", "0.3")
+    assert code == 0
+    assert "no state for 0.3 s" in shown
+    assert "3 planned" in shown
+
+
+@pytest.mark.parametrize("address", ["5005", "127.0.0.1:", "127.0.0.1:99999", "nowhere:x"])
+def test_an_address_that_is_none_is_refused(tmp_path: Path, address: str) -> None:
+    assert "expected host:port" in complaint("follow", written(tmp_path), "--listen", address)
+
+
+def test_what_is_not_kept_while_moving_is_refused(tmp_path: Path) -> None:
+    file = written(tmp_path)
+    file.write_text(file.read_text() + '\n[[relaxations]]\nrows = ["z"]\nband = 0.01\n')
+    assert "no row is relaxed" in complaint("follow", file)
+
+
+def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{other.getsockname()[1]}"
+        assert f"--listen {address}" in complaint("follow", written(tmp_path), "--listen", address)
