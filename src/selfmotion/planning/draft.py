@@ -195,10 +195,15 @@ class Draft:
         self, session: Session, *, chosen: bool = True, evaluations: int | None = None
     ) -> None:
         """Optimise a session; keep it if it is the best one and may be chosen."""
+        # What is only compared with is optimised to the end.
+        known = None if self.is_unmet or not chosen else self.best
+        dearest = np.inf if known is None else known.standing.cost
         try:
-            session.minimize(evaluations)
+            session.minimize(evaluations, dearest=dearest)
         except KeyboardInterrupt:
             session.end(Status.INTERRUPTED)
+        if session.is_hopeless:
+            return
         if chosen:
             self.consider(session)
         if session.cut_short and self.best is not None:

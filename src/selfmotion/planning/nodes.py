@@ -67,6 +67,8 @@ class NodeDescent:
     history : list of Iteration
     latest : MotionOnNodes or None
         The last motion on the way that keeps the conditions: what an interruption leaves.
+    is_hopeless : bool
+        Whether even what is best freely costs as much as what is known.
     """
 
     def __init__(
@@ -82,6 +84,7 @@ class NodeDescent:
         self._first = effort.counts.evaluations
         self.history: list[Iteration] = []
         self.latest: MotionOnNodes | None = None
+        self.is_hopeless = False
         self._ended: Status | None = None
 
     def grid(self, t: Array) -> NodeGrid:
@@ -90,12 +93,14 @@ class NodeDescent:
             self._problem, t, self._constraints, free=self._free, counts=self._effort.counts
         )
 
-    def near(self, trajectories: Sequence[Trajectory], t: Array) -> MotionOnNodes | None:
+    def near(
+        self, trajectories: Sequence[Trajectory], t: Array, dearest: float = np.inf
+    ) -> MotionOnNodes | None:
         """Return the best motion near the cheapest of some, on nodes at some times.
 
         Where what is best freely breaks conditions, also near motions from its start whose
         self-motion goes towards the middle of the joints' limits. None where there is none that
-        keeps them.
+        keeps them, or it would cost more than `dearest`.
         """
         grid = self.grid(t)
         motions = [grid.motion_near(trajectory) for trajectory in trajectories]
@@ -111,6 +116,10 @@ class NodeDescent:
         best = self._kept(freely)
         if best is not None or self._ended is not None:
             return best
+        if freely.motion.cost >= dearest:
+            # With conditions it would cost more still.
+            self.is_hopeless = True
+            return None
         broken = _broken(freely.motion)
         if _too_much(freely.motion, broken):
             return None

@@ -43,6 +43,8 @@ class Session:
         What was rolled out last.
     on_nodes : MotionOnNodes or None
         What was found on nodes, which then stands.
+    is_hopeless : bool
+        Whether it ended because another motion is known that costs less.
     """
 
     def __init__(self, rolled: RolledMotion) -> None:
@@ -50,7 +52,7 @@ class Session:
         self.on_nodes: MotionOnNodes | None = None
         self._descent = Descent(rolled.beginning.effort)
         self._ended: Status | None = None
-        self._tried_nodes = False
+        self._tried_nodes = self.is_hopeless = False
         # A finer null motion than asked for that led nowhere.
         self._tried: NullMotion | None = None
         self._warm: Plan | None = None
@@ -155,15 +157,19 @@ class Session:
         """Begin at the null motion of a motion along this path, unless that would be worse."""
         self.rolled = self.rolled.resumed(trajectory)
 
-    def minimize(self, evaluations: int | None = None) -> None:
+    def minimize(self, evaluations: int | None = None, *, dearest: float = np.inf) -> None:
         """Optimise on the present grid, from the motion that there is.
 
         Parameters
         ----------
         evaluations : int, optional
             So many of the cost, for a rough optimum; by default what `Effort` allows.
+        dearest : float
+            Of a motion that is known: it ends where it becomes clear that this one will cost more.
         """
-        if self.of_chain or (evaluations is None and self.take_nodes()):
+        if self.of_chain or (evaluations is None and self.take_nodes(dearest)):
+            return
+        if self.is_hopeless:
             return
         if self._warm is not None:
             warm, self._warm = self._warm, None
@@ -181,12 +187,12 @@ class Session:
         self.rolled = self.rolled.closed()
         self.rolled = self.rolled.judged()
 
-    def take_nodes(self) -> bool:
+    def take_nodes(self, dearest: float = np.inf) -> bool:
         """Go to the optimum on nodes near the motion; return whether that is what stands now."""
         start, before = self.beginning, self.on_nodes
         led_nowhere = self._tried_nodes and before is None
-        known = self._ended is not None or led_nowhere
-        if known or not takes(start.problem, start.effort, start.constraints):
+        over = self._ended is not None or led_nowhere
+        if over or not takes(start.problem, start.effort, start.constraints):
             return False
         # What led nowhere once would do so again.
         self._tried_nodes = True
@@ -200,8 +206,9 @@ class Session:
             here, t = self.motion().trajectory, rolled.objective.grid.nodes
             warm = self._warm
             if warm is None or warm.trajectory.t[-1] != warm.path.duration:
-                return descent.near([here], t)
-            return descent.near([slower(warm.trajectory, pace_of(warm, start.problem)), here], t)
+                return descent.near([here], t, dearest)
+            known = slower(warm.trajectory, pace_of(warm, start.problem))
+            return descent.near([known, here], t, dearest)
 
         self._by_nodes(optimum)
         return self.on_nodes is not None
@@ -229,6 +236,7 @@ class Session:
             found = descent.latest or self.on_nodes
             self._ended = Status.INTERRUPTED
         self._descent.history += descent.history
+        self.is_hopeless = descent.is_hopeless
         self.on_nodes = found or self.on_nodes
 
     def _descend(self, evaluations: int | None) -> None:
