@@ -11,6 +11,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.certificate import Stretch
 from selfmotion.certificate.feed import _Along, _rounded_down
+from selfmotion.path import section_at_rest
 from support.arms import PANDA_HOME
 from support.gantries import gantry
 from support.majorants import check_majorants
@@ -160,6 +161,26 @@ def test_a_section_is_judged_by_the_feeds_in_it(tmp_path: FilePath) -> None:
     back = path.feeds[1].timed(lambda t: path.duration - t)
     assert back.during.ravel() == pytest.approx(path.duration - path.feeds[1].during[0, ::-1])
     assert back.slowest == path.feeds[1].slowest
+
+
+@pytest.mark.parametrize("ramped", [(True, True), (False, True)])
+def test_a_section_at_rest_keeps_its_feed_but_in_its_ramps(
+    ramped: tuple[bool, bool], tmp_path: FilePath
+) -> None:
+    path = saddle(0.02)
+    first = 2.0 if ramped[0] else 0.0
+    section = section_at_rest(path, first, 6.0, 0.5, ramped)
+    (found,) = section.feeds
+    assert found.kept
+    certificate = followed(section, tmp_path)
+    assert certificate.verified, certificate.verdict
+    assert "feed" in certificate.covers
+    assert not followed(section, tmp_path, 0.1, (2.0, 3.0)).verified
+    # At another pace no feed is kept, and none is claimed.
+    t = np.array([0.0, path.duration])
+    other = sm.Retimed(path, 1.5 * t, t, np.full(2, 1.0 / 1.5))
+    assert not other.feeds
+    assert "feed" not in followed(other, tmp_path).covers
 
 
 def test_each_stretch_of_a_feed_has_to_reach_it() -> None:

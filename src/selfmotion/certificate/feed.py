@@ -16,6 +16,8 @@ from selfmotion.path import FeedKept, path_series
 
 # Shares of the room that is left are interpolated this well at least.
 _FINE = 1e-3
+# Times that are told are alike up to this [s].
+_SAME = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +94,8 @@ class FeedReached(Requirement):
         """Return the feed in words, and from when to when it is asked for near a time."""
         during = self.found.during
         first, last = during[int(np.argmin(np.abs(during - time).min(axis=1)))]
-        whole = len(during) == 1 and (first, last) == (0.0, self.follow.path.duration)
+        ends = 0.0, self.follow.path.duration
+        whole = len(during) == 1 and np.allclose((first, last), ends, rtol=0.0, atol=_SAME)
         stretch = "" if whole else f" from t = {first:.3f} to {last:.3f} s"
         return f"the feed of {self.found.asked:g} m/s{stretch}"
 

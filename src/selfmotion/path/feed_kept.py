@@ -109,14 +109,20 @@ class FeedKept:
 
     def between(self, first: float, last: float) -> "FeedKept | None":
         """Return it from one time to another [s]; None where it does not count in between."""
-        inside = (self.t >= first) & (self.t <= last)
-        if inside.all():
+        found = self.where((self.t >= first) & (self.t <= last))
+        return found and replace(found, during=np.clip(found.during, first, last))
+
+    def where(self, rows: Flags) -> "FeedKept | None":
+        """Return it at some of the times (K,); without stretches where it counts at none of them.
+
+        None where it counts in no stretch.
+        """
+        if rows.all():
             return self
-        counted = np.unique(self._stretch[self.counts & inside])
+        counted = np.unique(self._stretch[self.counts & rows])
         if not len(counted):
             return None
-        rows = inside & np.isin(self._stretch, counted)
+        rows = rows & np.isin(self._stretch, counted)
         chosen = {name: getattr(self, name)[rows] for name in ("t", "speeds", "lasts", "counts")}
         causes = tuple(np.array(self.causes)[rows].tolist())
-        during = np.clip(self.during[counted], first, last)
-        return replace(self, during=during, **chosen, causes=causes)
+        return replace(self, during=self.during[counted], **chosen, causes=causes)

@@ -7,7 +7,11 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, PathError, as_numbers, read_only
 from selfmotion.path.base import Path, PathSamples, PathSeries, _Derived, check_path
+from selfmotion.path.feed_kept import FeedKept
 from selfmotion.path.pace import Pace, times_when
+
+# The original is run through at its own pace where that is as near to it [share].
+_OWN = 1e-9
 
 
 class Retimed(_Derived, kind="retimed"):
@@ -63,6 +67,16 @@ class Retimed(_Derived, kind="retimed"):
     def marks(self) -> Array:
         """See `Path.marks`: the samples of the pace, and when the original's are passed."""
         return np.union1d(self._pace.t, self._passed(self._path.marks))
+
+    @property
+    def feeds(self) -> tuple[FeedKept, ...]:
+        """See `Path.feeds`: those of the original, where it is run through at its own pace."""
+        found = []
+        for item in self._path.feeds:
+            t = self.when(item.t)
+            own = item.where(np.abs(self._pace(t, 1) - 1.0) <= _OWN)
+            found += [own.timed(self.when)] if own else []
+        return tuple(found)
 
     def _passed(self, wanted: Array) -> Array:
         """Return when times of the original are passed, (K,), from 0 to the duration."""
