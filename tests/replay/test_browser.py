@@ -1,6 +1,7 @@
 """The page in a real browser: it moves as Pinocchio says, and its controls work."""
 
 import os
+import re
 import shutil
 from dataclasses import replace
 from itertools import pairwise
@@ -11,6 +12,7 @@ import pytest
 
 from selfmotion.collision import Box, CollisionModel
 from selfmotion.constraints import Clearance
+from selfmotion.formats import read_motion
 from selfmotion.replay import notebook_html, write_replay
 from selfmotion.robot import NAMED_ARMS
 from support.replay_plans import arm_plan, planar_plan, shelf_plan
@@ -310,6 +312,38 @@ def test_the_closest_pair_is_named_and_tinted(open_page, tmp_path):
     assert_quiet(page)
 
 
+def test_bodies_that_meet_are_red(open_page, tmp_path):
+    plan = arm_plan("panda")
+    block = Box("block", plan.path.pose(1.0).translation, (0.05, 0.05, 0.05))
+    constraints = (*plan.problem.constraints, Clearance([block]))
+    plan = replace(plan, problem=replace(plan.problem, constraints=constraints))
+    page = open_page(write_replay(plan, tmp_path / "block.html"))
+    page.evaluate("replay.seek(1.0)")
+    assert page.locator("#pair").inner_text().endswith("and block meet")
+    colors = page.evaluate("""() => {
+      const found = [];
+      viewer.scene_tree.find(["selfmotion"]).object.traverse((object) => {
+        if (object.material?.emissive?.getHex()) found.push(object.material.emissive.getHex());
+      });
+      return found;
+    }""")
+    assert set(colors) == {0xE00000}
+    assert_quiet(page)
+
+
+def test_the_motion_can_be_downloaded(open_page, files):
+    page = open_page(files["panda"])
+    plan = arm_plan("panda")
+    with page.expect_download() as found:
+        page.locator("#download").click()
+    assert found.value.suggested_filename == "motion.csv"
+    motion = read_motion(found.value.path().rename(found.value.path().with_suffix(".csv")))
+    assert motion.joint_names == plan.robot.joint_names
+    # The page holds single precision.
+    assert np.abs(motion(motion.t) - plan.trajectory(motion.t)).max() < 1e-6
+    assert_quiet(page)
+
+
 def test_what_rides_is_drawn_on_its_link(open_page, tmp_path):
     plan = arm_plan("panda")
     pose = pin.SE3(pin.rpy.rpyToMatrix(0.3, 0.0, 0.5), np.array([0.0, 0.05, 0.1]))
@@ -391,8 +425,34 @@ def test_without_webgl_the_plots_remain(playwright_without_webgl, files):
     page.goto(files["planar"].as_uri())
     page.wait_for_selector("html[data-replay=ready]")
     assert "No 3-D view" in page.locator("#notice").inner_text()
+    assert page.locator("#still").is_visible()
     page.keyboard.press("End")
     assert page.locator("#clock").inner_text() == "2.00 / 2.00 s"
+
+
+def test_without_scripts_there_is_a_picture(browser, files):
+    """On paper, too, in place of the scene."""
+    still = browser.new_page(java_script_enabled=False)
+    still.goto(files["panda"].as_uri())
+    assert still.locator("#still").is_visible()
+    assert not still.locator("#play").is_visible()
+    assert "verified" in still.locator("#description").inner_text()
+    still.close()
+
+
+def test_the_picture_is_of_the_arm(files):
+    """Each line ends where the next begins, and the last at the tool's path."""
+    text = files["panda"].read_text(encoding="utf-8")
+    drawn = re.findall(r'<polyline points="([^"]*)"', text)
+    lines = [np.array([p.split(",") for p in each.split()], dtype=float) for each in drawn]
+    *bones, path = lines
+    # Three arms of seven joints, from the world to the tool.
+    assert len(bones) == 3 * 8
+    for k, share in enumerate((0, 50, 100)):
+        arm = bones[8 * k : 8 * k + 8]
+        for one, other in pairwise(arm):
+            assert np.abs(one[1] - other[0]).max() < 0.11
+        assert np.abs(arm[-1][1] - path[share]).max() < 0.11
 
 
 @pytest.fixture

@@ -15,7 +15,8 @@ from support.replay_plans import planar_plan, two_seams
 TEXTS = ("h1", "#description", "#verdict", "#pair", "#numbers th", ".plot figcaption")
 BOXES = (
     "#said", "#legend", "#layers", "#layers label", "#play", "#time", "#clock", "#speed", "#home",
-    "#choice button", "#steps", ".plot svg", ".key button", ".key output", "#numbers table",
+    "#download", "#choice button", "#steps", ".plot svg", ".key button", ".key output",
+    "#numbers table",
 )  # fmt: skip
 
 

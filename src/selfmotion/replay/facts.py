@@ -68,8 +68,11 @@ def describe(plan: Plan) -> str:
     saved = ""
     if report.initial_cost:
         change = report.cost / report.initial_cost - 1.0
-        side = "below" if change <= 0 else "above"
-        saved = f", {abs(100 * change):.1f} % {side} the motion x = 0"
+        saved = (
+            f", {abs(100 * change):.1f} % {'below' if change <= 0 else 'above'} the motion x = 0"
+        )
+        if change > 5e-4 and plan.problem.all_constraints:
+            saved += ", which is not held to its constraints"
     items = plan.problem.follows.items
     what = "a tool motion" if len(items) == 1 else f"{len(items)} tool motions"
     tasks = " and ".join(f"'{item.task.value}'" for item in items)

@@ -19,6 +19,7 @@ from selfmotion.job import Program
 from selfmotion.replay.content import page_content
 from selfmotion.replay.facts import describe
 from selfmotion.replay.payload import Payload
+from selfmotion.replay.still import still
 from selfmotion.replay.whole import Whole
 from selfmotion.result import Move, Parts, Plan
 
@@ -73,17 +74,19 @@ def replay_html(
         triads=triads if whole is None else 0,
         whole=whole,
     )
+    obstacles = shown[0].obstacles if whole is None else whole.obstacles
+    picture = still(shown[0].robot, shown[0].trajectory, obstacles, content["camera"])
     if description is not None:
         for shown_plan in content["plans"]:
             shown_plan["description"] = description
     if whole is not None:
         heading = title or f"{shown[0].robot.name}, {type(plans).__name__.lower()}"
-        return _assemble(heading, description or whole.description, payload.pack(content))
+        return _assemble(heading, description or whole.description, payload.pack(content), picture)
     heading = title or f"{shown[0].robot.name}, {shown[0].task.value} task"
     sentences = [describe(plan) for plan in shown]
     if len(shown) > 1:
         sentences = [f"{name}: {said}." for name, said in zip(names, sentences, strict=True)]
-    return _assemble(heading, description or " ".join(sentences), payload.pack(content))
+    return _assemble(heading, description or " ".join(sentences), payload.pack(content), picture)
 
 
 def write_replay(plans: Shown, file: str | os.PathLike[str], **options: Any) -> Path:
@@ -103,8 +106,8 @@ def notebook_html(plan: Plan, height: int = 900) -> str:
     """Return the replay as an inline frame, for ``Plan._repr_html_`` in a notebook."""
     page = html.escape(replay_html(plan), quote=True)
     return (
-        f'<iframe srcdoc="{page}" sandbox="allow-scripts" title="selfmotion replay" '
-        f'style="width:100%;height:{height}px;border:0"></iframe>'
+        f'<iframe srcdoc="{page}" sandbox="allow-scripts allow-downloads" '
+        f'title="selfmotion replay" style="width:100%;height:{height}px;border:0"></iframe>'
     )
 
 
@@ -131,7 +134,7 @@ def _labels(plans: list[Plan], labels: Sequence[str] | None) -> list[str]:
     return list(labels)
 
 
-def _assemble(title: str, description: str, payload: str) -> str:
+def _assemble(title: str, description: str, payload: str, picture: str) -> str:
     viewer = _viewer_code()
     script = "\n" + "\n".join(_web(name) for name in _SCRIPTS)
     policy = "; ".join(
@@ -153,6 +156,7 @@ def _assemble(title: str, description: str, payload: str) -> str:
         style=_web("style.css"),
         viewer=packed.decode("ascii"),
         payload=payload,
+        still=picture,
         script=script,
     )
 

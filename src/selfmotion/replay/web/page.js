@@ -77,8 +77,11 @@ class Page {
     const last = clearance.t.length - 1;
     const k = Math.round((time / clearance.t[last]) * last);
     const [first, second] = clearance.pairs[k];
-    get("pair").textContent = `closest: ${first} and ${second}, ${format(clearance.value[k])} m`;
-    this.stage?.mark([first, second], this.plan.obstacles);
+    const apart = clearance.value[k];
+    get("pair").classList.toggle("meet", apart <= 0);
+    get("pair").textContent = apart > 0 ? `closest: ${first} and ${second}, ${format(apart)} m`
+      : `${first} and ${second} meet`;
+    this.stage?.mark([first, second], this.plan.obstacles, apart <= 0);
   }
 
   play() {
@@ -125,6 +128,7 @@ class Page {
     get("play").addEventListener("click", () => this.toggle());
     get("time").addEventListener("input", (event) => { this.pause(); this.seek(Number(event.target.value)); });
     get("home").addEventListener("click", () => this.stage?.frame());
+    get("download").addEventListener("click", () => this.download());
     document.addEventListener("keydown", (event) => this.key(event));
     const letters = this.content.layers.map(({ key, label }) => [key, label]);
     get("morekeys").replaceChildren(...letters.flatMap(([key, label]) => {
@@ -132,6 +136,19 @@ class Page {
       kbd.textContent = key;
       return [" · ", kbd, ` ${label}`];
     }));
+  }
+
+  // A table of the motion as it is shown: times and joint positions.
+  download() {
+    const { t, q } = this.plan.curves, { joints } = this.content;
+    const lines = Array.from(t, (time, row) =>
+      [time, ...q.subarray(row * joints.length, (row + 1) * joints.length)].join(","));
+    const text = [["t", ...joints.map(({ name }) => name)].join(","), ...lines, ""].join("\n");
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+    link.download = "motion.csv";
+    link.click();
+    URL.revokeObjectURL(link.href);
   }
 
   key(event) {
@@ -300,8 +317,10 @@ async function start() {
     element(document.head, "script", {}, code);
     stage = new Stage(get("view"), content);
     get("notice").hidden = true;
+    document.documentElement.classList.add("moving");
   } catch (error) {
     get("notice").textContent = `No 3-D view: ${error.message}. The plots and numbers are complete.`;
+    get("view").hidden = true;
     console.warn(error);
   }
   window.viewer = stage?.viewer;

@@ -132,14 +132,16 @@ class Stage {
   }
 
   // Tint the named bodies: links, or obstacles of the plan.
-  mark(names, obstacles) {
+  // Bodies that meet are red, the others of a warm tint.
+  mark(names, obstacles, meet = false) {
     const wanted = names.map((name) => obstacles[name] ?? this.content.links[name]).filter(Boolean);
-    if (String(wanted) === String(this.marked)) return;
+    if (String(wanted) === String(this.marked) && meet === this.meet) return;
+    this.meet = meet;
     const tint = (paths, color) => paths.forEach((path) => this.find(path).traverse((object) => {
       object.material?.emissive?.setHex(color);
     }));
     tint(this.marked, 0);
-    tint(wanted, 0x9c2f00);
+    tint(wanted, meet ? 0xe00000 : 0x9c2f00);
     this.marked = wanted;
   }
 
