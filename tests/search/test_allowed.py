@@ -125,3 +125,20 @@ def test_directions_keep_the_tool_allowed_to_first_order() -> None:
         assert np.linalg.norm(moved[3:5]) > 0.1 * step
         moved[3:5] = 0.0
         assert np.abs(moved).max() < 10.0 * step**2 / 1e-6 * 1e-3
+
+
+def test_what_is_no_number_misses_by_infinity() -> None:
+    """Others are approached as if it was not there."""
+    robot = robot_named("panda")
+    rng = np.random.default_rng(5)
+    pose = robot.pose(robot.dexterous_configuration())
+    follows = dwelling(robot, pose, "pose")
+    allowed = Allowed(follows, RELAXED["cone"], (False, False), robot.lower, robot.upper)
+    seeds, away = np.array(list(spread(robot, 6, rng))), np.zeros((6, 6))
+    q, _, misses = allowed.approach(seeds, 0.5, away)
+    away[2, 3] = np.nan
+    some, _, missed = allowed.approach(seeds, 0.5, away)
+    others = [0, 1, 3, 4, 5]
+    np.testing.assert_array_equal(some[others], q[others])
+    np.testing.assert_array_equal(missed[others], misses[others])
+    assert np.isinf(missed[2]).all()

@@ -170,18 +170,10 @@ class Allowed:
             ITERATIONS,
             left,
         )
-        linear = self.follows.linear
-        return (
-            found,
-            away,
-            np.stack(
-                [
-                    np.linalg.norm(left * linear, axis=1),
-                    np.linalg.norm(left * (1.0 - linear), axis=1),
-                ],
-                axis=1,
-            ),
-        )
+        in_metres = np.where(self.follows.linear, left, 0.0)
+        in_radians = np.where(self.follows.linear, 0.0, left)
+        misses = [np.sqrt(np.einsum("km,km->k", part, part)) for part in (in_metres, in_radians)]
+        return found, away, np.stack(misses, axis=1)
 
     def _away(self, deviation: Array | None, groups: Ints, count: int) -> Array:
         return np.zeros((count, 6)) if deviation is None else np.where(groups >= 0, deviation, 0.0)

@@ -94,7 +94,7 @@ def approach_all(
 
     Levenberg-Marquardt with steps that are cut off at the limits and bands, which arrives also
     where Newton's method does not, and at the nearest place where nothing arrives. `misses` (K, m)
-    are what is left in the rows [m, rad].
+    are what is left in the rows [m, rad]; infinite where that is no number from the beginning.
     """
     n, tips, m = q.shape[1], layout.shape[0], rows_of(layout)
     r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
@@ -105,7 +105,7 @@ def approach_all(
     trial, delta, bound = np.empty(n), np.empty(6), np.zeros(6, dtype=np.bool_)
     for k in range(len(q)):
         damping, best, idle = 1e-3, np.inf, 0
-        trial[:], delta[:] = q[k], deviation[k]
+        trial[:], delta[:], error[:] = q[k], deviation[k], np.inf
         for _ in range(iterations):
             for j in range(n):
                 trial[j] = min(max(trial[j], lower[j]), upper[j])
@@ -126,7 +126,8 @@ def approach_all(
                 hold(q[k], lower, upper, error, jacobian)
             else:
                 damping *= 10.0
-                if damping > 1e6:
+                # Before anything is known it is not a number: there is no way on from there.
+                if damping > 1e6 or best == np.inf:
                     break
             if best < NOTHING_LEFT**2 or idle == LITTLE_GAINS:
                 break
