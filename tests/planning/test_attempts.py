@@ -10,7 +10,11 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.engine import Counts
+from selfmotion.optimise import QuasiNewton
 from selfmotion.planning.attempts import ATTEMPTS
+from selfmotion.planning.effort import Effort
+from selfmotion.planning.session import Session
 
 Circle = Callable[..., sm.Problem]
 NAMES = [name for name, _ in ATTEMPTS]
@@ -76,3 +80,18 @@ def test_attempts_are_saved(panda_circle: Circle, tmp_path: Path) -> None:
     none = dataclasses.replace(plan.report, attempts=())
     dataclasses.replace(plan, report=none).save(tmp_path / "none.npz")
     assert sm.load_plan(tmp_path / "none.npz").report.attempts == ()
+
+
+@pytest.mark.parametrize("dearer", [True, False])
+def test_what_costs_more_freely_is_not_optimised_with_limits(
+    panda_circle: Circle, dearer: bool
+) -> None:
+    free = sm.plan(panda_circle("position"))
+    fastest = np.abs(free.trajectory.qd).max()
+    limits = [sm.JointVelocityLimits(0.9 * fastest)]
+    problem = dataclasses.replace(panda_circle("position"), constraints=limits)
+    effort = Effort(QuasiNewton(), None, None, Counts())
+    session = Session.begin(problem, effort, problem.given_start, free=False)
+    session.minimize(dearest=free.report.cost * (0.5 if dearer else 2.0))
+    assert session.is_hopeless == dearer
+    assert dearer or not session.violations
