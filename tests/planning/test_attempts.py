@@ -13,6 +13,7 @@ import selfmotion as sm
 from selfmotion.engine import Counts
 from selfmotion.optimise import QuasiNewton
 from selfmotion.planning.attempts import ATTEMPTS
+from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.session import Session
 
@@ -91,7 +92,7 @@ def test_what_costs_more_freely_is_not_optimised_with_limits(
     limits = [sm.JointVelocityLimits(0.9 * fastest)]
     problem = dataclasses.replace(panda_circle("position"), constraints=limits)
     effort = Effort(QuasiNewton(), None, None, Counts())
-    session = Session.begin(problem, effort, problem.given_start, free=False)
+    session = Session(Beginning.of(problem, effort, problem.given_start, free=False))
     session.minimize(dearest=free.report.cost * (0.5 if dearer else 2.0))
     assert session.is_hopeless == dearer
     assert dearer or not session.violations

@@ -7,6 +7,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.engine import Counts
 from selfmotion.optimise import QuasiNewton
+from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.refinement import settle
 from selfmotion.planning.session import Session
@@ -20,7 +21,7 @@ def test_a_null_motion_never_becomes_coarser(monkeypatch: pytest.MonkeyPatch) ->
     """
     problem = sm.sample_problem(null_motion=sm.RefinedNullMotion())
     effort = Effort(QuasiNewton(), None, None, Counts())
-    session = Session.begin(problem, effort, problem.given_start, free=False)
+    session = Session(Beginning.of(problem, effort, problem.given_start, free=False))
     asked: list[int] = []
 
     def left(rolled: RolledMotion, *, bound: bool) -> SimpleNamespace:

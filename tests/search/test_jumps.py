@@ -67,7 +67,9 @@ def wound() -> sm.Problem:
 
 def test_chains_do_without_jumps(monkeypatch: pytest.MonkeyPatch) -> None:
     # So far apart in time as on a path five times as long.
-    few = lambda problem: np.linspace(0.0, problem.path.duration, WAYPOINTS)  # noqa: E731
+    def few(problem: sm.Problem) -> np.ndarray:
+        return np.linspace(0.0, problem.path.duration, WAYPOINTS)
+
     monkeypatch.setattr(stretches_module, "waypoint_times", few)
     stretches = Stretches.of(wound())
     # What the samples alone would do.

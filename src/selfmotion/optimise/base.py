@@ -89,6 +89,11 @@ class Status(Enum):
         """What it means and what to do about it."""
         return _MESSAGES[self]
 
+    @property
+    def is_cut_short(self) -> bool:
+        """Whether the user wanted no more: by Ctrl-C, a deadline or the callback."""
+        return self in (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
+
 
 _MESSAGES = {
     Status.CONVERGED: "the predicted decrease fell below the tolerance",

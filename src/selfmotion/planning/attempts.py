@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable
 
 from selfmotion.basics import BreakdownError, InverseKinematicsError, NoSequenceError
-from selfmotion.optimise import Status
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.refusal import begins_off_path, looked_at, no_way
 from selfmotion.planning.sequences import optimise_sequences
@@ -169,8 +168,7 @@ def _plan_largest_part(draft: Draft) -> bool:
     """
     best, failure = draft.best, draft.failure
     if best is not None:
-        spent = best.status is Status.MAX_EVALUATIONS or draft.problem.damping is not None
-        short = draft.is_sought and bool(best.violations) and not spent
+        short = draft.is_sought and _may_meet_more(best) and draft.problem.damping is None
         if short and draft.reach().reason:
             draft.prove_part()
             return True
@@ -198,8 +196,7 @@ def _take_other_null_motion(draft: Draft) -> bool:
 
 
 def _may_meet_more(best: Session) -> bool:
-    spent = best.cut_short or best.status is Status.MAX_EVALUATIONS
-    return bool(best.violations) and not spent
+    return bool(best.violations) and not best.is_spent
 
 
 def _meet_more(draft: Draft, best: Session) -> None:
@@ -241,8 +238,7 @@ def _plan_part_instead(draft: Draft) -> bool:
         return False
     check = proved.finished.certificate
     # With damping the motion goes on where the path cannot be followed: so it was asked for.
-    no_more = best.cut_short or best.status is Status.MAX_EVALUATIONS
-    if no_more or draft.problem.damping is not None:
+    if best.is_spent or draft.problem.damping is not None:
         return False
     out_of_limits = bool(best.violations) and check.limit_margin.value < 0.0
     suspect = check.position_error.time

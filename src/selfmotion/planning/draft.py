@@ -12,6 +12,7 @@ from selfmotion.certificate import Tolerance
 from selfmotion.engine import Guide
 from selfmotion.motion import Trajectory
 from selfmotion.optimise import Status
+from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import Finished, finish
 from selfmotion.planning.heats import Heats
@@ -174,12 +175,13 @@ class Draft:
     ) -> Session | None:
         """Return the session of a start; None where it breaks down at once, which is noted."""
         try:
-            return Session.begin(
+            begun = Beginning.of(
                 self.problem, self.effort, start, free=free, guide=guide, deviation=deviation
             )
         except BreakdownError as error:
             self.failure = error
             return None
+        return Session(begun)
 
     def resumed(self, rough: Sequence[Trajectory]) -> list[Session]:
         """Return sessions that begin at rough motions, the best first."""

@@ -39,7 +39,6 @@ from selfmotion.result import Plan, rate_limits, retime
 # What brings a path to another pace.
 Pace = Callable[[Path], Path]
 # After these there is nothing to be tried any more.
-_CUT = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +205,7 @@ class _Rounds:
         found = self._taken("costs", planned)
         still = replace(planned, trajectory=planned.initial_trajectory)
         self._taken("x = 0", still)
-        if planned.report.status in _CUT:
+        if planned.report.status.is_cut_short:
             raise KeyboardInterrupt
         use, weight = LimitUse(self._v, self._a, POWER), 0.0
         pace: Pace = _own
@@ -219,7 +218,7 @@ class _Rounds:
             self.verdict = planned.certificate.verdict
             if planned.certificate.on_path and not planned.report.ending:
                 found = self._taken("rounds", planned)
-            if planned.report.status in _CUT:
+            if planned.report.status.is_cut_short:
                 raise KeyboardInterrupt
             self.times.append(self._duration)
             kept = self._keeps(planned)

@@ -13,9 +13,6 @@ from selfmotion.planning.draft import Draft, Proved
 from selfmotion.result import Gap, Plan, Report
 from selfmotion.search import SPACING
 
-# After these no other way is tried.
-ENDED = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED)
-
 
 def gathered(draft: Draft, deadline: Deadline) -> Plan:
     """Return the plan.
@@ -111,7 +108,7 @@ def message_of(
             f"the motion passes a singular pose near t = {least.time:.4g} s (smallest singular "
             f"value {least.value:.2g}), next to which its cost cannot be lowered"
         )
-    parts = [said] if status in ENDED or not violations else []
+    parts = [said] if status.is_cut_short or not violations else []
     if violations and certificate.verified:
         # Such as the clearance of bodies, whose convex hulls are planned with.
         parts.append(f"what planning fell short of is kept by the motion: {'; '.join(violations)}")

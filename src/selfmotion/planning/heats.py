@@ -13,6 +13,7 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError, Progress
 from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
+from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.promise import most_promising
 from selfmotion.planning.session import Session
@@ -55,10 +56,10 @@ class Heats:
         for number, start in enumerate(promising, 1):
             self._progress("start", number, len(promising))
             try:
-                session = Session.begin(problem, self._effort, start, free=True, grid=grid)
+                begun = Beginning.of(problem, self._effort, start, free=True, grid=grid)
             except BreakdownError:
                 continue
-            self._note(session)
+            self._note(Session(begun))
         for heat, (most, evaluations) in enumerate(HEATS, 1):
             del self._merits[max(most, finalists) :]
             running = [session for _, session in self._merits]

@@ -9,6 +9,7 @@ from selfmotion.engine import Evaluation, Guide, StillMotion
 from selfmotion.motion import Grid, Sampling
 from selfmotion.optimise import Status
 from selfmotion.path import Section
+from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import (
@@ -186,7 +187,7 @@ def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attemp
     try:
         start, guide = candidate
         free = problem.given_start is None
-        session = Session.begin(problem, effort, start, free=free, guide=guide)
+        session = Session(Beginning.of(problem, effort, start, free=free, guide=guide))
     except BreakdownError as error:
         reason = f"it runs into a singular pose near t = {error.time:.6g} s"
         return _Attempt(candidate, problem, None, error.time, None, reason)

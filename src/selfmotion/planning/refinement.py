@@ -9,15 +9,8 @@ from selfmotion.optimise import Status
 from selfmotion.planning.session import Session, relative_change
 from selfmotion.planning.settings import COST_AGREEMENT, RISE, RISES, ROUGH_AGREEMENT
 
-# After these the user has no more time to give, or there is nothing to go on from.
-_AT_END = (
-    Status.INTERRUPTED,
-    Status.DEADLINE,
-    Status.STOPPED,
-    Status.MAX_EVALUATIONS,
-    Status.UNBOUNDED,
-    Status.GRADIENT,
-)
+# After these there is nothing to go on from.
+_ADRIFT = (Status.UNBOUNDED, Status.GRADIENT)
 
 
 def settle(session: Session) -> None:
@@ -45,7 +38,7 @@ def _refine_until(session: Session, agreement: float) -> float:
     """
     rises, error = 0, 0.0
     while session.standing.steps < session.beginning.most_steps:
-        if session.status in _AT_END:
+        if session.is_spent or session.status in _ADRIFT:
             return 0.0
         unmet, before = bool(session.violations), session.standing.cost
         session.refine()
@@ -68,7 +61,7 @@ def _refine_until(session: Session, agreement: float) -> float:
 
 def _enriched(session: Session) -> bool:
     """Give the null motion more freedom if that pays, and know what is left; return whether."""
-    if session.violations or session.status in _AT_END:
+    if session.violations or session.is_spent or session.status in _ADRIFT:
         return False
     problem, rolled = session.beginning.problem, session.rolled
     wanted = problem.null_motion

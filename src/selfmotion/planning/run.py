@@ -20,7 +20,7 @@ from selfmotion.planning.attempts import go_through
 from selfmotion.planning.deadline import Deadline, TimedCounts
 from selfmotion.planning.draft import Draft, Known
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.gather import ENDED, gathered
+from selfmotion.planning.gather import gathered
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import DAMPED_EVALUATIONS
 from selfmotion.planning.warm_start import check_warm_start
@@ -141,7 +141,7 @@ def _planned(draft: Draft, clock: Deadline) -> Plan:
     # Few motions take an arm into itself: the others need not wait for distances. What breaks
     # something else as well would do so all the more where one thing more is asked.
     alone = _overlaps(found) and len(found.certificate.failures) == 1
-    if not alone or draft.blocked is not None or found.report.status in ENDED:
+    if not alone or draft.blocked is not None or found.report.status.is_cut_short:
         return found
     apart = replace(draft.effort, apart=True)
     again = [("apart from itself", apart, draft.search)]
@@ -170,7 +170,7 @@ def _planned(draft: Draft, clock: Deadline) -> Plan:
             return replace(found, report=replace(found.report, attempts=tuple(tried)))
         except KeyboardInterrupt:
             return _told(found, Status.DEADLINE if clock.passed else Status.INTERRUPTED)
-        if rival.report.status in ENDED:
+        if rival.report.status.is_cut_short:
             return _better(found, rival)
         found = rival
         if not _overlaps(found):

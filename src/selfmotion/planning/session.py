@@ -6,36 +6,31 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array
-from selfmotion.engine import Counts, Evaluation, Guide
+from selfmotion.engine import Counts, Evaluation
 from selfmotion.motion import Grid, NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.along_chain import along_chain
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.descent import Descent, breaks
-from selfmotion.planning.effort import Effort
 from selfmotion.planning.nodes import NodeDescent, takes
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import ALIKE
 from selfmotion.planning.standing import RolledMotion, Standing, score
 from selfmotion.planning.warm_start import pace_of, slower
-from selfmotion.problem import Problem
 from selfmotion.result import Plan
 from selfmotion.search import SequenceGuide
 
-# After these the user has no more time to give.
-_CUT_SHORT = (Status.INTERRUPTED, Status.DEADLINE, Status.STOPPED, Status.MAX_EVALUATIONS)
-
 
 class Session:
-    """The optimisation from one start; made by `Session.begin`.
+    """The optimisation from one start; from its motion at x = 0.
 
     What stands is replaced as a whole, so that an interruption finds what belongs together.
 
     Parameters
     ----------
-    rolled : RolledMotion
-        What is begun with.
+    beginning : Beginning
+    motion : NullMotion, optional
+        Another null motion than that of the problem.
 
     Attributes
     ----------
@@ -47,39 +42,15 @@ class Session:
         Whether it ended because another motion is known that costs less.
     """
 
-    def __init__(self, rolled: RolledMotion) -> None:
-        self.rolled = rolled
+    def __init__(self, beginning: Beginning, motion: NullMotion | None = None) -> None:
+        self.rolled = RolledMotion.still(beginning, motion)
         self.on_nodes: MotionOnNodes | None = None
-        self._descent = Descent(rolled.beginning.effort)
+        self._descent = Descent(beginning.effort)
         self._ended: Status | None = None
         self._tried_nodes = self.is_hopeless = False
         # A finer null motion than asked for that led nowhere.
         self._tried: NullMotion | None = None
         self._warm: Plan | None = None
-
-    @classmethod
-    def begin(
-        cls,
-        problem: Problem,
-        effort: Effort,
-        configuration: Array,
-        *,
-        free: bool,
-        guide: Guide | None = None,
-        deviation: Array | None = None,
-        grid: Grid | None = None,
-    ) -> "Session":
-        """Integrate the motion at x = 0 from a start, as `Beginning.of` does; return its session.
-
-        Raises
-        ------
-        BreakdownError
-            The motion at x = 0 runs into a singular pose.
-        """
-        beginning = Beginning.of(
-            problem, effort, configuration, free=free, guide=guide, deviation=deviation, grid=grid
-        )
-        return cls(RolledMotion.still(beginning))
 
     @property
     def beginning(self) -> Beginning:
@@ -114,7 +85,12 @@ class Session:
     @property
     def cut_short(self) -> bool:
         """Whether the user wants no more."""
-        return self.status in (Status.INTERRUPTED, Status.STOPPED)
+        return self.status.is_cut_short
+
+    @property
+    def is_spent(self) -> bool:
+        """Whether nothing more is to be evaluated."""
+        return self.cut_short or self.status is Status.MAX_EVALUATIONS
 
     @property
     def violations(self) -> tuple[str, ...]:
@@ -178,9 +154,9 @@ class Session:
         if not np.isfinite(objective.value(self.rolled.x)):
             objective.require_finite(self.rolled.x)
         if evaluations is None and self._take_rough_minimum():
-            status = self.status
+            spent, status = self.is_spent, self.status
             self.rolled = self.rolled.with_null_motion(wanted)
-            if status in _CUT_SHORT:
+            if spent:
                 self.end(status)
         if self._ended is None:
             self._descend(evaluations)
@@ -254,8 +230,8 @@ class Session:
         self._take_minimum()
         if not breaks(self.rolled.objective, self.rolled.x):
             return
-        status, self.rolled = self.status, stuck
-        if status in _CUT_SHORT:
+        spent, status, self.rolled = self.is_spent, self.status, stuck
+        if spent:
             self.end(status)
         else:
             self._take_minimum()
@@ -313,8 +289,7 @@ class Session:
         """
         start = self.beginning
         wanted = start.problem.null_motion
-        objective = start.objective(start.still.grid.with_steps(motion.fewest_steps), motion)
-        session = Session(RolledMotion(start, objective, np.zeros(objective.size), motion))
+        session = Session(start, motion)
         session._descent.before, session._descent.history = self._descent.before, self.history
         session.minimize()
         if wanted.gain == np.inf and not (session.violations or session.cut_short):

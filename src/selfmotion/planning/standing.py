@@ -99,10 +99,14 @@ class RolledMotion:
     remaining: float | None = None
 
     @classmethod
-    def still(cls, beginning: Beginning) -> "RolledMotion":
-        """Return the motion at x = 0."""
-        objective = beginning.first()
-        return cls(beginning, objective, np.zeros(objective.size), beginning.problem.null_motion)
+    def still(cls, beginning: Beginning, motion: NullMotion | None = None) -> "RolledMotion":
+        """Return the motion at x = 0, by default of the problem's null motion."""
+        if motion is None:
+            objective, motion = beginning.first(), beginning.problem.null_motion
+        else:
+            grid = beginning.still.grid.with_steps(motion.fewest_steps)
+            objective = beginning.objective(grid, motion)
+        return cls(beginning, objective, np.zeros(objective.size), motion)
 
     @property
     def status(self) -> Status:
