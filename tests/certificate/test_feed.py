@@ -296,3 +296,13 @@ def test_a_feed_is_named_that_both_path_and_arm_keep() -> None:
     slower = sm.Feed(path, float(named[1]), acceleration=8.0).slower(float(named[2]))
     found = sm.plan(sm.Problem(kinova, slower, "position", q)).certificate
     assert found.verified, found.verdict
+
+
+@pytest.mark.parametrize("brief", [1e-4, 1e-8, 1e-10])
+def test_a_feed_that_is_asked_for_an_instant_ends_in_a_verdict(brief: float) -> None:
+    panda = sm.load_robot("panda")
+    pose = panda.pose(PANDA_HOME)
+    end = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.1, 0.0]))
+    line = sm.Line(pose, end, 2.0, time_law="constant")
+    path = sm.Feed(line, 0.05, stretches=[[1.0, 0.02], [1.0 + brief, 0.05]])
+    assert sm.plan(sm.Problem(panda, path, "position", PANDA_HOME)).certificate.verified

@@ -1,6 +1,6 @@
 """The feed that was asked for, and the one that is reached."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,8 @@ from selfmotion.path import FeedKept, path_series
 _FINE = 1e-3
 # Times that are told are alike up to this [s].
 _SAME = 1e-3
+# A feed that is asked for no longer than this, as a share of the duration, is asked for nowhere.
+_INSTANT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +54,9 @@ class FeedReached(Requirement):
         found, allowed = self.found, (1.0 - self.found.within) * self.found.asked
         text = f"{self._named(found.time)} is reached up to {found.reached:.4g} m/s"
         if found.kept:
-            speeds = self._speeds(motion)
-            if _is_off(speeds):
-                time, text = self._off(speeds)
+            off = next(filter(_is_off, self._speeds(motion)), None)
+            if off is not None:
+                time, text = self._off(off)
                 return Finding(self.name, "path", time, found.slowest, allowed, False, text)
         else:
             slow = f"for {found.slower:.3g} s, " if found.slower else ""
@@ -65,17 +67,18 @@ class FeedReached(Requirement):
             )
         return Finding(self.name, "path", found.time, found.slowest, allowed, found.kept, text)
 
-    def _speeds(self, motion: FinishedMotion) -> Bounds:
-        """Return what is known of the tool's speed where the feed is asked for, the worst of it."""
+    def _speeds(self, motion: FinishedMotion) -> Iterator[Bounds]:
+        """Yield what is known of the tool's speed each time that the feed is asked for."""
         edges = smooth_between(self.follow.path, motion.trajectory)
-        along, looked = _Along(self.follow, self.found), []
+        along = _Along(self.follow, self.found)
         for window in self.found.during:
+            if window[1] - window[0] <= _INSTANT * self.follow.path.duration:
+                continue
             # Where feeds change the path has marks: rounding apart these are the nearest edges.
             first, last = (int(np.argmin(np.abs(edges - time))) for time in window)
-            if last > first:
-                part = edges[first : last + 1]
-                looked.append(bounded(along, motion.robot, motion.trajectory, part))
-        return next(filter(_is_off, looked), max(looked, key=lambda item: float(item.values[0])))
+            first = min(first, len(edges) - 2)
+            part = edges[first : max(last, first + 1) + 1]
+            yield bounded(along, motion.robot, motion.trajectory, part)
 
     def _off(self, speeds: Bounds) -> tuple[float, str]:
         """Return when the tool leaves the path's pace, and what is said of it."""
