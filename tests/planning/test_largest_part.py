@@ -222,9 +222,19 @@ def test_poses_that_limits_put_out_of_reach_end_the_search(
     line = sm.Line(first, last, 3.0)
     limits = sm.JointPositionLimits(np.full(3, -most), np.full(3, most))
     stages: list[str] = []
+    news: list[str] = []
+
+    def progress(told: str, number: int, of: int) -> None:
+        (stages if of else news).append(told)
+        # What is known is told before anything is planned.
+        assert given or news
+
     plan = sm.plan(
         sm.Problem(planar, line, "planar", start if given else None, constraints=[limits]),
-        progress=lambda stage, number, of: stages.append(stage),
+        progress=progress,
+    )
+    assert [told.startswith("no motion passes t = 3 s: none was found") for told in news] == (
+        [] if given else [True]
     )
     lengths = [np.linalg.norm(place.translation) for place in planar.model.jointPlacements][2:]
     lengths.append(np.linalg.norm(planar.model.frames[planar.chain.tip].placement.translation))

@@ -68,7 +68,10 @@ class StageDisplay(Display):
         self._stage = self._count = self._cost = ""
 
     def stage(self, stage: str, done: int, total: int) -> None:
-        """Show that number `done` of `total` in a stage has begun."""
+        """Show that number `done` of `total` in a stage has begun; of 0, news that stay."""
+        if total == 0:
+            self._console.print(stage, markup=False, highlight=False, soft_wrap=True)
+            return
         if stage != self._stage:
             self._stage, self._cost = stage, ""
             if not self._console.is_terminal:

@@ -68,8 +68,9 @@ def plan(
     callback : callable, optional
         Called with each `Iteration`; returning True stops, keeping the best so far.
     progress : callable, optional
-        Told the stage, how much of it has begun, and of how many: ``("start", 3, 24)``. It may
-        raise `KeyboardInterrupt` to stop.
+        Told the stage, how much of it has begun, and of how many: ``("start", 3, 24)``; of 0, news:
+        that no motion passes a pose is told at once, before the part of the path that can be
+        followed is planned. It may raise `KeyboardInterrupt` to stop.
 
     Returns
     -------
