@@ -189,10 +189,12 @@ def settled_still_motion(
     configuration: Array,
     guide: Guide | None = None,
     deviation: Array | None = None,
+    grid: Grid | None = None,
 ) -> tuple[StillMotion, int]:
     """Return the motion at x = 0 on the coarsest grid on which it stays near the path.
 
-    Damping takes it off the path: there, on the first grid that changes the error no more.
+    Damping takes it off the path: there, on the first grid that changes the error no more. The
+    first one that is tried is `grid`, by default one of few steps.
 
     Returns
     -------
@@ -206,7 +208,7 @@ def settled_still_motion(
         It runs into a singular pose.
     """
     steps = max(_FEWEST_STEPS, problem.null_motion.fewest_steps)
-    grid = Grid.aligned(problem.knots, steps)
+    grid = grid or Grid.aligned(problem.knots, steps)
     coarse: Array | None = None
     troubles: list[tuple[float, float]] = []
     evaluations = 0

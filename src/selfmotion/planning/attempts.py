@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from selfmotion.basics import BreakdownError, InverseKinematicsError, NoSequenceError
 from selfmotion.planning.draft import Draft
+from selfmotion.planning.long_paths import is_long, keep_to_posture
 from selfmotion.planning.refusal import begins_off_path, looked_at, no_way
 from selfmotion.planning.sequences import optimise_sequences
 from selfmotion.planning.session import Session
@@ -110,6 +111,16 @@ def _begin_at_plan(draft: Draft) -> bool:
         session.adopt(plan)
         draft.progress("warm start", 1, 1)
         draft.optimise(session)
+    return True
+
+
+def _keep_to_posture(draft: Draft) -> bool:
+    """Optimise from a motion in the posture that is best on a stretch, on a very long path."""
+    if not (draft.is_sought and draft.is_unmet and is_long(draft)):
+        return False
+    if draft.is_free and not draft.takes_starts:
+        return False
+    keep_to_posture(draft)
     return True
 
 
@@ -258,6 +269,7 @@ ATTEMPTS: tuple[tuple[str, Callable[[Draft], bool]], ...] = (
     ("part before a pose out of reach", _plan_before_blocked_pose),
     ("motion that is known", _follow_guide),
     ("warm start", _begin_at_plan),
+    ("posture of a stretch", _keep_to_posture),
     ("given start", _begin_at_start),
     ("starts", _draw_starts),
     ("global search", _search_globally),

@@ -67,15 +67,16 @@ class Beginning:
         deviation : (size,), optional
             That of the tool from its path at x = 0, as `Deviation` has it, likewise.
         grid : Grid, optional
-            Where a rough motion will do; by default one on which it stays near the path.
+            Where a rough motion will do; with a guide, one to begin with that is refined until it
+            stays near the path, as is done by default.
 
         Raises
         ------
         BreakdownError
             The motion at x = 0 runs into a singular pose.
         """
-        if grid is None:
-            still, jacobians = settled_still_motion(problem, configuration, guide, deviation)
+        if grid is None or guide is not None:
+            still, jacobians = settled_still_motion(problem, configuration, guide, deviation, grid)
         else:
             still, jacobians = rough_still_motion(problem, configuration, grid)
         effort.counts.jacobians += jacobians

@@ -10,7 +10,7 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError, Progress, SelfmotionError
 from selfmotion.certificate import Tolerance
 from selfmotion.engine import Guide
-from selfmotion.motion import Trajectory
+from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
@@ -172,11 +172,18 @@ class Draft:
         free: bool,
         guide: Guide | None = None,
         deviation: Array | None = None,
+        grid: Grid | None = None,
     ) -> Session | None:
         """Return the session of a start; None where it breaks down at once, which is noted."""
         try:
             begun = Beginning.of(
-                self.problem, self.effort, start, free=free, guide=guide, deviation=deviation
+                self.problem,
+                self.effort,
+                start,
+                free=free,
+                guide=guide,
+                deviation=deviation,
+                grid=grid,
             )
         except BreakdownError as error:
             self.failure = error

@@ -47,6 +47,11 @@ def takes(problem: Problem, effort: Effort, constraints: Sequence[BoundConstrain
     )
 
 
+def most_nodes(problem: Problem) -> int:
+    """Return how many nodes are as many as a path may need: more, the longer it is."""
+    return int(MOST_NODES * (len(problem.knots) + problem.way_in_reaches))
+
+
 _NO_COLUMNS: Ints = np.zeros(0, dtype=np.int64)
 _ARRIVED = (Status.CONVERGED, Status.PRECISION)
 
@@ -105,12 +110,13 @@ class NodeDescent:
         grid = self.grid(t)
         motions = [grid.motion_near(trajectory) for trajectory in trajectories]
         motion = min((one for one in motions if one), key=_aim_of, default=None)
+        return None if motion is None else self.best_near(motion, dearest)
+
+    def best_near(self, motion: NodeMotion, dearest: float = np.inf) -> MotionOnNodes | None:
+        """Return the best motion near one of nodes, likewise."""
+        grid = motion.grid
         # Of what is infinite, or depends on accelerations in other ways, there is no curvature.
-        if (
-            motion is None
-            or not np.isfinite(motion.aim)
-            or grid.cost.bends_by_rates(motion.partials)
-        ):
+        if not np.isfinite(motion.aim) or grid.cost.bends_by_rates(motion.partials):
             return None
         freely = self._minimise(motion, _NO_COLUMNS)
         best = self._kept(freely)
@@ -139,7 +145,7 @@ class NodeDescent:
 
         With one more between each two, put onto the path.
         """
-        dearest, most = np.inf, MOST_NODES * len(self._problem.knots)
+        dearest, most = np.inf, most_nodes(self._problem)
         for _ in range(NODE_ROUNDS):
             if self._ended is not None or 2 * standing.steps > most:
                 break

@@ -120,6 +120,11 @@ class Session:
         start = self.beginning
         self.on_nodes = along_chain(start.problem, start.effort, guide, start.constraints)
 
+    def stand_on(self, found: MotionOnNodes, history: list[Iteration]) -> None:
+        """Let what was found on nodes elsewhere be what stands, with the way to it."""
+        self.on_nodes, self._tried_nodes = found, True
+        self._descent.history += history
+
     @property
     def of_chain(self) -> bool:
         """Whether what stands is a chain of the search, at its optimum."""

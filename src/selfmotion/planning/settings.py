@@ -45,6 +45,13 @@ FALLS = 0.7
 ROUGH_GRIDS = 3
 FINER = 4
 
+# --- long paths (long_paths)
+# A path on which the tool goes more than so many times the arm's reach: x = 0 drifts away there.
+# And what a stretch of it is long that tells the posture.
+LONG_WAY, STRETCH_WAY = 8.0, 4.0
+# Nodes to begin with; the cost on them is right to this share.
+FIRST_NODES, LONG_AGREEMENT = 64, 1e-2
+
 # --- starts and sequences (candidates, heats)
 # Where nothing else leads to a motion that keeps the constraints, this many times more are tried.
 SECOND_EFFORT = 4

@@ -86,6 +86,10 @@ class _TaskField:
         problem.__dict__["_task"] = Task.of(task)
 
 
+# Samples of the tool's way to begin with and at most; more of them would make it longer by less.
+_WAY_SAMPLES, _MOST_WAY_SAMPLES, _WAY_GROWS = 101, 100_000, 1.05
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """A planning problem.
@@ -388,6 +392,18 @@ class Problem:
     def knots(self) -> Array:
         """Times [s] between which paths and deviations are smooth; see `Path.knots`."""
         return smooth_knots(self.follows, self.relaxations)
+
+    @cached_property
+    def way_in_reaches(self) -> float:
+        """How far the tool goes along the path, as a multiple of the arm's reach."""
+        way, before, samples = 0.0, -1.0, _WAY_SAMPLES
+        # Loops are many or few: the way through more and more points, of which none are the same.
+        while way > _WAY_GROWS * before and samples < _MOST_WAY_SAMPLES:
+            t = np.linspace(0.0, self.path.duration, samples)
+            places = self.path.samples(t).translation
+            before, way = way, float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+            samples = 2 * samples + 1
+        return way / self.robot.reach
 
     @property
     def pinned(self) -> tuple[bool, bool]:

@@ -1,0 +1,114 @@
+"""Motions along paths that are many times as long as the arm: they keep to a posture.
+
+Without self-motion an arm drifts from loop to loop, until it is folded or stretched, and rough
+motions of few steps tell nothing of hundreds of loops. A stretch of such a path tells in which
+posture the rest is best followed, too: from a motion whose self-motion goes back to it, Newton's
+method on nodes takes a handful of iterations, however many loops there are.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from selfmotion.basics import Array, SelfmotionError
+from selfmotion.motion import Grid, Sampling
+from selfmotion.nodes import NodeMotion
+from selfmotion.path import Section
+from selfmotion.planning.draft import Draft
+from selfmotion.planning.nodes import NodeDescent, most_nodes, takes
+from selfmotion.planning.settings import FIRST_NODES, LONG_AGREEMENT, LONG_WAY, STRETCH_WAY
+from selfmotion.planning.starts import optimise_starts
+from selfmotion.problem import Problem
+
+
+def is_long(draft: Draft) -> bool:
+    """Whether the tool's way is many times the arm's reach, and nodes will do for the problem."""
+    problem = draft.problem
+    if problem.way_in_reaches <= LONG_WAY:
+        return False
+    middle = problem.robot.dexterous_configuration(problem.task)
+    return takes(problem, draft.effort, problem.bind_constraints(middle, middle))
+
+
+def keep_to_posture(draft: Draft) -> None:
+    """Optimise a stretch in the middle, then the whole path from a motion in that posture."""
+    posture = _posture(draft)
+    if posture is None:
+        return
+    problem, start = draft.problem, draft.problem.given_start
+    if start is None:
+        try:
+            start = problem.robot.inverse_kinematics(
+                problem.path.pose(0.0), problem.task, seed=posture
+            )
+        except SelfmotionError:
+            return
+    constraints = problem.bind_constraints(start, start, apart=draft.effort.apart)
+    descent = NodeDescent(problem, draft.effort, constraints, free=draft.is_free)
+    draft.progress("whole path", 1, 1)
+    motion = _near(descent, problem, start, posture)
+    found = None if motion is None else descent.best_near(motion)
+    if motion is None or found is None:
+        return
+    session = draft.begin(start, free=draft.is_free, guide=_Rates(motion), grid=Grid(motion.grid.t))
+    if session is not None:
+        session.stand_on(found, descent.history)
+        draft.consider(session)
+
+
+def _posture(draft: Draft) -> Array | None:
+    """Return the mean configuration (n,) of the best motion along a stretch in the middle."""
+    problem = draft.problem
+    middle, half = 0.5, 0.5 * STRETCH_WAY / problem.way_in_reaches
+    first, last = (problem.path.duration * share for share in (middle - half, middle + half))
+    kept = [item.on_part() for item in problem.constraints]
+    stretch = replace(
+        problem,
+        **problem.along(lambda path: Section(path, first, last)),
+        start=None,
+        constraints=[item for item in kept if item is not None],
+        rest=False,
+    )
+    inner = replace(
+        draft, problem=stretch, best=None, failure=None, waiting=(), heats=None, attempts=[]
+    )
+    try:
+        optimise_starts(inner, draft.search.starts, draft.search.finalists)
+    except SelfmotionError:
+        return None
+    if inner.best is None or inner.best.violations:
+        return None
+    motion = inner.best.motion().trajectory
+    weights = Sampling.trapezoidal(motion.t).weights
+    return np.asarray(weights @ motion.q / weights.sum())
+
+
+def _near(
+    descent: NodeDescent, problem: Problem, start: Array, posture: Array
+) -> NodeMotion | None:
+    """Return the motion from a start (n,) that goes to a posture (n,) by self-motion.
+
+    On the coarsest nodes on which it costs what it does; None where there is none.
+    """
+    # As long as it takes the tool to go as far as the arm reaches.
+    time = problem.path.duration / problem.way_in_reaches
+    grid, most = Grid.aligned(problem.knots, FIRST_NODES), most_nodes(problem)
+    while grid.steps <= most:
+        motion = descent.grid(grid.nodes).motion_towards(start, posture, time)
+        if motion is not None:
+            exact = motion.exact_cost
+            if abs(exact - motion.cost) <= LONG_AGREEMENT * abs(exact):
+                return motion
+        grid = grid.halved()
+    return None
+
+
+class _Rates:
+    """The joint velocities of a motion, of which eq. 4 keeps the self-motion."""
+
+    def __init__(self, motion: NodeMotion) -> None:
+        self._trajectory = motion.trajectory
+
+    def __call__(self, t: Array) -> Array:
+        """Return them at times `t` (S,), (S, n)."""
+        return self._trajectory(t, 1)

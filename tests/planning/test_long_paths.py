@@ -1,0 +1,71 @@
+"""Paths many times as long as the arm: a loop costs what it costs, however many there are."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import silent
+from selfmotion.engine import Counts
+from selfmotion.optimise import QuasiNewton
+from selfmotion.planning.draft import Draft, Known
+from selfmotion.planning.effort import Effort
+from selfmotion.planning.long_paths import is_long
+from selfmotion.planning.settings import LONG_WAY
+
+NAME = "posture of a stretch"
+# The first and the last loop cost less than those between them; and what a given start costs more,
+# from which the arm goes to the better posture.
+ENDS, GIVEN = 0.02, 0.05
+ELBOW = np.array([-0.8, 1.0, 1.0])
+RADIUS, PERIOD, WAYPOINTS = 0.6, 4.0, 24
+
+
+def loops(planar: sm.RobotModel, count: int, start: bool = False) -> sm.Problem:
+    """Return so many circles, one after the other, with limits of joint angles and speeds."""
+    angle = np.linspace(0.0, 2.0 * np.pi * count, WAYPOINTS * count + 1)
+    flat = np.zeros_like(angle)
+    points = np.stack([2.2 + RADIUS * np.cos(angle), RADIUS * np.sin(angle), flat], axis=1)
+    path = sm.Waypoints(np.linspace(0.0, PERIOD * count, len(angle)), points)
+    first = planar.inverse_kinematics(path.pose(0.0), "planar", seed=ELBOW) if start else None
+    limits = [sm.JointPositionLimits(np.full(3, -2.8), np.full(3, 2.8)), sm.JointVelocityLimits()]
+    return sm.Problem(planar, path, "planar", first, constraints=limits, rest=False)
+
+
+def draft_of(problem: sm.Problem) -> Draft:
+    effort = Effort(QuasiNewton(), None, None, Counts())
+    return Draft(problem, effort, sm.Search(), sm.Tolerance(), silent, Known())
+
+
+@pytest.mark.parametrize("count", [2, 30])
+def test_the_way_is_measured_however_many_loops_there_are(
+    planar: sm.RobotModel, count: int
+) -> None:
+    problem = loops(planar, count)
+    way = 2.0 * np.pi * RADIUS * count / planar.reach
+    assert problem.way_in_reaches == pytest.approx(way, rel=0.03)
+
+
+def test_a_loop_costs_the_same_however_many_there_are(planar: sm.RobotModel) -> None:
+    plans = {count: sm.plan(loops(planar, count)).require() for count in (15, 45)}
+    for plan in plans.values():
+        assert plan.problem.way_in_reaches > LONG_WAY
+        assert plan.report.attempts[1].name == NAME
+        assert plan.report.attempts[1].outcome == "all constraints are met"
+    each = [plan.report.cost / count for count, plan in plans.items()]
+    assert each[1] == pytest.approx(each[0], rel=ENDS)
+
+
+def test_a_given_start_is_kept_and_left_for_the_better_posture(planar: sm.RobotModel) -> None:
+    problem = loops(planar, 30, start=True)
+    plan = sm.plan(problem).require()
+    assert plan.report.attempts[0].name == NAME
+    np.testing.assert_allclose(plan.trajectory.q[0], problem.given_start, atol=1e-12)
+    free = sm.plan(loops(planar, 30)).require()
+    assert free.report.cost <= plan.report.cost <= free.report.cost * (1.0 + GIVEN)
+
+
+def test_short_paths_and_other_null_motions_go_the_usual_way(planar: sm.RobotModel) -> None:
+    few, many = loops(planar, 2), loops(planar, 15)
+    cubic = sm.Problem(planar, many.path, "planar", null_motion=sm.PolynomialNullMotion())
+    for problem, long in ((few, False), (many, True), (cubic, False)):
+        assert is_long(draft_of(problem)) is long
