@@ -9,7 +9,7 @@ from selfmotion.planning.long_paths import is_long, keep_to_posture
 from selfmotion.planning.refusal import begins_off_path, looked_at, no_way
 from selfmotion.planning.sequences import optimise_sequences
 from selfmotion.planning.session import Session
-from selfmotion.planning.settings import SECOND_EFFORT
+from selfmotion.planning.settings import SECOND_EFFORT, VERY_LONG_WAY
 from selfmotion.planning.starts import optimise_starts
 from selfmotion.planning.warm_start import start_of
 from selfmotion.result import Attempt
@@ -115,13 +115,8 @@ def _begin_at_plan(draft: Draft) -> bool:
 
 
 def _keep_to_posture(draft: Draft) -> bool:
-    """Optimise from a motion in the posture that is best on a stretch, on a very long path."""
-    if not (draft.is_sought and draft.is_unmet and is_long(draft)):
-        return False
-    if draft.is_free and not draft.takes_starts:
-        return False
-    keep_to_posture(draft)
-    return True
+    """Optimise from motions in the postures that are best on a stretch, on a very long path."""
+    return draft.problem.way_in_reaches > VERY_LONG_WAY and _try_postures(draft)
 
 
 def _begin_at_start(draft: Draft) -> bool:
@@ -143,6 +138,22 @@ def _draw_starts(draft: Draft) -> bool:
     if not (draft.is_sought and draft.takes_starts and (draft.is_unmet or search.compare)):
         return False
     optimise_starts(draft, search.starts, search.finalists)
+    return True
+
+
+def _compare_postures(draft: Draft) -> bool:
+    """Do so on a path that is long, where it may lead to a better motion than other starts."""
+    return draft.problem.way_in_reaches <= VERY_LONG_WAY and _try_postures(draft)
+
+
+def _try_postures(draft: Draft) -> bool:
+    known = draft.known
+    nothing = known.plan is None and known.guide is None
+    wanted = draft.is_unmet or nothing
+    possible = is_long(draft) and (draft.takes_starts or not draft.is_free)
+    if not (draft.is_sought and wanted and possible):
+        return False
+    keep_to_posture(draft)
     return True
 
 
@@ -272,6 +283,7 @@ ATTEMPTS: tuple[tuple[str, Callable[[Draft], bool]], ...] = (
     ("posture of a stretch", _keep_to_posture),
     ("given start", _begin_at_start),
     ("starts", _draw_starts),
+    ("postures compared", _compare_postures),
     ("global search", _search_globally),
     ("search off the path", _search_off_path),
     ("more starts", _draw_more_starts),

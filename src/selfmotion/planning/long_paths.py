@@ -16,7 +16,13 @@ from selfmotion.nodes import NodeMotion
 from selfmotion.path import Section
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.nodes import NodeDescent, most_nodes, takes
-from selfmotion.planning.settings import FIRST_NODES, LONG_AGREEMENT, LONG_WAY, STRETCH_WAY
+from selfmotion.planning.settings import (
+    FIRST_NODES,
+    LONG_AGREEMENT,
+    LONG_WAY,
+    ONE_VALLEY,
+    STRETCH_WAY,
+)
 from selfmotion.planning.starts import optimise_starts
 from selfmotion.problem import Problem
 
@@ -31,33 +37,40 @@ def is_long(draft: Draft) -> bool:
 
 
 def keep_to_posture(draft: Draft) -> None:
-    """Optimise a stretch in the middle, then the whole path from a motion in that posture."""
-    posture = _posture(draft)
-    if posture is None:
-        return
+    """Optimise a stretch in the middle, then the whole path from motions in its postures."""
+    postures = _postures(draft)
+    for number, posture in enumerate(postures, 1):
+        draft.progress("posture", number, len(postures))
+        _optimise(draft, posture)
+        if draft.is_over:
+            break
+
+
+def _optimise(draft: Draft, posture: Array) -> None:
+    """Consider the best motion near one in a posture (n,), if it keeps the conditions."""
     problem, start = draft.problem, draft.problem.given_start
     if start is None:
+        pose = problem.path.pose(0.0)
         try:
-            start = problem.robot.inverse_kinematics(
-                problem.path.pose(0.0), problem.task, seed=posture
-            )
+            start = problem.robot.inverse_kinematics(pose, problem.task, seed=posture)
         except SelfmotionError:
             return
     constraints = problem.bind_constraints(start, start, apart=draft.effort.apart)
     descent = NodeDescent(problem, draft.effort, constraints, free=draft.is_free)
-    draft.progress("whole path", 1, 1)
     motion = _near(descent, problem, start, posture)
-    found = None if motion is None else descent.best_near(motion)
-    if motion is None or found is None:
+    dearest = np.inf if draft.is_unmet or draft.best is None else draft.best.standing.cost
+    found = None if motion is None else descent.best_near(motion, dearest)
+    if motion is None or found is None or found.cost >= dearest:
         return
-    session = draft.begin(start, free=draft.is_free, guide=_Rates(motion), grid=Grid(motion.grid.t))
+    grid = Grid(motion.grid.t)
+    session = draft.begin(start, free=draft.is_free, guide=_Rates(motion), grid=grid)
     if session is not None:
         session.stand_on(found, descent.history)
         draft.consider(session)
 
 
-def _posture(draft: Draft) -> Array | None:
-    """Return the mean configuration (n,) of the best motion along a stretch in the middle."""
+def _postures(draft: Draft) -> list[Array]:
+    """Return mean configurations (n,) of the best motions along a stretch in the middle."""
     problem = draft.problem
     middle, half = 0.5, 0.5 * STRETCH_WAY / problem.way_in_reaches
     first, last = (problem.path.duration * share for share in (middle - half, middle + half))
@@ -75,12 +88,16 @@ def _posture(draft: Draft) -> Array | None:
     try:
         optimise_starts(inner, draft.search.starts, draft.search.finalists)
     except SelfmotionError:
-        return None
-    if inner.best is None or inner.best.violations:
-        return None
-    motion = inner.best.motion().trajectory
-    weights = Sampling.trapezoidal(motion.t).weights
-    return np.asarray(weights @ motion.q / weights.sum())
+        return []
+    motions = [] if inner.best is None else [inner.best.motion().trajectory]
+    motions += [] if inner.heats is None else inner.heats.ranked
+    found: list[Array] = []
+    for motion in motions:
+        weights = Sampling.trapezoidal(motion.t).weights
+        posture = np.asarray(weights @ motion.q / weights.sum())
+        if all(np.abs(posture - other).max() > ONE_VALLEY for other in found):
+            found.append(posture)
+    return found
 
 
 def _near(

@@ -46,9 +46,11 @@ ROUGH_GRIDS = 3
 FINER = 4
 
 # --- long paths (long_paths)
-# A path on which the tool goes more than so many times the arm's reach: x = 0 drifts away there.
-# And what a stretch of it is long that tells the posture.
-LONG_WAY, STRETCH_WAY = 8.0, 4.0
+# A path is long where the tool goes more than so many times the arm's reach: x = 0 begins to drift
+# away. Of one that is longer than the second, rough motions from many starts tell nothing any more.
+LONG_WAY, VERY_LONG_WAY = 5.0, 12.0
+# What a stretch of it is long that tells the posture, likewise.
+STRETCH_WAY = 2.0
 # Nodes to begin with; the cost on them is right to this share.
 FIRST_NODES, LONG_AGREEMENT = 64, 1e-2
 
