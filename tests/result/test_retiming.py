@@ -95,13 +95,18 @@ def test_retiming_keeps_torques_and_what_the_tool_may(panda: sm.RobotModel) -> N
     dynamics, t = Dynamics(panda), np.linspace(0.0, 4.0, 2001)
     motion = slow.trajectory
     needed = np.abs(dynamics.torques(motion(t), motion(t, 1), motion(t, 2))).max(axis=0)
-    for limit in (sm.JointTorqueLimits(1.1 * needed + 0.5), sm.ToolLimits(speed=0.6)):
+    for limit in (
+        sm.JointTorqueLimits(1.1 * needed + 0.5),
+        sm.ToolLimits(speed=0.6),
+        sm.ToolLimits(acceleration=1.2),
+    ):
         problem = dataclasses.replace(slow.problem, constraints=(*slow.problem.constraints, limit))
         asked = dataclasses.replace(slow, problem=problem)
         assert asked.check().verified
         free, kept = sm.retime(slow, 15.0), sm.retime(asked, 15.0)
         assert kept.certificate.verified, kept.certificate.verdict
         assert free.path.duration < kept.path.duration < slow.path.duration
+        assert kept.limits_used.busy > BUSY
 
 
 def cornered(robot: sm.RobotModel, start: np.ndarray) -> sm.Path:
