@@ -210,3 +210,16 @@ def test_a_motion_that_begins_moving_goes_on_as_it_did(panda: sm.RobotModel) -> 
     assert np.abs(fast.trajectory.qd[0] - qd).max() <= 1e-9
     assert np.abs(fast.trajectory.qd[-1]).max() <= 1e-9
     assert fast.trajectory.duration < 0.7 * free.trajectory.duration
+
+
+def test_waits_are_told_of_and_what_rests_all_the_time_is_refused(panda: sm.RobotModel) -> None:
+    pose = panda.pose(PANDA_HOME)
+    there = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.05, 0.0]))
+    forth, back = sm.Line(pose, there, 1.0), sm.Line(there, pose, 1.0)
+    for waiting, told in ((forth + sm.Dwell(there, 0.5) + back, True), (forth + back, False)):
+        plan = sm.plan(sm.Problem(panda, waiting, start=PANDA_HOME))
+        message = sm.retime(plan, ACCELERATION).report.message
+        assert ("the 0.5 s that the tool waits" in message) == told
+    still = sm.plan(sm.Problem(panda, sm.Dwell(pose, 1.0), start=PANDA_HOME))
+    with pytest.raises(sm.PlanError, match="rests all the time"):
+        sm.retime(still, ACCELERATION)
