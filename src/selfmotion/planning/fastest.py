@@ -214,7 +214,7 @@ class _Rounds:
             before = self._duration
             weighted = self._kept.weighted(costs, weight * self._duration) if weight else ()
             asked = replace(self._free, costs=(use, *weighted))
-            planned = options.plan(replace(asked, **asked.along(pace)))
+            planned = options.plan(_at_pace(asked, pace))
             self.verdict = planned.certificate.verdict
             if planned.certificate.on_path and not planned.report.ending:
                 found = self._taken("rounds", planned)
@@ -252,6 +252,18 @@ def _at_its_fastest(planned: Plan, problem: Problem, v: Array, a: Array) -> Plan
     constraints: tuple[Constraint, ...] = tuple(problem.constraints)
     whole = replace(planned, problem=replace(planned.problem, constraints=constraints))
     return retime(whole, a, v)
+
+
+def _at_pace(problem: Problem, pace: Pace) -> Problem:
+    """Return a problem along a path at another pace, with the windows of its relaxations there."""
+    path = pace(problem.path)
+    moved = [
+        replace(item, during=tuple(path.when(np.array(item.during)).tolist()))
+        if item.during is not None and isinstance(path, Retimed)
+        else item
+        for item in problem.relaxations
+    ]
+    return replace(problem, **problem.along(pace), relaxations=moved)
 
 
 def _own(path: Path) -> Path:

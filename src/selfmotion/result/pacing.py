@@ -4,8 +4,8 @@ A pace is improved by linear programmes in b(τ), the square of how much faster 
 time τ. Velocity, acceleration and torque limits are linear in b, so that one programme finds their
 optimum (D. Verscheure et al., IEEE Trans. Automatic Control 54(10), 2009); limits of the jerk and
 of the tool's acceleration are kept by tangents, anew in each programme. Where the motion between
-two knots uses more than it may, a knot is put between them, or these two get less room: never is
-the whole motion slowed for one of its samples.
+two knots uses more than it may, a knot is put between them, or these two get less room: the whole
+motion is not slowed for one of its samples.
 """
 
 from dataclasses import dataclass
