@@ -183,7 +183,8 @@ class NodeDescent:
         """
         robot, start = self._problem.robot, known.place.q[0]
         limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-        middle = np.where(limited, 0.5 * (robot.lower + robot.upper), start)
+        middle = start.copy()
+        middle[limited] = 0.5 * (robot.lower[limited] + robot.upper[limited])
         for share in TOWARDS_MIDDLE:
             motion = grid.motion_towards(start, middle, share * self._problem.path.duration)
             if motion is not None and self._ended is None:
