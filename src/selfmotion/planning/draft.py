@@ -251,6 +251,27 @@ class Draft:
         finished = finish(self.problem, whole, self.tolerance, self.progress)
         self.proved = Proved(whole, finished, rival_cost)
 
+    def is_free_by_meshes(self) -> bool:
+        """Whether bodies are apart by their meshes along the best motion, though not by hulls."""
+        best = self.best
+        if best is None or not best.violations:
+            return False
+        q = best.motion().trajectory.q
+        rough = [
+            (model, far) for model, far in self.problem.envelope.bodies if not model.is_all_convex
+        ]
+        return bool(rough) and all(
+            model.worst(q).value >= far for model, far in self.problem.envelope.bodies
+        )
+
+    def prove_as_it_is(self, best: Session) -> bool:
+        """Let a motion be it if it is verified; return whether it is."""
+        whole = LargestPart(self.problem, best, "")
+        finished = finish(self.problem, whole, self.tolerance, self.progress)
+        if finished.certificate.verified:
+            self.proved = Proved(whole, finished)
+        return self.proved is not None
+
     def prove_part(self, suspect: float = 0.0) -> bool:
         """Let the largest part be it, a time [s] looked at closely; return whether there is one."""
         effort = self.effort
