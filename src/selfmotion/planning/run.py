@@ -20,9 +20,10 @@ from selfmotion.certificate import Tolerance
 from selfmotion.optimise import Callback, Optimizer, QuasiNewton, Status
 from selfmotion.planning.attempts import go_through
 from selfmotion.planning.deadline import Deadline, TimedCounts
-from selfmotion.planning.draft import Draft, Known
+from selfmotion.planning.draft import Draft
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.gather import gathered
+from selfmotion.planning.known import Known
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import DAMPED_EVALUATIONS
 from selfmotion.planning.warm_start import check_warm_start
