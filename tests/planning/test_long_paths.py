@@ -70,3 +70,35 @@ def test_short_paths_and_other_null_motions_go_the_usual_way(planar: sm.RobotMod
     cubic = sm.Problem(planar, many.path, "planar", null_motion=sm.PolynomialNullMotion())
     for problem, long in ((few, False), (many, True), (cubic, False)):
         assert is_long(draft_of(problem)) is long
+
+
+@pytest.mark.parametrize(
+    ("stage", "whole"), [("optimising start", False), ("posture", False), ("finer grid", True)]
+)
+def test_an_interruption_is_obeyed_on_the_stretch_too(
+    planar: sm.RobotModel, stage: str, whole: bool
+) -> None:
+    def progress(now: str, done: int, total: int) -> None:
+        if now == stage:
+            raise KeyboardInterrupt
+
+    if not whole:
+        with pytest.raises(KeyboardInterrupt):
+            sm.plan(loops(planar, 25), progress=progress)
+        return
+    plan = sm.plan(loops(planar, 25), progress=progress)
+    assert plan.report.status.value == "interrupted"
+    assert plan.certificate.on_path
+
+
+def test_a_callback_that_stops_ends_it(planar: sm.RobotModel) -> None:
+    told: list[float] = []
+
+    def stop(iteration: sm.Iteration) -> bool:
+        told.append(iteration.cost)
+        return True
+
+    plan = sm.plan(loops(planar, 25), callback=stop)
+    assert plan.report.status.value == "stopped"
+    assert plan.certificate.on_path
+    assert len(told) <= 4

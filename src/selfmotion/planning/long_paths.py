@@ -13,6 +13,7 @@ import numpy as np
 from selfmotion.basics import Array, SelfmotionError
 from selfmotion.motion import Grid, Sampling
 from selfmotion.nodes import NodeMotion
+from selfmotion.optimise import Status
 from selfmotion.path import Section
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.nodes import NodeDescent, most_nodes, takes
@@ -37,16 +38,19 @@ def is_long(draft: Draft) -> bool:
 
 
 def keep_to_posture(draft: Draft) -> None:
-    """Optimise a stretch in the middle, then the whole path from motions in its postures."""
-    postures = _postures(draft)
+    """Optimise a stretch in the middle, then the whole path from motions in its postures.
+
+    Where the user wants no more after the stretch, the motion in its posture has to do.
+    """
+    postures, ended = _postures(draft)
     for number, posture in enumerate(postures, 1):
         draft.progress("posture", number, len(postures))
-        _optimise(draft, posture)
+        _optimise(draft, posture, ended)
         if draft.is_over:
             break
 
 
-def _optimise(draft: Draft, posture: Array) -> None:
+def _optimise(draft: Draft, posture: Array, ended: Status | None) -> None:
     """Consider the best motion near one in a posture (n,), if it keeps the conditions."""
     problem, start = draft.problem, draft.problem.given_start
     if start is None:
@@ -57,6 +61,8 @@ def _optimise(draft: Draft, posture: Array) -> None:
             return
     constraints = problem.bind_constraints(start, start, apart=draft.effort.apart)
     descent = NodeDescent(problem, draft.effort, constraints, free=draft.is_free)
+    if ended is not None:
+        descent.end(ended)
     motion = _near(descent, problem, start, posture)
     dearest = np.inf if draft.is_unmet or draft.best is None else draft.best.standing.cost
     found = None if motion is None else descent.best_near(motion, dearest)
@@ -69,8 +75,11 @@ def _optimise(draft: Draft, posture: Array) -> None:
         draft.consider(session)
 
 
-def _postures(draft: Draft) -> list[Array]:
-    """Return mean configurations (n,) of the best motions along a stretch in the middle."""
+def _postures(draft: Draft) -> tuple[list[Array], Status | None]:
+    """Return mean configurations (n,) of the best motions along a stretch in the middle.
+
+    And what ended the search for them, if the user did.
+    """
     problem = draft.problem
     middle, half = 0.5, 0.5 * STRETCH_WAY / problem.way_in_reaches
     first, last = (problem.path.duration * share for share in (middle - half, middle + half))
@@ -88,7 +97,7 @@ def _postures(draft: Draft) -> list[Array]:
     try:
         optimise_starts(inner, draft.search.starts, draft.search.finalists)
     except SelfmotionError:
-        return []
+        return [], None
     motions = [] if inner.best is None else [inner.best.motion().trajectory]
     motions += [] if inner.heats is None else inner.heats.ranked
     found: list[Array] = []
@@ -97,7 +106,7 @@ def _postures(draft: Draft) -> list[Array]:
         posture = np.asarray(weights @ motion.q / weights.sum())
         if all(np.abs(posture - other).max() > ONE_VALLEY for other in found):
             found.append(posture)
-    return found
+    return found, inner.best.status if inner.is_over and inner.best is not None else None
 
 
 def _near(

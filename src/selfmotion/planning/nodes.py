@@ -98,6 +98,10 @@ class NodeDescent:
         self.is_hopeless = False
         self._ended: Status | None = None
 
+    def end(self, status: Status) -> None:
+        """Take motions as they are; there is no time for better ones."""
+        self._ended = status
+
     def grid(self, t: Array) -> NodeGrid:
         """Return nodes at some times."""
         return NodeGrid(
