@@ -52,6 +52,8 @@ def job(
         # Before anything is planned.
         happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
         formats.check_signals(happens, asked or sm.ProgramSettings())
+    for remark in work.remarks:
+        stages.print(f"note: {remark}", markup=False, soft_wrap=True)
     kept = folder or Path("out") / f"{file.stem}.job"
     here: Any = processes(workers) if workers > 1 else nullcontext()
     try:

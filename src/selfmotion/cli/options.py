@@ -226,11 +226,6 @@ def relaxation(text: str) -> sm.Relaxation:
         raise sm.ProblemError(
             f"--relax is '{text}', expected ROWS[=BAND][@FROM:TO] like rx,ry=0.2 or rz@1:2.5"
         ) from None
-    if found.angular and TURN < float(found.band) < np.inf:
-        raise sm.ProblemError(
-            f"--relax is '{text}': a band of {band} rad is more than a turn; in degrees? 10° is "
-            f"0.1745"
-        )
     return found
 
 

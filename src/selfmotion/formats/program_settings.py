@@ -115,7 +115,11 @@ def read_program_settings(file: str | FilePath) -> ProgramSettings:
         The file cannot be read, or says something else; file and key are named.
     """
     path = as_path(file)
-    values: dict[str, Any] = in_si(read_document(path))
+    try:
+        values: dict[str, Any] = in_si(read_document(path))
+    except FileFormatError as error:
+        text = str(error).removeprefix(f"{path}: ")
+        raise FileFormatError(f"{path}: {text}") from error
     known = [item.name for item in dataclasses.fields(ProgramSettings)]
     for key in values:
         if key not in known:
