@@ -104,7 +104,8 @@ def write_program(
 
         write_replay(program, file)
     else:
-        sm.write_motion(program, file, settings=settings)
+        with StageDisplay(stages) as display:
+            sm.write_motion(program, file, settings=settings, progress=display.stage)
 
 
 def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:

@@ -8,20 +8,23 @@ What is left of error is then measured by forward kinematics.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
-from selfmotion.basics import Array, Flags, PlanError, ProblemError
+from selfmotion.basics import Array, Flags, ProblemError, Progress, silent
 from selfmotion.certificate import Tolerance
-from selfmotion.job import Program
+from selfmotion.formats.pieces import Piece
+from selfmotion.formats.stretches import (
+    NO_MISS,
+    Event,
+    Miss,
+    Misses,
+    Stretch,
+    miss_between,
+    miss_of,
+)
 from selfmotion.motion import Trajectory
-from selfmotion.result import Move, Parts, Plan
-from selfmotion.robot import Chain
 
 # Programs count times [s], angles [°] and lengths [mm] in so many digits behind the point.
 TIME_DIGITS, ANGLE_DIGITS, LENGTH_DIGITS = 5, 5, 4
@@ -29,116 +32,23 @@ TIME_DIGITS, ANGLE_DIGITS, LENGTH_DIGITS = 5, 5, 4
 _REST, _WHILE = 1e-7, 0.02
 # Programs go from rest to rest: this is rest [rad or m/s], and so is such a share of the fastest.
 _SLOW, _SHARE = 1e-4, 1e-3
-# Where between two targets, and how near to each, the error is looked at.
-_BETWEEN = np.array([0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875])
+# Targets are at least so dense [of where they are densest].
+_SPARSE = 0.1
 # Times at which the motion's curvature is looked at, for each of its samples; targets at least
 # between two events or rests, tries, and more targets than this no controller takes.
 _FINER, _FEWEST, _TRIES, _MOST = 4, 4, 20, 100_000
 
 
-class Event(NamedTuple):
-    """What happens when a target is reached: its number in the stretch, and what."""
-
-    target: int
-    name: str
-
-
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """A motion from rest to rest by its targets, or a rest.
-
-    Attributes
-    ----------
-    name : str
-        Of the seam or move.
-    t : (K + 1,)
-        When each target is reached, from 0 [s].
-    q : (K + 1, n)
-        Where it begins, and its targets [rad or m].
-    events : tuple of Event
-    """
-
-    name: str
-    t: Array
-    q: Array
-    events: tuple[Event, ...] = ()
-
-    @property
-    def is_rest(self) -> bool:
-        """Whether the arm rests all the while."""
-        return bool((self.q == self.q[0]).all())
-
-
-class Miss(NamedTuple):
-    """How far targets take a controller off the motion, at the time where it is farthest.
-
-    Attributes
-    ----------
-    position, rotation : float
-        Of the tool [m, rad].
-    joint : float
-        Of a joint [rad or m].
-    """
-
-    position: float
-    rotation: float
-    joint: float
-
-    def share(self, allowed: Tolerance) -> float:
-        """Return how much of what is allowed it takes: above 1 too much."""
-        rotation = max(self.rotation, self.joint) / allowed.rotation
-        return max(self.position / allowed.position, rotation)
-
-
-class Piece(NamedTuple):
-    """A part of a motion with a name, events at times from its start, and the tools' chains."""
-
-    name: str
-    motion: Trajectory
-    events: tuple[tuple[float, str], ...]
-    chains: tuple[Chain, ...]
-
-
-def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
-    """Return what a plan, parts, a move or a program is made of, in order.
-
-    Raises
-    ------
-    PlanError
-        A move was not found, or there is nothing.
-    """
-    match plan:
-        case Plan():
-            return [_of_plan("path", plan)]
-        case Move():
-            return [Piece("move", plan.motion, (), (plan.robot.chain,))]
-        case Parts():
-            found = []
-            for number, part in enumerate(plan.plans, 1):
-                found.append(_of_plan(f"part {number}", part))
-                for move in plan.moves[number - 1 : number]:
-                    found.append(Piece(f"move {number}", move.motion, (), (move.robot.chain,)))
-            return found
-    found = []
-    for step in plan.steps:
-        events = tuple((at, name) for name, at in sorted(step.events, key=lambda item: item[1]))
-        made = step.made
-        several = _of_plan("", made).chains if isinstance(made, Plan) else (made.robot.chain,)
-        found.append(Piece(step.name, step.motion, events, several))
-    if not found:
-        raise PlanError(f"{plan.robot.name}: {plan.verdict}")
-    return found
-
-
-def _of_plan(name: str, plan: Plan) -> Piece:
-    chains = tuple(item.chain for item in plan.problem.follows.items)
-    return Piece(name, plan.trajectory, (), chains)
-
-
 def stretches_of(
-    pieces: Sequence[Piece], slides: Flags, allowed: Tolerance
-) -> tuple[list[Stretch], Miss]:
+    pieces: Sequence[Piece],
+    slides: Flags,
+    allowed: Tolerance,
+    of_moves: Tolerance | None = None,
+    progress: Progress = silent,
+) -> tuple[list[Stretch], Misses]:
     """Return the targets of a motion, as its file has them, and how far they are off it.
+
+    Moves through the air may be off by `of_moves`; by default as far as they keep apart.
 
     Raises
     ------
@@ -146,8 +56,9 @@ def stretches_of(
         It does not begin and end at rest, or takes more targets than any controller has.
     """
     found: list[Stretch] = []
-    worst = Miss(0.0, 0.0, 0.0)
-    for piece in pieces:
+    worst = Misses(NO_MISS, NO_MISS)
+    for k, piece in enumerate(pieces):
+        progress("targets", k + 1, len(pieces))
         motion = piece.motion
         for when in motion.t[[0, -1]]:
             speed = np.abs(motion(when, 1))
@@ -157,11 +68,23 @@ def stretches_of(
                     f"{speed.max():.3g} rad/s or m/s at t = {when:.6g} s; programs of controllers "
                     f"go from rest to rest: plan it with a ramp, or rest=True"
                 )
+        within = _allowed(piece, allowed, of_moves)
         for first, last in _moving(motion, [motion.t[0] + at for at, _ in piece.events]):
-            stretch, miss = _thinned(piece, slides, allowed, first, last)
-            worst = Miss(*map(max, worst, miss))
+            stretch, miss = _thinned(piece, slides, within, first, last)
+            both = Misses(NO_MISS, miss) if piece.is_move else Misses(miss, NO_MISS)
+            worst = worst.worse(both)
             found.append(stretch)
     return found, worst
+
+
+def _allowed(piece: Piece, allowed: Tolerance, of_moves: Tolerance | None) -> Tolerance:
+    """Return how far a controller may be off a piece."""
+    if not piece.is_move:
+        return allowed
+    if of_moves is not None or piece.room is None:
+        return of_moves or allowed
+    room = piece.room
+    return Tolerance(max(allowed.position, room.position), max(allowed.rotation, room.rotation))
 
 
 def _moving(motion: Trajectory, events: Sequence[float]) -> list[tuple[float, float]]:
@@ -212,26 +135,52 @@ def _thinned(
     ]
     fixed = _apart(first, last, [at for at, _ in events])
     still = bool(np.abs(motion(last) - motion(first)).max() < 1e-9) and _rests(motion, first, last)
+    _check_digits(piece, slides, allowed)
     more = 1.0
     for _ in range(_TRIES):
         t = fixed if still else _spread(piece, fixed, allowed, more)
         if len(t) > _MOST:
             raise ProblemError(
-                f"'{piece.name}' takes more than {_MOST} targets within {allowed}; allow more"
+                f"'{piece.name}' takes more than {_MOST} targets; allow more than "
+                f"{_in_words(piece, allowed)}"
             )
-        q = _in_digits(motion(t), slides)
+        offset = np.round(t - first, TIME_DIGITS)
+        # Where the arm is at the times that the file has.
+        q = _in_digits(motion(np.minimum(first + offset, last)), slides)
         if still:
             q[:] = q[0]
-        offset = np.round(t - first, TIME_DIGITS)
         named = tuple(Event(int(np.abs(t - at).argmin()), name) for at, name in events)
         stretch = Stretch(piece.name, offset, q, named)
         miss = miss_of(stretch, motion, piece.chains, first)
-        if still or miss.share(allowed) <= 1.0:
+        share = miss.share(allowed)
+        if still or share <= 1.0:
             return stretch, miss
-        more *= max(1.05, 1.02 * float(np.sqrt(miss.share(allowed))))
+        more *= max(1.05, 1.02 * float(np.sqrt(share)))
     raise ProblemError(
-        f"'{piece.name}' is off by {1e3 * miss.position:.3g} mm and {miss.rotation:.3g} rad by "
-        f"rounding alone; allow more than {allowed}"
+        f"'{piece.name}' is off by {1e3 * miss.position:.3g} mm and "
+        f"{np.degrees(max(miss.rotation, miss.joint)):.3g}° with {len(t)} targets; allow more than "
+        f"{_in_words(piece, allowed)}"
+    )
+
+
+def _check_digits(piece: Piece, slides: Flags, allowed: Tolerance) -> None:
+    """Refuse what no number of targets keeps, as they have few digits."""
+    q = piece.motion.q
+    miss = miss_between(_in_digits(q, slides), q, piece.chains)
+    if miss.share(allowed) > 1.0:
+        raise ProblemError(
+            f"'{piece.name}': programs count angles in {10.0**-ANGLE_DIGITS:g}°, which is up to "
+            f"{1e3 * miss.position:.2g} mm and {np.degrees(miss.rotation):.2g}° of the tool; allow "
+            f"more than {_in_words(piece, allowed)}"
+        )
+
+
+def _in_words(piece: Piece, allowed: Tolerance) -> str:
+    """Return what is allowed as the file of settings says it."""
+    key = "move_deviation" if piece.is_move else "deviation"
+    return (
+        f"{key} = {{ position_mm = {1e3 * allowed.position:.3g}, "
+        f"rotation_deg = {np.degrees(allowed.rotation):.3g} }}"
     )
 
 
@@ -259,8 +208,9 @@ def _spread(piece: Piece, fixed: Array, allowed: Tolerance, more: float) -> Arra
         count = _FINER * (len(marks) - 1) + 1
         t = np.interp(np.linspace(0, len(marks) - 1, count), np.arange(len(marks)), marks)
         bend = _bend(piece, t, allowed)
-        # Floor: no stretch is without targets where it bends nowhere.
-        rate = np.sqrt(bend / 8.0) + 1e-3 / max(end - begin, 1e-6)
+        rate = np.sqrt(bend / 8.0)
+        # A spline swings where long and short steps meet, and it bends nowhere.
+        rate = np.maximum(rate, _SPARSE * float(rate.max())) + 1e-3 / max(end - begin, 1e-6)
         way = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t)))
         targets = max(_FEWEST, int(np.ceil(more * way[-1])))
         # Programs count whole digits of time: targets may not fall on each other.
@@ -286,47 +236,3 @@ def _in_digits(q: Array, slides: Flags) -> Array:
     """Return coordinates [rad or m] as they are when their digits in a file are read again."""
     degrees = np.radians(np.round(np.degrees(q), ANGLE_DIGITS))
     return np.where(slides, 1e-3 * np.round(1e3 * q, LENGTH_DIGITS), degrees)
-
-
-def miss_of(
-    stretch: Stretch, motion: Trajectory, chains: Sequence[Chain], first: float = 0.0
-) -> Miss:
-    """Return how far a controller is off a motion at most, whichever way it joins the targets.
-
-    In between it may go straight in joint space, past each corner on the line between the middles
-    of the two sides, which is the largest corner that controllers round, or along the cubic spline
-    through all targets that begins and ends at rest; at the times of the motion, which holds it to
-    its speeds as well.
-    """
-    t, q = stretch.t, stretch.q
-    times = np.append((t[:-1, None] + _BETWEEN * np.diff(t)[:, None]).ravel(), t[-1])
-    exact = motion(np.clip(first + times, motion.t[0], motion.t[-1]))
-    worst = Miss(0.0, 0.0, 0.0)
-    for line in _ways(t, q, times):
-        joint = float(np.abs(line - exact).max())
-        worst = worst._replace(joint=max(worst.joint, joint))
-        for chain in chains:
-            _, here, there = chain.along(line)
-            _, turned, placed = chain.along(exact)
-            position = float(np.linalg.norm(there - placed, axis=1).max())
-            turns = Rotation.from_matrix(np.einsum("kji,kjl->kil", here, turned)).magnitude()
-            worst = Miss(
-                max(worst.position, position), max(worst.rotation, float(turns.max())), worst.joint
-            )
-    return worst
-
-
-def _ways(t: Array, q: Array, times: Array) -> list[Array]:
-    """Return joint positions (K, n) at times by each way of joining targets."""
-    lines = _straight(times, t, q)
-    if len(t) < 3:
-        return [lines]
-    middles = 0.5 * (t[:-1] + t[1:])
-    knots = np.concatenate([t[:1], middles, t[-1:]])
-    corners = _straight(times, knots, _straight(knots, t, q))
-    spline = CubicSpline(t, q, bc_type="clamped")(times)
-    return [lines, corners, spline]
-
-
-def _straight(times: Array, t: Array, q: Array) -> Array:
-    return np.stack([np.interp(times, t, column) for column in q.T], axis=1)
