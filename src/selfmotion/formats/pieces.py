@@ -8,6 +8,7 @@ from selfmotion.basics import Array, PlanError
 from selfmotion.certificate import KeepsApart, Tolerance
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
+from selfmotion.path import FeedKept
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import Chain
 
@@ -20,7 +21,8 @@ _SURE = 0.9
 class Piece(NamedTuple):
     """A part of a motion with a name, events at times from its start, and the tools' chains.
 
-    Of a move through the air also how far a controller may be off it, where there is room.
+    Of a move through the air also how far a controller may be off it, where there is room; of a
+    seam the feeds that its tools keep, one list for each chain.
     """
 
     name: str
@@ -29,6 +31,7 @@ class Piece(NamedTuple):
     chains: tuple[Chain, ...]
     is_move: bool = False
     room: Tolerance | None = None
+    feeds: tuple[tuple[FeedKept, ...], ...] = ()
 
 
 def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
@@ -62,8 +65,10 @@ def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
 
 
 def _of_plan(name: str, plan: Plan) -> Piece:
-    chains = tuple(item.chain for item in plan.problem.follows.items)
-    return Piece(name, plan.trajectory, (), chains)
+    items = plan.problem.follows.items
+    chains = tuple(item.chain for item in items)
+    feeds = tuple(tuple(feed for feed in item.path.feeds if feed.kept) for item in items)
+    return Piece(name, plan.trajectory, (), chains, feeds=feeds)
 
 
 def _of_move(name: str, move: Move) -> Piece:

@@ -100,8 +100,7 @@ def miss_of(
     through all targets that begins and ends at rest; at the times of the motion, which holds it to
     its speeds as well.
     """
-    t, q = stretch.t, stretch.q
-    times = np.append((t[:-1, None] + _BETWEEN * np.diff(t)[:, None]).ravel(), t[-1])
+    t, q, times = stretch.t, stretch.q, _looked_at(stretch)
     exact = motion(np.clip(first + times, motion.t[0], motion.t[-1]))
     worst = NO_MISS
     for line in ways(t, q, times):
@@ -119,6 +118,19 @@ def miss_between(q: Array, exact: Array, chains: Sequence[Chain]) -> Miss:
         turns = Rotation.from_matrix(np.einsum("kji,kjl->kil", here, turned)).magnitude()
         rotation = max(rotation, float(turns.max()))
     return Miss(position, rotation, float(np.abs(q - exact).max()))
+
+
+def _looked_at(stretch: Stretch) -> Array:
+    """Return times at targets and between them (K,) [s]."""
+    t = stretch.t
+    return np.append((t[:-1, None] + _BETWEEN * np.diff(t)[:, None]).ravel(), t[-1])
+
+
+def spline_of(stretch: Stretch) -> tuple[Array, Array, Array]:
+    """Return times (K,) [s], positions and velocities (K, n) of the spline through the targets."""
+    times = _looked_at(stretch)
+    spline = CubicSpline(stretch.t, stretch.q, bc_type="clamped")
+    return times, spline(times), spline(times, 1)
 
 
 def ways(t: Array, q: Array, times: Array) -> list[Array]:
