@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import KeepsApart
-from selfmotion.formats import program_miss
+from selfmotion.formats import judged_steps, program_miss
 from selfmotion.formats.program_axes import tool_from_flange
 from selfmotion.formats.program_files import read_program
 from selfmotion.formats.stretches import NO_MISS, ways
@@ -288,6 +288,68 @@ def test_what_digits_forbid_is_said_in_words_of_the_file(past: sm.Move, tmp_path
     )
     with pytest.raises(sm.ProblemError, match=said):
         sm.write_motion(past, tmp_path / "a.src", settings=asked)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_program_of_a_job_is_verified_by_its_job(
+    program: sm.Program, tmp_path: Path, name: str
+) -> None:
+    """Step by step, at the deviation that is stated; and not once a target is elsewhere."""
+    file, job = tmp_path / name, tmp_path / "a.program"
+    program.save(job)
+    sm.write_motion(program, file, settings=settings(name, 1e-3))
+    code, text = invoke("check", file, "--robot", job)
+    assert code == 0, text
+    assert [line.split(":")[0] for line in text.splitlines()[:-1]] == [
+        step.name for step in program.steps
+    ]
+    assert "verified, step by step" in text
+    text = file.read_text()
+    middle = text.index("SPTP" if name.endswith("src") else "MoveAbsJ", len(text) // 3)
+    moved = re.sub(
+        r"(\d)\.(\d)", lambda m: f"{m[1]}.{(int(m[2]) + 5) % 10}", text[middle:], count=1
+    )
+    file.write_text(text[:middle] + moved)
+    found = judged_steps(file, program)
+    assert sum(not step.verified for step in found) == 1
+    code, text = invoke("check", file, "--robot", job)
+    assert code == 1
+    assert f"not verified: 1 of {len(found)} steps" in text
+    other = replace(program, steps=program.steps[:-1])
+    with pytest.raises(sm.FileFormatError, match="goes on with '"):
+        judged_steps(file, other)
+
+
+@pytest.mark.parametrize(("name", "deviation"), [("weld.src", 1e-3), ("weld.mod", 1e-4)])
+def test_a_program_of_a_plan_is_verified_as_it_is_written(
+    name: str, deviation: float, tmp_path: Path
+) -> None:
+    """By the file of its problem, feed included, though only targets are known."""
+    ur5 = robot_named("ur5")
+    start = ur5.dexterous_configuration("pointing")
+    first = ur5.pose(start)
+    corner, last = first.copy(), first.copy()
+    corner.translation = first.translation - np.array([0.0, 0.0, 0.1])
+    last.translation = corner.translation + np.array([0.0, 0.1, 0.0])
+    way = sm.Polyline([x.translation for x in (first, corner, last)], tolerance=2e-3)
+    path = sm.Feed(way, 0.05)
+    limits = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits(9.0))
+    problem = sm.Problem(ur5, path, "position", start, constraints=limits, collision=None)
+    made = sm.plan(problem).require()
+    sm.write_problem(problem, tmp_path / "cell.toml")
+    asked = settings(name, deviation)
+    sm.write_motion(made, tmp_path / name, settings=asked)
+    code, text = invoke("check", tmp_path / name, "--robot", tmp_path / "cell.toml")
+    assert code == 0, text
+    assert "feed (at least: 0.049)" in text
+    # Slower than it was written, it neither takes its time nor keeps the feed.
+    late = (tmp_path / name).read_text()
+    late = re.sub(r"(TIME_BLOCK END = )", r"\g<1>1", late)
+    late = re.sub(r"\\T:=0", r"\\T:=1", late)
+    (tmp_path / name).write_text(late)
+    code, text = invoke("check", tmp_path / name, "--robot", tmp_path / "cell.toml")
+    assert code == 1
+    assert "feed (at least: 0.049)" in text
 
 
 def test_urscript_knows_tool_load_and_outputs(program: sm.Program, tmp_path: Path) -> None:

@@ -136,7 +136,7 @@ def show_certificate(
         if finding.requirement not in shown:
             name, value = finding.requirement, _SHARE.format(finding.amount)
             if finding.allowed != 1.0:
-                above = finding.kept == (finding.amount > finding.allowed)
+                above = finding.at_least or finding.kept == (finding.amount > finding.allowed)
                 side = "at least" if above else "at most"
                 name = f"{finding.requirement} ({side}: {finding.allowed:.4g})"
                 value = f"{finding.amount:.4g}"

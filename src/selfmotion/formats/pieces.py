@@ -1,11 +1,12 @@
 """What a motion is made of: seams, and moves through the air with room around them."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from selfmotion.basics import Array, PlanError
-from selfmotion.certificate import KeepsApart, Tolerance
+from selfmotion.certificate import JointLimits, KeepsApart, Requirement, Tolerance, arm_limits
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
 from selfmotion.path import FeedKept
@@ -22,7 +23,8 @@ class Piece(NamedTuple):
     """A part of a motion with a name, events at times from its start, and the tools' chains.
 
     Of a move through the air also how far a controller may be off it, where there is room; of a
-    seam the feeds that its tools keep, one list for each chain.
+    seam the feeds that its tools keep, one list for each chain. `speeds` (n,) are what joints may
+    have [rad/s or m/s].
     """
 
     name: str
@@ -32,6 +34,7 @@ class Piece(NamedTuple):
     is_move: bool = False
     room: Tolerance | None = None
     feeds: tuple[tuple[FeedKept, ...], ...] = ()
+    speeds: Array | None = None
 
 
 def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
@@ -68,12 +71,27 @@ def _of_plan(name: str, plan: Plan) -> Piece:
     items = plan.problem.follows.items
     chains = tuple(item.chain for item in items)
     feeds = tuple(tuple(feed for feed in item.path.feeds if feed.kept) for item in items)
-    return Piece(name, plan.trajectory, (), chains, feeds=feeds)
+    speeds = _speeds((*arm_limits(plan.robot, plan.requirements), *plan.requirements))
+    return Piece(name, plan.trajectory, (), chains, feeds=feeds, speeds=speeds)
 
 
 def _of_move(name: str, move: Move) -> Piece:
     room = safe_deviation(move)
-    return Piece(name, move.motion, (), (move.robot.chain,), is_move=True, room=room)
+    return Piece(
+        name,
+        move.motion,
+        (),
+        (move.robot.chain,),
+        is_move=True,
+        room=room,
+        speeds=_speeds(move.requirements),
+    )
+
+
+def _speeds(asked: Sequence[Requirement]) -> Array | None:
+    """Return the limits of joint speed (n,) among requirements; None for none."""
+    limits = [item.upper for item in asked if isinstance(item, JointLimits) and item.order == 1]
+    return np.minimum.reduce(limits) if limits else None
 
 
 def safe_deviation(move: Move) -> Tolerance | None:

@@ -3,7 +3,7 @@
 Targets are as far apart as the error of straight joint lines between them allows,
 h²|Jq̈|/8 ≤ deviation, spread over the time evenly in ∫ √(|Jq̈|/8) dt (de Boor, "Good approximation
 by splines with variable knots", 1973). What is left of it is then measured by forward kinematics.
-Where a feed is asked for, steps in which the spline through the targets misses it are halved.
+Steps in which the spline through the targets misses a feed, or passes a limit of speed, are halved.
 """
 
 from collections.abc import Sequence
@@ -32,6 +32,8 @@ TIME_DIGITS, ANGLE_DIGITS, LENGTH_DIGITS = 5, 5, 4
 _SPARSE = 0.1
 # Share of what a feed leaves that may be taken where it is looked at: the worst is in between.
 _OF_FEED = 0.8
+# Share of a limit of speed that the spline may use where the motion uses no more.
+_OF_SPEED = 0.9995
 # Times at which the motion's curvature is looked at, for each of its samples; targets at least
 # between two events or rests, tries, and more targets than this no controller takes.
 _FINER, _FEWEST, _TRIES, _MOST = 4, 4, 20, 100_000
@@ -84,7 +86,7 @@ class Span:
         t = self._within(allowed, fixed)
         for _ in range(_TRIES):
             stretch = self._passing(t)
-            missed = self._feed_shares(stretch) > 1.0
+            missed = self._missed(stretch)
             if not missed.any():
                 break
             # With their neighbours, so that steps do not differ much.
@@ -140,16 +142,20 @@ class Span:
                 f"tool; allow more than {_in_words(self.piece, allowed)}"
             )
 
-    def _feed_shares(self, stretch: Stretch) -> Array:
-        """Return how much of what a feed leaves the spline takes between two targets, (K,)."""
-        worst = np.zeros(len(stretch.t) - 1)
-        if not any(self.piece.feeds):
-            return worst
+    def _missed(self, stretch: Stretch) -> Flags:
+        """Whether the spline misses a feed, or passes a limit of speed, between two targets (K,).
+
+        Where the motion itself does not.
+        """
         times, q, qd = spline_of(stretch)
         motion = self.piece.motion
         t = np.clip(self.first + times, self.first, motion.t[-1])
         exact, rates = motion(t), motion(t, 1)
-        for chain, feeds in zip(self.piece.chains, self.piece.feeds, strict=True):
+        taken = np.zeros(len(t))
+        if self.piece.speeds is not None:
+            within = np.abs(rates) <= _OF_SPEED * self.piece.speeds
+            taken = np.where(within, np.abs(qd) / (_OF_SPEED * self.piece.speeds), 0.0).max(axis=1)
+        for chain, feeds in zip(self.piece.chains, self.piece.feeds, strict=False):
             moved, wanted = (
                 np.einsum("kcn,kn->kc", chain.along(at)[0][:, :3], speeds)
                 for at, speeds in ((q, qd), (exact, rates))
@@ -158,9 +164,9 @@ class Span:
             for feed in feeds:
                 room = _OF_FEED * feed.slowest * feed.left_over
                 for begin, end in feed.during + motion.t[0]:
-                    taken = np.where((t > begin) & (t < end), off / max(room, 1e-12), 0.0)
-                    worst = np.maximum(worst, taken[:-1].reshape(len(worst), -1).max(axis=1))
-        return worst
+                    asked = (t > begin) & (t < end)
+                    taken = np.maximum(taken, np.where(asked, off / max(room, 1e-12), 0.0))
+        return np.asarray(taken[:-1].reshape(len(stretch.t) - 1, -1).max(axis=1) > 1.0)
 
 
 def _in_words(piece: Piece, allowed: Tolerance) -> str:
