@@ -352,3 +352,20 @@ def test_a_list_of_seams_loses_no_events(tmp_path: Path) -> None:
     assert not seam.either_way
     told = written(tmp_path, "job.toml", text.replace("EVENTS", "events = []\n"))
     assert not sm.read_seam_job(told).seams[0].events
+    # Nor where the file is a part of the path; with other times it is refused.
+    inner = '{ kind = "file", file = "slot.nc" }'
+    for outer in (
+        f'kind = "placed"\npath = {inner}\nframe = {{ position = [0.4, 0, 0] }}\n',
+        f'kind = "weave"\npath = {inner}\namplitude = 0.001\npitch = 0.01\n',
+    ):
+        within = text.replace("EVENTS", "").replace(path, f"[seams.path]\n{outer}")
+        (again,) = sm.read_seam_job(written(tmp_path, "job.toml", within)).seams
+        assert again.events == seam.events
+        assert not again.either_way
+    for outer in (
+        f'kind = "joined"\npieces = [{inner}]\n',
+        f'kind = "feed"\nfeed = 0.01\npath = {inner}\n',
+    ):
+        within = text.replace("EVENTS", "").replace(path, f"[seams.path]\n{outer}")
+        with pytest.raises(sm.FileFormatError, match="event 'M3' would be lost"):
+            sm.read_seam_job(written(tmp_path, "job.toml", within))

@@ -1,7 +1,7 @@
 """A program makes every seam once, keeps everything at all times, and is the best that is known."""
 
 import itertools
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.job import Step
 from selfmotion.planning import FreeMotions
 from selfmotion.task import SE3
 from support.arms import robot_named
@@ -156,21 +157,30 @@ def test_what_is_made_stands_in_the_way_of_what_comes_later() -> None:
     assert "panda_hand" in hand
     post = sm.Box("post", [0.45, 0.0, 0.3], [0.04, 0.04, 0.3])
     seams = [
-        seam("raise", [0.45, 0.3, 0.35], [0.5, 0.3, 0.35], leaves=[post]),
+        seam("raise", [0.45, 0.3, 0.35], [0.5, 0.3, 0.35], leaves=[post], wait=0.1),
         seam("beside", [0.4, -0.3, 0.35], [0.5, -0.3, 0.35], after=["raise"]),
     ]
     made = sm.plan_job(panda, seams, branches=1).require()
-    move = made.moves[0]
-    assert [item.name for item in move.obstacles] == ["post"]
+    wait, move = made.moves
+    for judged in (wait, move):
+        assert [item.name for item in judged.obstacles] == ["post"]
     assert [item.name for item in made.plans["beside"].obstacles] == ["post"]
     # One without it is not verified: what stands there was not looked at.
     blind = sm.move(panda, move.motion.q[0], move.motion.q[-1]).require()
     steps = tuple(replace(s, made=blind) if s.made is move else s for s in made.steps)
     assert "is not judged against 'post'" in replace(made, steps=steps).verdict
+    # Nor one that is judged against the same thing elsewhere.
+    elsewhere = replace(post, pose=SE3(np.eye(3), np.array([0.45, 0.1, 0.3])))
+    steps = tuple(replace(s, leaves=(elsewhere,) if s.leaves else ()) for s in made.steps)
+    assert "is not judged against 'post'" in replace(made, steps=steps).verdict
     # What is made where another one stands has to come before it.
     inside = seam("inside", [0.45, 0.0, 0.3], [0.45, 0.05, 0.3])
     early = sm.plan_job(panda, [seams[0], inside], branches=1).require()
     assert early.order == ("inside", "raise")
+    # But an order that is given stays.
+    given = sm.plan_job(panda, [seams[0], inside], branches=1, order="given")
+    assert given.order == ("raise",)
+    assert "seam 'inside' is not made" in given.verdict
     late = sm.plan_job(panda, [seams[0], replace(inside, after=("raise",))], branches=1)
     assert "seam 'inside' is not made" in late.verdict
     assert "post" in late.verdict
@@ -219,6 +229,54 @@ def test_what_was_put_in_afterwards_is_judged_anew(program) -> None:
     assert "event 'on'" in late.verdict
     other = replace(program, robot=robot_named("xarm7"))
     assert "of another arm than" in other.verdict
+
+
+def test_a_program_begins_and_ends_at_rest() -> None:
+    panda = robot_named("panda")
+    ends = SE3(DOWN, np.array([0.4, 0.0, 0.3])), SE3(DOWN, np.array([0.45, 0.0, 0.3]))
+    moving = sm.Line(*ends, 1.0, time_law="constant")
+    with pytest.raises(sm.ProblemError, match=r"'hurry': its path begins at 0\.05 m/s"):
+        sm.Seam("hurry", moving, "pointing")
+    plan = sm.plan(sm.Problem(panda, moving, "pointing")).require()
+    alone = sm.Program(panda, (Step("hurry", plan),), {})
+    assert "'hurry' does not begin at rest" in alone.verdict
+    assert "'hurry' does not end at rest" in alone.verdict
+
+
+class OneAtOnce(Executor):
+    """Does all but what comes first, which never ends."""
+
+    def __init__(self) -> None:
+        self.first: Future | None = None
+
+    def submit(self, function, /, *given, **named) -> Future:
+        future: Future = Future()
+        if self.first is None:
+            self.first = future
+        else:
+            future.set_result(function(*given, **named))
+        return future
+
+
+def test_what_is_finished_elsewhere_is_kept_before_what_takes_longer(tmp_path) -> None:
+    def stop(_: str, number: int, __: int) -> None:
+        if number == 2:
+            raise KeyboardInterrupt
+
+    executor = OneAtOnce()
+    with pytest.raises(KeyboardInterrupt):
+        sm.plan_job(
+            robot_named("panda"),
+            row_of_seams(2),
+            branches=1,
+            folder=tmp_path,
+            executor=executor,
+            progress=stop,
+        )
+    assert list(tmp_path.glob("seam-seam-1.*.npz"))
+    # Nor does anybody wait for the other one.
+    assert executor.first is not None
+    assert executor.first.cancelled()
 
 
 def test_a_job_that_is_ended_anywhere_goes_on_to_the_same_program(program, tmp_path) -> None:

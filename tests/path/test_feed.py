@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 import selfmotion as sm
 from selfmotion import testing
 from selfmotion.basics import restore
+from selfmotion.path import Retimed, Reversed, Section
 from support.arms import PANDA_HOME
 from support.paths import polygon
 from support.shell import complaint
@@ -283,3 +284,32 @@ def test_a_stretch_from_the_start_is_kept_by_files_and_slower_feeds() -> None:
     again = restore(sm.Path, feed.to_dict())
     assert again.duration == feed.duration
     assert feed.slower(2.0).duration == pytest.approx(2.0 * feed.duration)
+
+
+def test_a_path_made_of_another_one_keeps_a_feed_as_that_does() -> None:
+    legs = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.1, 0.0], [0.2, 0.1, 0.0]])
+    cornered = sm.Polyline(legs, np.tile([1.0, 0.0, 0.0, 0.0], (4, 1)), tolerance=2e-3)
+    frame = pin.SE3(np.eye(3), np.array([0.1, 0.2, 0.3]))
+    evenly = cornered.at_constant_speed()
+    derived = {
+        "placed": sm.Placed(cornered, frame),
+        "reversed": Reversed(cornered),
+        "joined": sm.Joined([evenly]),
+        "section": Section(evenly, 0.0, evenly.duration),
+        "retimed": Retimed(
+            evenly, [0.0, 2.0], [0.0, evenly.duration], [0.5 * evenly.duration] * 2, [0.0, 0.0]
+        ),
+    }
+    # Rounded corners are slower, and do not count.
+    (own,) = sm.Feed(cornered, 0.1).feeds
+    assert own.kept
+    assert not sm.Feed(cornered, 0.1, smoothing=1e-3).feeds[0].counts.all()
+    for name, path in derived.items():
+        feed = sm.Feed(path, 0.1)
+        assert feed.duration == pytest.approx(sm.Feed(cornered, 0.1).duration, rel=1e-3), name
+        assert feed.feeds[0].kept, name
+    # A shape's own pace does not matter, wherever it stands.
+    line = sm.Line(pin.SE3.Identity(), frame, 3.0)
+    for path in (sm.Placed(line, frame), Reversed(line)):
+        assert sm.Feed(path, 0.05).duration == pytest.approx(sm.Feed(line, 0.05).duration, rel=1e-9)
+    assert sm.Feed(sm.Weave(line, 0.002, 0.02), 0.05).duration > sm.Feed(line, 0.05).duration

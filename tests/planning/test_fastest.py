@@ -17,6 +17,8 @@ from support.arms import PANDA_HOME, robot_named
 BUSY = 0.6
 # A cost that is kept, and to which share two integrals of it agree.
 KEPT, SAME = 1.005, 1e-4
+# Windows begin and end this near to where they did [m], between samples of the pace.
+NEAR = 1e-4
 
 
 @pytest.fixture(scope="module")
@@ -159,3 +161,26 @@ def test_a_file_may_ask_for_the_fastest_motion(tmp_path: Path) -> None:
     file.write_text(f'goal = "quick"\n{text}', encoding="utf-8")
     with pytest.raises(sm.FileFormatError, match="goal"):
         sm.read_job(file)
+
+
+def test_windows_of_relaxations_stay_where_they_are_on_the_path() -> None:
+    robot, start, window = robot_named("planar_3r"), np.array([0.2, 1.2, 0.9]), (1.0, 2.0)
+    pose = robot.pose(start)
+    there = pin.SE3(pose.rotation, pose.translation + np.array([-0.06, 0.06, 0.0]))
+    line = sm.Line(pose, there, 3.0)
+    asked = sm.Problem(
+        robot,
+        line,
+        "planar_pose",
+        start,
+        relaxations=[sm.Relaxation("rz", 0.3, during=window)],
+        collision=None,
+    )
+    found = sm.fastest(asked, acceleration=4.0, velocity=1.0)
+    assert found.plan.certificate.verified
+    assert found.duration <= found.retimed
+    (moved,) = found.plan.problem.relaxations
+    for new, old in zip(moved.during, window, strict=True):
+        np.testing.assert_allclose(
+            found.plan.path.pose(new).translation, line.pose(old).translation, atol=NEAR
+        )

@@ -95,13 +95,18 @@ def test_retiming_keeps_torques_and_what_the_tool_may(panda: sm.RobotModel) -> N
     dynamics, t = Dynamics(panda), np.linspace(0.0, 4.0, 2001)
     motion = slow.trajectory
     needed = np.abs(dynamics.torques(motion(t), motion(t, 1), motion(t, 2))).max(axis=0)
-    for limit in (sm.JointTorqueLimits(1.1 * needed + 0.5), sm.ToolLimits(speed=0.6)):
+    for limit in (
+        sm.JointTorqueLimits(1.1 * needed + 0.5),
+        sm.ToolLimits(speed=0.6),
+        sm.ToolLimits(acceleration=1.2),
+    ):
         problem = dataclasses.replace(slow.problem, constraints=(*slow.problem.constraints, limit))
         asked = dataclasses.replace(slow, problem=problem)
         assert asked.check().verified
         free, kept = sm.retime(slow, 15.0), sm.retime(asked, 15.0)
         assert kept.certificate.verified, kept.certificate.verdict
         assert free.path.duration < kept.path.duration < slow.path.duration
+        assert kept.limits_used.busy > BUSY
 
 
 def cornered(robot: sm.RobotModel, start: np.ndarray) -> sm.Path:
@@ -205,3 +210,16 @@ def test_a_motion_that_begins_moving_goes_on_as_it_did(panda: sm.RobotModel) -> 
     assert np.abs(fast.trajectory.qd[0] - qd).max() <= 1e-9
     assert np.abs(fast.trajectory.qd[-1]).max() <= 1e-9
     assert fast.trajectory.duration < 0.7 * free.trajectory.duration
+
+
+def test_waits_are_told_of_and_what_rests_all_the_time_is_refused(panda: sm.RobotModel) -> None:
+    pose = panda.pose(PANDA_HOME)
+    there = pin.SE3(pose.rotation, pose.translation + np.array([0.0, 0.05, 0.0]))
+    forth, back = sm.Line(pose, there, 1.0), sm.Line(there, pose, 1.0)
+    for waiting, told in ((forth + sm.Dwell(there, 0.5) + back, True), (forth + back, False)):
+        plan = sm.plan(sm.Problem(panda, waiting, start=PANDA_HOME))
+        message = sm.retime(plan, ACCELERATION).report.message
+        assert ("the 0.5 s that the tool waits" in message) == told
+    still = sm.plan(sm.Problem(panda, sm.Dwell(pose, 1.0), start=PANDA_HOME))
+    with pytest.raises(sm.PlanError, match="rests all the time"):
+        sm.retime(still, ACCELERATION)

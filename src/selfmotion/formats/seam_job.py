@@ -81,7 +81,8 @@ def read_seam_job(file: str | FilePath, *, allow_code: bool = False) -> SeamJob:
     may say besides; or one table ``[seams]`` that names a ``file`` of poses with a column ``seam``,
     as `read_path` reads them, with a ``feed`` or ``duration``, and what else all of them have. That
     may be a program of a machine tool, whose cuts are seams. Rows with an ``event``, and cuts, are
-    made one way only, unless ``either_way = true`` is said.
+    made one way only, unless ``either_way = true`` is said: then events are as long after the start
+    from the end on, too, which is at other poses.
 
     Parameters
     ----------
@@ -141,7 +142,7 @@ class _Reader:
         if "path" not in given:
             raise FileFormatError(f"{self._file}: {where}: path is missing")
         path, own = given["path"], dict(given)
-        if isinstance(path, Mapping) and path.get("kind") == "file" and "events" not in given:
+        if isinstance(path, Mapping) and "events" not in given:
             events, straight = self._events_of(in_si(path), where)
             own |= {"events": events} if events else {}
             if events or straight:
@@ -151,7 +152,24 @@ class _Reader:
     def _events_of(
         self, path: Mapping[str, Any], where: str
     ) -> tuple[list[tuple[str, float]], bool]:
-        """Return the events in the file of a path [s], and whether it is of a machine tool."""
+        """Return the events in the files of a path [s], and whether one is of a machine tool."""
+        kind, pieces = path.get("kind"), path.get("pieces")
+        if kind == "file":
+            return self._events_of_file(path, where)
+        inner = [path.get("path"), *(pieces if isinstance(pieces, list) else [])]
+        found = [self._events_of(in_si(one), where) for one in inner if isinstance(one, Mapping)]
+        events = [event for several, _ in found for event in several]
+        if events and kind not in _IN_STEP:
+            raise FileFormatError(
+                f"{self._file}: {where}: path: a path of kind {shown(kind)} has other times than "
+                f"the file in it, whose event '{events[0][0]}' would be lost; say when in events, "
+                f"or put the file into the path itself"
+            )
+        return _after_lead(events, path.get("leads")), any(straight for _, straight in found)
+
+    def _events_of_file(
+        self, path: Mapping[str, Any], where: str
+    ) -> tuple[list[tuple[str, float]], bool]:
         file = self._file.parent / str(path.get("file", ""))
         if not file.is_file():
             return [], False
@@ -287,6 +305,8 @@ def _after_lead(
     return [(event, later + at) for event, at in events]
 
 
+# Paths of another one that are at its poses at the same times.
+_IN_STEP = ("placed", "weave")
 # What is neither read by a model nor by what it is handed to.
 _KINDS: Mapping[str, tuple[type, str]] = {
     "file": (str, "the name of a file"),

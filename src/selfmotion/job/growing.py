@@ -38,8 +38,8 @@ class Growing:
     """Builds the program of a job that leaves something behind, one seam after the other.
 
     The order is that by what moves take at least. A seam that cannot be made any more at its place
-    comes earlier, before what stands in its way; where that does not help, it is missing, and said
-    to be.
+    comes earlier, before what stands in its way; where that does not help, or the order is given,
+    it is missing, and said to be.
 
     Parameters
     ----------
@@ -71,7 +71,8 @@ class Growing:
                 sofar.append(made)
                 continue
             tries = earlier[state.seam] = earlier.get(state.seam, 0) + 1
-            before = self._before_blockers(order, place) if tries <= _EARLIER else place
+            earlier_may_help = ordering.is_free and tries <= _EARLIER
+            before = self._before_blockers(order, place) if earlier_may_help else place
             name = ordering.seams[state.seam].name
             if before < place:
                 self._notes.append(f"'{name}' comes earlier: {why}")

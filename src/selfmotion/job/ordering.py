@@ -69,6 +69,8 @@ class Ordering:
 
     Attributes
     ----------
+    is_free : bool
+        Whether the order is.
     states : list of State
     missing : dict
         Seams without a state, and why.
@@ -83,7 +85,7 @@ class Ordering:
         is_free: bool,
     ) -> None:
         self.seams, self._work, self._ends = list(seams), work, ends
-        self._price, self._is_free = price, is_free
+        self._price, self.is_free = price, is_free
         asked = work.asked
         self._free = FreeMotions(asked.robot, asked.of_moves(()), np.random.default_rng(0))
         self.states: list[State] = []
@@ -186,7 +188,7 @@ class Ordering:
         if not place:
             return Round((), 0.0, 0.0)
         stops = self._stops(kept, place)
-        given = None if self._is_free else list(range(len(place)))
+        given = None if self.is_free else list(range(len(place)))
         if given is not None and not stops.keeps(given):
             raise ProblemError(
                 "the seams are in an order in which one comes before what it has to come after; "

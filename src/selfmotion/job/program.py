@@ -70,10 +70,14 @@ class Step:
         check = self.made.certificate
         return "" if check.verified else f"seam '{self.name}': {check.verdict}"
 
-    def meets(self, standing: Mapping[str, str]) -> list[str]:
-        """Return what it is not judged against though it stands there: name → who left it."""
-        known = {item.name for item in self.made.obstacles}
-        return [name for name in standing if name not in known and name not in self.may_meet]
+    def meets(self, standing: Mapping[str, Obstacle]) -> list[str]:
+        """Return the names of what it is not judged against, though it stands there."""
+        known = {item.name: item for item in self.made.obstacles}
+        return [
+            name
+            for name, item in standing.items()
+            if name not in self.may_meet and not _same(known.get(name), item)
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,6 +211,13 @@ class Program:
     def _gaps(self) -> Iterator[str]:
         """Yield where the arm would jump, or does not rest."""
         whole = [step for step in self.steps if not step.is_missing]
+        for step, end, where in [(each, 0, "begin") for each in whole[:1]] + [
+            (each, -1, "end") for each in whole[-1:]
+        ]:
+            for order, most in ((1, _REST), (2, _PUSH)):
+                rate = float(np.abs(step.motion(step.motion.t[end], order)).max())
+                if not rate <= most:
+                    yield f"'{step.name}' does not {where} at rest: {rate:.2e}"
         for one, other in pairwise(whole):
             ends = one.motion, other.motion
             for order, most in enumerate((_JOINT, _REST, _PUSH)):
@@ -221,12 +232,12 @@ class Program:
 
     def _left_out(self) -> Iterator[str]:
         """Yield what stands there and was not looked at."""
-        standing: dict[str, str] = {}
+        standing: dict[str, Obstacle] = {}
         for step in self.steps:
             met = step.meets(standing)
             if met:
                 yield f"'{step.name}' is not judged against '{met[0]}', which stands there by then"
-            standing |= {item.name: step.name for item in step.leaves}
+            standing |= {item.name: item for item in step.leaves}
 
     def _beyond(self) -> Iterator[str]:
         """Yield events that are not while their step lasts."""
@@ -276,6 +287,11 @@ class Program:
 
 # Names in a printed program.
 _SHOWN = 12
+
+
+def _same(one: Obstacle | None, other: Obstacle) -> bool:
+    """Whether two bodies are one, and in the same place."""
+    return one is other or (one is not None and one.to_dict() == other.to_dict())
 
 
 def _duration(step: Step) -> float:

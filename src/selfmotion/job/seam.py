@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from selfmotion.basics import ProblemError, as_flag, as_number, as_several, shown
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost
 from selfmotion.motion import reversed_motion
-from selfmotion.path import Path, Reversed
+from selfmotion.path import STILL, Path, Reversed
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
 from selfmotion.task import Relaxation, Task
@@ -98,6 +100,7 @@ class Seam:
         wait = as_number(self.wait, f"{what}: wait", least=0.0)
         object.__setattr__(self, "wait", wait)
         object.__setattr__(self, "events", self._checked_events(what))
+        self._check_rest(what)
         if self.either_way and any(one_way(item) for item in self.constraints):
             raise ProblemError(
                 f"{what}: a constraint is on one end of it, so that it can be made one way only; "
@@ -106,6 +109,16 @@ class Seam:
 
     def __repr__(self) -> str:
         return f"Seam('{self.name}', {self.path!r}, task '{Task.of(self.task).value}')"
+
+    def _check_rest(self, what: str) -> None:
+        """Raise ProblemError where the tool moves at an end."""
+        for time, said in ((0.0, "begins"), (self.path.duration, "ends")):
+            speed = float(np.linalg.norm(self.path.twist(time)[:3]))
+            if speed > STILL:
+                raise ProblemError(
+                    f"{what}: its path {said} at {speed:.3g} m/s, expected rest: "
+                    f"time_law='minimum_jerk', Feed(path, …), or section_at_rest(path)"
+                )
 
     def _checked_events(self, what: str) -> tuple[tuple[str, float], ...]:
         found = []

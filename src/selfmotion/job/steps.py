@@ -30,6 +30,8 @@ def seam_steps(
         q = np.tile(plan.trajectory.q[-1], (2, 1))
         times, names = np.array([0.0, seam.wait]), plan.robot.joint_names
         still = Trajectory(times, q, np.zeros_like(q), names, np.zeros_like(q))
-        wait = Move(plan.robot, work.asked.of_moves(standing), still)
+        # What it leaves stands there by then.
+        left = [item for item in seam.leaves if item.name not in seam.may_meet]
+        wait = Move(plan.robot, work.asked.of_moves((*standing, *left)), still)
         steps.append(Step(f"{seam.name}, wait", wait, may_meet=tuple(seam.may_meet)))
     return steps

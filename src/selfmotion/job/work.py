@@ -6,8 +6,9 @@ it wherever it is done, and whenever.
 
 import tempfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import Executor, Future, as_completed
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -38,6 +39,8 @@ _REMEMBERED = 8
 # What is asked of a piece of work, by name, and what comes of it.
 _Task = Mapping[str, Any]
 _Made = TypeVar("_Made")
+# Which task is finished, and what came of it.
+_Finished = tuple[int, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,35 +183,46 @@ class Work:
         kept: Sequence[_Made | None],
         keep: Callable[[Path | None, _Made], None],
     ) -> list[_Made]:
-        """Return what comes of tasks: what was kept, and the others, kept from now on."""
-        todo = [task for task, known in zip(tasks, kept, strict=True) if known is None]
-        fresh, found = self._done(todo, kind), list[_Made]()
-        for number, (file, known) in enumerate(zip(files, kept, strict=True), 1):
-            self.tell(stage, number, len(tasks))
-            made = next(fresh) if known is None else known
-            if known is None:
-                keep(file, made)
-            found.append(made)
-        return found
+        """Return what comes of tasks: what was kept, and the others, kept as they are finished."""
+        found = {k: known for k, known in enumerate(kept) if known is not None}
+        todo = {k: task for k, task in enumerate(tasks) if k not in found}
+        with closing(self._done(todo, kind)) as fresh:
+            for number in range(1, len(tasks) + 1):
+                self.tell(stage, number, len(tasks))
+                if number > len(tasks) - len(todo):
+                    k, made = next(fresh)
+                    keep(files[k], made)
+                    found[k] = made
+        return [found[k] for k in range(len(tasks))]
 
-    def _done(self, tasks: Sequence[_Task], kind: str) -> Iterator[Any]:
-        """Yield what comes of tasks, in their order; all of it is begun at once elsewhere."""
+    def _done(self, tasks: Mapping[int, _Task], kind: str) -> Generator[_Finished, None, None]:
+        """Yield what comes of which task, as it is finished; elsewhere all are begun at once."""
         if self._executor is None:
-            for task in tasks:
-                yield _move_here(task) if kind == "move" else _plans_here(task)
+            for k, task in tasks.items():
+                yield k, _move_here(task) if kind == "move" else _plans_here(task)
             return
         known: dict[str, Any] = {}
+        sent = {self._sent(task, kind): k for k, task in tasks.items()}
+        try:
+            for future in as_completed(sent):
+                found, why = future.result()
+                k = sent[future]
+                if kind == "move":
+                    missing = _missing(tasks[k], why)
+                    yield k, _unpacked(found, load_move, known) if found else missing
+                else:
+                    yield k, ([_unpacked(data, load_plan, known) for data in found], why)
+        finally:
+            # Nobody waits for the others where it was interrupted.
+            for future in sent:
+                future.cancel()
+
+    def _sent(self, task: _Task, kind: str) -> "Future[Any]":
+        if self._executor is None:
+            raise RuntimeError("there is no other process to send to")
         if kind == "move":
-            sent = [self._executor.submit(_move_there, _move_asked(task)) for task in tasks]
-            for future, task in zip(sent, tasks, strict=True):
-                data, trouble = future.result()
-                missing = _missing(task, trouble)
-                yield _unpacked(data, load_move, known) if data else missing
-            return
-        several = [self._executor.submit(_plans_there, _plans_asked(task)) for task in tasks]
-        for each in several:
-            packed, reason = each.result()
-            yield [_unpacked(data, load_plan, known) for data in packed], reason
+            return self._executor.submit(_move_there, _move_asked(task))
+        return self._executor.submit(_plans_there, _plans_asked(task))
 
 
 def check_can_be_sent(costs: Sequence[Any]) -> None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from selfmotion.basics import Array, Flags
-from selfmotion.optimise.interior_point import MET, interior_optimum
+from selfmotion.optimise.interior_point import interior_optimum
 
 # Unknowns that a row touches.
 WIDTH = 3
@@ -23,6 +23,9 @@ WIDTH = 3
 _BESIDE, _NEARER, _AMONG = 0.5, 0.2, 0.5
 # So often; then all rows are.
 _ROUNDS = 12
+# Rows that are left out may be broken by this share of their limits, and so many places beside one
+# that is come in with it.
+_BROKEN, _WIDE = 1e-5, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +76,23 @@ def banded_optimum(
             chosen = np.isfinite(room[0]), np.isfinite(room[1])
         c, reached = _solved(gradient, rows, chosen, start, least, most, gap)
         room = _room(rows, c)
-        if not reached or min(float(side.min(initial=0.0)) for side in room) >= -MET:
+        if not reached or min(float(side.min(initial=0.0)) for side in room) >= -_BROKEN:
             break
         # Where rows are far beyond their limits, those farthest beyond stand for the others.
         worst = np.minimum(*(side.min(axis=1, initial=0.0) for side in room))[:, None]
         near = np.where(worst < -_NEARER, _AMONG * worst, _NEARER)
-        chosen = chosen[0] | (room[0] < near), chosen[1] | (room[1] < near)
+        chosen = chosen[0] | _wide(room[0], near), chosen[1] | _wide(room[1], near)
     return c, reached
+
+
+def _wide(room: Array, near: Array) -> Flags:
+    """Return rows (K, M) with less room, and the same of places beside: an optimum evades there."""
+    rows = room < near
+    wide = rows.copy()
+    for k in range(1, _WIDE + 1):
+        wide[k:] |= rows[:-k]
+        wide[:-k] |= rows[k:]
+    return np.asarray(wide & np.isfinite(room))
 
 
 def _room(rows: BandedRows, c: Array) -> tuple[Array, Array]:

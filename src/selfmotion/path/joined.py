@@ -146,6 +146,13 @@ class Joined(Path, kind="joined"):
         return read_only([*np.concatenate(inner), self.duration])
 
     @property
+    def rounded(self) -> Array:
+        """See `Path.rounded`: those of all pieces."""
+        starts = self._ends - [piece.duration for piece in self.pieces]
+        pairs = zip(self.pieces, starts.tolist(), strict=True)
+        return read_only(np.concatenate([piece.rounded + start for piece, start in pairs]))
+
+    @property
     def feeds(self) -> tuple[FeedKept, ...]:
         """See `Path.feeds`: those of all pieces."""
         starts = self._ends - [piece.duration for piece in self.pieces]

@@ -34,6 +34,10 @@ class Placed(_InStep, kind="placed"):
         self._frame = path_pose(frame, "placed path: frame")
         self.duration = path.duration
 
+    def at_constant_speed(self) -> "Placed":
+        """See `Path.at_constant_speed`: as the original."""
+        return Placed(self._path.at_constant_speed(), self._frame)
+
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
         inner, turn = self._path.evaluate(t), self._frame.rotation

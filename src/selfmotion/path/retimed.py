@@ -69,6 +69,12 @@ class Retimed(_Derived, kind="retimed"):
         return np.union1d(self._pace.t, self._passed(self._path.marks))
 
     @property
+    def rounded(self) -> Array:
+        """See `Path.rounded`: when corners of the original are passed."""
+        corners = self._path.rounded
+        return read_only(self.when(corners.ravel()).reshape(corners.shape))
+
+    @property
     def feeds(self) -> tuple[FeedKept, ...]:
         """See `Path.feeds`: those of the original, where it is run through at its own pace."""
         found = []

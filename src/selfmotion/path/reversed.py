@@ -53,6 +53,10 @@ class Reversed(_Derived, kind="reversed"):
         """See `Path.feeds`."""
         return tuple(item.timed(lambda t: self.duration - t) for item in self._path.feeds)
 
+    def at_constant_speed(self) -> "Reversed":
+        """See `Path.at_constant_speed`: as the original."""
+        return Reversed(self._path.at_constant_speed())
+
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
         sigma = np.clip(self.duration - t, 0.0, self.duration)

@@ -73,6 +73,12 @@ class Section(_Derived, kind="section"):
         return read_only([0.0, *(inner - self._first), self.duration])
 
     @property
+    def rounded(self) -> Array:
+        """See `Path.rounded`: those in the stretch."""
+        corners = np.clip(self._path.rounded, self._first, self._last) - self._first
+        return read_only(corners[corners[:, 1] > corners[:, 0]])
+
+    @property
     def feeds(self) -> tuple[FeedKept, ...]:
         """See `Path.feeds`: those that count in the stretch."""
         found = (item.between(self._first, self._last) for item in self._path.feeds)

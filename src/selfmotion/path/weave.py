@@ -90,6 +90,16 @@ class Weave(_InStep, kind="weave"):
                 f"at least; lengths are in metres"
             )
 
+    def at_constant_speed(self) -> "Weave":
+        """See `Path.at_constant_speed`: as the seam, along which the swings stay where they are."""
+        return Weave(
+            self._path.at_constant_speed(),
+            self._amplitude,
+            self._pitch,
+            axis=self._axis,
+            dwell=self._dwell,
+        )
+
     @property
     def swings(self) -> int:
         """How many times the tool goes there and back."""

@@ -13,6 +13,7 @@ from selfmotion.basics import (
     PlanError,
     Progress,
     as_number,
+    held_interruption,
     silent,
 )
 from selfmotion.certificate import Tolerance
@@ -22,7 +23,7 @@ from selfmotion.optimise import Status
 from selfmotion.path import Path, Retimed
 from selfmotion.planning.deadline import Deadline
 from selfmotion.planning.kept_costs import KeptCosts
-from selfmotion.planning.run import plan
+from selfmotion.planning.run import plan, told_of
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import (
     COARSE,
@@ -133,7 +134,8 @@ def fastest(
     options = _Options(search, tolerance, clock, clock.telling(progress))
     status = Status.CONVERGED
     try:
-        rounds.run(options)
+        with held_interruption():
+            rounds.run(options)
     except KeyboardInterrupt:
         # A plan in between may have seen first that it is late.
         late = time.perf_counter() >= clock.end
@@ -144,7 +146,8 @@ def fastest(
         when = f" in {deadline} s" if status is Status.DEADLINE else ""
         raise PlanError(f"no motion keeps all limits at any pace{when}: {rounds.verdict}")
     found = rounds.retimed
-    return Fastest(rounds.best, found["x = 0"], found["costs"], tuple(rounds.times), status)
+    best = told_of(rounds.best, status) if status.is_cut_short else rounds.best
+    return Fastest(best, found["x = 0"], found["costs"], tuple(rounds.times), status)
 
 
 class _Options(NamedTuple):
@@ -214,7 +217,7 @@ class _Rounds:
             before = self._duration
             weighted = self._kept.weighted(costs, weight * self._duration) if weight else ()
             asked = replace(self._free, costs=(use, *weighted))
-            planned = options.plan(replace(asked, **asked.along(pace)))
+            planned = options.plan(_at_pace(asked, pace))
             self.verdict = planned.certificate.verdict
             if planned.certificate.on_path and not planned.report.ending:
                 found = self._taken("rounds", planned)
@@ -252,6 +255,18 @@ def _at_its_fastest(planned: Plan, problem: Problem, v: Array, a: Array) -> Plan
     constraints: tuple[Constraint, ...] = tuple(problem.constraints)
     whole = replace(planned, problem=replace(planned.problem, constraints=constraints))
     return retime(whole, a, v)
+
+
+def _at_pace(problem: Problem, pace: Pace) -> Problem:
+    """Return a problem along a path at another pace, with the windows of its relaxations there."""
+    path = pace(problem.path)
+    moved = [
+        replace(item, during=tuple(path.when(np.array(item.during)).tolist()))
+        if item.during is not None and isinstance(path, Retimed)
+        else item
+        for item in problem.relaxations
+    ]
+    return replace(problem, **problem.along(pace), relaxations=moved)
 
 
 def _own(path: Path) -> Path:

@@ -13,7 +13,7 @@ as one more joint, which goes on at a share of its largest speed there, within t
 joints have together.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,9 @@ _NOTHING = 1e-150
 SHARES = np.array([0.0, 0.5, 1.0])
 # What is at a knot up to rounding is at it: this near, by the length of an interval.
 _BESIDE = 1e-6
+# Directions in which vectors are held from both sides: within a polygon inside of the circle of the
+# limit, of which it leaves half a percent at most. One around it, mended by tangents, chatters.
+_SIDES = 16
 # Where the arm rests its length goes on at this share of its largest speed.
 _STILL = 0.01
 
@@ -105,12 +108,15 @@ class States:
     ----------
     q : (K + 1, n)
         At the knots.
+    between : (K, n)
+        In the middle of intervals.
     orders : three of (3, K, n + 1)
         First, second and third derivative of the joints and of the length at `SHARES` of each
         interval, as they are inside it.
     """
 
     q: Array
+    between: Array
     orders: tuple[Array, Array, Array]
 
     @classmethod
@@ -131,6 +137,7 @@ class States:
         )
         return cls(
             motion(at),
+            motion(inside[1]),
             (
                 by[0] * rate,
                 by[1] * rate**2 + by[0] * bend,
@@ -233,12 +240,35 @@ def _add_quantity(
 ) -> None:
     """Add a quantity f(q, q̇, q̈), of first order around b, which is exact for torques.
 
-    df = (½ f_q̇ q_τ / √b + f_q̈ q_ττ) db + ½ f_q̈ q_τ db'; of vectors the part along what they are.
+    A vector stays within its limit in some directions of the plane in which b and b' move it, that
+    of what it is among them.
     """
+    some, limit = item.limited, item.bounds[item.limited]
     first, second = (states.at_knots(order)[:, :-1] for order in (1, 2))
-    b, change = (near.at_knots(order)[:, None] for order in (0, 1))
+    at_knots = _parts(item, states.q, first, second, near.at_knots(), near.at_knots(1))
+    first, second = (order[1, :, :-1] for order in states.orders[:2])
+    between = _parts(item, states.between, first, second, near.inside(0.5), near.inside(0.5, 1))
+    places = (0.0, [x[:-1] for x in at_knots]), (0.5, between), (1.0, [x[1:] for x in at_knots])
+    for share, parts in places:
+        b, change = (near.inside(share, order)[:, None] for order in (0, 1))
+        value, slope, _ = (x[:, :, None] for x in basis(near.knots, share))
+        for direction, most in _directions(*parts):
+            found, by_value, by_slope = (_along(direction, x) / limit for x in parts)
+            still = found - by_value * b - by_slope * change
+            own = most * room[:, some]
+            table.add(by_value * value + by_slope * slope, -own - still, own - still)
+
+
+def _parts(
+    item: Quantity, q: Array, first: Array, second: Array, b: Array, change: Array
+) -> list[Array]:
+    """Return a quantity where b and b' are so, and what these change of it, (K, m) or (K, m, c).
+
+    df = (½ f_q̇ q_τ / √b + f_q̈ q_ττ) db + ½ f_q̈ q_τ db'
+    """
+    b, change = b[:, None], change[:, None]
     root = np.sqrt(np.maximum(b, LEAST))
-    state = states.q, root * first, second * b + 0.5 * first * change
+    state = q, root * first, second * b + 0.5 * first * change
     found, (_, *by) = item.away(*state), item.derivatives(*state)
     by_value = by_slope = np.zeros_like(found)
     if by:
@@ -246,19 +276,35 @@ def _add_quantity(
     if len(by) > 1:
         by_value = by_value + np.einsum("k...n,kn->k...", by[1], second)
         by_slope = 0.5 * np.einsum("k...n,kn->k...", by[1], first)
-    vector = found.ndim == 3
-    if vector:
-        size = np.linalg.norm(found, axis=2)
-        along = found / np.maximum(size, _NOTHING)[:, :, None]
-        by_value, by_slope = (np.einsum("kmc,kmc->km", along, x) for x in (by_value, by_slope))
-        found = size
-    some = item.limited
-    still = found - by_value * b - by_slope * change
-    still, by_value, by_slope = (
-        x[:, some] / item.bounds[some] for x in (still, by_value, by_slope)
-    )
-    for share, part in ((0.0, slice(None, -1)), (1.0, slice(1, None))):
-        value, slope, _ = (x[:, :, None] for x in basis(near.knots, share))
-        upper = room[:, some] - still[part]
-        lower = np.full_like(upper, -np.inf) if vector else -room[:, some] - still[part]
-        table.add(by_value[part] * value + by_slope[part] * slope, lower, upper)
+    return [x[:, item.limited] for x in (found, by_value, by_slope)]
+
+
+def _directions(
+    found: Array, by_value: Array, by_slope: Array
+) -> Iterator[tuple[Array | None, float]]:
+    """Yield directions (K, m, c) in which vectors (K, m, c) are held, and by what share.
+
+    None for numbers (K, m).
+    """
+    if found.ndim == 2:
+        yield None, 1.0
+        return
+    yield _unit(found), 1.0
+    if not by_slope.any():
+        # What only b moves goes on as it points.
+        return
+    across = _unit(by_slope)
+    other = _unit(by_value - across * (by_value * across).sum(axis=2, keepdims=True))
+    for angle in np.pi * np.arange(_SIDES) / _SIDES:
+        yield np.cos(angle) * across + np.sin(angle) * other, float(np.cos(0.5 * np.pi / _SIDES))
+
+
+def _along(direction: Array | None, vectors: Array) -> Array:
+    """Return vectors (K, m, c) along directions, (K, m); numbers as they are."""
+    return vectors if direction is None else np.einsum("kmc,kmc->km", direction, vectors)
+
+
+def _unit(vectors: Array) -> Array:
+    """Return vectors (…, c) with length 1, none of none."""
+    sizes = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.maximum(sizes, _NOTHING))

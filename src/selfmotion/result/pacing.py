@@ -4,15 +4,15 @@ A pace is improved by linear programmes in b(τ), the square of how much faster 
 time τ. Velocity, acceleration and torque limits are linear in b, so that one programme finds their
 optimum (D. Verscheure et al., IEEE Trans. Automatic Control 54(10), 2009); limits of the jerk and
 of the tool's acceleration are kept by tangents, anew in each programme. Where the motion between
-two knots uses more than it may, a knot is put between them, or these two get less room: never is
-the whole motion slowed for one of its samples.
+two knots uses more than it may, a knot is put between them, or these two get less room: the whole
+motion is not slowed for one of its samples.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, PlanError
+from selfmotion.basics import Array, Flags, PlanError, obey_interruption
 from selfmotion.motion import Trajectory, slowdown_of
 from selfmotion.optimise import banded_optimum
 from selfmotion.path import Pace, times_when
@@ -196,6 +196,7 @@ def _improved(
     gap: float,
 ) -> Squares:
     """Return the square of how much faster a pace becomes, near one that is known."""
+    obey_interruption()
     knots = near.knots
     states = States.of(motion, base, knots)
     start, fixed = _INSIDE * near.c, np.zeros(len(near.c), dtype=bool)

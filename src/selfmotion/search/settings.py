@@ -168,7 +168,7 @@ AT_LIMIT = 1e-3
 
 # --- relaxed rows
 # The search uses this share of a band: the spline that follows its motion needs some of the rest.
-WITHIN_BAND = 0.998
+WITHIN_BAND = 0.9995
 # Tries around the samples that a chain reaches, at least, and searches from other seeds before
 # nothing counts as found.
 FEWEST_STRAYS, SEARCHES = 320, 3
