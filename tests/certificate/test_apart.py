@@ -148,7 +148,10 @@ def test_nothing_to_be_near_to_is_far_enough() -> None:
 
 @pytest.mark.parametrize(
     ("value", "words"),
-    [(0.05, "too near already: first0 - second0 are 50.00 mm"), (-0.01, "overlap by 10.00 mm")],
+    [
+        (0.05, "too near already: first0 - second0 are 50.00 mm"),
+        (-0.01, "in collision: first0 - second0 overlap by 10.00 mm"),
+    ],
 )
 def test_a_start_that_is_too_near_is_told(value: float, words: str) -> None:
     motion = motion_of(np.zeros((2, 3)), np.zeros((2, 3)))

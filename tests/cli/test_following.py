@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.cli import runs
 from support.arms import PANDA_HOME, robot_named
 from support.shell import complaint, invoke
 
@@ -52,6 +53,7 @@ class Controller(threading.Thread):
         self.there, self.steps, self.ends = ("127.0.0.1", port), steps, ends
         self.clock, self.q, self.qd = 1000.0, PANDA_HOME, np.zeros(7)
         self.passed: list[tuple[float, np.ndarray]] = []
+        self.pushed = -1
 
     def run(self) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
@@ -61,6 +63,8 @@ class Controller(threading.Thread):
                 rows = self._answer(own)
                 now = rows[np.argmin(np.abs(rows[:, 0] - self.clock - PERIOD))]
                 self.clock, self.q, self.qd = now[0], now[1:8], now[8:15]
+                if len(self.passed) + 1 == self.pushed:
+                    self.q = self.q + 2e-3 * np.eye(7)[1]
                 self.passed.append((self.clock - 1000.0, self.q))
                 # What is no state changes nothing, wherever it comes from.
                 own.sendto(b"nonsense", self.there)
@@ -96,6 +100,42 @@ def test_the_arm_follows_the_path_of_the_file(tmp_path: Path) -> None:
     assert found["segments"] == {"planned": STEPS}
     assert found["states left out"] >= STEPS - 1
     assert found["largest position error"] < TRACKED
+
+
+def test_states_of_a_wrong_length_are_told_with_the_right_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At once, as the controller waits for an answer that never comes, and at the end."""
+    file, port = written(tmp_path), free_port()
+    controller = Controller(port, steps=20)
+    told: list[str] = []
+    monkeypatch.setattr(runs, "_told_apart", told.append)
+    controller.start()
+    code, shown = invoke("follow", file, "--listen", f"127.0.0.1:{port}")
+    controller.join(10.0)
+    assert code == 0
+    said = "a state has 120: 15 doubles (time, 7 positions, 7 velocities)"
+    # Once, however many there are.
+    assert told == [f"left out: a datagram of 8 bytes; {said}"]
+    assert f"of 8 bytes; {said}" in " ".join(shown.split("datagrams left out")[1].split())
+    assert "kept by all commands; used: position" in " ".join(shown.split())
+
+
+def test_when_the_tool_was_off_its_path_is_told(tmp_path: Path) -> None:
+    """A push of 2 mrad in one joint, which is led back within the limits."""
+    file, port = written(tmp_path), free_port()
+    controller = Controller(port, steps=80)
+    controller.pushed = 20
+    controller.start()
+    code, shown = invoke("follow", file, "--listen", f"127.0.0.1:{port}", "--json")
+    controller.join(10.0)
+    found = json.loads(shown[shown.index("{") :])
+    assert code == 0
+    ((first, last),) = found["off the path"]
+    assert first == pytest.approx(20 * PERIOD, abs=1.5 * PERIOD)
+    assert first < last < 80 * PERIOD
+    assert found["limits kept"]
+    assert found["limits used"]["acceleration"] > 0.0
 
 
 def test_a_controller_that_is_silent_ends_it(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """What is a pair: bodies fixed across a joint, bodies that held joints place, none at all."""
 
 import re
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -150,14 +151,31 @@ def test_nobody_moves_what_was_judged() -> None:
         assert isinstance(pose * pose.inverse(), pin.SE3)
 
 
-def test_a_mesh_in_millimetres_gets_a_hint(tmp_path: Path) -> None:
+def test_a_mesh_in_millimetres_is_refused(tmp_path: Path) -> None:
+    """As an obstacle, and as a body of the tool."""
     post = trimesh.creation.box((100.0, 100.0, 1200.0))
     post.apply_translation([400.0, 400.0, 600.0])
     post.export(tmp_path / "post.stl")
     panda = robot_named("panda")
     for scale, said in ((1.0, True), (1e-3, False)):
         mesh = sm.Mesh("post", [0.0] * 3, str(tmp_path / "post.stl"), scale=scale)
-        remarks = sm.Clearance([mesh]).requirement(panda).remarks
+        for use in (
+            lambda mesh: sm.Clearance([mesh]).requirement(panda),
+            lambda mesh: sm.load_robot("panda", bodies=[mesh]),
+        ):
+            with (
+                pytest.raises(sm.CollisionError, match=r"is 1\.2e\+03 m long: scale = 0\.001")
+                if said
+                else nullcontext()
+            ):
+                use(mesh)
+
+
+def test_an_obstacle_placed_in_millimetres_gets_a_hint() -> None:
+    panda = robot_named("panda")
+    for far, said in ((400.0, True), (0.4, False)):
+        post = sm.Box("post", [far, far, 0.6], [0.1, 0.1, 1.2])
+        remarks = sm.Clearance([post]).requirement(panda).remarks
         assert any("millimetres?" in text for text in remarks) is said
 
 

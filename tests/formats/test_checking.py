@@ -45,6 +45,12 @@ MALFORMED = [
     ('kind = "circle"', "", "path: has no key 'kind', which says what it is"),
     ("radius_mm = 100", "radius_mm = 0", "path: circle: radius is 0.0, expected a number > 0"),
     ("radius_mm = 100", "radius_deg = 100", "path.radius_deg: 'radius' is no angle"),
+    ("radius_mm = 100", "radus_mm = 100", "path.radus_mm: unknown key; nearest: 'radius_mm'"),
+    ("duration = 4", "feeed_mm = 4", "path.feeed_mm: unknown key; nearest: 'feed_mm'"),
+    ("= 50\n", "= 50\ntolerance_mm = { position = 1 }\n", "tolerance_mm: is {'position': 1}"),
+    ("= 50\n", "= 50\noptimiser = { tolerance_mm = 1 }\n", "'tolerance' is no length"),
+    ('tool = "panda_hand_tcp"', "base = { rpy=[0,0,180] }", "180 rad is more than a turn; in degr"),
+    ("band_deg = 5", "band = 5e1", "relaxations[0]: relaxation (rx, ry): a band of 50 rad is more"),
     ("radius_mm = 100", "radius_mm = 100\nradius = 0.1", "'radius' is given twice, in two units"),
     ("radius_mm = 100", "", "path: has neither, expected either center or radius"),
     ("[1, 0, 0]", "[1, 0]", "path: circle: normal is [1, 0] of shape (2,), expected"),
@@ -92,6 +98,31 @@ def test_a_tilt_in_degrees_is_the_one_in_radians(tmp_path: Path) -> None:
     for key, value in (("within_deg", 170.0), ("within", float(np.radians(170.0)))):
         problem = sm.read_problem(written(tmp_path, f"{CELL}\n{tilt}{key} = {value!r}\n"))
         assert problem.constraints[-1].within == pytest.approx(np.radians(170.0), rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("more", "given", "value"),
+    [
+        ('corners = "round"\nfeed_mm = 9', "tolerance_mm = 0.2", ("tolerance", 2e-4)),
+        ("feed_mm = 9", "turn_rate_deg = 90", ("turn_rate", np.pi / 2)),
+        ("feed_mm = 9", "acceleration_mm = 500", ("acceleration", 0.5)),
+    ],
+)
+def test_whatever_a_path_is_given_may_have_a_unit(
+    more: str, given: str, value: tuple[str, float], tmp_path: Path
+) -> None:
+    """Each is what the key without a unit says."""
+    (tmp_path / "a.csv").write_text("x,y,z\n0.4,0,0.4\n0.5,0,0.4\n0.5,0.1,0.4\n")
+    found = []
+    for text in (given, f"{value[0]} = {value[1]!r}"):
+        file = written(
+            tmp_path,
+            f'task = "position"\n[robot]\nname = "panda"\n[path]\nkind = "file"\n'
+            f'file = "a.csv"\n{more}\n{text}\n',
+        )
+        found.append(sm.read_problem(file).path)
+    assert found[0].duration == pytest.approx(found[1].duration, rel=1e-12)
+    assert found[0].to_dict() == found[1].to_dict()
 
 
 @pytest.mark.parametrize("case", MALFORMED, ids=lambda case: case[2][:40])

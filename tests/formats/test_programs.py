@@ -1,6 +1,7 @@
 """Programs of controllers: what is stated of them holds, whichever way the targets are joined."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,11 @@ from scipy.interpolate import CubicSpline
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.formats import program_miss
+from selfmotion.certificate import KeepsApart
+from selfmotion.formats import judged_steps, program_miss
 from selfmotion.formats.program_axes import tool_from_flange
+from selfmotion.formats.program_files import read_program
+from selfmotion.formats.stretches import NO_MISS, ways
 from selfmotion.job.program import Step
 from support.arms import PANDA_HOME, robot_named
 from support.shell import invoke
@@ -124,10 +128,10 @@ def test_the_deviation_that_is_stated_holds(plan: sm.Plan, tmp_path: Path, name:
         place = plan.robot.chain.along
         for way in (lines, smooth):
             off = np.linalg.norm(place(way)[2] - place(exact)[2], axis=1).max()
-            assert off <= FINER * stated.position
-        assert found.position <= stated.position <= deviation
+            assert off <= FINER * stated.path.position
+        assert found.path.position <= stated.path.position <= deviation
         # And it is used: fewer targets would not do.
-        assert stated.position > 0.4 * deviation
+        assert stated.path.position > 0.4 * deviation
     # The error of straight lines goes with the square of their length.
     assert 2.5 < counts[1] / counts[0] < 4.0
 
@@ -150,7 +154,7 @@ def test_what_is_read_is_what_was_written(plan: sm.Plan, tmp_path: Path, name: s
     )
     file.write_text(text[:middle] + moved)
     _, stated, found = program_miss(plan, file)
-    assert found.position > 2.0 * stated.position
+    assert found.path.position > 2.0 * stated.path.position
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -167,7 +171,7 @@ def test_a_job_keeps_its_seams_events_and_waits(
     motion = sm.read_motion(file)
     assert motion.duration == pytest.approx(program.duration, abs=1e-4)
     count, stated, found = program_miss(program, file)
-    assert found.position <= stated.position <= 2e-4
+    assert found.path.position <= stated.path.position <= 2e-4
     assert count < len(program.trajectory.t)
     switched = r"\$OUT\[7\] = (TRUE|FALSE)" if name.endswith("src") else "SetDO doArc, ([01]);"
     assert re.findall(switched, text) == (["TRUE", "FALSE"] if "src" in name else ["1", "0"]) * 2
@@ -220,7 +224,132 @@ def test_where_the_arm_rests_controllers_stop(cornered: sm.Plan, tmp_path: Path,
         assert after < text.rindex("PTP_SPLINE")
     for file in (abb, kuka):
         _, stated, found = program_miss(made, file)
-        assert found.position <= stated.position <= 2e-4
+        assert found.path.position <= stated.path.position <= 2e-4
+
+
+@pytest.fixture(scope="module")
+def past() -> sm.Move:
+    """A move past a box, most of it at the full speed of a joint."""
+    ur5 = robot_named("ur5")
+    first = np.array([-1.2, -1.2, 1.4, -1.8, -1.5, 0.0])
+    last = first + np.array([2.4, 0.2, 0.0, 0.0, 0.3, 0.0])
+    box = sm.Box("post", [0.9, 0.0, 0.1], [0.1, 0.1, 0.2])
+    limits = (sm.JointVelocityLimits(1.5), sm.JointAccelerationLimits(6.0))
+    asked = sm.Clearance([box], 0.005)
+    return sm.move(ur5, first, last, constraints=limits, clearance=asked).require()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_free_moves_are_as_far_off_as_bodies_keep_apart(
+    past: sm.Move, tmp_path: Path, name: str
+) -> None:
+    """However the controller joins the targets; the elbow and all else, not the tool alone."""
+    file = tmp_path / name
+    sm.write_motion(past, file, settings=settings(name, 1e-4))
+    few, stated, found = program_miss(past, file)
+    assert stated.path == NO_MISS
+    assert found.moves.position <= stated.moves.position
+    assert stated.moves.position > 5e-4
+    (apart,) = (item for item in past.requirements if isinstance(item, KeepsApart))
+    (stretch,) = read_program(file).stretches
+    times = np.linspace(0.0, stretch.t[-1], 400)
+    for way in ways(stretch.t, stretch.q, times):
+        assert min(apart.model.distance(q).value for q in way) >= apart.distance
+    # Where nothing else is said, and not for less.
+    narrow = replace(settings(name, 1e-4), move_deviation=sm.Tolerance(1e-4, 1e-3))
+    sm.write_motion(past, file, settings=narrow)
+    many, stated, found = program_miss(past, file)
+    assert found.moves.position <= stated.moves.position <= 1e-4
+    assert many > 1.5 * few
+
+
+def test_targets_grow_with_the_root_of_the_error_where_a_motion_has_straight_parts(
+    past: sm.Move, tmp_path: Path
+) -> None:
+    """Splines swing where long steps and short ones meet, and times have few digits."""
+    counts = []
+    for deviation in (1e-3, 1e-4, 1e-5):
+        within = sm.Tolerance(deviation, 10 * deviation)
+        asked = replace(settings("a.src"), move_deviation=within)
+        sm.write_motion(past, tmp_path / "a.src", settings=asked)
+        count, stated, _ = program_miss(past, tmp_path / "a.src")
+        assert stated.moves.position <= deviation
+        counts.append(count)
+    assert counts[1] < 4.0 * counts[0]
+    assert counts[2] < 4.0 * counts[1]
+
+
+def test_what_digits_forbid_is_said_in_words_of_the_file(past: sm.Move, tmp_path: Path) -> None:
+    tiny = sm.Tolerance(1e-8, 1e-3)
+    asked = replace(settings("a.src"), move_deviation=tiny)
+    said = (
+        r"'move': programs count angles in 1e-05°, which is up to .* mm and .*° of the tool; allow "
+        r"more than move_deviation = \{ position_mm = 1e-05, "
+    )
+    with pytest.raises(sm.ProblemError, match=said):
+        sm.write_motion(past, tmp_path / "a.src", settings=asked)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_program_of_a_job_is_verified_by_its_job(
+    program: sm.Program, tmp_path: Path, name: str
+) -> None:
+    """Step by step, at the deviation that is stated; and not once a target is elsewhere."""
+    file, job = tmp_path / name, tmp_path / "a.program"
+    program.save(job)
+    sm.write_motion(program, file, settings=settings(name, 1e-3))
+    code, text = invoke("check", file, "--robot", job)
+    assert code == 0, text
+    assert [line.split(":")[0] for line in text.splitlines()[:-1]] == [
+        step.name for step in program.steps
+    ]
+    assert "verified, step by step" in text
+    text = file.read_text()
+    middle = text.index("SPTP" if name.endswith("src") else "MoveAbsJ", len(text) // 3)
+    moved = re.sub(
+        r"(\d)\.(\d)", lambda m: f"{m[1]}.{(int(m[2]) + 5) % 10}", text[middle:], count=1
+    )
+    file.write_text(text[:middle] + moved)
+    found = judged_steps(file, program)
+    assert sum(not step.verified for step in found) == 1
+    code, text = invoke("check", file, "--robot", job)
+    assert code == 1
+    assert f"not verified: 1 of {len(found)} steps" in text
+    other = replace(program, steps=program.steps[:-1])
+    with pytest.raises(sm.FileFormatError, match="goes on with '"):
+        judged_steps(file, other)
+
+
+@pytest.mark.parametrize(("name", "deviation"), [("weld.src", 1e-3), ("weld.mod", 1e-4)])
+def test_a_program_of_a_plan_is_verified_as_it_is_written(
+    name: str, deviation: float, tmp_path: Path
+) -> None:
+    """By the file of its problem, feed included, though only targets are known."""
+    ur5 = robot_named("ur5")
+    start = ur5.dexterous_configuration("pointing")
+    first = ur5.pose(start)
+    corner, last = first.copy(), first.copy()
+    corner.translation = first.translation - np.array([0.0, 0.0, 0.1])
+    last.translation = corner.translation + np.array([0.0, 0.1, 0.0])
+    way = sm.Polyline([x.translation for x in (first, corner, last)], tolerance=2e-3)
+    path = sm.Feed(way, 0.05)
+    limits = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.JointAccelerationLimits(9.0))
+    problem = sm.Problem(ur5, path, "position", start, constraints=limits, collision=None)
+    made = sm.plan(problem).require()
+    sm.write_problem(problem, tmp_path / "cell.toml")
+    asked = settings(name, deviation)
+    sm.write_motion(made, tmp_path / name, settings=asked)
+    code, text = invoke("check", tmp_path / name, "--robot", tmp_path / "cell.toml")
+    assert code == 0, text
+    assert "feed (at least: 0.049)" in text
+    # Slower than it was written, it neither takes its time nor keeps the feed.
+    late = (tmp_path / name).read_text()
+    late = re.sub(r"(TIME_BLOCK END = )", r"\g<1>1", late)
+    late = re.sub(r"\\T:=0", r"\\T:=1", late)
+    (tmp_path / name).write_text(late)
+    code, text = invoke("check", tmp_path / name, "--robot", tmp_path / "cell.toml")
+    assert code == 1
+    assert "feed (at least: 0.049)" in text
 
 
 def test_urscript_knows_tool_load_and_outputs(program: sm.Program, tmp_path: Path) -> None:
@@ -274,8 +403,6 @@ def test_other_axes_are_in_mm_and_counted_apart(tmp_path: Path) -> None:
 def test_what_is_not_verified_is_written_only_when_forced(
     plan: sm.Plan, program: sm.Program, tmp_path: Path
 ) -> None:
-    from dataclasses import replace
-
     broken = replace(plan, altered="somebody changed it")
     unmade = replace(program, missing={"third": "out of reach"})
     for made in (broken, unmade):

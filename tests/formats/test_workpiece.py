@@ -57,6 +57,18 @@ def stands(x: float, tilt: float) -> SE3:
     return SE3(rpy.rpyToMatrix(angles), np.array([x, 0.1, 0.2]))
 
 
+def test_bodies_of_a_workpiece_and_of_a_tool_are_in_its_frame_by_default(tmp_path: Path) -> None:
+    """Those of the world have to say where they are."""
+    box = '{ shape = "box", name = "web", size_mm = [9, 9, 9] }'
+    held = '[[robot.bodies]]\nshape = "sphere"\nname = "tip"\nradius_mm = 5'
+    found = problem(tmp_path, "line", 0.4, 9.0, bodies=f"obstacles = [{box}]", reference=held)
+    (body,) = found.collision.obstacles
+    np.testing.assert_allclose(body.pose.homogeneous, stands(0.4, 9.0).homogeneous, atol=1e-12)
+    world = f'[[constraints]]\nkind = "Clearance"\nobstacles = [{box}]'
+    with pytest.raises(sm.FileFormatError, match=r"obstacles\[0\]\.position: is missing"):
+        problem(tmp_path, "line", 0.4, 9.0, bodies="", on=f"\n{world}")
+
+
 @pytest.mark.parametrize("path", PATHS)
 def test_moving_the_workpiece_moves_all_that_belongs_to_it(tmp_path: Path, path: str) -> None:
     here, there = (problem(tmp_path, path, *at) for at in ((0.4, 10.0), (0.55, -5.0)))

@@ -2,6 +2,7 @@
 
 import itertools
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -109,6 +110,45 @@ def test_directions_order_waits_and_events_are_as_asked() -> None:
     assert made.steps[-1].motion.duration == 0.5
     begin = made.begins[[step.name for step in made.steps].index("seam 0")]
     assert made.events == ((begin + 0.1, "seam 0", "on"), (begin + 0.9, "seam 0", "off"))
+
+
+def test_events_of_the_timetable_are_in_their_order(program, tmp_path) -> None:
+    """Gas before the arc, and seams may be called as the ends of a job are in other words."""
+    steps = list(program.steps)
+    k = next(k for k, step in enumerate(steps) if step.is_seam)
+    asked = [("gas on", 0.2), ("arc on", 0.2), ("arc off", 0.9), ("zap off", 1.0), ("air", 1.0)]
+    steps[k] = replace(steps[k], name="end", events=tuple(asked))
+    made = replace(program, steps=tuple(steps))
+    made.write_timetable(tmp_path / "a.csv")
+    rows = [line.split(",") for line in (tmp_path / "a.csv").read_text().splitlines()[1:]]
+    begins = [float(row[0]) for row in rows]
+    assert begins == sorted(begins)
+    events = [row[3].strip('"') for row in rows if row[2] == "event"]
+    assert events == [f"end: {name}" for name, _ in asked]
+    moves = [row[3].strip('"') for row in rows if row[2] == "move"]
+    assert moves[0].startswith("job start → ")
+    assert moves[-1].endswith(" → job end")
+
+
+@pytest.mark.parametrize(
+    ("events", "refused"),
+    [
+        ([("arc on", 0.3), ("arc off", 0.3)], True),
+        ([("Arc off", 0.3), ("gas on", 0.3), ("arc on", 0.3)], True),
+        ([("arc on", 0.3), ("arc off", 0.4)], False),
+        ([("gas off", 0.3), ("arc on", 0.3)], False),
+        ([("arc on", 0.3), ("arc on", 0.3)], False),
+    ],
+)
+def test_what_is_switched_on_and_off_at_once_is_refused(events, refused: bool) -> None:
+    with pytest.raises(sm.ProblemError, match="no effect") if refused else nullcontext():
+        seam("a", [0.4, 0.0, 0.3], [0.5, 0.0, 0.3], events=events)
+
+
+@pytest.mark.parametrize("name", ["job start", "job end"])
+def test_ends_of_a_job_have_names_of_their_own(name: str) -> None:
+    with pytest.raises(sm.ProblemError, match=f"'{name}' is an end of the job"):
+        seam(name, [0.4, 0.0, 0.3], [0.5, 0.0, 0.3])
 
 
 def test_what_is_made_stands_in_the_way_of_what_comes_later() -> None:

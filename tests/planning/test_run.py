@@ -40,7 +40,7 @@ def test_next_to_a_singular_pose_no_gradient_is_blamed(sample: sm.Plan, on_path:
 
 @pytest.mark.parametrize("verified", [True, False])
 def test_what_is_verified_is_not_called_infeasible(sample: sm.Plan, verified: bool) -> None:
-    wrong = "clearance: the convex hulls of 'torch' and 'pipes' are -49.37 mm apart"
+    wrong = "clearance: the convex hulls of 'torch' and 'pipes' overlap by 49.37 mm"
     certificate = certified(sample, *(() if verified else ("torch - pipes meet",)))
     said = message_of(Status.INFEASIBLE, (wrong,), certificate)
     assert wrong in said

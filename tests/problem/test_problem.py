@@ -2,9 +2,11 @@
 
 import dataclasses
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 import selfmotion as sm
 from support.arms import robot_named
@@ -43,6 +45,65 @@ def test_limits_far_above_the_arms_own_are_told(panda_circle: Circle) -> None:
             problem, constraints=[sm.JointVelocityLimits([9.0] * 6 + [180.0])]
         ).remarks[-1]
     )
+
+
+@pytest.mark.parametrize(
+    ("limit", "told"),
+    [
+        (sm.JointVelocityLimits(120.0, replace=True), "is more than arms do (above 50"),
+        (
+            sm.JointAccelerationLimits(400.0, replace=True),
+            "is more than arms do (above 200",
+        ),
+        (sm.JointAccelerationLimits(400.0), "has no effect, the arm's own limit is 15 rad/s²"),
+        (sm.JointJerkLimits(1e6), "has no effect, the arm's own limit is 7500 rad/s³"),
+        (sm.JointAccelerationLimits(7.0), ""),
+        (sm.ToolLimits(speed=250.0), "in mm/s? speed_mm"),
+        (sm.ToolLimits(speed=0.25), ""),
+    ],
+)
+def test_limits_that_no_arm_has_are_told(
+    panda_circle: Circle, limit: sm.Constraint, told: str
+) -> None:
+    remarks = dataclasses.replace(panda_circle(), constraints=[limit]).remarks
+    assert len(remarks) == bool(told)
+    assert told in "".join(remarks)
+
+
+def test_values_of_angles_beyond_turns_are_in_degrees(panda_circle: Circle) -> None:
+    problem = panda_circle()
+    panda = problem.robot
+    with pytest.raises(sm.ProblemError, match=r"center is 90 rad, more than a turn; in degrees\?"):
+        sm.Band(sm.SwivelAngle(), 90.0, 0.1)
+    with pytest.raises(sm.ProblemError, match=r"target is 90 rad, more than a turn; in degrees\?"):
+        sm.Towards(panda, sm.SwivelAngle(), 90.0)
+    with pytest.raises(sm.ProblemError, match=r"'panda_joint4': -135 rad is -21.5 turns"):
+        dataclasses.replace(problem, costs=[sm.Posture(posture=[0, 0, 0, -135, 0, 0, 0])])
+
+
+@pytest.mark.parametrize("shape", ["box", "capsule", "mesh", "away", "on the tool", "held"])
+def test_a_path_inside_an_obstacle_is_told_where_the_tool_has_no_body(
+    panda_circle: Circle, shape: str, tmp_path: Path
+) -> None:
+    """An obstacle that rides on a link is where the arm is; a tool with a body is checked."""
+    problem = panda_circle()
+    place = problem.path.pose(0.0).translation
+    trimesh.creation.icosphere(radius=0.02).export(tmp_path / "ball.stl")
+    obstacle = {
+        "capsule": sm.Capsule("it", place, 0.01, 0.02),
+        "mesh": sm.Mesh("it", place, tmp_path / "ball.stl"),
+        "away": sm.Box("it", place + np.array([0.0, 0.0, 1.0]), [0.02] * 3),
+        "on the tool": sm.Box("it", [0.0, 0.0, 0.3], [0.02] * 3, frame="panda_hand_tcp"),
+    }.get(shape, sm.Box("it", place, [0.02] * 3))
+    held = [sm.Sphere("tip", [0.0] * 3, 0.005)] if shape == "held" else []
+    robot = sm.load_robot("panda", bodies=held) if held else problem.robot
+    asked = dataclasses.replace(problem, robot=robot, constraints=[sm.Clearance([obstacle])])
+    told = [text for text in asked.remarks if "nothing is checked there" in text]
+    assert len(told) == (shape in ("box", "capsule", "mesh"))
+    if told:
+        depth = float(told[0].split("the path is ")[1].split(" mm")[0])
+        # A sphere's mesh has flat sides.
+        assert depth == pytest.approx(20.0 if shape == "mesh" else 10.0, rel=0.05)
 
 
 def test_missing_start_is_found(panda_circle: Circle) -> None:

@@ -37,6 +37,8 @@ class Row:
     aim : float
         What it is ranked by, the smaller the better: the duration of what was to be the fastest
         motion, else the cost.
+    ends : float or None
+        When the motion ends where that is before the path does [s].
     seconds : float
         Its worker's time.
     """
@@ -54,12 +56,18 @@ class Row:
     duration: float = 0.0
     evaluations: int = 0
     aim: float = float("inf")
+    ends: float | None = None
     seconds: float = 0.0
 
     @property
     def rank(self) -> tuple[bool, bool, float]:
         """Its place among others, the smaller the better: what has a plan, and a verified one."""
         return bool(self.error), not self.verified, self.aim
+
+    @property
+    def outcome(self) -> str:
+        """Its cost; of what is only a part of the path when it ends."""
+        return f"{self.cost:.6g}" if self.ends is None else f"ends at t = {self.ends:.4g} s"
 
     def plan(self) -> Plan:
         """Read the plan; FileFormatError where there is none."""
@@ -121,7 +129,8 @@ class Folder:
     ) -> list[str]:
         numbers = ["", "", ""]
         if not row.error:
-            numbers = [f"{v:.8g}" for v in (row.cost, row.initial_cost, row.duration)]
+            costs = [f"{v:.8g}" for v in (row.cost, row.initial_cost)]
+            numbers = [*(costs if row.ends is None else [row.outcome, ""]), f"{row.duration:.8g}"]
         settings = [json.dumps(row.settings[key]) if key in row.settings else "" for key in keys]
         file = "" if row.error else row.file.relative_to(self.path).as_posix()
         state = "no plan" if row.error else "yes" if row.verified else "no"
@@ -156,8 +165,9 @@ _PAGE = """<!doctype html>
 <meta name="viewport" content="width=device-width,initial-scale=1">
 <style>body{{font:14px/1.4 system-ui,sans-serif;margin:1.5em}}table{{border-collapse:collapse}}
 th,td{{padding:.25em .7em;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}}
-td{{overflow-wrap:anywhere}}td:last-child{{min-width:16em}}
-@media(max-width:1000px){{body{{margin:1em}}thead{{display:none}}tr{{display:block;padding:.6em 0}}
+td{{overflow-wrap:break-word}}td.whole{{white-space:nowrap}}td:last-child{{min-width:16em}}
+@media(max-width:1000px){{td{{overflow-wrap:anywhere}}td.whole{{white-space:normal}}
+body{{margin:1em}}thead{{display:none}}tr{{display:block;padding:.6em 0}}
 td{{display:flex;gap:1em;padding:.1em 0;border:0}}td:empty{{display:none}}
 td::before{{content:attr(data-name);flex:0 0 8em;color:#666}}tr{{border-bottom:1px solid #ddd}}}}
 </style></head><body><h1>{title}</h1>
@@ -167,6 +177,17 @@ td::before{{content:attr(data-name);flex:0 0 8em;color:#666}}tr{{border-bottom:1
 """
 
 
+# Columns whose cells are one word or number each.
+_WHOLE = {
+    "rank",
+    "verified",
+    "cost",
+    "without self-motion",
+    "duration",
+    "seconds",
+    "plan",
+    "replay",
+}
 # What the columns of numbers are of, for people.
 _HEADS = {"duration": "duration, s", "seconds": "planned in, s"}
 
@@ -179,7 +200,8 @@ def _page(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
         address = urllib.parse.quote(text)
         shown = f'<a href="{address}">{header[k]}</a>' if k in linked and text else safe
         name = html.escape(_HEADS.get(header[k], header[k]))
-        return f'<td data-name="{name}">{shown}</td>'
+        whole = ' class="whole"' if header[k] in _WHOLE else ""
+        return f'<td{whole} data-name="{name}">{shown}</td>'
 
     rows = ("".join(cell(k, text) for k, text in enumerate(line)) for line in lines)
     return _PAGE.format(

@@ -47,6 +47,8 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
         what = f"{type(error).__name__}: {error}"
         return {"error": what, "fault": True, "seconds": time.perf_counter() - began}, b""
     report, duration = found.report, found.trajectory.duration
+    is_part = bool(report.ending)
+    aim = duration if task["options"]["goal"] == "fastest" else report.cost
     row = {
         "verified": found.certificate.verified,
         "verdict": found.certificate.verdict,
@@ -54,7 +56,9 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
         "initial_cost": report.initial_cost,
         "duration": duration,
         "evaluations": report.evaluations,
-        "aim": duration if task["options"]["goal"] == "fastest" else report.cost,
+        # What is only a part of the path is not compared with the whole.
+        "aim": float("inf") if is_part else aim,
+        "ends": duration if is_part else None,
         "seconds": time.perf_counter() - began,
     }
     return row, archive

@@ -13,7 +13,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.certificate.findings import Extreme, Finding
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
-from selfmotion.collision import Closest, CollisionModel, Obstacle, srdf_line
+from selfmotion.collision import Closest, CollisionModel, Obstacle, how_near, srdf_line
 from selfmotion.motion import Trajectory
 
 # Intervals to begin with; each is halved so often before it counts as undecided.
@@ -118,14 +118,13 @@ class KeepsApart(Requirement):
             return ""
         pair = f"{start.first} - {start.second}"
         if start.value > 0.0:
-            return f"; the start is too near already: {pair} are {start.value * 1e3:.2f} mm apart"
-        depth = -start.value * 1e3
-        return f"; the start is in collision: {pair} overlap by {depth:.2f} mm: choose another one"
+            return f"; the start is too near already: {pair} {how_near(start.value)}"
+        return f"; the start is in collision: {pair} {how_near(start.value)}: choose another one"
 
     def _told(self, found: "Approach") -> str:
         text = (
-            f"{found.names} are {found.closest.value * 1e3:.2f} mm apart at t = {found.time:.3f} s "
-            f"(wanted: {self.distance * 1e3:.2f} mm)"
+            f"{found.names} {how_near(found.closest.value)} at t = {found.time:.3f} s (wanted: "
+            f"{self.distance * 1e3:.2f} mm)"
         )
         for pair in self.model.overlapping:
             if {pair.first, pair.second} == {found.closest.first, found.closest.second}:

@@ -57,7 +57,7 @@ class FeedReached(Requirement):
             off = next(filter(_is_off, self._speeds(motion)), None)
             if off is not None:
                 time, text = self._off(off)
-                return Finding(self.name, "path", time, found.slowest, allowed, False, text)
+                return self._found(time, allowed, False, text)
         else:
             slow = f"for {found.slower:.3g} s, " if found.slower else ""
             text = (
@@ -65,7 +65,11 @@ class FeedReached(Requirement):
                 f"by {found.held_by}: ask for {_reached(found):g} m/s, or allow it "
                 f"more (within=)"
             )
-        return Finding(self.name, "path", found.time, found.slowest, allowed, found.kept, text)
+        return self._found(found.time, allowed, found.kept, text)
+
+    def _found(self, time: float, allowed: float, kept: bool, text: str) -> Finding:
+        slowest = self.found.slowest
+        return Finding(self.name, "path", time, slowest, allowed, kept, text, at_least=True)
 
     def _speeds(self, motion: FinishedMotion) -> Iterator[Bounds]:
         """Yield what is known of the tool's speed each time that the feed is asked for."""

@@ -85,6 +85,8 @@ class Finding:
     factor : float
         By what factor it takes longer where it is kept, at the same pace but slower; 1 where it is
         kept, inf where that is not known.
+    at_least : bool
+        Whether no less than what is allowed has to be found, rather than no more.
     """
 
     requirement: str
@@ -96,6 +98,7 @@ class Finding:
     text: str
     of_pace: bool = False
     factor: float = 1.0
+    at_least: bool = False
 
     @property
     def extreme(self) -> Extreme:

@@ -1,7 +1,6 @@
 """The commands around one plan: parse, call, print."""
 
 import json
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,9 +8,8 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.basics import Progress, write_text
-from selfmotion.certificate import Extreme, approaches
-from selfmotion.cli import documents, jobs, json_tables, options, outputs, tables
+from selfmotion.basics import write_text
+from selfmotion.cli import checks, documents, jobs, json_tables, options, outputs, tables
 from selfmotion.cli.app import (
     NOT_VERIFIED,
     VERIFIED,
@@ -22,8 +20,6 @@ from selfmotion.cli.app import (
     terminal,
 )
 from selfmotion.cli.stage_display import StageDisplay
-
-_Near = Mapping[str, Extreme]
 
 
 @app.command(
@@ -166,70 +162,45 @@ def check(
         given = own | {"robot": robot, "degrees": degrees or None, "tolerance": tolerance}
         options.refuse(given | {"limits": any(judged) or None}, file, "the program's")
         jobs.check(sm.load_program(file), as_json)
+    if robot is not None and Path(robot).suffix == jobs.PROGRAM:
+        options.refuse(own | {"degrees": degrees or None}, robot, "the program's")
+        options.refuse({"limits": any(judged) or None}, robot, "the program's")
+        checks.of_program(file, Path(robot), within, as_json)
     with StageDisplay(stages) as display:
         if file.suffix == ".npz":
             options.refuse(own | {"robot": robot, "degrees": degrees or None}, file, "the plan's")
-            certificate, near, arm = _of_plan(file, within, judged, display.stage)
+            certificate, near, arm = checks.of_plan(file, within, judged, display.stage)
         elif robot is not None and Path(robot).suffix in documents.SUFFIXES:
             options.refuse(own, robot, "the problem's")
-            motion = sm.read_motion(file, degrees=degrees)
-            certificate, near, arm = _of_problem(robot, motion, within, judged, display.stage)
+            motion, stated = checks.read(file, degrees, within)
+            certificate, near, arm = checks.of_problem(
+                robot,
+                motion,
+                stated,
+                judged,
+                display.stage,
+                of_controller=checks.is_program(file),
+            )
         else:
             if robot is None or path is None:
                 raise sm.ProblemError(
                     f"{file}: a motion is checked against a robot and a path: give --robot and "
-                    f"--path, or a problem file as --robot"
+                    f"--path, or a problem file as --robot (a job's .program for its program)"
                 )
             held = options.locks(lock or [])
             arm = sm.load_robot(robot, tool=tool, lock=held, reference=reference)
-            motion, asked = (
-                sm.read_motion(file, degrees=degrees),
-                options.requirements(arm, *judged),
-            )
+            motion, stated = checks.read(file, degrees, within)
+            asked = options.requirements(arm, *judged)
             followed = formats.read_path(path, feed=feed, corners=corners or "blend")
             certificate = sm.certify(
-                arm, followed, task or "pose", motion, within, asked, progress=display.stage
+                arm, followed, task or "pose", motion, stated, asked, progress=display.stage
             )
-            near = _approaches(arm, motion, asked)
+            near = checks.near(arm, motion, asked)
     if as_json:
         terminal.print_json(data=json_tables.certificate_json(certificate, near))
     else:
         tables.show_certificate(certificate, near, arm, terminal)
     raise typer.Exit(VERIFIED if certificate.verified else NOT_VERIFIED)
-
-
-def _of_plan(
-    file: Path, within: sm.Tolerance | None, judged: tuple[Any, ...], progress: Progress
-) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
-    """Return the certificate of a plan, how near bodies come, and the arm."""
-    plan = sm.load_plan(file, progress=progress)
-    besides = options.requirements(plan.robot, *judged)
-    near = _approaches(plan.robot, plan.trajectory, (*plan.requirements, *besides))
-    if within is None and not any(judged):
-        return plan.certificate, near, plan.robot
-    return plan.check(within, besides, progress=progress), near, plan.robot
-
-
-def _of_problem(
-    file: str,
-    motion: sm.Trajectory,
-    within: sm.Tolerance | None,
-    judged: tuple[Any, ...],
-    progress: Progress,
-) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
-    """Return the same of a motion by all that a problem file asks, and what else is."""
-    job = sm.read_job(file)
-    besides = options.requirements(job.problem.robot, *judged)
-    within = within or job.tolerance
-    certificate = job.problem.certify(motion, within, besides=besides, progress=progress)
-    near = _approaches(job.problem.robot, motion, (*job.problem.requirements, *besides))
-    return certificate, near, job.problem.robot
-
-
-def _approaches(
-    robot: sm.RobotModel, motion: sm.Trajectory, asked: Sequence[sm.Requirement]
-) -> _Near:
-    return approaches(asked, sm.FinishedMotion(robot, motion.of_joints(robot.joint_names)))
 
 
 @app.command(epilog="Example: selfmotion compare a.npz b.npz")

@@ -8,7 +8,8 @@ import typer
 import selfmotion as sm
 from selfmotion import formats
 from selfmotion.cli import jobs, options
-from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, terminal
+from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, stages, terminal
+from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.result import is_move
 
 _Made = sm.Plan | sm.Parts | sm.Move | sm.Program
@@ -79,7 +80,8 @@ def export(
         together: dict[str, Path] = {}
         if parts and isinstance(made, sm.Plan) and not _is_program(target, form):
             together = sm.write_parts(made, target, **given)
-        sm.write_motion(made, target, settings=asked, **given)
+        with StageDisplay(stages) as display:
+            sm.write_motion(made, target, settings=asked, progress=display.stage, **given)
         kept, verdicts[str(target)] = _read_back(made, target, form)
         sound &= kept
         if together:
@@ -117,19 +119,28 @@ def _is_readable(target: Path, form: str | None) -> bool:
 def _read_back(made: _Made, target: Path, form: str | None) -> tuple[bool, str]:
     """Return whether what was written is still the motion, and what there is to say."""
     if _is_program(target, form) and target.suffix.lower() in formats.PROGRAMS:
-        count, stated, found = formats.program_miss(made, target)
-        text = (
-            f"read back: {count} targets, between which the tool is at most "
-            f"{1e3 * found.position:.3g} mm and {found.rotation:.2g} rad off the plan "
-            f"({1e3 * stated.position:.3g} mm are stated in the file)"
-        )
-        # The file states nine digits.
-        return found.position <= stated.position + 1e-9 and _verified(made), text
+        return _confirmed(made, target)
     if not isinstance(made, sm.Plan):
         return made.verified, made.verdict
     if not _is_readable(target, form):
         return made.certificate.verified, ""
     return _judged(made, sm.read_motion(target))
+
+
+def _confirmed(made: _Made, target: Path) -> tuple[bool, str]:
+    """Return whether a program keeps what it states, and that in words."""
+    count, stated, found = formats.program_miss(made, target)
+    told, kept = [], _verified(made)
+    for miss, said, where in zip(found, stated, ("off the plan", "in free moves"), strict=True):
+        # The file states nine digits.
+        kept &= miss.position <= said.position + 1e-9
+        if miss.position > 0.0:
+            told.append(
+                f"{1e3 * miss.position:.3g} mm and {miss.rotation:.2g} rad {where} "
+                f"({1e3 * said.position:.3g} mm are stated in the file)"
+            )
+    far = f", between which the tool is at most {', and '.join(told)}" if told else ""
+    return kept, f"read back: {count} targets{far}"
 
 
 def _verified(made: _Made) -> bool:

@@ -3,7 +3,7 @@
 import socket
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from select import select
@@ -20,6 +20,13 @@ from selfmotion.basics import Array
 # What a datagram holds at most, and how long one is waited for at a time [s].
 _LARGEST, _LOOK = 65_507, 0.2
 _FLOAT = np.dtype("<f8")
+# A tool farther than this from its path is off it [m, rad].
+_OFF = np.array([1e-4, 1e-3])
+# Rounding of limits that are used in full.
+_FULL = 1.0 + 1e-9
+_LIMITS = ("position", "speed", "acceleration")
+# So many times of being off the path are told one by one.
+_TOLD = 5
 
 
 @dataclass(eq=False)
@@ -29,14 +36,18 @@ class Link:
     A state is [t, q, q̇]; the path begins with the first one. A segment is a row [t, q, q̇, q̈] for
     each cycle, in the clock of the states. An empty datagram ends it. Segments go to where the
     first state came from; what comes from elsewhere, is of another length, or older than the last
-    state, is left out. Of several states that wait the newest counts.
+    state, is left out, and lengths that are wrong are told at once. Of several states that wait the
+    newest counts.
 
     Parameters
     ----------
     port : socket
         Bound.
     path : Path
-    dof : int
+    limits : (4, n)
+        Lower, upper, speed, acceleration of the joints.
+    tell : callable
+        What is told while it runs.
     silence : float
         Without a state for so long, it ends [s]; for the first one it waits without end.
     seconds : float
@@ -45,7 +56,8 @@ class Link:
 
     port: socket.socket
     path: sm.Path
-    dof: int
+    limits: Array
+    tell: Callable[[str], object]
     silence: float
     seconds: float
     flags: Counter[str] = field(default_factory=Counter)
@@ -53,6 +65,9 @@ class Link:
     took: list[float] = field(default_factory=list)
     error: Array = field(default_factory=lambda: np.zeros(2))
     left_out: int = 0
+    lengths: Counter[int] = field(default_factory=Counter)
+    used: Array = field(default_factory=lambda: np.zeros(3))
+    off: list[list[float]] = field(default_factory=list)
     ended: str = ""
     _peer: Any = None
     _first: float = 0.0
@@ -96,6 +111,28 @@ class Link:
         self.flags[segment.flag.value] += 1
         self.reasons.update(segment.reasons)
         self.error = np.maximum(self.error, segment.tool_error)
+        self._note_off(segment)
+        lower, upper, speed, acceleration = self.limits
+        middle, half = 0.5 * (upper + lower), 0.5 * (upper - lower)
+        away = np.divide(
+            segment.q - middle, half, out=np.zeros_like(segment.q), where=np.isfinite(half)
+        )
+        shares = (away, segment.qd / speed, segment.qdd / acceleration)
+        self.used = np.maximum(self.used, [np.abs(each).max() for each in shares])
+
+    @property
+    def dof(self) -> int:
+        """How many joints there are."""
+        return int(self.limits.shape[1])
+
+    def _note_off(self, segment: realtime.Segment) -> None:
+        """Note from when to when the tool is off its path, as measured [s]."""
+        is_off, now = bool((segment.tool_error > _OFF).any()), float(segment.t[0])
+        open_ = bool(self.off) and np.isnan(self.off[-1][1])
+        if is_off and not open_:
+            self.off.append([now, np.nan])
+        elif open_ and not is_off:
+            self.off[-1][1] = now
 
     def _newest(self) -> bytes | None:
         """Return the newest state or the end; None where nothing came for a while."""
@@ -111,11 +148,24 @@ class Link:
         wanted = (1 + 2 * self.dof) * _FLOAT.itemsize
         foreign = self._peer is not None and sender != self._peer
         fits = len(data) == wanted or (not data and self._peer is not None)
+        if not fits and not foreign:
+            if len(data) not in self.lengths:
+                self.tell(f"left out: a datagram of {len(data)} bytes; {self.expected}")
+            self.lengths[len(data)] += 1
         if foreign or not fits or (data and not self._is_later(data)):
             self.left_out += 1
             return None
         self._peer = sender
         return data
+
+    @property
+    def expected(self) -> str:
+        """How long a state is, in words."""
+        count = 1 + 2 * self.dof
+        return (
+            f"a state has {count * _FLOAT.itemsize}: {count} doubles (time, {self.dof} positions, "
+            f"{self.dof} velocities)"
+        )
 
     def _is_later(self, data: bytes) -> bool:
         t = float(np.frombuffer(data, dtype=_FLOAT, count=1)[0])
@@ -129,6 +179,10 @@ class Link:
             "segments": dict(self.flags),
             "reasons": dict(self.reasons),
             "states left out": self.left_out,
+            "lengths left out": {str(size): count for size, count in self.lengths.items()},
+            "off the path": [[a, None if np.isnan(b) else b] for a, b in self.off],
+            "limits used": dict(zip(_LIMITS, self.used.tolist(), strict=True)),
+            "limits kept": bool((self.used <= _FULL).all()),
             "largest position error": float(self.error[0]),
             "largest rotation error": float(self.error[1]),
             "longest step": max(self.took, default=0.0),
@@ -175,9 +229,20 @@ def show(link: Link, console: Console) -> None:
         table.add_row("", f"{count} times: {reason}")
     if link.left_out:
         table.add_row("datagrams left out", str(link.left_out))
+    for size, number in link.lengths.items():
+        table.add_row("", f"{number} of {size} bytes; {link.expected}")
     if link.took:
         median, longest = 1e3 * found["median step"], 1e3 * found["longest step"]
         table.add_row("a step takes", f"{median:.2f} ms in the median, {longest:.2f} ms at most")
         metres, angle = found["largest position error"], found["largest rotation error"]
         table.add_row("off the path, as measured", f"at most {metres:.2g} m and {angle:.2g} rad")
+        for number, (first, last) in enumerate(link.off, 1):
+            if number > _TOLD:
+                table.add_row("", f"and {len(link.off) - _TOLD} more times")
+                break
+            back = "to the end" if np.isnan(last) else f"to {last:.3g} s, then back on it"
+            table.add_row("", f"farther than 0.1 mm or 1 mrad from t = {first:.3g} s {back}")
+        said = "kept" if found["limits kept"] else "NOT kept"
+        shares = ", ".join(f"{name} {share:.0%}" for name, share in found["limits used"].items())
+        table.add_row("limits of the joints", f"{said} by all commands; used: {shares}")
     console.print(table)

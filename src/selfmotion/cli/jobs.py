@@ -52,6 +52,8 @@ def job(
         # Before anything is planned.
         happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
         formats.check_signals(happens, asked or sm.ProgramSettings())
+    for remark in work.remarks:
+        stages.print(f"note: {remark}", markup=False, soft_wrap=True)
     kept = folder or Path("out") / f"{file.stem}.job"
     here: Any = processes(workers) if workers > 1 else nullcontext()
     try:
@@ -102,7 +104,8 @@ def write_program(
 
         write_replay(program, file)
     else:
-        sm.write_motion(program, file, settings=settings)
+        with StageDisplay(stages) as display:
+            sm.write_motion(program, file, settings=settings, progress=display.stage)
 
 
 def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:

@@ -21,7 +21,7 @@ def batch_json(batch: "Batch") -> dict[str, Any]:
         for row in batch.rows
     ]
     for row in rows:
-        if row["error"]:
+        if row["error"] or row["ends"] is not None:
             row["cost"] = row["initial_cost"] = None
     return {"folder": str(batch.folder), "resumed": batch.resumed, "rows": rows}
 

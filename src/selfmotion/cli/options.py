@@ -166,13 +166,18 @@ OutOption = Annotated[
 HtmlOption = Annotated[Path | None, typer.Option(help="Write a replay to open in a browser.")]
 
 CheckedArgument = Annotated[
-    Path, typer.Argument(help="A plan saved as .npz, or a motion as .csv: t, a column per joint.")
+    Path,
+    typer.Argument(
+        help="A plan saved as .npz, a .program, or a motion: .csv (t, a column per joint), .json, "
+        ".yaml (ROS), .src (KUKA), .mod (ABB)."
+    ),
 ]
 RobotOption = Annotated[
     str | None,
     typer.Option(
         help="For a motion: name (`selfmotion robots`), .urdf file, or a problem file (.toml, "
-        ".json), all of which is judged then: a cell, constraints, what else is followed."
+        ".json), all of which is judged then: a cell, constraints, what else is followed; of a "
+        "job's .src or .mod its .program."
     ),
 ]
 LockOption = Annotated[
@@ -226,11 +231,6 @@ def relaxation(text: str) -> sm.Relaxation:
         raise sm.ProblemError(
             f"--relax is '{text}', expected ROWS[=BAND][@FROM:TO] like rx,ry=0.2 or rz@1:2.5"
         ) from None
-    if found.angular and TURN < float(found.band) < np.inf:
-        raise sm.ProblemError(
-            f"--relax is '{text}': a band of {band} rad is more than a turn; in degrees? 10° is "
-            f"0.1745"
-        )
     return found
 
 

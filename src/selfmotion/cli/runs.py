@@ -132,6 +132,10 @@ def track(
     raise typer.Exit(VERIFIED if kept else NOT_VERIFIED)
 
 
+def _told_apart(text: str) -> None:
+    stages.print(text, markup=False, soft_wrap=True)
+
+
 @app.command(epilog="Example: selfmotion follow cell.toml --listen 127.0.0.1:5005")
 def follow(
     file: Annotated[Path, typer.Argument(help="A problem file: arm, path, costs, constraints.")],
@@ -167,7 +171,7 @@ def follow(
         # Nothing compiles once the arm moves.
         sm.warm_up(replanner)
         stages.print(f"waits for states at {listen}", markup=False)
-        link = following.Link(port, problem.path, problem.robot.dof, silence, seconds)
+        link = following.Link(port, problem.path, replanner.limits, _told_apart, silence, seconds)
         try:
             realtime.follow(replanner, link.read, link.write, lead=latency)
         except KeyboardInterrupt:

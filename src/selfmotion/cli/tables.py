@@ -4,6 +4,7 @@ import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -122,9 +123,9 @@ def show_certificate(
         ("speed", certificate.velocity_ratio, _SHARE),
         ("smallest singular value", certificate.smallest_singular_value, "{:.4g}"),
         ("acceleration", certificate.acceleration_ratio, _SHARE),
-        ("clearance", certificate.clearance, "{:.4g} m"),
+        ("clearance", _in_mm(certificate.clearance), "{:.4g} mm"),
         # Of one body alone the clearance says it.
-        *((f"closest to {name}", near, "{:.4g} m") for name, near in several.items()),
+        *((f"closest to {name}", _in_mm(near), "{:.4g} mm") for name, near in several.items()),
     )
     for name, worst, form in rows:
         if worst is None:
@@ -136,7 +137,7 @@ def show_certificate(
         if finding.requirement not in shown:
             name, value = finding.requirement, _SHARE.format(finding.amount)
             if finding.allowed != 1.0:
-                above = finding.kept == (finding.amount > finding.allowed)
+                above = finding.at_least or finding.kept == (finding.amount > finding.allowed)
                 side = "at least" if above else "at most"
                 name = f"{finding.requirement} ({side}: {finding.allowed:.4g})"
                 value = f"{finding.amount:.4g}"
@@ -155,6 +156,11 @@ def show_certificate(
     console.print(certificate.verdict, style=style, markup=False, soft_wrap=not console.is_terminal)
 
 
+def _in_mm(near: Extreme | None) -> Extreme | None:
+    """Return a distance in millimetres."""
+    return None if near is None else replace(near, value=1e3 * near.value)
+
+
 def show_comparison(plans: Mapping[str, Plan], console: Console) -> None:
     """Print a column per plan: its costs, and the worst that its check found."""
     table = _table("plans side by side")
@@ -164,7 +170,8 @@ def show_comparison(plans: Mapping[str, Plan], console: Console) -> None:
     shown = list(plans.values())
     for term in dict.fromkeys(term for plan in shown for term in plan.report.terms):
         table.add_row(term, *(_number(plan.report.terms.get(term)) for plan in shown))
-    table.add_row("total cost", *(_number(plan.report.cost) for plan in shown))
+    # What ends before its path does has a cost that nothing can be compared with.
+    table.add_row("total cost", *map(_total, shown))
     table.add_section()
     table.add_row("duration, s", *(_number(plan.trajectory.duration) for plan in shown))
     length = (float(np.abs(np.diff(plan.trajectory.q, axis=0)).sum()) for plan in shown)
@@ -196,6 +203,12 @@ _WORST = {
 }
 
 
+def _total(plan: Plan) -> str:
+    if plan.report.ending:
+        return f"ends at t = {plan.trajectory.t[-1]:.4g} s"
+    return _number(plan.report.cost)
+
+
 def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.5g}"
 
@@ -214,7 +227,7 @@ def show_batch(batch: "Batch", console: Console) -> None:
         outcome = ["-", "-", "no plan"]
         if not row.error:
             state = "yes" if row.verified else "no"
-            outcome = [f"{row.cost:.6g}", f"{row.duration:.4g} s", state]
+            outcome = [row.outcome, f"{row.duration:.4g} s", state]
         table.add_row(escape(row.name), *values, *outcome)
     console.print(table)
     verified = sum(row.verified for row in batch.rows)

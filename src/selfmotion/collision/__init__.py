@@ -9,6 +9,7 @@ from selfmotion.collision.exact import CollisionModel as CollisionModel
 from selfmotion.collision.found import (
     Closest as Closest,
     Overlap as Overlap,
+    how_near as how_near,
     srdf_line as srdf_line,
 )
 from selfmotion.collision.obstacles import (

@@ -23,6 +23,12 @@ class Closest:
     index: int = 0
 
 
+def how_near(distance: float, digits: int = 2) -> str:
+    """Return in words how far two bodies are apart [m], or how deep one is in the other."""
+    length = f"{abs(distance) * 1e3:.{digits}f} mm"
+    return f"are {length} apart" if distance >= 0.0 else f"overlap by {length}"
+
+
 @dataclass(frozen=True)
 class Overlap:
     """Two links that overlap in half or more of 500 sampled configurations.

@@ -12,6 +12,9 @@ from selfmotion.basics import Array, CollisionError, as_numbers, read_only, show
 from selfmotion.collision.obstacles import Obstacle
 from selfmotion.robot import UrdfShape
 
+# A mesh that is longer than this is in millimetres [m].
+_LONGEST = 20.0
+
 
 @dataclass(frozen=True, eq=False)
 class Box(Obstacle):
@@ -165,14 +168,25 @@ class Mesh(Obstacle):
         if not self.file.is_file():
             raise CollisionError(f"{self.label}: no such file: {self.file}")
         try:
-            return coal.MeshLoader().load(str(self.file), np.full(3, self.scale))
+            found = coal.MeshLoader().load(str(self.file), np.full(3, self.scale))
         except (RuntimeError, ValueError) as error:
             # What comes before is where in the source of coal it was found.
             reason = " ".join(str(error).rpartition("message:")[2].split())
             raise CollisionError(f"{self.label}: {self.file} cannot be read: {reason}") from error
+        corners = np.array(found.vertices()).reshape(-1, 3)
+        size = float(np.ptp(corners, axis=0).max()) if len(corners) else 0.0
+        if _LONGEST < size < np.inf:
+            raise CollisionError(
+                f"{self.label}: {self.file} is {size:.3g} m long: scale = 0.001 if it is in "
+                f"millimetres; of a hall, leave what is within {_LONGEST:g} m"
+            )
+        return found
 
     def urdf_shapes(self) -> Sequence[UrdfShape]:
         """See `Obstacle.urdf_shapes`."""
+        if self.file.is_file():
+            # An arm carries nothing of that size either.
+            self.geometry()
         scale = " ".join([repr(self.scale)] * 3)
         return [UrdfShape("mesh", {"filename": str(self.file.resolve()), "scale": scale})]
 

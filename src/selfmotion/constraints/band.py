@@ -43,7 +43,7 @@ class Band(Constraint):
                 f"band: coordinate is {shown(self.coordinate)}, expected a JointCoordinate, "
                 f"FrameCoordinate or SwivelAngle"
             )
-        as_number(self.center, "band: center")
+        self.coordinate.check_value(self.center, "band: center")
         most = min(0.5 * self.coordinate.period, 1e100)
         as_number(self.half, "band: half", above=0.0, most=most)
         as_number(self.margin, "band: margin", above=0.0, most=1.0)

@@ -17,6 +17,7 @@ from selfmotion.collision import (
     CollisionModel,
     Obstacle,
     disabled_links,
+    how_near,
     obstacle_from_dict,
 )
 from selfmotion.constraints.base import Constraint
@@ -208,7 +209,7 @@ class BoundClearance:
         value = self.distance + self.margin - self.residual(samples)[row, column] * _METRE
         of_hulls = "" if self.model.is_exact(column) else "the convex hulls of "
         return (
-            f"{of_hulls}'{first}' and '{second}' are {value * 1e3:.2f} mm apart at t = "
+            f"{of_hulls}'{first}' and '{second}' {how_near(value)} at t = "
             f"{samples.sampling.node_times[row]:.3f} s, wanted {self.distance * 1e3:.2f} mm"
         )
 

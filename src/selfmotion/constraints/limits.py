@@ -13,12 +13,10 @@ from selfmotion.constraints.conditions import NodeTangents, motion_of_order
 from selfmotion.constraints.envelope import Envelope
 from selfmotion.costs import Samples
 from selfmotion.follow import Follows
-from selfmotion.robot import RobotModel
+from selfmotion.robot import RobotModel, check_radians
 
 _QUANTITIES = ("position", "speed", "acceleration", "jerk")
 _RATES = ("position", "velocity", "acceleration", "jerk")
-# Joints with limits turn less than this [rad].
-_MOST_TURNS = 4.0 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +68,7 @@ class JointPositionLimits(Constraint):
                 own.append(arm)
                 continue
             values = per_joint(given, robot.dof, f"{robot.name}: {LIMIT_NAMES[0]}: {side}")
-            _check_radians(robot, values)
+            check_radians(robot, values, f"{robot.name}: {LIMIT_NAMES[0]}", "limits")
             own.append(values if self.replace else read_only(tighter(values, arm)))
         lower, upper = own
         wrong = np.flatnonzero(~(lower < upper))
@@ -194,17 +192,6 @@ class JointJerkLimits(_RateLimits):
 
 def _check_margin(margin: float) -> None:
     as_number(margin, "limits: margin", above=0.0, most=1.0)
-
-
-def _check_radians(robot: RobotModel, limits: Array) -> None:
-    """Refuse limits of revolute joints that can only be meant in degrees."""
-    for name, value in zip(robot.joint_names, limits, strict=True):
-        if np.isfinite(value) and abs(value) > _MOST_TURNS and not robot.is_prismatic(name):
-            raise ProblemError(
-                f"{robot.name}: {LIMIT_NAMES[0]}: joint '{name}': {value:.6g} rad is "
-                f"{value / (2.0 * np.pi):.1f} turns; limits are in radians (numpy.radians), ±inf "
-                f"for none"
-            )
 
 
 @dataclass(frozen=True, eq=False)

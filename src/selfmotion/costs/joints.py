@@ -27,7 +27,7 @@ from selfmotion.costs.base import (
 )
 from selfmotion.costs.samples import Samples
 from selfmotion.follow import Follows
-from selfmotion.robot import RobotModel
+from selfmotion.robot import RobotModel, check_radians
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +175,7 @@ class Posture(_Quadratic):
             raise ProblemError(
                 f"cost '{self.name}': posture is {posture}, expected {robot.dof} finite numbers"
             )
+        check_radians(robot, posture, f"{robot.name}: cost '{self.name}'", "postures")
 
 
 @dataclass(frozen=True, eq=False)

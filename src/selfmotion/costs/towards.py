@@ -48,7 +48,7 @@ class Towards(Cost):
                 f"cost '{self.name}': coordinate is {shown(self.coordinate)}, expected a "
                 f"JointCoordinate, FrameCoordinate or SwivelAngle"
             )
-        as_number(self.target, f"cost '{self.name}': target")
+        self.coordinate.check_value(self.target, f"cost '{self.name}': target")
         as_number(self.weight, f"cost '{self.name}': weight", least=0.0)
         self.coordinate(self.robot, np.zeros((1, self.robot.dof)))
 

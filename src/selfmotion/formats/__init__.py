@@ -12,6 +12,11 @@ from selfmotion.formats.documents import (
 from selfmotion.formats.example import example_text as example_text
 from selfmotion.formats.job import Job as Job
 from selfmotion.formats.joint_limits import read_joint_limits as read_joint_limits
+from selfmotion.formats.judged_programs import (
+    judged_steps as judged_steps,
+    stated_deviation as stated_deviation,
+    what_targets_keep as what_targets_keep,
+)
 from selfmotion.formats.motion_parts import read_parts as read_parts, write_parts as write_parts
 from selfmotion.formats.motions import (
     FORMS as FORMS,

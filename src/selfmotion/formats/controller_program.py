@@ -9,10 +9,12 @@ from pathlib import Path as FilePath
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from selfmotion.basics import FileFormatError, ProblemError
+from selfmotion.basics import FileFormatError, ProblemError, Progress, silent
+from selfmotion.formats.pieces import pieces_of
 from selfmotion.formats.program_axes import Axis, axes_of, in_order, tool_from_flange
 from selfmotion.formats.program_settings import ProgramSettings, Signal
-from selfmotion.formats.targets import Miss, Stretch, miss_of, pieces_of, stretches_of
+from selfmotion.formats.stretches import NO_MISS, Miss, Misses, Stretch, miss_of
+from selfmotion.formats.targets import stretches_of
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
 from selfmotion.result import Move, Parts, Plan
@@ -32,14 +34,14 @@ class ControllerProgram:
         In the order of the file: A1 … A6, E1 … E6.
     stretches : tuple of Stretch
         From rest to rest, coordinates in the order of the axes.
-    miss : Miss
+    miss : Misses
         How far targets are off the motion, as the file states it.
     """
 
     name: str
     axes: tuple[Axis, ...]
     stretches: tuple[Stretch, ...]
-    miss: Miss
+    miss: Misses
 
     @property
     def targets(self) -> int:
@@ -67,7 +69,7 @@ class ControllerProgram:
         names = tuple(axis.joint for axis in self.axes)
         return Trajectory(np.concatenate(t), np.concatenate(q), np.concatenate(qd), names)
 
-    def miss_of(self, plan: Plan | Parts | Move | Program) -> Miss:
+    def miss_of(self, plan: Plan | Parts | Move | Program) -> Misses:
         """Return how far it is off the motion of a plan, parts, a move or a program.
 
         Raises
@@ -81,12 +83,13 @@ class ControllerProgram:
         if sorted(names) != sorted(known):
             raise FileFormatError(f"has joints {', '.join(names)}, expected {', '.join(known)}")
         order = [names.index(name) for name in known]
-        worst, at, k = Miss(0.0, 0.0, 0.0), 0.0, 0
+        worst, at, k = Misses(NO_MISS, NO_MISS), 0.0, 0
         for stretch in self.stretches:
             same = replace(stretch, q=stretch.q[:, order])
             piece = pieces[min(k, len(pieces) - 1)]
             found = miss_of(same, piece.motion, piece.chains, piece.motion.t[0] + at)
-            worst = Miss(*map(max, worst, found))
+            both = Misses(NO_MISS, found) if piece.is_move else Misses(found, NO_MISS)
+            worst = worst.worse(both)
             at += float(stretch.t[-1])
             if at >= piece.motion.duration - _MOMENT:
                 at, k = 0.0, k + 1
@@ -115,7 +118,11 @@ class Draft:
 
 
 def drafted(
-    plan: Plan | Parts | Move | Program, name: str, settings: ProgramSettings, verdict: str
+    plan: Plan | Parts | Move | Program,
+    name: str,
+    settings: ProgramSettings,
+    verdict: str,
+    progress: Progress = silent,
 ) -> Draft:
     """Return the program of a motion, named as its file is.
 
@@ -131,7 +138,9 @@ def drafted(
     axes = axes_of(robot, settings)
     check_signals({event: item.name for item in pieces for _, event in item.events}, settings)
     slides = np.array([axis.slides for axis in axes])
-    stretches, miss = stretches_of(pieces, slides, settings.deviation)
+    stretches, miss = stretches_of(
+        pieces, slides, settings.deviation, settings.move_deviation, progress
+    )
     order = in_order(axes)
     sorted_ones = tuple(replace(item, q=item.q[:, order]) for item in stretches)
     program = ControllerProgram(name, tuple(axes[k] for k in order), sorted_ones, miss)
@@ -155,17 +164,22 @@ def head(draft: Draft) -> list[str]:
     axes = ", ".join(
         f"{axis.name} = {axis.joint} [{'mm' if axis.slides else 'deg'}]" for axis in program.axes
     )
-    miss = program.miss
+    moves = program.miss.moves
     return [
         plain(f"selfmotion: {draft.robot.name}, {program.targets} targets"),
         *folded(plain(draft.verdict)),
         *folded(plain(f"axes: {axes}")),
-        f"deviation: {_up(1e3 * miss.position, 6)} mm, {_up(miss.rotation, 9)} rad, "
-        f"joints {_up(miss.joint, 9)}",
+        f"deviation: {_stated(program.miss.path)}",
+        *([] if moves == NO_MISS else [f"deviation of moves: {_stated(moves)}"]),
         "(of the tool from the plan, straight joint lines, rounded corners or a spline",
         "through the targets, at the times of the plan)",
         "Angles are those of the URDF: compare zeros and signs with the controller's.",
     ]
+
+
+def _stated(miss: Miss) -> str:
+    tool = f"{_up(1e3 * miss.position, 6)} mm, {_up(miss.rotation, 9)} rad"
+    return f"{tool}, joints {_up(miss.joint, 9)}"
 
 
 def _up(value: float, digits: int) -> str:

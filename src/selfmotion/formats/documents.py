@@ -3,32 +3,32 @@
 import json
 import math
 import tomllib
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Collection, Hashable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import FileFormatError, write_text
+from selfmotion.basics import TURN, FileFormatError, nearest, write_text
 
 # Keys with a number for each joint.
-PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "start", "upper")
-# Keys that may end in _deg or _mm: nothing else is an angle or a length.
-_BANDS = ("band", "center", "half", "target")
-_TURNS = (
-    "corner_angle",
-    "margin",
-    "rotation",
-    "rotation_vector",
-    "rpy",
-    "turn_tolerance",
-    "within",
-)
+PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "qdd", "start", "upper")
+# Keys that may end in _deg or _mm: nothing else is an angle or a length, or a rate of one.
+_BANDS = ("acceleration", "band", "center", "half", "speed", "target", "velocity")
+# What is beyond a turn here can only be meant in degrees.
+_WITHIN_A_TURN = ("corner_angle", "rotation", "rotation_vector", "rpy", "turn_tolerance")
+_TURNS = (*_WITHIN_A_TURN, "margin", "turn_acceleration", "turn_rate", "within")
 ANGLES = frozenset((*_BANDS, *_TURNS, *PER_JOINT))
-_SIZES = ("length", "radius", "size")
+_SIZES = ("length", "radius", "rise", "size", "tolerance")
 _WAYS = ("amplitude", "by", "distance", "feed", "jump", "pitch", "position", "positions", "retreat")
 LENGTHS = frozenset((*_BANDS, *_WAYS, *_SIZES))
 # Tables or lists in each other; files of the trade have less than ten.
 _DEEPEST = 50
 _SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}
+# Of joints, each with its angle.
+_TABLES_OF_NUMBERS = tuple(f"{name}_deg" for name in PER_JOINT)
+# How like a known key one has to be to be taken for it.
+_ALIKE = 0.8
+# Tables whose numbers have no unit.
+_UNITLESS = ("optimiser.",)
 
 
 def read_document(file: Path) -> dict[str, Any]:
@@ -159,7 +159,8 @@ def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
     Raises
     ------
     FileFormatError
-        A key with such an ending is no angle or length, is given twice, or holds no numbers.
+        A key with such an ending is no angle or length, is given twice, or holds no numbers; or an
+        angle in radians is more than a turn.
     """
     found: dict[str, Any] = {}
     for key, value in table.items():
@@ -169,17 +170,37 @@ def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
         for suffix, (allowed, scale) in _SUFFIXES.items():
             if key.endswith(suffix):
                 name, factor = key.removesuffix(suffix), scale
-                if name not in allowed:
-                    what = "angle" if suffix == "_deg" else "length"
-                    raise FileFormatError(
-                        f"{where}{key}: '{name}' is no {what}, expected one of: "
-                        f"{', '.join(sorted(allowed))}"
-                    )
+                _check_unit(name, suffix, where, allowed)
         if name in found:
             raise FileFormatError(f"{where}{key}: '{name}' is given twice, in two units; keep one")
         inner = _inner(value, f"{where}{name}")
+        if factor is None:
+            _check_radians(name, inner, where)
         found[name] = inner if factor is None else _scaled(inner, factor, f"{where}{key}")
     return found
+
+
+def _check_unit(name: str, suffix: str, where: str, allowed: Collection[str]) -> None:
+    """Refuse a key that is none, or has no such unit."""
+    if name in allowed and not where.startswith(_UNITLESS):
+        return
+    what = "angle" if suffix == "_deg" else "length"
+    near = nearest(name + suffix, [each + suffix for each in allowed], _ALIKE)
+    if near and name not in allowed:
+        raise FileFormatError(f"{where}{name}{suffix}: unknown key{near}")
+    known = "" if name in allowed else f", expected one of: {', '.join(sorted(allowed))}"
+    raise FileFormatError(f"{where}{name}{suffix}: '{name}' is no {what}{known}")
+
+
+def _check_radians(name: str, value: Any, where: str) -> None:
+    """Refuse an angle in radians that can only be meant in degrees."""
+    if name not in _WITHIN_A_TURN:
+        return
+    for item in value if isinstance(value, list) else [value]:
+        if isinstance(item, int | float) and TURN < abs(item) < math.inf:
+            raise FileFormatError(
+                f"{where}{name}: {item:g} rad is more than a turn; in degrees say {name}_deg"
+            )
 
 
 def _inner(value: Any, where: str) -> Any:
@@ -193,7 +214,7 @@ def _inner(value: Any, where: str) -> Any:
 def _scaled(value: Any, factor: float, where: str) -> Any:
     if isinstance(value, list):
         return [_scaled(item, factor, where) for item in value]
-    if isinstance(value, dict):
+    if isinstance(value, dict) and where.endswith(_TABLES_OF_NUMBERS):
         return {key: _scaled(item, factor, where) for key, item in value.items()}
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise FileFormatError(f"{where}: is {value!r}, expected numbers")

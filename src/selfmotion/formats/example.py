@@ -112,7 +112,7 @@ feed_mm = 50
 
 """
 _REST = """\
-# [null_motion]        # by default a cubic, refined where that lowers the cost
+# [null_motion]        # by default any at all, as good as can be found; or one of few numbers:
 # kind = "PolynomialNullMotion"
 # degree = 3
 

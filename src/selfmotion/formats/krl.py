@@ -22,7 +22,8 @@ from selfmotion.formats.controller_program import (
 from selfmotion.formats.program_axes import written
 from selfmotion.formats.program_lines import ProgramReader, Row
 from selfmotion.formats.program_settings import AXES
-from selfmotion.formats.targets import TIME_DIGITS, Stretch
+from selfmotion.formats.stretches import Stretch
+from selfmotion.formats.thinning import TIME_DIGITS
 from selfmotion.task import SE3, rpy
 
 # What no module may be called.

@@ -163,7 +163,8 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
     constraints = {**_kinds(Constraint), "Clearance": _clearance_model()}
     costs = {**_kinds(Cost), FUNCTION: _model(FUNCTION, _FUNCTION)}
     parts: Any = dict[str, _model("RobotPart", _PART)]  # type: ignore[misc]
-    of_robot: _Fields = {"parts": (parts, None), "bodies": (_shapes(), None)}
+    of_robot: _Fields = {"parts": (parts, None), "bodies": (_shapes(rides=True), None)}
+    of_workpiece: _Fields = {**_WORKPIECE, "obstacles": (_shapes(rides=True), None)}
     tasks: Any = Literal[tuple(task.value for task in Task)]
     tool_motion = _tool_motion()
     follow = _model("Follow", {**_FOLLOW, "task": (tasks, "pose"), "path": (tool_motion, None)})
@@ -178,7 +179,7 @@ def _document_model(known: tuple[type, ...]) -> type[BaseModel]:
         "constraints": (list[_one_of(constraints.values(), "kind")], None),  # type: ignore[misc]
         "relaxations": (list[model_of(Relaxation)], None),  # type: ignore[misc]
         "collision": (clearance, None),
-        "workpiece": (_model("Workpiece", {**_WORKPIECE, "obstacles": (_shapes(), None)}), None),
+        "workpiece": (_model("Workpiece", of_workpiece), None),
         "damping": (model_of(Damping), None),
         "rest": (bool, True),
         "joint_limits": (Text, None),
@@ -222,9 +223,14 @@ def _kinds(family: type[Saved]) -> dict[str, type[BaseModel]]:
     return {kind: model_of(cls, ("kind", kind)) for kind, cls in known.items()}
 
 
-def _shapes() -> Any:
-    """Return the type of a list of obstacles."""
-    shapes = [model_of(cls, ("shape", shape), _placed(cls)) for shape, cls in obstacle_shapes()]
+def _shapes(*, rides: bool = False) -> Any:
+    """Return the type of a list of obstacles: those of the world have to say where they are."""
+    return _shapes_of(tuple(obstacle_shapes()), rides)
+
+
+@lru_cache(maxsize=2)
+def _shapes_of(known: tuple[tuple[str, type[Obstacle]], ...], rides: bool) -> Any:
+    shapes = [model_of(cls, ("shape", shape), _placed(cls, rides)) for shape, cls in known]
     return list[_one_of(shapes, "shape")]  # type: ignore[misc]
 
 
@@ -240,14 +246,15 @@ def _clearance_model() -> type[BaseModel]:
     return model_of(Clearance, ("kind", "Clearance"), _clearance_fields())
 
 
-def _placed(cls: type[Obstacle]) -> _Fields:
+def _placed(cls: type[Obstacle], rides: bool) -> _Fields:
     """Return an obstacle's fields with its pose as position and orientation."""
     orientations: _Fields = {key: (Numbers, None) for key in ORIENTATIONS}
     fields: _Fields = {}
     for item in dataclasses.fields(cls):
         if item.name == "pose":
-            # Meshes have a place of their own.
-            fields |= {"position": (Numbers, None if cls is Mesh else ...), **orientations}
+            # Meshes have a place of their own, and what rides on something has its frame.
+            known = rides or cls is Mesh
+            fields |= {"position": (Numbers, None if known else ...), **orientations}
         else:
             default = ... if item.default is dataclasses.MISSING else item.default
             kind = Text if item.name == "file" else _type_of(item.type)

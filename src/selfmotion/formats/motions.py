@@ -12,10 +12,12 @@ from selfmotion.basics import (
     FileFormatError,
     PlanError,
     ProblemError,
+    Progress,
     as_flag,
     as_path,
     read_arrays,
     shown,
+    silent,
     write_bytes,
     write_csv,
     write_text,
@@ -43,6 +45,7 @@ def write_motion(
     form: str | None = None,
     settings: ProgramSettings | None = None,
     force: bool = False,
+    progress: Progress = silent,
 ) -> None:
     """Write the motion of a plan, parts, a move or a program as others read it; atomically.
 
@@ -72,6 +75,8 @@ def write_motion(
         targets, may be off the motion; there are as many as that takes, and a `rate` has no effect.
     force : bool
         Whether a motion that is not verified is written all the same.
+    progress : callable, optional
+        Told how far a controller's program is: ``("targets", 2, 7)``.
 
     Raises
     ------
@@ -92,7 +97,7 @@ def write_motion(
     if name in PROGRAMS.values():
         if rate is not None:
             raise ProblemError(f"{path}: rate has no effect: targets are as many as it takes")
-        write_program(plan, path, name, settings or ProgramSettings())
+        write_program(plan, path, name, settings or ProgramSettings(), progress)
         return
     if name == "urscript":
         _write_stream(path, plan, STREAM if rate is None else rate, settings or ProgramSettings())

@@ -78,7 +78,8 @@ def job_of(
         if "seams" in document or "job" in document:
             raise ProblemError(
                 "has seams, so that it is a job: `selfmotion job` plans it (read_seam_job); of "
-                "motions only its own .program is judged by it: `selfmotion check a.program`"
+                "motions only its own .program is judged by it: `selfmotion check a.program`; of "
+                "programs of controllers what was made of that: `check a.src --robot a.program`"
             )
         raw = in_si(document)
         functions = name_kinds(raw, FilePath() if file is None else file.parent, allow_code)

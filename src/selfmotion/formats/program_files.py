@@ -3,13 +3,13 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
 
-from selfmotion.basics import FileFormatError
+from selfmotion.basics import FileFormatError, Progress, silent
 from selfmotion.formats.controller_program import ControllerProgram, Draft, drafted
 from selfmotion.formats.krl import KrlReader, write_krl
 from selfmotion.formats.program_lines import ProgramReader
 from selfmotion.formats.program_settings import ProgramSettings
 from selfmotion.formats.rapid import RapidReader, write_rapid
-from selfmotion.formats.targets import Miss
+from selfmotion.formats.stretches import Misses
 from selfmotion.job import Program
 from selfmotion.result import Move, Parts, Plan
 
@@ -22,11 +22,15 @@ PROGRAMS = {".src": "krl", ".mod": "rapid"}
 
 
 def write_program(
-    plan: Plan | Parts | Move | Program, file: FilePath, form: str, settings: ProgramSettings
+    plan: Plan | Parts | Move | Program,
+    file: FilePath,
+    form: str,
+    settings: ProgramSettings,
+    progress: Progress = silent,
 ) -> None:
     """Write a motion as a program of a controller; see `write_motion`."""
     verdict = plan.certificate.verdict if isinstance(plan, Plan) else plan.verdict
-    _WRITERS[form](file, drafted(plan, file.stem, settings, verdict))
+    _WRITERS[form](file, drafted(plan, file.stem, settings, verdict, progress))
 
 
 def read_program(file: FilePath) -> ControllerProgram:
@@ -40,8 +44,8 @@ def read_program(file: FilePath) -> ControllerProgram:
     return _READERS[file.suffix.lower()](file).program()
 
 
-def program_miss(plan: Plan | Parts | Move | Program, file: FilePath) -> tuple[int, Miss, Miss]:
-    """Return what a program file holds: targets, the deviation it states, and what it is.
+def program_miss(plan: Plan | Parts | Move | Program, file: FilePath) -> tuple[int, Misses, Misses]:
+    """Return what a program file holds: targets, the deviations it states, and what it is.
 
     Raises
     ------

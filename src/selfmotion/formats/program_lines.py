@@ -11,7 +11,7 @@ import numpy as np
 from selfmotion.basics import FileFormatError
 from selfmotion.formats.controller_program import ControllerProgram
 from selfmotion.formats.program_axes import Axis
-from selfmotion.formats.targets import Miss, Stretch
+from selfmotion.formats.stretches import Miss, Misses, Stretch
 
 # A file of a controller has less than so many bytes, lines less than so many characters, numbers
 # less than that.
@@ -112,16 +112,20 @@ class Lines:
             raise FileFormatError(f"{self._file}: two axes are the same joint: {said[:200]}")
         return joints
 
-    def miss(self) -> Miss:
-        """Return the deviation that the comments state, or one without bounds."""
+    def miss(self) -> Misses:
+        """Return the deviations that the comments state, or ones without bounds."""
+        path = self._stated("deviation")
+        if path is None:
+            return Misses(*[Miss(np.inf, np.inf, np.inf)] * 2)
+        return Misses(path, self._stated("deviation of moves") or path)
+
+    def _stated(self, what: str) -> Miss | None:
         for note in self.notes:
-            found = re.fullmatch(
-                r"deviation: ([\d.]+) mm, ([\d.]+) rad, joints ([\d.]+)", note[:200]
-            )
+            found = re.fullmatch(rf"{what}: ([\d.]+) mm, ([\d.]+) rad, joints ([\d.]+)", note[:200])
             if found:
                 position, rotation, joint = (self.number_of(text) for text in found.groups())
                 return Miss(1e-3 * position, rotation, joint)
-        return Miss(np.inf, np.inf, np.inf)
+        return None
 
     def program(
         self, name: str, present: Sequence[str], rows: Sequence["Row"]

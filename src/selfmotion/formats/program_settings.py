@@ -35,6 +35,9 @@ class ProgramSettings:
         How far what the controller makes of the targets may be off the motion: the tool's position
         [m] and rotation [rad], and each joint by that angle or length as well. Targets are as many
         as that takes.
+    move_deviation : Tolerance, optional
+        Likewise of moves through the air. By default as far as they keep apart what has to be, up
+        to 5 mm and 5 mrad, and no less than `deviation`.
     axes : mapping, optional
         Joint → axis: ``"A1"`` to ``"A6"`` of the robot, ``"E1"`` to ``"E6"`` for others. By
         default joints that slide, and those of a cell's smaller parts, are others; of an arm with
@@ -61,6 +64,7 @@ class ProgramSettings:
     """
 
     deviation: Tolerance = _DEVIATION
+    move_deviation: Tolerance | None = None
     axes: Mapping[str, str] | None = None
     signals: Mapping[str, Signal | None] | None = None
     flange: str | None = None
@@ -69,9 +73,10 @@ class ProgramSettings:
     approach: float = 0.1
 
     def __post_init__(self) -> None:
-        if not isinstance(self.deviation, Tolerance):
-            found = shown(self.deviation)
-            raise ProblemError(f"deviation is {found}, expected a Tolerance, in m and rad")
+        for key in ("deviation", "move_deviation"):
+            value = getattr(self, key)
+            if not isinstance(value, Tolerance) and (value is not None or key == "deviation"):
+                raise ProblemError(f"{key} is {shown(value)}, expected a Tolerance, in m and rad")
         for name in ("axes", "signals"):
             if getattr(self, name) is None:
                 continue
@@ -106,8 +111,8 @@ class ProgramSettings:
 def read_program_settings(file: str | FilePath) -> ProgramSettings:
     """Read the settings of a controller's program: TOML or JSON, keys as in `ProgramSettings`.
 
-    ``deviation`` is a table with ``position`` (or ``position_mm``) and ``rotation`` (or
-    ``rotation_deg``); a signal is a list of an output and true or false.
+    ``deviation`` and ``move_deviation`` are tables with ``position`` (or ``position_mm``) and
+    ``rotation`` (or ``rotation_deg``); a signal is a list of an output and true or false.
 
     Raises
     ------
@@ -115,7 +120,11 @@ def read_program_settings(file: str | FilePath) -> ProgramSettings:
         The file cannot be read, or says something else; file and key are named.
     """
     path = as_path(file)
-    values: dict[str, Any] = in_si(read_document(path))
+    try:
+        values: dict[str, Any] = in_si(read_document(path))
+    except FileFormatError as error:
+        text = str(error).removeprefix(f"{path}: ")
+        raise FileFormatError(f"{path}: {text}") from error
     known = [item.name for item in dataclasses.fields(ProgramSettings)]
     for key in values:
         if key not in known:
@@ -123,11 +132,11 @@ def read_program_settings(file: str | FilePath) -> ProgramSettings:
                 f"{path}: unknown key '{key}'{nearest(key, known)}; expected {', '.join(known)}"
             )
     try:
-        if "deviation" in values:
-            given = values["deviation"]
+        for key in {"deviation", "move_deviation"} & set(values):
+            given = values[key]
             if not isinstance(given, dict) or set(given) - {"position", "rotation"}:
-                raise ProblemError("deviation: expected a table of position and rotation")
-            values["deviation"] = Tolerance(**{**dataclasses.asdict(_DEVIATION), **given})
+                raise ProblemError(f"{key}: expected a table of position and rotation")
+            values[key] = Tolerance(**{**dataclasses.asdict(_DEVIATION), **given})
         return ProgramSettings(**values)
     except SelfmotionError as error:
         raise FileFormatError(f"{path}: {error}") from error

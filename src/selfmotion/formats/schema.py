@@ -7,6 +7,7 @@ from typing import Any
 from selfmotion.formats.documents import ANGLES, LENGTHS
 from selfmotion.formats.models import document_model
 from selfmotion.formats.seam_job import JOB, OF_PROBLEM, OF_TABLE, SEAM
+from selfmotion.optimise import QuasiNewton
 
 _MOTION = "ToolMotion"
 # Paths that are made of others, and the key of these.
@@ -112,8 +113,13 @@ def _with_units(node: Any) -> Any:
     # A schema's own word, unless it is a key that is called so.
     if not isinstance(keys, dict) or "type" not in found:
         return found
+    if found.get("title") == QuasiNewton.__name__:
+        return found
     for suffix, names, scale in (("_deg", ANGLES, 180.0 / math.pi), ("_mm", LENGTHS, 1e3)):
         for name in sorted(names & set(keys)):
+            if "$ref" in keys[name]:
+                # A table, whose own keys have units.
+                continue
             keys[name + suffix] = _scaled(keys[name], scale)
             if name in found.get("required", []):
                 found["required"].remove(name)

@@ -17,7 +17,7 @@ from selfmotion.formats.problem_parts import FEED_BOUNDS, led, obstacle, start_o
 from selfmotion.formats.workpiece import NAME, placed_body, standing
 from selfmotion.job import Program, Seam, plan_job
 from selfmotion.path import Path, Placed, section_at_rest
-from selfmotion.problem import NO_OVERLAP
+from selfmotion.problem import NO_OVERLAP, Problem
 from selfmotion.robot import RobotModel
 
 # Keys of a job, of a seam besides those of a problem, and of seams in one table.
@@ -44,6 +44,28 @@ class SeamJob:
     robot: RobotModel
     seams: tuple[Seam, ...]
     settings: Mapping[str, Any]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What to know before planning: see `Problem.remarks`; of several seams the first's."""
+        clearance, kept = self.settings.get("clearance"), self.settings["constraints"]
+        found: dict[str, str] = {}
+        for seam in self.seams:
+            asked = (*kept, *seam.constraints, *([] if clearance is None else [clearance]))
+            try:
+                problem = Problem(
+                    self.robot,
+                    seam.path,
+                    seam.task,
+                    constraints=asked,
+                    relaxations=seam.relaxations,
+                )
+            except SelfmotionError:
+                # It is told why when the seam is planned.
+                continue
+            for remark in problem.remarks:
+                found.setdefault(remark.split(" at t =")[0], f"seam '{seam.name}': {remark}")
+        return tuple(found.values())
 
     def plan(self, **options: Any) -> Program:
         """Plan it; `options` are further ones of `plan_job`."""

@@ -10,6 +10,7 @@ from selfmotion.job.growing import Growing
 from selfmotion.job.order import EXACT
 from selfmotion.job.ordering import Ordering
 from selfmotion.job.program import Program, Step
+from selfmotion.job.seam import JOB_END, JOB_START
 from selfmotion.job.steps import seam_steps
 from selfmotion.job.work import Work
 from selfmotion.result import Move
@@ -118,7 +119,7 @@ class Builder:
 
     def _named(self, pair: Pair) -> str:
         names = [None if k is None else self._ordering.name_of(k) for k in pair]
-        return f"{names[0] or 'start'} → {names[1] or 'end'}"
+        return f"{names[0] or JOB_START} → {names[1] or JOB_END}"
 
     def _steps(self, states: Sequence[int], moves: dict[Pair, Move]) -> list[Step]:
         pairs, steps = self._pairs(states), list[Step]()

@@ -8,7 +8,7 @@ from selfmotion.certificate import FinishedMotion
 from selfmotion.collision import Obstacle
 from selfmotion.job.ordering import Ordering, State
 from selfmotion.job.program import Program, Step
-from selfmotion.job.seam import Seam
+from selfmotion.job.seam import JOB_END, JOB_START, Seam
 from selfmotion.job.steps import seam_steps
 from selfmotion.job.work import Work
 from selfmotion.problem import Problem
@@ -183,8 +183,8 @@ class Growing:
         return place
 
     def _move_step(self, sofar: _Sofar, seam: Seam | None, move: Move) -> Step:
-        first = "start" if sofar.seam is None else sofar.seam.name
-        last = "end" if seam is None else seam.name
+        first = JOB_START if sofar.seam is None else sofar.seam.name
+        last = JOB_END if seam is None else seam.name
         may = tuple(name for one in (sofar.seam, seam) if one is not None for name in one.may_meet)
         return Step(f"{first} → {last}", move, may_meet=may)
 

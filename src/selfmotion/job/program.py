@@ -260,16 +260,21 @@ class Program:
         return self
 
     def write_timetable(self, file: str | FilePath) -> None:
-        """Write when each step begins and ends, and each event is [s], as CSV; atomically."""
-        rows = [
-            (begin, begin + _duration(step), "seam" if step.is_seam else "move", step.name)
-            for begin, step in zip(self.begins, self.steps, strict=True)
-        ]
-        rows += [(at, at, "event", f"{seam}: {event}") for at, seam, event in self.events]
+        """Write when each step begins and ends, and each event is [s], as CSV; atomically.
+
+        Events at one time are in the order in which they were given.
+        """
+        rows = list[tuple[float, float, str, str]]()
+        for begin, step in zip(self.begins, self.steps, strict=True):
+            kind = "seam" if step.is_seam else "move"
+            rows.append((begin, begin + _duration(step), kind, step.name))
+            # Of those at one time the order counts.
+            for event, at in sorted(step.events, key=lambda item: item[1]):
+                rows.append((begin + at, begin + at, "event", f"{step.name}: {event}"))
         lines = ["begin,end,kind,name"]
         lines += [
             f'{begin:.6f},{end:.6f},{kind},"{name.replace(chr(34), chr(34) * 2)}"'
-            for begin, end, kind, name in sorted(rows)
+            for begin, end, kind, name in rows
         ]
         write_text(as_path(file), "\n".join(lines) + "\n")
 

@@ -15,6 +15,8 @@ from selfmotion.problem import Problem
 from selfmotion.result import Plan
 from selfmotion.task import Relaxation, Task
 
+# What the ends of a job are called; no seam is.
+JOB_START, JOB_END = "job start", "job end"
 # Names are columns of tables, and words of files and pages [characters].
 _LONGEST_NAME = 200
 
@@ -81,6 +83,8 @@ class Seam:
                 f"seam: name '{self.name[:20]}…' has {len(self.name)} characters, expected at most "
                 f"{_LONGEST_NAME}"
             )
+        if self.name in (JOB_START, JOB_END):
+            raise ProblemError(f"seam: '{self.name}' is an end of the job; give another name")
         what = f"seam '{self.name}'"
         if not isinstance(self.path, Path):
             raise ProblemError(f"{what}: path is {shown(self.path)}, expected a Path (Line, …)")
@@ -126,7 +130,21 @@ class Seam:
                 raise ProblemError(f"{what}: event {shown(name)}, expected a text and a time [s]")
             at = as_number(seconds, f"{what}: event '{name}'", least=0.0, most=self.path.duration)
             found.append((name, at))
+        _check_switched(found, what)
         return tuple(found)
+
+
+def _check_switched(events: Sequence[tuple[str, float]], what: str) -> None:
+    """Refuse what is switched on and off at once: the one that comes first has no effect."""
+    for k, (first, at) in enumerate(events):
+        for later, then in events[k + 1 :]:
+            words = (first.lower().split(), later.lower().split())
+            opposite = {each[-1] for each in words if each} == {"on", "off"}
+            if at == then and opposite and words[0][:-1] == words[1][:-1]:
+                raise ProblemError(
+                    f"{what}: events '{first}' and '{later}' are both at {at:.6g} s, so that the "
+                    f"first has no effect; give them different times (in a table different rows)"
+                )
 
 
 def one_way(constraint: Constraint) -> bool:

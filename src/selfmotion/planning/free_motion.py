@@ -14,6 +14,7 @@ from selfmotion.basics import (
     read_only,
     silent,
 )
+from selfmotion.collision import how_near
 from selfmotion.constraints import Constraint, Envelope
 from selfmotion.follow import Follows
 from selfmotion.motion import Trajectory, slowdown_of
@@ -161,8 +162,8 @@ class FreeMotions:
         for model, far in asked.bodies:
             near = model.distance(q)
             if near.value < far:
-                apart = f"{near.value * 1e3:.2f} mm apart (wanted: {far * 1e3:.2f} mm)"
-                return f"{near.first} and {near.second} are {apart}"
+                apart = f"{how_near(near.value)} (wanted: {far * 1e3:.2f} mm)"
+                return f"{near.first} and {near.second} {apart}"
         names = ", ".join(item.name for item in asked.quantities)
         return f"it leaves what is asked of {names}"
 

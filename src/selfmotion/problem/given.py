@@ -4,9 +4,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from selfmotion.basics import Array, ProblemError, StartError, shown
 from selfmotion.certificate import Requirement
-from selfmotion.constraints import Clearance, Constraint, JointVelocityLimits
+from selfmotion.constraints import (
+    Clearance,
+    Constraint,
+    JointAccelerationLimits,
+    JointJerkLimits,
+    JointVelocityLimits,
+    ToolLimits,
+)
 from selfmotion.costs import Cost
 from selfmotion.follow import Follow, Follows
 from selfmotion.motion import NullMotion
@@ -36,8 +45,11 @@ _EXAMPLES = {
     "damping": "Damping or None",
     "collision": "Clearance or None",
 }
-# Limits so many times the arm's own are in other units.
+# Limits so many times the arm's own are in other units, and so are those that no arm has: of joints
+# by order, and of the tool's speed [m/s].
 _FAR_ABOVE = 10.0
+_RATES = {1: ("rad/s", 50.0), 2: ("rad/s²", 200.0), 3: ("rad/s³", 5e4)}
+_FASTEST_TOOL = 50.0
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
 
@@ -86,18 +98,25 @@ def _beyond(robot: RobotModel, start: Array) -> str:
 
 
 def unit_remarks(robot: RobotModel, constraints: Sequence[Constraint]) -> Iterator[str]:
-    """Yield limits that are so far above the arm's own that they may be meant in degrees."""
+    """Yield limits so far above the arm's own, or any arm's, that they may be in other units."""
     for item in constraints:
-        if not isinstance(item, JointVelocityLimits) or item.limit is None or item.replace:
+        if isinstance(item, ToolLimits) and _FASTEST_TOOL < item.speed < np.inf:
+            yield f"ToolLimits: a speed of {item.speed:g} m/s is no limit; in mm/s? speed_mm"
+        limits = JointVelocityLimits | JointAccelerationLimits | JointJerkLimits
+        if not isinstance(item, limits) or item.limit is None:
             continue
-        own = replace(item, replace=True).of(robot)
-        published = item.published(robot)
+        kind, (unit, most) = type(item).__name__, _RATES[item.order]
+        own, published = replace(item, replace=True).of(robot), item.published(robot)
         for k, name in enumerate(robot.joint_names):
-            if own[k] > _FAR_ABOVE * published[k] and not robot.is_prismatic(name):
-                yield (
-                    f"JointVelocityLimits: {own[k]:g} rad/s for '{name}' has no effect, the arm's "
-                    f"own limit is {published[k]:.4g} rad/s; in degrees? limit_deg"
-                )
+            if robot.is_prismatic(name) or not np.isfinite(own[k]):
+                continue
+            told = ""
+            if not item.replace and own[k] > _FAR_ABOVE * published[k]:
+                told = f"has no effect, the arm's own limit is {published[k]:.4g} {unit}"
+            elif own[k] > most:
+                told = f"is more than arms do (above {most:g} {unit})"
+            if told:
+                yield f"{kind}: {own[k]:g} {unit} for '{name}' {told}; in degrees? limit_deg"
                 break
 
 

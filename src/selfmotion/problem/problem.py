@@ -57,6 +57,7 @@ from selfmotion.problem.given import (
     check_start,
     unit_remarks,
 )
+from selfmotion.problem.inside import inside_remarks
 from selfmotion.problem.knots import smooth_knots
 from selfmotion.robot import RobotModel
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
@@ -338,9 +339,9 @@ class Problem:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What to know before planning: links that overlap, limits that look wrong or are none."""
-        bodies = (model for model, _ in self.envelope.bodies)
-        found = (pair for model in bodies for pair in model.overlapping if pair.is_checked)
+        """What to know before planning: links that overlap, limits or places that look wrong."""
+        models = (model for model, _ in self.envelope.bodies)
+        found = (pair for model in models for pair in model.overlapping if pair.is_checked)
         told = (f"{pair.first} - {pair.second}: {pair.remedy}" for pair in found)
         vain = (
             f"{item.requirement(self.robot).name} are asked for, but none are known of "
@@ -350,7 +351,9 @@ class Problem:
             if not item.applies(self.robot) and not any(item is usual for usual in KEPT)
         )
         limits = unit_remarks(self.robot, self.constraints)
-        return tuple(dict.fromkeys([*told, *limits, *vain]))
+        bodies = [body for item in self.requirements for body in item.obstacles]
+        inside = inside_remarks(self.robot, self.follows, bodies)
+        return tuple(dict.fromkeys([*told, *limits, *vain, *inside]))
 
     def certify(
         self,

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError, nearest
-from selfmotion.collision import ClearanceModel, CollisionModel
+from selfmotion.collision import ClearanceModel, CollisionModel, how_near
 from selfmotion.costs import Samples
 from selfmotion.realtime.settings import CLEAR_FOR, CLEARANCE_MARGIN, LEAVING, LEVEL, NEARER
 from selfmotion.robot import RobotModel
@@ -101,9 +101,10 @@ class Surroundings:
             row, pair = np.argwhere(soon[1:] < allowed)[0]
             first, second = model.pairs[pair]
             self.blocked = True
+            near = how_near(float(soon[row + 1, pair]), digits=1).replace("are ", "be ")
             self.message = (
-                f"'{first}' and '{second}' would be {soon[row + 1, pair] * 1e3:.1f} mm apart in "
-                f"{times[row + 1]:.2f} s, wanted {distance * 1e3:.1f} mm"
+                f"'{first}' and '{second}' would {near} in {times[row + 1]:.2f} s, wanted "
+                f"{distance * 1e3:.1f} mm"
             )
         rows = -(found.slopes[:, None] @ by_q[nodes[found.rows]])[:, 0]
         # From where the arm is, no more can be asked for than to come no nearer. Obstacles that

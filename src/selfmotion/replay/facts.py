@@ -9,6 +9,9 @@ from selfmotion.result import Plan, Report
 # A number and a remark, shown smaller after it.
 Cell = tuple[str, str]
 
+# Costs that differ by less than this share are shown alike.
+_ALIKE = 5e-4
+
 
 def facts(plan: Plan) -> dict[str, Cell]:
     """Return what a reader wants to know of a plan: label → number and remark."""
@@ -36,7 +39,7 @@ def facts(plan: Plan) -> dict[str, Cell]:
     turns, *which = str(plan.reversals).split(": ", 1)
     rows["joints turn round"] = (turns, "".join(which))
     for name, near in plan.approaches.items():
-        rows[f"closest to {name}"] = _extreme(near, "m")
+        rows[f"closest to {name}"] = _extreme(replace(near, value=1e3 * near.value), "mm")
     rows["smallest singular value"] = _extreme(certificate.smallest_singular_value, "")
     rows["from end to start"] = (f"{certificate.closure:.3g} {robot.unit_of()}", "")
     rows["checked at"] = (f"{certificate.samples} times", "by forward kinematics")
@@ -68,9 +71,10 @@ def describe(plan: Plan) -> str:
     saved = ""
     if report.initial_cost:
         change = report.cost / report.initial_cost - 1.0
-        saved = (
-            f", {abs(100 * change):.1f} % {'below' if change <= 0 else 'above'} the motion x = 0"
-        )
+        saved = ", as without self-motion"
+        if abs(change) >= _ALIKE:
+            side = "below" if change <= 0 else "above"
+            saved = f", {abs(100 * change):.1f} % {side} that without self-motion"
         if change > 5e-4 and plan.problem.all_constraints:
             saved += ", which is not held to its constraints"
     items = plan.problem.follows.items

@@ -22,8 +22,8 @@ from selfmotion.result import Move, Parts, Plan, Report
 from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
-# Points of curves for each step, at least and in all; fewer than these nobody sees.
-_POINTS, _MOST_POINTS = 25, 6001
+# Points of curves for each step that is not brief [s], at least, and in all; more nobody sees.
+_POINTS, _BRIEF, _MOST_POINTS = 25, 0.5, 6001
 # Colours of seams, by turns: those of the page's plots.
 _COLORS = ((66, 105, 208), (232, 135, 30), (60, 169, 81), (224, 80, 140), (164, 99, 242))
 # Steps that are told to take longest.
@@ -86,7 +86,9 @@ class Whole:
     @property
     def points(self) -> int:
         """How many points its curves need."""
-        return min(max(401, _POINTS * len(self.marks)), _MOST_POINTS)
+        shortest = max(min(mark.end - mark.begin for mark in self.marks), _BRIEF)
+        wanted = int(_POINTS * self.marks[-1].end / shortest)
+        return min(max(401, wanted), _MOST_POINTS)
 
     @property
     def description(self) -> str:

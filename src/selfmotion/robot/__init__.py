@@ -1,5 +1,6 @@
 """The arm: a URDF loaded into Pinocchio as a chain with one coordinate per joint."""
 
+from selfmotion.robot.angles import check_radians as check_radians
 from selfmotion.robot.building import (
     moving_joints as moving_joints,
     rebuild_robot as rebuild_robot,

@@ -8,7 +8,16 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, ProblemError, Saved, as_numbers, nearest, series
+from selfmotion.basics import (
+    TURN,
+    Array,
+    ProblemError,
+    Saved,
+    as_number,
+    as_numbers,
+    nearest,
+    series,
+)
 from selfmotion.robot.chain_series import ChainSeries
 from selfmotion.robot.model import RobotModel
 
@@ -55,6 +64,12 @@ class Coordinate(Saved, ABC, family="coordinate"):
         measured: no proof.
         """
         return None
+
+    def check_value(self, value: float, what: str) -> None:
+        """Raise ProblemError for what is no value of it, or of an angle only in degrees."""
+        number = as_number(value, what)
+        if np.isfinite(self.period) and abs(number) > TURN:
+            raise ProblemError(f"{what} is {number:g} rad, more than a turn; in degrees?")
 
     def away(self, values: Array, center: float) -> Array:
         """Return how far values (K,) are from a centre; of angles the short way."""

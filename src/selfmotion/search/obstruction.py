@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.collision import how_near
 from selfmotion.problem import Problem
 from selfmotion.search.remedies import remedies
 from selfmotion.search.settings import AT_LIMIT, COARSE_POSES, MOST_LOOKED_AT, STRETCHED
@@ -76,8 +77,8 @@ def _roomiest(poses: SinglePoses, met: Array) -> str:
     # The last ones were moved aside from what they met.
     _, worst, asked = max((poses.room(q) for q in met[-MOST_LOOKED_AT:]), key=lambda each: each[0])
     return (
-        f"at best '{worst.first}' and '{worst.second}' are {1e3 * worst.value:.3g} mm apart "
-        f"(wanted: {1e3 * asked:.3g} mm)"
+        f"at best '{worst.first}' and '{worst.second}' {how_near(worst.value)} (wanted: "
+        f"{1e3 * asked:.3g} mm)"
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import ProblemError, shown
+from selfmotion.basics import TURN, ProblemError, shown
 
 POSITION_ROWS, _ROTATION = ("x", "y", "z"), ("rx", "ry", "rz")
 ROW_NAMES = (*POSITION_ROWS, *_ROTATION)
@@ -72,6 +72,11 @@ class Relaxation:
             )
         if not self.band > 0.0:
             raise ProblemError(f"relaxation {self.name}: band is {self.band}, expected > 0")
+        if self.angular and TURN < self.band < np.inf:
+            raise ProblemError(
+                f"relaxation {self.name}: a band of {self.band:g} rad is more than a turn; in "
+                f"degrees? 10° is 0.1745 rad"
+            )
         if self.axes not in ("world", "tool"):
             raise ProblemError(
                 f"relaxation {self.name}: axes are '{self.axes}', expected 'world' or 'tool'"

@@ -79,7 +79,7 @@ class Page {
     const [first, second] = clearance.pairs[k];
     const apart = clearance.value[k];
     get("pair").classList.toggle("meet", apart <= 0);
-    get("pair").textContent = apart > 0 ? `closest: ${first} and ${second}, ${format(apart)} m`
+    get("pair").textContent = apart > 0 ? `closest: ${first} and ${second}, ${format(1e3 * apart)} mm`
       : `${first} and ${second} meet`;
     this.stage?.mark([first, second], this.plan.obstacles, apart <= 0);
   }

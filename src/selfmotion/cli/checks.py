@@ -1,0 +1,96 @@
+"""What `selfmotion check` judges: plans, motions of files, programs of controllers."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NoReturn
+
+import typer
+
+import selfmotion as sm
+from selfmotion import formats
+from selfmotion.basics import Progress
+from selfmotion.certificate import Extreme, approaches
+from selfmotion.cli import options
+from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, stages, terminal
+
+_Near = Mapping[str, Extreme]
+
+
+def read(
+    file: Path, degrees: bool, within: sm.Tolerance | None
+) -> tuple[sm.Trajectory, sm.Tolerance | None]:
+    """Return the motion of a file, and what it may miss its path by: what a program states."""
+    motion = sm.read_motion(file, degrees=degrees)
+    if within is None and is_program(file):
+        within = formats.stated_deviation(file)
+        if within is not None:
+            text = (
+                f"note: judged within the {1e3 * within.position:.3g} mm and {within.rotation:.2g} "
+                f"rad that the file states; accelerations are the controller's, and not judged"
+            )
+            stages.print(text, markup=False, soft_wrap=True)
+    return motion, within
+
+
+def is_program(file: Path) -> bool:
+    """Whether a file is a program of a controller."""
+    return file.suffix.lower() in formats.PROGRAMS
+
+
+def of_plan(
+    file: Path, within: sm.Tolerance | None, judged: tuple[Any, ...], progress: Progress
+) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
+    """Return the certificate of a plan, how near bodies come, and the arm."""
+    plan = sm.load_plan(file, progress=progress)
+    besides = options.requirements(plan.robot, *judged)
+    close = near(plan.robot, plan.trajectory, (*plan.requirements, *besides))
+    if within is None and not any(judged):
+        return plan.certificate, close, plan.robot
+    return plan.check(within, besides, progress=progress), close, plan.robot
+
+
+def of_problem(
+    file: str,
+    motion: sm.Trajectory,
+    within: sm.Tolerance | None,
+    judged: tuple[Any, ...],
+    progress: Progress,
+    *,
+    of_controller: bool = False,
+) -> tuple[sm.Certificate, _Near, sm.RobotModel]:
+    """Return the same of a motion by all that a problem file asks, and what else is."""
+    job = sm.read_job(file)
+    problem = job.problem
+    if of_controller:
+        kept = formats.what_targets_keep(problem.constraints)
+        problem = replace(problem, constraints=kept)
+    besides = options.requirements(problem.robot, *judged)
+    allowed, robot = within or job.tolerance, problem.robot
+    certificate = problem.certify(motion, allowed, besides=besides, progress=progress)
+    return certificate, near(robot, motion, (*problem.requirements, *besides)), robot
+
+
+def near(robot: sm.RobotModel, motion: sm.Trajectory, asked: Sequence[sm.Requirement]) -> _Near:
+    """Return how near each body comes."""
+    return approaches(asked, sm.FinishedMotion(robot, motion.of_joints(robot.joint_names)))
+
+
+def of_program(file: Path, job: Path, within: sm.Tolerance | None, as_json: bool) -> NoReturn:
+    """Judge a controller's program by the job that it is of, step by step, and end."""
+    if not is_program(file):
+        raise sm.ProblemError(f"{file}: is no program of a controller, which {job} could judge")
+    steps = formats.judged_steps(file, sm.load_program(job), within)
+    verified = all(step.verified for step in steps)
+    if as_json:
+        data = {"verified": verified, "steps": [step._asdict() for step in steps]}
+        terminal.print_json(data=data)
+    else:
+        for step in steps:
+            style = None if step.verified else "bold red"
+            text = f"{step.name}: {step.verdict}"
+            terminal.print(text, style=style, markup=False, soft_wrap=True)
+        count = sum(not step.verified for step in steps)
+        text = f"not verified: {count} of {len(steps)} steps" if count else "verified, step by step"
+        terminal.print(text, markup=False, soft_wrap=True)
+    raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)

@@ -1,0 +1,149 @@
+"""Joint targets of a motion from rest to rest, and how far off it they take a controller."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from selfmotion.basics import Array
+from selfmotion.certificate import Tolerance
+from selfmotion.motion import Trajectory
+from selfmotion.robot import Chain
+
+# Where between two targets, and how near to each, the error is looked at.
+_BETWEEN = np.array([0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875])
+
+
+class Event(NamedTuple):
+    """What happens when a target is reached: its number in the stretch, and what."""
+
+    target: int
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A motion from rest to rest by its targets, or a rest.
+
+    Attributes
+    ----------
+    name : str
+        Of the seam or move.
+    t : (K + 1,)
+        When each target is reached, from 0 [s].
+    q : (K + 1, n)
+        Where it begins, and its targets [rad or m].
+    events : tuple of Event
+    """
+
+    name: str
+    t: Array
+    q: Array
+    events: tuple[Event, ...] = ()
+
+    @property
+    def is_rest(self) -> bool:
+        """Whether the arm rests all the while."""
+        return bool((self.q == self.q[0]).all())
+
+
+class Miss(NamedTuple):
+    """How far targets take a controller off the motion, at the time where it is farthest.
+
+    Attributes
+    ----------
+    position, rotation : float
+        Of the tool [m, rad].
+    joint : float
+        Of a joint [rad or m].
+    """
+
+    position: float
+    rotation: float
+    joint: float
+
+    def share(self, allowed: Tolerance) -> float:
+        """Return how much of what is allowed it takes: above 1 too much."""
+        rotation = max(self.rotation, self.joint) / allowed.rotation
+        return max(self.position / allowed.position, rotation)
+
+
+class Misses(NamedTuple):
+    """How far targets take a controller off what it makes, and off moves through the air.
+
+    Attributes
+    ----------
+    path, moves : Miss
+    """
+
+    path: Miss
+    moves: Miss
+
+    def worse(self, other: "Misses") -> "Misses":
+        """Return the larger ones of both."""
+        return Misses(*(Miss(*map(max, *pair)) for pair in zip(self, other, strict=True)))
+
+
+NO_MISS = Miss(0.0, 0.0, 0.0)
+
+
+def miss_of(
+    stretch: Stretch, motion: Trajectory, chains: Sequence[Chain], first: float = 0.0
+) -> Miss:
+    """Return how far a controller is off a motion at most, whichever way it joins the targets.
+
+    In between it may go straight in joint space, past each corner on the line between the middles
+    of the two sides, which is the largest corner that controllers round, or along the cubic spline
+    through all targets that begins and ends at rest; at the times of the motion, which holds it to
+    its speeds as well.
+    """
+    t, q, times = stretch.t, stretch.q, _looked_at(stretch)
+    exact = motion(np.clip(first + times, motion.t[0], motion.t[-1]))
+    worst = NO_MISS
+    for line in ways(t, q, times):
+        worst = Miss(*map(max, worst, miss_between(line, exact, chains)))
+    return worst
+
+
+def miss_between(q: Array, exact: Array, chains: Sequence[Chain]) -> Miss:
+    """Return how far configurations (K, n) are off others at most, one by one."""
+    position = rotation = 0.0
+    for chain in chains:
+        _, here, there = chain.along(q)
+        _, turned, placed = chain.along(exact)
+        position = max(position, float(np.linalg.norm(there - placed, axis=1).max()))
+        turns = Rotation.from_matrix(np.einsum("kji,kjl->kil", here, turned)).magnitude()
+        rotation = max(rotation, float(turns.max()))
+    return Miss(position, rotation, float(np.abs(q - exact).max()))
+
+
+def _looked_at(stretch: Stretch) -> Array:
+    """Return times at targets and between them (K,) [s]."""
+    t = stretch.t
+    return np.append((t[:-1, None] + _BETWEEN * np.diff(t)[:, None]).ravel(), t[-1])
+
+
+def spline_of(stretch: Stretch) -> tuple[Array, Array, Array]:
+    """Return times (K,) [s], positions and velocities (K, n) of the spline through the targets."""
+    times = _looked_at(stretch)
+    spline = CubicSpline(stretch.t, stretch.q, bc_type="clamped")
+    return times, spline(times), spline(times, 1)
+
+
+def ways(t: Array, q: Array, times: Array) -> list[Array]:
+    """Return joint positions (K, n) at times by each way of joining targets."""
+    lines = _straight(times, t, q)
+    if len(t) < 3:
+        return [lines]
+    middles = 0.5 * (t[:-1] + t[1:])
+    knots = np.concatenate([t[:1], middles, t[-1:]])
+    corners = _straight(times, knots, _straight(knots, t, q))
+    spline = CubicSpline(t, q, bc_type="clamped")(times)
+    return [lines, corners, spline]
+
+
+def _straight(times: Array, t: Array, q: Array) -> Array:
+    return np.stack([np.interp(times, t, column) for column in q.T], axis=1)
