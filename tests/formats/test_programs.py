@@ -11,7 +11,7 @@ import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.formats import program_miss
 from selfmotion.formats.program_axes import tool_from_flange
-from selfmotion.job.program import Step
+from selfmotion.job import Step
 from support.arms import PANDA_HOME, robot_named
 from support.shell import invoke
 
