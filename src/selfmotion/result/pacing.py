@@ -69,7 +69,7 @@ def fastest_pace(motion: Trajectory, limits: PaceLimits, ends: Ends, step: float
     limits : PaceLimits
     ends : Ends
     step : float
-        Time between two knots of the pace [s], about.
+        Time between two knots of the pace [s], about; more of a motion that is slow all along.
 
     Raises
     ------
@@ -85,12 +85,12 @@ def fastest_pace(motion: Trajectory, limits: PaceLimits, ends: Ends, step: float
     jerk = bool(np.isfinite(limits.jerk).any())
     for _ in range(_BASES if jerk else 0):
         # Tangents hold near a pace, so that the next one begins anew from there.
-        pace = _scaled(smooth(pace, step, jerk), motion, limits)
+        pace = _scaled(smooth(pace, step, jerk, len(motion.t)), motion, limits)
         near, room = Squares.constant(pace.t, 1.0), _all_room(len(pace.t) - 1, limits)
         pace = _changed(
             pace, _improved(pace, motion, limits, room, near, ends, _BY_JERKS, _ROUGH_GAP)
         )
-    pace = _scaled(smooth(pace, step, jerk), motion, limits)
+    pace = _scaled(smooth(pace, step, jerk, len(motion.t)), motion, limits)
     return _settled(pace, motion, limits, ends)
 
 
