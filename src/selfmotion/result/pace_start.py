@@ -11,7 +11,7 @@ from selfmotion.result.pace_rows import length_speed
 _FEWEST, _ENOUGH = 600, 3000
 # Its first and last intervals have so many parts.
 _GRADED = 12
-# A smooth pace has so many intervals at least; and so many at most, or for each sample of the motion,
+# A smooth pace has so many intervals at least; so many at most, or for each sample of the motion,
 # with this time between two [s], more with less: slow limits make a motion long, not more winding.
 _INTERVALS, _MANY, _PER_SAMPLE, _COARSE = 250, 4000, 4, 4e-3
 # It is as smooth as the mean, so often, over so many knots.
