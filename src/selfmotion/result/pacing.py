@@ -38,6 +38,8 @@ _ROUGH, _NEAREST = 1.002, 2e-4
 # With limits of the jerk likewise where at some time no limit is used by this share: within an
 # interval the jerk cannot follow what the path asks for.
 _IDLE = 0.8
+# A pace that passes limits manyfold is that of a programme which was not solved: what is known stays.
+_WILD = 10.0
 # A jump of this share of a limit has a knot of its own.
 _JUMP = 0.02
 # Gaps of the linear programmes, as shares: while the pace is rough, and then.
@@ -113,6 +115,8 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
     most = _BY_JERKS_LATER if jerk else _OTHERS
     for number in range(_MOST_STEPS):
         near = _improved(base, motion, limits, room, near, ends, most, _GAP)
+        if np.isfinite(best[0][1]) and not near.is_positive:
+            break
         pace = _changed(base, near)
         used, least = limits.shares(along(pace, motion))
         kept = _scaled(pace, motion, limits, least=1.0)
@@ -122,6 +126,8 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
         rank = max(passed, _KEPT), float(kept.t[-1])
         if rank < best[0]:
             best = rank, kept
+        if over.max() > _WILD and np.isfinite(best[0][1]):
+            break
         if over.max() < _NEAR and passed <= _KEPT and abs(before / pace.t[-1] - 1.0) < _GAIN:
             break
         before = pace.t[-1]
