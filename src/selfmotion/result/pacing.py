@@ -38,7 +38,7 @@ _ROUGH, _NEAREST = 1.002, 2e-4
 # With limits of the jerk likewise where at some time no limit is used by this share: within an
 # interval the jerk cannot follow what the path asks for.
 _IDLE = 0.8
-# A pace that passes limits manyfold is that of a programme which was not solved: what is known stays.
+# A pace that passes limits manyfold is of a programme that was not solved: what is known stays.
 _WILD = 10.0
 # A jump of this share of a limit has a knot of its own.
 _JUMP = 0.02
