@@ -79,7 +79,8 @@ def plan_job(
         What a unit of a seam's cost counts, beside the time of moves [s]; by default only time
         counts.
     deadline : float
-        After so many seconds a move counts as not found.
+        After so many seconds of the processor a move counts as not found. A move that takes nearly
+        as long to find may be found on one machine, or on one day, and not on another.
     folder : path, optional
         Keeps every plan and move there as soon as it is finished; a job that is begun again takes
         what it finds, and ends in the same program.
