@@ -33,12 +33,29 @@ def random_stops(rng: np.random.Generator, count: int, states: int, share: float
 
 def by_force(stops: Stops) -> float:
     """Return the least cost of all orders and states, one by one."""
-    least = np.inf
-    for order in itertools.permutations(range(stops.count)):
-        if stops.keeps(order):
-            for states in itertools.product(*(stops.states[k] for k in order)):
-                least = min(least, stops.cost(states))
-    return least
+
+    def onward(made: frozenset[int], state: int, cost: float) -> float:
+        if len(made) == stops.count:
+            return cost + stops.last[state]
+        return min(
+            (
+                onward(made | {stop}, other, cost + between[state][other] + own[other])
+                for stop in range(stops.count)
+                if stop not in made and stops.allows(stop, made)
+                for other in states[stop]
+            ),
+            default=np.inf,
+        )
+
+    between, own = stops.between.tolist(), stops.own.tolist()
+    states = [each.tolist() for each in stops.states]
+    begun = (
+        onward(frozenset({stop}), state, float(stops.first[state] + stops.own[state]))
+        for stop in range(stops.count)
+        if stops.allows(stop, frozenset())
+        for state in states[stop]
+    )
+    return min(begun, default=np.inf)
 
 
 @pytest.mark.parametrize("seed", range(20))
