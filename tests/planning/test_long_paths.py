@@ -7,8 +7,9 @@ import selfmotion as sm
 from selfmotion.basics import silent
 from selfmotion.engine import Counts
 from selfmotion.optimise import QuasiNewton
-from selfmotion.planning.draft import Draft, Known
+from selfmotion.planning.draft import Draft
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.known import Known
 from selfmotion.planning.long_paths import is_long
 from selfmotion.planning.settings import VERY_LONG_WAY
 from support.arms import robot_named

@@ -47,6 +47,12 @@ from selfmotion.basics.inputs import (
     as_whole as as_whole,
     random_numbers as random_numbers,
 )
+from selfmotion.basics.interruption import (
+    held_interruption as held_interruption,
+    obey_interruption as obey_interruption,
+    obeying as obeying,
+    was_interrupted as was_interrupted,
+)
 from selfmotion.basics.jit import called as called, inlined as inlined, kernel as kernel
 from selfmotion.basics.names import nearest as nearest
 from selfmotion.basics.progress import Progress as Progress, silent as silent

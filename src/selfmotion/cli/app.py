@@ -23,12 +23,21 @@ terminal = tables.console()
 stages = Console(stderr=True, highlight=False)
 
 VERIFIED, NOT_VERIFIED, BAD_INPUT, FAILED = 0, 1, 2, 3
+# What shells expect of a command that Ctrl-C ended.
+INTERRUPTED = 130
 
 
 def main() -> None:
-    """Run the command; exit code 2 and one line for bad input, 3 for a fault of ours."""
+    """Run the command; exit code 2 and one line for bad input, 3 for a fault of ours.
+
+    130 and a line where it was stopped before there was anything to keep.
+    """
     try:
         app()
+    except SystemExit as end:
+        if end.code == INTERRUPTED:
+            complain("stopped before there was anything to keep")
+        raise
     except sm.SelfmotionError as error:
         complain(f"error: {in_shell(str(error))}")
         sys.exit(BAD_INPUT)

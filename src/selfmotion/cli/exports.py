@@ -24,8 +24,8 @@ def export(
     out: Annotated[
         list[Path],
         typer.Option(
-            help="File: .csv, .npz, .json, .yaml (ROS 2 JointTrajectory), .xml (MuJoCo keyframes), "
-            ".script (URScript), .src (KUKA), .mod (ABB). Repeatable."
+            help="File: .csv, .npz, .json, .yaml (ROS 2 JointTrajectory), .mcap (ROS 2 bag), .xml "
+            "(MuJoCo keyframes), .script (URScript), .src (KUKA), .mod (ABB). Repeatable."
         ),
     ],
     rate: Annotated[

@@ -159,8 +159,8 @@ CompareOption = Annotated[
 OutOption = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Write the plan (.npz), its replay (.html) or motion (.csv, .json, .yaml, .xml, "
-        ".script; see `selfmotion export`). Repeatable."
+        help="Write the plan (.npz), its replay (.html) or motion (.csv, .json, .yaml, .mcap, "
+        ".xml, .script; see `selfmotion export`). Repeatable."
     ),
 ]
 HtmlOption = Annotated[Path | None, typer.Option(help="Write a replay to open in a browser.")]

@@ -147,6 +147,11 @@ class CollisionModel:
         """Whether both bodies of a pair are their own convex hulls."""
         return self._meshes.hulls_decide[pair]
 
+    @property
+    def is_all_convex(self) -> bool:
+        """Whether all bodies that are checked are their own convex hulls."""
+        return all(self.is_convex(pair) for pair in range(len(self.pairs)))
+
     def in_pieces(self) -> tuple[HullDistances, Ints]:
         """Return distances of hulls, obstacles in convex pieces, and which pair each is of, (Q,).
 

@@ -3,6 +3,7 @@
 from selfmotion.constraints.band import Band as Band
 from selfmotion.constraints.base import Constraint as Constraint
 from selfmotion.constraints.binding import Binding as Binding
+from selfmotion.constraints.bound_end import BoundEnd as BoundEnd
 from selfmotion.constraints.clearance import (
     BoundClearance as BoundClearance,
     Clearance as Clearance,
@@ -15,7 +16,6 @@ from selfmotion.constraints.conditions import (
     linearised as linearised,
 )
 from selfmotion.constraints.ends import (
-    BoundEnd as BoundEnd,
     ClosedPath as ClosedPath,
     EndAcceleration as EndAcceleration,
     EndConfiguration as EndConfiguration,

@@ -17,14 +17,11 @@ import numpy.typing as npt
 from selfmotion.basics import Array, ProblemError, as_flag, as_numbers, per_joint, read_only
 from selfmotion.certificate import QUANTITIES, ClosedMotion, EndState
 from selfmotion.constraints.base import Constraint
-from selfmotion.constraints.conditions import NodeTangents, motion_of_order
-from selfmotion.costs import Samples
+from selfmotion.constraints.bound_end import BoundEnd
 from selfmotion.follow import Follows
 from selfmotion.path import STILL
 from selfmotion.robot import RobotModel
 
-# The optimiser need only come near [rad, rad/s]: Newton's method then closes the rest.
-_NEAR = 1e-4
 # An end configuration may be this far off [m, rad]: what the certificate grants it.
 _NEAR_END = 1e-6
 # Poses nearer than this are the same: far above rounding, far below any tolerance.
@@ -45,7 +42,7 @@ class EndConfiguration(Constraint):
 
     q: npt.ArrayLike
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundEnd":
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
         """See `Constraint.bind`."""
         target = read_only(follows.robot.configuration(self.q))
         return BoundEnd("end configuration", (0,), target, follows.null_basis(target))
@@ -99,7 +96,7 @@ class _EndRate(Constraint):
     def _name(self) -> str:
         return f"{'start' if self.at_start else 'end'} {QUANTITIES[self.order]}"
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundEnd":
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
         """See `Constraint.bind`."""
         null = follows.null_basis(start if self.at_start else end)
         row = 0 if self.at_start else -1
@@ -233,7 +230,7 @@ class ClosedPath(Constraint):
     def __post_init__(self) -> None:
         as_flag(self.velocity, "closed path: velocity")
 
-    def bind(self, follows: Follows, start: Array, end: Array) -> "BoundEnd":
+    def bind(self, follows: Follows, start: Array, end: Array) -> BoundEnd:
         """See `Constraint.bind`."""
         orders = (0, 1) if self.velocity else (0,)
         return BoundEnd("closed path", orders, None, follows.null_basis(start))
@@ -262,45 +259,3 @@ class ClosedPath(Constraint):
 
     def on_last_part(self) -> None:
         """See `Constraint.on_last_part`: a part of a loop is not closed."""
-
-
-@dataclass(frozen=True, eq=False)
-class BoundEnd:
-    """Nᵀ(x - target) = 0 at an end (`row`), or Nᵀ(x(T) - x(0)) = 0 without a target.
-
-    x is q, q̇ or both.
-    """
-
-    name: str
-    orders: tuple[int, ...]
-    target: Array | None
-    null: Array
-    row: int = -1
-    equality = True
-    tolerance = _NEAR
-
-    def residual(self, samples: Samples) -> Array:
-        """See `BoundConstraint.residual`."""
-        parts = []
-        for order in self.orders:
-            x = motion_of_order(samples, order)
-            reached, wanted = (x[-1], x[0]) if self.target is None else (x[self.row], self.target)
-            parts.append(self.null.T @ (reached - wanted))
-        return np.concatenate(parts)[None, :]
-
-    def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
-        """See `BoundConstraint.tangents`."""
-        parts = []
-        for order in self.orders:
-            x = motion.of_order(order)
-            parts.append(self.null.T @ (x[-1] - x[0] if self.target is None else x[self.row]))
-        return np.concatenate(parts)[None]
-
-    def describe(self, samples: Samples, row: int, column: int) -> str:
-        """See `BoundConstraint.describe`."""
-        order = self.orders[column // self.null.shape[1]]
-        quantity = QUANTITIES[order]
-        goal = "that of the start" if self.target is None else "the one asked for"
-        miss = np.abs(self.residual(samples)).max()
-        where = "end" if self.row else "start"
-        return f"the {quantity} at the {where} is {miss:.3g} (rad or m, per s) away from {goal}"

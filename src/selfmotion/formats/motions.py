@@ -21,6 +21,7 @@ from selfmotion.basics import (
     write_text,
 )
 from selfmotion.formats import ros
+from selfmotion.formats.bag import bag, motion_of_bag
 from selfmotion.formats.controller_program import check_signals
 from selfmotion.formats.documents import read_document, write_document
 from selfmotion.formats.mujoco import keyframes
@@ -50,6 +51,8 @@ def write_motion(
     - ``json`` (``.json``): the same as lists
     - ``ros`` (``.yaml``): ROS 2 ``trajectory_msgs/JointTrajectory``
     - ``moveit``: ``moveit_msgs/RobotTrajectory``
+    - ``bag`` (``.mcap``): a ROS 2 bag of ``sensor_msgs/JointState`` and the tool's frame
+      (``tf2_msgs/TFMessage``), for Foxglove, PlotJuggler or ``ros2 bag play``
     - ``mujoco`` (``.xml``): keyframes, to include in an MJCF model made from the same URDF
     - ``urscript`` (``.script``): a stream of ``servoj``, its settings in the head
     - ``krl`` (``.src``): KUKA: axis targets with their times in spline blocks
@@ -128,8 +131,9 @@ def form_of(path: Path, form: str | None) -> str:
 
 
 def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
-    r"""Read a motion that `write_motion`, or something else, wrote: csv, npz, json, ros, moveit.
+    r"""Read a motion that `write_motion`, or something else, wrote.
 
+    In the forms ``csv``, ``npz``, ``json``, ``ros``, ``moveit`` and ``bag``, and programs.
     With accelerations where the file has them; see `Trajectory`. With `degrees` all coordinates are
     taken for angles in degrees, in any format.
 
@@ -160,11 +164,13 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
         return Trajectory.from_csv(path, degrees=degrees)
     if path.suffix.lower() == ".npz":
         return _in_radians(_read_npz(path), degrees)
+    if path.suffix.lower() == ".mcap":
+        return _in_radians(motion_of_bag(path), degrees)
     if path.suffix.lower() not in (".json", ".yaml", ".yml"):
         written = ", though it is written" if path.suffix.lower() in SUFFIXES else ""
         raise FileFormatError(
             f"{path}: is no motion that is read{written}: expected .csv, .npz, .json, .yaml (ROS), "
-            f".src (KUKA) or .mod (ABB)"
+            f".mcap (ROS bag), .src (KUKA) or .mod (ABB)"
         )
     document = read_document(path)
     read = _of_tables if "t" in document else ros.trajectory
@@ -221,6 +227,10 @@ def _write_yaml(file: Path, message: Mapping[str, Any]) -> None:
     write_document(file, message)
 
 
+def _write_bag(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
+    write_bytes(file, bag(motion, robot))
+
+
 def _write_mujoco(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
     if motion.robot_joints != robot.joint_names:
         raise ProblemError(f"{file}: keyframes are of all joints of {robot.name} together")
@@ -269,6 +279,7 @@ WRITERS: Mapping[str, _Writer] = {
     "json": _write_json,
     "ros": _write_ros,
     "moveit": _write_moveit,
+    "bag": _write_bag,
     "mujoco": _write_mujoco,
     "urscript": _write_urscript,
 }
@@ -278,10 +289,11 @@ SUFFIXES = {
     ".json": "json",
     ".yaml": "ros",
     ".yml": "ros",
+    ".mcap": "bag",
     ".xml": "mujoco",
     ".script": "urscript",
     **PROGRAMS,
 }
 FORMS = (*WRITERS, *PROGRAMS.values())
 # Those that say all that a check needs.
-READABLE = ("csv", "npz", "json", "ros", "moveit")
+READABLE = ("csv", "npz", "json", "ros", "moveit", "bag")

@@ -2,4 +2,5 @@
 
 from selfmotion.nodes.ends import NodeEnds as NodeEnds
 from selfmotion.nodes.motion import NodeGrid as NodeGrid, NodeMotion as NodeMotion
-from selfmotion.nodes.newton import Optimum as Optimum, Step as Step, minimise as minimise
+from selfmotion.nodes.newton import minimise as minimise
+from selfmotion.nodes.optimum import Optimum as Optimum, Step as Step

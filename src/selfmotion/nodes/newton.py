@@ -6,10 +6,6 @@ S. Wright, "Numerical Optimization", 2nd ed., chapter 19). Each condition knows 
 all matrices stay block-banded, and a step takes as much time as there are nodes.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
-
 import numpy as np
 
 from selfmotion.basics import Array, Ints
@@ -17,6 +13,7 @@ from selfmotion.nodes.conditions import spread
 from selfmotion.nodes.ends import Border
 from selfmotion.nodes.motion import NodeMotion
 from selfmotion.nodes.objective import Around, scattered
+from selfmotion.nodes.optimum import Optimum, Step, Told
 from selfmotion.optimise import Banded, Status
 
 # The cost is right to this share of itself once a step promises no more; where conditions count.
@@ -47,50 +44,6 @@ _MET_ENDS = 1e-9
 _STUCK, _TINY = 5, 0.02
 # Iterations after which the method is given up: it needs ten, thirty where limits bind.
 _MOST = 80
-
-
-class Step(NamedTuple):
-    """An iteration.
-
-    Attributes
-    ----------
-    motion : NodeMotion
-    slope : float
-        Norm of the gradient of what is minimised.
-    length : float
-        Share of Newton's step that was taken; 0 of the first.
-    """
-
-    motion: NodeMotion
-    slope: float
-    length: float
-
-
-Told = Callable[[Step], bool]
-"""Told of each iteration; True stops."""
-
-
-@dataclass(frozen=True, eq=False)
-class Optimum:
-    """Where Newton's method ended.
-
-    Attributes
-    ----------
-    motion : NodeMotion
-    prices : (N + 1, C)
-        λ of the conditions.
-    status : Status
-    promised : float
-        By how much another step would lower the cost.
-    end_prices : (E,)
-        Of what is asked of the ends.
-    """
-
-    motion: NodeMotion
-    prices: Array
-    status: Status
-    promised: float
-    end_prices: Array
 
 
 def minimise(begin: NodeMotion, columns: Ints, told: Told, prices: Array | None = None) -> Optimum:

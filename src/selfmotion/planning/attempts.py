@@ -157,6 +157,14 @@ def _try_postures(draft: Draft) -> bool:
     return True
 
 
+def _prove_on_meshes(draft: Draft) -> bool:
+    """Take a motion that bodies' hulls forbid where their meshes do not."""
+    if draft.best is None or not draft.is_sought or not draft.is_free_by_meshes():
+        return False
+    draft.prove_as_it_is(draft.best)
+    return True
+
+
 def _search_globally(draft: Draft) -> bool:
     """Optimise from the best chains of configurations over all self-motions."""
     wanted = draft.search.compare or (draft.chooses_globally and draft.is_unmet)
@@ -284,6 +292,7 @@ ATTEMPTS: tuple[tuple[str, Callable[[Draft], bool]], ...] = (
     ("given start", _begin_at_start),
     ("starts", _draw_starts),
     ("postures compared", _compare_postures),
+    ("proof on meshes", _prove_on_meshes),
     ("global search", _search_globally),
     ("search off the path", _search_off_path),
     ("more starts", _draw_more_starts),

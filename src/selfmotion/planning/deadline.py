@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 
-from selfmotion.basics import Progress
+from selfmotion.basics import Progress, obey_interruption
 from selfmotion.engine import Counts
 
 
@@ -31,7 +31,8 @@ class Deadline:
         return cls(time.perf_counter() + seconds)
 
     def check(self) -> None:
-        """Raise KeyboardInterrupt, once, if it is over."""
+        """Raise KeyboardInterrupt, once, if it is over; also where Ctrl-C was pressed."""
+        obey_interruption()
         if not self.passed and time.perf_counter() >= self.end:
             self.passed = True
             raise KeyboardInterrupt

@@ -14,8 +14,9 @@ from selfmotion.motion import Grid, Trajectory
 from selfmotion.optimise import Status
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.finish import Finished, finish
+from selfmotion.planning.finish import finish
 from selfmotion.planning.heats import Heats
+from selfmotion.planning.known import Known, Proved
 from selfmotion.planning.largest_part import LargestPart, largest_part
 from selfmotion.planning.refinement import settle
 from selfmotion.planning.refusal import leaves_path
@@ -23,44 +24,8 @@ from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import FREE_PART_EVALUATIONS, PART_EVALUATIONS
 from selfmotion.problem import Problem
-from selfmotion.result import Attempt, Plan
+from selfmotion.result import Attempt
 from selfmotion.search import Obstruction, Reach, SequenceGuide, reachable
-
-
-@dataclass(frozen=True, eq=False)
-class Known:
-    """What is known before planning.
-
-    Attributes
-    ----------
-    plan : Plan or None
-        Of this problem or of one like it: tried first; where its motion will do, nothing else is.
-    guide : SequenceGuide or None
-        Likewise a motion that a search over the whole path has found.
-    poses : bool
-        Whether single poses were looked at already, and nothing was found in the way.
-    """
-
-    plan: Plan | None = None
-    guide: SequenceGuide | None = None
-    poses: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Proved:
-    """What the plan is made of: a motion along all of the path or a part of it, and its check.
-
-    Attributes
-    ----------
-    part : LargestPart
-    finished : Finished
-    rival_cost : float or None
-        That of the best motion from the sequences of the search, where it keeps the constraints.
-    """
-
-    part: LargestPart
-    finished: Finished
-    rival_cost: float | None = None
 
 
 @dataclass(eq=False)
@@ -250,6 +215,27 @@ class Draft:
         whole = LargestPart(self.problem, best, "")
         finished = finish(self.problem, whole, self.tolerance, self.progress)
         self.proved = Proved(whole, finished, rival_cost)
+
+    def is_free_by_meshes(self) -> bool:
+        """Whether bodies are apart by their meshes along the best motion, though not by hulls."""
+        best = self.best
+        if best is None or not best.violations:
+            return False
+        q = best.motion().trajectory.q
+        rough = [
+            (model, far) for model, far in self.problem.envelope.bodies if not model.is_all_convex
+        ]
+        return bool(rough) and all(
+            model.worst(q).value >= far for model, far in self.problem.envelope.bodies
+        )
+
+    def prove_as_it_is(self, best: Session) -> bool:
+        """Let a motion be it if it is verified; return whether it is."""
+        whole = LargestPart(self.problem, best, "")
+        finished = finish(self.problem, whole, self.tolerance, self.progress)
+        if finished.certificate.verified:
+            self.proved = Proved(whole, finished)
+        return self.proved is not None
 
     def prove_part(self, suspect: float = 0.0) -> bool:
         """Let the largest part be it, a time [s] looked at closely; return whether there is one."""

@@ -13,6 +13,7 @@ from selfmotion.basics import (
     PlanError,
     Progress,
     as_number,
+    held_interruption,
     silent,
 )
 from selfmotion.certificate import Tolerance
@@ -22,7 +23,7 @@ from selfmotion.optimise import Status
 from selfmotion.path import Path, Retimed
 from selfmotion.planning.deadline import Deadline
 from selfmotion.planning.kept_costs import KeptCosts
-from selfmotion.planning.run import plan
+from selfmotion.planning.run import plan, told_of
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import (
     COARSE,
@@ -134,7 +135,8 @@ def fastest(
     options = _Options(search, tolerance, clock, clock.telling(progress))
     status = Status.CONVERGED
     try:
-        rounds.run(options)
+        with held_interruption():
+            rounds.run(options)
     except KeyboardInterrupt:
         # A plan in between may have seen first that it is late.
         late = time.perf_counter() >= clock.end - rounds.longest
@@ -145,7 +147,8 @@ def fastest(
         when = f" in {deadline} s" if status is Status.DEADLINE else ""
         raise PlanError(f"no motion keeps all limits at any pace{when}: {rounds.verdict}")
     found = rounds.retimed
-    return Fastest(rounds.best, found["x = 0"], found["costs"], tuple(rounds.times), status)
+    best = told_of(rounds.best, status) if status.is_cut_short else rounds.best
+    return Fastest(best, found["x = 0"], found["costs"], tuple(rounds.times), status)
 
 
 class _Options(NamedTuple):

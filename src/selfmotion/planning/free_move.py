@@ -10,6 +10,8 @@ from selfmotion.basics import (
     Progress,
     as_number,
     as_several,
+    held_interruption,
+    obeying,
     one_blas_thread,
     random_numbers,
     shown,
@@ -95,7 +97,7 @@ def move(
     if not isinstance(via, list | tuple | np.ndarray):
         raise ProblemError(f"via is {shown(via)}, expected a list of configurations")
     seconds, generator = as_number(deadline, "deadline", above=0.0), random_numbers(rng)
-    motions = FreeMotions(robot, asked, generator, progress)
-    with one_blas_thread():
+    motions = FreeMotions(robot, asked, generator, obeying(progress))
+    with one_blas_thread(), held_interruption():
         ends = [motions.configurations(end, Task.of(task)) for end in (first, *via, last)]
         return motions.through(ends, seconds)

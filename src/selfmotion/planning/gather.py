@@ -9,7 +9,8 @@ from selfmotion.basics import read_only
 from selfmotion.certificate import Certificate
 from selfmotion.optimise import Status
 from selfmotion.planning.deadline import Deadline
-from selfmotion.planning.draft import Draft, Proved
+from selfmotion.planning.draft import Draft
+from selfmotion.planning.known import Proved
 from selfmotion.result import Gap, Plan, Report
 from selfmotion.search import SPACING
 

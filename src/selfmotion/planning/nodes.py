@@ -4,21 +4,27 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints
+from selfmotion.basics import Array, Ints
 from selfmotion.constraints import BoundConstraint
 from selfmotion.engine import Conditions
 from selfmotion.motion import FreeNullMotion, Grid, Trajectory
 from selfmotion.nodes import NodeEnds, NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, QuasiNewton, Status
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.kept_on_nodes import (
+    aim_of,
+    broken_by,
+    cost_of,
+    meets_ends,
+    nearly_broken,
+    too_much,
+)
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import (
     COST_AGREEMENT,
-    ENDS_MET,
     FEWEST_WITH_ACCELERATIONS,
     LEAST_SAVING,
     MOST_NODES,
-    NEARLY,
     NODE_AGREEMENT,
     NODE_ROUNDS,
     SHORT_STEP,
@@ -109,7 +115,7 @@ class NodeDescent:
         """
         grid = self.grid(t)
         motions = [grid.motion_near(trajectory) for trajectory in trajectories]
-        motion = min((one for one in motions if one), key=_aim_of, default=None)
+        motion = min((one for one in motions if one), key=aim_of, default=None)
         return None if motion is None else self.best_near(motion, dearest)
 
     def best_near(self, motion: NodeMotion, dearest: float = np.inf) -> MotionOnNodes | None:
@@ -126,14 +132,14 @@ class NodeDescent:
             # With conditions it would cost more still.
             self.is_hopeless = True
             return None
-        broken = _broken(freely.motion)
-        if _too_much(freely.motion, broken):
+        broken = broken_by(freely.motion)
+        if too_much(freely.motion, broken):
             return None
         if not self._free and (freely.motion.orders[broken] == 0).any():
             best = self._towards_middle(grid, freely.motion)
         dearest = np.inf if best is None else best.cost
         found = None if self._ended else self._from_free(freely, dearest)
-        return min((one for one in (best, found) if one), key=_cost_of, default=None)
+        return min((one for one in (best, found) if one), key=cost_of, default=None)
 
     def again(self, standing: MotionOnNodes) -> MotionOnNodes | None:
         """Return the optimum near a motion on its nodes."""
@@ -183,7 +189,8 @@ class NodeDescent:
         """
         robot, start = self._problem.robot, known.place.q[0]
         limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
-        middle = np.where(limited, 0.5 * (robot.lower + robot.upper), start)
+        middle = start.copy()
+        middle[limited] = 0.5 * (robot.lower[limited] + robot.upper[limited])
         for share in TOWARDS_MIDDLE:
             motion = grid.motion_towards(start, middle, share * self._problem.path.duration)
             if motion is not None and self._ended is None:
@@ -197,14 +204,16 @@ class NodeDescent:
     def _kept(self, optimum: Optimum, columns: Ints = _NO_COLUMNS) -> MotionOnNodes | None:
         """Return the optimum if it is one, and keeps all conditions."""
         motion = optimum.motion
-        none = optimum.status is Status.GRADIENT or not _meets(motion) or _broken(motion).any()
+        none = (
+            optimum.status is Status.GRADIENT or not meets_ends(motion) or broken_by(motion).any()
+        )
         return None if none else self._standing(optimum, columns)
 
     def _from_free(self, freely: Optimum, dearest: float) -> MotionOnNodes | None:
         """Return the optimum that keeps all conditions, from one that keeps none."""
         motion = freely.motion
         orders = motion.orders
-        if (orders[_broken(motion)] < 2).all():
+        if (orders[broken_by(motion)] < 2).all():
             return self._bound(freely, _NO_COLUMNS, dearest)
         most = self._effort.max_evaluations
         if most is not None and most < FEWEST_WITH_ACCELERATIONS:
@@ -215,7 +224,7 @@ class NodeDescent:
         motion = self._minimise(smooth, _NO_COLUMNS, dearest).motion
         # One such limit leads to the next: all count at once.
         every = (orders == 2) & ~motion.grid.conditions.of_bodies()
-        columns = np.flatnonzero(every | _broken(motion) | _near(motion))
+        columns = np.flatnonzero(every | broken_by(motion) | nearly_broken(motion))
         return self._bound(self._minimise(motion, columns, dearest), columns, dearest)
 
     def _bound(
@@ -227,15 +236,15 @@ class NodeDescent:
         """
         while self._ended is None and optimum.status in _ARRIVED:
             motion = optimum.motion
-            broken = _broken(motion)
-            if not _meets(motion):
+            broken = broken_by(motion)
+            if not meets_ends(motion):
                 return None
             if not broken.any():
                 return self._standing(optimum, columns)
             if broken[columns].any():
                 return None
-            columns = np.union1d(columns, np.flatnonzero(broken | _near(motion)))
-            if _too_much(motion, columns):
+            columns = np.union1d(columns, np.flatnonzero(broken | nearly_broken(motion)))
+            if too_much(motion, columns):
                 return None
             optimum = self._minimise(motion, columns, dearest)
         return None
@@ -266,7 +275,7 @@ class NodeDescent:
             evaluations=effort.counts.evaluations,
         )
         self.history.append(iteration)
-        if _meets(motion) and (motion.h <= motion.grid.conditions.tolerances).all():
+        if meets_ends(motion) and (motion.h <= motion.grid.conditions.tolerances).all():
             none = np.zeros_like(motion.h)
             self.latest = MotionOnNodes(motion, Status.STOPPED, _NO_COLUMNS, none, (), None)
         if effort.callback is not None and effort.callback(iteration):
@@ -295,37 +304,3 @@ class NodeDescent:
         off = abs(motion.exact_cost - motion.cost)
         promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
         return MotionOnNodes(motion, status, columns, optimum.prices, active, off + promised)
-
-
-def _too_much(motion: NodeMotion, columns: Ints | Flags) -> bool:
-    """Whether some of the conditions are not for nodes.
-
-    Along a limit of jerk, what quintics on few nodes do jumps. Distances of bodies bend too much
-    between the few bodies that count for interior points.
-    """
-    of_bodies = motion.grid.conditions.of_bodies()
-    return bool((motion.orders[columns] > 2).any() or of_bodies[columns].any())
-
-
-def _broken(motion: NodeMotion) -> Flags:
-    """Return which columns of the conditions are not kept, (C,)."""
-    # Written so that NaN is not.
-    return np.asarray(~(motion.h <= motion.grid.conditions.tolerances).all(axis=0))
-
-
-def _meets(motion: NodeMotion) -> bool:
-    """Whether the ends are what is asked for."""
-    return bool(np.abs(motion.c).max(initial=0.0) <= ENDS_MET)
-
-
-def _near(motion: NodeMotion) -> Flags:
-    """Return which columns of the conditions are nearly broken, (C,)."""
-    return np.asarray((motion.h > -NEARLY).any(axis=0))
-
-
-def _cost_of(standing: MotionOnNodes) -> float:
-    return standing.cost
-
-
-def _aim_of(motion: NodeMotion) -> float:
-    return motion.aim

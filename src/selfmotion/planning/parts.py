@@ -17,6 +17,8 @@ from selfmotion.basics import (
     SelfmotionError,
     as_number,
     as_numbers,
+    held_interruption,
+    obeying,
     random_numbers,
     silent,
 )
@@ -104,6 +106,18 @@ def plan_in_parts(
     ramp = as_number(ramp, "ramp", above=0.0)
     random_numbers(rng)
     tolerance = Tolerance.of(tolerance)
+    with held_interruption():
+        return _parts(problem, retreats, ramp, rng, tolerance, obeying(progress))
+
+
+def _parts(
+    problem: Problem,
+    retreats: Retreat | None,
+    ramp: float,
+    rng: np.random.Generator | int,
+    tolerance: Tolerance,
+    progress: Progress,
+) -> Parts:
     # Samples of curves tell whether parts are needed; those of larger spaces may miss a way or two.
     missed = 0 if has_curves(problem) else MISSED_CUTS
     refused, chains = None, []

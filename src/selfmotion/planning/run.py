@@ -10,17 +10,20 @@ from selfmotion.basics import (
     SelfmotionError,
     as_number,
     as_whole,
+    held_interruption,
     one_blas_thread,
     shown,
     silent,
+    was_interrupted,
 )
 from selfmotion.certificate import Tolerance
 from selfmotion.optimise import Callback, Optimizer, QuasiNewton, Status
 from selfmotion.planning.attempts import go_through
 from selfmotion.planning.deadline import Deadline, TimedCounts
-from selfmotion.planning.draft import Draft, Known
+from selfmotion.planning.draft import Draft
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.gather import gathered
+from selfmotion.planning.known import Known
 from selfmotion.planning.search import Search
 from selfmotion.planning.settings import DAMPED_EVALUATIONS
 from selfmotion.planning.warm_start import check_warm_start
@@ -113,7 +116,7 @@ def plan(
     search, known = search or Search(), Known(plan=warm_start)
     draft = Draft(problem, effort, search, Tolerance.of(tolerance), clock.telling(progress), known)
     try:
-        with one_blas_thread():
+        with one_blas_thread(), held_interruption():
             return _planned(draft, clock)
     except KeyboardInterrupt:
         if not clock.passed:
@@ -131,11 +134,17 @@ def plan_along(
     clock = Deadline(inf)
     effort = Effort(QuasiNewton(), None, None, TimedCounts(deadline=clock))
     draft = Draft(problem, effort, Search(), tolerance, progress, Known(guide=guide))
-    with one_blas_thread():
+    with one_blas_thread(), held_interruption():
         return _planned(draft, clock)
 
 
 def _planned(draft: Draft, clock: Deadline) -> Plan:
+    """Return the plan, told of an interruption that came when all was done."""
+    found = _once_or_again(draft, clock)
+    return told_of(found, Status.INTERRUPTED) if was_interrupted() else found
+
+
+def _once_or_again(draft: Draft, clock: Deadline) -> Plan:
     """Return the plan; of the same list gone through again where the arm meets itself."""
     go_through(draft)
     found = gathered(draft, clock)
@@ -170,7 +179,7 @@ def _planned(draft: Draft, clock: Deadline) -> Plan:
         except SelfmotionError:
             return replace(found, report=replace(found.report, attempts=tuple(tried)))
         except KeyboardInterrupt:
-            return _told(found, Status.DEADLINE if clock.passed else Status.INTERRUPTED)
+            return told_of(found, Status.DEADLINE if clock.passed else Status.INTERRUPTED)
         if rival.report.status.is_cut_short:
             return _better(found, rival)
         found = rival
@@ -183,10 +192,10 @@ def _better(before: Plan, cut_short: Plan) -> Plan:
     """Return the one of which less is wrong, then the cheaper; its report says what cut it."""
     if _standing(cut_short) < _standing(before):
         return cut_short
-    return _told(before, cut_short.report.status)
+    return told_of(before, cut_short.report.status)
 
 
-def _told(plan: Plan, status: Status) -> Plan:
+def told_of(plan: Plan, status: Status) -> Plan:
     """Return a plan whose report says what kept another one from being tried to the end."""
     message = f"{status.message}; before: {plan.report.message}"
     return replace(plan, report=replace(plan.report, status=status, message=message))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, PlanError
+from selfmotion.basics import Array, Flags, PlanError, obey_interruption
 from selfmotion.motion import Trajectory, slowdown_of
 from selfmotion.optimise import banded_optimum
 from selfmotion.path import Pace, times_when
@@ -202,6 +202,7 @@ def _improved(
     gap: float,
 ) -> Squares:
     """Return the square of how much faster a pace becomes, near one that is known."""
+    obey_interruption()
     knots = near.knots
     states = States.of(motion, base, knots)
     start, fixed = _INSIDE * near.c, np.zeros(len(near.c), dtype=bool)

@@ -13,6 +13,7 @@ from selfmotion.basics import (
     Ints,
     PlanError,
     ProblemError,
+    held_interruption,
     one_blas_thread,
     per_joint,
     read_only,
@@ -105,7 +106,7 @@ def retime(
     quantities = quantities_of_pace(plan.requirements)
     limits = PaceLimits(kept.speed, kept.acceleration, kept.jerk, quantities)
     for step in _STEPS:
-        with one_blas_thread():
+        with one_blas_thread(), held_interruption():
             pace = fastest_pace(plan.trajectory, limits, _ends(plan), step)
         result = _retimed(plan, wanted, pace)
         factor = max((item.factor for item in result.certificate.findings), default=1.0)
