@@ -115,6 +115,7 @@ from selfmotion.formats import (
 from selfmotion.job import (
     Program as Program,
     Seam as Seam,
+    Specification as Specification,
     Step as Step,
     load_program as load_program,
     plan_job as plan_job,

@@ -15,7 +15,7 @@ from selfmotion.formats import judged_steps, program_miss
 from selfmotion.formats.program_axes import tool_from_flange
 from selfmotion.formats.program_files import read_program
 from selfmotion.formats.stretches import NO_MISS, ways
-from selfmotion.job.program import Step
+from selfmotion.job import Step
 from support.arms import PANDA_HOME, robot_named
 from support.shell import invoke
 

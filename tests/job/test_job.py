@@ -1,6 +1,7 @@
 """A program makes every seam once, keeps everything at all times, and is the best that is known."""
 
 import itertools
+from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
@@ -90,16 +91,28 @@ def test_the_order_is_the_best_of_all_by_the_times_of_the_moves(program) -> None
     assert program.transfer_time < ALIKE * given.transfer_time
 
 
-def test_directions_order_waits_and_events_are_as_asked() -> None:
-    panda, seams = robot_named("panda"), {item.name: item for item in row_of_seams(3)}
-    seams = {name: replace(item, either_way=False) for name, item in seams.items()}
-    events = [("on", 0.1), ("off", 0.9)]
-    first = replace(seams["seam 0"], after=("seam 1",), wait=0.5, events=events)
-    second = replace(seams["seam 1"], after_any=("seam 0", "seam 2"))
-    listed = [first, second, seams["seam 2"]]
+EVENTS = (("on", 0.1), ("off", 0.9))
+
+
+def ordered_seams() -> list[sm.Seam]:
+    """Return seams with an order, directions, events and a wait."""
+    seams = {item.name: replace(item, either_way=False) for item in row_of_seams(3)}
+    first = replace(seams["seam 0"], after=("seam 1",), wait=0.5, events=EVENTS)
+    second = replace(seams["seam 1"], after_any=("seam 0", "seam 2"), wait=0.2)
+    return [first, second, seams["seam 2"]]
+
+
+@pytest.fixture(scope="module")
+def ordered() -> sm.Program:
+    return sm.plan_job(robot_named("panda"), ordered_seams(), branches=1)
+
+
+def test_directions_order_waits_and_events_are_as_asked(ordered) -> None:
+    panda, seams = robot_named("panda"), {item.name: item for item in ordered_seams()}
+    circle = [seams["seam 0"], replace(seams["seam 1"], after=("seam 0",)), seams["seam 2"]]
     with pytest.raises(sm.ProblemError, match="circle"):
-        sm.plan_job(panda, [first, replace(second, after=("seam 0",)), listed[2]], branches=1)
-    made = sm.plan_job(panda, listed, branches=1).require()
+        sm.plan_job(panda, circle, branches=1)
+    made = ordered.require()
     assert made.order == ("seam 2", "seam 1", "seam 0")
     assert not any(step.turned for step in made.steps)
     for name, plan in made.plans.items():
@@ -149,6 +162,72 @@ def test_what_is_switched_on_and_off_at_once_is_refused(events, refused: bool) -
 def test_ends_of_a_job_have_names_of_their_own(name: str) -> None:
     with pytest.raises(sm.ProblemError, match=f"'{name}' is an end of the job"):
         seam(name, [0.4, 0.0, 0.3], [0.5, 0.0, 0.3])
+
+
+def tampered(program: sm.Program) -> Iterator[tuple[str, list[Step]]]:
+    """Yield steps of which something is missing, elsewhere, shorter, or has another name."""
+    steps = list(program.steps)
+    for k, step in enumerate(steps):
+        yield f"without {step.name}", steps[:k] + steps[k + 1 :]
+        yield f"{step.name} twice", [*steps[: k + 1], *steps[k:]]
+        for name in ("another", *(item.name for item in steps if item.name != step.name)):
+            yield f"{step.name} as {name}", [*steps[:k], replace(step, name=name), *steps[k + 1 :]]
+        if step.is_seam:
+            turned = replace(step, turned=not step.turned)
+            yield f"{step.name} turned", [*steps[:k], turned, *steps[k + 1 :]]
+            late = replace(step, events=(*step.events[1:], ("late", 0.5)))
+            yield f"{step.name} with other events", [*steps[:k], late, *steps[k + 1 :]]
+            left = replace(step, leaves=(sm.Sphere("drop", [0.0, 1.0, 2.0], 0.01),))
+            yield f"{step.name} leaves something", [*steps[:k], left, *steps[k + 1 :]]
+        met = replace(step, may_meet=("post",))
+        yield f"{step.name} may meet more", [*steps[:k], met, *steps[k + 1 :]]
+        if step.name.endswith(", wait"):
+            motion = step.motion
+            brief = replace(step.made, trajectory=replace(motion, t=0.9 * motion.t))
+            yield f"{step.name} is short", [*steps[:k], replace(step, made=brief), *steps[k + 1 :]]
+        for j in range(k):
+            swapped = list(steps)
+            swapped[j], swapped[k] = steps[k], steps[j]
+            yield f"{steps[j].name} and {step.name} swapped", swapped
+            swapped[j] = replace(swapped[j], name=steps[j].name)
+            swapped[k] = replace(swapped[k], name=step.name)
+            yield f"{steps[j].name} and {step.name} swapped and renamed", swapped
+
+
+def test_whatever_is_not_as_asked_is_caught(program, ordered, tmp_path) -> None:
+    for made in (program.require(), ordered.require()):
+        # What a file gives back is held against the same.
+        made.save(tmp_path / "asked.program")
+        again = sm.load_program(tmp_path / "asked.program").require()
+        for whole in (made, again):
+            for what, steps in tampered(whole):
+                assert not replace(whole, steps=tuple(steps)).verified, what
+
+
+def test_the_reason_says_what_is_not_as_asked(program, ordered) -> None:
+    def verdict(made: sm.Program, **given) -> str:
+        return replace(made, **given).verdict
+
+    assert "'seam 0' was asked for, and is neither" in verdict(ordered, steps=ordered.steps[:-3])
+    assert "rests 0 s, not 0.5 s" in verdict(ordered, steps=ordered.steps[:-1])
+    assert "does not begin where it was asked" in verdict(program, steps=program.steps[1:])
+    asked = ordered.specification
+    assert asked is not None
+    reversed_ = replace(asked.seams[2], after=("seam 0",))
+    early = replace(asked, seams=(*asked.seams[:2], reversed_))
+    assert "is made before 'seam 0'" in verdict(ordered, specification=early)
+    listed = replace(asked, in_order=True)
+    assert "not in the order" in verdict(ordered, specification=listed)
+    # What is judged by less than the job asked for is not verified either.
+    number = next(k for k, step in enumerate(ordered.steps) if not step.is_seam)
+    step = ordered.steps[number]
+    assert isinstance(step.made, sm.Move)
+    for less in ((), step.made.constraints[1:], step.made.constraints[:-1]):
+        free = replace(step, made=replace(step.made, constraints=less))
+        steps = (*ordered.steps[:number], free, *ordered.steps[number + 1 :])
+        assert "is not judged by" in verdict(ordered, steps=steps)
+    # Steps that were put together by hand are told from a job.
+    assert "nothing says what was asked for" in verdict(ordered, specification=None)
 
 
 def test_what_is_made_stands_in_the_way_of_what_comes_later() -> None:

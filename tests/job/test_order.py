@@ -1,6 +1,7 @@
 """Orders are the best there are where they say so, and never break what has to come first."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,12 +33,29 @@ def random_stops(rng: np.random.Generator, count: int, states: int, share: float
 
 def by_force(stops: Stops) -> float:
     """Return the least cost of all orders and states, one by one."""
-    least = np.inf
-    for order in itertools.permutations(range(stops.count)):
-        if stops.keeps(order):
-            for states in itertools.product(*(stops.states[k] for k in order)):
-                least = min(least, stops.cost(states))
-    return least
+
+    def onward(made: frozenset[int], state: int, cost: float) -> float:
+        if len(made) == stops.count:
+            return cost + stops.last[state]
+        return min(
+            (
+                onward(made | {stop}, other, cost + between[state][other] + own[other])
+                for stop in range(stops.count)
+                if stop not in made and stops.allows(stop, made)
+                for other in states[stop]
+            ),
+            default=np.inf,
+        )
+
+    between, own = stops.between.tolist(), stops.own.tolist()
+    states = [each.tolist() for each in stops.states]
+    begun = (
+        onward(frozenset({stop}), state, float(stops.first[state] + stops.own[state]))
+        for stop in range(stops.count)
+        if stops.allows(stop, frozenset())
+        for state in states[stop]
+    )
+    return min(begun, default=np.inf)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -74,6 +92,43 @@ def test_many_stops_are_ordered_well_and_not_below_the_bound(seed) -> None:
     assert found.bound <= found.cost
     # Random costs have no geometry: worse than what any job has.
     assert found.cost <= 1.5 * best.cost
+
+
+def with_moves_lost(stops: Stops, rng: np.random.Generator, share: float) -> Stops:
+    """Return stops of which a share of the moves cannot be made."""
+    lost = (
+        np.where(rng.uniform(size=table.shape) < share, np.inf, table)
+        for table in (stops.between, stops.first, stops.last)
+    )
+    between, first, last = lost
+    return replace(stops, between=between, first=first, last=last)
+
+
+def test_where_moves_cannot_be_made_a_round_is_found_if_there_is_one() -> None:
+    found = 0
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        stops = random_stops(rng, int(rng.integers(4, 7)), 2, share=0.3 * (seed % 2))
+        stops = with_moves_lost(stops, rng, float(rng.uniform(0.3, 0.8)))
+        best, quick = exact(stops), improved(stops)
+        assert bool(quick.states) == bool(best.states), seed
+        if quick.states:
+            found += 1
+            assert stops.keeps(stops.of[list(quick.states)].tolist())
+            assert best.cost * (1.0 - ROUNDING) <= stops.cost(quick.states) < np.inf
+            assert quick.bound <= best.cost * (1.0 + ROUNDING)
+    # Rounds there are and none, both often.
+    assert 30 < found < 120
+
+
+def test_of_many_stops_with_few_moves_a_round_is_found() -> None:
+    rng = np.random.default_rng(0)
+    stops = with_moves_lost(random_stops(rng, 25, 2), rng, 0.85)
+    # One there is.
+    hidden = 2 * rng.permutation(25) + rng.integers(0, 2, 25)
+    stops.between[hidden[:-1], hidden[1:]] = 1.0
+    stops.first[hidden[0]] = stops.last[hidden[-1]] = 1.0
+    assert np.isfinite(stops.cost(improved(stops).states))
 
 
 def test_what_cannot_be_ordered_has_no_round() -> None:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
 from selfmotion.basics import Array
@@ -11,6 +12,8 @@ AMPLITUDE, PITCH = 4e-3, 0.02
 LENGTH = 0.3
 # Interpolation of the length along the seam, as a share of a swing.
 COUNTED = 1e-6
+# What a place may be off the published formula [m].
+MICROMETRE = 1e-6
 
 
 def seam(turned: bool = False) -> sm.Path:
@@ -60,6 +63,66 @@ def test_a_sine_is_a_sine() -> None:
     for end in (0.0, plain.duration):
         np.testing.assert_array_equal(woven.twist(end), plain.twist(end))
         np.testing.assert_array_equal(woven.pose(end).homogeneous, plain.pose(end).homogeneous)
+
+
+def carrier(name: str) -> sm.Path:
+    """Return a seam to be woven along: straight, round or with rounded corners."""
+    tilted = Rotation.from_euler("xyz", [2.5, 0.3, -0.4]).as_matrix()
+    first = SE3(tilted, np.array([0.4, -0.2, 0.3]))
+    if name == "line":
+        further = Rotation.from_euler("xyz", [2.1, 0.1, 0.5]).as_matrix()
+        return sm.Feed(sm.Line(first, SE3(further, np.array([0.6, 0.1, 0.35])), 1.0), 0.05)
+    if name == "circle":
+        return sm.Circle.around(first, 0.1, 6.0, normal=(0.2, 0.1, 1.0))
+    legs = [[0.4, -0.2, 0.3], [0.55, -0.2, 0.3], [0.55, 0.0, 0.35], [0.7, 0.1, 0.35]]
+    return sm.Feed(sm.Polyline(legs, tolerance=2e-3), 0.04)
+
+
+def published_swing(count: Array, swings: int, dwell: float) -> Array:
+    """Return the offset, as a share of the amplitude, after so many swings, as `Weave` says.
+
+    From the middle up to one edge, there for `dwell`, across to the other edge, there as long, and
+    back; the first swing grows from nothing and the last one vanishes, each as 10x³ - 15x⁴ + 6x⁵.
+    """
+
+    def rise(x: Array) -> Array:
+        x = np.clip(x, 0.0, 1.0)
+        return 10.0 * x**3 - 15.0 * x**4 + 6.0 * x**5
+
+    grown = rise(count) * rise(swings - count)
+    if not dwell:
+        return grown * np.sin(2.0 * np.pi * count)
+    across, inside = 0.5 - dwell, np.mod(count, 1.0)
+    # Up from the edge below, which the swing before left half a crossing ago; down; and up again.
+    up = 2.0 * rise((inside + 0.5 * across) / across) - 1.0
+    down = 2.0 * rise((inside - 0.5 * across - dwell) / across)
+    again = 2.0 * rise((inside - 1.0 + 0.5 * across) / across)
+    return grown * (up - down + again)
+
+
+@pytest.mark.parametrize("name", ["line", "circle", "corners"])
+@pytest.mark.parametrize("dwell", [0.0, 0.15])
+def test_the_tool_is_where_the_formula_says_within_a_micrometre(name: str, dwell: float) -> None:
+    plain, axis = carrier(name), np.array([0.0, 0.6, 0.8])
+    woven = sm.Weave(plain, AMPLITUDE, PITCH, axis=axis, dwell=dwell)
+    # The length of the seam by its chords: of places alone, without any derivative.
+    t = np.linspace(0.0, plain.duration, 50_001)
+    places = plain.samples(t)
+    chords = np.linalg.norm(np.diff(places.translation, axis=0), axis=1)
+    way = np.append(0.0, np.cumsum(chords))
+    swings = round(way[-1] / PITCH)
+    away = AMPLITUDE * published_swing(way / way[-1] * swings, swings, dwell)
+    expected = places.translation + (places.rotation @ axis) * away[:, None]
+    found = woven.samples(t)
+    assert np.abs(away).max() > 0.99 * AMPLITUDE
+    np.testing.assert_allclose(found.translation, expected, rtol=0.0, atol=MICROMETRE)
+    np.testing.assert_array_equal(found.rotation, places.rotation)
+    # Another dwell, or a swing more, is seen.
+    for other in (
+        published_swing(way / way[-1] * swings, swings, dwell + 0.01),
+        published_swing(way / way[-1] * (swings + 1), swings + 1, dwell),
+    ):
+        assert np.abs(AMPLITUDE * other - away).max() > 10.0 * MICROMETRE
 
 
 def test_a_woven_seam_is_planned_and_verified() -> None:

@@ -21,6 +21,9 @@ BUSY_WITH_JERKS = 0.85
 # How much longer a motion may be than the optimum of its limits of velocity and acceleration on a
 # grid: limits are kept between its points, and accelerations do not jump.
 LONGER = 1.02
+# What a pace on few knots loses where it begins, ends and goes from one joint's limit to another's;
+# and how many those of a circle are, however slow it is.
+SLOWLY, FEW_KNOTS = 2e-3, 6000
 
 
 @pytest.fixture(scope="module")
@@ -198,6 +201,18 @@ def test_jerks_cost_time_and_are_kept(panda: sm.RobotModel) -> None:
         used = [np.abs(motion(t, k)) / most for k, most in ((1, 1.5), (2, 8.0), (3, jerk))]
         assert np.mean(np.concatenate(used, axis=1).max(axis=1) >= USED) >= BUSY_WITH_JERKS
     assert times[0] > times[1]
+
+
+def test_slow_limits_take_time_of_the_arm_alone(fast: sm.Plan) -> None:
+    t = np.linspace(0.0, fast.trajectory.duration, 20001)
+    speeds = np.abs(fast.trajectory(t, 1)).max(axis=1)
+    # Each joint may be equally fast, so that the fastest of each time tells how long it takes.
+    way = float(np.trapezoid(speeds, t))
+    for velocity in (1e-2, 1e-3):
+        slow = sm.retime(fast, 1.0, velocity)
+        assert slow.certificate.verified, slow.certificate.verdict
+        assert way <= velocity * slow.trajectory.duration <= (1.0 + SLOWLY) * way
+        assert len(slow.trajectory.t) < FEW_KNOTS
 
 
 def test_a_motion_that_begins_moving_goes_on_as_it_did(panda: sm.RobotModel) -> None:

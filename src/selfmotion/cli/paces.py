@@ -32,8 +32,8 @@ def fastest(
     acceleration: options.AccelerationOption = None,
     velocity: options.VelocityOption = None,
     deadline: Annotated[
-        float | None, typer.Option(help="After so many seconds the best so far has to do.")
-    ] = None,
+        float, typer.Option(help="After so many seconds the best so far has to do.")
+    ] = 60.0,
     keep: Annotated[
         list[str] | None,
         typer.Option(metavar="KIND=FACTOR", help="A cost may be so many times the best one's."),

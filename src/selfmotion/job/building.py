@@ -9,9 +9,10 @@ from selfmotion.basics import Array
 from selfmotion.job.growing import Growing
 from selfmotion.job.order import EXACT
 from selfmotion.job.ordering import Ordering
-from selfmotion.job.program import Program, Step
+from selfmotion.job.program import Program
 from selfmotion.job.seam import JOB_END, JOB_START
-from selfmotion.job.steps import seam_steps
+from selfmotion.job.seam_steps import seam_steps
+from selfmotion.job.step import Step
 from selfmotion.job.work import Work
 from selfmotion.result import Move
 

@@ -11,22 +11,26 @@ from typing import Any
 
 from selfmotion.basics import FileFormatError, SelfmotionError, as_path, write_text
 from selfmotion.collision import obstacle_from_dict
-from selfmotion.job.program import Program, Step
+from selfmotion.job.program import Program
+from selfmotion.job.specification import Specification
+from selfmotion.job.step import Step
 from selfmotion.result import Move, Plan, load_move, read_bundle, read_plan, write_bundle
 
 # Raised with every change that older versions cannot read.
-_FORMAT = 1
+_FORMAT = 2
 
 
 def write_program(program: Program, file: Path) -> None:
     """Write a program to one file, atomically; see `Program.save`."""
     found = [step for step in program.steps if not step.is_missing]
+    asked = program.specification
     troubles = {step.name: step.trouble for step in program.steps if step.is_missing}
     description: dict[str, Any] = {
         "steps": [_step_to_dict(step) for step in found],
         "missing": {**program.missing, **troubles},
         "bound": program.bound,
         "notes": list(program.notes),
+        "specification": None if asked is None else asked.to_dict(),
     }
     write_bundle(file, "program", _FORMAT, description, [step.made for step in found])
 
@@ -48,13 +52,15 @@ def load_program(file: str | Path) -> Program:
         steps = tuple(_step(values, item) for values, item in pairs)
         missing = {str(name): str(why) for name, why in description["missing"].items()}
         notes, bound = tuple(map(str, description["notes"])), float(description["bound"])
+        asked = description["specification"]
+        specification = None if asked is None else Specification.from_dict(asked, made[0].robot)
         if not math.isfinite(bound):
             raise ValueError(f"bound is {bound}, not finite")
     except (SelfmotionError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise FileFormatError(f"{path}: is a damaged program: {error!r}") from error
     if changed:
         missing[path.name] = "the file was changed after the program was written"
-    return Program(made[0].robot, steps, missing, bound, notes)
+    return Program(made[0].robot, steps, missing, bound, notes, specification)
 
 
 def _step_to_dict(step: Step) -> dict[str, Any]:

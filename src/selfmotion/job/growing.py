@@ -7,9 +7,10 @@ from selfmotion.basics import Array
 from selfmotion.certificate import FinishedMotion
 from selfmotion.collision import Obstacle
 from selfmotion.job.ordering import Ordering, State
-from selfmotion.job.program import Program, Step
+from selfmotion.job.program import Program
 from selfmotion.job.seam import JOB_END, JOB_START, Seam
-from selfmotion.job.steps import seam_steps
+from selfmotion.job.seam_steps import seam_steps
+from selfmotion.job.step import Step
 from selfmotion.job.work import Work
 from selfmotion.problem import Problem
 from selfmotion.result import Move, Plan

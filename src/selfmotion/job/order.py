@@ -5,17 +5,19 @@ leads from one state to another one costs something. Up to a dozen stops are ord
 dynamic programming over the sets of stops made (M. Held, R. Karp, "A dynamic programming approach
 to sequencing problems", 1962), with the states of the last one beside the set. More are inserted
 one by one, then moved and turned round where that pays (2-opt and or-opt), with the best states for
-each order by dynamic programming along it.
+each order by dynamic programming along it. What cannot be done costs more than any round there,
+so that these steps lead out of it; where they do not, `feasible` looks for an order without costs.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from selfmotion.basics import Array, Ints
+from selfmotion.job.feasible import feasible_order
 
 # Stops that are ordered exactly, at most: the sets of more fit neither into time nor memory.
 EXACT = 12
@@ -187,17 +189,43 @@ def along(stops: Stops, order: Sequence[int]) -> tuple[tuple[int, ...], float]:
 
 def improved(stops: Stops) -> Round:
     """Return a good round of many stops, and a bound of what any costs."""
-    order = _nearest_first(stops)
+    dear = _with_prices(stops)
+    order = _nearest_first(dear)
     if order is None:
         return _NONE
+    order = _settled(dear, order)
+    if not along(stops, order)[0]:
+        order = feasible_order(
+            stops.after,
+            stops.after_any,
+            stops.states,
+            np.isfinite(stops.between),
+            np.isfinite(stops.first + stops.own),
+            np.isfinite(stops.last),
+        )
+        order = [] if order is None else _settled(stops, order)
+    states, cost = along(stops, order)
+    return Round(states, cost, lower_bound(stops)) if states else _NONE
+
+
+def _with_prices(stops: Stops) -> Stops:
+    """Return the same where what cannot be done costs more than any round that can."""
+    tables = stops.between, stops.first, stops.last
+    dearest = max(float(np.abs(table[np.isfinite(table)]).max(initial=0.0)) for table in tables)
+    price = (stops.count + 1) * (1.0 + dearest) + float(np.abs(stops.own).sum())
+    between, first, last = (np.where(np.isfinite(table), table, price) for table in tables)
+    return replace(stops, between=between, first=first, last=last)
+
+
+def _settled(stops: Stops, order: list[int]) -> list[int]:
+    """Return an order after moving and turning round stretches of it until none pays any more."""
     cost = along(stops, order)[1]
     for _ in range(_ROUNDS):
         before = cost
         order, cost = _swept(stops, order, cost)
         if not cost < before - _GAIN:
             break
-    states, cost = along(stops, order)
-    return Round(states, cost, lower_bound(stops)) if states else _NONE
+    return order
 
 
 def lower_bound(stops: Stops) -> float:
@@ -237,14 +265,12 @@ def _nearest_first(stops: Stops) -> list[int] | None:
         may = [k for k in range(stops.count) if k not in made and stops.allows(k, made)]
         if not may:
             return None
-        # Also what cannot be reached: its cost is known to be inf, and order may mend it.
         nearest = min(may, key=lambda k: float(cost[stops.states[k]].min()))
         states = stops.states[nearest]
         order.append(nearest)
         made.add(nearest)
         reached = cost[states]
-        reached = reached - (reached.min() if np.isfinite(reached.min()) else 0.0)
-        cost = (reached[:, None] + stops.between[states]).min(axis=0) + stops.own
+        cost = (reached[:, None] - reached.min() + stops.between[states]).min(axis=0) + stops.own
     return order
 
 

@@ -10,6 +10,8 @@ import numpy as np
 
 from selfmotion.basics import PlanError, as_path, write_text
 from selfmotion.collision import Obstacle
+from selfmotion.job.specification import Specification
+from selfmotion.job.step import Step
 from selfmotion.motion import Trajectory, joined_motions
 from selfmotion.result import Move, Plan
 from selfmotion.robot import RobotModel
@@ -19,65 +21,6 @@ from selfmotion.robot import RobotModel
 _JOINT, _REST, _PUSH = 1e-9, 1e-6, 1e-4
 # Events may be outside their step by rounding [s].
 _ROUNDING = 1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """One seam of a program, a move, or a wait.
-
-    Attributes
-    ----------
-    name : str
-        That of the seam; of a move ``"A → B"``.
-    made : Plan or Move
-    turned : bool
-        Whether the seam is made from its end to its start.
-    events : tuple of (str, float)
-        What happens how long after its begin [s].
-    leaves : tuple of Obstacle
-        What stands there from its end on.
-    may_meet : tuple of str
-        Names of what stands there that it may meet.
-    """
-
-    name: str
-    made: Plan | Move
-    turned: bool = False
-    events: tuple[tuple[str, float], ...] = ()
-    leaves: tuple[Obstacle, ...] = ()
-    may_meet: tuple[str, ...] = ()
-
-    @property
-    def is_seam(self) -> bool:
-        """Whether it is a seam."""
-        return isinstance(self.made, Plan)
-
-    @property
-    def is_missing(self) -> bool:
-        """Whether it is a move that was not found."""
-        return isinstance(self.made, Move) and self.made.trajectory is None
-
-    @property
-    def motion(self) -> Trajectory:
-        """Its motion; PlanError for a move that was not found."""
-        return self.made.motion if isinstance(self.made, Move) else self.made.trajectory
-
-    @property
-    def trouble(self) -> str:
-        """What is wrong with it, "" for nothing."""
-        if isinstance(self.made, Move):
-            return "" if self.made.verified else f"move '{self.name}': {self.made.trouble}"
-        check = self.made.certificate
-        return "" if check.verified else f"seam '{self.name}': {check.verdict}"
-
-    def meets(self, standing: Mapping[str, Obstacle]) -> list[str]:
-        """Return the names of what it is not judged against, though it stands there."""
-        known = {item.name: item for item in self.made.obstacles}
-        return [
-            name
-            for name, item in standing.items()
-            if name not in self.may_meet and not _same(known.get(name), item)
-        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +40,9 @@ class Program:
         acceleration.
     notes : tuple of str
         What a reader should know: which orders were given up, and why.
+    specification : Specification, optional
+        What was asked for, which the steps are held against; None for steps that were put together
+        by hand, and the verdict says so.
     """
 
     robot: RobotModel
@@ -104,6 +50,7 @@ class Program:
     missing: Mapping[str, str]
     bound: float = 0.0
     notes: tuple[str, ...] = ()
+    specification: Specification | None = None
 
     def __repr__(self) -> str:
         """Return a few lines: how many seams in what order, how long, and the verdict."""
@@ -150,18 +97,18 @@ class Program:
     @property
     def begins(self) -> tuple[float, ...]:
         """When each step begins in `trajectory` [s]."""
-        durations = [_duration(step) for step in self.steps]
+        durations = [step.duration for step in self.steps]
         return tuple(accumulate(durations[:-1], initial=0.0))[: len(self.steps)]
 
     @property
     def duration(self) -> float:
         """How long all of it takes [s]."""
-        return sum(_duration(step) for step in self.steps)
+        return sum(step.duration for step in self.steps)
 
     @property
     def transfer_time(self) -> float:
         """How long moves and waits take [s]."""
-        return sum(_duration(step) for step in self.steps if not step.is_seam)
+        return sum(step.duration for step in self.steps if not step.is_seam)
 
     @property
     def events(self) -> tuple[tuple[float, str, str], ...]:
@@ -181,8 +128,10 @@ class Program:
     def verdict(self) -> str:
         """One line: verified, or what is wrong with which seam or move."""
         if self.verified:
+            alone = "" if self.specification else "; nothing says what was asked for"
             return (
-                f"verified at all times: {self.extent}, and all moves in between, from rest to rest"
+                f"verified at all times: {self.extent}, and all moves in between, from rest to "
+                f"rest{alone}"
             )
         return f"not verified: {'; '.join(self.failures)}"
 
@@ -205,6 +154,7 @@ class Program:
                 *self._gaps(),
                 *self._left_out(),
                 *self._beyond(),
+                *self._not_as_asked(),
             ]
         )
 
@@ -232,7 +182,8 @@ class Program:
 
     def _left_out(self) -> Iterator[str]:
         """Yield what stands there and was not looked at."""
-        standing: dict[str, Obstacle] = {}
+        asked = self.specification.obstacles if self.specification else ()
+        standing: dict[str, Obstacle] = {item.name: item for item in asked}
         for step in self.steps:
             met = step.meets(standing)
             if met:
@@ -242,10 +193,15 @@ class Program:
     def _beyond(self) -> Iterator[str]:
         """Yield events that are not while their step lasts."""
         for step in self.steps:
-            lasts = _duration(step)
+            lasts = step.duration
             for event, at in step.events:
                 if not -_ROUNDING <= at <= lasts + _ROUNDING:
                     yield f"event '{event}' of '{step.name}' is at {at:.6g} s of {lasts:.6g} s"
+
+    def _not_as_asked(self) -> Iterator[str]:
+        """Yield what was asked for and is not so."""
+        if self.specification is not None:
+            yield from self.specification.failures(self.robot, self.steps, self.missing)
 
     def require(self) -> "Program":
         """Return the program itself if all of it is verified.
@@ -267,7 +223,7 @@ class Program:
         rows = list[tuple[float, float, str, str]]()
         for begin, step in zip(self.begins, self.steps, strict=True):
             kind = "seam" if step.is_seam else "move"
-            rows.append((begin, begin + _duration(step), kind, step.name))
+            rows.append((begin, begin + step.duration, kind, step.name))
             # Of those at one time the order counts.
             for event, at in sorted(step.events, key=lambda item: item[1]):
                 rows.append((begin + at, begin + at, "event", f"{step.name}: {event}"))
@@ -287,12 +243,3 @@ class Program:
 
 # Names in a printed program.
 _SHOWN = 12
-
-
-def _same(one: Obstacle | None, other: Obstacle) -> bool:
-    """Whether two bodies are one, and in the same place."""
-    return one is other or (one is not None and one.to_dict() == other.to_dict())
-
-
-def _duration(step: Step) -> float:
-    return 0.0 if step.is_missing else step.motion.duration

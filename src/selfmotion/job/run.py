@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy.typing as npt
@@ -24,6 +25,7 @@ from selfmotion.job.files import Shelf
 from selfmotion.job.ordering import Ordering
 from selfmotion.job.program import Program
 from selfmotion.job.seam import Seam
+from selfmotion.job.specification import Specification
 from selfmotion.job.work import Asked, Work, check_can_be_sent
 from selfmotion.problem import KEPT, NO_OVERLAP
 from selfmotion.robot import RobotModel
@@ -77,7 +79,8 @@ def plan_job(
         What a unit of a seam's cost counts, beside the time of moves [s]; by default only time
         counts.
     deadline : float
-        After so many seconds a move counts as not found.
+        After so many seconds of the processor a move counts as not found. A move that takes nearly
+        as long to find may be found on one machine, or on one day, and not on another.
     folder : path, optional
         Keeps every plan and move there as soon as it is finished; a job that is begun again takes
         what it finds, and ends in the same program.
@@ -128,7 +131,11 @@ def plan_job(
     if not ordering.states:
         reasons = "".join(f"\n  '{name}': {why}" for name, why in ordering.missing.items())
         raise PlanError(f"{robot.name}: no seam has a motion:{reasons}")
-    return Builder(ordering, work, ends).program()
+    program = Builder(ordering, work, ends).program()
+    asked_for = Specification(
+        listed, not is_free, ends[0], ends[1], asked.constraints, asked.clearance
+    )
+    return replace(program, specification=asked_for)
 
 
 def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:

@@ -24,8 +24,8 @@ _BESIDE, _NEARER, _AMONG = 0.5, 0.2, 0.5
 # So often; then all rows are.
 _ROUNDS = 12
 # Rows that are left out may be broken by this share of their limits, and so many places beside one
-# that is come in with it.
-_BROKEN, _WIDE = 1e-5, 3
+# that is come in with it: with few, what is broken only moves on.
+_BROKEN, _WIDE = 1e-5, 20
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,7 +36,8 @@ class Weave(_InStep, kind="weave"):
     At the time t the tool is beside the path by y(ψ(t)) along an axis of its own frame, with the
     orientation that the path has there. ψ counts swings by the length of the path, so that they are
     as long as each other whatever the feed is; their number is whole. The swing grows over the
-    first one and vanishes over the last one, y, y′ and y″ being 0 at both ends.
+    first one and vanishes over the last one as g(x) = 10x³ - 15x⁴ + 6x⁵, so that y, y′ and y″ are 0
+    at both ends.
 
     Parameters
     ----------
@@ -50,7 +51,8 @@ class Weave(_InStep, kind="weave"):
         Direction of the swing in the tool's frame.
     dwell : float
         For what share of a swing the tool stays at each edge, from 0 to below 0.5. With 0 the swing
-        is a sine; otherwise the tool goes from edge to edge with continuous accelerations.
+        is the sine y = amplitude · g · sin 2πψ; otherwise the tool goes from edge to edge as g
+        over ½ - dwell of a swing, with continuous accelerations, half of it at whole ψ.
 
     Raises
     ------

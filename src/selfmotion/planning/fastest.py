@@ -28,6 +28,7 @@ from selfmotion.planning.search import Search
 from selfmotion.planning.settings import (
     COARSE,
     DEGREE,
+    FASTEST_DEADLINE,
     KEPT_GROWTH,
     KEPT_WEIGHT,
     POWER,
@@ -39,7 +40,6 @@ from selfmotion.result import Plan, rate_limits, retime
 
 # What brings a path to another pace.
 Pace = Callable[[Path], Path]
-# After these there is nothing to be tried any more.
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ def fastest(
     keep: Mapping[str, float] | None = None,
     search: Search | None = None,
     tolerance: Tolerance | None = None,
-    deadline: float | None = None,
+    deadline: float | None = FASTEST_DEADLINE,
     progress: Progress = silent,
 ) -> Fastest:
     """Return the fastest motion along the problem's path, whatever its own pace and costs.
@@ -109,8 +109,9 @@ def fastest(
     tolerance : Tolerance, optional
         See `plan`.
     deadline : float, optional
-        After so many seconds the best so far has to do; what is left, such as judging a motion,
-        takes some time more. Ctrl-C does the same.
+        After so many seconds the best so far has to do; None looks as long as rounds gain. Nothing
+        is begun that would take longer, by what the same took before; the first motion is judged
+        whatever the time. Ctrl-C keeps the best so far as well.
     progress : callable, optional
         Called with ``("fastest", round, rounds)``, and with the stages of `plan` in between. It may
         raise `KeyboardInterrupt` to stop.
@@ -138,7 +139,7 @@ def fastest(
             rounds.run(options)
     except KeyboardInterrupt:
         # A plan in between may have seen first that it is late.
-        late = time.perf_counter() >= clock.end
+        late = time.perf_counter() >= clock.end - rounds.longest
         status = Status.DEADLINE if late else Status.INTERRUPTED
         if rounds.best is None and not late:
             raise
@@ -158,10 +159,20 @@ class _Options(NamedTuple):
     clock: Deadline
     progress: Progress
 
-    def plan(self, problem: Problem) -> Plan:
-        """Plan, in the time that is left; KeyboardInterrupt where something stopped it."""
+    def left(self, kept: float = 0.0) -> float:
+        """Return the time that is left but for what is kept [s]; KeyboardInterrupt for none."""
         self.clock.check()
-        left = self.clock.end - time.perf_counter()
+        left = self.clock.end - time.perf_counter() - kept
+        if left <= 0.0:
+            raise KeyboardInterrupt
+        return left
+
+    def plan(self, problem: Problem, kept: float = 0.0) -> Plan:
+        """Plan, in the time that is left but for what is kept for its pace [s].
+
+        KeyboardInterrupt where something stopped it, or there is none.
+        """
+        left = self.left(kept)
         try:
             return plan(
                 problem,
@@ -195,6 +206,8 @@ class _Rounds:
         self.verdict = "nothing was planned yet"
         self.times: list[float] = []
         self.retimed = {"x = 0": np.inf, "costs": np.inf}
+        # What the pace of a motion took at most [s].
+        self.longest = 0.0
 
     def run(self, options: _Options) -> None:
         """Go on while rounds gain; KeyboardInterrupt where they were stopped."""
@@ -207,7 +220,10 @@ class _Rounds:
         self._bounds = self._kept.bounds(costs)
         found = self._taken("costs", planned)
         still = replace(planned, trajectory=planned.initial_trajectory)
-        self._taken("x = 0", still)
+        still = replace(still, certificate=still.check())
+        if still.certificate.on_path:
+            options.left(self.longest)
+            self._taken("x = 0", still)
         if planned.report.status.is_cut_short:
             raise KeyboardInterrupt
         use, weight = LimitUse(self._v, self._a, POWER), 0.0
@@ -217,7 +233,7 @@ class _Rounds:
             before = self._duration
             weighted = self._kept.weighted(costs, weight * self._duration) if weight else ()
             asked = replace(self._free, costs=(use, *weighted))
-            planned = options.plan(_at_pace(asked, pace))
+            planned = options.plan(_at_pace(asked, pace), self.longest)
             self.verdict = planned.certificate.verdict
             if planned.certificate.on_path and not planned.report.ending:
                 found = self._taken("rounds", planned)
@@ -241,7 +257,9 @@ class _Rounds:
 
     def _taken(self, name: str, planned: Plan) -> Plan:
         """Return a motion at its fastest: the best so far if none is faster and costs are kept."""
+        began = time.perf_counter()
         found = _at_its_fastest(planned, self._problem, self._v, self._a)
+        self.longest = max(self.longest, time.perf_counter() - began)
         self.verdict = found.certificate.verdict
         if found.certificate.verified:
             self.retimed[name] = found.path.duration

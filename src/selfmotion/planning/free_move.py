@@ -65,7 +65,8 @@ def move(
     task : Task or str
         The rows of the pose that count where an end is one.
     deadline : float
-        After so many seconds of looking the move counts as not found.
+        After so many seconds of looking the move counts as not found; of the processor, so that
+        what else a machine does changes nothing.
     rng : Generator or int
         Shifts the samples; the same one gives the same move, unless the deadline ends it.
     progress : callable, optional

@@ -185,6 +185,8 @@ SAME_ENDS = 0.2
 MOST_ESTIMATED = 2048
 
 # --- the fastest motion
+# After so many seconds the best so far has to do.
+FASTEST_DEADLINE = 60.0
 # Rounds end when one gains less than this share, or after so many.
 ROUND_GAIN = 2e-3
 ROUNDS = 8

@@ -113,7 +113,7 @@ def find_way(
     starts, goals : (a, n), (b, n)
         Free configurations.
     end : float
-        When to give up, by the clock `time.perf_counter` [s].
+        When to give up, by the clock of the processor `time.thread_time` [s].
     rng : Generator
 
     Returns
@@ -239,7 +239,7 @@ def _connected(
     one, other, forward = _Tree(starts, rates), _Tree(goals, rates), True
     middle = 0.5 * (starts[0] + goals[0])
     spread = SPREAD * float((np.abs(goals[0] - starts[0]) * rates).max()) / rates
-    while time.perf_counter() < end:
+    while time.thread_time() < end:
         near = rng.uniform() < AROUND_MIDDLE
         sample = rng.normal(middle, spread) if near else rng.uniform(lower, upper)
         k, _ = one.grow(room, np.clip(sample, lower, upper), LEG_RANGE)

@@ -11,8 +11,9 @@ from selfmotion.result.pace_rows import length_speed
 _FEWEST, _ENOUGH = 600, 3000
 # Its first and last intervals have so many parts.
 _GRADED = 12
-# A smooth pace has so many intervals at least.
-_INTERVALS = 250
+# A smooth pace has so many intervals at least; so many at most, or for each sample of the motion,
+# with this time between two [s], more with less: slow limits make a motion long, not more winding.
+_INTERVALS, _MANY, _PER_SAMPLE, _COARSE = 250, 4000, 4, 4e-3
 # It is as smooth as the mean, so often, over so many knots.
 _MEANS, _WINDOW = 4, 3
 # Accelerations build up over so many knots where the arm begins at rest and jerks are limited.
@@ -55,15 +56,17 @@ def of_constant_speed(motion: Trajectory) -> Pace:
     return Pace(length, knots - knots[0], 1.0 / speed, -gain / speed**3)
 
 
-def smooth(pace: Pace, step: float, jerk: bool) -> Pace:
+def smooth(pace: Pace, step: float, jerk: bool, samples: int) -> Pace:
     """Return a pace all of whose derivatives are smooth, on knots about so far apart in time [s].
 
+    Farther where a motion of so many samples is that slow.
     The mean over some knots, several times; beyond a rest it goes back, beyond others on. Where
     jerks are limited, accelerations begin at 0.
     """
     from scipy.interpolate import make_interp_spline
 
-    count = max(int(np.ceil(pace.t[-1] / step)), _INTERVALS)
+    most = int(np.ceil(max(_MANY, _PER_SAMPLE * samples) * _COARSE / step))
+    count = min(max(int(np.ceil(pace.t[-1] / step)), _INTERVALS), most)
     t = np.linspace(0.0, pace.t[-1], count + 1)
     sigma = np.maximum.accumulate(pace(t))
     beyond = _WINDOW // 2 * _MEANS

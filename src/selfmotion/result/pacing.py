@@ -38,6 +38,8 @@ _ROUGH, _NEAREST = 1.002, 2e-4
 # With limits of the jerk likewise where at some time no limit is used by this share: within an
 # interval the jerk cannot follow what the path asks for.
 _IDLE = 0.8
+# A pace that passes limits manyfold is of a programme that was not solved: what is known stays.
+_WILD = 10.0
 # A jump of this share of a limit has a knot of its own.
 _JUMP = 0.02
 # Gaps of the linear programmes, as shares: while the pace is rough, and then.
@@ -69,7 +71,7 @@ def fastest_pace(motion: Trajectory, limits: PaceLimits, ends: Ends, step: float
     limits : PaceLimits
     ends : Ends
     step : float
-        Time between two knots of the pace [s], about.
+        Time between two knots of the pace [s], about; more of a motion that is slow all along.
 
     Raises
     ------
@@ -85,12 +87,12 @@ def fastest_pace(motion: Trajectory, limits: PaceLimits, ends: Ends, step: float
     jerk = bool(np.isfinite(limits.jerk).any())
     for _ in range(_BASES if jerk else 0):
         # Tangents hold near a pace, so that the next one begins anew from there.
-        pace = _scaled(smooth(pace, step, jerk), motion, limits)
+        pace = _scaled(smooth(pace, step, jerk, len(motion.t)), motion, limits)
         near, room = Squares.constant(pace.t, 1.0), _all_room(len(pace.t) - 1, limits)
         pace = _changed(
             pace, _improved(pace, motion, limits, room, near, ends, _BY_JERKS, _ROUGH_GAP)
         )
-    pace = _scaled(smooth(pace, step, jerk), motion, limits)
+    pace = _scaled(smooth(pace, step, jerk, len(motion.t)), motion, limits)
     return _settled(pace, motion, limits, ends)
 
 
@@ -113,6 +115,8 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
     most = _BY_JERKS_LATER if jerk else _OTHERS
     for number in range(_MOST_STEPS):
         near = _improved(base, motion, limits, room, near, ends, most, _GAP)
+        if np.isfinite(best[0][1]) and not near.is_positive:
+            break
         pace = _changed(base, near)
         used, least = limits.shares(along(pace, motion))
         kept = _scaled(pace, motion, limits, least=1.0)
@@ -122,6 +126,8 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
         rank = max(passed, _KEPT), float(kept.t[-1])
         if rank < best[0]:
             best = rank, kept
+        if over.max() > _WILD and np.isfinite(best[0][1]):
+            break
         if over.max() < _NEAR and passed <= _KEPT and abs(before / pace.t[-1] - 1.0) < _GAIN:
             break
         before = pace.t[-1]

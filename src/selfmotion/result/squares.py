@@ -27,6 +27,11 @@ class Squares:
         """Return the same value everywhere."""
         return cls(knots, np.full(len(knots) + 1, value))
 
+    @property
+    def is_positive(self) -> bool:
+        """Whether no coefficient is below 0, so that b is nowhere."""
+        return bool(self.c.min() >= 0.0)
+
     def inside(self, share: float, order: int = 0) -> Array:
         """Return b, b' or b'' at a share of each interval, (K,)."""
         three = np.stack([self.c[:-2], self.c[1:-1], self.c[2:]])

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmotion.collision import Obstacle
-from selfmotion.job.program import Step
 from selfmotion.job.seam import Seam
+from selfmotion.job.step import Step
 from selfmotion.job.work import Work
 from selfmotion.motion import Trajectory
 from selfmotion.result import Move, Plan
