@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from selfmotion.collision import CollisionModel
+from selfmotion.collision import CollisionModel, how_near
 from selfmotion.collision.bodies import link_bodies
 from selfmotion.collision.pairs import candidate_pairs
 from selfmotion.robot import RobotModel, load_robot
@@ -35,3 +35,8 @@ def test_pairs_that_overlap_often_are_listed(name: str) -> None:
     for item in checked:
         pieces = [i for i, pair in enumerate(model.pairs) if pair == (item.first, item.second)]
         assert share[pieces].max() == pytest.approx(item.share, abs=0.13)
+
+
+def test_depths_are_told_as_such() -> None:
+    assert how_near(0.01788) == "are 17.88 mm apart"
+    assert how_near(-0.01788) == "overlap by 17.88 mm"
