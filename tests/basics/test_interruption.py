@@ -87,12 +87,14 @@ def test_a_search_for_the_fastest_ends_with_the_best_so_far(
     limits = [sm.JointVelocityLimits(np.full(3, 2.0)), sm.JointAccelerationLimits(np.full(3, 8.0))]
     problem = sm.Problem(planar, circle, "planar", start, constraints=limits)
     timer = threading.Timer(moment, press)
+    found = None
     try:
         timer.start()
         found = sm.fastest(problem)
+        timer.cancel()
+        timer.join()
     except KeyboardInterrupt:
-        found = None
-    finally:
+        # Before there was anything, or after the end.
         timer.join()
     if found is not None:
         assert found.plan.certificate.verified
