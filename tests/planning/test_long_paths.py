@@ -112,3 +112,25 @@ def test_a_callback_that_stops_ends_it(planar: sm.RobotModel) -> None:
     assert plan.report.status.value == "stopped"
     assert plan.certificate.on_path
     assert len(told) <= 4
+
+
+def test_an_interruption_of_newtons_method_keeps_the_best_so_far(planar: sm.RobotModel) -> None:
+    """It comes with the second iteration along the whole path."""
+    whole: list[float] = []
+    stages: list[str] = []
+
+    def interrupt(iteration: sm.Iteration) -> bool:
+        if stages[-1] == "posture":
+            whole.append(iteration.cost)
+        if len(whole) == 2:
+            whole.append(np.inf)
+            raise KeyboardInterrupt
+        return False
+
+    def progress(stage: str, done: int, total: int) -> None:
+        stages.append(stage)
+
+    plan = sm.plan(loops(planar, 25), callback=interrupt, progress=progress)
+    assert plan.report.status.value == "interrupted"
+    assert plan.certificate.verified
+    assert plan.report.cost <= whole[0] * (1.0 + ENDS)

@@ -65,13 +65,22 @@ def _optimise(draft: Draft, posture: Array, ended: Status | None) -> None:
         descent.end(ended)
     motion = _near(descent, problem, start, posture)
     dearest = np.inf if draft.is_unmet or draft.best is None else draft.best.standing.cost
-    found = None if motion is None else descent.best_near(motion, dearest)
-    if motion is None or found is None or found.cost >= dearest:
+    if motion is None:
+        return
+    try:
+        found = descent.best_near(motion, dearest)
+    except KeyboardInterrupt:
+        found, ended = descent.latest, Status.INTERRUPTED
+        if found is None:
+            raise
+    if found is None or found.cost >= dearest:
         return
     grid = Grid(motion.grid.t)
     session = draft.begin(start, free=draft.is_free, guide=_Rates(motion), grid=grid)
     if session is not None:
         session.stand_on(found, descent.history)
+        if ended is not None:
+            session.end(ended)
         draft.consider(session)
 
 
