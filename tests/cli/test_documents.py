@@ -99,7 +99,7 @@ def test_limits_and_obstacles_of_a_motion(plan: sm.Plan, seam: Path, tmp_path: P
     box = sm.Box("box", hand, [0.02, 0.02, 0.02])
     (tmp_path / "world.json").write_text(json.dumps([box.to_dict()]))
     code, text = invoke(*asked, "--obstacles", tmp_path / "world.json")
-    assert (code, "box are" in text) == (1, True)
+    assert (code, "box overlap by" in text) == (1, True)
     code, text = invoke(*asked, "--clearance", "0.001")
     assert (code, "self-collision" in text) == (0, True)
 
