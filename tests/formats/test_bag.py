@@ -10,7 +10,6 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 import selfmotion as sm
-from support.arms import PANDA_HOME, robot_named
 from support.shell import complaint, invoke
 
 # A stamp is a whole nanosecond.
@@ -18,13 +17,6 @@ NANO = 1e-9
 # Dense enough that cubics through q and q̇ are the motion, to what is told of it.
 RATE = 200.0
 SPOILED = 120
-
-
-@pytest.fixture(scope="module")
-def plan() -> sm.Plan:
-    panda = robot_named("panda")
-    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
-    return sm.plan(sm.Problem(panda, circle, start=PANDA_HOME))
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ import yaml
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from support.arms import PANDA_HOME, robot_named
+from support.arms import robot_named
 from support.shell import complaint, invoke
 
 # A setpoint's time is a whole nanosecond.
@@ -25,13 +25,6 @@ NANO = 1e-9
 
 # MuJoCo's frames from the same URDF [m]; it keeps the text's own digits.
 PLACE = 1e-6
-
-
-@pytest.fixture(scope="module")
-def plan() -> sm.Plan:
-    panda = robot_named("panda")
-    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 3.0, normal=(1.0, 0.0, 0.0))
-    return sm.plan(sm.Problem(panda, circle, start=PANDA_HOME))
 
 
 @pytest.fixture(scope="module")

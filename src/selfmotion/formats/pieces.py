@@ -60,8 +60,7 @@ def pieces_of(plan: Plan | Parts | Move | Program) -> list[Piece]:
     for step in plan.steps:
         made = step.made
         piece = _of_plan(step.name, made) if isinstance(made, Plan) else _of_move(step.name, made)
-        events = sorted(step.events, key=lambda item: item[1])
-        found.append(piece._replace(events=tuple((at, name) for name, at in events)))
+        found.append(piece._replace(events=tuple((at, name) for name, at in step.happenings)))
     if not found:
         raise PlanError(f"{plan.robot.name}: {plan.verdict}")
     return found

@@ -1,6 +1,7 @@
 """An order of stops in which each can be reached from the one before, whatever it costs."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -37,37 +38,55 @@ def feasible_order(
     first, last : (m,)
         Whether a state can be the first, or the last.
     """
-    return _Search(after, after_any, states, between, first, last).order()
+    ways = between.T
+    search = _Search(
+        after=[_bits(each) for each in after],
+        after_any=[_bits(each) for each in after_any],
+        of=[_bits(each.tolist()) for each in states],
+        onward=[_places(np.asarray(row)) for row in between],
+        into=[_places(np.asarray(ways[each].any(axis=0))) for each in states],
+        first=_places(first),
+        last=_places(last),
+    )
+    return search.order()
 
 
+@dataclass
 class _Search:
-    """Depth first over sets of stops, which are bits of whole numbers as states are."""
+    """Depth first over sets of stops, which are bits of whole numbers as states are.
 
-    def __init__(
-        self,
-        after: Sequence[frozenset[int]],
-        after_any: Sequence[frozenset[int]],
-        states: Sequence[Ints],
-        between: Flags,
-        first: Flags,
-        last: Flags,
-    ) -> None:
-        self._after = [_bits(each) for each in after]
-        self._after_any = [_bits(each) for each in after_any]
-        self._of = [_bits(each.tolist()) for each in states]
-        self._onward = [_bits(np.flatnonzero(row).tolist()) for row in between]
-        self._first, self._last = (_bits(np.flatnonzero(x).tolist()) for x in (first, last))
-        ways = between.T
-        self._into = [_bits(np.flatnonzero(ways[each].any(axis=0)).tolist()) for each in states]
-        self._looks = 0
+    Attributes
+    ----------
+    after, after_any : list of int
+        The stops before each one.
+    of : list of int
+        The states of each stop.
+    onward : list of int
+        The states that each state leads to.
+    into : list of int
+        The states that lead to each stop.
+    first, last : int
+        The states that can be the first, or the last.
+    looks : int
+        So many stops were looked at as the next one.
+    """
+
+    after: list[int]
+    after_any: list[int]
+    of: list[int]
+    onward: list[int]
+    into: list[int]
+    first: int
+    last: int
+    looks: int = 0
 
     def order(self) -> list[int] | None:
         """Return the order, or None."""
-        full, made = (1 << len(self._of)) - 1, 0
+        full, made = (1 << len(self.of)) - 1, 0
         tried: set[tuple[int, int]] = set()
         order: list[int] = []
-        levels = [self._following(0, self._first)]
-        while levels and self._looks < _LOOKS:
+        levels = [self._following(0, self.first)]
+        while levels and self.looks < _LOOKS:
             stop, reached = next(levels[-1], (-1, 0))
             if stop < 0:
                 levels.pop()
@@ -79,7 +98,7 @@ class _Search:
                 continue
             tried.add(key)
             if key[0] == full:
-                if reached & self._last:
+                if reached & self.last:
                     return [*order, stop]
                 continue
             order.append(stop)
@@ -89,36 +108,38 @@ class _Search:
 
     def _following(self, made: int, beyond: int, reached: int = 0) -> Iterator[_Next]:
         """Return stops that may come next, those first that leave the fewest ways to go on."""
-        left = [stop for stop in range(len(self._of)) if not made >> stop & 1]
-        self._looks += len(left)
+        left = [stop for stop in range(len(self.of)) if not made >> stop & 1]
+        self.looks += len(left)
         todo = 0
         for stop in left:
-            todo |= self._of[stop]
+            todo |= self.of[stop]
         # One that nothing leads to any more is never made.
-        if made and not all(self._into[stop] & (todo | reached) for stop in left):
+        if made and not all(self.into[stop] & (todo | reached) for stop in left):
             return iter(())
         rated = []
         for stop in left:
-            here = self._of[stop] & beyond
+            here = self.of[stop] & beyond
             if here and self._may(stop, made):
-                rated.append(
-                    ((self._beyond(here) & todo & ~self._of[stop]).bit_count(), stop, here)
-                )
+                rated.append(((self._beyond(here) & todo & ~self.of[stop]).bit_count(), stop, here))
         return iter([(stop, here) for _, stop, here in sorted(rated)])
 
     def _may(self, stop: int, made: int) -> bool:
-        any_of = self._after_any[stop]
-        return not self._after[stop] & ~made and (not any_of or bool(any_of & made))
+        any_of = self.after_any[stop]
+        return not self.after[stop] & ~made and (not any_of or bool(any_of & made))
 
     def _beyond(self, reached: int) -> int:
         """Return the states that can be reached from some."""
         found = 0
         while reached:
             lowest = reached & -reached
-            found |= self._onward[lowest.bit_length() - 1]
+            found |= self.onward[lowest.bit_length() - 1]
             reached ^= lowest
         return found
 
 
 def _bits(places: Sequence[int] | frozenset[int]) -> int:
     return sum(1 << int(k) for k in places)
+
+
+def _places(found: Flags) -> int:
+    return _bits(np.flatnonzero(found).tolist())

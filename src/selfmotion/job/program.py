@@ -116,7 +116,7 @@ class Program:
         return tuple(
             (begin + at, step.name, event)
             for begin, step in zip(self.begins, self.steps, strict=True)
-            for event, at in step.events
+            for event, at in step.happenings
         )
 
     @property
@@ -224,8 +224,7 @@ class Program:
         for begin, step in zip(self.begins, self.steps, strict=True):
             kind = "seam" if step.is_seam else "move"
             rows.append((begin, begin + step.duration, kind, step.name))
-            # Of those at one time the order counts.
-            for event, at in sorted(step.events, key=lambda item: item[1]):
+            for event, at in step.happenings:
                 rows.append((begin + at, begin + at, "event", f"{step.name}: {event}"))
         lines = ["begin,end,kind,name"]
         lines += [

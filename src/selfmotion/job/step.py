@@ -56,6 +56,11 @@ class Step:
         return 0.0 if self.is_missing else self.motion.duration
 
     @property
+    def happenings(self) -> list[tuple[str, float]]:
+        """The events by their time; those at one time in the order in which they were given."""
+        return sorted(self.events, key=lambda item: item[1])
+
+    @property
     def constraints(self) -> tuple[Constraint, ...]:
         """What it is judged by."""
         made = self.made

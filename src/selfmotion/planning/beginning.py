@@ -51,6 +51,7 @@ class Beginning:
         guide: Guide | None = None,
         deviation: Array | None = None,
         grid: Grid | None = None,
+        is_rough: bool = False,
     ) -> "Beginning":
         """Integrate the motion at x = 0 from a start.
 
@@ -67,18 +68,19 @@ class Beginning:
         deviation : (size,), optional
             That of the tool from its path at x = 0, as `Deviation` has it, likewise.
         grid : Grid, optional
-            Where a rough motion will do; with a guide, one to begin with that is refined until it
-            stays near the path, as is done by default.
+            To begin with; it is refined until the motion stays near the path.
+        is_rough : bool
+            Whether the motion on that grid will do, however far off the path it is.
 
         Raises
         ------
         BreakdownError
             The motion at x = 0 runs into a singular pose.
         """
-        if grid is None or guide is not None:
-            still, jacobians = settled_still_motion(problem, configuration, guide, deviation, grid)
-        else:
+        if is_rough and grid is not None:
             still, jacobians = rough_still_motion(problem, configuration, grid)
+        else:
+            still, jacobians = settled_still_motion(problem, configuration, guide, deviation, grid)
         effort.counts.jacobians += jacobians
         bound = problem.bind_constraints(configuration, still.end, apart=effort.apart)
         return cls(problem, effort, still, tuple(bound), free)

@@ -212,29 +212,24 @@ class Draft:
     def prove(self, best: Session) -> None:
         """Let the best motion be what the plan is made of, on grids that are fine enough."""
         rival_cost = self._settle(best, self.rival)
-        whole = LargestPart(self.problem, best, "")
-        finished = finish(self.problem, whole, self.tolerance, self.progress)
-        self.proved = Proved(whole, finished, rival_cost)
+        self.proved = self._proved(LargestPart(self.problem, best, ""), rival_cost)
 
     def is_free_by_meshes(self) -> bool:
         """Whether bodies are apart by their meshes along the best motion, though not by hulls."""
         best = self.best
         if best is None or not best.violations:
             return False
+        bodies = self.problem.envelope.bodies
+        if all(model.is_all_convex for model, _ in bodies):
+            return False
         q = best.motion().trajectory.q
-        rough = [
-            (model, far) for model, far in self.problem.envelope.bodies if not model.is_all_convex
-        ]
-        return bool(rough) and all(
-            model.worst(q).value >= far for model, far in self.problem.envelope.bodies
-        )
+        return all(model.worst(q).value >= far for model, far in bodies)
 
     def prove_as_it_is(self, best: Session) -> bool:
         """Let a motion be it if it is verified; return whether it is."""
-        whole = LargestPart(self.problem, best, "")
-        finished = finish(self.problem, whole, self.tolerance, self.progress)
-        if finished.certificate.verified:
-            self.proved = Proved(whole, finished)
+        proved = self._proved(LargestPart(self.problem, best, ""))
+        if proved.finished.certificate.verified:
+            self.proved = proved
         return self.proved is not None
 
     def prove_part(self, suspect: float = 0.0) -> bool:
@@ -249,9 +244,13 @@ class Draft:
         if found is None:
             return False
         self._settle(found.session, None)
-        finished = finish(self.problem, found, self.tolerance, self.progress)
-        self.proved = Proved(found, finished)
+        self.proved = self._proved(found)
         return True
+
+    def _proved(self, part: LargestPart, rival_cost: float | None = None) -> Proved:
+        """Return a motion on the first grid that holds the tolerance, with its check."""
+        finished = finish(self.problem, part, self.tolerance, self.progress)
+        return Proved(part, finished, rival_cost)
 
     def _settle(self, best: Session, rival: Session | None) -> float | None:
         """Go on to finer grids, also with what the best one is compared with; return its cost."""

@@ -56,7 +56,9 @@ class Heats:
         for number, start in enumerate(promising, 1):
             self._progress("start", number, len(promising))
             try:
-                begun = Beginning.of(problem, self._effort, start, free=True, grid=grid)
+                begun = Beginning.of(
+                    problem, self._effort, start, free=True, grid=grid, is_rough=True
+                )
             except BreakdownError:
                 continue
             self._note(Session(begun))

@@ -7,6 +7,7 @@ method on nodes takes a handful of iterations, however many loops there are.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from selfmotion.optimise import Status
 from selfmotion.path import Section
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.nodes import NodeDescent, most_nodes, takes
+from selfmotion.planning.part_problem import asked_of_part
 from selfmotion.planning.settings import (
     FIRST_NODES,
     LONG_AGREEMENT,
@@ -75,8 +77,9 @@ def _optimise(draft: Draft, posture: Array, ended: Status | None) -> None:
             raise
     if found is None or found.cost >= dearest:
         return
-    grid = Grid(motion.grid.t)
-    session = draft.begin(start, free=draft.is_free, guide=_Rates(motion), grid=grid)
+    # Of its velocities eq. 4 keeps the self-motion.
+    rates, grid = partial(motion.trajectory, order=1), Grid(motion.grid.t)
+    session = draft.begin(start, free=draft.is_free, guide=rates, grid=grid)
     if session is not None:
         session.stand_on(found, descent.history)
         if ended is not None:
@@ -92,12 +95,11 @@ def _postures(draft: Draft) -> tuple[list[Array], Status | None]:
     problem = draft.problem
     middle, half = 0.5, 0.5 * STRETCH_WAY / problem.way_in_reaches
     first, last = (problem.path.duration * share for share in (middle - half, middle + half))
-    kept = [item.on_part() for item in problem.constraints]
     stretch = replace(
         problem,
         **problem.along(lambda path: Section(path, first, last)),
         start=None,
-        constraints=[item for item in kept if item is not None],
+        constraints=list(asked_of_part(problem, is_first=False, is_last=False)),
         rest=False,
     )
     inner = replace(
@@ -136,14 +138,3 @@ def _near(
                 return motion
         grid = grid.halved()
     return None
-
-
-class _Rates:
-    """The joint velocities of a motion, of which eq. 4 keeps the self-motion."""
-
-    def __init__(self, motion: NodeMotion) -> None:
-        self._trajectory = motion.trajectory
-
-    def __call__(self, t: Array) -> Array:
-        """Return them at times `t` (S,), (S, n)."""
-        return self._trajectory(t, 1)
