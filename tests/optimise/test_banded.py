@@ -6,6 +6,7 @@ from scipy.optimize import linprog
 from scipy.sparse import lil_array
 
 from selfmotion.optimise import BandedRows, banded_optimum
+from selfmotion.result.squares import basis
 
 # The optimum is reached to this share.
 GAP = 1e-6
@@ -61,3 +62,36 @@ def test_rows_that_contradict_each_other_have_no_optimum() -> None:
     )
     bound = np.full(22, 5.0)
     assert not banded_optimum(gradient, against, np.zeros(22), -bound, bound)[1]
+
+
+def uneven_splines(seed: int, count: int) -> tuple[np.ndarray, BandedRows]:
+    """Quadratic splines on intervals of 0.1 to 1 ms, below a curve, with limited derivatives.
+
+    As those of paces around corners: rows of second derivatives are 1e8 times as steep as others.
+    """
+    rng = np.random.default_rng(seed)
+    widths = 1e-3 * 0.5 ** np.repeat(rng.integers(0, 4, -(-count // 30)), 30)[:count]
+    t = np.append(0.0, np.cumsum(widths))
+    value, slope, bend = (part[:, :, None] for part in basis(t, 0.5))
+    waves = np.arange(1, 9) * (t[1:, None] / t[-1] + rng.random(8))
+    most = np.exp(np.sin(2.0 * np.pi * waves) @ rng.normal(size=8))[:, None]
+    least = np.column_stack([np.full((count, 1), -np.inf), -np.ones((count, 2))])
+    matrix = np.concatenate([value, bend / 3e3, slope / 60.0], axis=2)
+    return np.ones(count + 2), BandedRows(matrix, least, np.column_stack([most, -least[:, 1:]]))
+
+
+# Prices of steep rows round.
+STEEP_GAP = 1e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("count", [300, 1000])
+def test_steep_rows_next_to_others_are_no_obstacle(seed: int, count: int) -> None:
+    gradient, rows = uneven_splines(seed, count)
+    none, most = np.zeros(count + 2), np.full(count + 2, 50.0)
+    c, reached = banded_optimum(gradient, rows, none + 1e-3, none, most)
+    assert reached
+    table, right = dense(rows)
+    assert (table @ c - right).max() <= 1e-5
+    found = linprog(-gradient, A_ub=table, b_ub=right, bounds=(0.0, 50.0), method="highs")
+    assert gradient @ c == pytest.approx(-found.fun, rel=STEEP_GAP)

@@ -10,13 +10,19 @@ from selfmotion.basics import Array, Flags, Ints, called, kernel
 # Rows are met to this share of their limits, or to this where they are smaller than 1.
 MET = 1e-7
 _STEPS = 200
-# Prices of steep rows round: where so little of the gap is left they have to pay no more exactly
-# than this.
-_LITTLE, _ROUNDED = 1e-2, 1e3
+# Products of slack and price are aimed at this share of the gap, no less: the smaller they are, the
+# more prices of steep rows round.
+_AIMED = 0.1
+# Where rounding leaves so much of g·c unpaid, by shares, and so many steps each leave more than
+# this of what the one before left, prices pay as exactly as they can.
+_ROUNDED, _STALLED, _SAME = 1e-2, 3, 0.7
 # Share of the way to the boundary that a step goes.
 _TO_BOUNDARY = 0.99
 # A product of slack and price is at least this share of their mean; steps are shortened for that.
 _NEAR, _SHORTER, _TRIES = 1e-3, 0.7, 12
+# A step that goes less far than this leads along the boundary: the next one goes to products this
+# much smaller, away from it.
+_POOR, _CENTRED = 0.1, 0.5
 # Shorter steps lead nowhere.
 _STUCK = 1e-8
 # Stands on the diagonal for an unknown that stays, and rounding on that of the others.
@@ -53,9 +59,14 @@ def interior_optimum(
     value = _begin(gradient, matrix, place, limit, c, slack, price)
     missed, ds, dz = np.empty(count), np.empty(count), np.empty(count)
     band, paid, dc = np.empty((3, size)), np.empty(size), np.empty(size)
+    stalled, before = 0, np.inf
     for _ in range(_STEPS):
         products, met = _measure(c, matrix, place, limit, slack, price, missed, band, paid)
-        if met <= MET and _is_paid(gradient, free, paid, c, products, gap, value):
+        whole, left = _unpaid(gradient, free, paid, c, value)
+        stalled = stalled + 1 if left > _SAME * before else 0
+        before = left
+        rounded = stalled >= _STALLED and left <= _ROUNDED * whole
+        if met <= MET and products <= gap * whole and (left <= gap * whole or rounded):
             return c, True
         if not _factored(band, free):
             break
@@ -64,10 +75,19 @@ def interior_optimum(
         primal, dual = _longest(matrix, place, dc, slack, price, missed, ds, dz, 0.0, 0.0, 1.0)
         after, _ = _products(slack, price, ds, dz, primal, dual)
         centre = mu * min((after / count / mu) ** 3, 1.0)
+        centre = max(centre, min(_AIMED * gap * whole / count, mu))
         _direct(centre, 1.0, gradient, free, matrix, place, slack, price, missed, ds, dz, band, dc)
         primal, dual = _longest(
             matrix, place, dc, slack, price, missed, ds, dz, centre, 1.0, _TO_BOUNDARY
         )
+        if min(primal, dual) < _POOR:
+            centre = _CENTRED * mu
+            _direct(
+                centre, 0.0, gradient, free, matrix, place, slack, price, missed, ds, dz, band, dc
+            )
+            primal, dual = _longest(
+                matrix, place, dc, slack, price, missed, ds, dz, centre, 0.0, _TO_BOUNDARY
+            )
         primal, dual = _balanced(slack, price, ds, dz, primal, dual)
         for k in range(size):
             c[k] += primal * dc[k]
@@ -101,19 +121,16 @@ def _begin(
 
 
 @called
-def _is_paid(
-    gradient: Array, free: Flags, paid: Array, c: Array, products: float, gap: float, value: float
-) -> bool:
-    """Return whether no more than `gap` is missing of g·c, nor of what prices pay for."""
+def _unpaid(
+    gradient: Array, free: Flags, paid: Array, c: Array, value: float
+) -> tuple[float, float]:
+    """Return how large g·c is, and what of it prices do not pay for."""
     reached, left = 0.0, 0.0
     for k in range(len(gradient)):
         reached += gradient[k] * c[k]
         if free[k]:
-            # What prices do not pay for may be missing as well.
             left += abs((gradient[k] - paid[k]) * c[k])
-    share = gap * max(abs(reached), MET * value)
-    paid_for = left <= share or (products <= _LITTLE * share and left <= _ROUNDED * share)
-    return products <= share and paid_for
+    return max(abs(reached), MET * value), left
 
 
 @called

@@ -14,6 +14,9 @@ _GRADED = 12
 # A smooth pace has so many intervals at least; so many at most, or for each sample of the motion,
 # with this time between two [s], more with less: slow limits make a motion long, not more winding.
 _INTERVALS, _MANY, _PER_SAMPLE, _COARSE = 250, 4000, 4, 4e-3
+# Where jerks are limited it has this many, unless these are nearer than this [s]: from a pace that
+# is coarse around corners the programmes come to slower ones, from which no near one is faster.
+_FINE, _FINEST = 2000, 1e-3
 # It is as smooth as the mean, so often, over so many knots.
 _MEANS, _WINDOW = 4, 3
 # Accelerations build up over so many knots where the arm begins at rest and jerks are limited.
@@ -65,6 +68,8 @@ def smooth(pace: Pace, step: float, jerk: bool, samples: int) -> Pace:
     """
     from scipy.interpolate import make_interp_spline
 
+    if jerk:
+        step = min(step, max(pace.t[-1] / _FINE, _FINEST))
     most = int(np.ceil(max(_MANY, _PER_SAMPLE * samples) * _COARSE / step))
     count = min(max(int(np.ceil(pace.t[-1] / step)), _INTERVALS), most)
     t = np.linspace(0.0, pace.t[-1], count + 1)

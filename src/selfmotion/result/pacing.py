@@ -127,7 +127,11 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
         if rank < best[0]:
             best = rank, kept
         if over.max() > _WILD and np.isfinite(best[0][1]):
-            break
+            # Near the best that is known programmes are solved again: b is 1 there.
+            base = best[1]
+            near = Squares.constant(base.t, 1.0)
+            room = _all_room(len(base.t) - 1, limits)
+            continue
         if over.max() < _NEAR and passed <= _KEPT and abs(before / pace.t[-1] - 1.0) < _GAIN:
             break
         before = pace.t[-1]
