@@ -109,6 +109,24 @@ def test_moves_keep_bands_and_what_depends_on_the_pace() -> None:
     assert move.motion.duration > sm.move(panda, HOME, last).require().motion.duration
 
 
+# A straight move is this much longer than limits of speed and acceleration ask, by the last share of
+# limits that is left; besides it takes what accelerations need to build up three times, where
+# nobody limits the jerk in this time [s].
+HURRIED, SOFT = 1.01, 0.02
+
+
+def test_straight_moves_are_as_fast_as_limits_allow() -> None:
+    panda = robot_named("panda")
+    constraints = [sm.JointPositionLimits(), sm.JointVelocityLimits()]
+    planner = FreeMotions(panda, constraints, np.random.default_rng(0))
+    rng = np.random.default_rng(3)
+    for size in (1e-3, 0.01, 0.1, 0.1, 0.5, 0.5):
+        last = HOME + size * rng.uniform(-1.0, 1.0, 7)
+        least = float(planner.time_of(HOME, last))
+        took = planner.between(HOME, last).require().motion.duration
+        assert least <= took <= HURRIED * least + 3.0 * SOFT, size
+
+
 def test_what_is_not_found_is_said_and_no_more() -> None:
     panda = robot_named("panda")
     clearance = sm.Clearance(list(SCENE), 5e-3)

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ from selfmotion.basics import (
     read_only,
     silent,
 )
+from selfmotion.certificate import Quantity
 from selfmotion.collision import how_near
 from selfmotion.constraints import Constraint, Envelope
 from selfmotion.follow import Follows
@@ -30,6 +32,8 @@ from selfmotion.planning.settings import (
     SHORTEST_PACED,
     SLOWER_FACTOR,
     SLOWER_TRIES,
+    SOFT,
+    STEP_OF_PACE,
     TRIES_OF_MOVE,
     UNHURRIED_SAMPLES,
     UP_TO_SPEED,
@@ -39,7 +43,7 @@ from selfmotion.planning.settings import (
 )
 from selfmotion.planning.ways import Room, find_way, shortened, straight_way
 from selfmotion.problem import envelope_of
-from selfmotion.result import Move, paced
+from selfmotion.result import Ends, Move, PaceLimits, along, fastest_pace, quantities_of_pace
 from selfmotion.robot import RobotModel
 from selfmotion.search import start_candidates
 from selfmotion.task import SE3, Task
@@ -229,14 +233,25 @@ class FreeMotions:
             asked,
             speed=read_only(USED * speed),
             acceleration=read_only(USED * faster),
-            jerk=read_only(USED * asked.jerk),
+            jerk=read_only(USED * np.where(np.isfinite(asked.jerk), asked.jerk, faster / SOFT)),
         )
+
+    @cached_property
+    def _quantities(self) -> tuple[Quantity, ...]:
+        """What else a slower pace may keep."""
+        return quantities_of_pace([item.requirement(self.robot) for item in self.constraints])
+
+    def _fast(self, path: Trajectory) -> Trajectory:
+        """Return a joint path at the fastest pace that the limits allow, from rest to rest."""
+        limits = self._limits
+        kept = PaceLimits(limits.speed, limits.acceleration, limits.jerk, self._quantities)
+        return along(fastest_pace(path, kept, Ends(), STEP_OF_PACE), path)
 
     def at_its_pace(self, path: Trajectory) -> Move:
         """Return the move along a joint path, as fast as it may be."""
         # Of the shortest ones a search for the fastest pace sees rounding only.
         short = path.travelled(path.t[-1:]).max() < SHORTEST_PACED
-        motion = self._unhurried(path) if short else paced(path, self._limits)
+        motion = self._unhurried(path) if short else self._fast(path)
         q, qd = motion.q.copy(), motion.qd.copy()
         # Exactly where it should begin and end.
         q[0], q[-1], qd[0], qd[-1] = path.q[0], path.q[-1], 0.0, 0.0

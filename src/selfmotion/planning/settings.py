@@ -129,6 +129,10 @@ MOVE_DEADLINE = 10.0
 USED = 0.95
 UP_TO_SPEED = 0.25
 USUAL_SPEED = 1.0
+# Controllers want accelerations without jumps from arms of any make: where nobody limits the jerk,
+# they are reached in this time [s]. Knots of a pace are so far apart [s].
+SOFT = 0.02
+STEP_OF_PACE = 4e-3
 # Requirements that depend on the pace may be kept by a slower one, tried so often.
 SLOWER_FACTOR = 1.2
 SLOWER_TRIES = 12

@@ -1,9 +1,13 @@
 """What came of a problem: plans, how they were found, their files, and other paces."""
 
 from selfmotion.result.bundle import read_bundle as read_bundle, write_bundle as write_bundle
-from selfmotion.result.limits_used import LimitsUsed as LimitsUsed
+from selfmotion.result.limits_used import (
+    LimitsUsed as LimitsUsed,
+    quantities_of_pace as quantities_of_pace,
+)
 from selfmotion.result.move import Move as Move, is_move as is_move, load_move as load_move
-from selfmotion.result.moves_pace import paced as paced
+from selfmotion.result.pace_rows import PaceLimits as PaceLimits
+from selfmotion.result.pacing import Ends as Ends, along as along, fastest_pace as fastest_pace
 from selfmotion.result.parts import Parts as Parts, load_parts as load_parts
 from selfmotion.result.plan import (
     Plan as Plan,

@@ -38,6 +38,8 @@ _ROUGH, _NEAREST = 1.002, 2e-4
 # With limits of the jerk likewise where at some time no limit is used by this share: within an
 # interval the jerk cannot follow what the path asks for.
 _IDLE = 0.8
+# This share of what a step may do is all of it.
+_ALL = 0.9
 # A pace that passes limits manyfold is of a programme that was not solved: what is known stays.
 _WILD = 10.0
 # A jump of this share of a limit has a knot of its own.
@@ -114,7 +116,8 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
     jerk = bool(np.isfinite(limits.jerk).any())
     most = _BY_JERKS_LATER if jerk else _OTHERS
     for number in range(_MOST_STEPS):
-        near = _improved(base, motion, limits, room, near, ends, most, _GAP)
+        known = near
+        near = _improved(base, motion, limits, room, known, ends, most, _GAP)
         if np.isfinite(best[0][1]) and not near.is_positive:
             break
         pace = _changed(base, near)
@@ -135,7 +138,9 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
         if over.max() < _NEAR and passed <= _KEPT and abs(before / pace.t[-1] - 1.0) < _GAIN:
             break
         before = pace.t[-1]
-        idle = least < _IDLE if jerk else np.zeros(len(over), dtype=bool)
+        # Where it became as fast as a step may make it, knots are not what holds it.
+        held = near.inside(0.5) < _ALL * most * known.inside(0.5)
+        idle = (least < _IDLE) & held & jerk
         cut = _to_cut(over, idle, pace) if number < _ADDING else np.zeros(len(over), dtype=bool)
         # A limit that is passed where a knot is added is looked at again before there is less room.
         room = [
