@@ -16,8 +16,8 @@ from selfmotion.engine.objective import Objective
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart
 from selfmotion.follow import Follows
+from selfmotion.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.motion.grid import Grid
-from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.task.damping import DampingLaw
 from support.arms import (
     PANDA_HOME,
