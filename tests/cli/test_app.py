@@ -158,7 +158,7 @@ def test_a_path_that_leaves_the_workspace_exits_with_1(tmp_path: Path) -> None:
 
 def test_a_log_names_the_stages_and_the_gap(tmp_path: Path) -> None:
     planned = run(
-        "plan", "planar_3r", "--circle", "0.3", "--normal", "z", "--task", "planar", "--compare"
+        "plan", "planar_3r", "--circle", "0.1", "--normal", "z", "--task", "planar", "--compare"
     )
     assert planned.returncode in (0, 1), planned.stderr
     assert planned.stderr.splitlines()[-1] == "checking"
