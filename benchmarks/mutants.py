@@ -108,7 +108,7 @@ PARTS = (
     ),
     Part(
         "objective",
-        ("engine/objective.py", "engine/conditions.py"),
+        ("engine/objective.py", "engine/cost_integrals.py", "engine/conditions.py"),
         (
             "engine/test_conditions.py",
             "constraints/test_base.py -k 'equality or finite or rows'",

@@ -10,9 +10,9 @@ from support.arms import CASES, PANDA_HOME, robot_named, short_line, start_of
 
 # Files that take longest, each by itself.
 LONGEST = (
-    *("test_site", "test_study", "test_readme", "test_browser", "test_generated", "test_newton"),
-    *("test_interruption", "test_retiming", "test_cells", "test_gap", "test_replanner"),
-    *("test_app", "test_deviation", "test_pictures", "test_acceptance", "test_spoiled_files"),
+    *("test_site", "test_browser", "test_readme", "test_study", "test_generated", "test_pictures"),
+    *("test_layout", "test_interruption", "test_run", "test_motions", "test_app", "test_deviation"),
+    *("test_riding", "test_job", "test_content", "test_feed", "test_cells", "test_retiming"),
 )
 
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import io
+import json
 import os
 import subprocess
 import sys
@@ -13,7 +14,14 @@ from rich.console import Console
 import selfmotion as sm
 from selfmotion.cli import tables
 
-SELFMOTION = Path(sys.executable).with_name("selfmotion")
+# Runs several commands in one process, each as the shell does, with a mark after each.
+SEVERAL = """
+import json, sys
+from selfmotion.cli import app
+for words in json.loads(sys.argv[1]):
+    assert not app(words, standalone_mode=False), words
+    print("\\f")
+"""
 
 
 @pytest.mark.parametrize("columns", [60, None])
@@ -24,18 +32,21 @@ def test_tables_fit_narrow_terminals_and_logs(tmp_path: Path, columns: int | Non
     environment = {key: value for key, value in os.environ.items() if key != "COLUMNS"}
     environment |= {} if columns is None else {"COLUMNS": str(columns)}
     verdict = sm.load_plan(file).certificate.verdict
-    for command in (["check", file], ["compare", file, file], ["robots"]):
-        printed = subprocess.run(
-            [SELFMOTION, *map(str, command)], capture_output=True, text=True, env=environment
-        )
-        assert printed.returncode == 0, printed.stderr
-        assert "…" not in printed.stdout
-        table = [line for line in printed.stdout.splitlines() if line != verdict]
+    commands = [["check", str(file)], ["compare", str(file), str(file)], ["robots"]]
+    printed = subprocess.run(
+        [sys.executable, "-c", SEVERAL, json.dumps(commands)],
+        capture_output=True,
+        text=True,
+        env=environment,
+    )
+    assert printed.returncode == 0, printed.stderr
+    checked, compared, robots, _ = printed.stdout.split("\f\n")
+    for text in (checked, compared, robots):
+        assert "…" not in text
+        table = [line for line in text.splitlines() if line != verdict]
         assert max(map(len, table)) <= (columns or 120)
-        if command[0] == "check":
-            assert verdict in printed.stdout.splitlines()
-        if command[0] == "compare":
-            assert "joint path, rad or m" in printed.stdout
+    assert verdict in checked.splitlines()
+    assert "joint path, rad or m" in compared
 
 
 @pytest.mark.parametrize(

@@ -59,6 +59,7 @@ def test_no_point_moves_farther_than_the_lever_arms_say(model: CollisionModel) -
     lower, upper = model.robot.finite_limits()
     bodies, reached = link_bodies(model.robot), np.zeros(len(levers))
     for q in samples(model.robot, 12):
+        before = corners(model, bodies, q)
         for size in (1e-3, 0.1, 1.0):
             step = size * rng.normal(size=model.robot.dof)
             if size < 0.01:
@@ -66,8 +67,9 @@ def test_no_point_moves_farther_than_the_lever_arms_say(model: CollisionModel) -
                 step *= np.arange(model.robot.dof) == rng.integers(model.robot.dof)
             other = np.clip(q + step, lower, upper)
             allowed = levers @ np.abs(other - q)
-            before, after = corners(model, bodies, q), corners(model, bodies, other)
-            for b, (start, end) in enumerate(zip(before, after, strict=True)):
+            for b, (start, end) in enumerate(
+                zip(before, corners(model, bodies, other), strict=True)
+            ):
                 moved = np.linalg.norm(end - start, axis=1).max()
                 assert moved <= allowed[b] + EXACT
                 if allowed[b] > 0.0:
@@ -82,12 +84,15 @@ def test_distances_change_by_no_more_than_the_pair_levers_say(model: CollisionMo
     lower, upper = model.robot.finite_limits()
     assert levers.shape == (len(model.pairs), model.robot.dof)
     for q in samples(model.robot, 6):
-        for size in (1e-3, 0.1):
-            other = np.clip(q + size * rng.normal(size=model.robot.dof), lower, upper)
-            values = model.distances(np.array([q, other]))
+        others = [
+            np.clip(q + size * rng.normal(size=model.robot.dof), lower, upper)
+            for size in (1e-3, 0.1)
+        ]
+        here, *there = model.distances(np.array([q, *others]))
+        for other, values in zip(others, there, strict=True):
             # A depth of hulls stands for one of meshes: it may jump where meshes begin to overlap.
-            apart = np.all(values > 0.0, axis=0)
-            change = np.abs(values[1] - values[0])[apart]
+            apart = (here > 0.0) & (values > 0.0)
+            change = np.abs(values - here)[apart]
             assert np.all(change <= (levers @ np.abs(other - q))[apart] + DISTANCE)
 
 

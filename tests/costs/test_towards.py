@@ -9,7 +9,8 @@ def test_a_pull_moves_the_elbow(panda: sm.RobotModel, tmp_path) -> None:
     free = sm.plan(small_circle(panda))
     target = float(coordinate_along(free, swivel)[-1]) + 0.5
     pull = sm.Towards(panda, swivel, target, 20.0)
-    plan = sm.plan(small_circle(panda, costs=[sm.JointVelocity(), pull]))
+    motion = sm.PolynomialNullMotion()
+    plan = sm.plan(small_circle(panda, costs=[sm.JointVelocity(), pull], null_motion=motion))
     assert plan.certificate.verified, plan.certificate.verdict
     assert coordinate_along(plan, swivel)[-1] > coordinate_along(free, swivel)[-1] + 0.1
     plan.save(tmp_path / "plan.npz")

@@ -11,8 +11,8 @@ from selfmotion.engine import Objective, StillMotion
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart
 from selfmotion.follow import Follows
+from selfmotion.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.motion.grid import Grid
-from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
 from support.arms import (
     PANDA_HOME,
     Case,

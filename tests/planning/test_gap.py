@@ -28,7 +28,7 @@ def level(x: float, y: float) -> pin.SE3:
 def free() -> sm.Problem:
     """A path inside 3 m, where elbow up and elbow down are families of their own."""
     robot = sm.load_robot("planar_3r")
-    path = sm.Line(level(1.0, 0.5), level(2.3, -0.4), 2.0)
+    path = sm.Line(level(1.0, 0.5), level(1.6, 0.1), 1.0)
     limits = (sm.JointPositionLimits(), sm.JointVelocityLimits())
     return sm.Problem(robot, path, "planar", constraints=limits)
 

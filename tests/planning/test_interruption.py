@@ -33,8 +33,8 @@ def level(x: float, y: float) -> pin.SE3:
 
 @pytest.fixture
 def problem(planar: sm.RobotModel) -> sm.Problem:
-    times = np.linspace(0.0, 2.0, 21)
-    line = sm.Line(level(2.0, 1.0), level(3.0, -0.5), 2.0)
+    times = np.linspace(0.0, 1.0, 6)
+    line = sm.Line(level(1.0, 0.5), level(1.3, 0.3), 1.0)
     path = sm.Waypoints.from_poses(times, [line.pose(float(t)) for t in times])
     # Of path length there is more than one good sequence here.
     return sm.Problem(planar, path, "planar", costs=[sm.PathLength()])

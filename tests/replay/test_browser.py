@@ -1,8 +1,6 @@
 """The page in a real browser: it moves as Pinocchio says, and its controls work."""
 
-import os
 import re
-import shutil
 from dataclasses import replace
 from itertools import pairwise
 
@@ -15,27 +13,14 @@ from selfmotion.constraints import Clearance
 from selfmotion.formats import read_motion
 from selfmotion.replay import notebook_html, write_replay
 from selfmotion.robot import NAMED_ARMS
+from support.layouts import chromium
 from support.replay_plans import arm_plan, planar_plan, shelf_plan
-
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-
-
-pytestmark = pytest.mark.skipif(
-    CHROMIUM is None and not os.environ.get("CI"), reason="needs a browser; CI has one"
-)
-
-
-SOFTWARE_GL = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 
 
 @pytest.fixture(scope="module")
 def browser():
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_GL)
-        yield browser
-        browser.close()
+    with chromium() as found:
+        yield found
 
 
 @pytest.fixture(scope="module")
@@ -63,23 +48,36 @@ class Seen:
         page.on("request", lambda request: self.requests.append(request.url))
 
 
+def opened(browser, file, **options):
+    # Pixels are drawn without a graphics card: few are enough.
+    options = {"viewport": {"width": 640, "height": 480}, "reduced_motion": "reduce", **options}
+    page = browser.new_context(**options).new_page()
+    page.seen = Seen(page)
+    page.goto(file.as_uri())
+    page.wait_for_selector("html[data-replay=ready]", timeout=60_000)
+    return page
+
+
 @pytest.fixture
 def open_page(browser):
-    contexts = []
+    pages = []
 
     def open_file(file, **options):
-        options = {"viewport": {"width": 900, "height": 700}, "reduced_motion": "reduce", **options}
-        context = browser.new_context(**options)
-        contexts.append(context)
-        page = context.new_page()
-        page.seen = Seen(page)
-        page.goto(file.as_uri() if hasattr(file, "as_uri") else file)
-        page.wait_for_selector("html[data-replay=ready]", timeout=60_000)
-        return page
+        pages.append(opened(browser, file, **options))
+        return pages[-1]
 
     yield open_file
-    for context in contexts:
-        context.close()
+    for page in pages:
+        page.context.close()
+
+
+@pytest.fixture(scope="module")
+def pages(browser, files):
+    """Open the page of each arm; shaders are compiled anew for each that is opened."""
+    found = {name: opened(browser, files[name]) for name in ("planar", "panda", "ur5")}
+    yield found
+    for page in found.values():
+        page.context.close()
 
 
 def assert_quiet(page):
@@ -127,8 +125,8 @@ def largest_difference(poses, plan, time):
 
 
 @pytest.mark.parametrize("name", ["planar", "panda", "ur5"])
-def test_links_are_where_pinocchio_has_them(open_page, files, name):
-    page = open_page(files[name])
+def test_links_are_where_pinocchio_has_them(pages, name):
+    page = pages[name]
     plan = planar_plan() if name == "planar" else arm_plan(name)
     assert page.evaluate("viewer.animator.duration") == pytest.approx(plan.trajectory.duration)
     for share in (0.0, 0.137, 0.5, 0.81, 1.0):
@@ -141,9 +139,8 @@ def test_links_are_where_pinocchio_has_them(open_page, files, name):
     assert_quiet(page)
 
 
-def test_every_triangle_reaches_the_scene(open_page, files):
-    page = open_page(files["ur5"])
-    drawn = page.evaluate("""() => {
+def test_every_triangle_reaches_the_scene(pages):
+    drawn = pages["ur5"].evaluate("""() => {
       let count = 0;
       viewer.scene_tree.find(["selfmotion", "robot"]).object.traverse((object) => {
         if (object.isMesh) count += object.geometry.index.count / 3;
@@ -170,14 +167,19 @@ def time_of(page):
     return page.evaluate("viewer.animator.actions[0].time")
 
 
+def box_of(seen):
+    seen.scroll_into_view_if_needed()
+    return seen.bounding_box()
+
+
 def cursor_of(page):
     return page.evaluate("""[...document.querySelectorAll(".plot .cursor")]
       .map((line) => Number(line.getAttribute("x1")))""")
 
 
-def test_keys_slider_and_plots_keep_one_time(open_page, files):
-    page = open_page(files["planar"])
-    assert time_of(page) == 0.0
+def test_keys_slider_and_plots_keep_one_time(pages):
+    page = pages["planar"]
+    page.evaluate("replay.seek(0.0)")
     places = [cursor_of(page)]
     for key, expected in (("ArrowRight", 0.02), ("Shift+ArrowRight", 0.22), ("ArrowLeft", 0.2)):
         page.keyboard.press(key)
@@ -191,7 +193,7 @@ def test_keys_slider_and_plots_keep_one_time(open_page, files):
     page.locator("#time").fill("1.5")
     assert time_of(page) == pytest.approx(1.5)
     assert page.locator("#clock").inner_text() == "1.50 / 2.00 s"
-    box = page.locator(".plot svg").first.bounding_box()
+    box = box_of(page.locator(".plot svg").first)
     page.mouse.click(box["x"] + 52 + 0.25 * (box["width"] - 62), box["y"] + 60)
     assert time_of(page) == pytest.approx(0.5, abs=0.02)
     page.evaluate("viewer.animator.seek(1.0); viewer.render()")
@@ -224,10 +226,11 @@ def test_it_starts_by_itself_otherwise(open_page, files):
     assert_quiet(page)
 
 
-def test_hover_shows_the_values_there(open_page, files):
-    page = open_page(files["planar"])
+def test_hover_shows_the_values_there(pages):
+    page = pages["planar"]
+    page.evaluate("replay.seek(0.0)")
     plan = planar_plan()
-    box = page.locator(".plot svg").first.bounding_box()
+    box = box_of(page.locator(".plot svg").first)
     page.mouse.move(box["x"] + 52 + 0.5 * (box["width"] - 62), box["y"] + 60)
     shown = [
         float(text) for text in page.locator(".plot").first.locator("output").all_inner_texts()
@@ -236,8 +239,8 @@ def test_hover_shows_the_values_there(open_page, files):
     assert time_of(page) == 0.0
 
 
-def test_a_joint_singled_out_shows_its_limits(open_page, files):
-    page = open_page(files["panda"])
+def test_a_joint_singled_out_shows_its_limits(pages):
+    page = pages["panda"]
     plot = page.locator(".plot").first
     before = plot.locator("svg text").all_text_contents()
     plot.locator("button").nth(3).click()
@@ -335,8 +338,8 @@ def test_bodies_that_meet_are_red(open_page, tmp_path):
     assert_quiet(page)
 
 
-def test_the_motion_can_be_downloaded(open_page, files):
-    page = open_page(files["panda"])
+def test_the_motion_can_be_downloaded(pages):
+    page = pages["panda"]
     plan = arm_plan("panda")
     with page.expect_download() as found:
         page.locator("#download").click()
@@ -402,10 +405,8 @@ def test_a_notebook_frame_works_in_its_sandbox(browser, tmp_path):
     context.close()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_telephone_shows_it_whole(open_page, files, scheme):
-    size = {"width": 390, "height": 780}
-    page = open_page(files["panda"], viewport=size, color_scheme=scheme)
+def test_a_telephone_shows_it_whole(open_page, files):
+    page = open_page(files["panda"], viewport={"width": 390, "height": 780})
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     view = page.locator("#view canvas").bounding_box()
     assert view["width"] > 350
@@ -417,11 +418,13 @@ def test_a_telephone_shows_it_whole(open_page, files, scheme):
     heights = "[verdict.scrollHeight, verdict.clientHeight]"
     whole, shown = page.evaluate(heights)
     assert whole <= shown + 1
-    text, ground = page.evaluate("""() => {
-      const style = getComputedStyle(document.body);
-      return [style.color, style.backgroundColor].map((c) => Number(c.match(/\\d+/)[0]));
-    }""")
-    assert (text > ground) == (scheme == "dark")
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        text, ground = page.evaluate("""() => {
+          const style = getComputedStyle(document.body);
+          return [style.color, style.backgroundColor].map((c) => Number(c.match(/\\d+/)[0]));
+        }""")
+        assert (text > ground) == (scheme == "dark")
 
 
 def test_without_webgl_the_plots_remain(playwright_without_webgl, files):

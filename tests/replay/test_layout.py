@@ -46,13 +46,18 @@ def opened(browser: Any, file: Path) -> Any:
     return page
 
 
+@pytest.fixture(scope="module")
+def pages(browser: Any, files: dict[str, Path]) -> dict[str, Any]:
+    """Open each once; the browser closes them."""
+    return {name: opened(browser, file) for name, file in files.items()}
+
+
 @pytest.mark.parametrize("name", ["plans", "a job"])
-def test_a_replay_is_seen_whole(browser: Any, files: dict[str, Path], name: str) -> None:
-    page = opened(browser, files[name])
+def test_a_replay_is_seen_whole(pages: dict[str, Any], name: str) -> None:
+    page = pages[name]
     assert page.locator("#verdict").inner_text()
     for width in WIDTHS:
         assert faults(page, TEXTS, BOXES, width) == [], width
-    page.close()
 
 
 SPOILT = {
@@ -63,14 +68,13 @@ SPOILT = {
 }
 
 
-def test_what_cannot_be_seen_is_found(browser: Any, files: dict[str, Path]) -> None:
-    page = opened(browser, files["plans"])
+def test_what_cannot_be_seen_is_found(pages: dict[str, Any]) -> None:
+    page = pages["plans"]
     for said, style in SPOILT.items():
         sheet = page.add_style_tag(content=style)
         assert any(said in fault for fault in faults(page, TEXTS, BOXES, 800)), said
         sheet.evaluate("sheet => sheet.remove()")
     assert faults(page, TEXTS, BOXES, 800) == []
-    page.close()
 
 
 def test_a_batch_is_seen_whole(browser: Any, tmp_path: Path) -> None:

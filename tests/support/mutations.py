@@ -3,8 +3,10 @@
 import io
 import json
 import re
+import struct
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -269,19 +271,32 @@ def _announced(member: bytes, rng: np.random.Generator) -> bytes:
     return member[:8] + after.to_bytes(2, "little") + head if before else member
 
 
-@cache
 def _zip_bomb(name: str) -> bytes:
     """Return an archive of a megabyte whose one member has a gigabyte."""
-    out, chunk = io.BytesIO(), b"\0" * (1 << 24)
-    head = {"descr": "<f8", "fortran_order": False, "shape": (8 * len(chunk),)}
-    with (
-        zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
-        archive.open(name, "w", force_zip64=True) as member,
-    ):
-        np.lib.format.write_array_header_1_0(member, head)
-        for _ in range(64):
-            member.write(chunk)
-    return out.getvalue()
+    packed, check, size = _packed_gigabyte()
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
+        archive.writestr(name, packed)
+    content = bytearray(out.getvalue())
+    # What was stored is said to be deflated, before the member and in the directory at the end.
+    for head in (0, content.rindex(b"PK\x01\x02") + 2):
+        struct.pack_into("<H", content, head + 8, zipfile.ZIP_DEFLATED)
+        struct.pack_into("<L", content, head + 14, check)
+        struct.pack_into("<L", content, head + 22, size)
+    return bytes(content)
+
+
+@cache
+def _packed_gigabyte() -> tuple[bytes, int, int]:
+    """Return an array of zeros as it is deflated, its CRC-32 and its size."""
+    chunk, head = b"\0" * (1 << 24), io.BytesIO()
+    described = {"descr": "<f8", "fortran_order": False, "shape": (8 * len(chunk),)}
+    np.lib.format.write_array_header_1_0(head, described)
+    packer, packed, check, size = zlib.compressobj(1, zlib.DEFLATED, -zlib.MAX_WBITS), b"", 0, 0
+    for part in (head.getvalue(), *[chunk] * 64):
+        packed += packer.compress(part)
+        check, size = zlib.crc32(part, check), size + len(part)
+    return packed + packer.flush(), check, size
 
 
 def _kind(suffix: str) -> str:

@@ -13,8 +13,8 @@ from selfmotion.costs import OffPath
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart
 from selfmotion.follow import Follows
+from selfmotion.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.motion.grid import Grid
-from selfmotion.motion.null_motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.task.damping import DampingLaw
 from support.arms import Case, central_difference, objective_of
 from support.rollouts import assert_sensitivities

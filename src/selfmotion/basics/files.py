@@ -186,15 +186,7 @@ def read_rows(
         The file cannot be read, has no rows, a name twice, or a row that is short, long or not
         numeric; the line is named.
     """
-    try:
-        lines = file.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as error:
-        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise FileFormatError(f"{file}: is no UTF-8 text: {error}") from error
-    kept = [(k, line) for k, line in enumerate(lines, 1) if line.strip() and line[0] != "#"]
-    if not kept:
-        raise FileFormatError(f"{file}: is empty, expected a header line and rows of numbers")
+    kept = _lines_with_numbers(file)
     mark = max(",;\t", key=kept[0][1].count)
     names = [name.strip().strip('"') for name in kept[0][1].split(mark)]
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -215,6 +207,20 @@ def read_rows(
             column.append(cells[names.index(name)].strip().strip('"'))
     found = np.array(rows, dtype=np.float64).reshape(-1, len(plain))
     return [names[k] for k in plain], found, numbers, cells_of
+
+
+def _lines_with_numbers(file: Path) -> list[tuple[int, str]]:
+    """Return the lines of a table, and which they are, without comments and empty ones."""
+    try:
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
+    except OSError as error:
+        raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise FileFormatError(f"{file}: is no UTF-8 text: {error}") from error
+    kept = [(k, line) for k, line in enumerate(lines, 1) if line.strip() and line[0] != "#"]
+    if not kept:
+        raise FileFormatError(f"{file}: is empty, expected a header line and rows of numbers")
+    return kept
 
 
 def _number(cell: str, where: str) -> float:

@@ -15,16 +15,14 @@ from selfmotion.collision.bodies import obstacle_bodies
 from selfmotion.collision.checked import checked_pairs
 from selfmotion.collision.distances import HullDistances, Ints
 from selfmotion.collision.found import Closest
-from selfmotion.collision.meshes import MeshDistances
 from selfmotion.collision.obstacles import Obstacle
 from selfmotion.collision.overlaps import count_overlaps, links_of
+from selfmotion.collision.pair_distances import PairDistances
 from selfmotion.collision.pairs import held_pairs
 from selfmotion.robot import RobotModel
 
 # Bodies that are put in touch may overlap by this much [m]: rounding.
 _TOUCHING = 1e-6
-# Joints that differ by less than this [rad or m] place bodies alike, to rounding of distances.
-_ALIKE = 1e-9
 # What the links of an arm are called together.
 ITSELF = "the arm itself"
 _NO_PAIR = Closest(math.inf, "", "")
@@ -106,9 +104,8 @@ class CollisionModel:
         obstacles = {item.name for item in self.obstacles}
         self.checks_links = not self.to_world.all()
         self.checks_obstacles = not all(obstacles.isdisjoint(pair) for pair in self.pairs)
-        self.hulls = HullDistances(self.robot, self._bodies, self._index)
-        solids = [body.solid for body in self._bodies]
-        self._meshes = MeshDistances(solids, self.bodies, self._index)
+        self._near = PairDistances(self.robot, self._bodies, self._index)
+        self.hulls = self._near.hulls
 
     def _with(self, pairs: Sequence[tuple[int, int]]) -> "CollisionModel":
         other = copy(self)
@@ -145,7 +142,7 @@ class CollisionModel:
 
     def is_convex(self, pair: int) -> bool:
         """Whether both bodies of a pair are their own convex hulls."""
-        return self._meshes.hulls_decide[pair]
+        return self._near.meshes.hulls_decide[pair]
 
     @property
     def is_all_convex(self) -> bool:
@@ -269,15 +266,17 @@ class CollisionModel:
         q = self.samples(q_samples)
         if not len(q) or not self.pairs:
             return _NO_PAIR
-        worst = self._closest(q, self.hulls.lower_bounds(q[:1])[0], _NO_PAIR, 0)
+        value, pair = self._near.closest(q[0], self.hulls.lower_bounds(q[:1])[0])
         # Pairs that are farther apart need no close look.
-        bounds = self.hulls.lower_bounds(q, worst.value)
+        bounds, worst = self.hulls.lower_bounds(q, value), 0
         lowest = bounds.min(axis=1)
         for row in np.argsort(lowest, kind="stable").tolist():
-            if lowest[row] >= worst.value:
+            if lowest[row] >= value:
                 break
-            worst = self._closest(q, bounds[row], worst, row)
-        return worst
+            found = self._near.closest(q[row], bounds[row], value)
+            if found[0] < value:
+                (value, pair), worst = found, row
+        return Closest(value, *self.pairs[pair], worst)
 
     def distances(
         self,
@@ -304,16 +303,7 @@ class CollisionModel:
         """
         q = self.samples(q_samples)
         asked = np.broadcast_to(np.asarray(within, dtype=np.float64), (len(q), len(self.pairs)))
-        exact = np.minimum(asked, exact_below)
-        values = self.hulls.lower_bounds(q, float(asked.max(initial=-math.inf)))
-        for row in range(len(q)):
-            near = np.flatnonzero(values[row] < asked[row]).tolist()
-            places = self.hulls.place(q[row]) if near else None
-            for pair in near:
-                hulls = self.hulls.distance(pair, values[row, pair])
-                far = hulls >= exact[row, pair]
-                values[row, pair] = hulls if far else self._meshes.refine(places, pair, hulls)
-        return values
+        return self._near.distances(q, asked, np.minimum(asked, exact_below))
 
     def collides(self, q: Array, margin: float = 0.0) -> bool:
         """Whether some pair is closer than `margin` [m] at `q` (n,); made for many calls.
@@ -328,7 +318,7 @@ class CollisionModel:
         """
         if q.shape != (self.robot.dof,) or not math.isfinite(q.dot(q)):
             self.robot.configuration(q)
-        return self._meets(q, self.hulls.lower_bounds(q[None], margin)[0], margin)
+        return self._near.closer(q, self.hulls.lower_bounds(q[None], margin)[0], margin)
 
     def colliding(self, q_samples: Array, margin: float = 0.0) -> npt.NDArray[np.bool_]:
         """Return at which of many configurations (K, n) `collides` holds, (K,).
@@ -338,63 +328,7 @@ class CollisionModel:
         RobotError
             The shape is not (K, n), or a number is not finite.
         """
-        q = self.samples(q_samples)
-        bounds = self.hulls.lower_bounds(q, margin)
-        found = np.zeros(len(q), dtype=bool)
-        undecided: dict[int, list[tuple[int, float]]] = {}
-        for row in np.flatnonzero((bounds < margin).any(axis=1)).tolist():
-            self.hulls.place(q[row])
-            met, left = self._by_hulls(bounds[row], margin)
-            found[row] = met
-            for hulls, pair in left:
-                undecided.setdefault(pair, []).append((row, hulls))
-        # What is deepest inside decides first, as a rule.
-        for pair, near in sorted(undecided.items(), key=lambda item: min(h for _, h in item[1])):
-            looked = [(row, hulls) for row, hulls in near if not found[row]]
-            rows = np.array([row for row, _ in looked], dtype=np.int64)
-            found[rows] = self._by_meshes(pair, q[rows], [hulls for _, hulls in looked], margin)
-        return found
-
-    def _meets(self, q: Array, bounds: Array, margin: float) -> bool:
-        """Whether a pair is closer than the margin at q (n,), with lower bounds (P,) known."""
-        places = self.hulls.place(q)
-        met, left = self._by_hulls(bounds, margin)
-        return met or any(
-            self._meshes.refine(places, pair, hulls, margin) < margin for hulls, pair in left
-        )
-
-    def _by_hulls(self, bounds: Array, margin: float) -> tuple[bool, list[tuple[float, int]]]:
-        """Return whether a pair is closer than the margin, as placed; else what hulls leave open.
-
-        The distance of the hulls, and the pair; the deepest first.
-        """
-        near = np.flatnonzero(bounds < margin)
-        near = near[np.argsort(bounds[near])]
-        left = []
-        for pair, bound in zip(near.tolist(), bounds[near].tolist(), strict=True):
-            hulls = self.hulls.distance(pair, bound)
-            if hulls < margin:
-                if self._meshes.hulls_decide[pair]:
-                    return True, []
-                left.append((hulls, pair))
-        return False, sorted(left)
-
-    def _by_meshes(
-        self, pair: int, q: Array, hulls: Sequence[float], margin: float
-    ) -> npt.NDArray[np.bool_]:
-        """Return where a pair whose hulls are closer than the margin is so itself, (K,).
-
-        Configurations (K, n) in which the bodies are alike to each other are looked at once: along
-        a self-motion it is often the same joints that rest.
-        """
-        first, second = self.moved[self._index[pair]]
-        joints = np.round(q[:, first != second] / _ALIKE)
-        _, once, which = np.unique(joints, axis=0, return_index=True, return_inverse=True)
-        closer = [
-            self._meshes.refine(self.hulls.place(q[row]), pair, hulls[row], margin) < margin
-            for row in once.tolist()
-        ]
-        return np.array(closer, dtype=bool)[which.reshape(-1)]
+        return self._near.closer_samples(self.samples(q_samples), margin)
 
     def touching(self, q: npt.ArrayLike) -> tuple[Closest, ...]:
         """Return all pairs that overlap at `q`, the deepest first; see also `srdf_line`.
@@ -408,24 +342,11 @@ class CollisionModel:
         rows = [i for i in np.argsort(values, kind="stable").tolist() if values[i] <= 0.0]
         return tuple(Closest(float(values[i]), *self.pairs[i]) for i in rows)
 
-    def _closest(self, q: Array, bounds: Array, best: Closest, row: int) -> Closest:
-        """Return the smaller of `best` and the smallest distance at a row of q (K, n)."""
-        places = self.hulls.place(q[row])
-        near = np.flatnonzero(bounds < best.value).tolist()
-        found = sorted((self.hulls.distance(pair, bounds[pair]), pair) for pair in near)
-        for hulls, pair in found:
-            if hulls >= best.value:
-                break
-            value = self._meshes.refine(places, pair, hulls, best.value)
-            if value < best.value:
-                best = Closest(value, *self.pairs[pair], row)
-        return best
-
     def overlap_counts(self) -> tuple[Ints, Ints]:
         """Return in how many of 500 configurations bodies overlap, and their hulls alone, (P,)."""
         known = [self._counts.get((i, j)) for i, j in self._index.tolist()]
         unknown = np.flatnonzero([counts is None for counts in known])
-        met, alone = count_overlaps(self.robot, self.hulls, self._meshes, unknown)
+        met, alone = count_overlaps(self.robot, self.hulls, self._near.meshes, unknown)
         for pair, counts in enumerate(known):
             if counts is not None:
                 met[pair], alone[pair] = counts

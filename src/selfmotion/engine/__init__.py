@@ -3,8 +3,9 @@
 from selfmotion.engine.conditions import Conditions as Conditions
 from selfmotion.engine.counts import Counts as Counts
 from selfmotion.engine.deviation import Deviation as Deviation
+from selfmotion.engine.evaluation import Evaluation as Evaluation
 from selfmotion.engine.frame import carried_bases as carried_bases, transport as transport
-from selfmotion.engine.objective import Evaluation as Evaluation, Objective as Objective
+from selfmotion.engine.objective import Objective as Objective
 from selfmotion.engine.remaining import Remaining as Remaining, finest as finest
 from selfmotion.engine.rollout import Rollout as Rollout
 from selfmotion.engine.start import FixedStart as FixedStart, FreeStart as FreeStart

@@ -1,52 +1,23 @@
 """From the decision vector to the cost and its gradient: the only place with the chain rule."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
 from selfmotion.constraints import BoundConstraint, NodeTangents
-from selfmotion.costs import ERROR, Cost, Samples
+from selfmotion.costs import Cost, Samples
 from selfmotion.engine.conditions import Conditions
+from selfmotion.engine.cost_integrals import CostIntegrals
 from selfmotion.engine.counts import Counts
 from selfmotion.engine.deviation import Deviation
+from selfmotion.engine.evaluation import Evaluation
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart, Start
-from selfmotion.engine.still import StillMotion, deviation_of
+from selfmotion.engine.still import StillMotion, deviation_of, null_motion_table
 from selfmotion.motion import Grid, NullMotion, NullMotionTable, Trajectory
 from selfmotion.optimise import Residuals, Rows
 from selfmotion.problem import Problem
-
-# Samples whose tangents are weighed together.
-_LOT = 4096
-
-
-@dataclass(frozen=True, eq=False)
-class Evaluation:
-    """A motion of the objective, on its own: nothing done later changes it.
-
-    Attributes
-    ----------
-    x : (size,)
-        The decision vector.
-    terms : dict
-        What each cost contributes to F.
-    trajectory : Trajectory
-        Its nodes put onto the path, unless damped.
-    damped : bool
-        Whether the inverse was damped anywhere.
-    """
-
-    x: Array
-    terms: dict[str, float]
-    trajectory: Trajectory
-    damped: bool
-
-    @property
-    def cost(self) -> float:
-        """F."""
-        return sum(self.terms.values())
 
 
 class Objective:
@@ -85,7 +56,7 @@ class Objective:
         self.rollout, self.null_motion, self.start = rollout, null_motion, start
         self.constraints, self.counts = constraints, counts
         self._deviation = deviation
-        self._costs = tuple(costs)
+        self._costs = CostIntegrals(costs, rollout.grid)
         self._at: Array | None = None
         # ∂q/∂x and ∂q̇/∂x there, once they were asked for.
         self._tangents: tuple[Array, Array] | None = None
@@ -129,20 +100,10 @@ class Objective:
         """
         follows, grid = problem.follows, grid or still.grid
         t = grid.stage_times
-        motion = null_motion or problem.null_motion
-        frame = still.frame(t, motion.space)
-        if around is None and still.guide is not None:
-            around = problem.brought_to_rest(t, still.guide(t))
-        table = NullMotionTable(
-            problem.null_functions(t, motion),
-            frame,
-            problem.robot.dof if frame is None else frame.shape[2],
-            around,
-        )
         start: Start = FreeStart(follows, still.start) if free else FixedStart(still.start)
         return cls(
             rollout or Rollout(follows, grid, damping=problem.damping_law),
-            table,
+            null_motion_table(problem, t, still, null_motion or problem.null_motion, around),
             problem.all_costs,
             start,
             deviation_of(problem, t, still.deviation),
@@ -186,7 +147,9 @@ class Objective:
         self.counts.gradients += 1
         if not np.isfinite(sum(self._terms.values())):
             return np.full(self.size, np.nan)
-        by_epsilon, by_start, by_target = self.rollout.pullback(*self._cotangents())
+        by_epsilon, by_start, by_target = self.rollout.pullback(
+            *self._costs.cotangents(self.rollout.samples())
+        )
         by_z, by_pose = self.start.tangent()
         parts = [by_start @ by_z, self.null_motion.pullback(by_epsilon)]
         if self._deviation.size:
@@ -200,8 +163,7 @@ class Objective:
         samples = self.samples(x)
         if not np.all(np.isfinite(samples.q)):
             return
-        for cost in self._costs:
-            self._require_finite(f"cost '{cost.name}'", "value", np.asarray(cost.value(samples)))
+        self._costs.require_finite(samples)
         for item in self.constraints.constraints:
             h = item.residual(samples)
             if not np.all(np.isfinite(h)):
@@ -209,15 +171,6 @@ class Objective:
                     f"constraint '{item.name}': its residual is not finite on the motion at the "
                     f"start; expected numbers wherever the arm may be"
                 )
-
-    def _require_finite(self, what: str, which: str, table: Array) -> None:
-        bad = ~np.isfinite(table)
-        if bad.any():
-            row = int(np.argmax(bad.reshape(len(bad), -1).any(axis=1)))
-            raise ProblemError(
-                f"{what}: its {which} is {table[row]} at t = {self.grid.stage_times[row]:.6g} s, "
-                f"expected finite numbers; selfmotion.testing.check_cost checks a cost"
-            )
 
     def slope(self, x: Array, direction: Array) -> float:
         """Return the derivative of `value` at x along `direction`."""
@@ -264,26 +217,8 @@ class Objective:
         keeps a deviation within its band. Its inverse starts the quasi-Newton method.
         """
         self._run(x)
-        n, sampling = self.rollout.robot.dof, self.grid.sampling
         by_q, by_qd = self._sensitivities(x)
-        curvatures = [cost.curvature(n) for cost in self._costs]
-        if not any(curvatures):
-            curvatures = [{1: np.eye(n)}]
-        metric = np.zeros((self.size, self.size))
-        nodes = by_qd[sampling.nodes].reshape(len(sampling.nodes), -1)
-        for curvature in curvatures:
-            for order, weight in curvature.items():
-                error = self._error_tangent(x, by_q) if order == ERROR else None
-                for first in range(0, len(by_q), _LOT):
-                    lot = slice(first, first + _LOT)
-                    if error is not None:
-                        tangent = error[lot]
-                    elif order > 1:
-                        operator = sampling.differentiation(order - 1)
-                        tangent = (operator[lot] @ nodes).reshape(by_qd[lot].shape)
-                    else:
-                        tangent = by_q[lot] if order == 0 else by_qd[lot]
-                    metric += self._weighted(tangent, weight, sampling.weights[lot])
+        metric = self._costs.curvature(by_q, by_qd, lambda: self._error_tangent(x, by_q))
         if self._deviation.size:
             # sin s bends as much as it rises: without it, steps would go round many times.
             slope = np.abs(self.parts(self.gradient(x))[2]) * self._deviation.banded
@@ -291,17 +226,12 @@ class Objective:
             metric[last:, last:] += np.diag(slope)
         return metric
 
-    def _weighted(self, tangent: Array, weight: Array, times: Array) -> Array:
-        """Return Σ times tangentᵀ W tangent over samples, (size, size)."""
-        # Near singular poses tangents may be beyond all numbers: see `inverse_metric`.
-        with np.errstate(over="ignore", invalid="ignore"):
-            weighted = times[:, None, None] * (weight @ tangent)
-            return np.asarray(tangent.reshape(-1, self.size).T @ weighted.reshape(-1, self.size))
-
     def node_tangents(self, x: Array) -> NodeTangents:
         """Return how the motion at the nodes changes with the decision vector, at x."""
         self._run(x)
-        return self._at_nodes(*self._sensitivities(x))
+        by_q, by_qd = self._sensitivities(x)
+        sampling = self.grid.sampling
+        return NodeTangents(by_q[sampling.nodes], by_qd[sampling.nodes], sampling)
 
     def _error_tangent(self, x: Array, by_q: Array) -> Array:
         """Return ∂(S e)/∂x = S ∂target/∂x - J ∂q/∂x, (S, m, size).
@@ -317,11 +247,6 @@ class Objective:
             tangent[:, :rows, -len(c) :] += samples.task.select_along(moved, samples.rotation)
         return np.asarray(tangent)
 
-    def _at_nodes(self, by_q: Array, by_qd: Array) -> NodeTangents:
-        sampling = self.grid.sampling
-        here = sampling.nodes
-        return NodeTangents(by_q[here], by_qd[here], sampling)
-
     def _run(self, x: Array) -> None:
         """Make x the motion that the rollout holds."""
         if self._at is not None and np.array_equal(self._at, x):
@@ -329,7 +254,7 @@ class Objective:
         self.counts.evaluated()
         # An interruption on the way must not leave half a motion as that of x.
         self._at = self._tangents = None
-        self._terms = {cost.name: np.inf for cost in self._costs}
+        self._terms = dict.fromkeys(self._costs.names, np.inf)
         before = self.rollout.jacobian_evaluations
         try:
             self._evaluate(x)
@@ -348,31 +273,7 @@ class Objective:
             return
         if self.rollout.run(start, self.null_motion.epsilon(coefficients)) is not None:
             return
-        samples = self.rollout.samples()
-        for cost in self._costs:
-            self._terms[cost.name] = float(samples.weights @ cost.value(samples))
-
-    def _cotangents(self) -> tuple[Array, Array, Array]:
-        """Return the derivatives of `value` with respect to q, q̇ and e at the stages."""
-        samples, sampling = self.rollout.samples(), self.grid.sampling
-        by_q, by_qd = np.zeros_like(samples.q), np.zeros_like(samples.qd)
-        by_error = np.zeros_like(samples.error)
-        weights, nodes = samples.weights[:, None], sampling.nodes
-        for cost in self._costs:
-            partials = cost.gradient(samples)
-            for total, part in (
-                (by_q, partials.q),
-                (by_qd, partials.qd),
-                (by_error, partials.error),
-            ):
-                if part is not None:
-                    self._require_finite(f"cost '{cost.name}'", "gradient", part)
-                    total += weights * part
-            for order, part in ((1, partials.qdd), (2, partials.qddd)):
-                if part is not None:
-                    self._require_finite(f"cost '{cost.name}'", "gradient", part)
-                    by_qd[nodes] += sampling.differentiation(order).T @ (weights * part)
-        return by_q, by_qd, by_error
+        self._terms = self._costs.values(self.rollout.samples())
 
     def _sensitivities(self, x: Array) -> tuple[Array, Array]:
         """Return ∂q/∂[z | x | c] and ∂q̇/∂[z | x | c] at the stages, (S, n, size)."""

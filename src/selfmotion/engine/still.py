@@ -10,7 +10,7 @@ from selfmotion.basics import Array, BreakdownError
 from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.frame import TransportedFrame
 from selfmotion.engine.rollout import Rollout
-from selfmotion.motion import Grid
+from selfmotion.motion import Grid, NullMotion, NullMotionTable
 from selfmotion.problem import Problem
 
 Guide = Callable[[Array], Array]
@@ -154,6 +154,20 @@ def deviation_of(problem: Problem, t: Array, around: Array | None = None) -> Dev
     return Deviation(
         problem.path, problem.relaxations, t, problem.pinned, problem.rests, around=around
     )
+
+
+def null_motion_table(
+    problem: Problem, t: Array, still: StillMotion, motion: NullMotion, around: Array | None
+) -> NullMotionTable:
+    """Return a null motion at times t (S,), in the basis of a motion at x = 0.
+
+    Around (S, n) is the null motion of x = 0, by default the guide's.
+    """
+    frame = still.frame(t, motion.space)
+    if around is None and still.guide is not None:
+        around = problem.brought_to_rest(t, still.guide(t))
+    rows = problem.robot.dof if frame is None else frame.shape[2]
+    return NullMotionTable(problem.null_functions(t, motion), frame, rows, around)
 
 
 def _extents(rollout: Rollout) -> Array:

@@ -26,8 +26,6 @@ _MOST_COEFFICIENTS = 110
 _HIGHEST = 100
 # So do splines of more intervals.
 _MOST_INTERVALS = 2000
-# A null motion that was found by a search fades in this share of the duration.
-_FADE = 0.05
 
 
 class NullMotion(Saved, ABC, family="null motion"):
@@ -262,80 +260,6 @@ class NodeNullMotion(NullMotion):
         from scipy.interpolate import CubicSpline
 
         return np.asarray(CubicSpline(self.times, np.eye(len(self.times)))(t / duration))
-
-
-def resting_window(t: Array, duration: float, orders: tuple[int, int]) -> Array:
-    """Return w(t) = c s^a (1 - s)^b with s = t / duration, (S,): at most 1.
-
-    Where a null motion is multiplied by it, that comes to rest at the start with its first a - 1
-    derivatives, and at the end with its first b - 1; `orders` are a and b.
-    """
-    a, b = orders
-    s = np.asarray(t) / duration
-    most = a**a * b**b / float((a + b) ** (a + b))
-    return np.asarray(s**a * (1.0 - s) ** b / most)
-
-
-def fading_window(t: Array, duration: float, ends: tuple[bool, bool]) -> Array:
-    """Return w(t), (S,): 1, except near those `ends` where it falls smoothly to 0."""
-    s = np.asarray(t) / duration
-    start, end = (_fade(x) if falls else 1.0 for x, falls in zip((s, 1.0 - s), ends, strict=True))
-    return np.asarray(np.ones(len(s)) * start * end)
-
-
-def _fade(s: Array) -> Array:
-    """Return a function of s (S,) that rises smoothly from 0 to 1 and stays there."""
-    u = np.minimum(s / _FADE, 1.0)
-    return np.asarray(u * u * (3.0 - 2.0 * u))
-
-
-@dataclass(frozen=True, eq=False)
-class NullMotionTable:
-    """A null motion at S stages, bound to one motion: ε = ε_0 + R E φ.
-
-    Attributes
-    ----------
-    functions : (S, K)
-        φ at the stages.
-    frame : (S, n, r) or None
-        R at the stages; None for the identity.
-    rows : int
-        Rows of E: r, or n where there is no frame.
-    offset : (S, n) or None
-        ε_0, the null motion of x = 0; None for zero.
-    """
-
-    functions: Array
-    frame: Array | None
-    rows: int
-    offset: Array | None = None
-
-    @property
-    def size(self) -> int:
-        """Number of coefficients."""
-        return self.rows * int(self.functions.shape[1])
-
-    def epsilon(self, x: Array) -> Array:
-        """Return ε at the stages for coefficients `x`, (S, n)."""
-        inner: Array = self.functions @ x.reshape(self.rows, self.functions.shape[1]).T
-        outer = inner if self.frame is None else np.einsum("snr,sr->sn", self.frame, inner)
-        return outer if self.offset is None else outer + self.offset
-
-    def pullback(self, epsilon_gradient: Array) -> Array:
-        """Return ∂F/∂x for ∂F/∂ε (S, n): the transpose of the linear part of `epsilon`."""
-        inner = epsilon_gradient
-        if self.frame is not None:
-            inner = np.einsum("snr,sn->sr", self.frame, inner)
-        return np.asarray((inner.T @ self.functions).ravel())
-
-    def matrix(self, before: int = 0, after: int = 0) -> Array:
-        """Return ∂ε/∂x at the stages, (S, n, size), between as many columns of zeros."""
-        frame = np.eye(self.rows)[None] if self.frame is None else self.frame
-        (stages, count), n = self.functions.shape, frame.shape[1]
-        full = np.zeros((stages, n, before + self.size + after))
-        own = full[:, :, before : before + self.size].reshape(stages, n, self.rows, count)
-        np.multiply(frame[:, :, :, None], self.functions[:, None, None, :], out=own)
-        return full
 
 
 def _check_degree(degree: int) -> None:

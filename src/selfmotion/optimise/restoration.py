@@ -96,22 +96,26 @@ def restored(
         # A motion in an instant has derivatives beyond all numbers: nothing leads out of it.
         return x, Status.INFEASIBLE
     ground += _REGULAR * np.trace(ground) * np.eye(len(x))
-    most = min(limit, function.evaluations + _EVALUATIONS)
-    value, damping = penalised.value(x), _DAMPING
+    most, value = min(limit, function.evaluations + _EVALUATIONS), penalised.value(x)
+    damping = _DAMPING
     try:
         while function.conditions(x).worst > 1.0:
             step = _fall(penalised, x, value, ground, damping, most)
             if step is None:
                 break
             before, (x, value, damping) = value, step
-            size = float(np.linalg.norm(function.gradient(x)))
-            if note(Iteration(x, function.value(x), size, "none", 1.0, function.evaluations)):
+            if note(_iteration(function, x)):
                 return x, Status.STOPPED
             if before - value <= _TOLERANCE * abs(before):
                 break
     except KeyboardInterrupt:
         return x, Status.INTERRUPTED
     return x, Status.MAX_EVALUATIONS if function.evaluations >= limit else None
+
+
+def _iteration(function: ConstrainedFunction, x: Array) -> Iteration:
+    size = float(np.linalg.norm(function.gradient(x)))
+    return Iteration(x, function.value(x), size, "none", 1.0, function.evaluations)
 
 
 def scanned(function: ConstrainedFunction, x: Array, axes: Array) -> Array:

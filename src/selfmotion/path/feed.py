@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,38 +10,19 @@ import numpy.typing as npt
 from selfmotion.basics import (
     Array,
     Flags,
-    Ints,
     PathError,
     as_number,
     as_numbers,
     read_only,
     series,
 )
-from selfmotion.path.base import STILL, Path, PathSamples, PathSeries, _Derived, check_path
+from selfmotion.path.base import Path, PathSamples, PathSeries, _Derived, check_path
 from selfmotion.path.feed_kept import FeedKept
-from selfmotion.path.pace import Pace, times_along, times_when
+from selfmotion.path.feed_nodes import FeedNodes, twist_sizes
+from selfmotion.path.pace import Pace, times_when
 
-# What holds a tool that is slower than its feed.
-_CAUSES = "the turn rate", "the acceleration in a bend", "the turn acceleration in a bend"
-# Nodes of the pace between two knots of the original, at least.
-_FEWEST = 16
-# Nodes of the pace in all, about: a feed is kept between them as far as splines through them do.
-_ABOUT = 1000
-# How far from a node, by the distance of knots, the original's accelerations are measured.
-_BESIDE = 1e-4
-# How far from a knot it is measured whether the twist jumps there.
-_AT = 1e-8
-# The pace of the original is followed between nodes to this share, by so many halvings at most.
-_ROUGH, _FINER = 0.05, 12
-# Halvings by which it is found where the turn rate begins to hold the tool, and how near to a node,
-# as a share of the way to the next one, that is the node.
-_HALVINGS, _CLOSE = 40, 1e-6
 # Faster feeds [m/s] are slips of units.
 _FASTEST = 3.0
-# A tool that is slower than this share of what it may be rests.
-_RESTS = 1e-6
-# The twist before and after a knot may differ by this share of it: by rounding.
-_KINK = 1e-6
 
 
 class Feed(_Derived, kind="feed"):
@@ -161,7 +141,7 @@ class Feed(_Derived, kind="feed"):
         """See `Path.marks`."""
         inner = [pace.t + start for start, _, pace in self._paces]
         # The length as a function of time, and time as one of the length, are splines.
-        inner.append(self._moved(np.union1d(self._path.marks, self._sigma)))
+        inner.append(self._moved(np.union1d(self._path.marks, self._nodes.sigma)))
         return _apart(np.concatenate(inner), self.duration)
 
     def _moved(self, wanted: Array) -> Array:
@@ -184,8 +164,8 @@ class Feed(_Derived, kind="feed"):
         reached, rate = np.empty(len(t)), np.empty(len(t))
         for here, own, pace in self._stretches(t):
             reached[here], rate[here] = pace(own), np.maximum(pace(own, 1), 0.0)
-        sigma = np.clip(self._original(reached), 0.0, self._path.duration)
-        return sigma, rate * np.maximum(self._original(reached, nu=1), 0.0)
+        sigma = np.clip(self._nodes.time_at(reached), 0.0, self._path.duration)
+        return sigma, rate * np.maximum(self._nodes.time_at(reached, nu=1), 0.0)
 
     def _stretches(self, t: Array) -> Iterator[tuple[Array, Array, Pace]]:
         """Yield for each stretch which of times (K,) lie in it, its own times, and its pace."""
@@ -201,7 +181,7 @@ class Feed(_Derived, kind="feed"):
             reached[here], length[:, here] = pace(own), pace.series(own, half[here])
         reach = series.after_first(length)
         reach = np.where(reach > 0.0, reach, 1.0)
-        spline = self._original
+        spline = self._nodes.time_at
         part = series.of_pieces(spline.x, spline.c[::-1], reached, reach)
         sigma = series.composed(series.of_polynomial(part), length / reach)
         return self._series_at(np.clip(spline(reached), 0.0, self._path.duration), sigma)
@@ -212,178 +192,25 @@ class Feed(_Derived, kind="feed"):
         return self._at_pace(t, *self.pace(t))
 
     @cached_property
+    def _nodes(self) -> FeedNodes:
+        return FeedNodes(self._path, self._limits, self._asked)
+
+    @cached_property
     def _paces(self) -> list[tuple[float, float, Pace]]:
-        """Start, end and pace of each stretch from rest to rest, the pace over `_lengths`."""
-        sigma, lengths = self._sigma, self._lengths
+        """Start, end and pace of each stretch from rest to rest, the pace over the length."""
         stretches, start = [], 0.0
-        for first, last in pairwise(np.searchsorted(sigma, self._stops)):
-            part = slice(first, last + 1)
-            most, gain = self._most[part], self._gain[part]
-            pace = _ramped(lengths[part], most, gain)[0].smoothed(self._limits["smoothing"])
+        for _, ramp, _ in self._nodes.ramps:
+            pace = ramp.smoothed(self._limits["smoothing"])
             end = start + float(pace.t[-1])
             stretches.append((start, end, pace))
             start = end
         return stretches
 
     @cached_property
-    def _stops(self) -> list[float]:
-        """The original's times between which it has no kink."""
-        knots = self._path.knots
-        inner = knots[1:-1]
-        if not len(inner):
-            return [0.0, self._path.duration]
-        beside = _AT * np.diff(knots)
-        before = self._path.samples(inner - beside[:-1]).twist
-        after = self._path.samples(inner + beside[1:]).twist
-        jump = np.abs(after - before).max(axis=1)
-        size = np.maximum(np.abs(before), np.abs(after)).max(axis=1)
-        kinks = inner[jump > _KINK * size + STILL]
-        return [0.0, *kinks.tolist(), self._path.duration]
-
-    @cached_property
-    def _sigma(self) -> Array:
-        """The original's times at the nodes, (K,)."""
-        parts = []
-        for start, end in pairwise(self._path.knots):
-            count = max(_FEWEST, int(np.ceil(_ABOUT * (end - start) / self._path.duration)))
-            parts.append(np.linspace(start, end, count, endpoint=False))
-        sigma = np.append(np.concatenate(parts), self._path.duration)
-        for _ in range(_FINER):
-            middle, share = 0.5 * (sigma[:-1] + sigma[1:]), self._share_of(sigma)
-            between, found = 0.5 * (share[:-1] + share[1:]), self._share_of(middle)
-            rough = np.abs(found - between) > _ROUGH * found
-            if not rough.any():
-                break
-            # Where the tool all but rests, its pace changes much faster than elsewhere.
-            sigma = np.union1d(sigma, middle[rough])
-        return self._with_changes(self._with_crossings(sigma))
-
-    def _with_changes(self, sigma: Array) -> Array:
-        """Return nodes, and where feeds change; however short, a stretch has one of its own."""
-        if len(self._asked) == 1:
-            return sigma
-        changes = np.append(self._asked[:, 0], self._path.duration)
-        apart = np.abs(sigma[:, None] - changes).min(axis=1)
-        inner = sigma[apart > _CLOSE * np.diff(changes).min()]
-        empty = np.diff(np.searchsorted(inner, changes)) == 0
-        between = 0.5 * (changes[:-1] + changes[1:])[empty]
-        return np.union1d(changes, np.append(inner, between))
-
-    def _with_crossings(self, sigma: Array) -> Array:
-        """Return nodes, and where the turn rate begins or ends to hold the tool: a kink of σ(λ)."""
-        turns = self._turns(sigma)
-        (cells,) = np.nonzero(turns[:-1] != turns[1:])
-        early, late, before = sigma[cells], sigma[cells + 1], turns[cells]
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (early + late)
-            same = self._turns(middle) == before
-            early, late = np.where(same, middle, early), np.where(same, late, middle)
-        widths = np.minimum(late - sigma[cells], sigma[cells + 1] - late)
-        return np.union1d(sigma, late[widths > _CLOSE * np.diff(sigma)[cells]])
-
-    def _turns(self, sigma: Array) -> Flags:
-        """Return at which times (K,) the turn rate holds the tool, rather than the feed."""
-        speeds = _sizes(self._path.samples(sigma).twist)
-        allowed = np.array([self._limits["feed"], self._limits["turn_rate"]])
-        return np.asarray(np.diff(speeds / allowed, axis=1)[:, 0] > 0.0)
-
-    @cached_property
-    def _shares(self) -> Array:
-        """What the original's own pace takes of the feed or the turn rate at the nodes, (K,)."""
-        share = self._share_of(self._sigma)
-        if share.min() <= _RESTS * share.max():
-            at = self._sigma[int(np.argmin(share))]
-            raise PathError(
-                f"feed: the path rests at {at:.6g} s of its own time, where it has no direction; "
-                f"take one that does not rest (Polyline, corners='blend'), or join several: "
-                f"Feed(first, …) + Dwell(…) + Feed(second, …)"
-            )
-        return share
-
-    def _share_of(self, sigma: Array) -> Array:
-        speeds = _sizes(self._path.samples(sigma).twist)
-        allowed = np.array([self._limits["feed"], self._limits["turn_rate"]])
-        return np.asarray((speeds / allowed).max(axis=1))
-
-    @cached_property
-    def _lengths(self) -> Array:
-        """How long the way to each node takes at the feed [s], (K,), by Simpson's rule."""
-        sigma, share = self._sigma, self._shares
-        middle = self._share_of(0.5 * (sigma[:-1] + sigma[1:]))
-        parts = np.diff(sigma) * (share[:-1] + 4.0 * middle + share[1:]) / 6.0
-        return np.append(0.0, np.cumsum(parts))
-
-    @cached_property
-    def _original(self) -> Any:
-        """The original's time as a function of the length."""
-        from scipy.interpolate import CubicHermiteSpline
-
-        return CubicHermiteSpline(self._lengths, self._sigma, 1.0 / self._shares)
-
-    @cached_property
-    def _bends(self) -> Array:
-        """|dv/dλ| and |dω/dλ| over the length λ with velocities per length too, (K, 2)."""
-        sigma, share = self._sigma, self._shares[:, None]
-        beside = float(_BESIDE * np.diff(self._path.knots).min())
-        inner = np.clip(sigma, sigma[0] + beside, sigma[-1] - beside)
-        early, here, late = (
-            self._path.samples(at).twist / self._share_of(at)[:, None]
-            for at in (inner - beside, inner, inner + beside)
-        )
-        # Before and after by themselves: where the turn rate begins to hold, they differ.
-        sides = (_sizes((b - a) / beside / share) for a, b in ((early, here), (here, late)))
-        return np.maximum(*sides)
-
-    @cached_property
-    def _caps(self) -> Array:
-        """What the square of the pace may be by feed and accelerations, (K, 3)."""
-        bends = 1.0 / np.maximum(self._bends / self._half, 1e-300)
-        if len(self._asked) == 1:
-            return np.hstack([np.ones((len(bends), 1)), bends])
-        speeds = _sizes(self._path.samples(self._sigma).twist)[:, :1] / self._shares[:, None]
-        slower = self._feeds_at_nodes[:, None] / np.maximum(speeds, _RESTS * self.feed)
-        return np.hstack([np.minimum(slower, 1.0) ** 2, bends])
-
-    @cached_property
-    def _feeds_at_nodes(self) -> Array:
-        """The feed that is asked for at each node, where it changes the slower one, (K,)."""
-        times, feeds = self._asked.T
-        after = feeds[np.searchsorted(times, self._sigma, side="right") - 1]
-        before = feeds[np.maximum(np.searchsorted(times, self._sigma) - 1, 0)]
-        return np.asarray(np.minimum(before, after))
-
-    @cached_property
-    def _most(self) -> Array:
-        """What the square of the pace may be by the feed and by bends near each node, (K,)."""
-        most: Array = self._caps.min(axis=1)[self._narrowest]
-        return most
-
-    @cached_property
-    def _narrowest(self) -> Ints:
-        """The node near each one at which the pace may be least, (K,)."""
-        most = self._caps.min(axis=1)
-        # What is kept half a window before and after is kept by the mean in the middle.
-        lengths, reach = self._lengths, 0.5 * self._limits["smoothing"] * np.sqrt(most)
-        before = later = lengths
-        if len(self._asked) > 1:
-            # A feed changes at one node: between the two beside it the pace does, too.
-            before, later = np.append(lengths[0], lengths[:-1]), np.append(lengths[1:], lengths[-1])
-        first = np.searchsorted(lengths, before - reach)
-        after = np.searchsorted(lengths, later + reach, side="right")
-        pairs = zip(first, after, strict=True)
-        return np.array([k + int(np.argmin(most[k:m])) for k, m in pairs])
-
-    @cached_property
-    def _gain(self) -> Array:
-        """How much the square of the pace may change per length by changes of speed, (K,)."""
-        speeds = _sizes(self._path.samples(self._sigma).twist) / self._shares[:, None]
-        return np.asarray(2.0 / np.maximum((speeds / self._half).max(axis=1), 1e-300))
-
-    @cached_property
     def feeds(self) -> tuple[FeedKept, ...]:
         """See `Path.feeds`: how well its own feeds are kept, each where it is asked for."""
         t, counts, causes, asked = self._counted
-        speeds, lasts = _sizes(self.samples(t).twist)[:, 0], np.gradient(t)
+        speeds, lasts = twist_sizes(self.samples(t).twist)[:, 0], np.gradient(t)
         begins = np.array([0.0, *self.when(self._asked[1:, 0]), self.duration])
         during = np.stack([begins[:-1], begins[1:]], axis=1)
         found = []
@@ -401,43 +228,27 @@ class Feed(_Derived, kind="feed"):
     @property
     def _counted(self) -> tuple[Array, Flags, list[str], Array]:
         """Return when nodes are passed (K,), whether the feed counts, what holds it, and which."""
-        sigma, window = self._sigma, self._limits["smoothing"]
-        speeds = _sizes(self._path.samples(sigma).twist) / self._shares[:, None]
-        causes = [_CAUSES[k] for k in np.argmin(self._caps, axis=1)[self._narrowest]]
-        feeds = self._feeds_at_nodes
-        turning = speeds[:, 0] < (1.0 - 0.5 * self._within) * feeds
-        corners = self._path.rounded
+        nodes, window = self._nodes, self._limits["smoothing"]
+        sigma, causes, corners = nodes.sigma, nodes.causes, self._path.rounded
         inside = (sigma[:, None] >= corners[:, 0]) & (sigma[:, None] <= corners[:, 1])
-        free = (inside.any(axis=1) | (speeds[:, 0] <= _RESTS * self.feed))[self._narrowest]
-        times, exempt, held = [], [], []
-        stops = np.searchsorted(sigma, self._stops)
-        for (first, last), (start, _, _) in zip(pairwise(stops), self._paces, strict=True):
-            part = slice(first, last + 1)
-            pace, anchors = _ramped(self._lengths[part], self._most[part], self._gain[part])
-            own = free[part].copy()
+        free = (inside.any(axis=1) | nodes.turns_on_the_spot)[nodes.narrowest]
+        times, exempt, held, asked = [], [], [], []
+        for (part, pace, anchors), (start, _, _) in zip(nodes.ramps, self._paces, strict=True):
+            own, feeds = free[part].copy(), nodes.feeds[part]
             own[[0, -1]] = True
             times.append(start + pace.t + 0.5 * window)
             # Down to a slower feed, and up from one, the tool runs as at the ends.
-            slower = feeds[self._narrowest][part][anchors] < feeds[part]
+            slower = nodes.feeds[nodes.narrowest][part][anchors] < feeds
             exempt.append(own[anchors] | slower)
-            held += [causes[first + k] for k in anchors]
+            held += [causes[part][k] for k in anchors]
+            asked.append(feeds)
         t, rests = np.concatenate(times), np.concatenate(exempt)
         # From there to the next node the pace changes, and near that its mean does.
         rests = np.convolve(rests, np.ones(3), mode="same") > 0.0
         before = np.append(0, np.cumsum(rests))
         near = [np.searchsorted(t, t + side * 1.5 * window) for side in (-1, 1)]
         counts = before[near[1]] == before[near[0]]
-        every = np.concatenate([turning[a : b + 1] for a, b in pairwise(stops)])
-        named = [
-            "the turn rate" if x and y == _CAUSES[0] else y
-            for x, y in zip(every, held, strict=True)
-        ]
-        asked = np.concatenate([feeds[a : b + 1] for a, b in pairwise(stops)])
-        return np.clip(t, 0.0, self.duration), counts, named, asked
-
-    @property
-    def _half(self) -> Array:
-        return 0.5 * np.array([self._limits["acceleration"], self._limits["turn_acceleration"]])
+        return np.clip(t, 0.0, self.duration), counts, held, np.concatenate(asked)
 
     def slower(self, factor: float) -> "Feed":
         """Return the same motion, taking `factor` times as long.
@@ -458,31 +269,6 @@ class Feed(_Derived, kind="feed"):
         if len(self._asked) > 1:
             described["stretches"] = self._asked.tolist()
         return {"kind": self.kind, "path": self._path.to_dict(), **described}
-
-
-def _sizes(twists: Array) -> Array:
-    """Return the sizes of the linear and the angular part of (K, 6), (K, 2)."""
-    parts = twists[:, :3], twists[:, 3:]
-    return np.stack([np.sqrt(np.sum(part**2, axis=1)) for part in parts], axis=1)
-
-
-def _ramped(lengths: Array, most: Array, gain: Array) -> tuple[Pace, Ints]:
-    """Return the largest pace from rest to rest, its square ≤ `most`, changing by ≤ `gain`.
-
-    And for each node which one limits its pace: itself, or one that it is run up from or down to.
-    """
-    limiting = np.arange(len(lengths))
-    squared = most.copy()
-    squared[0] = squared[-1] = 0.0
-    steps = np.diff(lengths) * np.minimum(gain[:-1], gain[1:])
-    for k in range(len(steps)):
-        if squared[k] + steps[k] < squared[k + 1]:
-            squared[k + 1], limiting[k + 1] = squared[k] + steps[k], limiting[k]
-    for k in reversed(range(len(steps))):
-        if squared[k + 1] + steps[k] < squared[k]:
-            squared[k], limiting[k] = squared[k + 1] + steps[k], limiting[k + 1]
-    rates = np.sqrt(squared)
-    return Pace(times_along(lengths, rates), lengths, rates), limiting
 
 
 def _apart(times: Array, duration: float) -> Array:

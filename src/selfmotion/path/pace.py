@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, series
+from selfmotion.basics import Array, Ints, series
 
 # Of samples within this share of a window the first is kept: the jerk of more would be rounding.
 _CLOSE = 0.1
@@ -105,6 +105,25 @@ class Pace:
 def times_along(places: Array, rates: Array) -> Array:
     """Return when places (K,) are reached at rates (K,) whose squares are linear in between."""
     return np.append(0.0, np.cumsum(2.0 * np.diff(places) / (rates[:-1] + rates[1:])))
+
+
+def largest_pace(lengths: Array, most: Array, gain: Array) -> tuple[Pace, Ints]:
+    """Return the largest pace from rest to rest, its square ≤ `most`, changing by ≤ `gain`.
+
+    And for each node which one limits its pace: itself, or one that it is run up from or down to.
+    """
+    limiting = np.arange(len(lengths))
+    squared = most.copy()
+    squared[0] = squared[-1] = 0.0
+    steps = np.diff(lengths) * np.minimum(gain[:-1], gain[1:])
+    for k in range(len(steps)):
+        if squared[k] + steps[k] < squared[k + 1]:
+            squared[k + 1], limiting[k + 1] = squared[k] + steps[k], limiting[k]
+    for k in reversed(range(len(steps))):
+        if squared[k + 1] + steps[k] < squared[k]:
+            squared[k], limiting[k] = squared[k + 1] + steps[k], limiting[k + 1]
+    rates = np.sqrt(squared)
+    return Pace(times_along(lengths, rates), lengths, rates), limiting
 
 
 def times_when(

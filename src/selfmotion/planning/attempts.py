@@ -224,22 +224,12 @@ def _take_other_null_motion(draft: Draft) -> bool:
     best = draft.best
     if best is None or not draft.is_sought or not _may_meet_more(best):
         return False
-    _meet_more(draft, best)
+    draft.meet_more(best)
     return True
 
 
 def _may_meet_more(best: Session) -> bool:
     return bool(best.violations) and not best.is_spent
-
-
-def _meet_more(draft: Draft, best: Session) -> None:
-    for motion in best.others():
-        other = best.by(motion)
-        if other.cut_short:
-            best.end(other.status)
-        draft.best = best = min(best, other, key=lambda one: (bool(one.violations), one.merit()))
-        if not best.violations or best.cut_short:
-            break
 
 
 def _prove(draft: Draft) -> bool:
@@ -259,7 +249,7 @@ def _do_without_nodes(draft: Draft) -> bool:
         return False
     best.leave_nodes()
     if _may_meet_more(best):
-        _meet_more(draft, best)
+        draft.meet_more(best)
     draft.prove(draft.best or best)
     return True
 

@@ -209,6 +209,16 @@ class Draft:
         failure = self.failure
         return isinstance(failure, BreakdownError) and bool(self.reach(failure.time).reason)
 
+    def meet_more(self, best: Session) -> None:
+        """Let a motion of another null motion be the best where that meets more constraints."""
+        for motion in best.others():
+            other = best.by(motion)
+            if other.cut_short:
+                best.end(other.status)
+            self.best = best = min(best, other, key=lambda one: (bool(one.violations), one.merit()))
+            if not best.violations or best.cut_short:
+                break
+
     def prove(self, best: Session) -> None:
         """Let the best motion be what the plan is made of, on grids that are fine enough."""
         rival_cost = self._settle(best, self.rival)

@@ -30,7 +30,7 @@ def gathered(draft: Draft, deadline: Deadline) -> Plan:
     session, motion, still = part.session, finished.motion, finished.still
     if deadline.passed and session.status is Status.INTERRUPTED:
         session.end(Status.DEADLINE)
-    counts, standing = session.counts, session.standing
+    counts, standing, check = session.counts, session.standing, finished.certificate
     report = Report(
         cost=motion.cost,
         initial_cost=still.cost,
@@ -42,13 +42,9 @@ def gathered(draft: Draft, deadline: Deadline) -> Plan:
         steps=len(motion.trajectory.t) - 1,
         iterations=sum(iteration.step > 0.0 for iteration in session.history),
         history=tuple(session.history),
-        status=status_of(session.status, finished.certificate),
+        status=status_of(session.status, check),
         message=message_of(
-            session.status,
-            session.violations,
-            finished.certificate,
-            ending=part.ending,
-            notes=draft.notes,
+            session.status, session.violations, check, ending=part.ending, notes=draft.notes
         ),
         seconds=time.perf_counter() - draft.began,
         gap=_gap(draft, proved),
@@ -64,7 +60,7 @@ def gathered(draft: Draft, deadline: Deadline) -> Plan:
         initial_trajectory=still.trajectory,
         coefficients=read_only(standing.coefficients),
         report=report,
-        certificate=finished.certificate,
+        certificate=check,
     )
 
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.constraints import BoundConstraint
-from selfmotion.engine import Conditions
-from selfmotion.motion import FreeNullMotion, Grid, Trajectory
+from selfmotion.motion import FreeNullMotion, Trajectory
 from selfmotion.nodes import NodeEnds, NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, QuasiNewton, Status
 from selfmotion.planning.effort import Effort
@@ -23,7 +22,6 @@ from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import (
     COST_AGREEMENT,
     FEWEST_WITH_ACCELERATIONS,
-    LEAST_SAVING,
     MOST_NODES,
     NODE_AGREEMENT,
     NODE_ROUNDS,
@@ -290,21 +288,6 @@ class NodeDescent:
         return self._ended is not None
 
     def _standing(self, optimum: Optimum, columns: Ints) -> MotionOnNodes:
-        motion = optimum.motion
         # What keeps the conditions, and leads no further, is as good as it gets.
         arrived = optimum.status if optimum.status in _ARRIVED else Status.PRECISION
-        status = self._ended or arrived
-        least = LEAST_SAVING * abs(motion.cost)
-        grid = motion.grid
-        inner = iter(grid.conditions.by_constraint(optimum.prices))
-        ends = grid.ends.by_item(optimum.end_prices)
-        each = [
-            ends[id(item)] if item.equality else next(inner).ravel() for item in self._constraints
-        ]
-        conditions = Conditions(self._constraints, Grid(grid.t))
-        active = conditions.active(
-            motion.samples.checked, np.concatenate([np.zeros(0), *each]), least
-        )
-        off = abs(motion.exact_cost - motion.cost)
-        promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
-        return MotionOnNodes(motion, status, columns, optimum.prices, active, off + promised)
+        return MotionOnNodes.of(optimum, self._constraints, columns, self._ended or arrived)

@@ -1,15 +1,17 @@
 """A motion of nodes that stands: an optimum that keeps the conditions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints
-from selfmotion.constraints import Binding
-from selfmotion.engine import Evaluation
+from selfmotion.constraints import Binding, BoundConstraint
+from selfmotion.engine import Conditions, Evaluation
 from selfmotion.motion import Grid, NodeNullMotion, NullMotion
-from selfmotion.nodes import NodeMotion
+from selfmotion.nodes import NodeMotion, Optimum
 from selfmotion.optimise import Status
+from selfmotion.planning.settings import LEAST_SAVING
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,28 @@ class MotionOnNodes:
     active: tuple[Binding, ...]
     remaining: float | None
     is_chain: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        optimum: Optimum,
+        constraints: Sequence[BoundConstraint],
+        columns: Ints,
+        status: Status,
+    ) -> "MotionOnNodes":
+        """Return what stands at an optimum, for which some columns of the conditions counted."""
+        motion, grid = optimum.motion, optimum.motion.grid
+        inner = iter(grid.conditions.by_constraint(optimum.prices))
+        ends = grid.ends.by_item(optimum.end_prices)
+        each = [ends[id(item)] if item.equality else next(inner).ravel() for item in constraints]
+        active = Conditions(constraints, Grid(grid.t)).active(
+            motion.samples.checked,
+            np.concatenate([np.zeros(0), *each]),
+            LEAST_SAVING * abs(motion.cost),
+        )
+        promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
+        remaining = abs(motion.exact_cost - motion.cost) + promised
+        return cls(motion, status, columns, optimum.prices, active, remaining)
 
     @property
     def steps(self) -> int:

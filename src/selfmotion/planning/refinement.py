@@ -6,8 +6,9 @@ import numpy as np
 
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import Status
-from selfmotion.planning.session import Session, relative_change
+from selfmotion.planning.session import Session
 from selfmotion.planning.settings import COST_AGREEMENT, RISE, RISES, ROUGH_AGREEMENT
+from selfmotion.planning.standing import relative_change
 
 # After these there is nothing to go on from.
 _ADRIFT = (Status.UNBOUNDED, Status.GRADIENT)

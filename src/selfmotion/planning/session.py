@@ -1,20 +1,18 @@
 """One start of one problem, optimised: what stands, and how it becomes better."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from selfmotion.engine import Counts, Evaluation
-from selfmotion.motion import Grid, NullMotion, Trajectory
+from selfmotion.motion import NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.along_chain import along_chain
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.descent import Descent, breaks
 from selfmotion.planning.nodes import NodeDescent, takes
 from selfmotion.planning.on_nodes import MotionOnNodes
-from selfmotion.planning.settings import ALIKE
 from selfmotion.planning.standing import RolledMotion, Standing, score
 from selfmotion.planning.warm_start import pace_of, slower
 from selfmotion.result import Plan
@@ -248,23 +246,12 @@ class Session:
         be small, and each would cost much.
         """
         before = self.rolled
-        rough, objective = before.null_motion.rough, before.objective
-        z, x, c = objective.parts(before.x)
-        first = before.minimum is None and not x.any()
-        if rough == before.null_motion or not first or not breaks(objective, before.x):
+        first = before.minimum is None and not before.coefficients.any()
+        can = first and before.null_motion.rough != before.null_motion
+        rough = before.rougher() if can and breaks(before.objective, before.x) else None
+        if rough is None:
             return False
-        cost = objective.value(before.x)
-        grid = Grid.aligned(self.beginning.problem.knots, rough.fewest_steps)
-        coarse = before.on(grid, rough)
-        # Written so that NaN asks for more steps, too.
-        while not relative_change(cost, coarse.value(np.zeros(coarse.size))) <= ALIKE:
-            if coarse.grid.steps >= objective.grid.steps:
-                return False
-            coarse = before.on(coarse.grid.halved(), rough)
-        none = np.zeros(coarse.null_motion.size)
-        self.rolled = replace(
-            before, x=np.concatenate([z, none, c]), objective=coarse, null_motion=rough
-        )
+        self.rolled = rough
         self._take_minimum()
         if self.status is Status.INFEASIBLE:
             self.rolled = before
@@ -308,8 +295,3 @@ class Session:
             self.on_nodes = self.on_nodes.refined(where)
         else:
             self.rolled = self.rolled.refined(where)
-
-
-def relative_change(before: float, after: float) -> float:
-    """Return the change of a cost as a share of what it was."""
-    return abs(after - before) / max(abs(before), np.finfo(float).tiny)

@@ -12,7 +12,7 @@ from selfmotion.motion import Grid, NodeNullMotion, NullMotion, Trajectory
 from selfmotion.optimise import Minimum, Status
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.closing import closed
-from selfmotion.planning.settings import MOST_ESTIMATED, THINNER
+from selfmotion.planning.settings import ALIKE, MOST_ESTIMATED, THINNER
 from selfmotion.planning.warm_start import coefficients_of, pace_of
 from selfmotion.result import Plan
 
@@ -187,6 +187,23 @@ class RolledMotion:
             minimum=None,
         )
 
+    def rougher(self) -> "RolledMotion | None":
+        """Return this motion at x = 0 with a rougher null motion, on a grid as coarse as will do.
+
+        None where that would be no coarser.
+        """
+        objective, rough = self.objective, self.null_motion.rough
+        z, _, c = objective.parts(self.x)
+        cost = objective.value(self.x)
+        coarse = self.on(Grid.aligned(self.beginning.problem.knots, rough.fewest_steps), rough)
+        # Written so that NaN asks for more steps, too.
+        while not relative_change(cost, coarse.value(np.zeros(coarse.size))) <= ALIKE:
+            if coarse.grid.steps >= objective.grid.steps:
+                return None
+            coarse = self.on(coarse.grid.halved(), rough)
+        x = np.concatenate([z, np.zeros(coarse.null_motion.size), c])
+        return replace(self, x=x, objective=coarse, null_motion=rough)
+
     def resumed(self, trajectory: Trajectory) -> "RolledMotion":
         """Return the one whose null motion is that of a motion along this path, if no worse."""
         return self._or_along(trajectory, 1.0, self.objective, self.null_motion)
@@ -224,3 +241,8 @@ class RolledMotion:
         fine = self.on(grid, spline, objective.null_motion.epsilon(x))
         none = np.zeros(fine.null_motion.size)
         return Remaining(fine, np.concatenate([z, none, c]), bound=bound)
+
+
+def relative_change(before: float, after: float) -> float:
+    """Return the change of a cost as a share of what it was."""
+    return abs(after - before) / max(abs(before), np.finfo(float).tiny)

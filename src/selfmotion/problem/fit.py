@@ -1,4 +1,4 @@
-"""Does this path fit this arm? Its rows, its units, how it begins and ends, what is relaxed."""
+"""Does this path fit this arm? Its rows, its units, its pace, what is relaxed."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -7,16 +7,12 @@ import numpy as np
 
 from selfmotion.basics import ProblemError, RedundancyError
 from selfmotion.follow import Follows
-from selfmotion.path import STILL, Path, check_oriented
+from selfmotion.path import Path, check_oriented
 from selfmotion.robot import Chain, RobotModel
 from selfmotion.task import POSITION_ROWS, ROW_NAMES, Relaxation, Task
 
 # Columns of Jacobians below this [m, rad] are zero.
 _NO_RATE = 1e-6
-# Speeds are compared this share of the duration from an end, and twice as far from it.
-_NEAR_END = 1e-4
-# Speed that grows with at least this power of the time has no acceleration at the end.
-_SMOOTH = 1.5
 # A path that is nowhere nearer than so many times the arm's reach is in other units.
 _FAR = 20.0
 # Joints without a limit of speed are taken to have this one [rad/s or m/s]; a path that is so many
@@ -187,28 +183,3 @@ def _check_pace(robot: RobotModel, path: Path, reach: float) -> None:
             f"{robot.name}: the path is too fast: {speeds[k]:.3g} m/s at t = {times[k]:.3g} s, "
             f"while its joints move the tool at {bound:.3g} m/s at most; durations are in seconds"
         )
-
-
-def rest_orders(path: Path, task: Task) -> tuple[int, int]:
-    """Return how smoothly the prescribed rows begin and end.
-
-    Of each end: 0 where the tool moves, 1 where it rests, 2 where it rests and does not accelerate
-    either, so that a motion from standstill is smooth there.
-    """
-    step = _NEAR_END * path.duration
-    t = np.array([0.0, step, 2.0 * step])
-    first, last = (_speeds(path, task, times) for times in (t, path.duration - t))
-    return _order(first), _order(last)
-
-
-def _speeds(path: Path, task: Task, t: np.ndarray) -> list[float]:
-    samples = path.samples(t)
-    rows = task.select_along(samples.twist[:, :, None], samples.rotation)[:, :, 0]
-    return [float(speed) for speed in np.abs(rows).max(axis=1)]
-
-
-def _order(speeds: list[float]) -> int:
-    at, near, far = speeds
-    if at > STILL:
-        return 0
-    return 2 if far == 0.0 or near <= far * 0.5**_SMOOTH else 1

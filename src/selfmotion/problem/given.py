@@ -1,21 +1,12 @@
 """Whether what a problem was given is of the right kind, and agrees with the rest."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from selfmotion.basics import Array, ProblemError, StartError, shown
 from selfmotion.certificate import Requirement
-from selfmotion.constraints import (
-    Clearance,
-    Constraint,
-    JointAccelerationLimits,
-    JointJerkLimits,
-    JointVelocityLimits,
-    ToolLimits,
-)
+from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import Cost
 from selfmotion.follow import Follow, Follows
 from selfmotion.motion import NullMotion
@@ -45,11 +36,6 @@ _EXAMPLES = {
     "damping": "Damping or None",
     "collision": "Clearance or None",
 }
-# Limits so many times the arm's own are in other units, and so are those that no arm has: of joints
-# by order, and of the tool's speed [m/s].
-_FAR_ABOVE = 10.0
-_RATES = {1: ("rad/s", 50.0), 2: ("rad/s²", 200.0), 3: ("rad/s³", 5e4)}
-_FASTEST_TOOL = 50.0
 # A start nearer to the path than this is on it: far above rounding, far below any tolerance.
 _ON_PATH = 1e-7
 
@@ -97,29 +83,6 @@ def _beyond(robot: RobotModel, start: Array) -> str:
     return ""
 
 
-def unit_remarks(robot: RobotModel, constraints: Sequence[Constraint]) -> Iterator[str]:
-    """Yield limits so far above the arm's own, or any arm's, that they may be in other units."""
-    for item in constraints:
-        if isinstance(item, ToolLimits) and _FASTEST_TOOL < item.speed < np.inf:
-            yield f"ToolLimits: a speed of {item.speed:g} m/s is no limit; in mm/s? speed_mm"
-        limits = JointVelocityLimits | JointAccelerationLimits | JointJerkLimits
-        if not isinstance(item, limits) or item.limit is None:
-            continue
-        kind, (unit, most) = type(item).__name__, _RATES[item.order]
-        own, published = replace(item, replace=True).of(robot), item.published(robot)
-        for k, name in enumerate(robot.joint_names):
-            if robot.is_prismatic(name) or not np.isfinite(own[k]):
-                continue
-            told = ""
-            if not item.replace and own[k] > _FAR_ABOVE * published[k]:
-                told = f"has no effect, the arm's own limit is {published[k]:.4g} {unit}"
-            elif own[k] > most:
-                told = f"is more than arms do (above {most:g} {unit})"
-            if told:
-                yield f"{kind}: {own[k]:g} {unit} for '{name}' {told}; in degrees? limit_deg"
-                break
-
-
 def check_start(follows: Follows, start: Array) -> None:
     """Raise StartError where a start (n,) is off one of the paths."""
     for item in follows.items:
@@ -134,3 +97,29 @@ def check_start(follows: Follows, start: Array) -> None:
                 position_miss=position,
                 rotation_miss=rotation,
             )
+
+
+def first_tool(several: Sequence[Follow], robot: RobotModel) -> tuple[Follow, RobotModel]:
+    """Return the first of several that follow a path, and the arm with its tool.
+
+    Raises
+    ------
+    ProblemError
+        There is none, or it is at a pose.
+    """
+    if not several:
+        raise ProblemError("path is an empty list, expected a Path, or what follows one")
+    first = several[0]
+    if not isinstance(first.path, Path):
+        raise ProblemError(
+            "the first Follow is at a pose, which does not tell how long the motion lasts; "
+            "begin with one that has a path, or take Dwell(pose, seconds)"
+        )
+    if isinstance(robot, RobotModel) and (first.tool or first.reference):
+        tool = first.tool or robot.tool
+        tools = (tool, *(name for name in robot.tools if name != tool))
+        own = robot.reference if tool == robot.tool else None
+        reference = own if first.reference is None else first.reference
+        robot = replace(robot, tools=tools, reference=reference)
+        robot.chain_to(tool, reference)
+    return first, robot

@@ -1,9 +1,8 @@
 """What to plan: an arm, a tool motion, the rows that count, and what to minimise."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, reduce
-from operator import and_
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,56 +23,31 @@ from selfmotion.certificate import (
     Certificate,
     Requirement,
     Tolerance,
-    arm_limits,
     certify,
     errors_between,
 )
-from selfmotion.constraints import (
-    BoundConstraint,
-    Clearance,
-    Constraint,
-    Envelope,
-    JointAccelerationLimits,
-    JointJerkLimits,
-    JointPositionLimits,
-    JointVelocityLimits,
-)
+from selfmotion.constraints import BoundConstraint, Clearance, Constraint, Envelope
 from selfmotion.costs import Cost, JointVelocity, OffPath
 from selfmotion.follow import Follow, Follows
-from selfmotion.motion import (
-    FreeNullMotion,
-    NullMotion,
-    Trajectory,
-    fading_window,
-    resting_window,
-)
+from selfmotion.motion import NullMotion, Trajectory, fading_window, resting_window
 from selfmotion.path import Path
-from selfmotion.problem.fit import check_fit, rest_orders
+from selfmotion.problem.defaults import ANY_NULL_MOTION, KEPT, NO_OVERLAP, USUAL_COSTS
+from selfmotion.problem.envelopes import asked_envelope, with_own_limits
+from selfmotion.problem.fit import check_fit
 from selfmotion.problem.given import (
     SEQUENCES,
     check_costs,
     check_judged,
     check_kinds,
     check_start,
-    unit_remarks,
+    first_tool,
 )
-from selfmotion.problem.inside import inside_remarks
 from selfmotion.problem.knots import smooth_knots
+from selfmotion.problem.remarks import remarks_on
+from selfmotion.problem.rest import arm_rest_orders
+from selfmotion.problem.way import way_of
 from selfmotion.robot import RobotModel
 from selfmotion.task import Damping, DampingLaw, Relaxation, Task, feedback_rate
-
-# Links must not overlap; one object, so that its bodies are made once for each arm.
-NO_OVERLAP = Clearance(distance=0.0)
-# Defaults of a problem; values, meant to be shared.
-_FREE = FreeNullMotion()
-KEPT: tuple[Constraint, ...] = (
-    JointPositionLimits(),
-    JointVelocityLimits(),
-    JointAccelerationLimits(),
-    JointJerkLimits(),
-)
-# Stands for the usual cost of whatever arm it is.
-_USUAL: tuple[Cost, ...] = (JointVelocity(),)
 
 
 class _TaskField:
@@ -85,10 +59,6 @@ class _TaskField:
 
     def __set__(self, problem: Any, task: Task | str) -> None:
         problem.__dict__["_task"] = Task.of(task)
-
-
-# Samples of the tool's way to begin with and at most; more of them would make it longer by less.
-_WAY_SAMPLES, _MOST_WAY_SAMPLES, _WAY_GROWS = 101, 100_000, 1.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +123,8 @@ class Problem:
     path: Path
     task: _TaskField = _TaskField()  # a descriptor, meant to be shared
     start: npt.ArrayLike | str | None = None
-    null_motion: NullMotion = _FREE
-    costs: Sequence[Cost] = _USUAL
+    null_motion: NullMotion = ANY_NULL_MOTION
+    costs: Sequence[Cost] = USUAL_COSTS
     constraints: Sequence[Constraint] = KEPT
     relaxations: Sequence[Relaxation] = ()
     damping: Damping | None = None
@@ -164,9 +134,14 @@ class Problem:
 
     def __post_init__(self) -> None:
         if isinstance(self.path, list | tuple):
-            self._take_first(as_several(self.path, "path", Follow))
+            several = as_several(self.path, "path", Follow)
+            first, robot = first_tool(several, self.robot)
+            object.__setattr__(self, "robot", robot)
+            object.__setattr__(self, "path", first.path)
+            object.__setattr__(self, "task", first.task)
+            object.__setattr__(self, "also", (*several[1:], *self.also))
         check_kinds(self)
-        if self.costs is _USUAL:
+        if self.costs is USUAL_COSTS:
             object.__setattr__(self, "costs", (JointVelocity.usual(self.robot),))
         for name, each in SEQUENCES.items():
             object.__setattr__(self, name, as_several(getattr(self, name), name, each))
@@ -195,28 +170,6 @@ class Problem:
     def follows(self) -> Follows:
         """What the arm follows: the one thing that planners are told."""
         return Follows.of(self.robot, self.path, self.task, self.also)
-
-    def _take_first(self, several: Sequence[Follow]) -> None:
-        """Make the first of several that follow a path the arm's tool."""
-        if not several:
-            raise ProblemError("path is an empty list, expected a Path, or what follows one")
-        first, robot = several[0], self.robot
-        if not isinstance(first.path, Path):
-            raise ProblemError(
-                "the first Follow is at a pose, which does not tell how long the motion lasts; "
-                "begin with one that has a path, or take Dwell(pose, seconds)"
-            )
-        if isinstance(robot, RobotModel) and (first.tool or first.reference):
-            tool = first.tool or robot.tool
-            tools = (tool, *(name for name in robot.tools if name != tool))
-            own = robot.reference if tool == robot.tool else None
-            reference = own if first.reference is None else first.reference
-            robot = replace(robot, tools=tools, reference=reference)
-            robot.chain_to(tool, reference)
-        object.__setattr__(self, "robot", robot)
-        object.__setattr__(self, "path", first.path)
-        object.__setattr__(self, "task", first.task)
-        object.__setattr__(self, "also", (*several[1:], *self.also))
 
     def along(self, other: Callable[[Path], Path]) -> dict[str, Any]:
         """Return, for `dataclasses.replace`, other paths in place of all that are followed."""
@@ -277,17 +230,7 @@ class Problem:
     @cached_property
     def rest_orders(self) -> tuple[int, int]:
         """How smoothly the arm comes to rest at the start and at the end; see `rest_orders`."""
-        if not self.rest:
-            return 0, 0
-        orders = [rest_orders(item.path, item.task) for item in self.follows.items]
-        start, end = (min(order[k] for order in orders) for k in (0, 1))
-        return self._rest_order(0, start), self._rest_order(1, end)
-
-    def _rest_order(self, end: int, order: int) -> int:
-        if any(item.sets_velocity[end] for item in self.constraints):
-            return 0
-        accelerates = any(item.sets_acceleration[end] for item in self.constraints)
-        return min(order, 1) if accelerates else order
+        return arm_rest_orders(self.follows, self.constraints) if self.rest else (0, 0)
 
     @property
     def rests(self) -> tuple[bool, bool]:
@@ -330,30 +273,20 @@ class Problem:
     @cached_property
     def asked_envelope(self) -> Envelope:
         """What the constraints ask of single configurations and velocities."""
-        return _asked_envelope(self.robot, self.all_constraints)
+        return asked_envelope(self.robot, self.all_constraints)
 
     @cached_property
     def envelope(self) -> Envelope:
         """The same, with the arm's own limits where the certificate judges these."""
-        return _with_own_limits(self.robot, self.requirements, self.asked_envelope)
+        return with_own_limits(self.robot, self.requirements, self.asked_envelope)
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """What to know before planning: links that overlap, limits or places that look wrong."""
-        models = (model for model, _ in self.envelope.bodies)
-        found = (pair for model in models for pair in model.overlapping if pair.is_checked)
-        told = (f"{pair.first} - {pair.second}: {pair.remedy}" for pair in found)
-        vain = (
-            f"{item.requirement(self.robot).name} are asked for, but none are known of "
-            f"{self.robot.name}: give limit"
-            for item in self.constraints
-            # What nobody asked for by name is not missed.
-            if not item.applies(self.robot) and not any(item is usual for usual in KEPT)
+        found = remarks_on(
+            self.robot, self.follows, self.constraints, self.requirements, self.envelope
         )
-        limits = unit_remarks(self.robot, self.constraints)
-        bodies = [body for item in self.requirements for body in item.obstacles]
-        inside = inside_remarks(self.robot, self.follows, bodies)
-        return tuple(dict.fromkeys([*told, *limits, *vain, *inside]))
+        return tuple(dict.fromkeys(found))
 
     def certify(
         self,
@@ -399,39 +332,13 @@ class Problem:
     @cached_property
     def way_in_reaches(self) -> float:
         """How far the tool goes along the path, as a multiple of the arm's reach."""
-        way, before, samples = 0.0, -1.0, _WAY_SAMPLES
-        # Loops are many or few: the way through more and more points, of which none are the same.
-        while way > _WAY_GROWS * before and samples < _MOST_WAY_SAMPLES:
-            t = np.linspace(0.0, self.path.duration, samples)
-            places = self.path.samples(t).translation
-            before, way = way, float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-            samples = 2 * samples + 1
-        return way / self.robot.reach
+        return way_of(self.path) / self.robot.reach
 
     @property
     def pinned(self) -> tuple[bool, bool]:
         """Whether the tool has to be on the path itself at its start and at its end."""
         pins = [(self.start is not None, False), *(item.pins for item in self.constraints)]
         return any(start for start, _ in pins), any(end for _, end in pins)
-
-
-def envelope_of(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
-    """Return what constraints ask of single configurations, with the arm's own limits."""
-    requirements = [item.requirement(robot) for item in constraints]
-    return _with_own_limits(robot, requirements, _asked_envelope(robot, constraints))
-
-
-def _asked_envelope(robot: RobotModel, constraints: Sequence[Constraint]) -> Envelope:
-    free = Envelope.unbounded(robot.dof)
-    return reduce(and_, (item.envelope(robot) for item in constraints), free)
-
-
-def _with_own_limits(
-    robot: RobotModel, requirements: Sequence[Requirement], asked: Envelope
-) -> Envelope:
-    """Return an envelope with the arm's own limits where the certificate judges these."""
-    own = (Envelope.of_limits(item) for item in arm_limits(robot, requirements))
-    return reduce(and_, own, asked)
 
 
 # What help() shows of a field that is a descriptor.

@@ -13,7 +13,8 @@ from selfmotion.costs import cost_from_dict
 from selfmotion.follow import Follow
 from selfmotion.motion import NullMotion
 from selfmotion.path import Path
-from selfmotion.problem.problem import NO_OVERLAP, Problem
+from selfmotion.problem.defaults import NO_OVERLAP
+from selfmotion.problem.problem import Problem
 from selfmotion.robot import RobotModel, rebuild_robot
 from selfmotion.task import Damping, Relaxation, Task
 

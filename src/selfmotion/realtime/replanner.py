@@ -22,8 +22,9 @@ from selfmotion.realtime.arguments import (
 from selfmotion.realtime.clear import Surroundings
 from selfmotion.realtime.commands import Commands
 from selfmotion.realtime.horizon import Horizon
+from selfmotion.realtime.last_path import LastPath
 from selfmotion.realtime.limits import joint_limits, planned_limits
-from selfmotion.realtime.reference import Approach, Reference, resting
+from selfmotion.realtime.reference import Approach, Reference
 from selfmotion.realtime.segment import Flag, Segment
 from selfmotion.realtime.settings import AHEAD, SOON
 from selfmotion.robot import RobotModel
@@ -118,13 +119,7 @@ class Replanner:
         bodies = [pair for item in constraints for pair in item.envelope(robot).bodies]
         self._around = Surroundings(robot, bodies) if bodies else None
         self._horizon = Horizon(
-            follows,
-            costs,
-            planned_limits(limits),
-            null_motion,
-            self.horizon,
-            steps,
-            self._around,
+            follows, costs, planned_limits(limits), null_motion, self.horizon, steps, self._around
         )
         self._kinematics, self._layout = follows.only.chain.kinematics(), follows.layout
         self._cycles = round(self.period / self.cycle) + round(reserve / self.cycle)
@@ -211,7 +206,8 @@ class Replanner:
         if self._around is not None:
             self._around.move(obstacles)
         moving = self._measure(q, passed, reasons)
-        target = self._target(commands.time, path, passed, reasons)
+        waited = max(passed, self.cycle)
+        target = self._path.samples(path, commands.time + self._times, waited, reasons)
         error, flag, follows = np.zeros(2), Flag.STOPPING, False
         first = 0
         if target is not None:
@@ -228,8 +224,8 @@ class Replanner:
 
     def _begin(self, t: float, q: Array, qd: Array) -> None:
         self._commands.begin(t, q, qd)
-        self._path: Path | None = None
-        self._without_path = self._without_state = self._without_way = 0.0
+        self._path = LastPath(self._patience)
+        self._without_state = self._without_way = 0.0
         self._horizon.forget()
         self._follows = self._begun = True
 
@@ -255,25 +251,6 @@ class Replanner:
         off = self._commands.measure(q, passed)
         reasons += [off] if off else []
         return not off
-
-    def _target(
-        self, t: float, path: Path, passed: float, reasons: list[str]
-    ) -> PathSamples | None:
-        """Return the path at the times of the horizon and the cycles; the last one where it fails.
-
-        None after too long.
-        """
-        try:
-            target = resting(path, t + self._times)
-            self._path, self._without_path = path, 0.0
-            return target
-        # A path is the user's code: whatever it raises must not leave the arm without a command.
-        except Exception as error:
-            reasons.append(f"the path failed: {type(error).__name__}: {error}")
-        self._without_path += max(passed, self.cycle)
-        if self._path is None or self._without_path > self._patience:
-            return None
-        return resting(self._path, t + self._times)
 
     def _plan(self, passed: float, rate: Array, place: Array, reasons: list[str]) -> Flag:
         """Improve the plan; write ε of the cycles into the table."""

@@ -94,10 +94,7 @@ def retime(
         No pace keeps the limits, or the arm does not move at all.
     """
     _check_plan(plan)
-    if np.abs(plan.trajectory.extremes(1)[1]).max() <= STILL:
-        raise PlanError(
-            f"{plan.robot.name}: the arm rests all the time, which nothing makes faster"
-        )
+    _check_moves(plan)
     v, a = rate_limits(plan.problem, acceleration, velocity)
     wanted = [JointVelocityLimits(v), JointAccelerationLimits(a)]
     # The problem's own limits stay: the tighter of both is kept.
@@ -162,6 +159,13 @@ def _ends(plan: Plan) -> Ends:
 def _check_plan(plan: Plan) -> None:
     if not isinstance(plan, Plan):
         raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
+
+
+def _check_moves(plan: Plan) -> None:
+    if np.abs(plan.trajectory.extremes(1)[1]).max() <= STILL:
+        raise PlanError(
+            f"{plan.robot.name}: the arm rests all the time, which nothing makes faster"
+        )
 
 
 def rate_limits(

@@ -33,31 +33,7 @@ def build_robot(
     full = full_model(urdf)
     _check_lock(urdf, full, lock)
     chain = moving_joints(urdf, tools, reference) if chain is None else chain
-    for joint in chain:
-        if joint.kind in ("floating", "planar"):
-            raise RobotError(
-                f"{urdf.source}: joint '{joint.name}' is {joint.kind}; an arm's joints are "
-                f"revolute, continuous or prismatic"
-            )
-        if joint.mimics is not None and joint.name not in lock:
-            raise RobotError(
-                f"{urdf.source}: joint '{joint.name}' on the way to '{tools[0]}' mimics "
-                f"'{joint.mimics}'; choose a tool or a reference before it, or hold it with lock="
-            )
-    free = [joint.name for joint in chain if joint.name not in lock]
-    where = "the root" if reference is None else f"'{reference}'"
-    if not chain:
-        moved = [link for link in urdf.links if any(j.kind != "fixed" for j in urdf.chain(link))]
-        which = f"one that does, of: {', '.join(moved)}" if moved else "another arm"
-        relative = "" if reference is None else f" relative to '{reference}'"
-        raise RobotError(
-            f"{urdf.source}: no joint moves the tool '{tools[0]}'{relative}; choose {which}"
-        )
-    if not free:
-        raise RobotError(
-            f"{urdf.source}: no joint is left free between {where} and '{tools[0]}': lock holds "
-            f"all of {', '.join(joint.name for joint in chain)}"
-        )
+    free = _free_joints(urdf, chain, tools[0], lock, reference)
     locked = _locked_joints(urdf, full, free, lock)
     configuration, locked_ids = locked_configuration(full, locked)
     model = pin.buildReducedModel(full, locked_ids, configuration)
@@ -86,6 +62,42 @@ def build_robot(
         acceleration_limit=read_only(np.full(len(names), np.inf)),
         jerk_limit=read_only(np.full(len(names), np.inf)),
     )
+
+
+def _free_joints(
+    urdf: Urdf,
+    chain: Sequence[UrdfJoint],
+    tool: str,
+    lock: Mapping[str, float],
+    reference: str | None,
+) -> list[str]:
+    """Return the joints of a chain that are not held; RobotError where it is none of an arm."""
+    for joint in chain:
+        if joint.kind in ("floating", "planar"):
+            raise RobotError(
+                f"{urdf.source}: joint '{joint.name}' is {joint.kind}; an arm's joints are "
+                f"revolute, continuous or prismatic"
+            )
+        if joint.mimics is not None and joint.name not in lock:
+            raise RobotError(
+                f"{urdf.source}: joint '{joint.name}' on the way to '{tool}' mimics "
+                f"'{joint.mimics}'; choose a tool or a reference before it, or hold it with lock="
+            )
+    free = [joint.name for joint in chain if joint.name not in lock]
+    where = "the root" if reference is None else f"'{reference}'"
+    if not chain:
+        moved = [link for link in urdf.links if any(j.kind != "fixed" for j in urdf.chain(link))]
+        which = f"one that does, of: {', '.join(moved)}" if moved else "another arm"
+        relative = "" if reference is None else f" relative to '{reference}'"
+        raise RobotError(
+            f"{urdf.source}: no joint moves the tool '{tool}'{relative}; choose {which}"
+        )
+    if not free:
+        raise RobotError(
+            f"{urdf.source}: no joint is left free between {where} and '{tool}': lock holds "
+            f"all of {', '.join(joint.name for joint in chain)}"
+        )
+    return free
 
 
 def moving_joints(urdf: Urdf, tools: Sequence[str], reference: str | None) -> list[UrdfJoint]:

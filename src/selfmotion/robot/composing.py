@@ -56,13 +56,7 @@ def composed(
         A part that is placed does not exist, a link that carries one does not, or they carry each
         other.
     """
-    for what, given in (("base", base), ("on", on)):
-        for name in given:
-            if name not in parts:
-                raise RobotError(
-                    f"{what} names part '{name}', which there is not{nearest(name, parts)}; parts: "
-                    f"{', '.join(parts)}"
-                )
+    _check_placed(parts, base=base, on=on)
     cell = ElementTree.Element("robot", name="+".join(parts))
     ElementTree.SubElement(cell, "link", name=WORLD_LINK)
     folders = dict.fromkeys(folder for urdf in parts.values() for folder in urdf.package_dirs)
@@ -88,6 +82,16 @@ def composed(
     return found.with_continuous(
         f"{name}/{joint}" for name, urdf in parts.items() for joint in urdf.continuous()
     )
+
+
+def _check_placed(parts: Mapping[str, Urdf], **placed_parts: Mapping[str, object]) -> None:
+    for what, given in placed_parts.items():
+        for name in given:
+            if name not in parts:
+                raise RobotError(
+                    f"{what} names part '{name}', which there is not{nearest(name, parts)}; parts: "
+                    f"{', '.join(parts)}"
+                )
 
 
 def _settle_meshes(root: ElementTree.Element, own: Iterable[str], all_parts: Iterable[str]) -> None:

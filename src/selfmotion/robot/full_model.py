@@ -14,6 +14,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from typing import Any
 
+import coal
 import pinocchio as pin
 
 from selfmotion.basics import RobotError
@@ -22,6 +23,8 @@ from selfmotion.robot.urdf import Urdf
 
 # The terminal's file descriptor belongs to the process: one thread at a time may take it.
 _terminal = threading.Lock()
+# Meshes that are only drawn are read once, as long as their files are those that were read.
+_drawn = coal.CachedMeshLoader()
 
 
 def full_model(urdf: Urdf) -> Any:
@@ -54,11 +57,16 @@ def link_geometry(urdf: Urdf, model: Any, kind: pin.GeometryType) -> Any:
     RobotError
         A mesh file is missing or cannot be read.
     """
-    tag = "visual" if kind == pin.GeometryType.VISUAL else "collision"
+    drawn = kind == pin.GeometryType.VISUAL
+    tag, loader = ("visual", _drawn) if drawn else ("collision", coal.MeshLoader())
     with _complaints() as said:
         try:
             geometry = pin.buildGeomFromUrdfString(
-                model, _inner_text(urdf), kind, package_dirs=list(urdf.package_dirs)
+                model,
+                _inner_text(urdf),
+                kind,
+                package_dirs=list(urdf.package_dirs),
+                mesh_loader=loader,
             )
         except (ValueError, RuntimeError) as error:
             bad = bad_meshes(urdf, tag)

@@ -1,7 +1,7 @@
 """The arm as a chain with one coordinate per joint, on Pinocchio's model of it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -9,23 +9,14 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import (
-    Array,
-    Flags,
-    RobotError,
-    as_number,
-    nearest,
-    plain_numbers,
-    random_numbers,
-    shown,
-)
+from selfmotion.basics import Array, Flags, RobotError, plain_numbers, random_numbers, shown
 from selfmotion.robot.chain import WORLD, Chain
-from selfmotion.robot.full_model import full_model, link_geometry
-from selfmotion.robot.held import locked_configuration
+from selfmotion.robot.freedom import can_follow, most_dexterous, redundancy
+from selfmotion.robot.geometry import readable_visuals, reduced_geometry
 from selfmotion.robot.inverse import solved
-from selfmotion.robot.mesh_files import bad_meshes, without_meshes
 from selfmotion.robot.tree_arrays import TreeArrays, tree_arrays
 from selfmotion.robot.urdf import Urdf
+from selfmotion.robot.weights import joint_weights, part_weights
 from selfmotion.task import Task
 
 
@@ -140,14 +131,9 @@ class RobotModel:
 
     def reach_of(self, chain: Chain) -> float:
         """Return how far from its base the tip of a chain can be at most [m]."""
-        arrays = chain.arrays
-        links = np.vstack([arrays.tree.positions, arrays.tip_position])
-        slides = [
-            float(max(abs(low), abs(high)))
-            for name, low, high in zip(self.joint_names, self.lower, self.upper, strict=True)
-            if self.is_prismatic(name)
-        ]
-        return float(np.linalg.norm(links, axis=1).sum()) + sum(slides)
+        slides = ~self.is_revolute
+        farthest = np.maximum(np.abs(self.lower), np.abs(self.upper))
+        return float(chain.arrays.link_lengths.sum() + farthest[slides].sum())
 
     @property
     def joint_weights(self) -> Array:
@@ -157,12 +143,7 @@ class RobotModel:
         by a metre at the arm's mean lever: the mean over revolute joints of the lengths of all
         links beyond [rad/m].
         """
-        arrays = self.chain.arrays
-        links = np.linalg.norm([*arrays.tree.positions[1:], arrays.tip_position], axis=1)
-        beyond = np.cumsum(links[::-1])[::-1]
-        levers = beyond[arrays.tree.is_revolute]
-        mean = float(levers.mean()) if levers.size and levers.max() > 0.0 else 1.0
-        return np.where(self.is_revolute, 1.0, 1.0 / mean)
+        return joint_weights(self)
 
     def part_weights(self, weights: Mapping[str, float]) -> Array:
         """Return `joint_weights`, those of some parts or joints times a number, (n,).
@@ -174,18 +155,7 @@ class RobotModel:
         RobotError
             No joint belongs to a part of that name, nor has the name.
         """
-        if not isinstance(weights, Mapping):
-            raise RobotError(f"weights are {shown(weights)}, expected a dict of parts or joints")
-        found = self.joint_weights.copy()
-        for name, weight in weights.items():
-            mine = np.array([j == name or j.startswith(f"{name}/") for j in self.joint_names])
-            if not mine.any():
-                raise RobotError(
-                    f"{self.name}: no part or joint '{name}' to weigh"
-                    f"{nearest(name, self.joint_names)}; joints: {', '.join(self.joint_names)}"
-                )
-            found[mine] *= as_number(weight, f"weight of '{name}'", least=0.0, error=RobotError)
-        return found
+        return part_weights(self, weights)
 
     def configuration(self, q: npt.ArrayLike) -> Array:
         """Return `q` as a float64 vector of n finite numbers.
@@ -229,9 +199,7 @@ class RobotModel:
 
     def redundancy(self, task: Task | str) -> int:
         """Return n - rank J of the task at generic configurations (0: no self-motion)."""
-        task = Task.of(task)
-        jacobians = [self.task_jacobian(q, task) for q in self.generic_configurations()]
-        return self.dof - int(max(np.linalg.matrix_rank(jacobians, tol=_RANK_TOLERANCE)))
+        return redundancy(self, Task.of(task))
 
     def can_follow(self, task: Task | str) -> bool:
         """Return whether the arm can move the tool in every row that the task prescribes.
@@ -239,12 +207,7 @@ class RobotModel:
         ``planar_pose`` also wants an arm that moves in the x-y plane: elsewhere there is no angle
         about z that the rate ωz would be the derivative of.
         """
-        task = Task.of(task)
-        if task is Task.PLANAR_POSE:
-            jacobians = np.array([self.jacobian(q) for q in self.generic_configurations()])
-            if np.abs(jacobians[:, 2:5]).max() > _RANK_TOLERANCE:
-                return False
-        return self.dof - self.redundancy(task) == task.dimension
+        return can_follow(self, Task.of(task))
 
     def generic_configurations(self) -> Array:
         """Return a few configurations within the limits, at none of which anything is special."""
@@ -264,13 +227,7 @@ class RobotModel:
         Of 1000 samples (fixed seed) in the middle half of the limits, the one with the largest
         manipulability √det(JJᵀ) of the task: a start for motions that may begin anywhere.
         """
-        task = Task.of(task)
-        lower, upper = self.finite_limits()
-        share = np.random.default_rng(0).uniform(0.25, 0.75, (1000, self.dof))
-        samples = lower + (upper - lower) * share
-        jacobians = np.array([self.task_jacobian(q, task) for q in samples])
-        determinants = np.linalg.det(jacobians @ jacobians.transpose(0, 2, 1))
-        return np.array(samples[np.argmax(determinants)])
+        return most_dexterous(self, Task.of(task))
 
     def inverse_kinematics(
         self,
@@ -356,7 +313,7 @@ class RobotModel:
         RobotError
             A mesh file is missing or cannot be read.
         """
-        return self._reduced(self.urdf, kind)
+        return reduced_geometry(self.urdf, self.locked, kind)
 
     def visuals(self) -> tuple[Any, tuple[str, ...]]:
         """Return the visual geometry as far as its meshes can be read, and what is missing.
@@ -368,26 +325,4 @@ class RobotModel:
         missing : tuple of str
             Link, file and reason of each mesh that is left out.
         """
-        try:
-            return self.geometry(pin.GeometryType.VISUAL), ()
-        except RobotError:
-            bad = bad_meshes(self.urdf, "visual")
-            if not bad:
-                raise
-        text = without_meshes(self.urdf.text, "visual", {item.file for item in bad})
-        rest = replace(self.urdf, text=text)
-        return self._reduced(rest, pin.GeometryType.VISUAL), tuple(map(str, bad))
-
-    def _reduced(self, urdf: Urdf, kind: pin.GeometryType) -> Any:
-        full = full_model(urdf)
-        geometry = link_geometry(urdf, full, kind)
-        reference, locked_ids = locked_configuration(full, self.locked)
-        _, reduced = pin.buildReducedModel(full, [geometry], locked_ids, reference)
-        return reduced[0]
-
-
-# Singular values below this [m, rad] are zero.
-_RANK_TOLERANCE = 1e-6
-
-# What an inverse-kinematics solution may miss by, far below what a certificate accepts.
-_IK_TOLERANCE = 1e-10
+        return readable_visuals(self.urdf, self.locked)

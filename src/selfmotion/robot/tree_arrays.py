@@ -49,6 +49,11 @@ class ChainArrays(NamedTuple):
     tip_rotation: Array
     tip_position: Array
 
+    @property
+    def link_lengths(self) -> Array:
+        """How far each joint is from the one before, and the tip from the last, (c + 1,) [m]."""
+        return np.asarray(np.linalg.norm([*self.tree.positions, self.tip_position], axis=1))
+
 
 def tree_arrays(model: Any) -> TreeArrays:
     """Return what compiled kinematics need of all joints of a model, placed in the world."""

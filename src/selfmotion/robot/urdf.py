@@ -5,7 +5,6 @@ Here such files are refused with a message that names the joint or link, and con
 become single-angle joints without limits; mesh addresses become absolute.
 """
 
-import contextlib
 import hashlib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Mapping
@@ -16,11 +15,14 @@ from typing import Any
 from selfmotion.basics import RobotError, nearest
 from selfmotion.robot.joint_elements import check_joint_elements
 from selfmotion.robot.link_elements import check_link_elements
+from selfmotion.robot.urdf_text import (
+    check_expanded,
+    make_meshes_absolute,
+    make_single_angles,
+    parsed_by_yourdfpy,
+    root_of,
+)
 
-# A limit that no motion reaches; Pinocchio wants finite numbers for a revolute joint.
-_UNLIMITED = 1e6
-# Elements in each other; URDFs have six.
-_DEEPEST = 100
 # Fixed joints that are ours: where the base stands, how the tool is held, and before the name of a
 # body that the arm carries.
 BASE_JOINT, TOOL_JOINT, BODY_JOINT = "base_placement", "tool_offset", "carried_body/"
@@ -212,82 +214,22 @@ def parse_urdf(
     text: str, *, source: str, package_dirs: tuple[str, ...], mesh_folder: Path | None = None
 ) -> Urdf:
     """Validate URDF text; see `read_urdf`. Relative mesh names are taken from `mesh_folder`."""
-    root = _root(text, source)
-    _check_expanded(root, source)
+    root = root_of(text, source)
+    check_expanded(root, source)
     check_link_elements(root, source)
     check_joint_elements(root, source)
-    parsed = _parse_with_yourdfpy(ElementTree.tostring(root, encoding="unicode"), source)
+    parsed = parsed_by_yourdfpy(ElementTree.tostring(root, encoding="unicode"), source)
     if [joint.name for joint in parsed.joints] != [j.get("name") for j in root.findall("joint")]:
         raise RobotError(f"{source}: is XML that parsers read differently; write it plainly")
     joints = {joint.name: joint for joint in map(_joint, parsed.joints)}
     _check_tree(parsed, source)
     _check_mimics(joints, source)
-    _single_angle(root)
+    make_single_angles(root)
     if mesh_folder is not None:
-        _absolute_meshes(root, mesh_folder)
+        make_meshes_absolute(root, mesh_folder)
     links = tuple(link.name for link in parsed.links)
     prepared = ElementTree.tostring(root, encoding="unicode")
     return Urdf(source, prepared, package_dirs, joints, links)
-
-
-def _root(text: str, source: str) -> ElementTree.Element:
-    """Return the ``<robot>``."""
-    if not text.strip():
-        raise RobotError(f"{source}: is empty, expected a URDF")
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        if "<xacro:" in text:
-            raise RobotError(f"{source}: is a xacro file; give it the suffix .xacro") from error
-        if text.startswith("version https://git-lfs"):
-            raise RobotError(
-                f"{source}: is a pointer of Git LFS, not the file itself; run git lfs pull"
-            ) from error
-        raise RobotError(f"{source}: is not well-formed XML: {error}") from error
-    level = [root]
-    for _ in range(_DEEPEST):
-        level = [child for element in level for child in element]
-    if level:
-        raise RobotError(f"{source}: more than {_DEEPEST} elements lie in each other")
-    if any("xacro" in element.tag for element in root.iter() if isinstance(element.tag, str)):
-        raise RobotError(f"{source}: is a xacro file; give it the suffix .xacro")
-    if root.tag != "robot":
-        raise RobotError(f"{source}: the root element is <{root.tag}>, expected <robot>")
-    if not root.get("name"):
-        raise RobotError(f'{source}: the <robot> has no name; add name="…"')
-    if root.find("link") is None:
-        raise RobotError(f"{source}: has no <link>, expected those of an arm")
-    return root
-
-
-def _check_expanded(root: ElementTree.Element, source: str) -> None:
-    """Refuse what xacro should have replaced."""
-    for part in (root, *root.findall("link"), *root.findall("joint")):
-        for element in [root] if part is root else part.iter():
-            for key, value in element.items():
-                if "${" in value or "$(" in value:
-                    owner = f"<{part.tag}> '{part.get('name')}': " if part is not element else ""
-                    raise RobotError(
-                        f'{source}: {owner}<{element.tag}> has {key}="{value}": xacro is not '
-                        f"expanded; give the file the suffix .xacro"
-                    )
-
-
-def _parse_with_yourdfpy(text: str, source: str) -> Any:
-    import io
-    import logging
-
-    import yourdfpy
-
-    logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):
-            return yourdfpy.URDF.load(
-                io.BytesIO(text.encode()), load_meshes=False, build_scene_graph=False
-            ).robot
-    # It raises what its parsers do, of which there are several.
-    except Exception as error:
-        raise RobotError(f"{source}: is not a valid URDF: {error}") from error
 
 
 def _joint(joint: Any) -> UrdfJoint:
@@ -339,21 +281,3 @@ def _check_mimics(joints: dict[str, UrdfJoint], source: str) -> None:
                 raise RobotError(f"{source}: joint '{joint.name}' mimics '{name}', {what}{hint}")
             passed.add(name)
             name = joints[name].mimics
-
-
-def _single_angle(root: ElementTree.Element) -> None:
-    for joint in root.findall("joint"):
-        if joint.get("type") == "continuous":
-            joint.set("type", "revolute")
-            limit = joint.find("limit")
-            if limit is None:
-                limit = ElementTree.SubElement(joint, "limit", effort="0", velocity="0")
-            limit.set("lower", str(-_UNLIMITED))
-            limit.set("upper", str(_UNLIMITED))
-
-
-def _absolute_meshes(root: ElementTree.Element, folder: Path) -> None:
-    for mesh in root.iter("mesh"):
-        name = mesh.get("filename", "")
-        if "://" not in name and not Path(name).is_absolute():
-            mesh.set("filename", str(folder / name))

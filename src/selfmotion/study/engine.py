@@ -48,7 +48,7 @@ class Scale:
     @classmethod
     def reduced(cls) -> "Scale":
         """Return what the tests run: the same claims on less work."""
-        return cls("reduced", 8, (3, 6, 12), (1.0,), (1e-2, 1e-4, 1e-9), False)
+        return cls("reduced", 6, (3, 5, 8), (1.0,), (1e-2, 1e-4, 1e-9), False)
 
 
 def bind(problem: Problem, steps: int = 64) -> Objective:

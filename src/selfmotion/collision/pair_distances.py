@@ -1,0 +1,135 @@
+"""Distances of pairs of bodies: of their hulls first, of the meshes where those do not decide."""
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from selfmotion.basics import Array
+from selfmotion.collision import levers
+from selfmotion.collision.bodies import Body
+from selfmotion.collision.distances import HullDistances, Ints
+from selfmotion.collision.meshes import MeshDistances
+from selfmotion.robot import RobotModel
+
+# Joints that differ by less than this [rad or m] place bodies alike, to rounding of distances.
+_ALIKE = 1e-9
+
+
+class PairDistances:
+    """Distances of pairs of bodies; the meshes are visited for those alone that may decide.
+
+    Parameters
+    ----------
+    robot : RobotModel
+    bodies : sequence of Body
+    pairs : (P, 2)
+        Which bodies.
+
+    Attributes
+    ----------
+    hulls : HullDistances
+    meshes : MeshDistances
+    """
+
+    def __init__(self, robot: RobotModel, bodies: Sequence[Body], pairs: Ints) -> None:
+        self.hulls = HullDistances(robot, bodies, pairs)
+        self.meshes = MeshDistances(
+            [body.solid for body in bodies], [body.name for body in bodies], pairs
+        )
+        self._robot, self._bodies, self._pairs = robot, bodies, pairs
+
+    def closest(self, q: Array, bounds: Array, below: float = math.inf) -> tuple[float, int]:
+        """Return the smallest distance at q (n,) and its pair, with lower bounds (P,) known.
+
+        `below` and no pair (-1) where none is smaller.
+        """
+        places = self.hulls.place(q)
+        near = np.flatnonzero(bounds < below).tolist()
+        found = sorted((self.hulls.distance(pair, bounds[pair]), pair) for pair in near)
+        best = below, -1
+        for hulls, pair in found:
+            if hulls >= best[0]:
+                break
+            value = self.meshes.refine(places, pair, hulls, best[0])
+            if value < best[0]:
+                best = value, pair
+        return best
+
+    def distances(self, q: Array, within: Array, exact_below: Array) -> Array:
+        """Return the distances at samples (K, n), (K, P); see `CollisionModel.distances`."""
+        values = self.hulls.lower_bounds(q, float(within.max(initial=-math.inf)))
+        for row in range(len(q)):
+            near = np.flatnonzero(values[row] < within[row]).tolist()
+            places = self.hulls.place(q[row]) if near else None
+            for pair in near:
+                hulls = self.hulls.distance(pair, values[row, pair])
+                far = hulls >= exact_below[row, pair]
+                values[row, pair] = hulls if far else self.meshes.refine(places, pair, hulls)
+        return values
+
+    def closer(self, q: Array, bounds: Array, margin: float) -> bool:
+        """Whether a pair is closer than the margin at q (n,), with lower bounds (P,) known."""
+        places = self.hulls.place(q)
+        met, left = self._by_hulls(bounds, margin)
+        return met or any(
+            self.meshes.refine(places, pair, hulls, margin) < margin for hulls, pair in left
+        )
+
+    def closer_samples(self, q: Array, margin: float) -> npt.NDArray[np.bool_]:
+        """Return at which samples (K, n) a pair is closer than the margin, (K,)."""
+        bounds = self.hulls.lower_bounds(q, margin)
+        found = np.zeros(len(q), dtype=bool)
+        undecided: dict[int, list[tuple[int, float]]] = {}
+        for row in np.flatnonzero((bounds < margin).any(axis=1)).tolist():
+            self.hulls.place(q[row])
+            met, left = self._by_hulls(bounds[row], margin)
+            found[row] = met
+            for hulls, pair in left:
+                undecided.setdefault(pair, []).append((row, hulls))
+        # What is deepest inside decides first, as a rule.
+        for pair, near in sorted(undecided.items(), key=lambda item: min(h for _, h in item[1])):
+            looked = [(row, hulls) for row, hulls in near if not found[row]]
+            rows = np.array([row for row, _ in looked], dtype=np.int64)
+            found[rows] = self._by_meshes(pair, q[rows], [hulls for _, hulls in looked], margin)
+        return found
+
+    def _by_hulls(self, bounds: Array, margin: float) -> tuple[bool, list[tuple[float, int]]]:
+        """Return whether a pair is closer than the margin, as placed; else what hulls leave open.
+
+        The distance of the hulls, and the pair; the deepest first.
+        """
+        near = np.flatnonzero(bounds < margin)
+        near = near[np.argsort(bounds[near])]
+        left = []
+        for pair, bound in zip(near.tolist(), bounds[near].tolist(), strict=True):
+            hulls = self.hulls.distance(pair, bound)
+            if hulls < margin:
+                if self.meshes.hulls_decide[pair]:
+                    return True, []
+                left.append((hulls, pair))
+        return False, sorted(left)
+
+    def _by_meshes(
+        self, pair: int, q: Array, hulls: Sequence[float], margin: float
+    ) -> npt.NDArray[np.bool_]:
+        """Return where a pair whose hulls are closer than the margin is so itself, (K,).
+
+        Configurations (K, n) in which the bodies are alike to each other are looked at once: along
+        a self-motion it is often the same joints that rest.
+        """
+        joints = np.round(q[:, self._moving[pair]] / _ALIKE)
+        _, once, which = np.unique(joints, axis=0, return_index=True, return_inverse=True)
+        closer = [
+            self.meshes.refine(self.hulls.place(q[row]), pair, hulls[row], margin) < margin
+            for row in once.tolist()
+        ]
+        return np.array(closer, dtype=bool)[which.reshape(-1)]
+
+    @cached_property
+    def _moving(self) -> npt.NDArray[np.bool_]:
+        """Which joints move one body of each pair and not the other, (P, n)."""
+        first, second = levers.moved_by(self._bodies, self._robot)[self._pairs.T]
+        return np.asarray(first != second)

@@ -1,0 +1,36 @@
+"""What a unit of each joint counts where joints of both kinds are added up."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from selfmotion.basics import Array, RobotError, as_number, nearest, shown
+
+if TYPE_CHECKING:
+    from selfmotion.robot.model import RobotModel
+
+
+def joint_weights(robot: "RobotModel") -> Array:
+    """Return what a unit of each joint counts, (n,); see `RobotModel.joint_weights`."""
+    arrays = robot.chain.arrays
+    beyond = np.cumsum(arrays.link_lengths[:0:-1])[::-1]
+    levers = beyond[arrays.tree.is_revolute]
+    mean = float(levers.mean()) if levers.size and levers.max() > 0.0 else 1.0
+    return np.where(robot.is_revolute, 1.0, 1.0 / mean)
+
+
+def part_weights(robot: "RobotModel", weights: Mapping[str, float]) -> Array:
+    """Return these with some parts' times a number, (n,); see `RobotModel.part_weights`."""
+    if not isinstance(weights, Mapping):
+        raise RobotError(f"weights are {shown(weights)}, expected a dict of parts or joints")
+    found = robot.joint_weights.copy()
+    for name, weight in weights.items():
+        mine = np.array([j == name or j.startswith(f"{name}/") for j in robot.joint_names])
+        if not mine.any():
+            raise RobotError(
+                f"{robot.name}: no part or joint '{name}' to weigh"
+                f"{nearest(name, robot.joint_names)}; joints: {', '.join(robot.joint_names)}"
+            )
+        found[mine] *= as_number(weight, f"weight of '{name}'", least=0.0, error=RobotError)
+    return found
