@@ -109,8 +109,8 @@ def test_moves_keep_bands_and_what_depends_on_the_pace() -> None:
     assert move.motion.duration > sm.move(panda, HOME, last).require().motion.duration
 
 
-# A straight move is this much longer than limits of speed and acceleration ask, by the last share of
-# limits that is left; besides it takes what accelerations need to build up three times, where
+# A straight move is this much longer than limits of speed and acceleration ask, by the last share
+# of limits that is left; besides it takes what accelerations need to build up three times, where
 # nobody limits the jerk in this time [s].
 HURRIED, SOFT = 1.01, 0.02
 
