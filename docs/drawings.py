@@ -2,6 +2,8 @@
 
 import io
 import re
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import matplotlib
@@ -9,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import selfmotion as sm
+from selfmotion.batch import grid_items, plan_items
 from selfmotion.study.engine import optimum
 from selfmotion.study.published import published_null_motion
 
@@ -17,6 +20,7 @@ if TYPE_CHECKING:
 
 _STYLE = {"svg.fonttype": "none", "svg.hashsalt": "selfmotion", "font.size": 9.0}
 _SIZE = (6.4, 3.0)
+_PLACES = Path(__file__).parent / "pages" / "howto" / "places.md"
 
 
 def draw_all() -> dict[str, str]:
@@ -27,6 +31,7 @@ def draw_all() -> dict[str, str]:
         "speeds": speeds(plan),
         "convergence": convergence(),
         "path_error": path_error(plan),
+        "places": places(),
     }
 
 
@@ -94,6 +99,21 @@ def path_error(plan: sm.Plan) -> str:
     axes.set(xlabel="t [s]", ylabel="distance from the path [m]")
     axes.legend(title="samples", frameon=False)
     return _svg(figure)
+
+
+def places() -> str:
+    """Return the map of what the places of the page about them cost."""
+    block = re.search(r'```toml title="places.toml"\n(.*?)```', _PLACES.read_text(), re.DOTALL)
+    if block is None:
+        raise ValueError(f"{_PLACES}: has no block 'places.toml'")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "places.toml").write_text(block.group(1))
+        plan_items(grid_items(folder / "places.toml"), out=folder, workers=1)
+        shown = re.search(r"<svg.*?</svg>", (folder / "index.html").read_text(), re.DOTALL)
+    if shown is None:
+        raise ValueError(f"{_PLACES}: its grid has no map")
+    return shown.group()
 
 
 def _axes() -> tuple[Figure, "Axes"]:

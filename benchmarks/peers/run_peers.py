@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
 import sys
@@ -28,6 +29,7 @@ PEERS = {
 
 def main() -> int:
     """Run ours and every peer, one after the other, on one machine."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     OUT.mkdir(parents=True, exist_ok=True)
     robot = sm.load_robot("panda", tool="panda_hand")
     path = sm.Waypoints.from_csv(HERE.parent / "data" / "panda__1cube" / "path.csv")

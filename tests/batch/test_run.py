@@ -20,8 +20,9 @@ import pytest
 import selfmotion as sm
 from selfmotion.batch import BatchProgress, Item, grid_items, plan_items, run
 from selfmotion.cli.runs import is_answered
+from selfmotion.formats import write_combination
 from support.arms import PANDA_HOME, robot_named
-from support.places import TESTS
+from support.places import ROOT, TESTS
 from support.shell import complaint, invoke
 
 GRID = """
@@ -300,10 +301,67 @@ def test_tables_are_ranked_and_linked(grid: Path, tmp_path: Path) -> None:
     assert rows[0]["replay"] in (out / "index.html").read_text()
 
 
+def test_the_best_combination_is_a_problem_file(reference: sm.Batch, tmp_path: Path) -> None:
+    (file,) = reference.best_files
+    (item,) = grid_items(file)
+    assert reference.best is not None
+    assert item.key == reference.best.key
+    assert item.key not in {row.key for row in reference.rows if row != reference.best}
+
+
+PLACES = """
+task = "pointing"
+robot = { name = "panda" }
+path = { kind = "file", file = "seam.csv", feed = 0.05 }
+joint_limits = "limits.yaml"
+outputs = ["motion.csv"]
+[workpiece]
+frame = { position = [0.5, 0.0, 0.3] }
+mesh = "part/frame.stl"
+[grid]
+"workpiece.frame.position.0" = [0.4, 0.5]
+"""
+
+
+def test_a_combination_is_the_same_problem_in_any_folder(tmp_path: Path) -> None:
+    (tmp_path / "part").mkdir()
+    (tmp_path / "part" / "frame.stl").write_bytes((ROOT / "examples" / "frame.stl").read_bytes())
+    (tmp_path / "seam.csv").write_bytes((ROOT / "examples" / "seam.csv").read_bytes())
+    limits = (
+        "joint_limits:\n  panda_joint1:\n    has_velocity_limits: true\n    max_velocity: 1.0\n"
+    )
+    (tmp_path / "limits.yaml").write_text(limits)
+    (tmp_path / "cell.toml").write_text(PLACES)
+    made = grid_items(tmp_path / "cell.toml")
+    for folder in (tmp_path, tmp_path / "deep" / "er"):
+        for item in made:
+            target = folder / f"{item.name}.toml"
+            write_combination(tmp_path / "cell.toml", item.settings, target)
+            (again,) = grid_items(target)
+            assert again.key == item.key
+            assert [file.resolve() for file in again.make().outputs] == [tmp_path / "motion.csv"]
+    assert made[0].key != made[1].key
+
+
+def test_refusals_say_why_in_a_few_words(reference: sm.Batch, grid: Path, tmp_path: Path) -> None:
+    assert {row.reason for row in reference.rows} == {""}
+    lines = '[grid]\n"path.by" = [[-0.4, 0, 0], [-9, 0, 0]]\n'
+    grid.write_text(GRID.split("[grid]")[0] + lines)
+    near, away = plan_items(grid_items(grid), InPlace(), out=tmp_path / "out").rows
+    assert (near.verified, near.reason) == (True, "")
+    assert near.margin is not None
+    assert near.margin > 0.0
+    assert not away.verified
+    assert away.reason in ("out of reach", "no way through", "ends on the way")
+
+
 def test_the_shell_says_what_went_wrong(grid: Path, tmp_path: Path) -> None:
     assert "no scheduler answers" in complaint("batch", grid, "--dask", "no address at all")
     grid.write_text(GRID.replace("[0, 1]", "1"))
     assert "grid.costs.1.mu: is 1, expected a list of values" in complaint("batch", grid)
+    grid.write_text(GRID.replace('"path.duration"', '"robot.base.position.0"'))
+    told = complaint("batch", grid)
+    assert "sets one number of 'position', which is not there: give all of them" in told
     grid.write_text(GRID)
     (tmp_path / "b").mkdir()
     other = tmp_path / "b" / "cell.toml"

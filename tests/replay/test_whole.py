@@ -1,5 +1,7 @@
 """Pages of programs, parts and moves: every step can be jumped to, and seams have colours."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -38,3 +40,19 @@ def test_a_program_becomes_a_page_and_what_is_missing_none(program) -> None:
     missing = sm.Move(program.robot, (), None, "no way")
     with pytest.raises(sm.PlanError, match="no way"):
         replay_html(missing)
+
+
+def test_what_happens_is_on_the_path_in_the_order_of_time() -> None:
+    program = two_seams()
+    first = program.steps[0]
+    at = 0.4 * first.duration
+    marked = replace(first, events=(("gas off", 2.0 * at), ("gas on", at)))
+    told = Whole.of(replace(program, steps=(marked, *program.steps[1:])))
+    assert Whole.of(program).happenings() == []
+    assert [(each["t"], each["name"]) for each in told.happenings()] == [
+        (pytest.approx(at), f"{first.name}: gas on"),
+        (pytest.approx(2.0 * at), f"{first.name}: gas off"),
+    ]
+    assert [color for *_, color in told.seams()] == [
+        step["color"] for step in told.steps() if step["color"]
+    ]

@@ -7,73 +7,11 @@ import io
 import json
 import urllib.parse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from selfmotion.basics import FileFormatError, write_bytes, write_text
-from selfmotion.result import Plan, load_plan
-
-
-@dataclass(frozen=True)
-class Row:
-    """What became of one problem.
-
-    Attributes
-    ----------
-    name : str
-    key : str
-        Digest of the problem and its options.
-    settings : dict
-        Its values of the grid.
-    file : Path
-        The plan's archive; not there where `error` says why.
-    error : str
-        "" where there is a plan.
-    fault : bool
-        Whether the error is a fault of a program rather than of the problem; such are tried again.
-    verified, verdict, cost, initial_cost, duration, evaluations
-        Of the plan.
-    aim : float
-        What it is ranked by, the smaller the better: the duration of what was to be the fastest
-        motion, else the cost.
-    ends : float or None
-        When the motion ends where that is before the path does [s].
-    seconds : float
-        Its worker's time.
-    """
-
-    name: str
-    key: str
-    file: Path
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    error: str = ""
-    fault: bool = False
-    verified: bool = False
-    verdict: str = ""
-    cost: float = float("inf")
-    initial_cost: float = float("inf")
-    duration: float = 0.0
-    evaluations: int = 0
-    aim: float = float("inf")
-    ends: float | None = None
-    seconds: float = 0.0
-
-    @property
-    def rank(self) -> tuple[bool, bool, float]:
-        """Its place among others, the smaller the better: what has a plan, and a verified one."""
-        return bool(self.error), not self.verified, self.aim
-
-    @property
-    def outcome(self) -> str:
-        """Its cost; of what is only a part of the path when it ends."""
-        return f"{self.cost:.6g}" if self.ends is None else f"ends at t = {self.ends:.4g} s"
-
-    def plan(self) -> Plan:
-        """Read the plan; FileFormatError where there is none."""
-        if self.error:
-            raise FileFormatError(f"{self.name}: has no plan: {self.error}")
-        return load_plan(self.file)
+from selfmotion.basics import write_bytes, write_text
+from selfmotion.batch.maps import labels, maps
+from selfmotion.batch.row import Row
 
 
 class Folder:
@@ -118,25 +56,28 @@ class Folder:
         planned = [row for row in ranked if not row.error]
         links = {row.name: self._replay(row, k < replays) for k, row in enumerate(planned)}
         keys = list(dict.fromkeys(key for row in rows for key in row.settings))
-        header = ["rank", "name", *keys, "verified", "cost", "without self-motion", "duration"]
-        header += ["seconds", "plan", "replay", "verdict"]
+        said = ["verified", "reason", "cost", "without self-motion", "margin", "clearance"]
+        said += ["duration", "seconds", "plan", "replay", "verdict"]
         lines = [self._cells(k, row, keys, links) for k, row in enumerate(ranked, 1)]
-        write_text(self.path / "table.csv", _csv([header, *lines]))
-        write_text(self.path / "index.html", _page(header, lines))
+        write_text(self.path / "table.csv", _csv([["rank", "name", *keys, *said], *lines]))
+        page = _page(["rank", "name", *labels(keys), *said], lines, maps(rows, links))
+        write_text(self.path / "index.html", page)
 
     def _cells(
         self, rank: int, row: Row, keys: Sequence[str], links: Mapping[str, str]
     ) -> list[str]:
-        numbers = ["", "", ""]
+        numbers = ["", "", "", "", ""]
         if not row.error:
             costs = [f"{v:.8g}" for v in (row.cost, row.initial_cost)]
-            numbers = [*(costs if row.ends is None else [row.outcome, ""]), f"{row.duration:.8g}"]
+            margins = ["" if v is None else f"{v:.4g}" for v in (row.margin, row.clearance)]
+            costs = costs if row.ends is None else [row.outcome, ""]
+            numbers = [*costs, *margins, f"{row.duration:.8g}"]
         settings = [json.dumps(row.settings[key]) if key in row.settings else "" for key in keys]
         file = "" if row.error else row.file.relative_to(self.path).as_posix()
         state = "no plan" if row.error else "yes" if row.verified else "no"
         timing = f"{row.seconds:.3f}"
         said = row.error or row.verdict
-        start = [str(rank), row.name, *settings, state, *numbers, timing]
+        start = [str(rank), row.name, *settings, state, row.reason, *numbers, timing]
         return [*start, file, links.get(row.name, ""), said]
 
     def _replay(self, row: Row, wanted: bool) -> str:
@@ -164,14 +105,16 @@ _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>selfmotion batch</title>
 <meta name="viewport" content="width=device-width,initial-scale=1">
 <style>body{{font:14px/1.4 system-ui,sans-serif;margin:1.5em}}table{{border-collapse:collapse}}
-th,td{{padding:.25em .7em;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}}
+th,td{{padding:.25em .6em;border-bottom:1px solid #ddd;text-align:left;vertical-align:top}}
 td{{overflow-wrap:break-word}}td.whole{{white-space:nowrap}}td:last-child{{min-width:16em}}
 @media(max-width:1000px){{td{{overflow-wrap:anywhere}}td.whole{{white-space:normal}}
 body{{margin:1em}}thead{{display:none}}tr{{display:block;padding:.6em 0}}
 td{{display:flex;gap:1em;padding:.1em 0;border:0}}td:empty{{display:none}}
 td::before{{content:attr(data-name);flex:0 0 8em;color:#666}}tr{{border-bottom:1px solid #ddd}}}}
+.maps{{display:flex;flex-wrap:wrap;gap:1em 2em;margin-bottom:1em}}svg{{max-width:100%}}
+a:hover rect{{opacity:.85}}
 </style></head><body><h1>{title}</h1>
-<table><thead><tr>{head}</tr></thead><tbody>
+{maps}<table><thead><tr>{head}</tr></thead><tbody>
 {body}
 </tbody></table></body></html>
 """
@@ -180,32 +123,42 @@ td::before{{content:attr(data-name);flex:0 0 8em;color:#666}}tr{{border-bottom:1
 # Columns whose cells are one word or number each.
 _WHOLE = {
     "rank",
-    "verified",
-    "cost",
     "without self-motion",
+    "margin",
+    "clearance",
     "duration",
     "seconds",
     "plan",
     "replay",
 }
 # What the columns of numbers are of, for people.
-_HEADS = {"duration": "duration, s", "seconds": "planned in, s"}
+_HEADS = {
+    "margin": "joint margin, rad or m",
+    "clearance": "clearance, m",
+    "duration": "duration, s",
+    "seconds": "planned in, s",
+}
 
 
-def _page(header: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+def _page(header: Sequence[str], lines: Sequence[Sequence[str]], pictures: Sequence[str]) -> str:
     linked = {header.index("plan"), header.index("replay")}
+    state, reason = header.index("verified"), header.index("reason")
+    shown = [k for k in range(len(header)) if k != reason]
+    # In few words; the last column has all of them.
+    lines = [[*line[:state], line[reason] or line[state], *line[state + 1 :]] for line in lines]
 
     def cell(k: int, text: str) -> str:
         safe = html.escape(text)
         address = urllib.parse.quote(text)
-        shown = f'<a href="{address}">{header[k]}</a>' if k in linked and text else safe
+        said = f'<a href="{address}">{header[k]}</a>' if k in linked and text else safe
         name = html.escape(_HEADS.get(header[k], header[k]))
         whole = ' class="whole"' if header[k] in _WHOLE else ""
-        return f'<td{whole} data-name="{name}">{shown}</td>'
+        return f'<td{whole} data-name="{name}">{said}</td>'
 
-    rows = ("".join(cell(k, text) for k, text in enumerate(line)) for line in lines)
+    rows = ("".join(cell(k, line[k]) for k in shown) for line in lines)
     return _PAGE.format(
         title=f"{len(lines)} problems, best first",
-        head="".join(f"<th>{html.escape(_HEADS.get(name, name))}</th>" for name in header),
+        maps=f'<div class="maps">{"".join(pictures)}</div>\n' if pictures else "",
+        head="".join(f"<th>{html.escape(_HEADS.get(header[k], header[k]))}</th>" for k in shown),
         body="\n".join(f"<tr>{row}</tr>" for row in rows),
     )

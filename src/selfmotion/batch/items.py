@@ -26,11 +26,14 @@ class Item:
         Returns the job; may raise what is wrong with it.
     settings : dict
         What tells it from the others: keys of the grid and their values.
+    file : Path or None
+        The problem file whose grid it is of.
     """
 
     name: str
     make: Callable[[], Job]
     settings: Mapping[str, Any] = field(default_factory=dict)
+    file: Path | None = None
 
     @cached_property
     def task(self) -> dict[str, Any]:
@@ -88,7 +91,7 @@ def grid_items(file: Path, *, allow_code: bool = False) -> list[Item]:
         return lambda: job_of(document, file, allow_code=allow_code, memory=memory)
 
     return [
-        Item(f"{file.stem}-{k:0{digits}d}" if settings else file.stem, maker(one), settings)
+        Item(f"{file.stem}-{k:0{digits}d}" if settings else file.stem, maker(one), settings, file)
         for k, (one, settings) in enumerate(found)
     ]
 

@@ -3,7 +3,7 @@
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import PlanError, SelfmotionError, silent
-from selfmotion.batch.folder import Folder, Row
+from selfmotion.batch.folder import Folder
 from selfmotion.batch.items import Item, problem_items
+from selfmotion.batch.row import Row
 from selfmotion.batch.worker import begin_process, plan_task
-from selfmotion.formats import Job
+from selfmotion.formats import Job, write_combination
 from selfmotion.problem import Problem
 
 # Each worker has this many problems at hand, so that none waits for the next one.
@@ -60,11 +61,14 @@ class Batch:
         Has ``table.csv`` and ``index.html``, and the plans in ``plans``.
     resumed : int
         How many of them an earlier run had finished.
+    best_files : tuple of Path
+        Of each file with a grid, the problem file of its best combination, where one is verified.
     """
 
     rows: tuple[Row, ...]
     folder: Path
     resumed: int
+    best_files: tuple[Path, ...] = ()
 
     @property
     def best(self) -> Row | None:
@@ -146,7 +150,22 @@ def plan_items(
         run.on_this_machine(pending, workers or os.cpu_count() or 1)
     rows = tuple(run.rows[item.name] for item in items)
     folder.write_tables(rows, replays)
-    return Batch(rows, folder.path, run.resumed)
+    return Batch(rows, folder.path, run.resumed, _write_best(items, run.rows, folder.path))
+
+
+def _write_best(items: Sequence[Item], rows: Mapping[str, Row], folder: Path) -> tuple[Path, ...]:
+    """Write the best combination of each file with a grid as a problem file."""
+    best: dict[Path, Row] = {}
+    for item in items:
+        row = rows[item.name]
+        if item.file is not None and item.settings and row.verified:
+            best[item.file] = min(best.get(item.file, row), row, key=lambda each: each.rank)
+    written = []
+    for file, row in best.items():
+        target = folder / f"{file.stem}-best{file.suffix}"
+        write_combination(file, row.settings, target)
+        written.append(target)
+    return tuple(written)
 
 
 class _Run:

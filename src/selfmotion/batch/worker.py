@@ -10,13 +10,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import SelfmotionError
+from selfmotion.basics import InverseKinematicsError, NoSequenceError, SelfmotionError
 from selfmotion.formats import Job
 from selfmotion.problem import problem_from_dict
+from selfmotion.result import Plan
 
 # Arms and bodies of problems planned before; forgotten when there are many.
 _known: dict[str, Any] = {}
 _MANY = 64
+# What errors come to in a few words.
+_REASONS = ((InverseKinematicsError, "out of reach"), (NoSequenceError, "no way through"))
 
 
 def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
@@ -41,17 +44,22 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
             found.save(file)
             archive = file.read_bytes()
     except SelfmotionError as error:
-        return {"error": str(error), "seconds": time.perf_counter() - began}, b""
+        reason = next((text for kind, text in _REASONS if isinstance(error, kind)), "no plan")
+        seconds = time.perf_counter() - began
+        return {"error": str(error), "reason": reason, "seconds": seconds}, b""
     # A fault of ours, or of the user's own code, must not stop the other problems.
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
         return {"error": what, "fault": True, "seconds": time.perf_counter() - began}, b""
-    report, duration = found.report, found.trajectory.duration
+    report, certificate, duration = found.report, found.certificate, found.trajectory.duration
     is_part = bool(report.ending)
     aim = duration if task["options"]["goal"] == "fastest" else report.cost
     row = {
-        "verified": found.certificate.verified,
-        "verdict": found.certificate.verdict,
+        "verified": certificate.verified,
+        "verdict": certificate.verdict,
+        "reason": _reason(found),
+        "margin": certificate.limit_margin.value,
+        "clearance": None if certificate.clearance is None else certificate.clearance.value,
         "cost": report.cost,
         "initial_cost": report.initial_cost,
         "duration": duration,
@@ -62,6 +70,17 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
         "seconds": time.perf_counter() - began,
     }
     return row, archive
+
+
+def _reason(plan: Plan) -> str:
+    """Say in a few words why a plan is not verified; "" where it is."""
+    certificate = plan.certificate
+    if certificate.verified:
+        return ""
+    if plan.report.ending:
+        return "ends on the way"
+    broken = [item.requirement for item in certificate.findings if not item.kept]
+    return broken[0] if broken else "off the path"
 
 
 def begin_process() -> None:

@@ -23,7 +23,8 @@ def batch_json(batch: "Batch") -> dict[str, Any]:
     for row in rows:
         if row["error"] or row["ends"] is not None:
             row["cost"] = row["initial_cost"] = None
-    return {"folder": str(batch.folder), "resumed": batch.resumed, "rows": rows}
+    best = [str(file) for file in batch.best_files]
+    return {"folder": str(batch.folder), "resumed": batch.resumed, "best_files": best, "rows": rows}
 
 
 def robots_json(robots: Mapping[str, RobotModel]) -> dict[str, Any]:

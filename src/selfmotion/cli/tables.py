@@ -20,7 +20,7 @@ from selfmotion.robot import RobotModel
 from selfmotion.task import Task
 
 if TYPE_CHECKING:
-    from selfmotion.batch import Batch
+    from selfmotion.batch import Batch, Row
     from selfmotion.study import Claim
 
 
@@ -215,30 +215,43 @@ def _number(value: float | None) -> str:
 
 def show_batch(batch: "Batch", console: Console) -> None:
     """Print the best of many plans, and how many there are."""
+    from selfmotion.batch import labels
+
     ranked = sorted(batch.rows, key=lambda row: row.rank)
     keys = list(dict.fromkeys(key for row in ranked for key in row.settings))
     table = _table("the best of them")
-    for name in ("name", *keys):
+    for name in ("name", *labels(keys)):
         table.add_column(escape(name), overflow="fold")
-    for name in ("cost", "duration", "verified"):
+    for name in ("cost", "duration", "margin", "clearance", "verified"):
         table.add_column(name, no_wrap=True)
     for row in ranked[:_SHOWN]:
         values = [escape(json.dumps(row.settings.get(key, ""))) for key in keys]
-        outcome = ["-", "-", "no plan"]
+        outcome = ["-", "-", "-", "-"]
         if not row.error:
-            state = "yes" if row.verified else "no"
-            outcome = [row.outcome, f"{row.duration:.4g} s", state]
-        table.add_row(escape(row.name), *values, *outcome)
+            near = "-" if row.clearance is None else f"{1e3 * row.clearance:.4g} mm"
+            outcome = [row.outcome, f"{row.duration:.4g} s", _number(row.margin), near]
+        table.add_row(escape(row.name), *values, *outcome, row.reason or "yes")
     console.print(table)
     verified = sum(row.verified for row in batch.rows)
-    failed = [row for row in ranked if row.error]
+    failed = [row for row in ranked if not row.verified]
     console.print(
-        f"{len(ranked)} problems: {verified} verified, {len(failed)} without a plan; "
-        f"{batch.resumed} finished before"
+        f"{len(ranked)} problems: {verified} verified, {sum(bool(row.error) for row in failed)} "
+        f"without a plan; {batch.resumed} finished before"
     )
-    for row in failed[:_SHOWN]:
-        console.print(f"{row.name}: {row.error}", style="red", markup=False, soft_wrap=True)
-    console.print(f"wrote {batch.folder / 'index.html'}", markup=False, soft_wrap=True)
+    # Of many that are refused alike, one says what there is to say.
+    for reason, rows in _by_reason(failed).items():
+        more = f" ({len(rows)} of them)" if len(rows) > 1 else ""
+        told = f"{reason}{more}: {rows[0].name}: {rows[0].error or rows[0].verdict}"
+        console.print(told, style="red", markup=False, soft_wrap=True)
+    for file in (batch.folder / "index.html", *batch.best_files):
+        console.print(f"wrote {file}", markup=False, soft_wrap=True)
+
+
+def _by_reason(rows: Sequence["Row"]) -> dict[str, list["Row"]]:
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(row.reason, []).append(row)
+    return found
 
 
 # Rows of a batch on the terminal; the files have all of them.

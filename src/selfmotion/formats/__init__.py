@@ -29,6 +29,7 @@ from selfmotion.formats.overrides import (
     grid_documents as grid_documents,
     parse_setting as parse_setting,
     set_key as set_key,
+    write_combination as write_combination,
 )
 from selfmotion.formats.path_files import events_of as events_of, read_path as read_path
 from selfmotion.formats.poses import pose_of as pose_of

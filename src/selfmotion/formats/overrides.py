@@ -2,11 +2,17 @@
 
 import itertools
 import json
+import os
 from collections.abc import Mapping
 from copy import deepcopy
+from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import FileFormatError
+from selfmotion.formats.documents import read_document, write_document
+
+# Keys whose values are names of files, looked for beside the document.
+_FILES = ("file", "joint_limits", "mesh", "outputs", "srdf")
 
 
 def set_key(document: dict[str, Any], key: str, value: Any) -> None:
@@ -18,8 +24,14 @@ def set_key(document: dict[str, Any], key: str, value: Any) -> None:
         The way leads through something that is no table, or past the end of a list.
     """
     node: Any = document
-    *parts, last = key.split(".")
-    for part in parts:
+    parts = key.split(".")
+    last = parts[-1]
+    for part, inner in itertools.pairwise(parts):
+        if isinstance(node, dict) and part not in node and inner.isdigit():
+            raise FileFormatError(
+                f"{key}: sets one number of '{part}', which is not there: give all of them in the "
+                f"file, like {part} = [0, 0, 0]"
+            )
         node = node.setdefault(part, {}) if isinstance(node, dict) else _item(node, part, key)
     if isinstance(node, dict):
         # The same in another unit gives way.
@@ -78,3 +90,30 @@ def grid_documents(document: Mapping[str, Any]) -> list[tuple[dict[str, Any], di
             set_key(one, key, value)
         found.append((one, settings))
     return found
+
+
+def write_combination(file: Path, settings: Mapping[str, Any], target: Path) -> None:
+    """Write the problem file that one combination of a file's ``[grid]`` stands for.
+
+    Files that it names beside itself are named from where the new one is.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read, or the new one not be written.
+    """
+    document = {key: value for key, value in read_document(file).items() if key != "grid"}
+    for key, value in settings.items():
+        set_key(document, key, value)
+    write_document(target, _named_from(document, file.resolve().parent, target.resolve().parent))
+
+
+def _named_from(value: Any, old: Path, new: Path, key: str = "") -> Any:
+    """Return a document whose files, named from a folder, are named from another one."""
+    if isinstance(value, dict):
+        return {name: _named_from(item, old, new, name) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_named_from(item, old, new, key) for item in value]
+    if key in _FILES and isinstance(value, str) and not Path(value).is_absolute():
+        return Path(os.path.relpath(old / value, new)).as_posix()
+    return value

@@ -145,7 +145,8 @@ def obstacle(values: Mapping[str, Any], beside: Callable[[str], FilePath]) -> An
     except ValueError as error:
         raise FileFormatError(f"obstacle '{values.get('name')}': {error}") from error
     if "file" in given:
-        given["file"] = str(beside(given["file"]))
+        # A plan or a problem with this body may be kept in another folder than where it is made.
+        given["file"] = str(beside(given["file"]).resolve())
     position, rotation = pose.translation.tolist(), pose.rotation.tolist()
     return obstacle_from_dict({**given, "position": position, "rotation": rotation})
 

@@ -87,10 +87,16 @@ def page_content(
         [points for motion in motions for tip in motion.tips for points in tip.outline],
     )
     box = scene.Extent(hull.min(axis=0), hull.max(axis=0))
+    # A part is seen whole, a floor is not.
+    around = [
+        corners
+        for motion in motions
+        for corners in obstacles.outlines(motion.obstacles, box.radius)
+    ]
     scale = _scale(motions)
     longest = max(float(np.linalg.norm(m.shown.ellipsoid, axis=(1, 2)).max()) for m in motions)
     return {
-        "camera": scene.camera(hull, motions[0].shown.tool_in_world),
+        "camera": scene.camera(np.concatenate([hull, *around]), motions[0].shown.tool_in_world),
         "commands": [
             *scene.stage_commands(box),
             *links.arm_commands(robot, arm),
@@ -160,6 +166,7 @@ def _plan(
         "label": name,
         "description": describe(motion.plan) if whole is None else whole.description,
         "steps": [] if whole is None else whole.steps(),
+        "events": [] if whole is None else whole.happenings(),
         "root": root,
         "tips": [
             {"root": f"{root}/tip{f}", "carrier": tip.carrier} for f, tip in enumerate(motion.tips)
@@ -193,12 +200,6 @@ def _plan(
             ),
         ],
     }
-
-
-def _seams(
-    whole: Whole | None, root: str, payload: Payload, shown: Curves, size: float
-) -> list[Json]:
-    return [] if whole is None else whole.commands(root, payload, shown, _TRACE_RADIUS * size)
 
 
 def _traces(

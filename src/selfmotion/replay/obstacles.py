@@ -1,5 +1,6 @@
 """Obstacles as commands for the viewer: in the world, or on the links that carry them."""
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,7 +23,29 @@ from selfmotion.replay.payload import Json, Payload
 from selfmotion.replay.scene import triangles
 from selfmotion.robot import RobotModel
 
-_OBSTACLE = (0.80, 0.62, 0.42)
+# Of what stands around, the part that is worked on, and what the arm carries.
+_AROUND, _PART, _CARRIED = (0.80, 0.62, 0.42), (0.47, 0.66, 0.56), (0.36, 0.48, 0.70)
+# What the part of a problem file is called.
+_WORKPIECE = "workpiece"
+
+
+def color_of(item: Obstacle, robot: RobotModel) -> tuple[float, float, float]:
+    """Return the colour of a body by what it is: red, green and blue in 0..1."""
+    if item.name == _WORKPIECE or (item.frame is not None and item.frame == robot.reference):
+        return _PART
+    return _AROUND if place_of(item, item.pose, robot)[0] == 0 else _CARRIED
+
+
+def outlines(items: Sequence[Obstacle], largest: float) -> list[Array]:
+    """Return the corners (8, 3) of boxes around what stands in the world and is no larger [m]."""
+    found = []
+    for item in items:
+        solid = Solid(item.geometry(), item.label)
+        if item.frame is None and np.linalg.norm(solid.high - solid.low) <= largest:
+            ends = zip(solid.low, solid.high, strict=True)
+            corners = np.array(list(itertools.product(*ends)))
+            found.append(corners @ item.pose.rotation.T + item.pose.translation)
+    return found
 
 
 def obstacle_node(root: str, obstacle: Obstacle) -> str:
@@ -54,9 +77,13 @@ def obstacle_commands(
     CollisionError
         An own shape has no geometry.
     """
-    look = three.material(_OBSTACLE, opacity=0.85)
     return [
-        three.set_object(f"{obstacle_node(root, item)}/{k}", geometry, look, matrix)
+        three.set_object(
+            f"{obstacle_node(root, item)}/{k}",
+            geometry,
+            three.material(color_of(item, robot), opacity=0.85),
+            matrix,
+        )
         for item in obstacles
         for k, (geometry, matrix) in enumerate(_obstacle(item, robot, payload))
     ]

@@ -75,7 +75,8 @@ def replay_html(
         whole=whole,
     )
     obstacles = shown[0].obstacles if whole is None else whole.obstacles
-    picture = still(shown[0].robot, shown[0].trajectory, obstacles, content["camera"])
+    seams = [] if whole is None else whole.seams()
+    picture = still(shown[0].robot, shown[0].trajectory, obstacles, content["camera"], seams)
     if description is not None:
         for shown_plan in content["plans"]:
             shown_plan["description"] = description

@@ -9,18 +9,25 @@ from scipy.spatial import ConvexHull, QhullError
 from selfmotion.basics import Array
 from selfmotion.collision import Obstacle, Solid
 from selfmotion.motion import Trajectory
+from selfmotion.replay.obstacles import color_of
 from selfmotion.replay.payload import Json
 from selfmotion.robot import RobotModel
 
 # The arm at these shares of the motion's time, from pale to dark.
 _SHARES = (0.0, 0.5, 1.0)
 _INKS = ("#b9c4d6", "#7f93b5", "#2f4a7d")
+# Of the tool's path, and of the moves between seams that have colours of their own.
+_PATH, _MOVE = "#d0482f", "#8a94a3"
 # Width of the picture, and what is left free around it, in its own units.
 _WIDTH, _MARGIN = 900.0, 40.0
 
 
 def still(
-    robot: RobotModel, motion: Trajectory, obstacles: Sequence[Obstacle], camera: Json
+    robot: RobotModel,
+    motion: Trajectory,
+    obstacles: Sequence[Obstacle],
+    camera: Json,
+    seams: Sequence[tuple[float, float, str]] = (),
 ) -> str:
     """Return the arm at the begin, in the middle and at the end, its tool's path and obstacles.
 
@@ -29,21 +36,23 @@ def still(
     robot : RobotModel
     motion : Trajectory
     obstacles : sequence of Obstacle
-        Those that stand in the world are drawn, as outlines.
+        Drawn as outlines; those that ride on a link where that is in the end.
     camera : dict
-        From where the scene is seen; see `scene.camera`.
+        What is seen, and from where; see `scene.camera`.
+    seams : sequence of (float, float, str)
+        Parts of the path with a colour of their own: from when to when [s], and which.
     """
     right, up = _axes(np.array(camera["direction"]))
     view = np.stack([right, -up], axis=1)
     first, last = motion.t[[0, -1]]
     arms = [_skeleton(robot, motion(first + share * (last - first))) @ view for share in _SHARES]
     chain = robot.chain_to(robot.tool)
-    path = np.array([chain.place(q).translation for q in motion(np.linspace(first, last, 101))])
-    path = path @ view
-    blocks = [
-        corners @ view for item in obstacles if item.frame is None for corners in _outlines(item)
-    ]
-    seen = np.concatenate([path, *(arm.reshape(-1, 2) for arm in arms)])
+
+    def traced(begin: float, end: float) -> Array:
+        times = first + np.linspace(begin, end, 101)
+        return np.array([chain.place(q).translation for q in motion(times)]) @ view
+
+    seen = np.array(camera["points"]) @ view
     low, high = seen.min(axis=0), seen.max(axis=0)
     scale = (_WIDTH - 2.0 * _MARGIN) / max(float((high - low).max()), 1e-9)
     height = float((high - low)[1]) * scale + 2.0 * _MARGIN
@@ -54,16 +63,25 @@ def still(
         placed[:, 0] += 0.5 * (_WIDTH - 2.0 * _MARGIN - float((high - low)[0]) * scale)
         return " ".join(f"{x:.1f},{y:.1f}" for x, y in placed)
 
-    parts = [
-        f'<polygon points="{drawn(_hull(block))}" fill="#d9a05b" fill-opacity="0.35" '
-        f'stroke="#a36a22"/>'
-        for block in blocks
-    ]
+    # Behind and before each other as in the scene, which pieces of one body are not.
+    behind, before = list[str](), list[str]()
+    for item in obstacles:
+        ink = "rgb({}, {}, {})".format(*(round(255 * part) for part in color_of(item, robot)))
+        pieces = _outlines(item, robot, motion(last))
+        inner = "".join(f'<polygon points="{drawn(_hull(each @ view))}"/>' for each in pieces)
+        body = f'<g fill="{ink}" stroke="{ink}" opacity="0.6">{inner}</g>'
+        (behind if item.frame is None else before).append(body)
+    parts = behind
     for arm, ink in zip(arms, _INKS, strict=True):
         parts += [
             f'<polyline points="{drawn(bone)}" stroke="{ink}" stroke-width="9"/>' for bone in arm
         ]
-    parts.append(f'<polyline points="{drawn(path)}" stroke="#d0482f" stroke-width="3"/>')
+    parts += before
+    whole = (0.0, float(last - first), _MOVE if seams else _PATH)
+    parts += [
+        f'<polyline points="{drawn(traced(begin, end))}" stroke="{ink}" stroke-width="3"/>'
+        for begin, end, ink in (whole, *seams)
+    ]
     return (
         f'<svg id="still" viewBox="0 0 {_WIDTH:.0f} {height:.0f}" role="img" '
         f'aria-label="The arm at the begin, in the middle and at the end of its motion" '
@@ -89,10 +107,11 @@ def _skeleton(robot: RobotModel, q: Array) -> Array:
     return np.array(bones)
 
 
-def _outlines(item: Obstacle) -> list[Array]:
-    """Return the corners (V, 3) of the convex pieces of an obstacle."""
+def _outlines(item: Obstacle, robot: RobotModel, q: Array) -> list[Array]:
+    """Return the corners (V, 3) of the convex pieces of an obstacle, with the arm at q."""
     pieces = Solid(item.geometry(), item.label).pieces
-    turn, at = item.pose.rotation, item.pose.translation
+    pose = item.pose if item.frame is None else robot.chain_to(item.frame).place(q) * item.pose
+    turn, at = pose.rotation, pose.translation
     return [piece.surface()[0] @ turn.T + at for piece in pieces]
 
 

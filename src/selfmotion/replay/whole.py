@@ -30,6 +30,10 @@ _COLORS = ((66, 105, 208), (232, 135, 30), (60, 169, 81), (224, 80, 140), (164, 
 _LONGEST = 3
 
 
+# Of what happens on the way: the same in the scene, the plots and the list of steps.
+_EVENT = (194, 24, 91)
+
+
 @dataclass(frozen=True)
 class Mark:
     """A step of a whole: when it begins and ends [s], what it is called, and if it is a seam."""
@@ -51,6 +55,8 @@ class Whole:
     marks : tuple of Mark
     verdict : str
     verified : bool
+    events : tuple of (float, str)
+        What happens on the way, and when [s].
     obstacles : tuple of Obstacle
         All that stands there in the end.
     grows : bool
@@ -61,6 +67,7 @@ class Whole:
     marks: tuple[Mark, ...]
     verdict: str
     verified: bool
+    events: tuple[tuple[float, str], ...]
     obstacles: tuple[Obstacle, ...]
     grows: bool
 
@@ -70,7 +77,9 @@ class Whole:
         motion = made.motion if isinstance(made, Move) else made.trajectory
         marks = tuple(_marks(made))
         left: tuple[Obstacle, ...] = ()
+        events: tuple[tuple[float, str], ...] = ()
         if isinstance(made, Program):
+            events = tuple((at, f"{name}: {event}") for at, name, event in made.events)
             left = tuple(item for step in made.steps for item in step.leaves)
             moves = [step.made for step in made.steps]
             constraints = tuple(moves[0].constraints) if isinstance(moves[0], Move) else ()
@@ -81,7 +90,8 @@ class Whole:
             constraints, known = made.constraints, list(made.obstacles)
         unique = {item.name: item for item in known}
         plan = _stand_in(made.robot, motion, constraints)
-        return cls(plan, marks, made.verdict, made.verified, tuple(unique.values()), bool(left))
+        standing = tuple(unique.values())
+        return cls(plan, marks, made.verdict, made.verified, events, standing, bool(left))
 
     @property
     def points(self) -> int:
@@ -128,7 +138,26 @@ class Whole:
                 look = three.material(color, roughness=0.8)
                 found.append(three.set_object(f"{root}/trace/seam{number}", drawn, look))
             number += 1
+        return [*found, *self._beads(root, payload, shown, radius)]
+
+    def _beads(self, root: str, payload: Payload, shown: Curves, radius: float) -> list[Json]:
+        """Return the commands for a bead where the tool is at each event."""
+        look = three.material([part / 255.0 for part in _EVENT], roughness=0.8)
+        found = []
+        for number, (at, _) in enumerate(self.events):
+            place = np.array([[np.interp(at, shown.t, axis) for axis in shown.tool.T]])
+            drawn = scene.triangles(payload, *shapes.beads(place, 3.0 * radius))
+            found.append(three.set_object(f"{root}/trace/event{number}", drawn, look))
         return found
+
+    def seams(self) -> list[tuple[float, float, str]]:
+        """Return when each seam begins and ends [s], and its colour."""
+        return [(s["begin"], s["end"], s["color"]) for s in self.steps() if s["color"]]
+
+    def happenings(self) -> list[Json]:
+        """Return the events for the page, in the order of time."""
+        color = "rgb({}, {}, {})".format(*_EVENT)
+        return [{"t": at, "name": name, "color": color} for at, name in sorted(self.events)]
 
     def steps(self) -> list[Json]:
         """Return the steps for the page's table of jumps."""

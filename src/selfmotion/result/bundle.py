@@ -67,9 +67,9 @@ def read_bundle(
             if sum(item.file_size for item in archive.infolist()) > _LARGEST:
                 raise ValueError(f"it unpacks to more than {_LARGEST:g} bytes")
             description: dict[str, Any] = json.loads(archive.read(_NAME))
-            found = description["kind"], description["version"]
-            if found != (kind, version):
-                raise ValueError(f"it is a {found[0]} of format {found[1]}, expected {version}")
+            if description["kind"] != kind:
+                raise ValueError(f"it is a {description['kind']}, expected a {kind}")
+            _check_version(file, kind, description["version"], version)
             changed = description.pop("digest", None) != digest_of(description, {})
             made, known = list[Plan | Move](), dict[str, Any]()
             for number, item in enumerate(description["members"]):
@@ -83,6 +83,8 @@ def read_bundle(
         raise FileFormatError(f"{file}: no such file") from None
     except OSError as error:
         raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
+    except _OtherVersionError:
+        raise
     # Any number or key of a damaged file may be any other, and fail anywhere.
     except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
@@ -90,6 +92,23 @@ def read_bundle(
     if not made:
         raise FileFormatError(f"{file}: is no {kind}, or a damaged one: it holds no motion")
     return description, made, changed
+
+
+class _OtherVersionError(FileFormatError):
+    """The file is sound, and of another version."""
+
+
+def _check_version(file: Path, kind: str, found: object, wanted: int) -> None:
+    """Refuse a format that is not ours, and say which version wrote it, where that is known."""
+    if found == wanted:
+        return
+    if isinstance(found, bool) or not isinstance(found, int):
+        raise ValueError(f"its format is {found!r}, expected {wanted}")
+    age = "an older" if found < wanted else "a newer"
+    raise _OtherVersionError(
+        f"{file}: was written by {age} version of selfmotion (a {kind} of format {found}, expected "
+        f"{wanted}): make it anew, or read it with that version"
+    )
 
 
 def _member(number: int) -> str:

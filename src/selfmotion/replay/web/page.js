@@ -229,7 +229,7 @@ class Page {
   makePlots() {
     for (const plot of this.plots) plot.remove();
     this.plots = plotSpecs(this.content, this.plan).map((spec, id) => new Plot(
-      get("plots"), { ...spec, id }, (time) => { this.pause(); this.seek(time); }));
+      get("plots"), { ...spec, id, events: this.plan.events }, (time) => { this.pause(); this.seek(time); }));
   }
 
   // What a program consists of: a button for each step, which leads to its begin.

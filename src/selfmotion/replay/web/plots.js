@@ -30,7 +30,7 @@ function ticks(low, high, count) {
   return places;
 }
 
-// spec: { title, unit, note, t, log, floor, curves: [{ name, values, color, start, low, high }] }
+// spec: { title, unit, note, t, log, floor, events: [{ t, name, color }], curves: [{ name, values, color, start, low, high }] }
 class Plot {
   constructor(parent, spec, onSeek) {
     Object.assign(this, spec);
@@ -119,6 +119,11 @@ class Plot {
     const clip = element(element(this.svg, "clipPath", { id: `clip-${this.id}` }), "rect", {
       x: left, y: top, width: width - left - right, height: HEIGHT - top - bottom });
     const group = element(this.svg, "g", { "clip-path": `url(#${clip.parentNode.id})` });
+    for (const { t, name, color } of this.events ?? []) {
+      const line = element(group, "line", {
+        class: "event", x1: this.x(t), x2: this.x(t), y1: top, y2: HEIGHT - bottom, stroke: color });
+      element(line, "title", {}, name);
+    }
     for (const curve of this.curves) this.drawCurve(group, curve, left, width - right);
     this.hoverLine = element(this.svg, "line", { class: "hover", y1: top, y2: HEIGHT - bottom });
     this.cursor = element(this.svg, "line", { class: "cursor", y1: top, y2: HEIGHT - bottom });
