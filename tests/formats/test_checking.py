@@ -46,6 +46,9 @@ MALFORMED = [
     ("radius_mm = 100", "radius_mm = 0", "path: circle: radius is 0.0, expected a number > 0"),
     ("radius_mm = 100", "radius_deg = 100", "path.radius_deg: 'radius' is no angle"),
     ("radius_mm = 100", "radus_mm = 100", "path.radus_mm: unknown key; nearest: 'radius_mm'"),
+    ("duration = 4", "feed = 0.1\nwithin_deg = 2", "path.within_deg: 'within' is no angle"),
+    ("band_deg = 5", "band_mm = 5", "relaxations[0].band_mm: row 'rx' is an angle; say band_deg"),
+    ('["rx", "ry"]', '["x", "y"]', "relaxations[0].band_deg: row 'x' is a length; say band_mm"),
     ("duration = 4", "feeed_mm = 4", "path.feeed_mm: unknown key; nearest: 'feed_mm'"),
     ("= 50\n", "= 50\ntolerance_mm = { position = 1 }\n", "tolerance_mm: is {'position': 1}"),
     ("= 50\n", "= 50\noptimiser = { tolerance_mm = 1 }\n", "'tolerance' is no length"),
@@ -70,7 +73,7 @@ MALFORMED = [
     ("size_mm = [100, 100, 1200]", "", "constraints[1].obstacles[0].size: is missing"),
     ("[[constraints.obstacles]]", "[constraints.obstacles]", "expected a list of tables ([[…]])"),
     ('["rx", "ry"]', '["rx", "q"]', "relaxations[0]: relaxation: rows are 'rx, q', expected some"),
-    ("band_deg = 5", "band_mm = 5\nduring = [3, 1]", "relaxations[0]: relaxation (rx, ry): during"),
+    ("band_deg = 5", "band_deg = 5\nduring = [3, 1]", "relaxations[0]: relaxation (rx, ry): dur"),
     ("position = 1e-5", "position = -1", "tolerance: "),
 ]  # fmt: skip
 

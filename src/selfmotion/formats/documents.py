@@ -27,8 +27,11 @@ _SUFFIXES = {"_deg": (ANGLES, math.pi / 180.0), "_mm": (LENGTHS, 1e-3)}
 _TABLES_OF_NUMBERS = tuple(f"{name}_deg" for name in PER_JOINT)
 # How like a known key one has to be to be taken for it.
 _ALIKE = 0.8
-# Tables whose numbers have no unit.
+# Rows of relaxations, by what they are.
+_MOVED, _TURNED = ("x", "y", "z"), ("rx", "ry", "rz")
+# Tables whose numbers have no unit; and keys that are shares there, of a feed.
 _UNITLESS = ("optimiser.",)
+_SHARES = ("path.within",)
 
 
 def read_document(file: Path) -> dict[str, Any]:
@@ -163,6 +166,7 @@ def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
         angle in radians is more than a turn.
     """
     found: dict[str, Any] = {}
+    _check_rows(table, where)
     for key, value in table.items():
         if value is None:
             continue
@@ -182,7 +186,8 @@ def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
 
 def _check_unit(name: str, suffix: str, where: str, allowed: Collection[str]) -> None:
     """Refuse a key that is none, or has no such unit."""
-    if name in allowed and not where.startswith(_UNITLESS):
+    is_share = f"{where}{name}".endswith(_SHARES)
+    if name in allowed and not where.startswith(_UNITLESS) and not is_share:
         return
     what = "angle" if suffix == "_deg" else "length"
     near = nearest(name + suffix, [each + suffix for each in allowed], _ALIKE)
@@ -190,6 +195,18 @@ def _check_unit(name: str, suffix: str, where: str, allowed: Collection[str]) ->
         raise FileFormatError(f"{where}{name}{suffix}: unknown key{near}")
     known = "" if name in allowed else f", expected one of: {', '.join(sorted(allowed))}"
     raise FileFormatError(f"{where}{name}{suffix}: '{name}' is no {what}{known}")
+
+
+def _check_rows(table: Mapping[str, Any], where: str) -> None:
+    """Refuse a band in mm of rows that turn, and one in degrees of rows that do not."""
+    rows = table.get("rows")
+    several = [rows] if isinstance(rows, str) else rows if isinstance(rows, list) else []
+    for row in several:
+        turns = row in _TURNED
+        wrong, right = ("_mm", "_deg") if turns else ("_deg", "_mm")
+        if f"band{wrong}" in table and (turns or row in _MOVED):
+            what = "an angle" if turns else "a length"
+            raise FileFormatError(f"{where}band{wrong}: row '{row}' is {what}; say band{right}")
 
 
 def _check_radians(name: str, value: Any, where: str) -> None:
