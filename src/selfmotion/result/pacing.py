@@ -33,8 +33,11 @@ _MOST_STEPS, _ADDING, _GAIN = 12, 7, 5e-4
 _AIM, _KEPT, _NEAR = 0.999, 0.9998, 1.0003
 # A step takes at most this share of the room that there is.
 _LEAST_ROOM = 0.8
-# A knot is added where a limit is passed by this share, unless knots are so near [s].
-_ROUGH, _NEAREST = 1.002, 2e-4
+# A knot is added where a limit is passed by this share, unless knots are so near [s], or become so
+# many times as many: what is passed all along is no matter of knots.
+_ROUGH, _NEAREST, _MORE = 1.002, 2e-4, 4
+# So many programmes in turn that are not solved are the last ones: others would not be either.
+_UNSOLVED = 2
 # With limits of the jerk likewise where at some time no limit is used by this share: within an
 # interval the jerk cannot follow what the path asks for.
 _IDLE = 0.8
@@ -85,15 +88,15 @@ def fastest_pace(motion: Trajectory, limits: PaceLimits, ends: Ends, step: float
     for most in _FIRST:
         near = Squares.constant(pace.t, 1.0)
         room = _all_room(len(pace.t) - 1, rough)
-        pace = _changed(pace, _improved(pace, motion, rough, room, near, ends, most, _ROUGH_GAP))
+        better, _ = _improved(pace, motion, rough, room, near, ends, most, _ROUGH_GAP)
+        pace = _changed(pace, better)
     jerk = bool(np.isfinite(limits.jerk).any())
     for _ in range(_BASES if jerk else 0):
         # Tangents hold near a pace, so that the next one begins anew from there.
         pace = _scaled(smooth(pace, step, jerk, len(motion.t)), motion, limits)
         near, room = Squares.constant(pace.t, 1.0), _all_room(len(pace.t) - 1, limits)
-        pace = _changed(
-            pace, _improved(pace, motion, limits, room, near, ends, _BY_JERKS, _ROUGH_GAP)
-        )
+        better, _ = _improved(pace, motion, limits, room, near, ends, _BY_JERKS, _ROUGH_GAP)
+        pace = _changed(pace, better)
     pace = _scaled(smooth(pace, step, jerk, len(motion.t)), motion, limits)
     return _settled(pace, motion, limits, ends)
 
@@ -114,10 +117,11 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
     near = Squares.constant(_knots(base, motion, limits), 1.0)
     room = _all_room(len(near.knots) - 1, limits)
     jerk = bool(np.isfinite(limits.jerk).any())
-    most = _BY_JERKS_LATER if jerk else _OTHERS
+    most, count, unsolved = _BY_JERKS_LATER if jerk else _OTHERS, len(near.knots), 0
     for number in range(_MOST_STEPS):
         known = near
-        near = _improved(base, motion, limits, room, known, ends, most, _GAP)
+        near, reached = _improved(base, motion, limits, room, known, ends, most, _GAP)
+        unsolved = 0 if reached else unsolved + 1
         if np.isfinite(best[0][1]) and not near.is_positive:
             break
         pace = _changed(base, near)
@@ -129,6 +133,8 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
         rank = max(passed, _KEPT), float(kept.t[-1])
         if rank < best[0]:
             best = rank, kept
+        if unsolved == _UNSOLVED:
+            break
         if over.max() > _WILD and np.isfinite(best[0][1]):
             # Near the best that is known programmes are solved again: b is 1 there.
             base = best[1]
@@ -141,7 +147,9 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
         # Where it became as fast as a step may make it, knots are not what holds it.
         held = near.inside(0.5) < _ALL * most * known.inside(0.5)
         idle = (least < _IDLE) & held & jerk
-        cut = _to_cut(over, idle, pace) if number < _ADDING else np.zeros(len(over), dtype=bool)
+        cut = _to_cut(over, idle, pace)
+        if number >= _ADDING or len(near.knots) + np.count_nonzero(cut) > _MORE * count:
+            cut[:] = False
         # A limit that is passed where a knot is added is looked at again before there is less room.
         room = [
             np.repeat(own * _less(table, cut), 1 + cut, axis=0)
@@ -209,8 +217,11 @@ def _improved(
     ends: Ends,
     most: float,
     gap: float,
-) -> Squares:
-    """Return the square of how much faster a pace becomes, near one that is known."""
+) -> tuple[Squares, bool]:
+    """Return the square of how much faster a pace becomes, near one that is known.
+
+    And whether its programme was solved.
+    """
     obey_interruption()
     knots = near.knots
     states = States.of(motion, base, knots)
@@ -234,7 +245,7 @@ def _improved(
         found, reached = banded_optimum(gradient, rows, start, least, upper, gap)
         if reached:
             break
-    return Squares(knots, found)
+    return Squares(knots, found), reached
 
 
 def _keep(start: Array, fixed: Flags, end: int, base: Pace, knots: Array) -> None:
