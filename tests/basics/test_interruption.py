@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -12,6 +13,14 @@ from selfmotion.basics import held_interruption, obey_interruption, was_interrup
 
 # When it comes, after the beginning [s]: within compiled code, within Python, and when all is done.
 MOMENTS = (0.01, 0.1, 0.4, 1.0)
+
+
+@pytest.fixture(autouse=True)
+def in_the_foreground() -> Iterator[None]:
+    """Shells let what they run in the background ignore Ctrl-C, this run of tests as well."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def press() -> None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from selfmotion.basics import (
     Array,
     InverseKinematicsError,
+    PlanError,
     Progress,
     read_only,
     silent,
@@ -127,7 +128,10 @@ class FreeMotions:
                 break
             path = rounded(room, *way)
             if path is not None:
-                move = self.at_its_pace(path)
+                try:
+                    move = self.at_its_pace(path)
+                except PlanError as error:
+                    return self._missing(str(error))
                 if move.verified:
                     return move
                 worst = worst or f", where {move.trouble}"
@@ -233,7 +237,7 @@ class FreeMotions:
             asked,
             speed=read_only(USED * speed),
             acceleration=read_only(USED * faster),
-            jerk=read_only(USED * np.where(np.isfinite(asked.jerk), asked.jerk, faster / SOFT)),
+            jerk=read_only(USED * asked.jerk),
         )
 
     @cached_property
@@ -244,7 +248,8 @@ class FreeMotions:
     def _fast(self, path: Trajectory) -> Trajectory:
         """Return a joint path at the fastest pace that the limits allow, from rest to rest."""
         limits = self._limits
-        kept = PaceLimits(limits.speed, limits.acceleration, limits.jerk, self._quantities)
+        jerk = np.where(np.isfinite(limits.jerk), limits.jerk, limits.acceleration / SOFT)
+        kept = PaceLimits(limits.speed, limits.acceleration, jerk, self._quantities)
         return along(fastest_pace(path, kept, Ends(), STEP_OF_PACE), path)
 
     def at_its_pace(self, path: Trajectory) -> Move:
