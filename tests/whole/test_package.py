@@ -12,7 +12,8 @@ def test_import_leaves_the_heavy_and_optional_packages_alone() -> None:
     code = (
         "import sys, selfmotion; "
         "print([name for name in ('meshcat', 'matplotlib', 'trimesh', 'yourdfpy', "
-        "'typer', 'rich', 'scipy.integrate', 'pydantic', 'tomli_w', 'xacro', 'distributed') "
+        "'typer', 'rich', 'scipy.integrate', 'scipy.interpolate', 'scipy.spatial', "
+        "'pydantic', 'tomli_w', 'xacro', 'distributed') "
         "if name in sys.modules])"
     )
     result = subprocess.run(

@@ -7,7 +7,6 @@ from math import ceil
 from pathlib import Path as FilePath
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from selfmotion.basics import FileFormatError, ProblemError, Progress, silent
 from selfmotion.formats.pieces import pieces_of
@@ -57,6 +56,8 @@ class ControllerProgram:
         FileFormatError
             There is none.
         """
+        from scipy.interpolate import CubicSpline
+
         t, q, qd = [np.zeros(1)], [self.stretches[0].q[:1]], [0.0 * self.stretches[0].q[:1]]
         for stretch in self.stretches:
             rates = 0.0 * stretch.q

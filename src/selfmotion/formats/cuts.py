@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from selfmotion.basics import Array, FileFormatError
 from selfmotion.formats.path_rows import PoseRows
@@ -77,6 +76,8 @@ class Cut:
 
 def _transported(axes: Array) -> Array:
     """Return rotations whose z axes are (N, 3), each turned from the last one about no z axis."""
+    from scipy.spatial.transform import Rotation
+
     found = [from_normal(axes[0])]
     for axis in axes[1:]:
         before = found[-1][:, 2]

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
 from selfmotion.basics import Array
 from selfmotion.certificate import Tolerance
@@ -110,6 +108,8 @@ def miss_of(
 
 def miss_between(q: Array, exact: Array, chains: Sequence[Chain]) -> Miss:
     """Return how far configurations (K, n) are off others at most, one by one."""
+    from scipy.spatial.transform import Rotation
+
     position = rotation = 0.0
     for chain in chains:
         _, here, there = chain.along(q)
@@ -128,6 +128,8 @@ def _looked_at(stretch: Stretch) -> Array:
 
 def spline_of(stretch: Stretch) -> tuple[Array, Array, Array]:
     """Return times (K,) [s], positions and velocities (K, n) of the spline through the targets."""
+    from scipy.interpolate import CubicSpline
+
     times = _looked_at(stretch)
     spline = CubicSpline(stretch.t, stretch.q, bc_type="clamped")
     return times, spline(times), spline(times, 1)
@@ -135,6 +137,8 @@ def spline_of(stretch: Stretch) -> tuple[Array, Array, Array]:
 
 def ways(t: Array, q: Array, times: Array) -> list[Array]:
     """Return joint positions (K, n) at times by each way of joining targets."""
+    from scipy.interpolate import CubicSpline
+
     lines = _straight(times, t, q)
     if len(t) < 3:
         return [lines]

@@ -5,7 +5,6 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.follow import Follows
@@ -183,6 +182,8 @@ class Allowed:
 
         A little within the bands, so that it may leave their borders.
         """
+        from scipy.spatial.transform import Rotation
+
         relaxed, away = self.relaxed(t), np.zeros((len(q), 6))
         if not relaxed or not len(q):
             return away
