@@ -2,7 +2,8 @@
 
 import dataclasses
 import json
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -88,8 +89,25 @@ def test_files_that_are_no_plans_are_named(plan: sm.Plan, tmp_path: Path) -> Non
     with pytest.raises(sm.FileFormatError, match=r"other\.npz: is no plan"):
         sm.load_plan(tmp_path / "other.npz")
     files.write_archive(tmp_path / "empty.npz", {}, {})
-    with pytest.raises(sm.FileFormatError, match="has no format number"):
+    with pytest.raises(sm.FileFormatError, match="its format is None"):
         sm.load_plan(tmp_path / "empty.npz")
+
+
+@pytest.mark.parametrize(
+    ("load", "key", "kind"), [(sm.load_plan, "format", "plan"), (sm.load_move, "move", "move")]
+)
+def test_files_of_another_version_say_so(
+    load: Callable[[Path], object], key: str, kind: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "a.npz"
+    for found, told in ((0, f"an older version of selfmotion (a {kind}"), (99, "a newer version")):
+        files.write_archive(file, {key: found}, {})
+        with pytest.raises(sm.FileFormatError, match=re.escape(told)):
+            load(file)
+    other = {"format": "move", "move": "format"}[key]
+    files.write_archive(file, {other: 1}, {})
+    with pytest.raises(sm.FileFormatError, match=f"not a {kind}"):
+        load(file)
 
 
 def _leaves(value: Any, way: tuple[Any, ...] = ()) -> Iterator[tuple[tuple[Any, ...], Any]]:

@@ -45,6 +45,7 @@ from selfmotion.basics.inputs import (
     as_numbers as as_numbers,
     as_several as as_several,
     as_whole as as_whole,
+    is_number as is_number,
     random_numbers as random_numbers,
 )
 from selfmotion.basics.interruption import (

@@ -98,6 +98,11 @@ def as_whole(
     return int(value)
 
 
+def is_number(value: Any) -> bool:
+    """Whether a value of a document is a number; True and False are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def as_flag(value: Any, what: str, error: type[Exception] = ProblemError) -> bool:
     """Return `value`, True or False; `error` otherwise, whose message calls it `what`."""
     if not isinstance(value, bool | np.bool_):

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from selfmotion.basics import is_number
 from selfmotion.batch.row import Row
 
 # Of poses, what their numbers are called.
@@ -67,7 +68,7 @@ def maps(rows: Sequence[Row], links: Mapping[str, str]) -> list[str]:
 def _of_file(rows: Sequence[Row], links: Mapping[str, str], title: str) -> list[str]:
     flat = [_flat(row.settings) for row in rows]
     varying = [key for key in flat[0] if len({json.dumps(item.get(key)) for item in flat}) > 1]
-    axes = [key for key in varying if all(_is_number(item.get(key)) for item in flat)][:2]
+    axes = [key for key in varying if all(is_number(item.get(key)) for item in flat)][:2]
     if len(axes) < 2:
         return []
     others = [key for key in varying if key not in axes]
@@ -99,12 +100,8 @@ def _flat(value: Any, key: str = "") -> dict[str, Any]:
     return found
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
 def _text(value: Any) -> str:
-    return f"{value:g}" if _is_number(value) else str(value)
+    return f"{value:g}" if is_number(value) else str(value)
 
 
 @dataclass(frozen=True)

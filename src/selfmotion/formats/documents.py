@@ -7,7 +7,7 @@ from collections.abc import Collection, Hashable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import TURN, FileFormatError, nearest, write_text
+from selfmotion.basics import TURN, FileFormatError, is_number, nearest, write_text
 
 # Keys with a number for each joint.
 PER_JOINT = ("limit", "lock", "lower", "posture", "q", "qd", "qdd", "start", "upper")
@@ -233,7 +233,7 @@ def _scaled(value: Any, factor: float, where: str) -> Any:
         return [_scaled(item, factor, where) for item in value]
     if isinstance(value, dict) and where.endswith(_TABLES_OF_NUMBERS):
         return {key: _scaled(item, factor, where) for key, item in value.items()}
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if not is_number(value):
         raise FileFormatError(f"{where}: is {value!r}, expected numbers")
     try:
         return value * factor

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import PlainValidator, WithJsonSchema
 
-from selfmotion.basics import PathError
+from selfmotion.basics import PathError, is_number
 from selfmotion.formats.poses import ORIENTATIONS, pose_of
 
 # No angle, length, weight or time is beyond this, and its square is a number still.
@@ -34,7 +34,7 @@ def _is_sensible(value: float) -> bool:
 def _are_numbers(value: Any) -> bool:
     if isinstance(value, list):
         return bool(value) and all(map(_are_numbers, value))
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number(value)
 
 
 def _numbers(value: Any) -> Any:

@@ -10,7 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError, ProblemError, as_path, nearest, shown
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    ProblemError,
+    as_path,
+    is_number,
+    nearest,
+    shown,
+)
 from selfmotion.constraints import (
     Constraint,
     JointAccelerationLimits,
@@ -165,7 +173,7 @@ def _joint(file: Path, joint: str, values: Any) -> dict[str, float]:
 
 
 def _number(file: Path, where: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _MOST:
+    if not (is_number(value) and abs(value) <= _MOST):
         raise FileFormatError(f"{file}: {where} is {value!r}, expected a finite number")
     return float(value)
 

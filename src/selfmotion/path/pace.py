@@ -102,7 +102,7 @@ class Pace:
         return PPoly(np.stack([*higher, start, self.rate[:-1], self.sigma[:-1]]), self.t)
 
 
-def times_along(places: Array, rates: Array) -> Array:
+def _times_along(places: Array, rates: Array) -> Array:
     """Return when places (K,) are reached at rates (K,) whose squares are linear in between."""
     return np.append(0.0, np.cumsum(2.0 * np.diff(places) / (rates[:-1] + rates[1:])))
 
@@ -123,7 +123,7 @@ def largest_pace(lengths: Array, most: Array, gain: Array) -> tuple[Pace, Ints]:
         if squared[k + 1] + steps[k] < squared[k]:
             squared[k], limiting[k] = squared[k + 1] + steps[k], limiting[k + 1]
     rates = np.sqrt(squared)
-    return Pace(times_along(lengths, rates), lengths, rates), limiting
+    return Pace(_times_along(lengths, rates), lengths, rates), limiting
 
 
 def times_when(

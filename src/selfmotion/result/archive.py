@@ -74,7 +74,11 @@ class Archive(NamedTuple):
         their description, and put there: making their bodies takes a good part of a second.
         """
         description, arrays = read_archive(file)
-        _check_format(file, description)
+        if "move" in description:
+            raise FileFormatError(
+                f"{file}: is a move, not a plan: load_move reads it, and `selfmotion export`"
+            )
+        check_version(file, "plan", description.get("format"), FORMAT)
         written = description.pop("digest", None)
         altered = ""
         if written != digest_of(description, arrays):
@@ -117,22 +121,22 @@ def digest_of(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> st
     return digest.hexdigest()
 
 
-def _check_format(file: FilePath, description: Mapping[str, Any]) -> None:
-    found = description.get("format")
-    if found == FORMAT:
+class OtherVersionError(FileFormatError):
+    """A file is of a format that is not read here."""
+
+
+def check_version(file: FilePath, kind: str, found: object, wanted: int) -> None:
+    """Refuse a format that is not ours, and say which version wrote it, where that is known."""
+    if found == wanted:
         return
-    if "move" in description:
-        raise FileFormatError(
-            f"{file}: is a move, not a plan: load_move reads it, and `selfmotion export`"
+    if isinstance(found, bool) or not isinstance(found, int):
+        raise OtherVersionError(
+            f"{file}: is no {kind}, or a damaged one: its format is {found!r}, expected {wanted}"
         )
-    if isinstance(found, int) and found > FORMAT:
-        raise FileFormatError(
-            f"{file}: has format {found}, this version of selfmotion reads format {FORMAT}; "
-            f"install a newer one"
-        )
-    raise FileFormatError(
-        f"{file}: has no format number, or one before {FORMAT}: it was written by an earlier "
-        f"version of selfmotion, or is no plan; plan anew"
+    age = "an older" if found < wanted else "a newer"
+    raise OtherVersionError(
+        f"{file}: was written by {age} version of selfmotion (a {kind} of format {found}, expected "
+        f"{wanted}): make it anew, or read it with that version"
     )
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import FileFormatError, write_atomically
-from selfmotion.result.archive import digest_of
+from selfmotion.result.archive import OtherVersionError, check_version, digest_of
 from selfmotion.result.move import Move, load_move
 from selfmotion.result.plan import Plan, load_plan
 
@@ -69,7 +69,7 @@ def read_bundle(
             description: dict[str, Any] = json.loads(archive.read(_NAME))
             if description["kind"] != kind:
                 raise ValueError(f"it is a {description['kind']}, expected a {kind}")
-            _check_version(file, kind, description["version"], version)
+            check_version(file, kind, description["version"], version)
             changed = description.pop("digest", None) != digest_of(description, {})
             made, known = list[Plan | Move](), dict[str, Any]()
             for number, item in enumerate(description["members"]):
@@ -83,7 +83,7 @@ def read_bundle(
         raise FileFormatError(f"{file}: no such file") from None
     except OSError as error:
         raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
-    except _OtherVersionError:
+    except OtherVersionError:
         raise
     # Any number or key of a damaged file may be any other, and fail anywhere.
     except Exception as error:
@@ -92,23 +92,6 @@ def read_bundle(
     if not made:
         raise FileFormatError(f"{file}: is no {kind}, or a damaged one: it holds no motion")
     return description, made, changed
-
-
-class _OtherVersionError(FileFormatError):
-    """The file is sound, and of another version."""
-
-
-def _check_version(file: Path, kind: str, found: object, wanted: int) -> None:
-    """Refuse a format that is not ours, and say which version wrote it, where that is known."""
-    if found == wanted:
-        return
-    if isinstance(found, bool) or not isinstance(found, int):
-        raise ValueError(f"its format is {found!r}, expected {wanted}")
-    age = "an older" if found < wanted else "a newer"
-    raise _OtherVersionError(
-        f"{file}: was written by {age} version of selfmotion (a {kind} of format {found}, expected "
-        f"{wanted}): make it anew, or read it with that version"
-    )
 
 
 def _member(number: int) -> str:

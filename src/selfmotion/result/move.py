@@ -20,7 +20,7 @@ from selfmotion.collision import Obstacle
 from selfmotion.constraints import Constraint
 from selfmotion.motion import Trajectory
 from selfmotion.problem import arm_and_constraints, describe_arm
-from selfmotion.result.archive import arrays_of, digest_of, trajectory_of
+from selfmotion.result.archive import arrays_of, check_version, digest_of, trajectory_of
 from selfmotion.robot import RobotModel
 
 # Raised with every change that older versions cannot read.
@@ -153,11 +153,9 @@ def load_move(file: str | FilePath, *, known: MutableMapping[str, Any] | None = 
     """
     path = as_path(file)
     description, arrays = read_archive(path)
-    if description.get("move") != _FORMAT:
-        raise FileFormatError(
-            f"{path}: is no move of format {_FORMAT}: it is a plan or a program, or was written by "
-            f"another version of selfmotion"
-        )
+    if "move" not in description and "format" in description:
+        raise FileFormatError(f"{path}: is a plan, not a move: load_plan reads it")
+    check_version(path, "move", description.get("move"), _FORMAT)
     written = description.pop("digest", None)
     altered = written != digest_of(description, arrays)
     try:

@@ -63,6 +63,11 @@ class PaceLimits:
         """The limits of q̇, q̈ and the jerk."""
         return self.speed, self.acceleration, self.jerk
 
+    @property
+    def has_jerk(self) -> bool:
+        """Whether the jerk of some joint is limited."""
+        return bool(np.isfinite(self.jerk).any())
+
     def with_length(self) -> "PaceLimits":
         """Return the same with the length of the joint path as one more joint."""
         speed, acceleration = (

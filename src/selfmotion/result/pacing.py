@@ -86,18 +86,12 @@ def fastest_pace(motion: Trajectory, limits: PaceLimits, ends: Ends, step: float
     rough = limits.without_jerk()
     pace = _scaled(of_constant_speed(motion), motion, rough)
     for most in _FIRST:
-        near = Squares.constant(pace.t, 1.0)
-        room = _all_room(len(pace.t) - 1, rough)
-        better, _ = _improved(pace, motion, rough, room, near, ends, most, _ROUGH_GAP)
-        pace = _changed(pace, better)
-    jerk = bool(np.isfinite(limits.jerk).any())
-    for _ in range(_BASES if jerk else 0):
+        pace = _stepped(pace, motion, rough, ends, most)
+    for _ in range(_BASES if limits.has_jerk else 0):
         # Tangents hold near a pace, so that the next one begins anew from there.
-        pace = _scaled(smooth(pace, step, jerk, len(motion.t)), motion, limits)
-        near, room = Squares.constant(pace.t, 1.0), _all_room(len(pace.t) - 1, limits)
-        better, _ = _improved(pace, motion, limits, room, near, ends, _BY_JERKS, _ROUGH_GAP)
-        pace = _changed(pace, better)
-    pace = _scaled(smooth(pace, step, jerk, len(motion.t)), motion, limits)
+        pace = _scaled(smooth(pace, step, limits.has_jerk, len(motion.t)), motion, limits)
+        pace = _stepped(pace, motion, limits, ends, _BY_JERKS)
+    pace = _scaled(smooth(pace, step, limits.has_jerk, len(motion.t)), motion, limits)
     return _settled(pace, motion, limits, ends)
 
 
@@ -116,8 +110,7 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
     best, before = ((np.inf, np.inf), base), base.t[-1]
     near = Squares.constant(_knots(base, motion, limits), 1.0)
     room = _all_room(len(near.knots) - 1, limits)
-    jerk = bool(np.isfinite(limits.jerk).any())
-    most, count, unsolved = _BY_JERKS_LATER if jerk else _OTHERS, len(near.knots), 0
+    most, count, unsolved = _BY_JERKS_LATER if limits.has_jerk else _OTHERS, len(near.knots), 0
     for number in range(_MOST_STEPS):
         known = near
         near, reached = _improved(base, motion, limits, room, known, ends, most, _GAP)
@@ -146,7 +139,7 @@ def _settled(base: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends) -> 
         before = pace.t[-1]
         # Where it became as fast as a step may make it, knots are not what holds it.
         held = near.inside(0.5) < _ALL * most * known.inside(0.5)
-        idle = (least < _IDLE) & held & jerk
+        idle = (least < _IDLE) & held & limits.has_jerk
         cut = _to_cut(over, idle, pace)
         if number >= _ADDING or len(near.knots) + np.count_nonzero(cut) > _MORE * count:
             cut[:] = False
@@ -208,6 +201,12 @@ def _scaled(pace: Pace, motion: Trajectory, limits: PaceLimits, least: float = 0
     return pace.slower(max(needed, least) * (1.0 + _ROUNDING))
 
 
+def _stepped(pace: Pace, motion: Trajectory, limits: PaceLimits, ends: Ends, most: float) -> Pace:
+    """Return a pace after one rough step with all the room there is."""
+    near, room = Squares.constant(pace.t, 1.0), _all_room(len(pace.t) - 1, limits)
+    return _changed(pace, _improved(pace, motion, limits, room, near, ends, most, _ROUGH_GAP)[0])
+
+
 def _improved(
     base: Pace,
     motion: Trajectory,
@@ -226,11 +225,10 @@ def _improved(
     knots = near.knots
     states = States.of(motion, base, knots)
     start, fixed = _INSIDE * near.c, np.zeros(len(near.c), dtype=bool)
-    jerk = bool(np.isfinite(limits.jerk).any())
     for kept, end in ((ends.start_kept, 0), (ends.end_kept, -1)):
         if kept:
             _keep(start, fixed, end, base, knots)
-        elif _starts(states, end, jerk):
+        elif _starts(states, end, limits.has_jerk):
             start[end], fixed[end] = 0.0, True
     rows = rows_of(states, limits, room, near)
     # To first order the time falls with half the integral of b by b^(3/2).
@@ -240,7 +238,7 @@ def _improved(
     upper = np.minimum(most * near.c, _MOST) + 2.0 * LEAST
     upper = np.where(fixed, start, upper)
     # Where a pace may not be much slower either, none can be within the room that is left.
-    for lower in ([near.c / most] if jerk else []) + [0.0 * near.c]:
+    for lower in ([near.c / most] if limits.has_jerk else []) + [0.0 * near.c]:
         least = np.where(fixed, start, np.maximum(lower, LEAST))
         found, reached = banded_optimum(gradient, rows, start, least, upper, gap)
         if reached:
