@@ -14,6 +14,8 @@ from selfmotion.basics import read_only
 from selfmotion.cli.app import app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.collision.kernels import winding_number
+from selfmotion.job.exchange import improved
+from selfmotion.job.stops import Stops
 from selfmotion.task import SE3
 
 
@@ -85,6 +87,7 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "a global search", plan(free, search=sm.Search(mode="global"))
     yield "self-motion curves", plan(replace(free, task="pose"), search=sm.Search(mode="global"))
     yield "several tips and moving frames", plan(_carried())
+    yield "orders of many seams", lambda: improved(_two_stops())
     yield "moves", lambda: sm.move(arm, home, home + 0.3, clearance=box)
     yield "a replanner", lambda: realtime.warm_up(realtime.Replanner(arm, "position"))
 
@@ -99,6 +102,12 @@ def _refused(problem: sm.Problem) -> str:
 def _far(pose: SE3) -> SE3:
     """Return a pose that no Panda reaches."""
     return SE3(pose.rotation, pose.translation + np.array([1.5, 0.0, 0.0]))
+
+
+def _two_stops() -> Stops:
+    """Return two seams that can be made one way each, in any order."""
+    none, any_, free = [frozenset[int]()] * 2, np.ones(2), np.zeros((2, 2), dtype=bool)
+    return Stops(none, none, np.arange(2), any_, np.ones((2, 2)), any_, any_, free)
 
 
 def _carried() -> sm.Problem:

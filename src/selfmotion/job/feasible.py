@@ -20,6 +20,7 @@ def feasible_order(
     between: Flags,
     first: Flags,
     last: Flags,
+    too_late: Flags,
 ) -> list[int] | None:
     """Return an order of all stops that can be made; None where none was found.
 
@@ -37,6 +38,8 @@ def feasible_order(
         Whether one can go from the end of a state to the beginning of another one.
     first, last : (m,)
         Whether a state can be the first, or the last.
+    too_late : (m, n)
+        Whether a state cannot be made any more once a stop is made.
     """
     ways = between.T
     search = _Search(
@@ -47,6 +50,7 @@ def feasible_order(
         into=[_places(np.asarray(ways[each].any(axis=0))) for each in states],
         first=_places(first),
         last=_places(last),
+        lost=[_places(column) for column in too_late.T],
     )
     return search.order()
 
@@ -67,6 +71,8 @@ class _Search:
         The states that lead to each stop.
     first, last : int
         The states that can be the first, or the last.
+    lost : list of int
+        The states that cannot be made any more once each stop is made.
     looks : int
         So many stops were looked at as the next one.
     """
@@ -78,6 +84,7 @@ class _Search:
     into: list[int]
     first: int
     last: int
+    lost: list[int]
     looks: int = 0
 
     def order(self) -> list[int] | None:
@@ -113,12 +120,17 @@ class _Search:
         todo = 0
         for stop in left:
             todo |= self.of[stop]
-        # One that nothing leads to any more is never made.
-        if made and not all(self.into[stop] & (todo | reached) for stop in left):
+        for stop, lost in enumerate(self.lost):
+            if made >> stop & 1:
+                todo &= ~lost
+        # One without a state, or that nothing leads to any more, is never made.
+        if not all(self.of[stop] & todo for stop in left) or (
+            made and not all(self.into[stop] & (todo | reached) for stop in left)
+        ):
             return iter(())
         rated = []
         for stop in left:
-            here = self.of[stop] & beyond
+            here = self.of[stop] & beyond & todo
             if here and self._may(stop, made):
                 rated.append(((self._beyond(here) & todo & ~self.of[stop]).bit_count(), stop, here))
         return iter([(stop, here) for _, stop, here in sorted(rated)])

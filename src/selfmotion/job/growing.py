@@ -1,46 +1,37 @@
 """Jobs whose seams leave something behind: each is planned past what stands there by then."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.certificate import FinishedMotion
 from selfmotion.collision import Obstacle
-from selfmotion.job.ordering import Ordering, State
+from selfmotion.job.ordering import Ordering
 from selfmotion.job.program import Program
 from selfmotion.job.seam import JOB_END, JOB_START, Seam
 from selfmotion.job.seam_steps import seam_steps
 from selfmotion.job.step import Step
 from selfmotion.job.work import Work
-from selfmotion.problem import Problem
 from selfmotion.result import Move, Plan
 
-# A seam is tried in so many ways that are known, before others are looked for; and comes earlier,
-# where something stands in its way, so often.
-_WAYS, _EARLIER = 8, 3
-
-
-@dataclass(frozen=True, eq=False)
-class _Sofar:
-    """What is made: steps, what stands there, where the arm is, and after which seam."""
-
-    steps: tuple[Step, ...] = ()
-    standing: tuple[Obstacle, ...] = ()
-    q: Array | None = None
-    seam: Seam | None = None
-
-    def without(self, *seams: Seam | None) -> tuple[Obstacle, ...]:
-        """Return what stands there but for what seams may meet."""
-        may = {name for seam in seams if seam is not None for name in seam.may_meet}
-        return tuple(item for item in self.standing if item.name not in may)
+# For a seam other ways are looked for so often.
+_TRIES = 3
+# What stands there, by name.
+_Standing = dict[str, Obstacle]
+# From which state to which one past what; None is the start or the end of the program.
+_Way = tuple[int | None, int | None, frozenset[str]]
 
 
 class Growing:
-    """Builds the program of a job that leaves something behind, one seam after the other.
+    """Builds the program of a job that leaves something behind.
 
-    The order is that by what moves take at least. A seam that cannot be made any more at its place
-    comes earlier, before what stands in its way; where that does not help, or the order is given,
-    it is missing, and said to be.
+    The order is that by what moves take at least. A state that meets what stands there by then is
+    too late for it, for good: what stands there stays. With that known the order is looked for
+    again, until each seam can be made at its place and reached. Where no order is left, other ways
+    are looked for to make the seams in question; where there are none, these are missing, and said
+    to be.
 
     Parameters
     ----------
@@ -53,144 +44,214 @@ class Growing:
     def __init__(self, ordering: Ordering, work: Work, ends: tuple[Array | None, ...]) -> None:
         self._ordering, self._work, self._ends = ordering, work, ends
         self._notes: list[str] = []
-        self._blockers: set[str] = set()
+        self._leaves_it = {
+            item.name: number for number, seam in enumerate(ordering.seams) for item in seam.leaves
+        }
+        # What plans are known to keep clear of; states that were checked past something; moves.
+        self._clear: dict[Plan, set[str]] = {}
+        self._checked: dict[tuple[int, frozenset[str]], Plan] = {}
+        self._moves: dict[_Way, Move] = {}
+        # Seams that did not go at their place: past what, from where, and why; the last one last.
+        self._troubles: dict[int, tuple[_Standing, Array | None, str]] = {}
+        self._tries: dict[int, int] = {}
 
     def program(self) -> Program:
         """Return the program; what could not be made is named."""
-        ordering, found = self._ordering, self._ordering.best()
-        order = [ordering.states[k] for k in found.states]
-        # What is made before each place.
-        sofar = [_Sofar(q=self._ends[0])]
-        earlier: dict[int, int] = {}
-        while len(sofar) <= len(order):
-            place = len(sofar) - 1
-            state = order[place]
-            self._work.tell("program", place + 1, len(order))
-            following = order[place + 1] if place + 1 < len(order) else None
-            made, why = self._next(sofar[-1], state, following)
-            if made is not None:
-                sofar.append(made)
-                continue
-            tries = earlier[state.seam] = earlier.get(state.seam, 0) + 1
-            earlier_may_help = ordering.is_free and tries <= _EARLIER
-            before = self._before_blockers(order, place) if earlier_may_help else place
-            name = ordering.seams[state.seam].name
-            if before < place:
-                self._notes.append(f"'{name}' comes earlier: {why}")
-                order.insert(before, order.pop(place))
-                del sofar[before + 1 :]
-            else:
-                ordering.drop(state.seam, why)
-                kept = set(ordering.made)
-                order = [item for item in order if item.seam in kept]
-        steps = self._to_the_end(sofar[-1])
-        robot, missing = self._work.asked.robot, dict(ordering.missing)
+        found = self._ordering.best()
+        states: Sequence[int] = found.states
+        while states and not self._goes(states):
+            states = self._ordering.best(states).states or self._otherwise(states)
+        robot, missing = self._work.asked.robot, dict(self._ordering.missing)
+        steps = tuple(self._steps(states))
         return Program(robot, steps, missing, found.bound, tuple(self._notes))
 
-    def _next(
-        self, sofar: _Sofar, state: State, following: State | None
-    ) -> tuple[_Sofar | None, str]:
-        """Return what is made after a seam; or None, and why it cannot be made."""
-        seam = self._ordering.seams[state.seam]
-        self._blockers, why = set(), ""
-        # The first that can be made and reached.
-        for plan, turned, reason in self._ways(sofar, state, following):
-            if plan is None:
-                why = why or reason
-                continue
-            start = plan.trajectory.q[0]
-            steps: list[Step] = []
-            if sofar.q is not None:
-                standing = sofar.without(sofar.seam, seam)
-                (move,) = self._work.moves([(sofar.q, start, standing)])
-                if not move.verified:
-                    why = why or f"the move to it: {move.trouble}"
-                    continue
-                steps.append(self._move_step(sofar, seam, move))
-            steps += seam_steps(seam, plan, turned, self._work, sofar.without(seam))
-            standing = (*sofar.standing, *seam.leaves)
-            whole = (*sofar.steps, *steps)
-            return _Sofar(whole, standing, plan.trajectory.q[-1], seam), ""
-        return None, why
+    def _goes(self, states: Sequence[int]) -> bool:
+        """Whether an order can be made as it is; what is in its way is learnt."""
+        return self._all_clear(states) and self._all_verified(states) and self._all_reached(states)
 
-    def _ways(
-        self, sofar: _Sofar, state: State, following: State | None
-    ) -> Iterator[tuple[Plan | None, bool, str]]:
-        """Yield plans of a seam past what stands there, those known first, or why one is none."""
-        seam = self._ordering.seams[state.seam]
-        standing = sofar.without(seam)
-        problems = {
-            turned: self._work.asked.problem(seam, standing, turned)
-            for turned in ([False, True] if seam.either_way else [False])
-        }
-        for one in self._known_ways(sofar, state, following):
-            if not standing:
-                yield one.made, one.turned, ""
+    def _places(self, states: Sequence[int]) -> Iterator[tuple[int, Array | None, _Standing]]:
+        """Yield each state with where the arm comes from, and what stands in its way by then."""
+        q, standing = self._ends[0], _Standing()
+        for state in states:
+            seam = self._seam(state)
+            yield state, q, _without(standing, seam)
+            q = self._ordering.states[state].ends[1]
+            standing |= {item.name: item for item in seam.leaves}
+
+    def _all_clear(self, states: Sequence[int]) -> bool:
+        """Whether each seam keeps clear of what stands there by then."""
+        goes = True
+        for number, (state, q, past) in enumerate(self._places(states), start=1):
+            self._work.tell("program", number, len(states))
+            met, why = self._met(self._ordering.states[state].plan, past)
+            if met:
+                goes = False
+                self._ordering.learn_late(state, {self._leaves_it[name] for name in met})
+                self._trouble(state, q, past, why)
+        return goes
+
+    def _met(self, plan: Plan, past: _Standing) -> tuple[set[str], str]:
+        """Return what of all that stands there a plan meets, and how it meets the first."""
+        asked = self._work.asked
+        clear = self._clear.setdefault(plan, set())
+        met, why = set[str](), ""
+        while new := {n: item for n, item in past.items() if n not in clear and n not in met}:
+            apart = asked.apart(tuple(new.values()))
+            motion = FinishedMotion(asked.robot, plan.trajectory)
+            found = None if apart is None else apart.requirement(asked.robot).judge(motion)
+            if found is None or found.kept:
+                clear |= set(new)
+                break
+            why = why or found.text
+            # What is not named may be any of them.
+            met |= {name for name in found.subject.split(" - ") if name in new} or set(new)
+        return met, why
+
+    def _all_verified(self, states: Sequence[int]) -> bool:
+        """Whether each seam is verified with all that stands there by then."""
+        goes = True
+        for state, q, past in self._places(states):
+            check = self._past(state, past).certificate
+            if past and not check.verified:
+                goes = False
+                self._ordering.learn_late(state, {self._leaves_it[name] for name in past})
+                self._trouble(state, q, past, check.verdict)
+        return goes
+
+    def _past(self, state: int, past: _Standing) -> Plan:
+        """Return the plan of a state, checked with what stands there."""
+        key = state, frozenset(past)
+        if key not in self._checked:
+            one, plan = self._ordering.states[state], self._ordering.states[state].made
+            if past:
+                seam = self._ordering.seams[one.seam]
+                problem = self._work.asked.problem(seam, tuple(past.values()), one.turned)
+                plan = replace(plan, problem=problem)
+                plan = replace(plan, certificate=plan.check())
+            self._checked[key] = plan
+        return self._checked[key]
+
+    def _all_reached(self, states: Sequence[int]) -> bool:
+        """Whether the move to each seam is found."""
+        ways = self._ways(states)
+        new = [way for way in ways if way not in self._moves]
+        asked = [(*self._ends_of(way), tuple(ways[way].values())) for way in new]
+        self._moves |= zip(new, self._work.moves(asked), strict=True)
+        goes = True
+        for way, past in ways.items():
+            first, last, _ = way
+            # The end of the program is where it was asked for, whatever the order.
+            if last is not None and not self._moves[way].verified:
+                goes = False
+                self._ordering.learn(first, last, np.inf)
+                why = f"the move to it: {self._moves[way].trouble}"
+                self._trouble(last, self._ends_of(way)[0], past, why)
+        return goes
+
+    def _ways(self, states: Sequence[int]) -> dict[_Way, _Standing]:
+        """Return the moves of an order, and what stands in the way of each."""
+        found = dict[_Way, _Standing]()
+        standing, before = _Standing(), None
+        for state in (*states, None):
+            ends = [None if k is None else self._seam(k) for k in (before, state)]
+            past = _without(standing, *ends)
+            if self._goes_between(before, state):
+                found[before, state, frozenset(past)] = past
+            if state is not None:
+                standing |= {item.name: item for item in self._seam(state).leaves}
+            before = state
+        return found
+
+    def _goes_between(self, first: int | None, last: int | None) -> bool:
+        """Whether there is a move: not to ends of the program that were not asked for."""
+        asked = self._ends[0] is not None, self._ends[1] is not None
+        return (first is not None or asked[0]) and (last is not None or asked[1])
+
+    def _ends_of(self, way: _Way) -> tuple[Array, Array]:
+        """Return where a move begins and ends, (n,) each."""
+        states = self._ordering.states
+        first = self._ends[0] if way[0] is None else states[way[0]].ends[1]
+        last = self._ends[1] if way[1] is None else states[way[1]].ends[0]
+        if first is None or last is None:
+            raise RuntimeError("no move leads to where nothing was asked for")
+        return first, last
+
+    def _trouble(self, state: int, q: Array | None, past: _Standing, why: str) -> None:
+        """Keep it in mind that a state did not go past something, from a configuration (n,)."""
+        seam = self._ordering.states[state].seam
+        self._troubles.pop(seam, None)
+        self._troubles[seam] = past, q, why
+        self._notes.append(f"'{self._ordering.name_of(state)}' is made otherwise: {why}")
+
+    def _otherwise(self, states: Sequence[int]) -> Sequence[int]:
+        """Return an order with other ways to make seams that did not go, or without them."""
+        found: Sequence[int] = ()
+        while not found and self._troubles:
+            seam, (past, q, why) = self._troubles.popitem()
+            name = self._ordering.seams[seam].name
+            if name in self._ordering.missing:
                 continue
-            plan, reason = self._past(one.made, problems[one.turned])
-            yield plan, one.turned, reason
-        # Others begin clear of what stands there; what they meet later is judged as well.
-        alone = {turned: self._work.asked.problem(seam, (), turned) for turned in problems}
-        if sofar.q is not None:
-            wanted = [(seam, problem, sofar.q) for problem in alone.values()]
-            for turned, plans in zip(alone, self._work.nearby(wanted), strict=True):
-                for plan in plans:
-                    past, why = self._past(plan, problems[turned])
-                    yield past, turned, why
-        for turned, problem in problems.items():
-            ((plans, reason),) = self._work.branches([(seam, alone[turned])], problem)
+            tries = self._tries[seam] = self._tries.get(seam, 0) + 1
+            if tries <= _TRIES and self._added(seam, q, past):
+                self._troubles = {seam: (past, q, why), **self._troubles}
+            else:
+                self._ordering.drop(seam, why)
+            made = set(self._ordering.made)
+            near = [state for state in states if self._ordering.states[state].seam in made]
+            found = self._ordering.best(near).states
+        return found
+
+    def _added(self, number: int, q: Array | None, past: _Standing) -> bool:
+        """Add ways to make a seam that keep clear of what stands there; whether there are any."""
+        seam, work = self._ordering.seams[number], self._work
+        turns = [False, True] if seam.either_way else [False]
+        alone = {turned: work.asked.problem(seam, (), turned) for turned in turns}
+        wanted = [] if q is None else [(seam, alone[turned], q) for turned in turns]
+        ways = [*zip(turns, work.nearby(wanted), strict=True)] if wanted else []
+        if not self._added_of(number, ways, past):
+            # Others begin clear of what stands there; what they meet later is judged as well.
+            allowed = [work.asked.problem(seam, tuple(past.values()), turned) for turned in turns]
+            ways = [
+                (turned, work.branches([(seam, alone[turned])], problem)[0][0])
+                for turned, problem in zip(turns, allowed, strict=True)
+            ]
+            return self._added_of(number, ways, past)
+        return True
+
+    def _added_of(
+        self, number: int, ways: Sequence[tuple[bool, Sequence[Plan]]], past: _Standing
+    ) -> bool:
+        """Add those plans of a seam that keep clear of what stands there; whether any does."""
+        count = len(self._ordering.states)
+        for turned, plans in ways:
             for plan in plans:
-                past, why = self._past(plan, problem)
-                yield past, turned, why
-            if not plans:
-                yield None, turned, reason
+                if not self._met(plan, past)[0]:
+                    self._ordering.add(number, plan, turned)
+        return len(self._ordering.states) > count
 
-    def _known_ways(self, sofar: _Sofar, state: State, following: State | None) -> list[State]:
-        """Return the states of a seam, the one that was chosen and then the nearest first."""
-        ordering = self._ordering
-        same = [one for one in ordering.states if one.seam == state.seam and one is not state]
+    def _steps(self, states: Sequence[int]) -> Iterator[Step]:
+        """Yield the steps of a program: moves, seams and waits."""
+        moves = {way[1]: (way, self._moves[way]) for way in self._ways(states)} if states else {}
+        for state, _, past in self._places(states):
+            if state in moves:
+                yield self._move_step(*moves[state])
+            seam, turned = self._seam(state), self._ordering.states[state].turned
+            plan, standing = self._past(state, past), tuple(past.values())
+            yield from seam_steps(seam, plan, turned, self._work, standing)
+        if None in moves:
+            yield self._move_step(*moves[None])
 
-        def far(one: State) -> float:
-            to = 0.0 if sofar.q is None else ordering.seconds(sofar.q, one.ends[0])
-            away = 0.0 if following is None else ordering.seconds(one.ends[1], following.ends[0])
-            return to + away
+    def _move_step(self, way: _Way, move: Move) -> Step:
+        first, last = (None if k is None else self._seam(k) for k in way[:2])
+        names = JOB_START if first is None else first.name, JOB_END if last is None else last.name
+        may = tuple(name for one in (first, last) if one is not None for name in one.may_meet)
+        return Step(" → ".join(names), move, may_meet=may)
 
-        return [state, *sorted(same, key=far)][:_WAYS]
+    def _seam(self, state: int) -> Seam:
+        return self._ordering.seams[self._ordering.states[state].seam]
 
-    def _past(self, plan: Plan, problem: Problem) -> tuple[Plan | None, str]:
-        """Return a plan for a problem with more that stands there; or None, and what it meets."""
-        apart = problem.own_collision
-        if apart is not None:
-            found = apart.requirement(problem.robot).judge(
-                FinishedMotion(problem.robot, plan.trajectory)
-            )
-            if not found.kept:
-                self._blockers |= set(found.subject.split(" - "))
-                return None, found.text
-        checked = replace(plan, problem=problem)
-        checked = replace(checked, certificate=checked.check())
-        verified = checked.certificate.verified
-        return (checked, "") if verified else (None, checked.certificate.verdict)
 
-    def _before_blockers(self, order: list[State], place: int) -> int:
-        """Return an earlier place for a seam, before what stands in its way; its own for none."""
-        ordering = self._ordering
-        for at, state in enumerate(order[:place]):
-            left = {item.name for item in ordering.seams[state.seam].leaves}
-            if left & self._blockers:
-                moved = [one.seam for one in order]
-                moved.insert(at, moved.pop(place))
-                return at if ordering.keeps(moved) else place
-        return place
-
-    def _move_step(self, sofar: _Sofar, seam: Seam | None, move: Move) -> Step:
-        first = JOB_START if sofar.seam is None else sofar.seam.name
-        last = JOB_END if seam is None else seam.name
-        may = tuple(name for one in (sofar.seam, seam) if one is not None for name in one.may_meet)
-        return Step(f"{first} → {last}", move, may_meet=may)
-
-    def _to_the_end(self, sofar: _Sofar) -> tuple[Step, ...]:
-        if self._ends[1] is None or sofar.q is None:
-            return sofar.steps
-        (move,) = self._work.moves([(sofar.q, self._ends[1], sofar.without(sofar.seam))])
-        return (*sofar.steps, self._move_step(sofar, None, move))
+def _without(standing: _Standing, *seams: Seam | None) -> _Standing:
+    """Return what stands there but for what seams may meet."""
+    may = {name for seam in seams if seam is not None for name in seam.may_meet}
+    return {name: item for name, item in standing.items() if name not in may}

@@ -1,14 +1,15 @@
 """The order of a job by what is known of its moves."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from selfmotion.basics import Array, ProblemError
-from selfmotion.job.order import EXACT, Before, Round, Stops, best_round
+from selfmotion.job.order import EXACT, best_round
 from selfmotion.job.seam import Seam, backwards_plan
+from selfmotion.job.stops import Before, Round, Stops
 from selfmotion.job.work import Work
 from selfmotion.planning import FreeMotions
 from selfmotion.problem import Problem
@@ -92,19 +93,21 @@ class Ordering:
         self.missing: dict[str, str] = {}
         # What is known better than by limits: from state to state, None for the ends.
         self._known: dict[tuple[int | None, int | None], float] = {}
+        # The seams that plans cannot come after.
+        self._too_late: dict[Plan, set[int]] = {}
         self.problems: list[Problem] = [asked.problem(seam) for seam in self.seams]
         found = work.branches(list(zip(self.seams, self.problems, strict=True)))
         for number, (plans, reason) in enumerate(found):
             if not plans:
                 self.missing[self.seams[number].name] = reason
             for plan in plans:
-                self._add(number, plan)
+                self.add(number, plan)
         self._drop_what_hangs()
         if self.states:
             self._add_alike()
             self._add_nearby()
 
-    def _add(self, seam: int, plan: Plan, turned: bool = False) -> None:
+    def add(self, seam: int, plan: Plan, turned: bool = False) -> None:
         """Add a way to make a seam, and the same the other way round where that is one."""
         self.states.append(State(seam, plan, turned))
         if self.seams[seam].either_way:
@@ -150,6 +153,10 @@ class Ordering:
         """Take it from now on that a move between states takes so long; inf for none at all."""
         self._known[first, last] = seconds
 
+    def learn_late(self, state: int, seams: Iterable[int]) -> None:
+        """Take it from now on that a state, and its mirror image, cannot come after seams."""
+        self._too_late.setdefault(self.states[state].plan, set()).update(seams)
+
     @property
     def made(self) -> list[int]:
         """The seams that are not missing."""
@@ -175,8 +182,10 @@ class Ordering:
         )
         return Before(after, after_any)
 
-    def best(self) -> Round:
+    def best(self, near: Sequence[int] | None = None) -> Round:
         """Return the best round of states by what is known; its states are numbers of `states`.
+
+        Many seams are ordered from a round of states that is `near` to it, where there is one.
 
         Raises
         ------
@@ -194,8 +203,9 @@ class Ordering:
                 "the seams are in an order in which one comes before what it has to come after; "
                 "give order='free', or another list"
             )
-        found = best_round(stops, given)
-        if not found.states and np.isfinite(stops.between).all():
+        beside = None if near is None else [place[self.states[k].seam] for k in near]
+        found = best_round(stops, given, beside)
+        if not found.states and not self._known and not self._too_late:
             raise ProblemError("what seams have to come after goes round in a circle")
         return Round(tuple(kept[k] for k in found.states), found.cost, found.bound)
 
@@ -211,6 +221,10 @@ class Ordering:
             elif one in row and other in row:
                 between[row[one], row[other]] = seconds
         before = self._before(place)
+        too_late = np.zeros((len(kept), len(place)), dtype=bool)
+        for k, state in enumerate(kept):
+            seams = self._too_late.get(self.states[state].plan, ())
+            too_late[k, [place[seam] for seam in seams if seam in place]] = True
         return Stops(
             before.after,
             before.after_any,
@@ -219,6 +233,7 @@ class Ordering:
             between,
             first,
             last,
+            too_late,
         )
 
     @cached_property
@@ -246,7 +261,7 @@ class Ordering:
             for plan in found:
                 starts = [self.seconds(plan.trajectory.q[0], state.ends[0]) for state in known]
                 if min(starts) > _WORTH:
-                    self._add(seam, plan)
+                    self.add(seam, plan)
 
     def _add_nearby(self) -> None:
         """Add motions that begin near where the one before ends, along the best round."""
@@ -274,7 +289,7 @@ class Ordering:
                     starts = plan.trajectory.q[0], here.ends[0]
                     nearer, present = (self.seconds(before, q) for q in starts)
                     if nearer < present - _WORTH:
-                        self._add(here.seam, plan, here.turned)
+                        self.add(here.seam, plan, here.turned)
                         added += 1
             if not added:
                 break

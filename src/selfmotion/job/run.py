@@ -56,8 +56,9 @@ def plan_job(
     exactly for up to twelve seams, and beyond that by insertion and exchange, with a bound told.
     Then the moves are planned. Where one takes longer than it should, or is not found, the order is
     looked for again: up to twelve seams the one that results is the best of all orders of the
-    motions that are known, by the times of the moves themselves. Where a seam leaves something
-    behind, what comes later is planned past it, one after the other.
+    motions that are known, by the times of the moves themselves. Where seams leave
+    something behind, motions that meet it come before it: the order is looked for again until
+    every seam and move can be made past what stands there by then.
 
     Parameters
     ----------
