@@ -69,6 +69,7 @@ bench-spirals: $(READY)  ## loops of a spiral, from a few to an hour of them
 
 fuzz-job: $(READY)  ## a job killed at 20 random times, and begun again
 	$(BIN)/python benchmarks/job_killed.py
+	$(BIN)/python benchmarks/job_killed.py --workers 2
 
 bench-job: $(READY)  ## a frame of 132 strokes: order, plans, moves past what was made
 	$(BIN)/python benchmarks/job.py
