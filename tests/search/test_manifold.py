@@ -72,3 +72,21 @@ def test_bases_are_carried_without_turning() -> None:
         np.testing.assert_allclose(robot.task_jacobian(here, task) @ basis, 0.0, atol=1e-12)
     # Between neighbours 0.03 rad apart, bases of the same planes turn about as much.
     assert np.abs(np.diff(bases, axis=0)).max() < 0.1
+
+
+@pytest.mark.parametrize("short", [1e-4, 1e-6, 1e-9])
+def test_from_near_by_it_arrives_at_poses_that_are_all_but_singular(short: float) -> None:
+    # Nearly stretched out a planar arm reaches a point, but its steps there are long and many.
+    robot = robot_named("planar_3r")
+    free = np.full(robot.dof, np.inf)
+    manifold = Manifold(standing(robot, sm.Task.PLANAR), -free, free)
+    stretched = np.zeros(robot.dof)
+    place = robot.pose(stretched).translation * (1.0 - short)
+    target = np.concatenate([place, np.eye(3).ravel()])
+    begun = stretched + [0.05, -0.03, 0.02]
+    (q,), arrived = manifold.project(begun[None], target)
+    assert arrived.all()
+    assert np.linalg.norm(robot.pose(q).translation - place) < 1e-9
+    # What is beyond is not reached in any number of steps.
+    beyond = np.concatenate([robot.pose(stretched).translation * (1.0 + 1e-3), np.eye(3).ravel()])
+    assert not manifold.project(begun[None], beyond)[1].any()

@@ -57,19 +57,22 @@ class Manifold:
         far : bool
             Whether q is any configuration instead of one near the solution.
         """
-        found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
         wanted = np.array(np.broadcast_to(target, (len(q), np.shape(target)[-1])), order="C")
-        steps = FAR_STEPS if far else NEAR_STEPS
-        projection.project_all(
-            found,
-            wanted,
-            self.chains,
-            self.layout,
-            *self._limits,
-            LONGEST_CORRECTION,
-            steps,
-            arrived,
-        )
+        # Near singular poses Newton's method takes many steps, from near as well.
+        for steps in (FAR_STEPS,) if far else (NEAR_STEPS, FAR_STEPS):
+            found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
+            projection.project_all(
+                found,
+                wanted,
+                self.chains,
+                self.layout,
+                *self._limits,
+                LONGEST_CORRECTION,
+                steps,
+                arrived,
+            )
+            if arrived.any():
+                break
         return found, arrived
 
     def _check(self) -> None:
