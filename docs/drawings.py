@@ -250,6 +250,68 @@ def cam(page: "Page") -> str:
     return _svg(figure)
 
 
+def controllers(page: "Page") -> str:
+    """Draw the targets of a program along the plan, and how far off it lines between them are."""
+    plan = sm.load_plan(page.folder / "seam.npz")
+    program = sm.read_motion(page.folder / "seam.src")
+    t, places, _ = _tool(plan)
+    lines = np.stack([np.interp(t, program.t, each) for each in program.q.T], axis=1)
+    _, _, joined = plan.robot.chain.along(lines)
+    figure = Figure(figsize=(_NARROW, 4.6), layout="constrained")
+    joints, off = figure.subplots(2, 1, sharex=True, height_ratios=(1.6, 1))
+    for k in range(plan.robot.dof):
+        start = plan.trajectory.q[0, k]
+        (line,) = joints.plot(t, np.degrees(plan.trajectory(t)[:, k] - start), linewidth=1)
+        angles = np.degrees(program.q[:, k] - start)
+        joints.plot(program.t, angles, ".", color=line.get_color(), markersize=3.5)
+    joints.set(ylabel="joints from the start [°]", title=f"{len(program.t) - 1} targets")
+    off.plot(t, 1e3 * np.linalg.norm(joined - places, axis=1), color=_BLUE, linewidth=1)
+    off.axhline(0.1, color="black", linestyle="dashed", linewidth=1)
+    off.set(xlabel="t [s]", ylabel="off the plan [mm]", title="the tool, on lines between targets")
+    return _svg(figure)
+
+
+def check(page: "Page") -> str:
+    """Draw how far off a path the tool is, at the samples of a motion and between them."""
+    motion, panda, circle = (page.names[name] for name in ("motion", "panda", "circle"))
+
+    def off(t: np.ndarray) -> np.ndarray:
+        places = panda.chain.along(motion(t))[2]
+        return np.linalg.norm(places - circle.samples(t).translation, axis=1)
+
+    figure, axes = _axes()
+    figure.set_size_inches(_NARROW, 3.2)
+    t, floor = np.linspace(0.0, circle.duration, 1601), 1e-13
+    there = off(motion.t)
+    axes.semilogy(t, np.maximum(off(t), floor), color=_BLUE, linewidth=1, label="between samples")
+    axes.semilogy(motion.t, np.maximum(there, floor), ".", color=_ORANGE,
+                  label=f"at samples ({there.max():.0e} at most)")  # fmt: skip
+    axes.axhline(1e-4, color="black", linestyle="dashed", linewidth=1, label="allowed")
+    axes.set(xlabel="t [s]", ylabel="distance from the path [m]", ylim=(5e-14, 1e-3))
+    figure.legend(frameon=False, ncols=3, fontsize=8, loc="outside upper center")
+    return _svg(figure)
+
+
+def realtime(page: "Page") -> str:
+    """Draw the speeds that one step tells an arm."""
+    segment, period = page.names["segment"], 1e3 * page.names["replanner"].period
+    t = 1e3 * (segment.t - segment.t[0])
+    figure, axes = _axes()
+    figure.set_size_inches(_NARROW, 3.2)
+    axes.axvspan(0.0, period, color=_GREEN, alpha=0.25, linewidth=0)
+    axes.plot(t, segment.qd, linewidth=1.5)
+    axes.annotate("obeyed", (0.5 * period, 1.0), xycoords=("data", "axes fraction"), ha="center",
+                  va="top", xytext=(0, -4), textcoords="offset points")  # fmt: skip
+    axes.annotate("for when the next step is late", (0.5 * (period + t[-1]), 1.0), ha="center",
+                  xycoords=("data", "axes fraction"), va="top", xytext=(0, -4),
+                  textcoords="offset points")  # fmt: skip
+    axes.margins(y=0.2)
+    axes.set(xlabel="time from now [ms]", ylabel="joint speed [rad/s]", xlim=(0, t[-1]))
+    names = page.names["panda"].joint_names
+    figure.legend(axes.lines, names, frameon=False, ncols=4, fontsize=8, loc="outside lower center")
+    return _svg(figure)
+
+
 def places(page: "Page") -> str:
     """Return the map of what the places of the page about them cost."""
     written = page.folder / "out" / "places" / "index.html"
@@ -265,6 +327,9 @@ _OF_HOW_TOS: Mapping[str, Callable[["Page"], str]] = {
     "limits": limits,
     "retiming": retiming,
     "cam": cam,
+    "controllers": controllers,
+    "check": check,
+    "realtime": realtime,
     "places": places,
 }
 
