@@ -30,7 +30,7 @@ _BLUE, _ORANGE, _GREEN, _GREY = "#4269d0", "#e8871e", "#3ca951", "#b0b7c3"
 
 
 def draw_all(how_tos: Mapping[str, "Page"]) -> dict[str, str]:
-    """Return name → SVG; those of how-tos have the names of their pages."""
+    """Return name → SVG; the first one of a how-to has the name of its page."""
     plan = sm.plan(sm.sample_problem())
     return {
         "self_motion": self_motion(),
@@ -38,6 +38,7 @@ def draw_all(how_tos: Mapping[str, "Page"]) -> dict[str, str]:
         "convergence": convergence(),
         "path_error": path_error(plan),
         **{name: draw(how_tos[name]) for name, draw in _OF_HOW_TOS.items()},
+        "weave": weave(how_tos["seam"]),
     }
 
 
@@ -133,6 +134,20 @@ def seam(page: "Page") -> str:
     for begin in (0.0, path.duration - lead):
         pace.axvspan(begin, begin + lead, color=_ORANGE, alpha=0.15, linewidth=0)
     pace.set(xlabel="t [s]", ylabel="speed of the tool [mm/s]", ylim=(0, None))
+    return _svg(figure)
+
+
+def weave(page: "Page") -> str:
+    """Draw how the tool begins to swing along a woven seam."""
+    seam, swung = 1e3 * np.array(page.names["points"]), page.names["plan"]
+    t = np.linspace(0.0, swung.trajectory.duration, 6001)
+    _, _, places = swung.robot.chain.along(swung.trajectory(t))
+    figure = Figure(figsize=(_NARROW, 1.8), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(seam[:, 1], seam[:, 0], color=_GREY, linestyle="dashed", label="seam")
+    axes.plot(*1e3 * places[:, 1::-1].T, color=_BLUE, linewidth=1.2, label="the tool's way")
+    axes.set(aspect="equal", xlabel="y [mm]", ylabel="x [mm]", xlim=(-103, -47), ylim=(494, 506))
+    figure.legend(frameon=False, ncols=2, loc="outside upper center")
     return _svg(figure)
 
 
