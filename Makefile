@@ -78,7 +78,7 @@ bench-latency: $(READY)  ## 10,000 steps of the replanner: percentiles, misses, 
 	$(BIN)/python benchmarks/latency.py
 
 docs: $(READY)  ## the site, into out/site
-	@echo "every example runs for it: some minutes; the site takes 31 MB in out/site"
+	@echo "every example runs for it: some minutes; the site takes 32 MB in out/site"
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --config-file docs/mkdocs.yml
 
 errors: $(READY)  ## docs/errors.md: every bad input of the tests, and what the user sees

@@ -1,37 +1,44 @@
-"""The pictures of the method, drawn from plans while the site is built; the same each time."""
+"""The pictures of the method and of how-tos, drawn from plans while the site is built.
+
+Those of a how-to are of what its own code makes.
+"""
 
 import io
 import re
-import tempfile
-from pathlib import Path
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.spatial.transform import Rotation
 
 import selfmotion as sm
-from selfmotion.batch import grid_items, plan_items
+from selfmotion.replay.motion import curves
 from selfmotion.study.engine import optimum
 from selfmotion.study.published import published_null_motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from shown import Page
 
 _STYLE = {"svg.fonttype": "none", "svg.hashsalt": "selfmotion", "font.size": 9.0}
 _SIZE = (6.4, 3.0)
-_PLACES = Path(__file__).parent / "pages" / "howto" / "places.md"
+# Of how-tos: no wider than a telephone's text is, twice.
+_NARROW = 5.2
+_BLUE, _ORANGE, _GREEN, _GREY = "#4269d0", "#e8871e", "#3ca951", "#b0b7c3"
 
 
-def draw_all() -> dict[str, str]:
-    """Return name → SVG."""
+def draw_all(how_tos: Mapping[str, "Page"]) -> dict[str, str]:
+    """Return name → SVG; the first one of a how-to has the name of its page."""
     plan = sm.plan(sm.sample_problem())
     return {
         "self_motion": self_motion(),
         "speeds": speeds(plan),
         "convergence": convergence(),
         "path_error": path_error(plan),
-        "places": places(),
+        **{name: draw(how_tos[name]) for name, draw in _OF_HOW_TOS.items()},
+        "weave": weave(how_tos["seam"]),
     }
 
 
@@ -101,19 +108,252 @@ def path_error(plan: sm.Plan) -> str:
     return _svg(figure)
 
 
-def places() -> str:
+def seam(page: "Page") -> str:
+    """Draw how the tool comes to the seam and goes, and its speed."""
+    lead, feed = 1.0, 0.03
+    path = page.names["whole"]
+    plan = sm.plan(sm.Problem(page.names["panda"], path, task="pointing")).require()
+    t, places, turns = _tool(plan)
+    here = (t >= lead) & (t <= path.duration - lead)
+    figure = Figure(figsize=(_NARROW, 4.2), layout="constrained")
+    side, pace = figure.subplots(2, 1, height_ratios=(1, 1.5))
+    for part, ink, name in ((~here, _ORANGE, "lead"), (here, _BLUE, "seam")):
+        shown = np.where(part[:, None], 1e3 * places, np.nan)
+        side.plot(shown[:, 1], shown[:, 2], color=ink, linewidth=2.5, label=name)
+    for k in np.linspace(np.flatnonzero(here)[0], np.flatnonzero(here)[-1], 6).astype(int):
+        tip, back = 1e3 * places[k], -12.0 * turns[k][:, 2]
+        side.plot(*np.array([tip, tip + back])[:, 1:].T, color=_GREY, linewidth=1.5, zorder=0)
+    side.plot([], [], color=_GREY, label="tool")
+    side.set(aspect="equal", xlabel="y [mm]", ylabel="z [mm]", title="seen from the side")
+    side.legend(frameon=False, loc="upper center", ncols=3)
+    speed = 1e3 * np.linalg.norm(np.gradient(places, t, axis=0), axis=1)
+    pace.plot(t, speed, color=_BLUE)
+    pace.axhline(1e3 * feed, color=_GREY, linestyle="dashed")
+    middle = (0.5 * path.duration, 1e3 * feed)
+    pace.annotate("the feed", middle, (0, 3), textcoords="offset points", ha="center")
+    for begin in (0.0, path.duration - lead):
+        pace.axvspan(begin, begin + lead, color=_ORANGE, alpha=0.15, linewidth=0)
+    pace.set(xlabel="t [s]", ylabel="speed of the tool [mm/s]", ylim=(0, None))
+    return _svg(figure)
+
+
+def weave(page: "Page") -> str:
+    """Draw how the tool begins to swing along a woven seam."""
+    seam, swung = 1e3 * np.array(page.names["points"]), page.names["plan"]
+    t = np.linspace(0.0, swung.trajectory.duration, 6001)
+    _, _, places = swung.robot.chain.along(swung.trajectory(t))
+    figure = Figure(figsize=(_NARROW, 1.8), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(seam[:, 1], seam[:, 0], color=_GREY, linestyle="dashed", label="seam")
+    axes.plot(*1e3 * places[:, 1::-1].T, color=_BLUE, linewidth=1.2, label="the tool's way")
+    axes.set(aspect="equal", xlabel="y [mm]", ylabel="x [mm]", xlim=(-103, -47), ylim=(494, 506))
+    figure.legend(frameon=False, ncols=2, loc="outside upper center")
+    return _svg(figure)
+
+
+def relaxations(page: "Page") -> str:
+    """Draw what is allowed around the path, and what the plan uses of it."""
+    plan = page.names["plan"]
+    cone, stick, free = plan.problem.relaxations
+    t, places, turns = _tool(plan)
+    target = plan.path.samples(t)
+    between = np.einsum("kji,kjl->kil", target.rotation, turns)
+    angles = np.degrees(Rotation.from_matrix(between).as_rotvec())
+    off = 1e3 * np.einsum("kji,kj->ki", target.rotation, places - target.translation)
+    figure = Figure(figsize=(_NARROW, 5.6), layout="constrained")
+    grid = figure.add_gridspec(3, 2, height_ratios=(2.4, 1, 1))
+    _cones(figure.add_subplot(grid[0, 0]), cone.band, target, places, turns)
+    axes = figure.add_subplot(grid[0, 1])
+    along, about = (figure.add_subplot(grid[k, :]) for k in (1, 2))
+    around, band = np.linspace(0.0, 2.0 * np.pi, 200), float(np.degrees(cone.band))
+    edge = band * np.array([np.cos(around), np.sin(around)])
+    axes.fill(*edge, color=_GREEN, alpha=0.25, linewidth=0)
+    axes.plot(angles[:, 0], angles[:, 1], color=_BLUE, linewidth=2)
+    axes.plot(0, 0, "+", color="black")
+    axes.set(aspect="equal", xlabel="rx [°]", ylabel="ry [°]", title=f"in the cone of {band:.0f}°")
+    half = 1e3 * stick.band
+    along.axhspan(-half, half, color=_GREEN, alpha=0.25, linewidth=0)
+    along.plot(t, off[:, 2], color=_BLUE)
+    along.set(ylabel="z [mm]", title="stick-out", xlim=(0, t[-1]), ylim=(-1.2 * half, 1.2 * half))
+    about.axvspan(*free.window(t[-1]), color=_GREEN, alpha=0.25, linewidth=0)
+    about.plot(t, angles[:, 2], color=_BLUE)
+    about.set(xlabel="t [s]", ylabel="rz [°]", title="turn about the axis", xlim=(0, t[-1]))
+    return _svg(figure)
+
+
+def _cones(
+    axes: "Axes", band: float, target: sm.PathSamples, places: np.ndarray, turns: np.ndarray
+) -> None:
+    """Draw the cones of allowed axes along a path in the plane of y and z, and the tool's axes."""
+    length, steps = 0.09, np.linalg.norm(np.diff(target.translation, axis=0), axis=1)
+    way = np.append(0.0, np.cumsum(steps))
+    chosen = np.searchsorted(way, np.linspace(0.0, way[-1], 12, endpoint=False))
+    axes.plot(*1e3 * target.translation[:, 1:].T, color=_GREY, linewidth=2, label="path")
+    for number, k in enumerate(chosen):
+        tip, axis = places[k], -length * target.rotation[k][:, 2]
+        sides = [Rotation.from_rotvec([side * band, 0.0, 0.0]).apply(axis) for side in (-1, 1)]
+        corners = 1e3 * np.array([tip, *(tip + side for side in sides)])[:, 1:]
+        axes.fill(
+            *corners.T, color=_GREEN, alpha=0.3, linewidth=0, label="" if number else "allowed"
+        )
+        used = 1e3 * np.array([tip, tip - length * turns[k][:, 2]])[:, 1:]
+        axes.plot(*used.T, color=_BLUE, linewidth=1.5, label="" if number else "used")
+    axes.set(aspect="equal", xlabel="y [mm]", ylabel="z [mm]", title="the tool's axis")
+    axes.legend(frameon=False, fontsize=8, loc="center")
+
+
+def limits(page: "Page") -> str:
+    """Draw how near each joint of a plan comes to each of its limits."""
+    plan = page.names["plan"]
+    robot, motion = plan.robot, curves(plan, plan.trajectory)
+    asked = {type(item): item for item in plan.problem.constraints}
+    used = {
+        "speed": (motion.qd, asked[sm.JointVelocityLimits], _BLUE),
+        "acceleration": (motion.qdd, asked[sm.JointAccelerationLimits], _ORANGE),
+        "torque": (motion.torque, asked[sm.JointTorqueLimits], _GREEN),
+    }
+    figure = Figure(figsize=(_NARROW, 4.2), layout="constrained")
+    axes, rows = figure.subplots(), np.arange(robot.dof)
+    for k, (name, (values, limit, ink)) in enumerate(used.items()):
+        share = 100.0 * np.abs(values).max(axis=0) / limit.of(robot)
+        bars = axes.barh(rows + 0.26 * (k - 1), share, 0.24, color=ink, label=name)
+        nearest = int(share.argmax())
+        axes.annotate(
+            f"{share[nearest]:.0f} %", (share[nearest], bars[nearest].get_y() + 0.12), (3, 0),
+            textcoords="offset points", va="center", fontsize=9,
+        )  # fmt: skip
+    axes.axvline(100.0, color="black", linestyle="dashed", linewidth=1)
+    axes.set(xlabel="largest share of the limit [%]", xlim=(0, 108))
+    axes.set_yticks(rows, robot.joint_names)
+    axes.invert_yaxis()
+    axes.legend(frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return _svg(figure)
+
+
+def retiming(page: "Page") -> str:
+    """Draw the joint accelerations of a plan, and of the same joint path at its fastest pace."""
+    figure = Figure(figsize=(_NARROW, 4.8), layout="constrained")
+    plans = {"plan": page.names["plan"], "retimed": page.names["fast"]}
+    last = plans["plan"].trajectory.duration
+    for axes, (name, plan) in zip(figure.subplots(2, 1), plans.items(), strict=True):
+        motion = curves(plan, plan.trajectory)
+        axes.plot(motion.t, motion.qdd, linewidth=1.2)
+        for limit in (-5.0, 5.0):
+            axes.axhline(limit, color="black", linestyle="dashed", linewidth=1)
+        axes.set(title=f"{name}: {motion.t[-1]:.2f} s", ylabel="acceleration [rad/s²]")
+        axes.set(xlim=(0, last), ylim=(-6, 6))
+    figure.axes[1].set_xlabel("t [s]")
+    names = plans["plan"].robot.joint_names
+    figure.legend(names, frameon=False, ncols=4, fontsize=8, loc="outside lower center")
+    return _svg(figure)
+
+
+def cam(page: "Page") -> str:
+    """Draw a drawing as it is, and the tool's way along it."""
+    plan = sm.load_plan(page.folder / "bracket.npz")
+    rows = sm.read_path(page.folder / "bracket.dxf", feed=0.03, seam="weld", tolerance=1e-6)
+    drawn = rows.samples(np.linspace(0.0, rows.duration, 600)).translation
+    _, places, _ = _tool(plan)
+    shown = places - np.array([0.45, -0.1, 0.3])
+    figure = Figure(figsize=(_NARROW, 3.6), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(*1e3 * drawn[:, :2].T, color=_GREY, linewidth=6, label="drawn: line, arc, line")
+    axes.plot(*1e3 * shown[:, :2].T, color=_BLUE, linewidth=1.5, label="the tool's way")
+    axes.plot(*1e3 * shown[0, :2], "o", color=_BLUE, markersize=5, label="begin")
+    axes.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]", title="layer weld")
+    axes.legend(frameon=False, loc="upper left")
+    return _svg(figure)
+
+
+def controllers(page: "Page") -> str:
+    """Draw the targets of a program along the plan, and how far off it lines between them are."""
+    plan = sm.load_plan(page.folder / "seam.npz")
+    program = sm.read_motion(page.folder / "seam.src")
+    t, places, _ = _tool(plan)
+    lines = np.stack([np.interp(t, program.t, each) for each in program.q.T], axis=1)
+    _, _, joined = plan.robot.chain.along(lines)
+    figure = Figure(figsize=(_NARROW, 4.6), layout="constrained")
+    joints, off = figure.subplots(2, 1, sharex=True, height_ratios=(1.6, 1))
+    for k in range(plan.robot.dof):
+        start = plan.trajectory.q[0, k]
+        (line,) = joints.plot(t, np.degrees(plan.trajectory(t)[:, k] - start), linewidth=1)
+        angles = np.degrees(program.q[:, k] - start)
+        joints.plot(program.t, angles, ".", color=line.get_color(), markersize=3.5)
+    joints.set(ylabel="joints from the start [°]", title=f"{len(program.t) - 1} targets")
+    off.plot(t, 1e3 * np.linalg.norm(joined - places, axis=1), color=_BLUE, linewidth=1)
+    off.axhline(0.1, color="black", linestyle="dashed", linewidth=1)
+    off.set(xlabel="t [s]", ylabel="off the plan [mm]", title="the tool, on lines between targets")
+    return _svg(figure)
+
+
+def check(page: "Page") -> str:
+    """Draw how far off a path the tool is, at the samples of a motion and between them."""
+    motion, panda, circle = (page.names[name] for name in ("motion", "panda", "circle"))
+
+    def off(t: np.ndarray) -> np.ndarray:
+        places = panda.chain.along(motion(t))[2]
+        return np.linalg.norm(places - circle.samples(t).translation, axis=1)
+
+    figure, axes = _axes()
+    figure.set_size_inches(_NARROW, 3.2)
+    t, floor = np.linspace(0.0, circle.duration, 1601), 1e-13
+    there = off(motion.t)
+    axes.semilogy(t, np.maximum(off(t), floor), color=_BLUE, linewidth=1, label="between samples")
+    axes.semilogy(motion.t, np.maximum(there, floor), ".", color=_ORANGE,
+                  label=f"at samples ({there.max():.0e} at most)")  # fmt: skip
+    axes.axhline(1e-4, color="black", linestyle="dashed", linewidth=1, label="allowed")
+    axes.set(xlabel="t [s]", ylabel="distance from the path [m]", ylim=(5e-14, 1e-3))
+    figure.legend(frameon=False, ncols=3, fontsize=8, loc="outside upper center")
+    return _svg(figure)
+
+
+def realtime(page: "Page") -> str:
+    """Draw the speeds that one step tells an arm."""
+    segment, period = page.names["segment"], 1e3 * page.names["replanner"].period
+    t = 1e3 * (segment.t - segment.t[0])
+    figure, axes = _axes()
+    figure.set_size_inches(_NARROW, 3.2)
+    axes.axvspan(0.0, period, color=_GREEN, alpha=0.25, linewidth=0)
+    axes.plot(t, segment.qd, linewidth=1.5)
+    axes.annotate("obeyed", (0.5 * period, 1.0), xycoords=("data", "axes fraction"), ha="center",
+                  va="top", xytext=(0, -4), textcoords="offset points")  # fmt: skip
+    axes.annotate("for when the next step is late", (0.5 * (period + t[-1]), 1.0), ha="center",
+                  xycoords=("data", "axes fraction"), va="top", xytext=(0, -4),
+                  textcoords="offset points")  # fmt: skip
+    axes.margins(y=0.2)
+    axes.set(xlabel="time from now [ms]", ylabel="joint speed [rad/s]", xlim=(0, t[-1]))
+    names = page.names["panda"].joint_names
+    figure.legend(axes.lines, names, frameon=False, ncols=4, fontsize=8, loc="outside lower center")
+    return _svg(figure)
+
+
+def places(page: "Page") -> str:
     """Return the map of what the places of the page about them cost."""
-    block = re.search(r'```toml title="places.toml"\n(.*?)```', _PLACES.read_text(), re.DOTALL)
-    if block is None:
-        raise ValueError(f"{_PLACES}: has no block 'places.toml'")
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        (folder / "places.toml").write_text(block.group(1))
-        plan_items(grid_items(folder / "places.toml"), out=folder, workers=1)
-        shown = re.search(r"<svg.*?</svg>", (folder / "index.html").read_text(), re.DOTALL)
+    written = page.folder / "out" / "places" / "index.html"
+    shown = re.search(r"<svg.*?</svg>", written.read_text(), re.DOTALL)
     if shown is None:
-        raise ValueError(f"{_PLACES}: its grid has no map")
+        raise ValueError(f"{written}: has no map")
     return shown.group()
+
+
+_OF_HOW_TOS: Mapping[str, Callable[["Page"], str]] = {
+    "seam": seam,
+    "relaxations": relaxations,
+    "limits": limits,
+    "retiming": retiming,
+    "cam": cam,
+    "controllers": controllers,
+    "check": check,
+    "realtime": realtime,
+    "places": places,
+}
+
+
+def _tool(plan: sm.Plan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times (K,) [s], and where the tool is then: (K, 3) [m] and (K, 3, 3)."""
+    t = np.linspace(0.0, plan.trajectory.duration, 801)
+    _, turns, places = plan.robot.chain.along(plan.trajectory(t))
+    return t, places, turns
 
 
 def _axes() -> tuple[Figure, "Axes"]:

@@ -1,4 +1,4 @@
-"""What is made while the site is built: pictures, replays, and pages with the examples' output."""
+"""What is made while the site is built: pictures, replays, pages with what their code prints."""
 
 import sys
 from pathlib import Path
@@ -52,14 +52,18 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for name in BESIDE:
         files.append(File.generated(config, name, abs_src_path=str(DOCS / name)))
     ran = shown.run_all()
+    with shown.run_how_tos() as how_tos:
+        drawn = drawings.draw_all(how_tos)
     made: dict[str, str] = {
         "examples.md": examples_page(ran),
         "gallery.md": gallery_page(ran),
         **{f"replays/{name}.html": ran[name].replay() for name in GALLERY},
-        **{f"drawings/{name}.svg": text for name, text in drawings.draw_all().items()},
+        **{f"drawings/{name}.svg": text for name, text in drawn.items()},
     }
     for name, content in made.items():
         files.append(File.generated(config, name, content=content))
+    for name, page in how_tos.items():
+        files.get_file_from_path(f"howto/{name}.md").content_string = page.text
     return files
 
 

@@ -1,10 +1,12 @@
-"""What the site shows of the examples: each is run while the site is built."""
+"""What the site shows of examples and how-tos: each is run while the site is built."""
 
 import io
 import os
+import re
 import runpy
+import shlex
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +18,11 @@ from selfmotion.cli import app
 from selfmotion.replay import write_replay
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
+HOWTOS = Path(__file__).parent / "pages" / "howto"
+# A block of a page: its language, what is said of it, and its text.
+BLOCK = re.compile(r"^```(\w*)([^\n]*)\n(.*?)^```\n", re.DOTALL | re.MULTILINE)
+_TITLE = re.compile(r'title="([^"]*)"')
+_COLUMNS = {"COLUMNS": "90"}
 # In the order of the page; a file that is in none of the groups does not build.
 GROUPS = {
     "Jobs": (
@@ -66,6 +73,25 @@ class Shown:
             return write_replay(self.plan, Path(folder) / "replay.html").read_text()
 
 
+@dataclass(frozen=True)
+class Page:
+    """A page whose blocks were run.
+
+    Attributes
+    ----------
+    text : str
+        Of the page, below each block what it printed.
+    names : dict
+        What its Python knows in the end.
+    folder : Path
+        Where its files are.
+    """
+
+    text: str
+    names: dict[str, object]
+    folder: Path
+
+
 def run_all() -> dict[str, Shown]:
     """Run every example, each in the same empty folder."""
     names = [name for group in GROUPS.values() for name in group]
@@ -80,9 +106,61 @@ def run_shell() -> str:
     """Return what `SHELL` prints."""
     with _empty_folder():
         Path("examples").symlink_to(EXAMPLES)
-        result = CliRunner().invoke(app, SHELL.split(), env={"COLUMNS": "90"})
+        return _invoked(SHELL.split())
+
+
+def run_page(file: Path, *, not_run: Collection[str] = ()) -> Page:
+    """Run the blocks of a page in their order, in this folder and one Python.
+
+    Files are those that the page shows, each by its title. Commands of `not_run` are passed over.
+    """
+    text = file.read_text()
+    Path("examples").symlink_to(EXAMPLES)
+    for _, said, content in BLOCK.findall(text):
+        if title := _TITLE.search(said):
+            Path(title[1]).write_text(content)
+    names: dict[str, object] = {"__name__": "page"}
+
+    def with_output(block: re.Match[str]) -> str:
+        language, said, content = block.groups()
+        printed = ""
+        if language == "python":
+            stream = io.StringIO()
+            with redirect_stdout(stream):
+                exec(compile(content, str(file), "exec"), names)
+            printed = stream.getvalue()
+        elif language == "console":
+            commands = [shlex.split(line, comments=True) for line in content.splitlines()]
+            printed = _session(
+                [each for each in commands if shlex.join(each) not in ("", *not_run)]
+            )
+        elif not _TITLE.search(said):
+            raise ValueError(f"{file.name}: a block of {language} that is neither run nor a file")
+        # What is told of files is where a reader has them.
+        printed = printed.replace(f"{Path.cwd()}/", "").strip()
+        return f'{block[0]}\n````text title="prints"\n{printed}\n````\n' if printed else block[0]
+
+    return Page(BLOCK.sub(with_output, text), names, Path.cwd())
+
+
+def _session(commands: Sequence[Sequence[str]]) -> str:
+    """Return what commands print, each below itself where there are several."""
+    printed = []
+    for command in commands:
+        program, *words = command
+        if program != "selfmotion":
+            raise ValueError(f"{shlex.join(command)}: a page shows commands of selfmotion only")
+        output = _invoked(words).strip()
+        if output:
+            head = f"$ {shlex.join(command)}\n" if len(commands) > 1 else ""
+            printed.append(head + output)
+    return "\n\n".join(printed)
+
+
+def _invoked(words: list[str]) -> str:
+    result = CliRunner().invoke(app, words, env=_COLUMNS)
     if result.exit_code != 0:
-        raise RuntimeError(f"selfmotion {SHELL}: {result.output}")
+        raise RuntimeError(f"selfmotion {shlex.join(words)}: {result.output}") from result.exception
     return result.stdout
 
 
@@ -96,11 +174,29 @@ def _run(name: str) -> Shown:
 
 
 @contextmanager
-def _empty_folder() -> Iterator[None]:
-    before = Path.cwd()
+def run_how_tos() -> Iterator[dict[str, Page]]:
+    """Run every how-to, each in an empty folder that is there until the end."""
     with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
-        try:
-            yield
-        finally:
-            os.chdir(before)
+        found = {}
+        for page in sorted(HOWTOS.glob("*.md")):
+            own = Path(folder) / page.stem
+            own.mkdir()
+            with _within(own):
+                found[page.stem] = run_page(page)
+        yield found
+
+
+@contextmanager
+def _empty_folder() -> Iterator[None]:
+    with tempfile.TemporaryDirectory() as folder, _within(Path(folder)):
+        yield
+
+
+@contextmanager
+def _within(folder: Path) -> Iterator[None]:
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)

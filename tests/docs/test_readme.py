@@ -5,9 +5,9 @@ import shlex
 from pathlib import Path
 
 import pytest
+import shown
 
 from support.places import ROOT
-from support.shell import invoke
 
 README = (ROOT / "README.md").read_text()
 
@@ -18,9 +18,6 @@ PAGES = [
 ]
 
 
-BLOCK = re.compile(r"^```(\w*)([^\n]*)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-
-
 # All that is not run: it installs, or takes minutes.
 NOT_RUN = {"make demo", "make test", "pip install ."}
 
@@ -28,7 +25,7 @@ NOT_RUN = {"make demo", "make test", "pip install ."}
 def blocks(page: str) -> list[tuple[str, str, str]]:
     """Return language, title and text of each."""
     found = []
-    for language, rest, text in BLOCK.findall((ROOT / page).read_text()):
+    for language, rest, text in shown.BLOCK.findall((ROOT / page).read_text()):
         title = re.search(r'title="([^"]*)"', rest)
         found.append((language, title.group(1) if title else "", text))
     return found
@@ -42,26 +39,43 @@ def commands(page: str) -> list[list[str]]:
     return [words for words in (shlex.split(line, comments=True) for line in lines) if words]
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)])
+# Those of how-tos run while the site is built, by the same function: see `test_site.py`.
+RUN = [page for page in PAGES if blocks(page) and not page.startswith("docs/pages/howto/")]
+
+
+@pytest.mark.parametrize("page", RUN)
 def test_every_block_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In order, in one folder and one Python; files are those that the page shows."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    for _, title, text in blocks(page):
-        if title:
-            (tmp_path / title).write_text(text)
-    names: dict[str, object] = {"__name__": "page"}
-    for language, title, text in blocks(page):
-        if language == "python":
-            exec(compile(text, page, "exec"), names)
-        elif language == "console":
-            for line in text.splitlines():
-                words = shlex.split(line, comments=True)
-                if words and shlex.join(words) not in NOT_RUN:
-                    assert words[0] == "selfmotion", line
-                    assert invoke(*words[1:])[0] == 0, line
-        else:
-            assert title, f"a block of {language} that is neither run nor a file"
+    shown.run_page(ROOT / page, not_run=NOT_RUN)
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        'python\nraise ArithmeticError("no")',
+        "console\nselfmotion plan nothing",
+        "console\nls",
+        "yaml\na: 1",
+    ],
+)
+def test_a_block_that_does_not_run_is_told(
+    block: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text(f"# Page\n\n```{block}\n```\n")
+    with pytest.raises((ArithmeticError, RuntimeError, ValueError)):
+        shown.run_page(page)
+
+
+def test_what_blocks_print_is_below_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text("# Page\n\n```python\nfor k in (6, 7):\n    print(k)\n```\n\nEnd.\n")
+    told = shown.run_page(page)
+    assert told.text.endswith('```\n\n````text title="prints"\n6\n7\n````\n\nEnd.\n')
+    assert told.names["k"] == 7
 
 
 def test_what_is_not_run_is_there() -> None:
@@ -81,7 +95,7 @@ def test_quickstart_is_short_and_verified(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_first_steps_are_five_commands() -> None:
     first = README.split("[start:first]")[1].split("[end:first]")[0]
-    (block,) = BLOCK.findall(first)
+    (block,) = shown.BLOCK.findall(first)
     assert len(block[2].splitlines()) == 5
 
 

@@ -74,6 +74,20 @@ def test_every_example_is_shown_with_its_output(site: Path, name: str) -> None:
     assert len(re.sub(r"<[^>]*>", "", printed).strip()) > 20
 
 
+@pytest.mark.parametrize("page", sorted((ROOT / "docs/pages/howto").glob("*.md")), ids=str)
+def test_every_how_to_shows_what_its_code_makes(site: Path, page: Path) -> None:
+    """What each block prints that prints anything, and pictures that say what they show."""
+    text = (site / "howto" / f"{page.stem}.html").read_text()
+    asked = re.findall(r"^```(?:python|console)\n(.*?)^```", page.read_text(), re.DOTALL | re.M)
+    talks = [code for code in asked if "print(" in code or code.startswith("selfmotion plan")]
+    assert text.count('<span class="filename">prints</span>') >= len(talks)
+    assert '<span class="filename">prints</span>' in text or 'class="replay"' in text
+    for image in re.findall(r"<img [^>]*drawings/[^>]*>", text):
+        assert len(re.search(r'alt="([^"]*)"', image)[1]) > 40, image
+    assert str(ROOT) not in text
+    assert "/tmp" not in text
+
+
 def test_examples_are_short() -> None:
     for name in EXAMPLES:
         # The one's two classes, and the other's two ends of a wire, are the point.
@@ -110,7 +124,7 @@ def test_pages_are_seen_whole(site: Path, browser: Any) -> None:
     """What is read stays within the page; replays, too. Their insides have tests of their own."""
     page = browser.new_page()
     page.route("**/replays/*.html", lambda route: route.fulfill(body="a replay"))
-    for name in ("gallery", "index", "howto/follow", "method", "api/plan"):
+    for name in ("gallery", "index", "howto/relaxations", "howto/retiming", "method", "api/plan"):
         page.goto((site / f"{name}.html").as_uri())
         for width in WIDTHS:
             texts = ("article h1", "article h2", "article p", "article img")

@@ -227,7 +227,7 @@ MALFORMED: list[tuple[str, str, str, str]] = [
     ("a.csv", csv(*GOOD), "--feed 0.1", "has times, so that --feed has no effect"),
     ("a.csv", csv(*GOOD), "--frame 1,2", "--frame has 2 numbers, expected 6"),
     ("a.csv", "t x y z\n0 0 0 0\n", "", "line 2: t x y z: is '0 0 0 0', expected"),
-    ("a.dxf", "", "", "has suffix '.dxf', expected one of .csv"),
+    ("a.step", "", "", "has suffix '.step', expected one of .csv"),
     ("a.npy", "no array", "", "cannot be read as a NumPy array"),
     ("a.json", "{", "", "is not JSON"),
     ("a.json", "[]", "", "holds a list, expected a table"),

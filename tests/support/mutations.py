@@ -300,7 +300,8 @@ def _packed_gigabyte() -> tuple[bytes, int, int]:
 
 
 def _kind(suffix: str) -> str:
-    return "cut" if suffix in (".nc", ".apt") else "path"
+    kinds = {".nc": "cut", ".apt": "cut", ".dxf": "drawing"}
+    return kinds.get(suffix, "path")
 
 
 def _path(file: Path) -> object:
@@ -345,8 +346,28 @@ def _paths() -> list[tuple[str, bytes]]:
         out = io.BytesIO()
         np.save(out, array)
         found.append((".npy", out.getvalue()))
-    found += [(".nc", _GCODE), (".apt", _CLDATA), (".csv", _SEAMS)]
+    found += [(".nc", _GCODE), (".apt", _CLDATA), (".csv", _SEAMS), (".dxf", _drawing())]
     return found
+
+
+def _drawing() -> bytes:
+    """Return a drawing of one stroke: a line, an arc, a polyline with a bulge, a spline."""
+    entities = [
+        "LINE 10 0 20 0 30 0 11 40 21 0 31 0",
+        "ARC 10 40 20 10 30 0 40 10 50 270 51 0",
+        "LWPOLYLINE 90 2 70 0 10 50 20 10 42 0.4 10 50 20 30",
+        "SPLINE 70 8 71 3 72 8 73 4 74 0 40 0 40 0 40 0 40 0 40 1 40 1 40 1 40 1 "
+        "10 50 20 30 30 0 10 50 20 40 30 0 10 60 20 50 30 5 10 70 20 50 30 5",
+    ]
+    said = "0 SECTION 2 HEADER 9 $ACADVER 1 AC1015 9 $INSUNITS 70 4 0 ENDSEC 0 SECTION 2 ENTITIES "
+    for k, text in enumerate(entities):
+        kind, _, rest = text.partition(" ")
+        classes = {"LWPOLYLINE": "AcDbPolyline", "ARC": "AcDbCircle"}
+        own = classes.get(kind, f"AcDb{kind.capitalize()}")
+        if kind == "ARC":
+            rest = rest.replace(" 50 270", " 100 AcDbArc 50 270")
+        said += f"0 {kind} 5 {k + 64:X} 100 AcDbEntity 8 weld 100 {own} {rest} "
+    return ("\n".join((said + "0 ENDSEC 0 EOF").split()) + "\n").encode()
 
 
 _GCODE = b"""%

@@ -1,7 +1,7 @@
 """What programs of machine tools do: cuts at a feed, and rapids in between."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -196,7 +196,8 @@ class Machine:
         self._next = []
         if not moved:
             raise FileFormatError(f"{self.file}: has no cut: no motion at a feed")
-        return {f"cut {number}": cut.rows() for number, cut in enumerate(moved, 1)}
+        rows = (replace(cut.rows(), one_way=True) for cut in moved)
+        return {f"cut {number}": each for number, each in enumerate(rows, 1)}
 
 
 def unit_axis(values: Sequence[float], machine: Machine) -> Array:

@@ -105,12 +105,12 @@ def _through(
 
 
 def _of_cut(file: FilePath, rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
-    """Return the straight legs of a machine's cut, which rests where it goes back on itself."""
+    """Return the straight legs of a cut or stroke, which rests where it goes back on itself."""
     if asked.duration is not None:
-        raise PathError("cuts have feeds, so that duration has no effect; drop it")
+        raise PathError("straight legs go at a feed, so that duration has no effect; drop it")
     feeds = rows.feed if asked.feed is None else np.full(len(rows.positions), asked.feed)
     if feeds is None:
-        raise PathError("the program says no feed (F, FEDRAT); give a feed [m/s]")
+        raise PathError("it says no feed (programs: F, FEDRAT); give a feed [m/s]")
     legs = np.diff(rows.positions, axis=0)
     lengths = np.linalg.norm(legs, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -199,8 +199,8 @@ def _check_jumps(file: FilePath, rows: PoseRows, rotations: Array, jump: float) 
 def _remedy(jump: float, is_cut: bool) -> str:
     if is_cut:
         return (
-            f"more than {jump:g} m; give a larger jump if it is meant, or the program's own units "
-            f"(G20, UNITS/INCHES: inches; G21, UNITS/MM: mm)"
+            f"more than {jump:g} m; give a larger jump if it is meant, or the file's own units "
+            f"(G20, UNITS/INCHES: inches; G21, UNITS/MM: mm; of drawings $INSUNITS)"
         )
     return (
         f"more than {jump:g} m; give a larger jump if it is meant, or name the columns x_mm,… if "

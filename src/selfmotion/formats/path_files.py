@@ -1,4 +1,4 @@
-"""Tool motions from files: tables, arrays, what ROS writes, and programs of machine tools."""
+"""Tool motions from files: tables, arrays, what ROS writes, programs of machine tools, drawings."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
@@ -6,16 +6,18 @@ from typing import Any
 
 from selfmotion.basics import FileFormatError, as_number, as_path, nearest
 from selfmotion.formats.cldata import read_cldata
+from selfmotion.formats.drawing import read_drawing
 from selfmotion.formats.gcode import read_gcode
 from selfmotion.formats.path_building import JUMP, Pacing, path_of_rows
 from selfmotion.formats.path_rows import READERS, PoseRows
 from selfmotion.path import Path
 
-_MACHINES = {
+_MADE = {
     **dict.fromkeys((".nc", ".ngc", ".gcode", ".tap"), read_gcode),
     **dict.fromkeys((".apt", ".cls", ".cl"), read_cldata),
+    ".dxf": read_drawing,
 }
-_READERS: Mapping[str, Callable[[FilePath], Mapping[str, PoseRows]]] = {**READERS, **_MACHINES}
+_READERS: Mapping[str, Callable[[FilePath], Mapping[str, PoseRows]]] = {**READERS, **_MADE}
 
 
 def read_path(
@@ -46,6 +48,7 @@ def read_path(
     - ``.yaml .json``: ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``
     - ``.nc .ngc .gcode .tap``: G-code of up to five axes, below
     - ``.apt .cls .cl``: APT, cutter location data, below
+    - ``.dxf``: a drawing, below; with ``pip install 'selfmotion[dxf]'``
 
     Of programs of machine tools, what goes at a feed is a cut; rapids part cuts, called ``cut 1``,
     ``cut 2``, …. Legs are straight, their corners rounded within `tolerance`, and the tool rests
@@ -63,6 +66,14 @@ def read_path(
       cutter's shape and number (``LOADTL``, …) are passed over; ``FINI`` ends it
 
     Any other word or statement is refused, by its line.
+
+    Of drawings, what is drawn in model space on one layer is joined end to end, where ends are
+    within 0.01 mm of each other and no third one is there. A stroke has the name of its layer,
+    with a number where the layer has several, and the direction of what was drawn first of it.
+    ``LINE ARC CIRCLE ELLIPSE SPLINE LWPOLYLINE POLYLINE`` are read, curves as chords within
+    0.01 mm, which are followed as legs of a cut; any other entity is refused by its handle, but
+    not on layers that are off or frozen. The unit is that of ``$INSUNITS``, and none is refused.
+    The tool's z axis points down, against that of the drawing. A feed has to be given.
 
     Parameters
     ----------
@@ -83,13 +94,15 @@ def read_path(
     turn_rate, acceleration, turn_acceleration, smoothing, within : float, optional
         Bounds of a feed, as in `Feed`.
     seam : str, optional
-        Which of several seams or cuts of the file.
+        Which of several seams, cuts or strokes of the file.
 
     Raises
     ------
     FileFormatError
         The file cannot be read, or a row cannot be used: not finite, a zero quaternion, times that
-        do not increase, a jump, other units. The line or pose is named.
+        do not increase, a jump, other units. The line, pose or entity is named.
+    ProblemError
+        A drawing, and the package that reads them is not installed.
     """
     path = as_path(file)
     asked = _pacing(

@@ -58,6 +58,8 @@ class PoseRows:
         At which pose what happens.
     straight : bool
         Whether the tool goes straight from pose to pose.
+    one_way : bool
+        Whether it is meant in its own direction only, as cuts of a machine are.
     """
 
     places: Sequence[str]
@@ -68,6 +70,7 @@ class PoseRows:
     feed: Array | None = None
     events: tuple[tuple[int, str], ...] = ()
     straight: bool = False
+    one_way: bool = False
 
 
 def read_tables(file: FilePath) -> dict[str, PoseRows]:
@@ -96,6 +99,7 @@ def _some(rows: PoseRows, chosen: Sequence[int]) -> PoseRows:
         None if rows.feed is None else rows.feed[chosen],
         tuple((new[k], event) for k, event in rows.events if k in new),
         rows.straight,
+        rows.one_way,
     )
 
 

@@ -143,9 +143,9 @@ class _Reader:
             raise FileFormatError(f"{self._file}: {where}: path is missing")
         path, own = given["path"], dict(given)
         if isinstance(path, Mapping) and "events" not in given:
-            events, straight = self._events_of(in_si(path), where)
+            events, one_way = self._events_of(in_si(path), where)
             own |= {"events": events} if events else {}
-            if events or straight:
+            if events or one_way:
                 own.setdefault("either_way", False)
         return [self._seam(own, None, where)]
 
@@ -165,7 +165,7 @@ class _Reader:
                 f"the file in it, whose event '{events[0][0]}' would be lost; say when in events, "
                 f"or put the file into the path itself"
             )
-        return _after_lead(events, path.get("leads")), any(straight for _, straight in found)
+        return _after_lead(events, path.get("leads")), any(one_way for _, one_way in found)
 
     def _events_of_file(
         self, path: Mapping[str, Any], where: str
@@ -176,11 +176,11 @@ class _Reader:
         try:
             rows = one_seam(file, path.get("seam"))
             if not rows.events:
-                return [], rows.straight
+                return [], rows.one_way
             options = {key: path[key] for key in ("seam", *_PACED) if key in path}
             timed = _ramped(read_path(file, **options), path)
             events = times_of_events(timed, rows)
-            return _after_lead(events, path.get("leads")), rows.straight
+            return _after_lead(events, path.get("leads")), rows.one_way
         except (SelfmotionError, TypeError) as error:
             raise FileFormatError(f"{self._file}: {where}: path: {error}") from error
 
@@ -199,7 +199,7 @@ class _Reader:
         rest = {key: value for key, value in given.items() if key not in OF_TABLE}
         found, seams = list[Seam](), read_seams(table, options)
         # What a machine switches stays switched in the cuts that follow: they keep their order.
-        switched = any(rows.straight and rows.events for _, rows in seams.values())
+        switched = any(rows.one_way and rows.events for _, rows in seams.values())
         for name, (path, rows) in seams.items():
             path = _ramped(path, values)
             own = {**rest, "name": name}
@@ -210,7 +210,7 @@ class _Reader:
                 path = led(path, values["leads"])
             if events:
                 own["events"] = [*events, *rest.get("events", [])]
-            if events or rows.straight:
+            if events or rows.one_way:
                 # What happens where, and how a machine cuts, is meant one way.
                 own.setdefault("either_way", False)
             if switched and found:

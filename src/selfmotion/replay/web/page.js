@@ -4,6 +4,9 @@ const COLORS = ["#4269d0", "#e8871e", "#3ca951", "#e0508c", "#a463f2", "#12a5a5"
 const PLAY = "M7 4.5v15l12-7.5z";
 const PAUSE = "M6.5 4.5h4v15h-4zm7 0h4v15h-4z";
 
+// Times this near [s] are the same.
+const MOMENT = 1e-6;
+
 const get = (id) => document.getElementById(id);
 
 class Page {
@@ -14,6 +17,7 @@ class Page {
     this.now = 0;
     this.playing = false;
     this.plots = [];
+    this.marks = [];
     this.makeChoice();
     this.makeLegend();
     this.makeLayers();
@@ -43,6 +47,7 @@ class Page {
     this.applyLayers();
     this.makePlots();
     this.makeSteps();
+    this.makeMarks();
     this.seek(Math.min(this.now, this.duration));
   }
 
@@ -57,11 +62,13 @@ class Page {
   follow(time) {
     this.now = time;
     get("time").value = time;
-    get("time").setAttribute("aria-valuetext", `${time.toFixed(2)} seconds`);
+    const here = this.marks.filter(({ t }) => Math.abs(t - time) < MOMENT).map(({ name }) => `, ${name}`);
+    get("time").setAttribute("aria-valuetext", `${time.toFixed(2)} seconds${here.join("")}`);
     get("clock").textContent = `${time.toFixed(2)} / ${this.duration.toFixed(2)} s`;
     for (const plot of this.plots) plot.seek(time);
     this.showPair(time);
     this.showStep(time);
+    this.showLast(time);
     if (this.layers.ellipsoid) this.stage?.stretch(this.plan.ellipsoid, time, this.content.ellipsoidSize);
   }
 
@@ -163,6 +170,8 @@ class Page {
       Home: () => { this.pause(); this.seek(0); },
       End: () => { this.pause(); this.seek(this.duration); },
       r: () => this.stage?.frame(),
+      ",": () => this.jump(-1),
+      ".": () => this.jump(1),
     };
     const number = Number(event.key) - 1;
     if (layer) this.setLayer(layer.name, !this.layers[layer.name]);
@@ -249,8 +258,39 @@ class Page {
   showStep(time) {
     const { steps } = this.plan;
     // At the end of one the next one has begun.
-    const now = steps.findLastIndex(({ begin }) => begin <= time + 1e-9);
+    const now = steps.findLastIndex(({ begin }) => begin <= time + MOMENT);
     this.steps?.forEach((button, k) => button.setAttribute("aria-current", k === now ? "step" : "false"));
+  }
+
+  // Below the slider: seams as long as they last, events as ticks. Keys lead to them as well, so
+  // that a job of hundreds has not as many stops of the tabulator once more.
+  makeMarks() {
+    const seams = this.plan.steps.filter(({ color }) => color).map((step) => ({ ...step, t: step.begin }));
+    this.marks = [...seams, ...this.plan.events];
+    get("marks").hidden = get("markkeys").hidden = this.marks.length === 0;
+    get("last").hidden = this.plan.events.length === 0;
+    get("marks").replaceChildren();
+    for (const { t, end, name, color } of this.marks) {
+      const title = `${name}, at ${t.toFixed(2)} s`;
+      const button = element(get("marks"), "button", {
+        type: "button", tabindex: -1, title, "aria-label": title, class: end === undefined ? "event" : "seam" });
+      button.style.color = color;
+      button.style.left = `${(100 * t) / this.duration}%`;
+      if (end !== undefined) button.style.width = `${(100 * (end - t)) / this.duration}%`;
+      button.addEventListener("click", () => { this.pause(); this.seek(t); });
+    }
+  }
+
+  // To the next mark, or to the one before.
+  jump(way) {
+    const there = this.marks.map(({ t }) => t).filter((t) => way * (t - this.now) > MOMENT);
+    this.pause();
+    if (there.length) this.seek(way > 0 ? Math.min(...there) : Math.max(...there));
+  }
+
+  showLast(time) {
+    const event = this.plan.events.findLast(({ t }) => t <= time + MOMENT);
+    get("last").textContent = event ? `${event.name}, at ${event.t.toFixed(2)} s` : "no event yet";
   }
 
   makeTable() {
