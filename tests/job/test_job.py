@@ -266,6 +266,24 @@ def test_what_is_made_stands_in_the_way_of_what_comes_later() -> None:
     assert late.order == ("raise",)
 
 
+def test_a_seam_that_ends_in_what_it_leaves_is_made_from_there() -> None:
+    panda = robot_named("panda")
+    post = sm.Box("post", [0.5, 0.2, 0.35], [0.04, 0.04, 0.04])
+    seams = [
+        seam("towards", [0.45, 0.3, 0.35], [0.5, 0.2, 0.35], leaves=[post]),
+        seam("then", [0.4, -0.3, 0.35], [0.5, -0.3, 0.35]),
+    ]
+    made = sm.plan_job(panda, seams, branches=1, order="given").require()
+    assert [step.turned for step in made.steps if step.name == "towards"] == [True]
+    # One that may meet what it leaves can go on from either end.
+    free = [replace(seams[0], may_meet=("post",)), seams[1]]
+    assert sm.plan_job(panda, free, branches=1, order="given").verified
+    # From neither end where it leaves something at both: then it is the last one.
+    other = sm.Box("other", [0.45, 0.3, 0.35], [0.04, 0.04, 0.04])
+    both = replace(seams[0], leaves=[post, other])
+    assert sm.plan_job(panda, [both, seams[1]], branches=1).require().order == ("then", "towards")
+
+
 def not_verified(file: Path) -> bool:
     """Whether a file is refused, or is not verified."""
     try:
