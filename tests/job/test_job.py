@@ -260,6 +260,11 @@ def test_what_is_made_stands_in_the_way_of_what_comes_later() -> None:
     given = sm.plan_job(panda, [seams[0], inside], branches=1, order="given")
     assert given.order == ("raise",)
     assert "seam 'inside' is not made" in given.verdict
+    # Where one is in the way of two, it is the one that is left out.
+    deeper = seam("deeper", [0.45, 0.05, 0.3], [0.45, 0.0, 0.3])
+    two = sm.plan_job(panda, [seams[0], inside, deeper], branches=1, order="given")
+    assert two.order == ("inside", "deeper")
+    assert "seam 'raise' is not made: it leaves what is in the way of '" in two.verdict
     late = sm.plan_job(panda, [seams[0], replace(inside, after=("raise",))], branches=1)
     assert "seam 'inside' is not made" in late.verdict
     assert "post" in late.verdict
