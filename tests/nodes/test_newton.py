@@ -46,6 +46,17 @@ def test_convergence_is_quadratic(case: Case, free: bool) -> None:
         assert third / second <= 1e-2
 
 
+def test_another_step_gains_nothing_where_it_ends(case: Case) -> None:
+    """Also where that is told by the matrix of the step before."""
+    optimum = minimise(nodes_of(problem_of(case), 16), NONE, never)
+    cost = optimum.motion.cost
+    assert optimum.promised <= 1e-8 * cost
+    # From there it has no matrix of a step before.
+    again = minimise(optimum.motion, NONE, never)
+    assert again.promised <= 1e-8 * cost
+    assert abs(again.motion.cost - cost) <= 1e-8 * cost
+
+
 def test_many_nodes_take_as_many_iterations(panda: sm.RobotModel) -> None:
     path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     problem = sm.Problem(

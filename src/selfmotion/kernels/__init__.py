@@ -38,6 +38,8 @@ from selfmotion.kernels.table import (
     Stage as Stage,
     Tip as Tip,
     columns as columns,
+    path_of as path_of,
+    rates_of as rates_of,
     stage_of as stage_of,
     tip_of as tip_of,
     view as view,

@@ -213,8 +213,8 @@ class NodeMotion:
 
     def broken(self) -> Flags:
         """Return on which intervals `trajectory` does not keep the conditions, (N,)."""
-        over = self.grid.conditions.over(self.exact)[:-1] > 0.0
-        return np.asarray(over.reshape(len(self.grid.t) - 1, -1).any(axis=1))
+        broken = self.grid.conditions.broken(self.exact)[:-1]
+        return np.asarray(broken.reshape(len(self.grid.t) - 1, -1).any(axis=1))
 
     @property
     def exact_cost(self) -> float:
@@ -261,6 +261,12 @@ class NodeMotion:
     def epsilon(self) -> Array:
         """The null motion ε at the nodes, (N + 1, n)."""
         return np.asarray((self.charts.bases @ self.nu[:, :, None])[:, :, 0])
+
+    def forget(self) -> None:
+        """Let go of what can be computed anew: most of the memory that a long path takes."""
+        for name in ("exact", "h", "partials"):
+            self.__dict__.pop(name, None)
+        self.samples.forget()
 
     def smoothed(self) -> "NodeMotion | None":
         """Return the motion through the same nodes, as fast there as a spline through them.
