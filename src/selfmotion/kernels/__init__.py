@@ -33,7 +33,7 @@ from selfmotion.kernels.forward import (
     evaluate as evaluate,
 )
 from selfmotion.kernels.null_space import factor_damped as factor_damped, transport as transport
-from selfmotion.kernels.start import approach_start as approach_start
+from selfmotion.kernels.start import approach as approach, approach_start as approach_start
 from selfmotion.kernels.table import (
     Stage as Stage,
     Tip as Tip,
