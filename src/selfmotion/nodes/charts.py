@@ -84,6 +84,18 @@ class Charts:
         )
         return out
 
+    def moving(self, place: Place, nu: Array) -> Place:
+        """Return the reference, given as the `place` of ν = 0, with null motions ν (N + 1, r).
+
+        N0 is what J takes to 0 there, so that eq. 4 adds ε = N0 ν to q̇ and leaves all else. Takes
+        over the table of that place.
+        """
+        added = (self.bases @ nu[:, :, None])[:, :, 0]
+        qd, epsilon = self.manifolds.rates(place.table)
+        qd += added
+        epsilon[:] = added
+        return Place(place.q, np.array(qd), self.bases, place.table)
+
     def recentred(self, place: Place) -> tuple["Charts", Array]:
         """Return the charts around a place, and its ν there."""
         bases = orthonormal(place.tangents)
@@ -128,18 +140,15 @@ class Manifolds:
         """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
         return kernels.rates_of(table, self.follows.robot.dof)
 
-    def charts(self, q: Array, qd: Array) -> tuple[Charts, Array] | None:
-        """Return charts around a motion near the path, q and q̇ (N + 1, n), and its ν.
+    def charts(self, q: Array) -> tuple[Charts, Place] | None:
+        """Return charts around a motion near the path, q (N + 1, n), and its place at ν = 0.
 
         None where a node does not come onto its manifold.
         """
         bases = carried_bases(self.follows, q)
         charts, none = Charts(self, q, bases), np.zeros((len(q), bases.shape[2]))
         place = charts.at(none, none)
-        if place is None:
-            return None
-        centred, _ = charts.recentred(place)
-        return centred, np.einsum("knr,kn->kr", centred.bases, qd)
+        return None if place is None else (charts.recentred(place)[0], place)
 
     def accelerations(self, q: Array, qd: Array) -> Array:
         """Return the least q̈ by which motions q, q̇ (N + 1, n) follow the path: J⁺(ẍ - J̇q̇).

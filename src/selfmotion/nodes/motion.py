@@ -117,12 +117,13 @@ class NodeGrid:
 
     def near(self, q: Array, qd: Array) -> "NodeMotion | None":
         """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇, or None."""
-        found = self.manifolds.charts(q, qd)
+        found = self.manifolds.charts(q)
         if found is None:
             return None
-        charts, nu = found
+        charts, place = found
+        nu = np.einsum("knr,kn->kr", charts.bases, qd)
         nu.reshape(-1)[self._rates] = 0.0
-        return self.motion(charts, nu)
+        return self.at(charts, nu, charts.moving(place, nu))
 
     def motion_towards(self, start: Array, wanted: Array, time: float) -> "NodeMotion | None":
         """Return a motion from a start (n,) whose self-motion goes towards `wanted` (n,).
