@@ -26,7 +26,10 @@ _LITTLE = 1e-3
 _INWARD = 0.995
 # A step is taken if it does at least this share of what it promises, and cut by half otherwise.
 _SHARE, _SHORTEST = 1e-4, 1e-6
-# A matrix that is not positive definite gets this share of its largest entry on the diagonal, or a
+# Motions that cost nothing, as of a joint whose axis the tool is on, are left alone: the matrix has
+# this share of its usual entry more on the diagonal, which is above rounding there.
+_FLAT = 1e-13
+# One that is not positive definite gets this share of its largest entry on the diagonal, or a
 # third of what the last one needed; then more by this factor, again and again.
 _SHIFT, _LESS, _MORE = 1e-6, 1.0 / 3.0, 8.0
 # Nodes go no further than this in one step [rad or m]; one that would go beyond that is none of a
@@ -200,7 +203,9 @@ class _Solver:
         right = (gradient + spread((turned @ pressure)[:, :, 0])).ravel()
         right[self.motion.grid.held] = 0.0
         wide = bool(rows.shape[1] or by_jumps.shape[2])
-        shift, largest = 0.0, float(np.abs(curved).max() + np.abs(intervals).max())
+        largest = float(np.abs(curved).max() + np.abs(intervals).max())
+        usual = float(np.median(np.abs(np.diagonal(intervals, axis1=1, axis2=2))))
+        shift = _FLAT * usual
         while shift <= 1e6 * largest:
             matrix = Banded(count, size, 2 if wide else 1)
             matrix.add(0, 0, curved)
