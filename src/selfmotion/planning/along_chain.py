@@ -56,7 +56,7 @@ def along_chain(
         broken = motion.broken() | _beyond_limits(motion)
         if not broken.any():
             none = np.zeros(0, dtype=np.int64)
-            prices = np.zeros_like(motion.h)
+            prices = np.zeros((len(motion.grid.t), 0))
             return MotionOnNodes(motion, Status.PRECISION, none, prices, (), None, is_chain=True)
         finer = finer.halved(np.convolve(broken, np.ones(3), "same") > 0.0)
     return None
