@@ -10,7 +10,7 @@ from selfmotion.motion import Grid
 from selfmotion.nodes import NodeGrid, NodeMotion
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.nodes import takes
+from selfmotion.planning.for_nodes import takes
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import CHAIN_ROUNDS, FINER_CHAIN
 from selfmotion.problem import Problem

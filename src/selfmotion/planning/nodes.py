@@ -6,10 +6,11 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.constraints import BoundConstraint
-from selfmotion.motion import FreeNullMotion, Trajectory
-from selfmotion.nodes import NodeEnds, NodeGrid, NodeMotion, Optimum, Step, minimise
-from selfmotion.optimise import Iteration, QuasiNewton, Status
+from selfmotion.motion import Trajectory
+from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
+from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.for_nodes import most_nodes
 from selfmotion.planning.kept_on_nodes import (
     aim_of,
     broken_by,
@@ -23,7 +24,6 @@ from selfmotion.planning.settings import (
     COST_AGREEMENT,
     FAR_OFF,
     FEWEST_WITH_ACCELERATIONS,
-    MOST_NODES,
     NODE_AGREEMENT,
     NODE_ROUNDS,
     SAME_COST,
@@ -31,32 +31,6 @@ from selfmotion.planning.settings import (
     TOWARDS_MIDDLE,
 )
 from selfmotion.problem import Problem
-
-
-def takes(problem: Problem, effort: Effort, constraints: Sequence[BoundConstraint]) -> bool:
-    """Whether a problem is one for nodes.
-
-    Not where the user asks for another null motion or optimiser, the tool leaves the path, nothing
-    is free, a cost weighs jerks, which cubic splines do not have, or a condition is on the whole
-    motion.
-    """
-    dof = problem.robot.dof
-    orders = [order for cost in problem.all_costs for order in cost.curvature(dof)]
-    return (
-        isinstance(problem.null_motion, FreeNullMotion)
-        and effort.optimizer == QuasiNewton()
-        and problem.damping is None
-        and not problem.relaxations
-        and problem.follows.redundancy == dof - problem.follows.dimension > 0
-        and max(orders, default=0) < 3
-        and all(NodeEnds.takes(item) for item in constraints if item.equality)
-    )
-
-
-def most_nodes(problem: Problem) -> int:
-    """Return how many nodes are as many as a path may need: more, the longer it is."""
-    return int(MOST_NODES * (len(problem.knots) + problem.way_in_reaches))
-
 
 _NO_COLUMNS: Ints = np.zeros(0, dtype=np.int64)
 _ARRIVED = (Status.CONVERGED, Status.PRECISION)
