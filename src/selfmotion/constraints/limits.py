@@ -1,6 +1,7 @@
 """Limits of joint position, velocity, acceleration and jerk."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -231,10 +232,18 @@ class BoundLimits:
 
     def residual(self, samples: Samples) -> Array:
         """See `BoundConstraint.residual`."""
-        x = motion_of_order(samples, self.order)[:, self.joints]
-        above = (x - self.upper) / self.scale + self.margin
-        below = (self.lower - x) / self.scale + self.margin
-        return np.hstack([above, below])
+        x = motion_of_order(samples, self.order)
+        x = x if len(self.joints) == x.shape[1] else x[:, self.joints]
+        h = np.empty((len(x), 2 * len(self.joints)))
+        np.subtract(x, self.upper, out=h[:, : len(self.joints)])
+        np.subtract(self.lower, x, out=h[:, len(self.joints) :])
+        h /= self._both_scales
+        h += self.margin
+        return h
+
+    @cached_property
+    def _both_scales(self) -> Array:
+        return np.concatenate([self.scale, self.scale])
 
     def tangents(self, samples: Samples, motion: NodeTangents) -> Array:
         """See `BoundConstraint.tangents`."""
