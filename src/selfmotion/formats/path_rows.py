@@ -10,6 +10,7 @@ import numpy as np
 from selfmotion.basics import (
     Array,
     FileFormatError,
+    nearest,
     read_arrays,
     read_rows,
 )
@@ -71,6 +72,19 @@ class PoseRows:
     events: tuple[tuple[int, str], ...] = ()
     straight: bool = False
     one_way: bool = False
+
+
+# So many names of seams are listed.
+_LISTED = 5
+
+
+def no_such_seam(file: FilePath, seam: str, names: Sequence[str]) -> FileFormatError:
+    """Return an error that says which seams a file has, those of a like name if there are any."""
+    listed = ", ".join(repr(name) for name in names[:_LISTED])
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return FileFormatError(
+        f"{file}: has no seam '{seam}'{nearest(seam, names) or f'; it has {listed}{more}'}"
+    )
 
 
 def read_tables(file: FilePath) -> dict[str, PoseRows]:
