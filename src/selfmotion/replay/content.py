@@ -222,7 +222,7 @@ def _packed(frames: KeyFrames, payload: Payload) -> Json:
 
 
 def _curves(plan: Plan, sampled: Curves, payload: Payload) -> Json:
-    drawn = {
+    drawn: Json = {
         "t": payload.array(sampled.t),
         "q": payload.array(sampled.q),
         "qd": payload.array(sampled.qd),
@@ -235,6 +235,8 @@ def _curves(plan: Plan, sampled: Curves, payload: Payload) -> Json:
         drawn["position"] = payload.array(sampled.position_error)
     if np.any(plan.task.rows >= 3):
         drawn["rotation"] = payload.array(sampled.rotation_error)
+    # What is allowed is no error, and a page says so.
+    drawn["relaxed"] = bool(plan.problem.relaxations)
     return drawn
 
 
