@@ -1,6 +1,7 @@
 """A path followed in a closed loop by the command, with a simulated controller over a socket."""
 
 import json
+import re
 import socket
 import threading
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.cli import runs
+from selfmotion.cli.following import out_of_reach
 from support.arms import PANDA_HOME, robot_named
 from support.shell import complaint, invoke
 
@@ -119,6 +121,19 @@ def test_states_of_a_wrong_length_are_told_with_the_right_one(
     assert told == [f"left out: a datagram of 8 bytes; {said}"]
     assert f"of 8 bytes; {said}" in " ".join(shown.split("datagrams left out")[1].split())
     assert "kept by all commands; used: position" in " ".join(shown.split())
+
+
+def test_a_path_that_leaves_the_reach_is_told_before_the_arm_moves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, told = written(tmp_path), list[str]()
+    assert out_of_reach(sm.read_problem(file)) == ""
+    file.write_text(file.read_text().replace("radius = 0.05", "radius = 0.9"))
+    monkeypatch.setattr(runs, "_told_apart", told.append)
+    # An address that is none ends it before anything moves.
+    assert "expected host:port" in complaint("follow", file, "--listen", "nowhere")
+    (note,) = told
+    assert re.match(r"note: from t = [0-9.]+ s on the pose is out of reach", note)
 
 
 def test_when_the_tool_was_off_its_path_is_told(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from rich.table import Table
 import selfmotion as sm
 from selfmotion import realtime
 from selfmotion.basics import Array
+from selfmotion.search import reachable
 
 # What a datagram holds at most, and how long one is waited for at a time [s].
 _LARGEST, _LOOK = 65_507, 0.2
@@ -216,6 +217,11 @@ def replanner_of(problem: sm.Problem, **options: Any) -> sm.Replanner:
     if problem.relaxations:
         raise sm.ProblemError("while the arm moves no row is relaxed: leave 'relaxations' out")
     return sm.Replanner(problem.robot, problem.task, problem.costs, problem.constraints, **options)
+
+
+def out_of_reach(problem: sm.Problem) -> str:
+    """Return in words from when on poses of the path are out of reach; "" where none is."""
+    return reachable(problem, sm.Search().starts, np.random.default_rng(0)).reason
 
 
 def show(link: Link, console: Console) -> None:
