@@ -11,7 +11,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.cli import runs
-from selfmotion.cli.following import out_of_reach
+from selfmotion.cli.following import out_of_reach, replanner_of
 from support.arms import PANDA_HOME, robot_named
 from support.shell import complaint, invoke
 
@@ -172,6 +172,20 @@ def test_what_is_not_kept_while_moving_is_refused(tmp_path: Path) -> None:
     file = written(tmp_path)
     file.write_text(file.read_text() + '\n[[relaxations]]\nrows = ["z"]\nband = 0.01\n')
     assert "no row is relaxed" in complaint("follow", file)
+
+
+def test_a_file_without_constraints_is_followed_and_jerks_that_are_asked_for_are_not(
+    tmp_path: Path,
+) -> None:
+    """The maker's limits of the jerk are the default of plans; the loop keeps none."""
+    file = written(tmp_path)
+    text, _ = file.read_text().split("[[constraints]]")
+    file.write_text(text)
+    limits = replanner_of(sm.read_problem(file)).limits
+    panda = robot_named("panda")
+    np.testing.assert_array_equal(limits[2:], [panda.velocity_limit, panda.acceleration_limit])
+    file.write_text(text + '[[constraints]]\nkind = "JointJerkLimits"\n')
+    assert "constraint JointJerkLimits is not kept while moving" in complaint("follow", file)
 
 
 def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:
