@@ -67,7 +67,8 @@ bench-lifts: $(READY)  ## paths of an arm on a torso lift, each with a known mot
 bench-spirals: $(READY)  ## loops of a spiral, from a few to an hour of them
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/spirals.py
 
-fuzz-job: $(READY)  ## a job killed at 20 random times, and begun again
+fuzz-job: $(READY)  ## random jobs that leave posts; one that is killed at 20 random times, and begun again
+	$(BIN)/python benchmarks/random_jobs.py
 	$(BIN)/python benchmarks/job_killed.py
 	$(BIN)/python benchmarks/job_killed.py --workers 2
 

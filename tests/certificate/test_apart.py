@@ -109,6 +109,16 @@ def test_the_closest_approach_is_found_wherever_it_is(seed: int) -> None:
         assert (judged.subject, judged.allowed) == ("first1 - second1", distance)
 
 
+def test_in_lots_the_same_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
+    bodies = Bodies(
+        lambda q: np.full(len(q), 0.35), lambda q: 0.01 + np.minimum(np.abs(q[:, 0] - 0.7), 0.3)
+    )
+    at_once = closest_at_all_times(bodies, motion.trajectory, 0.0)  # type: ignore[arg-type]
+    monkeypatch.setattr("selfmotion.certificate.apart._LOT", 3)
+    assert closest_at_all_times(bodies, motion.trajectory, 0.0) == at_once  # type: ignore[arg-type]
+
+
 def test_a_distance_that_is_grazed_is_undecided_and_said_to_be() -> None:
     motion = motion_of([[0.0] * 3, [3.0, 0.0, 0.0]], [[3.0, 0.0, 0.0]] * 2, [0.0, 1.0])
     bodies = Bodies(lambda q: 0.1 + np.minimum(np.abs(q[:, 0] - 1.0), 0.3), lever=2.0)

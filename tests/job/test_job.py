@@ -260,10 +260,33 @@ def test_what_is_made_stands_in_the_way_of_what_comes_later() -> None:
     given = sm.plan_job(panda, [seams[0], inside], branches=1, order="given")
     assert given.order == ("raise",)
     assert "seam 'inside' is not made" in given.verdict
+    # Where one is in the way of two, it is the one that is left out.
+    deeper = seam("deeper", [0.45, 0.05, 0.3], [0.45, 0.0, 0.3])
+    two = sm.plan_job(panda, [seams[0], inside, deeper], branches=1, order="given")
+    assert two.order == ("inside", "deeper")
+    assert "seam 'raise' is not made: it leaves what is in the way of '" in two.verdict
     late = sm.plan_job(panda, [seams[0], replace(inside, after=("raise",))], branches=1)
     assert "seam 'inside' is not made" in late.verdict
     assert "post" in late.verdict
     assert late.order == ("raise",)
+
+
+def test_a_seam_that_ends_in_what_it_leaves_is_made_from_there() -> None:
+    panda = robot_named("panda")
+    post = sm.Box("post", [0.5, 0.2, 0.35], [0.04, 0.04, 0.04])
+    seams = [
+        seam("towards", [0.45, 0.3, 0.35], [0.5, 0.2, 0.35], leaves=[post]),
+        seam("then", [0.4, -0.3, 0.35], [0.5, -0.3, 0.35]),
+    ]
+    made = sm.plan_job(panda, seams, branches=1, order="given").require()
+    assert [step.turned for step in made.steps if step.name == "towards"] == [True]
+    # One that may meet what it leaves can go on from either end.
+    free = [replace(seams[0], may_meet=("post",)), seams[1]]
+    assert sm.plan_job(panda, free, branches=1, order="given").verified
+    # From neither end where it leaves something at both: then it is the last one.
+    other = sm.Box("other", [0.45, 0.3, 0.35], [0.04, 0.04, 0.04])
+    both = replace(seams[0], leaves=[post, other])
+    assert sm.plan_job(panda, [both, seams[1]], branches=1).require().order == ("then", "towards")
 
 
 def not_verified(file: Path) -> bool:

@@ -96,6 +96,21 @@ def test_the_way_is_the_integral_of_the_speed(quintic: bool) -> None:
     np.testing.assert_allclose(motion.travelled(t[some + 1]), way[some], rtol=0, atol=1e-8)
 
 
+@pytest.mark.parametrize("order", [0, 1, 2, 3])
+def test_in_lots_a_motion_is_what_it_is_at_once(
+    order: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def looked_at() -> tuple[np.ndarray, np.ndarray]:
+        motion = random_motion(True, 4, 20)
+        times = np.linspace(motion.t[0], motion.t[-1], 101)
+        return motion(times, order), motion.travelled(times)
+
+    at_once = looked_at()
+    monkeypatch.setattr("selfmotion.motion.spline._LOT", 7)
+    for found, expected in zip(looked_at(), at_once, strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
 def test_accelerations_are_continuous_where_they_are_given() -> None:
     motion, h = random_motion(quintic=True), 1e-12
     inner = motion.t[1:-1]

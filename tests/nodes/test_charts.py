@@ -74,6 +74,27 @@ def test_tangents_and_pullbacks_are_central_differences(case: Case) -> None:
     assert abs(np.sum(wrong * step) - expected) > 1e-4
 
 
+def test_null_motions_are_added_where_charts_begin(case: Case) -> None:
+    """What is known of ν = 0 and of ε there is what eq. 4 says of both."""
+    motion = nodes_of(problem_of(case))
+    rng = np.random.default_rng(8)
+    nu = rng.normal(size=motion.nu.shape)
+    none = np.zeros_like(nu)
+    rests, expected = (motion.charts.at(none, each) for each in (none, nu))
+    assert rests is not None
+    assert expected is not None
+    found = motion.charts.moving(rests, nu)
+    for own, other in (
+        (found.q, expected.q),
+        (found.qd, expected.qd),
+        (found.tangents, expected.tangents),
+    ):
+        np.testing.assert_allclose(own, other, atol=1e-9)
+    by_q, by_qd = rng.normal(size=(2, *found.q.shape))
+    slopes = [motion.charts.pulled(place, by_q, by_qd) for place in (found, expected)]
+    np.testing.assert_allclose(slopes[0], slopes[1], atol=1e-8 * np.abs(slopes[1]).max())
+
+
 def test_charts_around_a_motion_are_of_the_same_motion(case: Case) -> None:
     motion = nodes_of(problem_of(case))
     motion = moved(motion, random_step(motion, 5, 0.05))

@@ -6,9 +6,8 @@ from scipy.interpolate import CubicHermiteSpline
 
 import selfmotion as sm
 from selfmotion.nodes.hermite import Hermite
-from selfmotion.nodes.objective import Around
 from support.arms import PANDA_HOME
-from support.nodes import centred, moved, nodes_of, random_step
+from support.nodes import around_of, centred, moved, nodes_of, random_step
 
 NEAR, DIFFERENCE = 1e-5, 1e-6
 
@@ -47,8 +46,7 @@ def test_rows_and_pullbacks_are_central_differences(panda: sm.RobotModel, name: 
     step, conditions = random_step(motion, 2), motion.grid.conditions
     above, below = (moved(motion, sign * NEAR * step).h for sign in (1.0, -1.0))
     change = (above - below) / (2 * NEAR)
-    around = Around.of(motion.charts, motion.nu)
-    assert around is not None
+    around = around_of(motion)
     columns = np.arange(motion.h.shape[1])
     rows = conditions.rows(motion.samples.checked, around.changes, columns)
     padded = np.pad(step, ((1, 1), (0, 0)))
@@ -67,8 +65,7 @@ def test_rows_and_pullbacks_are_central_differences(panda: sm.RobotModel, name: 
 
 def test_columns_are_those_of_all(panda: sm.RobotModel) -> None:
     motion = motion_with(panda, "two")
-    around = Around.of(motion.charts, motion.nu)
-    assert around is not None
+    around = around_of(motion)
     rows = motion.grid.conditions.rows
     checked = motion.samples.checked
     every = rows(checked, around.changes, np.arange(motion.h.shape[1]))

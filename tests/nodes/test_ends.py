@@ -7,10 +7,9 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.nodes import NodeEnds, Step, minimise
-from selfmotion.nodes.objective import Around
 from selfmotion.optimise import Status
 from support.arms import PANDA_HOME, Case
-from support.nodes import centred, moved, nodes_of, problem_of, random_step
+from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step
 
 # Central differences of positions and velocities.
 STEP, ALIKE = 1e-5, 1e-7
@@ -46,8 +45,7 @@ def there_and_back(case: Case, shape: str, **options) -> sm.Problem:
 @pytest.mark.parametrize("shape", SHAPES)
 def test_derivatives_are_central_differences(case: Case, shape: str) -> None:
     motion = centred(nodes_of(there_and_back(case, shape)))
-    ends, around = motion.grid.ends, Around.of(motion.charts, motion.nu)
-    assert around is not None
+    ends, around = motion.grid.ends, around_of(motion)
     assert ends.count == len(motion.c) > 0
     step = random_step(motion, 7)
     above, below = (moved(motion, sign * STEP * step) for sign in (1.0, -1.0))

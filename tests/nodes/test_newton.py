@@ -46,6 +46,29 @@ def test_convergence_is_quadratic(case: Case, free: bool) -> None:
         assert third / second <= 1e-2
 
 
+def test_another_step_gains_nothing_where_it_ends(case: Case) -> None:
+    """Also where that is told by the matrix of the step before."""
+    optimum = minimise(nodes_of(problem_of(case), 16), NONE, never)
+    cost = optimum.motion.cost
+    assert optimum.promised <= 1e-8 * cost
+    # From there it has no matrix of a step before.
+    again = minimise(optimum.motion, NONE, never)
+    assert again.promised <= 1e-8 * cost
+    assert abs(again.motion.cost - cost) <= 1e-8 * cost
+
+
+def test_what_costs_nothing_stays_as_it_is(panda: sm.RobotModel) -> None:
+    """The tool's origin is on the last joint's axis: wherever that stands, costs are the same."""
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    begin = nodes_of(problem_of((panda, "position", PANDA_HOME, path)), 64, free=True)
+    found = minimise(begin, NONE, never)
+    assert found.status is Status.CONVERGED
+    away = np.abs(found.motion.place.q - begin.place.q).max(axis=0)
+    # Others go far; what rounding says of the last one is not followed.
+    assert away[:6].max() > 0.05
+    assert away[6] < 0.01
+
+
 def test_many_nodes_take_as_many_iterations(panda: sm.RobotModel) -> None:
     path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
     problem = sm.Problem(

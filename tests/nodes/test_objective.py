@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.nodes.objective import Around, scattered
+from selfmotion.nodes.objective import scattered
 from selfmotion.optimise import Banded
 from selfmotion.robot import has_masses
 from support.arms import Case
-from support.nodes import centred, moved, nodes_of, problem_of, random_step
+from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step
 
 NEAR = 1e-5
 # Of central differences at that distance, relative to the largest entry.
@@ -41,11 +41,10 @@ def test_gradient_and_curvature_are_central_differences(case: Case, rest: bool) 
     own = gradient(motion)
     assert abs(np.sum(own * step) - slope) < GRADIENT * np.abs(own).max() * step.size
     # Charts around the same motion: ν there is another function of z, but its zero is the same.
-    around = Around.of(motion.charts, motion.nu)
-    assert around is not None
     slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
+    around = around_of(motion, slopes)
     matrix = Banded(len(motion.nu), step.shape[1], 1)
-    matrix.add(0, 0, around.curvature(slopes))
+    matrix.add(0, 0, around.curvature)
     matrix.add_pairs(0, motion.grid.cost.curvature(motion.samples, motion.partials, around.changes))
     change = (gradient(above) - gradient(below)) / (2 * NEAR)
     product = matrix.dense() @ step.ravel()
@@ -70,12 +69,11 @@ def test_curvature_of_other_costs_is_right_to_second_order(case: Case, kind: str
         motion = nodes_of(problem_of(case, costs=(sm.JointVelocity(), cost)), count)
         shape = np.sin(np.linspace(0.0, 3.0, count + 1))[:, None]
         step = shape * np.ones(2 * motion.nu.shape[1])
-        around = Around.of(motion.charts, motion.nu)
-        assert around is not None
-        intervals = motion.grid.cost.curvature(motion.samples, motion.partials, around.changes)
         slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
+        around = around_of(motion, slopes)
+        intervals = motion.grid.cost.curvature(motion.samples, motion.partials, around.changes)
         matrix = Banded(count + 1, step.shape[1], 1)
-        matrix.add(0, 0, around.curvature(slopes))
+        matrix.add(0, 0, around.curvature)
         matrix.add_pairs(0, intervals)
         change = gradient(moved(motion, NEAR * step)) - gradient(moved(motion, -NEAR * step))
         change = change.ravel() / (2 * NEAR)
@@ -100,3 +98,12 @@ def test_the_cost_is_of_fourth_order(case: Case) -> None:
     if errors[-1] > 1e-12 * costs[-1]:
         orders = np.log2(errors[:-1] / errors[1:])
         assert orders.min() > 3.0, (errors, orders)
+
+
+def test_in_lots_the_curvature_is_the_same(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    motion = nodes_of(problem_of(case))
+    changes = around_of(motion).changes
+    at_once = motion.grid.cost.curvature(motion.samples, motion.partials, changes)
+    monkeypatch.setattr("selfmotion.nodes.objective._LOT", 5)
+    found = motion.grid.cost.curvature(motion.samples, motion.partials, changes)
+    np.testing.assert_array_equal(found, at_once)

@@ -5,9 +5,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.nodes import NodeMotion
-from selfmotion.nodes.objective import Around
 from support.arms import PANDA_HOME, Case
-from support.nodes import nodes_of, problem_of
+from support.nodes import around_of, nodes_of, problem_of
 
 # Central differences of jumps, which go with the square of the number of nodes.
 STEP, ALIKE = 1e-5, 1e-6
@@ -23,9 +22,8 @@ def continuous(motion: NodeMotion) -> NodeMotion:
 def test_tangents_are_central_differences(case: Case, rest: bool) -> None:
     motion = continuous(nodes_of(problem_of(case, rest=rest), 12))
     continuity, charts = motion.grid.continuity, motion.charts
-    around = Around.of(charts, motion.nu)
+    around = around_of(motion)
     assert continuity is not None
-    assert around is not None
     tangents = continuity.tangents(around.changes)
     step = np.random.default_rng(5).normal(size=(13, around.changes.shape[3]))
     r = motion.nu.shape[1]

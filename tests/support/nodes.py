@@ -7,6 +7,7 @@ from selfmotion.basics import Array
 from selfmotion.engine import Counts, settled_still_motion
 from selfmotion.motion import Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion
+from selfmotion.nodes.objective import Around
 from support.arms import Case
 
 
@@ -42,6 +43,15 @@ def moved(motion: NodeMotion, step: Array) -> NodeMotion:
 def centred(motion: NodeMotion) -> NodeMotion:
     """Return the same nodes with charts around them."""
     found = motion.recentred()
+    assert found is not None
+    return found
+
+
+def around_of(motion: NodeMotion, by_node: Array | None = None) -> Around:
+    """Return how nodes at the reference of their charts move, for slopes (N + 1, 2, n) or none."""
+    count, n, _ = motion.charts.bases.shape
+    slopes = np.zeros((count, 2, n)) if by_node is None else by_node
+    found = Around.of(motion.charts, motion.nu, slopes)
     assert found is not None
     return found
 

@@ -20,6 +20,8 @@ from selfmotion.motion import Trajectory
 _FIRST, _DEPTH = 16, 40
 # More intervals than this at once are not looked at: what is left is undecided.
 _MOST = 200_000
+# Of these, so many are looked at together.
+_LOT = 4096
 # Hulls will do where some halvings more settle a pair with them; meshes are slow.
 _HULLS_DO = 0.05
 # The distance that is reported is the smallest one to this share, or to this [m].
@@ -170,35 +172,61 @@ def closest_at_all_times(
     approach = Approach(best, float(edges[best.index]))
     if not model.pairs:
         return approach
-    intervals = np.stack([edges[:-1], edges[1:]], axis=1)
-    budget = np.diff(way(edges), axis=0) @ levers.T
+    intervals, made = (np.stack([each[:-1], each[1:]], axis=1) for each in (edges, way(edges)))
+    budget = (made[:, 1] - made[:, 0]) @ levers.T
     goal = _goal(best, distance)
     need = np.maximum(np.pad(budget, ((0, 1), (0, 0))), np.pad(budget, ((1, 0), (0, 0))))
     values = model.distances(trajectory(edges), goal + need, goal + _HULLS_DO * need)
-    first, last = values[:-1], values[1:]
+    sides = np.stack([values[:-1], values[1:]], axis=1)
     for _ in range(_DEPTH):
         # Written so that NaN settles nothing.
-        unsettled = ~(0.5 * (first + last - budget) >= goal)
-        rows = np.flatnonzero(unsettled.any(axis=1))
+        lots = _lots(len(sides))
+        settled = [_bounds(made[lot], sides[lot], levers) >= goal for lot in lots]
+        rows = np.flatnonzero(~np.concatenate([each.all(axis=1) for each in settled]))
         if not rows.size or approach.closest.value < distance:
             return approach
         if len(rows) > _MOST:
             break
-        settled, (begin, end) = ~unsettled[rows], intervals[rows].T
-        middle = 0.5 * (begin + end)
-        intervals = np.stack([begin, middle, middle, end], axis=1).reshape(-1, 2)
-        budget = (way(intervals[:, 1]) - way(intervals[:, 0])) @ levers.T
-        need = np.maximum(budget[0::2], budget[1::2])
-        exact_below = goal + _HULLS_DO * need
-        asked = np.where(settled, -np.inf, goal + need)
-        inner = model.distances(trajectory(middle), asked, exact_below)
+        intervals, made, sides = intervals[rows], made[rows], sides[rows]
         # Pairs that are settled need no number any more.
-        ends = [np.where(settled, np.inf, side) for side in (first[rows], inner, last[rows])]
-        first = np.stack(ends[:2], axis=1).reshape(len(intervals), -1)
-        last = np.stack(ends[1:], axis=1).reshape(len(intervals), -1)
-        approach = _nearer(approach, model, middle, ends[1], exact_below)
+        known = np.concatenate(settled)[rows]
+        np.copyto(sides, np.inf, where=known[:, None])
+        middle = intervals.mean(axis=1)
+        between, inner = way(middle), np.empty_like(sides[:, 0])
+        for lot in _lots(len(rows)):
+            (before, after), here = made[lot].swapaxes(0, 1), between[lot]
+            need = np.maximum((here - before) @ levers.T, (after - here) @ levers.T)
+            exact_below = goal + _HULLS_DO * need
+            asked = np.where(known[lot], -np.inf, goal + need)
+            found = model.distances(trajectory(middle[lot]), asked, exact_below)
+            inner[lot] = np.where(known[lot], np.inf, found)
+            approach = _nearer(approach, model, middle[lot], inner[lot], exact_below)
+        intervals, made, sides = (
+            _halves(each, own)
+            for each, own in ((intervals, middle), (made, between), (sides, inner))
+        )
         goal = _goal(approach.closest, distance)
-    return _undecided(model, approach, intervals, first, 0.5 * (first + last - budget), distance)
+    bounds = _bounds(made, sides, levers)
+    return _undecided(model, approach, intervals, sides[:, 0], bounds, distance)
+
+
+def _lots(count: int) -> list[slice]:
+    """Return so many intervals in lots: what they need for a while is much more than they are."""
+    return [slice(first, first + _LOT) for first in range(0, count, _LOT)]
+
+
+def _halves(sides: Array, middle: Array) -> Array:
+    """Return what is at both ends of the halves of intervals, (2 I, 2, …), for theirs (I, 2, …)."""
+    both = np.stack([sides[:, 0], middle, middle, sides[:, 1]], axis=1)
+    return both.reshape(2 * len(sides), *sides.shape[1:])
+
+
+def _bounds(made: Array, sides: Array, levers: Array) -> Array:
+    """Return how near pairs may come, (I, P): for ways (I, 2, n) and distances at both ends."""
+    bounds: Array = sides[:, 0] + sides[:, 1]
+    bounds -= (made[:, 1] - made[:, 0]) @ levers.T
+    bounds *= 0.5
+    return bounds
 
 
 def _levers(model: CollisionModel, trajectory: Trajectory) -> Array:

@@ -47,12 +47,15 @@ def jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
     frames = [chain.tip] if chain.base == WORLD else [chain.tip, chain.base]
     world = np.empty((len(frames), len(q), 6, model.nv))
     turns, places = np.empty((len(frames), len(q), 3, 3)), np.empty((len(frames), len(q), 3))
+    placed = [data.oMf[frame] for frame in frames]
+    # Views of what each placement sets.
+    seen = [(pose.rotation, pose.translation) for pose in placed]
     for k, configuration in enumerate(q):
         pin.computeJointJacobians(model, data, configuration)
         for f, frame in enumerate(frames):
-            pose = pin.updateFramePlacement(model, data, frame)
+            pin.updateFramePlacement(model, data, frame)
             world[f, k] = pin.getFrameJacobian(model, data, frame, _AXES).reshape(6, -1)
-            turns[f, k], places[f, k] = pose.rotation, pose.translation
+            turns[f, k], places[f, k] = seen[f]
     if chain.base == WORLD:
         return world[0], turns[0]
     own, other = world

@@ -20,17 +20,17 @@ from typing import NamedTuple
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.engine.turns import (
-    SMALL,
+from selfmotion.path import Path, PathSamples
+from selfmotion.task import (
+    SMALL_TURN,
+    Relaxation,
     exponentials,
     left,
     left_derivative,
     left_matrices,
-    skew,
+    skews,
     turn,
 )
-from selfmotion.path import Path, PathSamples
-from selfmotion.task import Relaxation
 
 _DEGREE = 3
 
@@ -193,7 +193,7 @@ class Deviation:
         """Return Q δ̇ + Q̇ δ, Q̇ = [ω]× Q in tool axes."""
         if not self._in_tool_axes:
             return rate
-        spin = skew(self._nominal.twist[:, 3:])
+        spin = skews(self._nominal.twist[:, 3:])
         return self._shift(rate) + turn(spin, self._shift(delta))
 
 
@@ -243,7 +243,7 @@ def _squash(s: Array, band: float) -> tuple[Array, Array, Array]:
 
 def _sine_series(u: Array) -> tuple[Array, Array, Array]:
     """Return f = sin u / u, f'/u and (f'/u)'/u."""
-    small = np.abs(u) < SMALL
+    small = np.abs(u) < SMALL_TURN
     safe = np.where(small, 1.0, u)
     sine, cosine = np.sin(safe), np.cos(safe)
     first = np.where(small, 1.0 - u**2 / 6.0 + u**4 / 120.0, sine / safe)

@@ -61,6 +61,8 @@ class Objective:
         # ∂q/∂x and ∂q̇/∂x there, once they were asked for.
         self._tangents: tuple[Array, Array] | None = None
         self._terms: dict[str, float] = {}
+        # The evaluation there, likewise.
+        self._evaluation: Evaluation | None = None
         self._first = rollout.first_target
 
     @classmethod
@@ -189,12 +191,15 @@ class Objective:
     def at(self, x: Array) -> Evaluation:
         """Return the motion of x with all that is known of it."""
         self._run(x)
-        before = self.rollout.jacobian_evaluations
-        t, q, qd = self.rollout.polished()
-        names = self.rollout.robot.joint_names
-        trajectory = Trajectory(t, q, qd, names, self.grid.derivative(qd))
-        self.counts.jacobians += self.rollout.jacobian_evaluations - before
-        return Evaluation(x.copy(), dict(self._terms), trajectory, self.rollout.damped)
+        if self._evaluation is None:
+            before = self.rollout.jacobian_evaluations
+            t, q, qd = self.rollout.polished()
+            names = self.rollout.robot.joint_names
+            trajectory = Trajectory(t, q, qd, names, self.grid.derivative(qd))
+            self.counts.jacobians += self.rollout.jacobian_evaluations - before
+            damped = self.rollout.damped
+            self._evaluation = Evaluation(x.copy(), dict(self._terms), trajectory, damped)
+        return self._evaluation
 
     def violations(self, x: Array) -> tuple[str, ...]:
         """Return what is wrong for each constraint that is not kept at x, on its worst place."""
@@ -253,7 +258,7 @@ class Objective:
             return
         self.counts.evaluated()
         # An interruption on the way must not leave half a motion as that of x.
-        self._at = self._tangents = None
+        self._at = self._tangents = self._evaluation = None
         self._terms = dict.fromkeys(self._costs.names, np.inf)
         before = self.rollout.jacobian_evaluations
         try:

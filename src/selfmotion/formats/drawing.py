@@ -4,7 +4,7 @@ What the codes of a drawing mean: https://ezdxf.mozman.at/docs/.
 """
 
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
@@ -12,28 +12,18 @@ import numpy as np
 
 from selfmotion.basics import Array, FileFormatError, Ints, ProblemError
 from selfmotion.formats.cuts import Cut
+from selfmotion.formats.drawn_entities import DRAWN
 from selfmotion.formats.path_rows import PoseRows, no_such_seam
 
 # What ezdxf remarks, such as handles that two entities share, is not told beside our own errors.
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())
-# A drawing has less than so many bytes, a curve less than so many points; nothing is farther away
-# than this [m].
-_BYTES, _POINTS, _FAR = 50_000_000, 200_000, 1e3
+# A drawing has less than so many bytes; nothing is farther away than this [m].
+_BYTES, _FAR = 50_000_000, 1e3
 # Metres of a unit by its number in $INSUNITS.
 _UNITS = {1: 25.4e-3, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 14: 0.1}
 _UNIT_NAMES = "1 (inches), 2 (feet), 4 (mm), 5 (cm), 6 (m) or 14 (dm)"
 # What chords may be off a curve, and ends off each other that meet [m].
 _DEVIATION = _MEET = 1e-5
-# A cubic is off its chord by at most this many times what it is off at thirds of its parameter.
-_BETWEEN_THIRDS = 1.31
-# Arcs of a larger radius, in deviations of a chord, are a fault of what wrote them.
-_FLATTEST = 1e11
-# A chord is halved so many times at most.
-_HALVINGS = 30
-# Pieces of a span between knots, and of an ellipse, to begin with.
-_PIECES = 4
-# Of polylines: fitted by a curve, by a spline, meshes.
-_NOT_AS_DRAWN = 2 | 4 | 16 | 64
 # What spoilt drawings lead to is as various as the entities that they are in.
 _SPOILT = (
     ArithmeticError,
@@ -132,10 +122,10 @@ def _piece(file: FilePath, layer: str, entity: Any, unit: float) -> Iterator[_Pi
 
     kind = entity.dxftype()
     place = f"{kind} {entity.dxf.handle}"
-    draw = _DRAWN.get(kind)
+    draw = DRAWN.get(kind)
     if draw is None:
         raise FileFormatError(
-            f"{file}: layer '{layer}': {place} is not read, expected {', '.join(_DRAWN)}; draw it "
+            f"{file}: layer '{layer}': {place} is not read, expected {', '.join(DRAWN)}; draw it "
             f"with these, delete it, or switch its layer off"
         )
     try:
@@ -151,95 +141,6 @@ def _piece(file: FilePath, layer: str, entity: Any, unit: float) -> Iterator[_Pi
         )
     if len(points) and np.ptp(points, axis=0).max() > _MEET:
         yield _Piece(place, points)
-
-
-# How entities are drawn: points (N, 3) along them in units of the drawing.
-
-
-def _line_drawn(entity: Any, deviation: float) -> Array:
-    return np.array([entity.dxf.start, entity.dxf.end])
-
-
-def _arc_drawn(entity: Any, deviation: float) -> Array:
-    radius = abs(entity.dxf.radius)
-    if not 0.0 < radius < _FLATTEST * deviation:
-        raise ValueError(f"its radius is {radius:.6g}")
-    return np.array(list(entity.flattening(min(deviation, 0.5 * radius))))
-
-
-def _ellipse_drawn(entity: Any, deviation: float) -> Array:
-    ellipse = entity.construction_tool()
-    ends = np.linspace(0.0, ellipse.param_span, 2 * _PIECES + 1)
-    return _chords(lambda t: ellipse.vertices(ellipse.start_param + t), ends, deviation)
-
-
-def _spline_drawn(entity: Any, deviation: float) -> Array:
-    spline = entity.construction_tool()
-    first, last = spline.knots()[spline.order - 1], spline.knots()[spline.count]
-    knots = np.unique([first, *(each for each in spline.knots() if first < each < last), last])
-    ends = np.interp(np.arange(_PIECES * (len(knots) - 1) + 1) / _PIECES, range(len(knots)), knots)
-    return _chords(spline.points, ends, deviation)
-
-
-def _polyline_drawn(entity: Any, deviation: float) -> Array:
-    """Return the corners of a polyline, and points of the arcs between them."""
-    if entity.dxf.flags & _NOT_AS_DRAWN and entity.dxftype() == "POLYLINE":
-        raise ValueError("is a mesh, or fitted by a curve; explode it")
-    if entity.dxftype() == "POLYLINE" and entity.is_3d_polyline:
-        corners = [vertex.dxf.location for vertex in entity.vertices]
-        return np.array(corners + corners[:1] if entity.is_closed else corners)
-    found = np.zeros((0, 3))
-    for part in entity.virtual_entities():
-        points = _DRAWN[part.dxftype()](part, deviation)
-        # Arcs go round to the left, also where the polyline goes to the right.
-        last = found[-1] if len(found) else np.array(_first_corner(entity))
-        away = np.linalg.norm(points[[0, -1]] - last, axis=1)
-        found = np.concatenate([found, points[::-1] if away[1] < away[0] else points])
-    return found
-
-
-def _first_corner(entity: Any) -> Any:
-    if entity.dxftype() == "POLYLINE":
-        return next(iter(entity.points_in_wcs()))
-    return next(iter(entity.vertices_in_wcs()))
-
-
-def _chords(curve: Callable[[Array], Any], ends: Array, deviation: float) -> Array:
-    """Return points of a curve whose chords are nowhere off it by more than a deviation.
-
-    Between two parameters it is taken for a cubic, which is what is between two knots of a spline
-    of degree three, and soon what is left of any other curve.
-    """
-    t = ends
-    for _ in range(_HALVINGS):
-        points = np.array([tuple(each) for each in curve(t)])
-        if not np.isfinite(points).all():
-            raise ValueError("is not finite")
-        chords, steps = np.diff(points, axis=0), np.diff(t)
-        far = np.zeros(len(chords), dtype=bool)
-        lengths = np.maximum((chords * chords).sum(axis=1), np.finfo(np.float64).tiny)
-        for share in (1.0 / 3.0, 2.0 / 3.0):
-            here = np.array([tuple(each) for each in curve(t[:-1] + share * steps)]) - points[:-1]
-            along = np.clip((here * chords).sum(axis=1) / lengths, 0.0, 1.0)
-            away = np.linalg.norm(here - along[:, None] * chords, axis=1)
-            far |= ~(_BETWEEN_THIRDS * away <= deviation)
-        if not far.any():
-            return points
-        if len(t) + far.sum() > _POINTS:
-            break
-        t = np.sort(np.concatenate([t, t[:-1][far] + 0.5 * steps[far]]))
-    raise ValueError(f"needs more than {_POINTS} chords to be within {_DEVIATION:g} m")
-
-
-_DRAWN: Mapping[str, Callable[[Any, float], Array]] = {
-    "LINE": _line_drawn,
-    "ARC": _arc_drawn,
-    "CIRCLE": _arc_drawn,
-    "ELLIPSE": _ellipse_drawn,
-    "SPLINE": _spline_drawn,
-    "LWPOLYLINE": _polyline_drawn,
-    "POLYLINE": _polyline_drawn,
-}
 
 
 def _strokes(pieces: Sequence[_Piece]) -> list[PoseRows]:

@@ -1,7 +1,5 @@
 """Joint motions as the files that controllers and simulators read."""
 
-import io
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,24 +13,29 @@ from selfmotion.basics import (
     Progress,
     as_flag,
     as_path,
-    read_arrays,
     shown,
     silent,
     write_bytes,
-    write_csv,
     write_text,
 )
 from selfmotion.formats import ros
 from selfmotion.formats.bag import bag, motion_of_bag
 from selfmotion.formats.controller_program import check_signals
 from selfmotion.formats.documents import read_document, write_document
+from selfmotion.formats.motion_tables import (
+    of_tables,
+    read_npz,
+    write_arrays,
+    write_columns,
+    write_lists,
+)
 from selfmotion.formats.mujoco import keyframes
 from selfmotion.formats.program_files import PROGRAMS, read_program, write_program
 from selfmotion.formats.program_settings import ProgramSettings
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.formats.urscript import script
 from selfmotion.job import Program
-from selfmotion.motion import Trajectory, column_names
+from selfmotion.motion import Trajectory
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.robot import RobotModel
 
@@ -168,7 +171,7 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
     if path.suffix.lower() == ".csv":
         return Trajectory.from_csv(path, degrees=degrees)
     if path.suffix.lower() == ".npz":
-        return _in_radians(_read_npz(path), degrees)
+        return _in_radians(read_npz(path), degrees)
     if path.suffix.lower() == ".mcap":
         return _in_radians(motion_of_bag(path), degrees)
     if path.suffix.lower() not in (".json", ".yaml", ".yml"):
@@ -178,7 +181,7 @@ def read_motion(file: str | Path, *, degrees: bool = False) -> Trajectory:
             f".mcap (ROS bag), .src (KUKA) or .mod (ABB)"
         )
     document = read_document(path)
-    read = _of_tables if "t" in document else ros.trajectory
+    read = of_tables if "t" in document else ros.trajectory
     return _in_radians(read(path, document), degrees)
 
 
@@ -198,24 +201,6 @@ def _in_radians(motion: Trajectory, degrees: bool) -> Trajectory:
     q, qd = np.radians(motion.q), np.radians(motion.qd)
     qdd = None if motion.qdd is None else np.radians(motion.qdd)
     return Trajectory(motion.t, q, qd, motion.joint_names, qdd)
-
-
-def _write_csv(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
-    table = np.column_stack([motion.t, motion.q, motion.qd, motion.qdd])
-    write_csv(file, column_names(motion.joint_names), table)
-
-
-def _write_npz(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
-    stream = io.BytesIO()
-    arrays: dict[str, Any] = {"t": motion.t, "q": motion.q, "qd": motion.qd, "qdd": motion.qdd}
-    np.savez_compressed(stream, joint_names=np.array(motion.joint_names), **arrays)
-    write_bytes(file, stream.getvalue())
-
-
-def _write_json(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
-    table: dict[str, Any] = {"joint_names": list(motion.joint_names)}
-    table |= {name: getattr(motion, name).tolist() for name in ("t", "q", "qd", "qdd")}
-    write_text(file, json.dumps(table) + "\n")
 
 
 def _write_ros(file: Path, motion: MotionSamples, robot: RobotModel, rate: float | None) -> None:
@@ -260,28 +245,13 @@ def _write_stream(
     write_text(file, script(plan.robot, joints, q, rate, settings, events))
 
 
-def _read_npz(file: Path) -> Trajectory:
-    return _of_tables(file, read_arrays(file))
-
-
-def _of_tables(file: Path, tables: Mapping[str, Any]) -> Trajectory:
-    missing = [name for name in ("t", "q", "qd", "joint_names") if name not in tables]
-    if missing:
-        raise FileFormatError(f"{file}: '{missing[0]}' is missing, expected t, q, qd, joint_names")
-    try:
-        names = tuple(map(str, tables["joint_names"]))
-        return Trajectory(tables["t"], tables["q"], tables["qd"], names, tables.get("qdd"))
-    except (FileFormatError, TypeError, ValueError) as error:
-        raise FileFormatError(f"{file}: {error}") from error
-
-
 # Samples per second of a stream to an arm of Universal Robots.
 STREAM = 125.0
 _Writer = Callable[[Path, MotionSamples, RobotModel, float | None], None]
 WRITERS: Mapping[str, _Writer] = {
-    "csv": _write_csv,
-    "npz": _write_npz,
-    "json": _write_json,
+    "csv": write_columns,
+    "npz": write_arrays,
+    "json": write_lists,
     "ros": _write_ros,
     "moveit": _write_moveit,
     "bag": _write_bag,

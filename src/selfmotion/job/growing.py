@@ -16,8 +16,8 @@ from selfmotion.job.step import Step
 from selfmotion.job.work import Work
 from selfmotion.result import Move, Plan
 
-# For a seam other ways are looked for so often.
-_TRIES = 3
+# For a seam other ways are looked for so often; those whose ends are so near [rad or m] are one.
+_TRIES, _SAME = 3, 1e-6
 # What stands there, by name.
 _Standing = dict[str, Obstacle]
 # From which state to which one past what; None is the start or the end of the program.
@@ -43,7 +43,8 @@ class Growing:
 
     def __init__(self, ordering: Ordering, work: Work, ends: tuple[Array | None, ...]) -> None:
         self._ordering, self._work, self._ends = ordering, work, ends
-        self._notes: list[str] = []
+        # Each once, in order.
+        self._notes: dict[str, None] = {}
         self._leaves_it = {
             item.name: number for number, seam in enumerate(ordering.seams) for item in seam.leaves
         }
@@ -51,9 +52,12 @@ class Growing:
         self._clear: dict[Plan, set[str]] = {}
         self._checked: dict[tuple[int, frozenset[str]], Plan] = {}
         self._moves: dict[_Way, Move] = {}
+        self._held: dict[int, set[str]] = {}
         # Seams that did not go at their place: past what, from where, and why; the last one last.
         self._troubles: dict[int, tuple[_Standing, Array | None, str]] = {}
         self._tries: dict[int, int] = {}
+        # Seams whose leavings others meet, and how.
+        self._in_the_way: dict[int, str] = {}
 
     def program(self) -> Program:
         """Return the program; what could not be made is named."""
@@ -79,16 +83,43 @@ class Growing:
             standing |= {item.name: item for item in seam.leaves}
 
     def _all_clear(self, states: Sequence[int]) -> bool:
-        """Whether each seam keeps clear of what stands there by then."""
-        goes = True
+        """Whether each seam keeps clear of what stands there by then, and its end of its own."""
+        goes, last = True, states[-1]
         for number, (state, q, past) in enumerate(self._places(states), start=1):
             self._work.tell("program", number, len(states))
             met, why = self._met(self._ordering.states[state].plan, past)
             if met:
+                owners = {self._leaves_it[name] for name in met}
+                self._ordering.learn_late(state, owners)
+                name = self._ordering.name_of(state)
+                told = f"it leaves what is in the way of '{name}': {why}"
+                self._in_the_way |= dict.fromkeys(owners, told)
+            elif state != last and self._held_by(state) - set(self._seam(states[number]).may_meet):
+                why = f"it ends in what it leaves: '{min(self._held_by(state))}'"
+                for other in range(len(self._ordering.states)):
+                    if self._held_by(state) - set(self._seam(other).may_meet):
+                        self._ordering.learn(state, other, np.inf)
+            if why:
                 goes = False
-                self._ordering.learn_late(state, {self._leaves_it[name] for name in met})
                 self._trouble(state, q, past, why)
         return goes
+
+    def _held_by(self, state: int) -> set[str]:
+        """Return what a state ends in of that which its seam leaves: few moves lead away."""
+        if state not in self._held:
+            q, seam = self._ordering.states[state].ends[1], self._seam(state)
+            left = _without({item.name: item for item in seam.leaves}, seam)
+            is_near = self._is_near(q, *left.values())
+            held = {name for name, item in left.items() if is_near and self._is_near(q, item)}
+            self._held[state] = held
+        return self._held[state]
+
+    def _is_near(self, q: Array, *bodies: Obstacle) -> bool:
+        """Whether the arm at q (n,) is nearer to one of some bodies than it may be."""
+        apart = self._work.asked.apart(bodies)
+        return apart is not None and bool(
+            apart.model(self._work.asked.robot).distance(q).value < apart.distance
+        )
 
     def _met(self, plan: Plan, past: _Standing) -> tuple[set[str], str]:
         """Return what of all that stands there a plan meets, and how it meets the first."""
@@ -181,28 +212,37 @@ class Growing:
         seam = self._ordering.states[state].seam
         self._troubles.pop(seam, None)
         self._troubles[seam] = past, q, why
-        self._notes.append(f"'{self._ordering.name_of(state)}' is made otherwise: {why}")
+        self._notes[f"'{self._ordering.name_of(state)}' is made otherwise: {why}"] = None
 
     def _otherwise(self, states: Sequence[int]) -> Sequence[int]:
-        """Return an order with other ways to make seams that did not go, or without them."""
-        found: Sequence[int] = ()
-        while not found and self._troubles:
-            seam, (past, q, why) = self._troubles.popitem()
-            name = self._ordering.seams[seam].name
-            if name in self._ordering.missing:
-                continue
+        """Return an order with other ways to make seams that did not go, or without some seam."""
+        ordering = self._ordering
+        for seam, (past, q, _) in list(reversed(self._troubles.items())):
             tries = self._tries[seam] = self._tries.get(seam, 0) + 1
-            if tries <= _TRIES and self._added(seam, q, past):
-                self._troubles = {seam: (past, q, why), **self._troubles}
-            else:
-                self._ordering.drop(seam, why)
-            made = set(self._ordering.made)
-            near = [state for state in states if self._ordering.states[state].seam in made]
-            found = self._ordering.best(near).states
-        return found
+            if tries <= _TRIES and seam in ordering.made and self._added(seam, q, past):
+                found = ordering.best(states).states
+                if found:
+                    return found
+        while reasons := self._reasons_to_drop():
+            # The one without which most of the others are made; as a rule one that did not go.
+            seam = max(reasons, key=ordering.left_without)
+            ordering.drop(seam, reasons[seam])
+            made = set(ordering.made)
+            near = [state for state in states if ordering.states[state].seam in made]
+            found = ordering.best(near).states
+            if found:
+                return found
+        return ()
+
+    def _reasons_to_drop(self) -> dict[int, str]:
+        """Return the seams without which there may be an order, and what to say of each."""
+        troubles = {seam: why for seam, (_, _, why) in reversed(self._troubles.items())}
+        # Those that did not go come first.
+        reasons = troubles | {k: why for k, why in self._in_the_way.items() if k not in troubles}
+        return {seam: why for seam, why in reasons.items() if seam in self._ordering.made}
 
     def _added(self, number: int, q: Array | None, past: _Standing) -> bool:
-        """Add ways to make a seam that keep clear of what stands there; whether there are any."""
+        """Add new ways to make a seam that keep clear of what stands there; whether any were."""
         seam, work = self._ordering.seams[number], self._work
         turns = [False, True] if seam.either_way else [False]
         alone = {turned: work.asked.problem(seam, (), turned) for turned in turns}
@@ -221,13 +261,16 @@ class Growing:
     def _added_of(
         self, number: int, ways: Sequence[tuple[bool, Sequence[Plan]]], past: _Standing
     ) -> bool:
-        """Add those plans of a seam that keep clear of what stands there; whether any does."""
-        count = len(self._ordering.states)
+        """Add those plans of a seam that are new and keep clear of what stands there."""
+        ordering, count = self._ordering, len(self._ordering.states)
+        known = [one.plan.trajectory.q for one in ordering.states if one.seam == number]
         for turned, plans in ways:
             for plan in plans:
-                if not self._met(plan, past)[0]:
-                    self._ordering.add(number, plan, turned)
-        return len(self._ordering.states) > count
+                ends = plan.trajectory.q[[0, -1]]
+                is_known = any(np.abs(q[[0, -1]] - ends).max() < _SAME for q in known)
+                if not is_known and not self._met(plan, past)[0]:
+                    ordering.add(number, plan, turned)
+        return len(ordering.states) > count
 
     def _steps(self, states: Sequence[int]) -> Iterator[Step]:
         """Yield the steps of a program: moves, seams and waits."""

@@ -131,6 +131,14 @@ class Ordering:
         self.missing[self.seams[seam].name] = reason
         self._drop_what_hangs()
 
+    def left_without(self, seam: int) -> int:
+        """Return how many seams there is an order of when one is left out; 0 for no order."""
+        known = dict(self.missing)
+        self.drop(seam, "")
+        count = len(self.made) if self.best().states else 0
+        self.missing = known
+        return count
+
     def _drop_what_hangs(self) -> None:
         """Leave out what comes after seams that are not made."""
         while True:
@@ -161,11 +169,6 @@ class Ordering:
     def made(self) -> list[int]:
         """The seams that are not missing."""
         return [k for k, seam in enumerate(self.seams) if seam.name not in self.missing]
-
-    def keeps(self, order: Sequence[int]) -> bool:
-        """Whether an order of seams makes none before what it has to come after."""
-        place = self._places
-        return self._before(place).keeps([place[seam] for seam in order])
 
     @property
     def _places(self) -> dict[int, int]:

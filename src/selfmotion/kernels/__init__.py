@@ -33,11 +33,13 @@ from selfmotion.kernels.forward import (
     evaluate as evaluate,
 )
 from selfmotion.kernels.null_space import factor_damped as factor_damped, transport as transport
-from selfmotion.kernels.start import approach_start as approach_start
+from selfmotion.kernels.start import approach as approach, approach_start as approach_start
 from selfmotion.kernels.table import (
     Stage as Stage,
     Tip as Tip,
     columns as columns,
+    path_of as path_of,
+    rates_of as rates_of,
     stage_of as stage_of,
     tip_of as tip_of,
     view as view,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, kernel
+from selfmotion.basics import Array, called, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
 from selfmotion.kernels.tool import errors_and_rows, rows_of
@@ -20,15 +20,47 @@ def approach_start(
     reference: Array,
     z: Array,
 ) -> float:
+    """Do as `approach`, with room of its own to work in."""
+    size = rows_of(layout) + null.shape[1]
+    return approach(
+        q,
+        jacobians,
+        rotations,
+        translations,
+        target,
+        layout,
+        null,
+        reference,
+        z,
+        np.empty(size),
+        np.empty((size, q.shape[0])),
+        np.empty((size, size)),
+    )
+
+
+@called
+def approach(
+    q: Array,
+    jacobians: Array,
+    rotations: Array,
+    translations: Array,
+    target: Array,
+    layout: Layout,
+    null: Array,
+    reference: Array,
+    z: Array,
+    b: Array,
+    system: Array,
+    factor: Array,
+) -> float:
     """Add B⁻¹b to q (n,), with B = [J; N0ᵀ] and b = [e; z - N0ᵀ(q - q_ref)]; return max |b|.
 
     Of all tips, (F, 6, n), (F, 3, 3) and (F, 3), and their targets' translations and rotations,
     (12 F,). B⁻¹ = Bᵀ(BBᵀ)⁻¹: errors of the product are taken out by the next step. -1 where B is
-    singular, NaN where q is not finite.
+    singular, NaN where q is not finite. Sets `system` (m + r, n) to B and `factor`, square, to the
+    Cholesky factor of BBᵀ; `b` (m + r,) is to work in.
     """
     m, r, n = rows_of(layout), null.shape[1], q.shape[0]
-    b = np.empty(m + r)
-    system, factor = np.empty((m + r, n)), np.empty((m + r, m + r))
     errors_and_rows(layout, target, jacobians, rotations, translations, b, system)
     for i in range(r):
         b[m + i] = z[i]

@@ -140,6 +140,16 @@ def tip_of(table: Array, f: int, n: int, m: int) -> Tip:
     )
 
 
+def path_of(table: Array, f: int, n: int, m: int) -> Array:
+    """Return a tip's path as `tip_of` has it, in one: target translation, rotation and twist."""
+    return view(table, shared_columns(n, m) + f * tip_columns(n), (18,))
+
+
+def rates_of(table: Array, n: int) -> tuple[Array, Array]:
+    """Return q̇ and ε of a whole table, as `stage_of` has them: of all parts, two."""
+    return view(table, n, (n,)), view(table, 2 * n, (n,))
+
+
 @inlined
 def q_of(table: Array, s: int, n: int) -> Array:
     """Return q of stage s, as `stage_of` has it."""

@@ -1,6 +1,6 @@
 """The polynomials of a motion between its samples, and the ways that joints make on them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -62,6 +62,22 @@ class Spline:
         k = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
         return k, (t - self.t[k]) / (self.t[k + 1] - self.t[k])
 
+    def at(self, t: Array, order: int = 0) -> Array:
+        """Return the motion or a derivative at times t (…), (…, n)."""
+        return _by_lots(lambda part: self._at(part, order), t)
+
+    def _at(self, t: Array, order: int) -> Array:
+        k, s = self.place(t)
+        return evaluated(self.pieces(k, order), s[..., None])
+
+    def travelled(self, t: Array) -> Array:
+        """Return the ways made by times t (K,), (K, n)."""
+        return _by_lots(self._travelled, t)
+
+    def _travelled(self, t: Array) -> Array:
+        k, s = self.place(t)
+        return np.asarray(self.before[k] + self.way(k, s))
+
     def lots(self) -> Iterator[Ints]:
         """Yield the numbers of all intervals in lots that fit into memory."""
         for first in range(0, len(self.t) - 1, _LOT):
@@ -93,3 +109,13 @@ class Spline:
         h, ends = self.t[k + 1] - self.t[k], (k, k + 1)
         given = (self.q, self.qd) if self.qdd is None else (self.q, self.qd, self.qdd)
         return hermite(h[..., None], *((table[ends[0]], table[ends[1]]) for table in given))
+
+
+def _by_lots(function: Callable[[Array], Array], t: Array) -> Array:
+    """Return what a function returns for times t, of many a lot after the other.
+
+    The coefficients that it needs are several times as large as what it returns.
+    """
+    if t.ndim != 1 or len(t) <= _LOT:
+        return function(t)
+    return np.concatenate([function(t[k : k + _LOT]) for k in range(0, len(t), _LOT)])

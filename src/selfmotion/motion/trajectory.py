@@ -212,8 +212,7 @@ class Trajectory:
 
         Exact: from one turn, where q̇ = 0, to the next.
         """
-        k, s = self._spline.place(t)
-        return self._spline.before[k] + self._spline.way(k, s)
+        return self._spline.travelled(t)
 
     def __call__(self, t: npt.ArrayLike, order: int = 0) -> Array:
         """Return q (`order` 0), q̇ (1), q̈ (2) or the jerk (3) at `t`.
@@ -244,8 +243,7 @@ class Trajectory:
                 f"time {times.min()}..{times.max()} s is outside the motion, "
                 f"{self.t[0]}..{self.t[-1]} s"
             )
-        k, s = self._spline.place(times)
-        return evaluated(self._spline.pieces(k, order), s[..., None])
+        return self._spline.at(times, order)
 
     def polynomials(self, middle: Array, half: Array) -> Array:
         """Return the motion on intervals without samples, as polynomials of u, (m, I, n).

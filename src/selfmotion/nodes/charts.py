@@ -57,14 +57,15 @@ class Charts:
         """Return the nodes at z and ν, (N + 1, r) each; None where one is not to be had."""
         own, bases = self.manifolds, self.bases
         q = self.q + (bases @ z[:, :, None])[:, :, 0]
-        table = own.table.copy()
-        own.stages(table).epsilon[:] = (bases @ nu[:, :, None])[:, :, 0]
+        table = own.table()
+        qd, epsilon = own.rates(table)
+        epsilon[:] = (bases @ nu[:, :, None])[:, :, 0]
         tangents = np.empty_like(bases)
         z = np.ascontiguousarray(z)
         failed = look(q, z, bases, self.q, own.targets, own.chains, own.layout, table, tangents)
         if failed >= 0:
             return None
-        return Place(q, np.array(own.stages(table).qd), tangents, table)
+        return Place(q, np.array(qd), tangents, table)
 
     def pulled(self, place: Place, by_q: Array, by_qd: Array) -> Array:
         """Return the derivatives by (z, ν), (N + 1, 2r), of what has these by q and q̇."""
@@ -83,10 +84,22 @@ class Charts:
         )
         return out
 
+    def moving(self, place: Place, nu: Array) -> Place:
+        """Return the reference, given as the `place` of ν = 0, with null motions ν (N + 1, r).
+
+        N0 is what J takes to 0 there, so that eq. 4 adds ε = N0 ν to q̇ and leaves all else. Takes
+        over the table of that place.
+        """
+        added = (self.bases @ nu[:, :, None])[:, :, 0]
+        qd, epsilon = self.manifolds.rates(place.table)
+        qd += added
+        epsilon[:] = added
+        return Place(place.q, np.array(qd), self.bases, place.table)
+
     def recentred(self, place: Place) -> tuple["Charts", Array]:
         """Return the charts around a place, and its ν there."""
         bases = orthonormal(place.tangents)
-        epsilon = self.manifolds.stages(place.table).epsilon
+        _, epsilon = self.manifolds.rates(place.table)
         nu = np.einsum("knr,kn->kr", bases, epsilon)
         return Charts(self.manifolds, place.q, bases), nu
 
@@ -105,56 +118,57 @@ class Manifolds:
         self.follows, self.t = follows, t
         self.chains = tuple(item.chain.arrays for item in follows.items)
         self.layout = follows.layout
-        n, m, count = follows.robot.dof, follows.dimension, len(follows.items)
-        self._sizes = n, m
-        self.targets = follows.targets(t)
-        self.table = np.zeros((len(t), kernels.columns(n, m, count)))
-        self.work = np.zeros(kernels.space_size(n, m, count))
-        self.no_error = np.zeros((count, 6))
-        for f, item in enumerate(follows.items):
-            tip, target = kernels.tip_of(self.table, f, n, m), item.target(t)
-            tip.target_translation[:] = target.translation
-            tip.target_rotation[:] = target.rotation
-            tip.target_twist[:] = target.twist
+        self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
+        self.work = np.zeros(kernels.space_size(*self._sizes))
+        self.no_error = np.zeros((len(follows.items), 6))
+        targets = [item.target(t) for item in follows.items]
+        self._paths = [
+            np.hstack([one.translation, one.rotation.reshape(len(t), 9), one.twist])
+            for one in targets
+        ]
+        self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
 
-    def stages(self, table: Array) -> kernels.Stage:
-        """Return the parts of a table."""
-        return kernels.stage_of(table, *self._sizes)
+    def table(self) -> Array:
+        """Return a table with nothing in it but the paths."""
+        n, m, count = self._sizes
+        table = np.zeros((len(self.t), kernels.columns(n, m, count)))
+        for f, path in enumerate(self._paths):
+            kernels.path_of(table, f, n, m)[:] = path
+        return table
 
-    def charts(self, q: Array, qd: Array) -> tuple[Charts, Array] | None:
-        """Return charts around a motion near the path, q and q̇ (N + 1, n), and its ν.
+    def rates(self, table: Array) -> tuple[Array, Array]:
+        """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
+        return kernels.rates_of(table, self.follows.robot.dof)
+
+    def charts(self, q: Array) -> tuple[Charts, Place] | None:
+        """Return charts around a motion near the path, q (N + 1, n), and its place at ν = 0.
 
         None where a node does not come onto its manifold.
         """
         bases = carried_bases(self.follows, q)
         charts, none = Charts(self, q, bases), np.zeros((len(q), bases.shape[2]))
         place = charts.at(none, none)
-        if place is None:
-            return None
-        centred, _ = charts.recentred(place)
-        return centred, np.einsum("knr,kn->kr", centred.bases, qd)
+        return None if place is None else (charts.recentred(place)[0], place)
 
     def accelerations(self, q: Array, qd: Array) -> Array:
         """Return the least q̈ by which motions q, q̇ (N + 1, n) follow the path: J⁺(ẍ - J̇q̇).
 
-        J q̈ is the rate of ẋ - J q̇ along the motion at fixed q̇. It is taken from both sides of each
-        node: at marks of the path it may jump, and is the mean.
+        J q̈ is the rate of ẋ - J q̇ along the motion at fixed q̇: a central difference, which at marks
+        of the path, where it may jump, is the mean of both sides.
         """
         step, end = _STEP * self.t[-1], self.t[-1]
-        # Two steps back, one back, one on, two on; at the ends of the path both inside.
-        steps = step * np.array([-2.0, -1.0, 1.0, 2.0])[:, None] * np.ones(len(self.t))
-        steps[:2, self.t <= 2.0 * step] = steps[3:1:-1, self.t <= 2.0 * step]
-        steps[2:, self.t >= end - 2.0 * step] = steps[1::-1, self.t >= end - 2.0 * step]
-        far, near, soon, late = self._unmet(q, qd, steps)
-        before = (far - near) / (steps[0] - steps[1])[:, None]
-        after = (late - soon) / (steps[3] - steps[2])[:, None]
+        # One step back, one on; at the ends of the path both inside.
+        steps = step * np.array([-1.0, 1.0])[:, None] * np.ones(len(self.t))
+        steps[:, self.t <= step] = step * np.array([1.0, 2.0])[:, None]
+        steps[:, self.t >= end - step] = step * np.array([-2.0, -1.0])[:, None]
+        before, after = self._unmet(q, qd, steps)
+        right = ((after - before) / (steps[1] - steps[0])[:, None])[:, :, None]
         rows = self._rows(q)[0]
-        right = 0.5 * (before + after)[:, :, None]
         turned = np.swapaxes(rows, 1, 2)
         return np.asarray((turned @ np.linalg.solve(rows @ turned, right))[:, :, 0])
 
     def _unmet(self, q: Array, qd: Array, steps: Array) -> Array:
-        """Return ẋ - J q̇ so much later (4, N + 1), at t + s and q + q̇ s, (4, N + 1, m)."""
+        """Return ẋ - J q̇ so much later (2, N + 1), at t + s and q + q̇ s, (2, N + 1, m)."""
         moved = (q + steps[:, :, None] * qd).reshape(-1, q.shape[1])
         rows, rotations = self._rows(moved)
         twists = []

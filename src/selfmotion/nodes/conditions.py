@@ -111,14 +111,20 @@ class NodeConditions:
         """Return h, (N + 1, C)."""
         tables = [item.residual(samples) for item in self.constraints]
         self._counts = [table.shape[1] for table in tables]
-        none = np.zeros((2 * len(self.spline.t) - 1, 0))
-        return _by_node(np.concatenate([none, *tables], axis=1), _NONE)
+        half, first = sum(self._counts), 0
+        found = np.full((len(self.spline.t), 2 * half), _NONE)
+        for table, own in zip(tables, self._counts, strict=True):
+            found[:, first : first + own] = table[::2]
+            found[:-1, half + first : half + first + own] = table[1::2]
+            first += own
+        return found
 
-    def over(self, samples: Samples) -> Array:
-        """Return how far each condition is beyond its tolerance at other samples, (S, C / 2)."""
-        none = np.zeros((len(samples.nodes), 0))
-        tables = [item.residual(samples) - item.tolerance for item in self.constraints]
-        return np.concatenate([none, *tables], axis=1)
+    def broken(self, samples: Samples) -> Flags:
+        """Return at which of other samples a condition is beyond its tolerance, (S,)."""
+        found = np.zeros(len(samples.nodes), dtype=np.bool_)
+        for item in self.constraints:
+            found |= (item.residual(samples) > item.tolerance).any(axis=1)
+        return found
 
     @property
     def tolerances(self) -> Array:
@@ -194,13 +200,6 @@ class NodeConditions:
                 found[:-1] += shares[1:, 0] * here[1:, None]
                 found[1:] += shares[:-1, 2] * here[:-1, None]
         return found
-
-
-def _by_node(points: Array, last: float) -> Array:
-    """Return what nodes and middles have in turn, (2 N + 1, C, …), as (N + 1, 2 C, …)."""
-    middles = np.full_like(points[::2], last)
-    middles[:-1] = points[1::2]
-    return np.concatenate([points[::2], middles], axis=1)
 
 
 def spread(near: Array) -> Array:

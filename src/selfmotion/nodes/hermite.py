@@ -223,6 +223,11 @@ class HermiteSamples(_WithRates):
         """The same as constraints see it."""
         return CheckedSamples(self)
 
+    def forget(self) -> None:
+        """Let go of what can be computed anew."""
+        for name in ("checked", "qdd", "qddd", "_placed"):
+            self.__dict__.pop(name, None)
+
     def _of_order(self, order: int) -> Array:
         count, _, n = self.ends.shape
         found = np.empty((_SAMPLES * count + 1, n))

@@ -13,7 +13,7 @@ from selfmotion.basics import Array, inlined, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels import (
     Tip,
-    approach_start,
+    approach,
     cholesky,
     errors_and_rows,
     evaluate,
@@ -61,7 +61,7 @@ def look(
         off = np.inf
         for _ in range(_STEPS):
             place_tips(q[k], chains, turns, places, rotations, positions, jacobians)
-            off = approach_start(
+            off = approach(
                 q[k],
                 jacobians,
                 rotations,
@@ -71,18 +71,14 @@ def look(
                 bases[k],
                 references[k],
                 coordinates[k],
+                b,
+                system,
+                factor,
             )
             # Singular, not a number, or there: what that step has moved is rounding.
             if not off >= _THERE:
                 break
         if not 0.0 <= off < _THERE:
-            return k
-        errors_and_rows(layout, targets[k], jacobians, rotations, positions, b, system)
-        for i in range(r):
-            for j in range(n):
-                system[m + i, j] = bases[k, j, i]
-        gram(system, factor)
-        if not cholesky(factor):
             return k
         for x in range(r):
             for i in range(n):

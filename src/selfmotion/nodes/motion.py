@@ -117,12 +117,13 @@ class NodeGrid:
 
     def near(self, q: Array, qd: Array) -> "NodeMotion | None":
         """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇, or None."""
-        found = self.manifolds.charts(q, qd)
+        found = self.manifolds.charts(q)
         if found is None:
             return None
-        charts, nu = found
+        charts, place = found
+        nu = np.einsum("knr,kn->kr", charts.bases, qd)
         nu.reshape(-1)[self._rates] = 0.0
-        return self.motion(charts, nu)
+        return self.at(charts, nu, charts.moving(place, nu))
 
     def motion_towards(self, start: Array, wanted: Array, time: float) -> "NodeMotion | None":
         """Return a motion from a start (n,) whose self-motion goes towards `wanted` (n,).
@@ -213,8 +214,8 @@ class NodeMotion:
 
     def broken(self) -> Flags:
         """Return on which intervals `trajectory` does not keep the conditions, (N,)."""
-        over = self.grid.conditions.over(self.exact)[:-1] > 0.0
-        return np.asarray(over.reshape(len(self.grid.t) - 1, -1).any(axis=1))
+        broken = self.grid.conditions.broken(self.exact)[:-1]
+        return np.asarray(broken.reshape(len(self.grid.t) - 1, -1).any(axis=1))
 
     @property
     def exact_cost(self) -> float:
@@ -261,6 +262,12 @@ class NodeMotion:
     def epsilon(self) -> Array:
         """The null motion ε at the nodes, (N + 1, n)."""
         return np.asarray((self.charts.bases @ self.nu[:, :, None])[:, :, 0])
+
+    def forget(self) -> None:
+        """Let go of what can be computed anew: most of the memory that a long path takes."""
+        for name in ("exact", "h", "partials"):
+            self.__dict__.pop(name, None)
+        self.samples.forget()
 
     def smoothed(self) -> "NodeMotion | None":
         """Return the motion through the same nodes, as fast there as a spline through them.

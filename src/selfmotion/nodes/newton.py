@@ -20,11 +20,16 @@ from selfmotion.optimise import Banded, Status
 _AGREES, _AGREES_BOUND = 1e-8, 1e-6
 # A step that promises more than this share of the cost, and lowers it by nothing, is no rounding.
 _ROUNDING = 1e-6
+# The matrix of a step that promised no more than this share of the cost is that of its end as well.
+_LITTLE = 1e-3
 # Slacks and prices go no further than this share towards 0 in one step.
 _INWARD = 0.995
 # A step is taken if it does at least this share of what it promises, and cut by half otherwise.
 _SHARE, _SHORTEST = 1e-4, 1e-6
-# A matrix that is not positive definite gets this share of its largest entry on the diagonal, or a
+# Motions that cost nothing, as of a joint whose axis the tool is on, are left alone: the matrix has
+# this share of its usual entry more on the diagonal, which is above rounding there.
+_FLAT = 1e-13
+# One that is not positive definite gets this share of its largest entry on the diagonal, or a
 # third of what the last one needed; then more by this factor, again and again.
 _SHIFT, _LESS, _MORE = 1e-6, 1.0 / 3.0, 8.0
 # Nodes go no further than this in one step [rad or m]; one that would go beyond that is none of a
@@ -55,7 +60,7 @@ def minimise(begin: NodeMotion, columns: Ints, told: Told, prices: Array | None 
     columns : (c,)
         Of h, see `NodeConditions`; may be none.
     told : callable
-    prices : (N + 1, C), optional
+    prices : (N + 1, c), optional
         Of an optimum near by.
     """
     solver = _Solver(begin, columns, prices)
@@ -80,46 +85,48 @@ class _Solver:
         else:
             self._barrier = _KNOWN_FIRST * each
             usual = self._barrier / np.maximum(-h, _KNOWN_SLACK)
-            self._prices = np.maximum(prices[:, columns], usual)
+            self._prices = np.maximum(prices, usual)
             self._slacks = np.maximum(-h, self._barrier / self._prices)
         self._penalty, self._promised, self._length = 0.0, np.inf, 0.0
         self._tiny, self._shift = 0, 0.0
+        self._matrix: Banded | None = None
         self._end_prices = np.zeros(begin.grid.ends.count)
 
     def optimum(self, status: Status) -> Optimum:
         """Return where it is now."""
-        prices = np.zeros_like(self.motion.h)
-        prices[:, self._columns] = self._prices
-        return Optimum(self.motion, prices, status, self._promised, self._end_prices)
+        return Optimum(self.motion, self._prices, status, self._promised, self._end_prices)
 
     def advance(self, told: Told) -> Status | None:
         """Take a step; return how the method ended, if it did."""
         motion = self.motion
-        around = Around.of(motion.charts, motion.nu)
         motion.grid.counts.gradients += 1
-        if around is None:
-            return Status.GRADIENT
         slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
         gradient = motion.charts.pulled(motion.place, slopes[:, 0], slopes[:, 1])
+        gradient.reshape(-1)[motion.grid.held] = 0.0
+        if self._is_there(gradient):
+            stops = told(Step(motion, float(np.linalg.norm(gradient)), self._length))
+            return Status.STOPPED if stops else Status.CONVERGED
+        by_prices = slopes
+        if self._columns.size:
+            prices = np.zeros_like(motion.h)
+            prices[:, self._columns] = self._prices
+            by_prices = slopes + motion.grid.conditions.pulled(motion.samples.checked, prices)
+        if len(motion.c):
+            by_prices = by_prices + motion.grid.ends.pulled(self._end_prices, len(slopes))
+        around = Around.of(motion.charts, motion.nu, by_prices)
+        if around is None:
+            return Status.GRADIENT
         jumps, by_jumps = self._jumps(around)
         gradient += spread((by_jumps @ jumps[:, :, None])[:, :, 0])
         gradient.reshape(-1)[motion.grid.held] = 0.0
         if told(Step(motion, float(np.linalg.norm(gradient)), self._length)):
             return Status.STOPPED
         rows = self._rows(around)
-        by_prices = slopes
-        if self._columns.size:
-            prices = np.zeros_like(motion.h)
-            prices[:, self._columns] = self._prices
-            by_prices = slopes + motion.grid.conditions.pulled(motion.samples.checked, prices)
         ends = motion.grid.ends.border(motion.c, around.changes, motion.grid.held)
-        if len(motion.c):
-            by_prices = by_prices + motion.grid.ends.pulled(self._end_prices, len(slopes))
-        curved = around.curvature(by_prices)
         intervals = motion.grid.cost.curvature(motion.samples, motion.partials, around.changes)
         gap = motion.wanted[:, self._columns] + self._slacks
         while True:
-            step = self._step(gradient, curved, intervals, by_jumps, rows, gap, ends)
+            step = self._step(gradient, around.curvature, intervals, by_jumps, rows, gap, ends)
             if step is None:
                 return Status.GRADIENT
             by_slack, by_price = self._others(rows, gap, step)
@@ -134,6 +141,26 @@ class _Solver:
                 break
             self._barrier = max(self._least, min(_FALL * self._barrier, self._barrier**_POWER))
         return self._move(gradient, gap, step, by_slack, by_price)
+
+    def _is_there(self, gradient: Array) -> bool:
+        """Whether another step would promise nothing, by the matrix of the last one.
+
+        Only where nothing is asked of the motion but to cost little: of what else counts, the
+        matrix knows prices that change. The look around, which is most of a step, is spared then.
+        """
+        motion = self.motion
+        size = max(abs(motion.aim), np.finfo(float).tiny)
+        asked = self._columns.size or len(self._end_prices) or motion.grid.continuity is not None
+        if asked or self._matrix is None or self._promised > _LITTLE * size:
+            return False
+        solved = self._matrix.solve(gradient.ravel())
+        if solved is None:
+            return False
+        promised = float(gradient.ravel() @ solved)
+        if promised > _AGREES * size:
+            return False
+        self._promised = promised
+        return True
 
     def _rows(self, around: Around) -> Array:
         """Return ∂h/∂w of the columns, (N + 1, c, 6r); nothing moves what is held."""
@@ -175,22 +202,24 @@ class _Solver:
         pressure = (self._barrier / self._slacks + ratio * gap)[:, :, None]
         right = (gradient + spread((turned @ pressure)[:, :, 0])).ravel()
         right[self.motion.grid.held] = 0.0
-        near = turned @ (ratio[:, :, None] * rows) + by_jumps @ np.swapaxes(by_jumps, 1, 2)
         wide = bool(rows.shape[1] or by_jumps.shape[2])
-        shift, largest = 0.0, float(np.abs(curved).max() + np.abs(intervals).max())
+        largest = float(np.abs(curved).max() + np.abs(intervals).max())
+        usual = float(np.median(np.abs(np.diagonal(intervals, axis1=1, axis2=2))))
+        shift = _FLAT * usual
         while shift <= 1e6 * largest:
             matrix = Banded(count, size, 2 if wide else 1)
             matrix.add(0, 0, curved)
             matrix.add_pairs(0, intervals)
             if wide:
-                matrix.add_triples(near)
+                near = turned @ (ratio[:, :, None] * rows)
+                matrix.add_triples(near + by_jumps @ np.swapaxes(by_jumps, 1, 2))
             matrix.add_diagonal(shift)
             matrix.hold(self.motion.grid.held)
             solved = matrix.solve(np.column_stack([-right, ends.columns]))
             if solved is not None:
                 step, prices = ends.met_by(solved)
                 if np.abs(step.reshape(count, 2, -1)[:, 0]).max() <= _TRUSTED:
-                    self._shift, self._end_prices = shift, prices
+                    self._shift, self._end_prices, self._matrix = shift, prices, matrix
                     self._promised = float(-(right + ends.columns @ prices) @ step)
                     return step.reshape(count, size)
             shift = max(_MORE * shift, _SHIFT * largest, _LESS * self._shift)

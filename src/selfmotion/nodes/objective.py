@@ -20,7 +20,7 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.costs import Cost, Partials, Samples
 from selfmotion.follow import Follows
-from selfmotion.nodes.charts import Charts, Place, orthonormal
+from selfmotion.nodes.charts import Charts, orthonormal
 from selfmotion.nodes.hermite import Hermite, HermiteSamples, PlacedLater
 from selfmotion.nodes.smoothness import Smoothing
 
@@ -31,6 +31,8 @@ _REACH = 1e-4
 # of a matrix that need not be exact.
 _NEAR = 1e-6
 _NAMES = ("q", "qd", "qdd", "qddd")
+# Intervals whose matrices are multiplied at once: what that takes is several times what it leaves.
+_LOT = 4096
 
 
 class NodeCost:
@@ -120,15 +122,15 @@ class NodeCost:
         `changes` (N + 1, 2, n, 2r) is Γ of the nodes.
         """
         count, _, n, size = changes.shape
-        both = np.zeros((count - 1, 4, n, 2 * size))
-        both[:, :2, :, :size], both[:, 2:, :, size:] = changes[:-1], changes[1:]
-        flat = np.swapaxes(both.reshape(count - 1, 4 * n, 2 * size), 1, 2)
         found = np.zeros((count - 1, 2 * size, 2 * size))
-        for stiffness, weight in self._forms:
-            turned = stiffness @ (weight @ both).reshape(count - 1, 4, -1)
-            found += flat @ turned.reshape(count - 1, 4 * n, 2 * size)
+        for first in range(0, count - 1, _LOT):
+            both, part = _at_ends(changes[first : first + _LOT + 1]), slice(first, first + _LOT)
+            flat = np.swapaxes(both.reshape(len(both), 4 * n, 2 * size), 1, 2)
+            for stiffness, weight in self._forms:
+                turned = stiffness[part] @ (weight @ both).reshape(len(both), 4, -1)
+                found[part] += flat @ turned.reshape(len(both), 4 * n, 2 * size)
         if self._bent:
-            found += self._bending(samples, self._of_bent(partials), both)
+            found += self._bending(samples, self._of_bent(partials), _at_ends(changes))
         return found
 
     def _bending(self, samples: HermiteSamples, here: Partials, both: Array) -> Array:
@@ -181,6 +183,17 @@ class NodeCost:
         return Partials(**parts)
 
 
+def _at_ends(changes: Array) -> Array:
+    """Return how q, q̇ at both ends of intervals change with w of both, (N, 4, n, 4r).
+
+    For Γ of the nodes, (N + 1, 2, n, 2r).
+    """
+    count, _, n, size = changes.shape
+    both = np.zeros((count - 1, 4, n, 2 * size))
+    both[:, :2, :, :size], both[:, 2:, :, size:] = changes[:-1], changes[1:]
+    return both
+
+
 def _summed(each: Sequence[Partials]) -> Partials:
     """Return the sum of derivatives."""
     parts = {}
@@ -210,43 +223,39 @@ class Around:
 
     Attributes
     ----------
-    charts : Charts
     changes : (N + 1, 2, n, 2r)
         Γ = ∂(q, q̇)/∂(z, ν).
-    moved : sequence of (Place, Place)
-        The nodes moved along each z, to both sides.
+    curvature : (N + 1, 2r, 2r)
+        ∂(Γᵀλ)/∂w at fixed λ, symmetric.
     """
 
-    charts: Charts
     changes: Array
-    moved: Sequence[tuple[Place, Place]]
+    curvature: Array
 
     @classmethod
-    def of(cls, charts: Charts, nu: Array) -> "Around | None":
-        """Look around the reference of charts; None where a neighbour is not to be had."""
+    def of(cls, charts: Charts, nu: Array, by_node: Array) -> "Around | None":
+        """Look around the reference of charts; None where a neighbour is not to be had.
+
+        `by_node` (N + 1, 2, n) is λ.
+        """
         count, n, r = charts.bases.shape
-        changes, moved = np.zeros((count, 2, n, 2 * r)), []
+        by_q, by_qd = np.ascontiguousarray(by_node[:, 0]), np.ascontiguousarray(by_node[:, 1])
+        changes, bends = np.zeros((count, 2, n, 2 * r)), np.zeros((count, 2 * r, 2 * r))
         changes[:, 0, :, :r] = changes[:, 1, :, r:] = charts.bases
         for x in range(r):
-            z = np.zeros((count, r))
-            z[:, x] = _REACH
-            above, below = charts.at(z, nu), charts.at(-z, nu)
-            if above is None or below is None:
-                return None
-            changes[:, 1, :, x] = (above.qd - below.qd) / (2.0 * _REACH)
-            moved.append((above, below))
-        return cls(charts, changes, moved)
-
-    def curvature(self, by_node: Array) -> Array:
-        """Return ∂(Γᵀλ)/∂w at fixed λ = `by_node` (N + 1, 2, n), symmetric (N + 1, 2r, 2r)."""
-        count, _, r = self.charts.bases.shape
-        found = np.zeros((count, 2 * r, 2 * r))
-        by_q, by_qd = np.ascontiguousarray(by_node[:, 0]), np.ascontiguousarray(by_node[:, 1])
-        for x, (above, below) in enumerate(self.moved):
-            sides = [self.charts.pulled(place, by_q, by_qd) for place in (above, below)]
-            column = (sides[0] - sides[1]) / (2.0 * _REACH)
-            found[:, :, x] = column
-            found[:, x, r:] = column[:, r:]
-        along = found[:, :r, :r]
-        found[:, :r, :r] = 0.5 * (along + np.swapaxes(along, 1, 2))
-        return found
+            rates, slopes = [], []
+            for side in (_REACH, -_REACH):
+                z = np.zeros((count, r))
+                z[:, x] = side
+                beside = charts.at(z, nu)
+                if beside is None:
+                    return None
+                rates.append(beside.qd)
+                slopes.append(charts.pulled(beside, by_q, by_qd))
+            changes[:, 1, :, x] = (rates[0] - rates[1]) / (2.0 * _REACH)
+            column = (slopes[0] - slopes[1]) / (2.0 * _REACH)
+            bends[:, :, x] = column
+            bends[:, x, r:] = column[:, r:]
+        along = bends[:, :r, :r]
+        bends[:, :r, :r] = 0.5 * (along + np.swapaxes(along, 1, 2))
+        return cls(changes, bends)

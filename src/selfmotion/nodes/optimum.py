@@ -37,8 +37,8 @@ class Optimum:
     Attributes
     ----------
     motion : NodeMotion
-    prices : (N + 1, C)
-        λ of the conditions.
+    prices : (N + 1, c)
+        λ of the conditions that counted.
     status : Status
     promised : float
         By how much another step would lower the cost.

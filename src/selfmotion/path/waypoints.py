@@ -23,6 +23,7 @@ from selfmotion.basics import (
     shown,
 )
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
+from selfmotion.path.turns import Turning
 from selfmotion.path.waypoint_arguments import as_table, bends, check_waypoints
 from selfmotion.task import SE3, Quaternion
 
@@ -182,21 +183,15 @@ class Waypoints(Path, kind="waypoints"):
         return np.flatnonzero(self._stops | (self._t == 0.0) | (self._t == self.duration))
 
     @cached_property
-    def _pieces(self) -> tuple[npt.NDArray[np.intp], list[tuple[Any, Any]]]:
+    def _pieces(self) -> tuple[npt.NDArray[np.intp], list[tuple[Any, Turning]]]:
         """First waypoint of each piece between corners, and its (position, rotation) splines."""
         from scipy.interpolate import CubicSpline
-        from scipy.spatial.transform import Rotation, RotationSpline
 
         bounds, splines = self._bounds, []
         for first, last in pairwise(bounds):
             part = slice(first, last + 1)
-            rotations = Rotation.from_quat(self._turns[part], scalar_first=True)
-            splines.append(
-                (
-                    CubicSpline(self._t[part], self._points[part]),
-                    RotationSpline(self._t[part], rotations),
-                )
-            )
+            t = self._t[part]
+            splines.append((CubicSpline(t, self._points[part]), Turning(t, self._turns[part])))
         return bounds[:-1], splines
 
     def _warp(self, t: Array) -> tuple[Array, Array]:
@@ -231,10 +226,8 @@ class Waypoints(Path, kind="waypoints"):
             if not np.any(here):
                 continue
             position[here] = line(tau[here])
-            turned = turn(tau[here])
-            rotation[here] = turned.as_matrix()
             twist[here, :3] = line(tau[here], 1)
-            twist[here, 3:] = turned.apply(turn(tau[here], 1))  # its rates are in tool axes
+            rotation[here], twist[here, 3:] = turn.at(tau[here])
         return PathSamples(t, position, rotation, twist * slope[:, None])
 
     def series(self, middle: Array, half: Array) -> PathSeries:
@@ -255,7 +248,7 @@ class Waypoints(Path, kind="waypoints"):
             here = piece == index
             if not np.any(here):
                 continue
-            for spline, whole in zip((line, turn.interpolator), found, strict=True):
+            for spline, whole in zip((line, turn), found, strict=True):
                 part = series.of_pieces(spline.x, spline.c[::-1], at[here], reach[here])
                 bounds = series.of_vectors(part)
                 if whole is found.rotation:

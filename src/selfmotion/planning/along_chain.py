@@ -10,7 +10,7 @@ from selfmotion.motion import Grid
 from selfmotion.nodes import NodeGrid, NodeMotion
 from selfmotion.optimise import Status
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.nodes import takes
+from selfmotion.planning.for_nodes import takes
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import CHAIN_ROUNDS, FINER_CHAIN
 from selfmotion.problem import Problem
@@ -56,7 +56,7 @@ def along_chain(
         broken = motion.broken() | _beyond_limits(motion)
         if not broken.any():
             none = np.zeros(0, dtype=np.int64)
-            prices = np.zeros_like(motion.h)
+            prices = np.zeros((len(motion.grid.t), 0))
             return MotionOnNodes(motion, Status.PRECISION, none, prices, (), None, is_chain=True)
         finer = finer.halved(np.convolve(broken, np.ones(3), "same") > 0.0)
     return None

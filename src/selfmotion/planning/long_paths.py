@@ -17,7 +17,8 @@ from selfmotion.nodes import NodeMotion
 from selfmotion.optimise import Status
 from selfmotion.path import Section
 from selfmotion.planning.draft import Draft
-from selfmotion.planning.nodes import NodeDescent, most_nodes, takes
+from selfmotion.planning.for_nodes import most_nodes, takes
+from selfmotion.planning.nodes import NodeDescent
 from selfmotion.planning.part_problem import asked_of_part
 from selfmotion.planning.settings import (
     FIRST_NODES,

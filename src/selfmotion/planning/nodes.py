@@ -6,10 +6,11 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.constraints import BoundConstraint
-from selfmotion.motion import FreeNullMotion, Trajectory
-from selfmotion.nodes import NodeEnds, NodeGrid, NodeMotion, Optimum, Step, minimise
-from selfmotion.optimise import Iteration, QuasiNewton, Status
+from selfmotion.motion import Trajectory
+from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
+from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.effort import Effort
+from selfmotion.planning.for_nodes import most_nodes
 from selfmotion.planning.kept_on_nodes import (
     aim_of,
     broken_by,
@@ -21,40 +22,15 @@ from selfmotion.planning.kept_on_nodes import (
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import (
     COST_AGREEMENT,
+    FAR_OFF,
     FEWEST_WITH_ACCELERATIONS,
-    MOST_NODES,
     NODE_AGREEMENT,
     NODE_ROUNDS,
+    SAME_COST,
     SHORT_STEP,
     TOWARDS_MIDDLE,
 )
 from selfmotion.problem import Problem
-
-
-def takes(problem: Problem, effort: Effort, constraints: Sequence[BoundConstraint]) -> bool:
-    """Whether a problem is one for nodes.
-
-    Not where the user asks for another null motion or optimiser, the tool leaves the path, nothing
-    is free, a cost weighs jerks, which cubic splines do not have, or a condition is on the whole
-    motion.
-    """
-    dof = problem.robot.dof
-    orders = [order for cost in problem.all_costs for order in cost.curvature(dof)]
-    return (
-        isinstance(problem.null_motion, FreeNullMotion)
-        and effort.optimizer == QuasiNewton()
-        and problem.damping is None
-        and not problem.relaxations
-        and problem.follows.redundancy == dof - problem.follows.dimension > 0
-        and max(orders, default=0) < 3
-        and all(NodeEnds.takes(item) for item in constraints if item.equality)
-    )
-
-
-def most_nodes(problem: Problem) -> int:
-    """Return how many nodes are as many as a path may need: more, the longer it is."""
-    return int(MOST_NODES * (len(problem.knots) + problem.way_in_reaches))
-
 
 _NO_COLUMNS: Ints = np.zeros(0, dtype=np.int64)
 _ARRIVED = (Status.CONVERGED, Status.PRECISION)
@@ -158,19 +134,28 @@ class NodeDescent:
             if self._ended is not None or 2 * standing.steps > most:
                 break
             motion = standing.motion
-            off = abs(motion.exact_cost - motion.cost)
+            off, size = abs(motion.exact_cost - motion.cost), abs(motion.exact_cost)
             where = None
-            if off <= NODE_AGREEMENT * abs(motion.exact_cost):
+            if off <= NODE_AGREEMENT * size:
                 finer = standing.refined()
                 # That is on the path, also between the nodes.
-                broken = finer.motion.broken()
                 ends = motion.ends_of_limits
-                if not broken.any() and not (ends.any() and self._saves(motion, dearest)):
-                    return finer.smoothed()
+                is_last = not (ends.any() and self._saves(motion, dearest))
+                if is_last and not standing.columns.size:
+                    # Where nothing binds, smooth velocities are all there is to look at.
+                    smooth = finer.smoothed(motion.exact_cost + SAME_COST * size)
+                    if smooth is not None:
+                        return smooth
+                broken = finer.motion.broken()
+                if is_last and not broken.any():
+                    return finer.smoothed(finer.cost) or finer
                 dearest = motion.cost
                 each = broken.reshape(-1, 2).any(axis=1)
                 where = np.convolve(each, np.ones(3), "same") > 0.0 if each.any() else ends
-            finer = standing.refined(where)
+            # One halving makes it about a twelfth.
+            far = off > FAR_OFF * NODE_AGREEMENT * size
+            twice = where is None and far and 4 * standing.steps <= most
+            finer = standing.refined(where, 2 if twice else 1)
             if where is not None and broken.any():
                 # A limit begins or ends to bind there: that wants to be known well.
                 finer = finer.refined(np.repeat(where, 1 + where))
@@ -278,7 +263,7 @@ class NodeDescent:
         )
         self.history.append(iteration)
         if meets_ends(motion) and (motion.h <= motion.grid.conditions.tolerances).all():
-            none = np.zeros_like(motion.h)
+            none = np.zeros((len(motion.h), 0))
             self.latest = MotionOnNodes(motion, Status.STOPPED, _NO_COLUMNS, none, (), None)
         if effort.callback is not None and effort.callback(iteration):
             self._ended = Status.STOPPED

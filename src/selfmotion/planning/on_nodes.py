@@ -24,8 +24,8 @@ class MotionOnNodes:
     status : Status
     columns : (c,)
         Of the conditions: those that counted.
-    prices : (N + 1, C)
-        Of the conditions, on the nodes of the optimum.
+    prices : (N + 1, c)
+        Of these, on the nodes of the optimum.
     active : tuple of Binding
     remaining : float or None
         What a finer grid and another step might still save [cost]; None where that is not known.
@@ -50,15 +50,10 @@ class MotionOnNodes:
         status: Status,
     ) -> "MotionOnNodes":
         """Return what stands at an optimum, for which some columns of the conditions counted."""
-        motion, grid = optimum.motion, optimum.motion.grid
-        inner = iter(grid.conditions.by_constraint(optimum.prices))
-        ends = grid.ends.by_item(optimum.end_prices)
-        each = [ends[id(item)] if item.equality else next(inner).ravel() for item in constraints]
-        active = Conditions(constraints, Grid(grid.t)).active(
-            motion.samples.checked,
-            np.concatenate([np.zeros(0), *each]),
-            LEAST_SAVING * abs(motion.cost),
-        )
+        motion: NodeMotion = optimum.motion
+        active: tuple[Binding, ...] = ()
+        if columns.size or optimum.end_prices.size:
+            active = _binding(optimum, constraints, columns)
         promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
         remaining = abs(motion.exact_cost - motion.cost) + promised
         return cls(motion, status, columns, optimum.prices, active, remaining)
@@ -95,22 +90,25 @@ class MotionOnNodes:
     def evaluation(self) -> Evaluation:
         """Return the motion with its costs."""
         motion = self.motion
-        return Evaluation(self.coefficients, motion.exact_terms, motion.trajectory, damped=False)
+        found = Evaluation(self.coefficients, motion.exact_terms, motion.trajectory, damped=False)
+        motion.forget()
+        return found
 
-    def smoothed(self) -> "MotionOnNodes":
-        """Return it with smooth velocities, where these cost no more and keep the conditions."""
+    def smoothed(self, dearest: float) -> "MotionOnNodes | None":
+        """Return it with smooth velocities; None where it costs more then, or breaks conditions."""
         motion = self.motion.smoothed()
-        dearer = motion is None or not motion.exact_cost <= self.cost
-        return (
-            self
-            if motion is None or dearer or motion.broken().any()
-            else replace(self, motion=motion)
-        )
+        if motion is None or not motion.exact_cost <= dearest or motion.broken().any():
+            return None
+        motion.forget()
+        return replace(self, motion=motion)
 
-    def refined(self, where: Flags | None = None) -> "MotionOnNodes":
-        """Return it with more nodes, in the middle of each interval or of some (N,)."""
+    def refined(self, where: Flags | None = None, times: int = 1) -> "MotionOnNodes":
+        """Return it with more nodes: all intervals halved so many times, or some (N,) once."""
         t = self.motion.grid.t
+        self.motion.forget()
         finer = Grid(t).halved(where).nodes
+        for _ in range(1, times):
+            finer = Grid(finer).halved().nodes
         motion = self.motion.on(self.motion.grid.on(finer))
         if motion is None:
             return self
@@ -118,3 +116,20 @@ class MotionOnNodes:
         near = np.searchsorted(t, finer, side="right") - 1
         prices = self.prices[near] * (len(t) / len(finer))
         return replace(self, motion=motion, prices=prices)
+
+
+def _binding(
+    optimum: Optimum, constraints: Sequence[BoundConstraint], columns: Ints
+) -> tuple[Binding, ...]:
+    """Return what kept an optimum from a lower cost, of some columns of the conditions."""
+    motion, grid = optimum.motion, optimum.motion.grid
+    prices = np.zeros_like(motion.h)
+    prices[:, columns] = optimum.prices
+    inner = iter(grid.conditions.by_constraint(prices))
+    ends = grid.ends.by_item(optimum.end_prices)
+    each = [ends[id(item)] if item.equality else next(inner).ravel() for item in constraints]
+    return Conditions(constraints, Grid(grid.t)).active(
+        motion.samples.checked,
+        np.concatenate([np.zeros(0), *each]),
+        LEAST_SAVING * abs(motion.cost),
+    )

@@ -11,7 +11,8 @@ from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.along_chain import along_chain
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.descent import Descent, breaks
-from selfmotion.planning.nodes import NodeDescent, takes
+from selfmotion.planning.for_nodes import takes
+from selfmotion.planning.nodes import NodeDescent
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.standing import RolledMotion, Standing, score
 from selfmotion.planning.warm_start import pace_of, slower

@@ -11,6 +11,8 @@ COST_AGREEMENT = 1e-4
 # The same of nodes, of which twice as many are a sixteenth as far from the truth.
 NODE_AGREEMENT = 3e-5
 ROUGH_AGREEMENT = 1e-2
+# Farther off than so many times what nodes may be, intervals are halved twice at once.
+FAR_OFF = 8.0
 # A grid on which the motion at x = 0 costs this much more or less will do for a rough null motion.
 ALIKE = 0.05
 # While a null motion is chosen, this share of the steps that it should have will do.
@@ -18,6 +20,8 @@ THINNER = 2
 # A cost that rises this much on so many grids in turn has no limit.
 RISE = 1.5
 RISES = 2
+# Costs that differ by less than this share are the same where velocities are made smooth.
+SAME_COST = 1e-6
 # Nodes of Newton's method: at most so many for each stretch of the path on which it is smooth.
 MOST_NODES = 1024
 # More of them are put in so often, at most, where limits begin and end to bind.

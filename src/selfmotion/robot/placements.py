@@ -8,20 +8,23 @@ from selfmotion.basics import Array, Flags, Ints, inlined, kernel
 
 
 @inlined
-def turned(axis: Array, angle: float, rotation: Array) -> None:
-    """Write the rotation by an angle about a unit vector (Rodrigues' formula)."""
-    s, c = math.sin(angle), math.cos(angle)
-    x, y, z, rest = axis[0], axis[1], axis[2], 1.0 - c
+def moved(axis: Array, x: float, turns: bool, r: Array, p: Array) -> None:
+    """Turn a placement by x about a unit vector in its own axes (Rodrigues' formula), or shift it.
+
+    Numbers, no arrays to work in: making one takes as long as all of this.
+    """
+    u, v, w = axis[0], axis[1], axis[2]
+    s, c = math.sin(x), math.cos(x)
     for a in range(3):
-        for b in range(3):
-            rotation[a, b] = axis[a] * axis[b] * rest
-        rotation[a, a] += c
-    rotation[0, 1] -= z * s
-    rotation[1, 0] += z * s
-    rotation[0, 2] += y * s
-    rotation[2, 0] -= y * s
-    rotation[1, 2] -= x * s
-    rotation[2, 1] += x * s
+        first, second, third = r[a, 0], r[a, 1], r[a, 2]
+        along = first * u + second * v + third * w
+        if turns:
+            rest = (1.0 - c) * along
+            r[a, 0] = c * first + rest * u + s * (second * w - third * v)
+            r[a, 1] = c * second + rest * v + s * (third * u - first * w)
+            r[a, 2] = c * third + rest * w + s * (first * v - second * u)
+        else:
+            p[a] += x * along
 
 
 @inlined
@@ -53,18 +56,14 @@ def placements(
     """
     # Loops, here and in all kernels: for an array assigned to a slice of another, numba compiles
     # for seconds what NumPy says of shapes that differ.
-    turn, middle, shift, slide = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     for a in range(3):
         p[0, a] = 0.0
         for b in range(3):
             r[0, a, b] = 1.0 if a == b else 0.0
     for j in range(len(joints)):
-        x, before = q[joints[j]], parents[j]
-        compose(r[before], p[before], rotations[j], positions[j], middle, shift)
-        turned(axes[j], x if is_revolute[j] else 0.0, turn)
-        for a in range(3):
-            slide[a] = 0.0 if is_revolute[j] else x * axes[j, a]
-        compose(middle, shift, turn, slide, r[j + 1], p[j + 1])
+        before = parents[j]
+        compose(r[before], p[before], rotations[j], positions[j], r[j + 1], p[j + 1])
+        moved(axes[j], q[joints[j]], is_revolute[j], r[j + 1], p[j + 1])
 
 
 @kernel

@@ -70,20 +70,18 @@ def place_tip(
 @inlined
 def _jacobian(r: Array, p: Array, tree: TreeArrays, tip: Array, jacobian: Array) -> None:
     """Write the columns of a tip's Jacobian [v, ω] (6, n) at its origin, in the base's axes."""
-    axis = np.empty(3)
     for j in range(len(tree.joints)):
         column = tree.joints[j]
-        for a in range(3):
-            axis[a] = 0.0
-            for b in range(3):
-                axis[a] += r[j + 1, a, b] * tree.axes[j, b]
+        u, v, w = tree.axes[j, 0], tree.axes[j, 1], tree.axes[j, 2]
+        x = r[j + 1, 0, 0] * u + r[j + 1, 0, 1] * v + r[j + 1, 0, 2] * w
+        y = r[j + 1, 1, 0] * u + r[j + 1, 1, 1] * v + r[j + 1, 1, 2] * w
+        z = r[j + 1, 2, 0] * u + r[j + 1, 2, 1] * v + r[j + 1, 2, 2] * w
         if tree.is_revolute[j]:
-            x, y, z = tip[0] - p[j + 1, 0], tip[1] - p[j + 1, 1], tip[2] - p[j + 1, 2]
-            jacobian[0, column] = axis[1] * z - axis[2] * y
-            jacobian[1, column] = axis[2] * x - axis[0] * z
-            jacobian[2, column] = axis[0] * y - axis[1] * x
-            for a in range(3):
-                jacobian[3 + a, column] = axis[a]
+            a, b, c = tip[0] - p[j + 1, 0], tip[1] - p[j + 1, 1], tip[2] - p[j + 1, 2]
+            jacobian[0, column] = y * c - z * b
+            jacobian[1, column] = z * a - x * c
+            jacobian[2, column] = x * b - y * a
+            jacobian[3, column], jacobian[4, column], jacobian[5, column] = x, y, z
         else:
-            for a in range(3):
-                jacobian[a, column], jacobian[3 + a, column] = axis[a], 0.0
+            jacobian[0, column], jacobian[1, column], jacobian[2, column] = x, y, z
+            jacobian[3, column], jacobian[4, column], jacobian[5, column] = 0.0, 0.0, 0.0

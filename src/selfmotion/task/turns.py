@@ -5,7 +5,7 @@ import numpy as np
 from selfmotion.basics import Array
 
 # Below this angle the closed forms lose digits and their series serve.
-SMALL = 5e-2
+SMALL_TURN = 5e-2
 
 
 def exponentials(vectors: Array) -> Array:
@@ -18,7 +18,7 @@ def exponentials(vectors: Array) -> Array:
 def _left_weights(vectors: Array) -> tuple[Array, Array, Array, Array]:
     """Return a = (1 - cos θ)/θ², b = (θ - sin θ)/θ³, a'/θ and b'/θ at θ = |δ|."""
     angle = np.linalg.norm(vectors, axis=1)
-    small = angle < SMALL
+    small = angle < SMALL_TURN
     safe = np.where(small, 1.0, angle)
     sine, cosine = np.sin(safe), np.cos(safe)
     a = np.where(small, 0.5 - angle**2 / 24.0 + angle**4 / 720.0, (1.0 - cosine) / safe**2)
@@ -39,7 +39,7 @@ def _left_weights(vectors: Array) -> tuple[Array, Array, Array, Array]:
 def left_matrices(vectors: Array) -> Array:
     """Return Jl(δ) = I + a [δ]× + b [δ]×², (S, 3, 3)."""
     a, b, _, _ = _left_weights(vectors)
-    cross = skew(vectors)
+    cross = skews(vectors)
     return np.asarray(np.eye(3) + a[:, None, None] * cross + b[:, None, None] * cross @ cross)
 
 
@@ -51,16 +51,16 @@ def left(vectors: Array, rates: Array) -> Array:
 def left_derivative(vectors: Array, rates: Array) -> Array:
     """Return ∂(Jl(δ) v)/∂δ at v = δ̇, (S, 3, 3)."""
     a, b, by_a, by_b = _left_weights(vectors)
-    delta, v = skew(vectors), skew(rates)
+    delta, v = skews(vectors), skews(rates)
     once = turn(delta, rates)
     twice = turn(delta, once)
     gradient = by_a[:, None] * once + by_b[:, None] * twice
     # ∂(δ×v) = -[v]× ∂δ and ∂(δ×(δ×v)) = -([δ×v]× + [δ]×[v]×) ∂δ.
-    direct = -a[:, None, None] * v - b[:, None, None] * (skew(once) + delta @ v)
+    direct = -a[:, None, None] * v - b[:, None, None] * (skews(once) + delta @ v)
     return np.asarray(direct + gradient[:, :, None] * vectors[:, None, :])
 
 
-def skew(vectors: Array) -> Array:
+def skews(vectors: Array) -> Array:
     """Return [v]× for vectors (S, 3), (S, 3, 3)."""
     x, y, z = vectors.T
     zero = np.zeros_like(x)
