@@ -87,6 +87,20 @@ def test_the_best_is_framed_and_dearer_ones_are_lighter() -> None:
     assert len(set(light)) == len(light)
 
 
+@pytest.mark.parametrize("least", [1.0, 0.0])
+def test_colours_tell_costs_apart_beside_a_dear_one(least: float) -> None:
+    """By ratios where they are positive: 1 and 3 beside 300; one without cost is the best."""
+    costs = (least, 3.0, 300.0)
+    rows = [row(f"a-{k}", {X: k, Y: k}, cost) for k, cost in enumerate(costs)]
+    (picture,) = maps(rows, {})
+    fills = [r"rgb\((\d+),(\d+),(\d+)\)", re.escape("rgb(255,243,205)")]
+    reds = [int(found[0]) for found in re.findall(fills[0], picture)]
+    assert len(re.findall(fills[1], picture)) == 1
+    assert reds == sorted(reds)
+    # A fifth of the way from 1 to 300, which steps of equal size would leave at a hundredth.
+    assert (reds[1] - reds[0] > 255 // 6) == (least > 0.0)
+
+
 @pytest.mark.parametrize(
     "settings",
     [

@@ -361,7 +361,16 @@ def test_the_shell_says_what_went_wrong(grid: Path, tmp_path: Path) -> None:
     assert "grid.costs.1.mu: is 1, expected a list of values" in complaint("batch", grid)
     grid.write_text(GRID.replace('"path.duration"', '"robot.base.position.0"'))
     told = complaint("batch", grid)
-    assert "sets one number of 'position', which is not there: give all of them" in told
+    assert told.startswith(f"error: {grid}: robot.base.position.0: ")
+    assert "sets one number of 'position', which is not there; give all of them" in told
+    # The same in another unit, or written wrongly, is named.
+    there = "\n[workpiece]\nframe = { position_mm = [500, 0, 200] }\n"
+    for key in ("position", "positoin_mm"):
+        wanted = GRID.replace('"path.duration"', f'"workpiece.frame.{key}.0"')
+        grid.write_text(wanted.replace("[grid]", f"{there}[grid]"))
+        assert f"'{key}', which is not there; nearest: 'position_mm'; give" in complaint(
+            "batch", grid
+        )
     grid.write_text(GRID)
     (tmp_path / "b").mkdir()
     other = tmp_path / "b" / "cell.toml"

@@ -1,6 +1,7 @@
 """A path followed in a closed loop by the command, with a simulated controller over a socket."""
 
 import json
+import re
 import socket
 import threading
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.cli import runs
+from selfmotion.cli.following import out_of_reach, replanner_of
 from support.arms import PANDA_HOME, robot_named
 from support.shell import complaint, invoke
 
@@ -121,6 +123,19 @@ def test_states_of_a_wrong_length_are_told_with_the_right_one(
     assert "kept by all commands; used: position" in " ".join(shown.split())
 
 
+def test_a_path_that_leaves_the_reach_is_told_before_the_arm_moves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, told = written(tmp_path), list[str]()
+    assert out_of_reach(sm.read_problem(file)) == ""
+    file.write_text(file.read_text().replace("radius = 0.05", "radius = 0.9"))
+    monkeypatch.setattr(runs, "_told_apart", told.append)
+    # An address that is none ends it before anything moves.
+    assert "expected host:port" in complaint("follow", file, "--listen", "nowhere")
+    (note,) = told
+    assert re.match(r"note: from t = [0-9.]+ s on the pose is out of reach", note)
+
+
 def test_when_the_tool_was_off_its_path_is_told(tmp_path: Path) -> None:
     """A push of 2 mrad in one joint, which is led back within the limits."""
     file, port = written(tmp_path), free_port()
@@ -157,6 +172,20 @@ def test_what_is_not_kept_while_moving_is_refused(tmp_path: Path) -> None:
     file = written(tmp_path)
     file.write_text(file.read_text() + '\n[[relaxations]]\nrows = ["z"]\nband = 0.01\n')
     assert "no row is relaxed" in complaint("follow", file)
+
+
+def test_a_file_without_constraints_is_followed_and_jerks_that_are_asked_for_are_not(
+    tmp_path: Path,
+) -> None:
+    """The maker's limits of the jerk are the default of plans; the loop keeps none."""
+    file = written(tmp_path)
+    text, _ = file.read_text().split("[[constraints]]")
+    file.write_text(text)
+    limits = replanner_of(sm.read_problem(file)).limits
+    panda = robot_named("panda")
+    np.testing.assert_array_equal(limits[2:], [panda.velocity_limit, panda.acceleration_limit])
+    file.write_text(text + '[[constraints]]\nkind = "JointJerkLimits"\n')
+    assert "constraint JointJerkLimits is not kept while moving" in complaint("follow", file)
 
 
 def test_a_port_that_is_taken_is_told(tmp_path: Path) -> None:

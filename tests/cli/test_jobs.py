@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.cli.documents import seams_of_file
 from support.places import ROOT
 from support.shell import complaint, invoke
 
@@ -63,6 +64,18 @@ def test_a_column_of_a_table_tells_the_seams(table) -> None:
     np.testing.assert_allclose(job.seams[0].path.pose(0.0).translation, [0.45, 0.2, 0.3])
     assert job.seams[0].path.feeds[0].asked == 0.05
     np.testing.assert_allclose(job.settings["start"], sm.NAMED_ARMS["panda"].home)
+
+
+def test_anything_of_a_job_file_can_be_set(table) -> None:
+    """As if the file said so; what it is set to is refused as that of the file."""
+    there = "seams.frame.position=[0.5, 0.0, 0.3]"
+    seams = seams_of_file(table, [there, "seams.feed=0.04", "job.branches=2"], False)
+    np.testing.assert_allclose(seams.seams[0].path.pose(0.0).translation, [0.5, 0.2, 0.3])
+    assert seams.seams[0].path.feeds[0].asked == 0.04
+    assert seams.settings["branches"] == 2
+    assert "feeds are in m/s, not mm/s" in complaint("job", table, "--set", "seams.feed=40")
+    assert "unknown key 'brunches'" in complaint("job", table, "--set", "job.brunches=2")
+    assert "expected KEY=VALUE" in complaint("job", table, "--set", "job.branches")
 
 
 def test_a_job_from_the_shell_is_written_read_and_exported(tmp_path) -> None:

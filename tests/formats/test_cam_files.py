@@ -167,7 +167,7 @@ def test_tables_name_seams_and_events(tmp_path: Path) -> None:
     np.testing.assert_allclose(path.pose(0.0).translation, [0, 0.1, 0], atol=1e-12)
     with pytest.raises(sm.FileFormatError, match="has 2 seams or cuts, left to right: choose one"):
         sm.read_path(file)
-    with pytest.raises(sm.FileFormatError, match="has no seam 'middle'"):
+    with pytest.raises(sm.FileFormatError, match="has no seam 'middle'; it has 'left', 'right'"):
         sm.read_path(file, seam="middle")
     job = tmp_path / "job.toml"
     job.write_text('task = "position"\n[robot]\nname = "panda"\n[seams]\nfile = "seams.csv"\n')

@@ -197,6 +197,28 @@ def test_what_is_not_read_is_named_and_hidden_layers_are_not_read(tmp_path: Path
         sm.read_path(file, feed=0.1)
 
 
+def test_beside_the_layer_of_a_seam_anything_may_be_drawn(tmp_path: Path) -> None:
+    def draw(space: Any) -> None:
+        for y in (0, 10):
+            space.add_line((0, y), (60, y), dxfattribs={"layer": "weld"})
+        space.add_line((0, 50), (60, 50), dxfattribs={"layer": "glue"})
+        space.add_text("bracket", dxfattribs={"layer": "notes"})
+
+    file = drawn(tmp_path / "part.dxf", draw)
+    assert list(read_drawing(file, "glue")) == ["glue"]
+    assert list(read_drawing(file, "weld 2")) == ["weld 1", "weld 2"]
+    for seam, told in {
+        "weld": "has no seam 'weld'; nearest: 'weld 2', 'weld 1'",
+        "welt": "has no seam 'welt'; nearest: 'weld'",
+        "7": "has no seam '7'; it has 'weld', 'glue', 'notes'",
+        "notes": "layer 'notes': TEXT .* is not read",
+    }.items():
+        with pytest.raises(sm.FileFormatError, match=told):
+            sm.read_path(file, feed=0.05, seam=seam)
+    with pytest.raises(sm.FileFormatError, match=r"layer 'notes': TEXT .* is not read"):
+        read_drawing(file)
+
+
 def test_a_drawing_is_a_path_and_its_strokes_a_job(tmp_path: Path) -> None:
     def draw(space: Any) -> None:
         space.add_lwpolyline([(0, 0), (60, 0), (60, 40)], dxfattribs={"layer": "weld"})

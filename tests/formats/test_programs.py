@@ -440,6 +440,13 @@ def test_the_shell_writes_programs_and_confirms_them(program: sm.Program, tmp_pa
         sm.ProblemError, match=r"'arc on' has no signal; .*--settings .*\[signals\]"
     ):
         invoke(*asked)
+    # A signal of no event is named where it may be meant, one of another event is not.
+    signals = {"arc on": (7, True), "arc of": (7, False)}
+    with pytest.raises(sm.ProblemError, match="'arc off' has no signal; nearest: 'arc of'; say"):
+        sm.write_motion(program, tmp_path / "b.src", settings=sm.ProgramSettings(signals=signals))
+    signals.pop("arc of")
+    with pytest.raises(sm.ProblemError, match="'arc off' has no signal; say"):
+        sm.write_motion(program, tmp_path / "b.src", settings=sm.ProgramSettings(signals=signals))
     (tmp_path / "quiet.toml").write_text('[signals]\n"arc on" = false\n"arc off" = false\n')
     assert invoke(*asked, "--settings", tmp_path / "quiet.toml")[0] == 0
     assert "; event: arc on" in (tmp_path / "weld.src").read_text()

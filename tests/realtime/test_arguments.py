@@ -39,3 +39,15 @@ def test_a_first_state_that_cannot_be_stopped_in_time_is_refused(
     fast[3] = 2.0
     with pytest.raises(sm.StartError, match="panda_joint4"):
         Replanner(panda).step(0.0, near, fast, slow_circle)
+
+
+def test_a_first_state_in_degrees_is_asked_about(
+    panda: sm.RobotModel, slow_circle: sm.Circle
+) -> None:
+    near = PANDA_HOME.copy()
+    near[3] = panda.upper[3] + 0.1
+    rad = r"is at .* rad, 0 rad/s, from where it cannot stop within .* rad at up to .* rad/s"
+    for q, asked in ((np.degrees(PANDA_HOME), True), (near, False)):
+        with pytest.raises(sm.StartError, match=rad) as caught:
+            Replanner(panda).step(0.0, q, np.zeros(7), slow_circle)
+        assert ("in degrees?" in str(caught.value)) is asked

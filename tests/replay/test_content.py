@@ -4,6 +4,7 @@ import base64
 import gzip
 import json
 import struct
+from dataclasses import replace
 
 import coal
 import collada
@@ -14,6 +15,8 @@ import pytest
 import selfmotion as sm
 from selfmotion.basics.errors import RobotError
 from selfmotion.replay import shapes
+from selfmotion.replay.content import page_content
+from selfmotion.replay.facts import facts
 from selfmotion.replay.links import bake
 from selfmotion.replay.meshes import make_mesh, read_meshes
 from selfmotion.replay.motion import curves, key_frames
@@ -178,6 +181,18 @@ def test_curves_know_a_path_that_is_missed():
     reach = np.linalg.norm(missed.tool[:, :2], axis=1)
     assert np.all(missed.position_error > 0.00999 * reach)
     assert missed.position_error.max() == pytest.approx(0.01 * reach.max(), rel=1e-3)
+
+
+def test_what_is_relaxed_is_not_shown_as_an_error():
+    plan = arm_plan("panda")
+    leaning = sm.plan(replace(plan.problem, relaxations=[sm.Relaxation(("rx", "ry"), 0.1)]))
+    for each, relaxed in ((plan, False), (leaning, True)):
+        content = page_content([each], ["plan"], Payload(), triads=0)
+        assert content["plans"][0]["curves"]["relaxed"] is relaxed
+    (worst,) = leaning.certificate.deviations
+    name = "off the path, as relaxed (rx, ry)"
+    assert facts(leaning)[name][0] == f"{worst.value:.3g} rad"
+    assert name not in facts(plan)
 
 
 def test_manipulability_is_the_root_of_the_determinant():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.replay import replay_html
+from selfmotion.replay import replay_html, shapes
 from selfmotion.replay.whole import Whole
 from support.replay_plans import two_seams
 
@@ -40,6 +40,20 @@ def test_a_program_becomes_a_page_and_what_is_missing_none(program) -> None:
     missing = sm.Move(program.robot, (), None, "no way")
     with pytest.raises(sm.PlanError, match="no way"):
         replay_html(missing)
+
+
+def test_seams_are_drawn_thicker_than_moves(program, monkeypatch) -> None:
+    tube, drawn = shapes.tube, []
+
+    def recorded(points, radius):
+        drawn.append((radius, np.ptp(points, axis=0).max()))
+        return tube(points, radius)
+
+    monkeypatch.setattr(shapes, "tube", recorded)
+    replay_html(program)
+    whole, seams = drawn[:-2], drawn[-2:]
+    assert [length for _, length in seams] == pytest.approx([0.1, 0.1], abs=1e-3)
+    assert max(radius for radius, _ in whole) < 0.6 * min(radius for radius, _ in seams)
 
 
 def test_what_happens_is_on_the_path_in_the_order_of_time() -> None:

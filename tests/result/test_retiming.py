@@ -50,6 +50,23 @@ def test_retimed_plans_keep_limits_and_geometry(fast: sm.Plan, tmp_path) -> None
     assert sm.load_plan(tmp_path / "slow.npz").check() == slow.certificate
 
 
+def test_what_binds_does_so_where_it_did(panda: sm.RobotModel) -> None:
+    """At other times, but at the same places of the joint path."""
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 6.0, normal=(1.0, 0.0, 0.0))
+    limits = (sm.JointPositionLimits(), sm.JointVelocityLimits(0.36))
+    problem = sm.Problem(panda, path, task="position", start=PANDA_HOME, constraints=limits)
+    plan = sm.plan(problem).require()
+    again = sm.retime(plan, ACCELERATION, velocity=0.15)
+    plans, times = (plan, again), []
+    for each in plans:
+        spans = [span for item in each.report.active for span in item.spans]
+        times.append(np.array(spans).ravel())
+    assert len(times[0]) > 2
+    there = [each.trajectory(when) for each, when in zip(plans, times, strict=True)]
+    np.testing.assert_allclose(there[1], there[0], atol=1e-6)
+    assert np.abs(times[1] - times[0]).max() > 1.0
+
+
 def test_the_factor_is_the_one_that_suffices(fast: sm.Plan) -> None:
     factor = sm.slowdown(fast)
     assert factor == pytest.approx(fast.certificate.velocity_ratio.value)

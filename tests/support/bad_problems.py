@@ -321,8 +321,8 @@ def setting_rows() -> list[Row]:
             axes={"['A1']": ["A1"], "{'joint1': 'A7'}": {"joint1": "A7"}},
             signals={"3": 3, "{'on': 7}": {"on": 7}, "{'on': (7, 1)}": {"on": (7, 1)}},
             flange={"3": 3},
-            mass={"0": 0, "'heavy'": "heavy"},
-            center={"[0, 0]": [0, 0], "'tip'": "tip"},
+            mass={"0": 0, "3200": 3200, "'heavy'": "heavy"},
+            center={"[0, 0]": [0, 0], "[0, 0, 80]": [0, 0, 80], "'tip'": "tip"},
             approach={"0": 0, "2": 2},
         ),
         *bad_values_of(

@@ -164,12 +164,15 @@ def as_path(file: Any) -> Path:
 
 
 def read_rows(
-    file: Path, texts: Sequence[str] = ()
+    file: Path,
+    texts: Sequence[str] = (),
+    check: Callable[[Sequence[str]], object] | None = None,
 ) -> tuple[list[str], Array, list[int], dict[str, list[str]]]:
     """Read a table of numbers with a header line, and tell on which line each row stands.
 
     Columns are separated by comma, semicolon or tab, whichever the header has; lines that begin
-    with # and empty ones are left out, a byte order mark is not seen.
+    with # and empty ones are left out, a byte order mark is not seen. `check` is called with the
+    names of the columns of numbers before rows are read: it raises for one that has no meaning.
 
     Returns
     -------
@@ -194,6 +197,8 @@ def read_rows(
         raise FileFormatError(f"{file}: line {kept[0][0]}: column '{twice[0]}' appears twice")
     rows, numbers = [], []
     plain = [k for k, name in enumerate(names) if name not in texts]
+    if check is not None:
+        check([names[k] for k in plain])
     cells_of: dict[str, list[str]] = {name: [] for name in names if name in texts}
     for number, line in kept[1:]:
         cells = line.split(mark)

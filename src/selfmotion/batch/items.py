@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import ProblemError, SelfmotionError
+from selfmotion.basics import FileFormatError, ProblemError, SelfmotionError
 from selfmotion.costs import FunctionCost
 from selfmotion.formats import Job, grid_documents, job_of, read_document
 from selfmotion.problem import Problem, problem_to_dict
@@ -84,7 +84,11 @@ def grid_items(file: Path, *, allow_code: bool = False) -> list[Item]:
         by their rows.
     """
     memory: dict[str, Any] = {}
-    found = grid_documents(read_document(file))
+    document = read_document(file)
+    try:
+        found = grid_documents(document)
+    except FileFormatError as error:
+        raise FileFormatError(f"{file}: {error}") from error
     digits = len(str(len(found) - 1))
 
     def maker(document: dict[str, Any]) -> Callable[[], Job]:

@@ -2,6 +2,7 @@
 
 import html
 import json
+import math
 import urllib.parse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -123,8 +124,12 @@ class _Scale:
 
     def colours(self, aim: float) -> tuple[str, str]:
         """Return the colour of a cell, and of what is written in it."""
-        extent = self.most - self.least
-        share = (aim - self.least) / extent if extent > 0.0 else 0.0
+        share = 0.0
+        if self.most > self.least > 0.0:
+            # By ratios: beside a place at ten times the cost others can still be told apart.
+            share = math.log(aim / self.least) / math.log(self.most / self.least)
+        elif self.most > self.least:
+            share = (aim - self.least) / (self.most - self.least)
         mixed = [round(a + share * (b - a)) for a, b in zip(_BEST, _WORST, strict=True)]
         return f"rgb({','.join(map(str, mixed))})", "#222" if share > 0.4 else "#fff"
 

@@ -15,6 +15,7 @@ from selfmotion.formats import (
     job_of,
     parse_setting,
     read_document,
+    seam_job_of,
     set_key,
 )
 
@@ -192,11 +193,22 @@ def of_file(file: Path, settings: list[str], allow_code: bool) -> sm.Job:
     return _with_settings(document, file, settings, allow_code)
 
 
+def seams_of_file(file: Path, settings: list[str], allow_code: bool) -> sm.SeamJob:
+    """Return the job of a file with seams."""
+    document = read_document(file)
+    _set(document, settings)
+    return seam_job_of(document, file, allow_code=allow_code)
+
+
+def _set(document: dict[str, Any], settings: list[str]) -> None:
+    for text in settings:
+        set_key(document, *parse_setting(text))
+
+
 def _with_settings(
     document: dict[str, Any], file: Path | None, settings: list[str], allow_code: bool
 ) -> sm.Job:
-    for text in settings:
-        set_key(document, *parse_setting(text))
+    _set(document, settings)
     job = job_of(document, file, allow_code=allow_code)
     _tell_left_out(document, file)
     return job

@@ -16,6 +16,8 @@ from rich.table import Table
 import selfmotion as sm
 from selfmotion import realtime
 from selfmotion.basics import Array
+from selfmotion.problem import KEPT
+from selfmotion.search import reachable
 
 # What a datagram holds at most, and how long one is waited for at a time [s].
 _LARGEST, _LOOK = 65_507, 0.2
@@ -215,7 +217,21 @@ def replanner_of(problem: sm.Problem, **options: Any) -> sm.Replanner:
         raise sm.ProblemError("while the arm moves one frame follows a path: leave 'also' out")
     if problem.relaxations:
         raise sm.ProblemError("while the arm moves no row is relaxed: leave 'relaxations' out")
-    return sm.Replanner(problem.robot, problem.task, problem.costs, problem.constraints, **options)
+    # Limits of the jerk that nobody wrote, as all problems have them by default, are left to plans.
+    asked = [
+        item
+        for item in problem.constraints
+        if item.kept_moving or not any(item is usual for usual in KEPT)
+    ]
+    return sm.Replanner(problem.robot, problem.task, problem.costs, asked, **options)
+
+
+def out_of_reach(problem: sm.Problem) -> str:
+    """Return in words from when on poses of the path are out of reach; "" where none is.
+
+    PlanError where it begins there.
+    """
+    return reachable(problem, sm.Search().starts, np.random.default_rng(0)).reason
 
 
 def show(link: Link, console: Console) -> None:

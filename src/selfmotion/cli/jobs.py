@@ -8,7 +8,7 @@ import typer
 
 import selfmotion as sm
 from selfmotion import formats
-from selfmotion.cli import json_tables, options, outputs, tables
+from selfmotion.cli import documents, json_tables, options, outputs, tables
 from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, app, complain, stages, terminal
 from selfmotion.cli.batch_display import executor_at
 from selfmotion.cli.stage_display import StageDisplay
@@ -37,6 +37,7 @@ def job(
         str | None, typer.Option(help="Or the address of a Dask scheduler, host:port.")
     ] = None,
     settings: options.SettingsOption = None,
+    changes: options.SetOption = None,
     allow_code: options.AllowCodeOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -46,7 +47,7 @@ def job(
     wanted = [*(out or []), *([] if html is None else [html])]
     for target in wanted:
         _check(target)
-    work = sm.read_seam_job(file, allow_code=allow_code)
+    work = documents.seams_of_file(file, changes or [], allow_code)
     asked = None if settings is None else sm.read_program_settings(settings)
     if asked is not None or any(_switches(target) for target in wanted):
         # Before anything is planned.

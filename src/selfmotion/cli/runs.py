@@ -167,6 +167,9 @@ def follow(
     problem = sm.read_problem(file, allow_code=allow_code)
     asked = {"horizon": horizon, "period": period, "cycle": cycle, "latency": latency}
     replanner = following.replanner_of(problem, **asked)
+    # The arm goes as far as it can; better to know before it moves.
+    if beyond := following.out_of_reach(problem):
+        _told_apart(f"note: {beyond}")
     with following.listening(listen) as port:
         # Nothing compiles once the arm moves.
         sm.warm_up(replanner)

@@ -48,7 +48,11 @@ from selfmotion.formats.program_settings import (
     read_program_settings as read_program_settings,
 )
 from selfmotion.formats.samples import LinearMiss as LinearMiss, linear_miss as linear_miss
-from selfmotion.formats.seam_job import SeamJob as SeamJob, read_seam_job as read_seam_job
+from selfmotion.formats.seam_job import (
+    SeamJob as SeamJob,
+    read_seam_job as read_seam_job,
+    seam_job_of as seam_job_of,
+)
 
 
 def json_schema() -> dict[str, Any]:

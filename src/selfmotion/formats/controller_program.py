@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError, ProblemError, Progress, silent
+from selfmotion.basics import FileFormatError, ProblemError, Progress, nearest, silent
 from selfmotion.formats.pieces import pieces_of
 from selfmotion.formats.program_axes import Axis, axes_of, in_order, tool_from_flange
 from selfmotion.formats.program_settings import ProgramSettings, Signal
@@ -150,12 +150,13 @@ def drafted(
 
 def check_signals(seams: Mapping[str, str], settings: ProgramSettings) -> None:
     """Refuse events (event → seam) of which nothing says what they switch."""
+    spare = [event for event in settings.signals or {} if event not in seams]
     for event, seam in seams.items():
         if not settings.knows(event):
             raise ProblemError(
-                f"seam '{seam}': event '{event}' has no signal; say in the file of --settings what "
-                f"it switches, [signals] '{event}' = [output, true], or false for a comment only "
-                f"(ProgramSettings(signals=…))"
+                f"seam '{seam}': event '{event}' has no signal{nearest(event, spare)}; say in the "
+                f"file of --settings what it switches, [signals] '{event}' = [output, true], or "
+                f"false for a comment only (ProgramSettings(signals=…))"
             )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from selfmotion.basics import Array, FileFormatError, Ints, ProblemError
 from selfmotion.formats.cuts import Cut
 from selfmotion.formats.drawn_entities import DRAWN
-from selfmotion.formats.path_rows import PoseRows
+from selfmotion.formats.path_rows import PoseRows, no_such_seam
 
 # What ezdxf remarks, such as handles that two entities share, is not told beside our own errors.
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())
@@ -46,14 +46,16 @@ class _Piece(NamedTuple):
     points: Array
 
 
-def read_drawing(file: FilePath) -> Mapping[str, PoseRows]:
+def read_drawing(file: FilePath, seam: str | None = None) -> Mapping[str, PoseRows]:
     """Read the strokes of a drawing by the names of their layers; see `read_path`.
+
+    Where one seam is asked for, other layers are not looked at: they may hold texts and dimensions.
 
     Raises
     ------
     FileFormatError
-        The file cannot be read, says no unit, or has an entity that is not read; its handle is
-        named.
+        The file cannot be read, says no unit, has no layer of that seam, or an entity that is not
+        read; its handle is named.
     ProblemError
         The package that reads drawings is not installed.
     """
@@ -83,11 +85,21 @@ def read_drawing(file: FilePath) -> Mapping[str, PoseRows]:
         drawn = [(_visible_layer(drawing, entity), entity) for entity in drawing.modelspace()]
     except spoilt as error:
         raise FileFormatError(f"{file}: is no DXF drawing: {_line(error)}") from error
-    layers: dict[str, list[_Piece]] = {}
+    present = list(dict.fromkeys(layer for layer, _ in drawn if layer is not None))
+    asked = [layer for layer in present if seam is None or _may_have(layer, seam)]
+    if seam is not None and present and not asked:
+        raise no_such_seam(file, seam, present)
+    layers: dict[str, list[_Piece]] = {layer: [] for layer in asked}
     for layer, entity in drawn:
-        if layer is not None:
-            layers.setdefault(layer, []).extend(_piece(file, layer, entity, unit))
+        if layer in layers:
+            layers[layer].extend(_piece(file, layer, entity, unit))
     return _named(file, {layer: _strokes(pieces) for layer, pieces in layers.items()})
+
+
+def _may_have(layer: str, seam: str) -> bool:
+    """Whether a layer may have a stroke of this name: its own, or that with a number."""
+    name, _, number = seam.rpartition(" ")
+    return seam == layer or (name == layer and number.isdigit())
 
 
 def _line(error: BaseException) -> str:

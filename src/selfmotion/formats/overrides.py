@@ -8,7 +8,7 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import FileFormatError
+from selfmotion.basics import FileFormatError, nearest
 from selfmotion.formats.documents import read_document, write_document
 
 # Keys whose values are names of files, looked for beside the document.
@@ -29,8 +29,8 @@ def set_key(document: dict[str, Any], key: str, value: Any) -> None:
     for part, inner in itertools.pairwise(parts):
         if isinstance(node, dict) and part not in node and inner.isdigit():
             raise FileFormatError(
-                f"{key}: sets one number of '{part}', which is not there: give all of them in the "
-                f"file, like {part} = [0, 0, 0]"
+                f"{key}: sets one number of '{part}', which is not there{nearest(part, node)}; "
+                f"give all of them in the file, like {part} = [0, 0, 0]"
             )
         node = node.setdefault(part, {}) if isinstance(node, dict) else _item(node, part, key)
     if isinstance(node, dict):

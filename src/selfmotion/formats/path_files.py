@@ -4,20 +4,20 @@ from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
 from typing import Any
 
-from selfmotion.basics import FileFormatError, as_number, as_path, nearest
+from selfmotion.basics import FileFormatError, as_number, as_path
 from selfmotion.formats.cldata import read_cldata
 from selfmotion.formats.drawing import read_drawing
 from selfmotion.formats.gcode import read_gcode
 from selfmotion.formats.path_building import JUMP, Pacing, path_of_rows
-from selfmotion.formats.path_rows import READERS, PoseRows
+from selfmotion.formats.path_rows import READERS, PoseRows, no_such_seam
 from selfmotion.path import Path
 
-_MADE = {
+_READERS: Mapping[str, Callable[[FilePath], Mapping[str, PoseRows]]] = {
+    **READERS,
     **dict.fromkeys((".nc", ".ngc", ".gcode", ".tap"), read_gcode),
     **dict.fromkeys((".apt", ".cls", ".cl"), read_cldata),
-    ".dxf": read_drawing,
 }
-_READERS: Mapping[str, Callable[[FilePath], Mapping[str, PoseRows]]] = {**READERS, **_MADE}
+_DRAWING = ".dxf"
 
 
 def read_path(
@@ -72,8 +72,9 @@ def read_path(
     with a number where the layer has several, and the direction of what was drawn first of it.
     ``LINE ARC CIRCLE ELLIPSE SPLINE LWPOLYLINE POLYLINE`` are read, curves as chords within
     0.01 mm, which are followed as legs of a cut; any other entity is refused by its handle, but
-    not on layers that are off or frozen. The unit is that of ``$INSUNITS``, and none is refused.
-    The tool's z axis points down, against that of the drawing. A feed has to be given.
+    not on layers that are off or frozen, nor beside the layer of `seam`. The unit is that of
+    ``$INSUNITS``, and none is refused. The tool's z axis points down, against that of the drawing.
+    A feed has to be given.
 
     Parameters
     ----------
@@ -152,12 +153,15 @@ def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
     return asked
 
 
-def _read(path: FilePath) -> Mapping[str, PoseRows]:
-    reader = _READERS.get(path.suffix.lower())
+def _read(path: FilePath, seam: str | None = None) -> Mapping[str, PoseRows]:
+    """Return the rows of a file by the names of its seams, of a drawing those of one layer."""
+    suffix = path.suffix.lower()
+    if suffix == _DRAWING:
+        return read_drawing(path, seam)
+    reader = _READERS.get(suffix)
     if reader is None:
-        raise FileFormatError(
-            f"{path}: has suffix '{path.suffix}', expected one of {', '.join(_READERS)}"
-        )
+        known = ", ".join((*_READERS, _DRAWING))
+        raise FileFormatError(f"{path}: has suffix '{path.suffix}', expected one of {known}")
     return reader(path)
 
 
@@ -171,7 +175,7 @@ def events_of(file: FilePath, seam: str | None) -> tuple[str, ...]:
 
 def one_seam(path: FilePath, seam: str | None) -> PoseRows:
     """Return the rows of one seam of a file."""
-    seams = _read(path)
+    seams = _read(path, seam)
     if seam is None and len(seams) == 1:
         return next(iter(seams.values()))
     if seam is not None and seam in seams:
@@ -184,4 +188,4 @@ def one_seam(path: FilePath, seam: str | None) -> PoseRows:
         )
     if not names:
         raise FileFormatError(f"{path}: names no seams, so that seam has no effect; drop it")
-    raise FileFormatError(f"{path}: has no seam '{seam}'{nearest(seam, names)}")
+    raise no_such_seam(path, seam, names)

@@ -10,6 +10,7 @@ import numpy as np
 from selfmotion.basics import (
     Array,
     FileFormatError,
+    nearest,
     read_arrays,
     read_rows,
 )
@@ -30,6 +31,10 @@ _COLUMNS: Mapping[tuple[str, ...], str] = {
 # Columns of texts: which seam a row is of, and what happens at it.
 SEAM, EVENT = "seam", "event"
 _KNOWN = {"t", "feed", *_POSITION, *(name for names in _COLUMNS for name in names)}
+
+
+# Names that are long enough to be taken for one another.
+_LONG = ("feed", "roll", "pitch", "yaw")
 
 
 _UNITS = {
@@ -73,9 +78,24 @@ class PoseRows:
     one_way: bool = False
 
 
+# So many names of seams are listed.
+_LISTED = 5
+
+
+def no_such_seam(file: FilePath, seam: str, names: Sequence[str]) -> FileFormatError:
+    """Return an error that says which seams a file has, those of a like name if there are any."""
+    listed = ", ".join(repr(name) for name in names[:_LISTED])
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return FileFormatError(
+        f"{file}: has no seam '{seam}'{nearest(seam, names) or f'; it has {listed}{more}'}"
+    )
+
+
 def read_tables(file: FilePath) -> dict[str, PoseRows]:
     """Return the rows of a table by the names in its column ``seam``, "" where it has none."""
-    header, table, lines, texts = read_rows(file, (SEAM, EVENT))
+    header, table, lines, texts = read_rows(
+        file, (SEAM, EVENT), check=lambda names: [_meant(file, name) for name in names]
+    )
     whole = _of_table(file, header, table, lines, texts.get(EVENT, [""] * len(lines)))
     if SEAM not in texts:
         return {"": whole}
@@ -151,19 +171,25 @@ def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, A
     """Return the columns in SI units, by their names without unit."""
     columns: dict[str, Array] = {}
     for k, title in enumerate(header):
-        name, scale = title, 1.0
-        for suffix, (names, factor) in _UNITS.items():
-            if title.endswith(suffix) and title.removesuffix(suffix) in names:
-                name, scale = title.removesuffix(suffix), factor or np.pi / 180.0
-        if name not in _KNOWN:
-            raise FileFormatError(
-                f"{file}: unknown column '{title}', expected t, feed, seam, event, x,y,z and "
-                f"{' or '.join(','.join(names) for names in _COLUMNS)}"
-            )
+        name, scale = _meant(file, title)
         if name in columns:
             raise FileFormatError(f"{file}: column '{name}' appears twice, in two units")
         columns[name] = scale * table[:, k]
     return columns
+
+
+def _meant(file: FilePath, title: str) -> tuple[str, float]:
+    """Return the name of a column without its unit, and that in SI units."""
+    name, scale = title, 1.0
+    for suffix, (names, factor) in _UNITS.items():
+        if title.endswith(suffix) and title.removesuffix(suffix) in names:
+            name, scale = title.removesuffix(suffix), factor or np.pi / 180.0
+    if name not in _KNOWN:
+        raise FileFormatError(
+            f"{file}: unknown column '{title}'{nearest(title, (*_LONG, SEAM, EVENT))}, expected t, "
+            f"feed, seam, event, x,y,z and {' or '.join(','.join(names) for names in _COLUMNS)}"
+        )
+    return name, scale
 
 
 def _read_array(file: FilePath) -> PoseRows:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
+
 from selfmotion.basics import (
     FileFormatError,
     ProblemError,
@@ -22,6 +24,8 @@ from selfmotion.formats.documents import in_si, read_document
 # Where an output of a signal is, and what it becomes.
 Signal = tuple[str | int, bool]
 _DEVIATION = Tolerance(1e-4, 1e-3)
+# No arm carries more [kg], nor holds it farther from its flange [m].
+_HEAVIEST, _FARTHEST = 3000.0, 5.0
 AXES = tuple(f"{kind}{number}" for kind in "AE" for number in range(1, 7))
 
 
@@ -93,8 +97,19 @@ class ProgramSettings:
         if self.flange is not None and not isinstance(self.flange, str):
             raise ProblemError(f"flange is {shown(self.flange)}, expected the name of a link")
         if self.mass is not None:
-            object.__setattr__(self, "mass", as_number(self.mass, "mass", above=0.0))
+            mass = as_number(self.mass, "mass", above=0.0)
+            if mass > _HEAVIEST:
+                raise ProblemError(
+                    f"mass: {mass:g} kg is more than any arm carries, expected at most "
+                    f"{_HEAVIEST:g}: masses are in kg, not g"
+                )
+            object.__setattr__(self, "mass", mass)
         center = as_numbers(self.center, "center", "3 finite numbers [m]", (3,))
+        if np.abs(center).max() > _FARTHEST:
+            raise ProblemError(
+                f"center: {np.abs(center).max():g} m is far from any flange, expected at most "
+                f"{_FARTHEST:g}: in m, or center_mm in files"
+            )
         object.__setattr__(self, "center", tuple(center.tolist()))
         approach = as_number(self.approach, "approach", above=0.0, most=1.0)
         object.__setattr__(self, "approach", approach)

@@ -96,22 +96,29 @@ def read_seam_job(file: str | FilePath, *, allow_code: bool = False) -> SeamJob:
         The file cannot be read, or says something that cannot be planned; file and key are named.
     """
     path = as_path(file)
-    document = read_document(path)
-    given, settings = document.pop("seams", None), document.pop("job", {})
-    if "path" in document or not isinstance(given, dict | list) or not given:
+    return seam_job_of(read_document(path), path, allow_code=allow_code)
+
+
+def seam_job_of(
+    document: Mapping[str, Any], file: FilePath, *, allow_code: bool = False
+) -> SeamJob:
+    """Return the job that a document of a file describes. See `read_seam_job`."""
+    given, settings = document.get("seams"), document.get("job", {})
+    shared = {key: value for key, value in document.items() if key not in ("seams", "job")}
+    if "path" in shared or not isinstance(given, dict | list) or not given:
         raise FileFormatError(
-            f"{path}: expected seams, a list [[seams]] or a table [seams] with a file, and no path "
+            f"{file}: expected seams, a list [[seams]] or a table [seams] with a file, and no path "
             f"beside them"
         )
-    if not isinstance(document.get(NAME, {}), Mapping):
-        raise FileFormatError(f"{path}: {NAME}: expected a table [{NAME}]")
-    reader = _Reader(path, document, allow_code, {})
+    if not isinstance(shared.get(NAME, {}), Mapping):
+        raise FileFormatError(f"{file}: {NAME}: expected a table [{NAME}]")
+    reader = _Reader(file, shared, allow_code, {})
     entries = [reader.of_table(given)] if isinstance(given, dict) else map(reader.of_list, given)
     seams = [seam for several in entries for seam in several]
     whole = reader.first
     apart = [item for item in whole.problem.constraints if isinstance(item, Clearance)]
     if len(apart) > 1:
-        raise FileFormatError(f"{path}: constraints: two clearances, expected one for all")
+        raise FileFormatError(f"{file}: constraints: two clearances, expected one for all")
     options = reader.settings(settings)
     kept = [item for item in reader.shared if not isinstance(item, Clearance)]
     clearance = apart[0] if apart else whole.problem.collision

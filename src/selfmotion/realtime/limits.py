@@ -76,10 +76,15 @@ def stoppable(robot: RobotModel, limits: Array, q: Array, qd: Array, cycle: floa
     bad = np.flatnonzero((c < lower) | (c > upper) | (np.abs(qd) > speed) | (need > room))
     if bad.size:
         k = int(bad[0])
+        name = robot.joint_names[k]
+        unit = robot.unit_of(name)
+        is_outside = not lower[k] <= q[k] <= upper[k]
+        asks = is_outside and unit == "rad" and abs(q[k]) > 2.0 * np.pi
         raise StartError(
-            f"joint '{robot.joint_names[k]}' is at {q[k]:.6g}, {qd[k]:.6g} per second, from where "
-            f"it cannot stop within {lower[k]:.6g}..{upper[k]:.6g} at up to {speed[k]:.6g}; bring "
-            f"the arm within its limits first",
+            f"joint '{name}' is at {q[k]:.6g} {unit}, {qd[k]:.6g} {unit}/s, from where it cannot "
+            f"stop within {lower[k]:.6g}..{upper[k]:.6g} {unit} at up to {speed[k]:.6g} {unit}/s; "
+            f"bring the arm within its limits first"
+            f"{'; are its angles in degrees? expected rad' if asks else ''}",
             position_miss=0.0,
             rotation_miss=0.0,
         )

@@ -24,6 +24,8 @@ _PAIR_LAYER = {"name": "pair", "label": "closest pair", "key": "c", "on": True}
 
 # Sizes of what is drawn, relative to half the diagonal of the scene.
 _TRACE_RADIUS = 0.005
+# How thick moves are beside seams, which are what a job is about.
+_THIN = 0.4
 _TRIAD_LENGTH = 0.09
 _ELLIPSOID_LENGTH = 0.3
 
@@ -191,7 +193,15 @@ def _plan(
             *(
                 command
                 for f, tip in enumerate(motion.tips)
-                for command in _traces(f"{root}/tip{f}", payload, tip, scale, times, size)
+                for command in _traces(
+                    f"{root}/tip{f}",
+                    payload,
+                    tip,
+                    scale,
+                    times,
+                    size,
+                    1.0 if whole is None else _THIN,
+                )
             ),
             *(
                 []
@@ -203,10 +213,10 @@ def _plan(
 
 
 def _traces(
-    root: str, payload: Payload, tip: _Tip, scale: Json, times: Array, size: float
+    root: str, payload: Payload, tip: _Tip, scale: Json, times: Array, size: float, width: float
 ) -> list[Json]:
     """Return the commands for the traces of a tip, below the node `root` of what carries them."""
-    look = (scale, _TRACE_RADIUS * size)
+    look = (scale, width * _TRACE_RADIUS * size)
     return [
         *scene.trace_commands(root, payload, tip.shown, tip.start, tip.target, *look),
         scene.triad_command(root, payload, tip.shown, times, _TRIAD_LENGTH * size),
@@ -222,7 +232,7 @@ def _packed(frames: KeyFrames, payload: Payload) -> Json:
 
 
 def _curves(plan: Plan, sampled: Curves, payload: Payload) -> Json:
-    drawn = {
+    drawn: Json = {
         "t": payload.array(sampled.t),
         "q": payload.array(sampled.q),
         "qd": payload.array(sampled.qd),
@@ -235,6 +245,8 @@ def _curves(plan: Plan, sampled: Curves, payload: Payload) -> Json:
         drawn["position"] = payload.array(sampled.position_error)
     if np.any(plan.task.rows >= 3):
         drawn["rotation"] = payload.array(sampled.rotation_error)
+    # What is allowed is no error, and a page says so.
+    drawn["relaxed"] = bool(plan.problem.relaxations)
     return drawn
 
 

@@ -29,6 +29,12 @@ def facts(plan: Plan) -> dict[str, Cell]:
         tip = bound.chain.tip_name
         rows[f"position error of {tip}, worst"] = _extreme(position, "m")
         rows[f"rotation error of {tip}, worst"] = _extreme(rotation, "rad")
+    for worst in certificate.deviations:
+        unit = "rad" if "r" in worst.name else "m"
+        rows[f"off the path, as relaxed {worst.name}"] = (
+            f"{worst.value:.3g} {unit}",
+            f"at {worst.time:.3g} s",
+        )
     nearest, robot = certificate.limit_margin, plan.robot
     unit = robot.unit_of(*({nearest.name} & set(robot.joint_names)))
     rows["margin to a joint limit, least"] = _extreme(nearest, unit)

@@ -68,5 +68,6 @@ def _errors(axes: "Axes", shown: Curves, plan: Plan) -> None:
         axes.semilogy(shown.t, np.maximum(shown.position_error, floor), label="position [m]")
     if np.any(rows >= 3):
         axes.semilogy(shown.t, np.maximum(shown.rotation_error, floor), label="rotation [rad]")
-    axes.set(ylabel="path error", xlabel="t [s]")
+    label = "off the path, relaxed rows too" if plan.problem.relaxations else "path error"
+    axes.set(ylabel=label, xlabel="t [s]")
     axes.legend(fontsize="x-small")

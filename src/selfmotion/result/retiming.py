@@ -74,9 +74,10 @@ def retime(
     Velocity, acceleration, jerk and torque limits and those of the tool are kept, all that the
     plan was asked to keep, by linear programmes in the square of the pace (`result.pacing`). Where
     the problem says how fast the arm begins or ends, it does so. The geometric path of joints and
-    tool stays; the tool motion becomes a `Retimed` one, the certificate is made anew, the report
-    stays, but for remarks: where no jerk is limited and accelerations often change at once, and
-    where the tool waited on its way (`Dwell`), which it does no longer than limits ask.
+    tool stays; the tool motion becomes a `Retimed` one, the certificate is made anew. The report
+    stays, but for when constraints bind, which moves along, and for remarks: where no jerk is
+    limited and accelerations often change at once, and where the tool waited on its way (`Dwell`),
+    which it does no longer than limits ask.
 
     Parameters
     ----------
@@ -197,6 +198,11 @@ def rate_limits(
 def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
     trajectory = along(pace, plan.trajectory)
     old = plan.problem
+    when = Retimed(old.path, pace.t, pace.sigma, pace.rate, pace.bend).when
+    active = tuple(
+        replace(item, spans=tuple((float(a), float(b)) for a, b in map(when, np.array(item.spans))))
+        for item in plan.report.active
+    )
     # What asks for something of the end asks for it of the whole motion.
     asked = (item.on_part() if plan.report.ending else item for item in old.constraints)
     problem = replace(
@@ -205,7 +211,13 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
         constraints=(*(item for item in asked if item is not None), *wanted),
         relaxations=[_moved(item, pace.t, pace.sigma) for item in old.relaxations],
     )
-    retimed = replace(plan, problem=problem, trajectory=trajectory, initial_trajectory=trajectory)
+    retimed = replace(
+        plan,
+        problem=problem,
+        trajectory=trajectory,
+        initial_trajectory=trajectory,
+        report=replace(plan.report, active=active),
+    )
     return replace(retimed, certificate=retimed.check())
 
 

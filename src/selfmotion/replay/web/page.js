@@ -342,7 +342,8 @@ function plotSpecs({ joints }, { curves, start, clearance, steps }) {
     ...("torque" in curves ? [within("Joint torques", unit.replaceAll(/rad|m/g, (u) => (u === "m" ? "N" : "Nm")), curves.torque, "effort")] : []),
     { title: "Manipulability √det(JJᵀ)", unit: "", t, zero: true, curves: both("manipulability") },
     // Of several steps each has a path of its own, or none.
-    ...(steps.length ? [] : [{ title: "Path error", unit: "", t, log: true, floor: 1e-16, curves: errors }]),
+    ...(steps.length ? [] : [{ title: curves.relaxed ? "Off the path" : "Path error", unit: "", t, log: true,
+      floor: 1e-16, note: curves.relaxed ? "relaxed rows included" : "", curves: errors }]),
     ...(clearance ? [{ title: "Clearance", unit: "m", t: clearance.t, zero: true,
       curves: [{ name: "closest pair", values: clearance.value, color: COLORS[0] }] }] : []),
   ];
