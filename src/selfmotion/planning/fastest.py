@@ -213,8 +213,8 @@ class _Rounds:
         """Go on while rounds gain; KeyboardInterrupt where they were stopped."""
         planned = options.plan(self._free)
         if planned.report.ending or not planned.certificate.on_path:
-            # At no pace can it be followed to its end.
-            self.verdict = planned.certificate.verdict
+            # At no pace can it be followed to its end: what else is wrong says nothing.
+            self.verdict = planned.report.ending or planned.certificate.verdict
             return
         costs = self._kept.values(planned)
         self._bounds = self._kept.bounds(costs)
