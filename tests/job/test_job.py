@@ -287,6 +287,13 @@ def test_a_seam_that_ends_in_what_it_leaves_is_made_from_there() -> None:
     other = sm.Box("other", [0.45, 0.3, 0.35], [0.04, 0.04, 0.04])
     both = replace(seams[0], leaves=[post, other])
     assert sm.plan_job(panda, [both, seams[1]], branches=1).require().order == ("then", "towards")
+    # Nor does it rest in it, or move away to the end of the program.
+    for alone, end in ((replace(seams[0], wait=0.1), None), (seams[0], HOME)):
+        last = sm.plan_job(panda, [alone], end=end, branches=1).require()
+        assert [step.turned for step in last.steps if step.is_seam] == [True]
+    resting = sm.plan_job(panda, [replace(both, wait=0.1), seams[1]], branches=1)
+    assert resting.order == ("then",)
+    assert "'towards' is not made: it ends in what it leaves" in resting.verdict
 
 
 def not_verified(file: Path) -> bool:

@@ -84,7 +84,7 @@ class Growing:
 
     def _all_clear(self, states: Sequence[int]) -> bool:
         """Whether each seam keeps clear of what stands there by then, and its end of its own."""
-        goes, last = True, states[-1]
+        goes, following = True, (*states[1:], None)
         for number, (state, q, past) in enumerate(self._places(states), start=1):
             self._work.tell("program", number, len(states))
             met, why = self._met(self._ordering.states[state].plan, past)
@@ -94,15 +94,22 @@ class Growing:
                 name = self._ordering.name_of(state)
                 told = f"it leaves what is in the way of '{name}': {why}"
                 self._in_the_way |= dict.fromkeys(owners, told)
-            elif state != last and self._held_by(state) - set(self._seam(states[number]).may_meet):
+            elif not self._leads_on(state, following[number - 1]):
                 why = f"it ends in what it leaves: '{min(self._held_by(state))}'"
-                for other in range(len(self._ordering.states)):
-                    if self._held_by(state) - set(self._seam(other).may_meet):
+                for other in (*range(len(self._ordering.states)), None):
+                    if not self._leads_on(state, other):
                         self._ordering.learn(state, other, np.inf)
             if why:
                 goes = False
                 self._trouble(state, q, past, why)
         return goes
+
+    def _leads_on(self, state: int, other: int | None) -> bool:
+        """Whether a state may end in what it leaves: nothing rests there, or moves away past it."""
+        held, seam = self._held_by(state), self._seam(state)
+        may = set() if other is None else set(self._seam(other).may_meet)
+        is_over = other is None and self._ends[1] is None
+        return not held or (seam.wait == 0.0 and (is_over or held <= may))
 
     def _held_by(self, state: int) -> set[str]:
         """Return what a state ends in of that which its seam leaves: few moves lead away."""
