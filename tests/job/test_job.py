@@ -296,6 +296,22 @@ def test_a_seam_that_ends_in_what_it_leaves_is_made_from_there() -> None:
     assert "'towards' is not made: it ends in what it leaves" in resting.verdict
 
 
+@pytest.mark.parametrize("order", ["free", "given"])
+def test_what_stands_on_what_is_not_made_is_not_made(order: str) -> None:
+    lone = seam("lone", [0.4, 0.2, 0.3], [0.5, 0.2, 0.3])
+    far = seam("far", [2.0, 0.0, 0.3], [2.1, 0.0, 0.3])
+    upon = seam("upon", [0.4, 0.0, 0.3], [0.5, 0.0, 0.3], after_any=["far", "then"])
+    then = seam("then", [0.4, -0.2, 0.3], [0.5, -0.2, 0.3], after=["upon"])
+    made = sm.plan_job(robot_named("panda"), [far, upon, then, lone], branches=1, order=order)
+    assert made.order == ("lone",)
+    assert made.missing["upon"] == "none of what it stands on is made before it"
+    assert made.missing["then"] == "it comes after 'upon', which is not made"
+    # In a list it is in time that counts.
+    later = [far, upon, replace(then, after=()), lone]
+    listed = sm.plan_job(robot_named("panda"), later, branches=1, order=order)
+    assert sorted(listed.missing) == (["far"] if order == "free" else ["far", "upon"])
+
+
 def not_verified(file: Path) -> bool:
     """Whether a file is refused, or is not verified."""
     try:
