@@ -18,6 +18,9 @@ from selfmotion.result import Move, Plan
 
 # For a seam other ways are looked for so often; those whose ends are so near [rad or m] are one.
 _TRIES, _SAME = 3, 1e-6
+# Moves to a seam that are not found, each after its whole deadline; from then on only those that
+# were found before lead to it.
+_NOT_FOUND = 20
 # What stands there, by name.
 _Standing = dict[str, Obstacle]
 # From which state to which one past what; None is the start or the end of the program.
@@ -56,6 +59,7 @@ class Growing:
         # Seams that did not go at their place: past what, from where, and why; the last one last.
         self._troubles: dict[int, tuple[_Standing, Array | None, str]] = {}
         self._tries: dict[int, int] = {}
+        self._not_found: dict[int, int] = {}
         # Seams whose leavings others meet, and how.
         self._in_the_way: dict[int, str] = {}
 
@@ -184,7 +188,20 @@ class Growing:
                 self._ordering.learn(first, last, np.inf)
                 why = f"the move to it: {self._moves[way].trouble}"
                 self._trouble(last, self._ends_of(way)[0], past, why)
+                self._count_not_found(self._ordering.states[last].seam)
         return goes
+
+    def _count_not_found(self, seam: int) -> None:
+        """Count that a move to a seam was not found; after many no others are tried."""
+        self._not_found[seam] = self._not_found.get(seam, 0) + 1
+        if self._not_found[seam] < _NOT_FOUND:
+            return
+        found = {way[:2] for way, move in self._moves.items() if move.verified}
+        states = range(len(self._ordering.states))
+        for last in [k for k in states if self._ordering.states[k].seam == seam]:
+            for first in (None, *states):
+                if (first, last) not in found:
+                    self._ordering.learn(first, last, np.inf)
 
     def _ways(self, states: Sequence[int]) -> dict[_Way, _Standing]:
         """Return the moves of an order, and what stands in the way of each."""
