@@ -314,6 +314,8 @@ def test_a_seam_that_no_move_reaches_is_given_up_soon(monkeypatch) -> None:
     made = sm.plan_job(robot_named("panda"), [first, then, lone], branches=1)
     assert made.order == ("lone", "first")
     assert made.missing["then"] == "the move to it: not found"
+    # What is not made does not count in the bound.
+    assert made.bound <= made.transfer_time
     # Each takes its whole deadline: of hundreds of pairs of states twenty to each of two seams are
     # tried, and some with other ways.
     assert next(tried) < 50

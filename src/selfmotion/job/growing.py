@@ -65,13 +65,13 @@ class Growing:
 
     def program(self) -> Program:
         """Return the program; what could not be made is named."""
-        found = self._ordering.best()
-        states: Sequence[int] = found.states
+        states: Sequence[int] = self._ordering.best().states
         while states and not self._goes(states):
             states = self._ordering.best(states).states or self._otherwise(states)
         robot, missing = self._work.asked.robot, dict(self._ordering.missing)
-        steps = tuple(self._steps(states))
-        return Program(robot, steps, missing, found.bound, tuple(self._notes))
+        # By now there may be more states and fewer seams than at first.
+        steps, bound = tuple(self._steps(states)), self._ordering.bound()
+        return Program(robot, steps, missing, bound, tuple(self._notes))
 
     def _goes(self, states: Sequence[int]) -> bool:
         """Whether an order can be made as it is; what is in its way is learnt."""

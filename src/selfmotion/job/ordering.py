@@ -224,6 +224,14 @@ class Ordering:
         found = best_round(stops, given, beside)
         return Round(tuple(kept[k] for k in found.states), found.cost, found.bound)
 
+    def bound(self) -> float:
+        """Return a cost that no round of the states there are is below, whatever is learnt."""
+        known, too_late = self._known, self._too_late
+        self._known, self._too_late = {}, {}
+        least = self.best().bound
+        self._known, self._too_late = known, too_late
+        return least
+
     def _stops(self, kept: list[int], place: dict[int, int]) -> Stops:
         first, last, between = self.estimates
         first, last, between = first[kept].copy(), last[kept].copy(), between[np.ix_(kept, kept)]
