@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.job import Step
+from selfmotion.job import Step, work
 from selfmotion.planning import FreeMotions
 from selfmotion.task import SE3
 from support.arms import robot_named
@@ -287,6 +287,54 @@ def test_a_seam_that_ends_in_what_it_leaves_is_made_from_there() -> None:
     other = sm.Box("other", [0.45, 0.3, 0.35], [0.04, 0.04, 0.04])
     both = replace(seams[0], leaves=[post, other])
     assert sm.plan_job(panda, [both, seams[1]], branches=1).require().order == ("then", "towards")
+    # Nor does it rest in it, or move away to the end of the program.
+    for alone, end in ((replace(seams[0], wait=0.1), None), (seams[0], HOME)):
+        last = sm.plan_job(panda, [alone], end=end, branches=1).require()
+        assert [step.turned for step in last.steps if step.is_seam] == [True]
+    resting = sm.plan_job(panda, [replace(both, wait=0.1), seams[1]], branches=1)
+    assert resting.order == ("then",)
+    assert "'towards' is not made: it ends in what it leaves" in resting.verdict
+
+
+def test_a_seam_that_no_move_reaches_is_given_up_soon(monkeypatch) -> None:
+    post = sm.Box("post", [-0.5, 0.5, 0.3], [0.05, 0.05, 0.05])
+    lone = seam("lone", [0.4, 0.3, 0.4], [0.45, 0.3, 0.4])
+    first = replace(lone, name="first", leaves=[post])
+    then = seam("then", [0.5, 0.0, 0.35], [0.55, 0.0, 0.35], after=["first"])
+    tried, move = itertools.count(1), work._move_here
+
+    def blocked(task) -> sm.Move:
+        missing = sm.Move(*task["arm"], None, "not found")
+        if not missing.obstacles:
+            return move(task)
+        next(tried)
+        return missing
+
+    monkeypatch.setattr(work, "_move_here", blocked)
+    made = sm.plan_job(robot_named("panda"), [first, then, lone], branches=1)
+    assert made.order == ("lone", "first")
+    assert made.missing["then"] == "the move to it: not found"
+    # What is not made does not count in the bound.
+    assert made.bound <= made.transfer_time
+    # Each takes its whole deadline: of hundreds of pairs of states twenty to each of two seams are
+    # tried, and some with other ways.
+    assert next(tried) < 50
+
+
+@pytest.mark.parametrize("order", ["free", "given"])
+def test_what_stands_on_what_is_not_made_is_not_made(order: str) -> None:
+    lone = seam("lone", [0.4, 0.2, 0.3], [0.5, 0.2, 0.3])
+    far = seam("far", [2.0, 0.0, 0.3], [2.1, 0.0, 0.3])
+    upon = seam("upon", [0.4, 0.0, 0.3], [0.5, 0.0, 0.3], after_any=["far", "then"])
+    then = seam("then", [0.4, -0.2, 0.3], [0.5, -0.2, 0.3], after=["upon"])
+    made = sm.plan_job(robot_named("panda"), [far, upon, then, lone], branches=1, order=order)
+    assert made.order == ("lone",)
+    assert made.missing["upon"] == "none of what it stands on is made before it"
+    assert made.missing["then"] == "it comes after 'upon', which is not made"
+    # In a list it is in time that counts.
+    later = [far, upon, replace(then, after=()), lone]
+    listed = sm.plan_job(robot_named("panda"), later, branches=1, order=order)
+    assert sorted(listed.missing) == (["far"] if order == "free" else ["far", "upon"])
 
 
 def not_verified(file: Path) -> bool:

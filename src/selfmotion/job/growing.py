@@ -18,6 +18,9 @@ from selfmotion.result import Move, Plan
 
 # For a seam other ways are looked for so often; those whose ends are so near [rad or m] are one.
 _TRIES, _SAME = 3, 1e-6
+# Moves to a seam that are not found, each after its whole deadline; from then on only those that
+# were found before lead to it.
+_NOT_FOUND = 20
 # What stands there, by name.
 _Standing = dict[str, Obstacle]
 # From which state to which one past what; None is the start or the end of the program.
@@ -56,18 +59,19 @@ class Growing:
         # Seams that did not go at their place: past what, from where, and why; the last one last.
         self._troubles: dict[int, tuple[_Standing, Array | None, str]] = {}
         self._tries: dict[int, int] = {}
+        self._not_found: dict[int, int] = {}
         # Seams whose leavings others meet, and how.
         self._in_the_way: dict[int, str] = {}
 
     def program(self) -> Program:
         """Return the program; what could not be made is named."""
-        found = self._ordering.best()
-        states: Sequence[int] = found.states
+        states: Sequence[int] = self._ordering.best().states
         while states and not self._goes(states):
             states = self._ordering.best(states).states or self._otherwise(states)
         robot, missing = self._work.asked.robot, dict(self._ordering.missing)
-        steps = tuple(self._steps(states))
-        return Program(robot, steps, missing, found.bound, tuple(self._notes))
+        # By now there may be more states and fewer seams than at first.
+        steps, bound = tuple(self._steps(states)), self._ordering.bound()
+        return Program(robot, steps, missing, bound, tuple(self._notes))
 
     def _goes(self, states: Sequence[int]) -> bool:
         """Whether an order can be made as it is; what is in its way is learnt."""
@@ -84,7 +88,7 @@ class Growing:
 
     def _all_clear(self, states: Sequence[int]) -> bool:
         """Whether each seam keeps clear of what stands there by then, and its end of its own."""
-        goes, last = True, states[-1]
+        goes, following = True, (*states[1:], None)
         for number, (state, q, past) in enumerate(self._places(states), start=1):
             self._work.tell("program", number, len(states))
             met, why = self._met(self._ordering.states[state].plan, past)
@@ -94,15 +98,22 @@ class Growing:
                 name = self._ordering.name_of(state)
                 told = f"it leaves what is in the way of '{name}': {why}"
                 self._in_the_way |= dict.fromkeys(owners, told)
-            elif state != last and self._held_by(state) - set(self._seam(states[number]).may_meet):
+            elif not self._leads_on(state, following[number - 1]):
                 why = f"it ends in what it leaves: '{min(self._held_by(state))}'"
-                for other in range(len(self._ordering.states)):
-                    if self._held_by(state) - set(self._seam(other).may_meet):
+                for other in (*range(len(self._ordering.states)), None):
+                    if not self._leads_on(state, other):
                         self._ordering.learn(state, other, np.inf)
             if why:
                 goes = False
                 self._trouble(state, q, past, why)
         return goes
+
+    def _leads_on(self, state: int, other: int | None) -> bool:
+        """Whether a state may end in what it leaves: nothing rests there, or moves away past it."""
+        held, seam = self._held_by(state), self._seam(state)
+        may = set() if other is None else set(self._seam(other).may_meet)
+        is_over = other is None and self._ends[1] is None
+        return not held or (seam.wait == 0.0 and (is_over or held <= may))
 
     def _held_by(self, state: int) -> set[str]:
         """Return what a state ends in of that which its seam leaves: few moves lead away."""
@@ -177,7 +188,20 @@ class Growing:
                 self._ordering.learn(first, last, np.inf)
                 why = f"the move to it: {self._moves[way].trouble}"
                 self._trouble(last, self._ends_of(way)[0], past, why)
+                self._count_not_found(self._ordering.states[last].seam)
         return goes
+
+    def _count_not_found(self, seam: int) -> None:
+        """Count that a move to a seam was not found; after many no others are tried."""
+        self._not_found[seam] = self._not_found.get(seam, 0) + 1
+        if self._not_found[seam] < _NOT_FOUND:
+            return
+        found = {way[:2] for way, move in self._moves.items() if move.verified}
+        states = range(len(self._ordering.states))
+        for last in [k for k in states if self._ordering.states[k].seam == seam]:
+            for first in (None, *states):
+                if (first, last) not in found:
+                    self._ordering.learn(first, last, np.inf)
 
     def _ways(self, states: Sequence[int]) -> dict[_Way, _Standing]:
         """Return the moves of an order, and what stands in the way of each."""

@@ -75,6 +75,11 @@ class Ordering:
     states : list of State
     missing : dict
         Seams without a state, and why.
+
+    Raises
+    ------
+    ProblemError
+        What has to come first goes round in a circle, or comes later in the order that is given.
     """
 
     def __init__(
@@ -91,6 +96,7 @@ class Ordering:
         self._free = FreeMotions(asked.robot, asked.of_moves(()), np.random.default_rng(0))
         self.states: list[State] = []
         self.missing: dict[str, str] = {}
+        self._check_order()
         # What is known better than by limits: from state to state, None for the ends.
         self._known: dict[tuple[int | None, int | None], float] = {}
         # The seams that plans cannot come after.
@@ -140,22 +146,40 @@ class Ordering:
         return count
 
     def _drop_what_hangs(self) -> None:
-        """Leave out what comes after seams that are not made."""
-        while True:
-            lost = {seam.name: self._hangs(seam) for seam in self.seams if self._hangs(seam)}
-            if not lost:
-                break
-            self.missing |= lost
+        """Leave out what cannot come any more without seams that are not made."""
+        never = [self.seams[k] for k in self._never()]
+        names = {seam.name for seam in never} | self.missing.keys()
+        for seam in never:
+            gone = [name for name in seam.after if name in names]
+            self.missing[seam.name] = (
+                f"it comes after '{gone[0]}', which is not made"
+                if gone
+                else "none of what it stands on is made before it"
+            )
 
-    def _hangs(self, seam: Seam) -> str:
-        if seam.name in self.missing:
-            return ""
-        gone = [name for name in seam.after if name in self.missing]
-        if gone:
-            return f"it comes after '{gone[0]}', which is not made"
-        if seam.after_any and all(name in self.missing for name in seam.after_any):
-            return "none of what it stands on is made"
-        return ""
+    def _never(self) -> list[int]:
+        """Return the seams that are not missing, but before which something always is."""
+        before = self._before({k: k for k in range(len(self.seams))})
+        made, count = set[int](), -1
+        while len(made) > count:
+            count = len(made)
+            for seam in self.made:
+                if before.allows(seam, made):
+                    made.add(seam)
+            if not self.is_free:
+                break
+        return [seam for seam in self.made if seam not in made]
+
+    def _check_order(self) -> None:
+        """Raise ProblemError where seams cannot come in any order, or in the one that is given."""
+        if not self._never():
+            return
+        if self.is_free:
+            raise ProblemError("what seams have to come after goes round in a circle")
+        raise ProblemError(
+            "the seams are in an order in which one comes before what it has to come after; "
+            "give order='free', or another list"
+        )
 
     def learn(self, first: int | None, last: int | None, seconds: float) -> None:
         """Take it from now on that a move between states takes so long; inf for none at all."""
@@ -189,11 +213,6 @@ class Ordering:
         """Return the best round of states by what is known; its states are numbers of `states`.
 
         Many seams are ordered from a round of states that is `near` to it, where there is one.
-
-        Raises
-        ------
-        ProblemError
-            What has to come first goes round in a circle.
         """
         place = self._places
         kept = [k for k, state in enumerate(self.states) if state.seam in place]
@@ -201,16 +220,17 @@ class Ordering:
             return Round((), 0.0, 0.0)
         stops = self._stops(kept, place)
         given = None if self.is_free else list(range(len(place)))
-        if given is not None and not stops.keeps(given):
-            raise ProblemError(
-                "the seams are in an order in which one comes before what it has to come after; "
-                "give order='free', or another list"
-            )
         beside = None if near is None else [place[self.states[k].seam] for k in near]
         found = best_round(stops, given, beside)
-        if not found.states and not self._known and not self._too_late:
-            raise ProblemError("what seams have to come after goes round in a circle")
         return Round(tuple(kept[k] for k in found.states), found.cost, found.bound)
+
+    def bound(self) -> float:
+        """Return a cost that no round of the states there are is below, whatever is learnt."""
+        known, too_late = self._known, self._too_late
+        self._known, self._too_late = {}, {}
+        least = self.best().bound
+        self._known, self._too_late = known, too_late
+        return least
 
     def _stops(self, kept: list[int], place: dict[int, int]) -> Stops:
         first, last, between = self.estimates
