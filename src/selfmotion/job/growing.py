@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.certificate import FinishedMotion
-from selfmotion.collision import Obstacle
+from selfmotion.job.meeting import Meeting, Standing, without
 from selfmotion.job.ordering import Ordering
 from selfmotion.job.program import Program
 from selfmotion.job.seam import JOB_END, JOB_START, Seam
@@ -21,8 +20,6 @@ _TRIES, _SAME = 3, 1e-6
 # Moves to a seam that are not found, each after its whole deadline; from then on only those that
 # were found before lead to it.
 _NOT_FOUND = 20
-# What stands there, by name.
-_Standing = dict[str, Obstacle]
 # From which state to which one past what; None is the start or the end of the program.
 _Way = tuple[int | None, int | None, frozenset[str]]
 
@@ -51,13 +48,13 @@ class Growing:
         self._leaves_it = {
             item.name: number for number, seam in enumerate(ordering.seams) for item in seam.leaves
         }
-        # What plans are known to keep clear of; states that were checked past something; moves.
-        self._clear: dict[Plan, set[str]] = {}
+        # What plans meet; states that were checked past something; moves; what states end in.
+        self._meeting = Meeting(work.asked)
         self._checked: dict[tuple[int, frozenset[str]], Plan] = {}
         self._moves: dict[_Way, Move] = {}
         self._held: dict[int, set[str]] = {}
         # Seams that did not go at their place: past what, from where, and why; the last one last.
-        self._troubles: dict[int, tuple[_Standing, Array | None, str]] = {}
+        self._troubles: dict[int, tuple[Standing, Array | None, str]] = {}
         self._tries: dict[int, int] = {}
         self._not_found: dict[int, int] = {}
         # Seams whose leavings others meet, and how.
@@ -77,12 +74,12 @@ class Growing:
         """Whether an order can be made as it is; what is in its way is learnt."""
         return self._all_clear(states) and self._all_verified(states) and self._all_reached(states)
 
-    def _places(self, states: Sequence[int]) -> Iterator[tuple[int, Array | None, _Standing]]:
+    def _places(self, states: Sequence[int]) -> Iterator[tuple[int, Array | None, Standing]]:
         """Yield each state with where the arm comes from, and what stands in its way by then."""
-        q, standing = self._ends[0], _Standing()
+        q, standing = self._ends[0], Standing()
         for state in states:
             seam = self._seam(state)
-            yield state, q, _without(standing, seam)
+            yield state, q, without(standing, seam)
             q = self._ordering.states[state].ends[1]
             standing |= {item.name: item for item in seam.leaves}
 
@@ -91,7 +88,7 @@ class Growing:
         goes, following = True, (*states[1:], None)
         for number, (state, q, past) in enumerate(self._places(states), start=1):
             self._work.tell("program", number, len(states))
-            met, why = self._met(self._ordering.states[state].plan, past)
+            met, why = self._meeting.met(self._ordering.states[state].plan, past)
             if met:
                 owners = {self._leaves_it[name] for name in met}
                 self._ordering.learn_late(state, owners)
@@ -119,35 +116,13 @@ class Growing:
         """Return what a state ends in of that which its seam leaves: few moves lead away."""
         if state not in self._held:
             q, seam = self._ordering.states[state].ends[1], self._seam(state)
-            left = _without({item.name: item for item in seam.leaves}, seam)
-            is_near = self._is_near(q, *left.values())
-            held = {name for name, item in left.items() if is_near and self._is_near(q, item)}
+            left = without({item.name: item for item in seam.leaves}, seam)
+            is_near = self._meeting.is_near(q, *left.values())
+            held = {
+                name for name, item in left.items() if is_near and self._meeting.is_near(q, item)
+            }
             self._held[state] = held
         return self._held[state]
-
-    def _is_near(self, q: Array, *bodies: Obstacle) -> bool:
-        """Whether the arm at q (n,) is nearer to one of some bodies than it may be."""
-        apart = self._work.asked.apart(bodies)
-        return apart is not None and bool(
-            apart.model(self._work.asked.robot).distance(q).value < apart.distance
-        )
-
-    def _met(self, plan: Plan, past: _Standing) -> tuple[set[str], str]:
-        """Return what of all that stands there a plan meets, and how it meets the first."""
-        asked = self._work.asked
-        clear = self._clear.setdefault(plan, set())
-        met, why = set[str](), ""
-        while new := {n: item for n, item in past.items() if n not in clear and n not in met}:
-            apart = asked.apart(tuple(new.values()))
-            motion = FinishedMotion(asked.robot, plan.trajectory)
-            found = None if apart is None else apart.requirement(asked.robot).judge(motion)
-            if found is None or found.kept:
-                clear |= set(new)
-                break
-            why = why or found.text
-            # What is not named may be any of them.
-            met |= {name for name in found.subject.split(" - ") if name in new} or set(new)
-        return met, why
 
     def _all_verified(self, states: Sequence[int]) -> bool:
         """Whether each seam is verified with all that stands there by then."""
@@ -160,7 +135,7 @@ class Growing:
                 self._trouble(state, q, past, check.verdict)
         return goes
 
-    def _past(self, state: int, past: _Standing) -> Plan:
+    def _past(self, state: int, past: Standing) -> Plan:
         """Return the plan of a state, checked with what stands there."""
         key = state, frozenset(past)
         if key not in self._checked:
@@ -203,13 +178,13 @@ class Growing:
                 if (first, last) not in found:
                     self._ordering.learn(first, last, np.inf)
 
-    def _ways(self, states: Sequence[int]) -> dict[_Way, _Standing]:
+    def _ways(self, states: Sequence[int]) -> dict[_Way, Standing]:
         """Return the moves of an order, and what stands in the way of each."""
-        found = dict[_Way, _Standing]()
-        standing, before = _Standing(), None
+        found = dict[_Way, Standing]()
+        standing, before = Standing(), None
         for state in (*states, None):
             ends = [None if k is None else self._seam(k) for k in (before, state)]
-            past = _without(standing, *ends)
+            past = without(standing, *ends)
             if self._goes_between(before, state):
                 found[before, state, frozenset(past)] = past
             if state is not None:
@@ -231,7 +206,7 @@ class Growing:
             raise RuntimeError("no move leads to where nothing was asked for")
         return first, last
 
-    def _trouble(self, state: int, q: Array | None, past: _Standing, why: str) -> None:
+    def _trouble(self, state: int, q: Array | None, past: Standing, why: str) -> None:
         """Keep it in mind that a state did not go past something, from a configuration (n,)."""
         seam = self._ordering.states[state].seam
         self._troubles.pop(seam, None)
@@ -265,7 +240,7 @@ class Growing:
         reasons = troubles | {k: why for k, why in self._in_the_way.items() if k not in troubles}
         return {seam: why for seam, why in reasons.items() if seam in self._ordering.made}
 
-    def _added(self, number: int, q: Array | None, past: _Standing) -> bool:
+    def _added(self, number: int, q: Array | None, past: Standing) -> bool:
         """Add new ways to make a seam that keep clear of what stands there; whether any were."""
         seam, work = self._ordering.seams[number], self._work
         turns = [False, True] if seam.either_way else [False]
@@ -283,7 +258,7 @@ class Growing:
         return True
 
     def _added_of(
-        self, number: int, ways: Sequence[tuple[bool, Sequence[Plan]]], past: _Standing
+        self, number: int, ways: Sequence[tuple[bool, Sequence[Plan]]], past: Standing
     ) -> bool:
         """Add those plans of a seam that are new and keep clear of what stands there."""
         ordering, count = self._ordering, len(self._ordering.states)
@@ -292,7 +267,7 @@ class Growing:
             for plan in plans:
                 ends = plan.trajectory.q[[0, -1]]
                 is_known = any(np.abs(q[[0, -1]] - ends).max() < _SAME for q in known)
-                if not is_known and not self._met(plan, past)[0]:
+                if not is_known and not self._meeting.met(plan, past)[0]:
                     ordering.add(number, plan, turned)
         return len(ordering.states) > count
 
@@ -316,9 +291,3 @@ class Growing:
 
     def _seam(self, state: int) -> Seam:
         return self._ordering.seams[self._ordering.states[state].seam]
-
-
-def _without(standing: _Standing, *seams: Seam | None) -> _Standing:
-    """Return what stands there but for what seams may meet."""
-    may = {name for seam in seams if seam is not None for name in seam.may_meet}
-    return {name: item for name, item in standing.items() if name not in may}

@@ -17,12 +17,12 @@ from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import finish
 from selfmotion.planning.heats import Heats
 from selfmotion.planning.known import Known, Proved
-from selfmotion.planning.largest_part import LargestPart, largest_part
+from selfmotion.planning.largest_part import LargestPart, largest_part, shorter_part
 from selfmotion.planning.refinement import settle
 from selfmotion.planning.refusal import leaves_path
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
-from selfmotion.planning.settings import FREE_PART_EVALUATIONS, PART_EVALUATIONS
+from selfmotion.planning.settings import FREE_PART_EVALUATIONS, PART_EVALUATIONS, SHORTER_PARTS
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt
 from selfmotion.search import Obstruction, Reach, SequenceGuide, reachable
@@ -255,6 +255,17 @@ class Draft:
             return False
         self._settle(found.session, None)
         self.proved = self._proved(found)
+        for _ in range(SHORTER_PARTS):
+            # Besides that it ends, nothing should be wrong with it.
+            if len(self.proved.finished.certificate.failures) < 2 or found.session.cut_short:
+                break
+            if (shorter := shorter_part(self.problem, found, effort)) is None:
+                break
+            found = shorter
+            self._settle(found.session, None)
+            proved = self._proved(found)
+            if len(proved.finished.certificate.failures) < 2:
+                self.proved = proved
         return True
 
     def _proved(self, part: LargestPart, rival_cost: float | None = None) -> Proved:

@@ -21,6 +21,7 @@ from selfmotion.planning.settings import (
     FREE_PROBES,
     LEAST_PART,
     OFF_PATH,
+    PART_BACK,
     PART_FINALISTS,
     PART_STARTS,
     PROBES,
@@ -44,11 +45,14 @@ class LargestPart:
         Optimised.
     ending : str
         Why it goes no further; "" where the part is the whole after all.
+    why : str
+        The reasons alone.
     """
 
     problem: Problem
     session: Session
     ending: str
+    why: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,12 +163,28 @@ def _part(problem: Problem, found: _Attempt, reach: Reach, further: str) -> Larg
     """Return the part, with the reason why nothing goes `further` in words."""
     if found.session is None:
         raise RuntimeError("a part is made of a motion that was found")
-    end, whole = found.problem.path.duration, problem.path.duration
     nearer = "gets nearer to that" if reach.reason else "goes further"
     reasons = [reach.reason] if reach.reason else []
     reasons += [f"no motion found {nearer}: {further}"] if further else []
-    ending = f"the motion ends at t = {end:.6g} s of {whole:.6g} s: {'; '.join(reasons)}"
-    return LargestPart(found.problem, found.session, ending if end < whole else "")
+    return _ending_at(problem, found.problem, found.session, "; ".join(reasons))
+
+
+def shorter_part(problem: Problem, part: LargestPart, effort: Effort) -> LargestPart | None:
+    """Return a motion on a part that ends a little earlier; None where none is found.
+
+    For one whose last bit is too rough: near a singular pose rates grow between its nodes.
+    """
+    first = _until(problem, part.problem.path.duration * (1.0 - PART_BACK))
+    attempt = _attempt(first, (part.session.motion().trajectory.q[0], None), effort)
+    if attempt.session is None or not attempt.arrived:
+        return None
+    return _ending_at(problem, first, attempt.session, part.why)
+
+
+def _ending_at(problem: Problem, part: Problem, session: Session, why: str) -> LargestPart:
+    end, whole = part.path.duration, problem.path.duration
+    ending = f"the motion ends at t = {end:.6g} s of {whole:.6g} s: {why}"
+    return LargestPart(part, session, ending if end < whole else "", why)
 
 
 def _until(problem: Problem, time: float) -> Problem:

@@ -103,6 +103,8 @@ FREE_PROBES = 5
 # the path by this share of its extent.
 PART_FINALISTS = 3
 FOLLOWED_STEPS = 256
+# Where the last bit of a part is too rough, parts that end by this share earlier, so often.
+PART_BACK, SHORTER_PARTS = 0.02, 3
 # Where the start is free: of so many starts, and in so many steps, only the best one.
 PART_STARTS, FREE_FOLLOWED_STEPS = 16, 128
 OFF_PATH = 1e-2
