@@ -23,9 +23,8 @@ from selfmotion.problem import Problem
 class Objective:
     """F = ∫ Σ G(q̇, q, t) dt along the motion of a decision vector, and the conditions on it.
 
-    The decision vector is [z | x | c]: where the start is on its self-motion manifold (nothing for
-    a given start), the null motion's coefficients, and those of the tool's deviation from the path
-    (nothing where no row is relaxed). Made by `Objective.of`.
+    The decision vector is [z | x | c]: where the start is on its self-motion manifold (nothing if
+    it is given), the null motion's coefficients, and the tool's deviation (if rows are relaxed).
 
     Parameters
     ----------
@@ -58,11 +57,10 @@ class Objective:
         self._deviation = deviation
         self._costs = CostIntegrals(costs, rollout.grid)
         self._at: Array | None = None
-        # ∂q/∂x and ∂q̇/∂x there, once they were asked for.
+        # ∂q/∂x and ∂q̇/∂x there, and the evaluation, once they were asked for.
         self._tangents: tuple[Array, Array] | None = None
-        self._terms: dict[str, float] = {}
-        # The evaluation there, likewise.
         self._evaluation: Evaluation | None = None
+        self._terms: dict[str, float] = {}
         self._first = rollout.first_target
 
     @classmethod
