@@ -285,3 +285,12 @@ def test_the_package_that_is_missing_is_named(tmp_path: Path, monkeypatch: Any) 
     monkeypatch.setitem(sys.modules, "ezdxf.filemanagement", None)
     with pytest.raises(sm.ProblemError, match=r"pip install 'selfmotion\[dxf\]'"):
         read_drawing(tmp_path / "part.dxf")
+
+
+def test_curves_that_are_absurdly_far_away_are_refused_without_a_warning(tmp_path: Path) -> None:
+    document = ezdxf.new(units=4)
+    document.modelspace().add_spline().control_points = [(0, 0), (1e200, 0), (0, 1e200), (1, 1)]
+    file = tmp_path / "far.dxf"
+    document.saveas(file)
+    with pytest.raises(sm.FileFormatError, match=r"SPLINE .* cannot be drawn"):
+        read_drawing(file)

@@ -9,6 +9,8 @@ from selfmotion.basics import Array
 
 # A curve has less than so many points.
 _POINTS = 200_000
+# What is farther away than this, in units of the drawing, is a fault of what wrote it.
+_LARGEST = 1e100
 # A cubic is off its chord by at most this many times what it is off at thirds of its parameter.
 _BETWEEN_THIRDS = 1.31
 # Arcs of a larger radius, in deviations of a chord, are a fault of what wrote them.
@@ -80,11 +82,14 @@ def _chords(curve: Callable[[Array], Any], ends: Array, deviation: float) -> Arr
         points = np.array([tuple(each) for each in curve(t)])
         if not np.isfinite(points).all():
             raise ValueError("is not finite")
+        if not np.abs(points).max() < _LARGEST:
+            raise ValueError(f"is farther away than {_LARGEST:g}")
         chords, steps = np.diff(points, axis=0), np.diff(t)
         far = np.zeros(len(chords), dtype=bool)
         lengths = np.maximum((chords * chords).sum(axis=1), np.finfo(np.float64).tiny)
         for share in (1.0 / 3.0, 2.0 / 3.0):
             here = np.array([tuple(each) for each in curve(t[:-1] + share * steps)]) - points[:-1]
+            here = np.clip(here, -_LARGEST, _LARGEST)
             along = np.clip((here * chords).sum(axis=1) / lengths, 0.0, 1.0)
             away = np.linalg.norm(here - along[:, None] * chords, axis=1)
             far |= ~(_BETWEEN_THIRDS * away <= deviation)
