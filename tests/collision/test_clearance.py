@@ -139,6 +139,18 @@ def test_changes_along_motions_are_the_gradients_times_these(models) -> None:
     assert clearances.along(tangents) == pytest.approx(expected, abs=1e-10)
 
 
+def test_what_is_closer_is_known_without_slopes(models) -> None:
+    """As `clearances` has it, at every margin that is not levelled off."""
+    exact, model = models
+    q = samples(exact.robot, 60)
+    values = model.clearances(q).values
+    for margin in (-0.01, 0.0, 0.01, NEAR):
+        decided = np.all(np.abs(values - margin) > GJK, axis=1)
+        closer = model.closer(q, margin)
+        np.testing.assert_array_equal(closer[decided], (values < margin).any(axis=1)[decided])
+    assert model.closer(q, NEAR).any()
+
+
 def test_no_pair_is_closer_than_its_clearance(models) -> None:
     exact, model = models
     q = samples(model.robot, 25)

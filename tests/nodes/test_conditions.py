@@ -23,7 +23,7 @@ CONSTRAINTS = {
     "two": lambda: [sm.JointPositionLimits(), sm.JointAccelerationLimits(2.0)],
     "clearance": lambda: [
         sm.JointPositionLimits(),
-        sm.Clearance([sm.Sphere("ball", (0.6, 0.35, 0.4), 0.1)], distance=0.01),
+        sm.Clearance([sm.Sphere("ball", (0.6, 0.35, 0.4), 0.1)], distance=0.02),
     ],
 }
 
@@ -38,6 +38,22 @@ def motion_with(panda: sm.RobotModel, name: str):
     )
     motion = nodes_of(problem, 10)
     return centred(moved(motion, random_step(motion, 1, 0.02)))
+
+
+@pytest.mark.parametrize("name", CONSTRAINTS)
+@pytest.mark.parametrize("known", [False, True])
+def test_what_is_near_a_limit_is_what_the_residuals_say(
+    panda: sm.RobotModel, name: str, known: bool
+) -> None:
+    """Whether these are known already or not."""
+    motion = motion_with(panda, name)
+    between = motion.h[:-1, motion.h.shape[1] // 2 :].max(axis=1)
+    # Between two of them, so that no rounding decides.
+    near = -np.sort(between)[-3:-1].mean()
+    asked = motion if known else motion_with(panda, name)
+    found = asked.grid.conditions.along(asked.samples.checked, near)
+    assert np.count_nonzero(found) == 2
+    np.testing.assert_array_equal(found, between > -near)
 
 
 @pytest.mark.parametrize("name", CONSTRAINTS)

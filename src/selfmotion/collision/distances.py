@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from selfmotion.basics import Array, CollisionError
+from selfmotion.basics import Array, CollisionError, Flags
 from selfmotion.collision.bodies import Body
 from selfmotion.collision.bounds import BoundingBoxes
 from selfmotion.robot import RobotModel
@@ -148,6 +148,50 @@ class HullDistances:
         if not bound - _ROUNDING <= value <= bound + self._sizes[pair]:
             value = self._again(pair, bound).min_distance
         return float(value)
+
+    def closer(
+        self, q: Array, bounds: Array, margin: float, decide: Sequence[bool]
+    ) -> tuple[Flags, list[tuple[int, int, float]]]:
+        """Return at which samples a pair that decides is closer than the margin, (K,).
+
+        Parameters
+        ----------
+        q : (K, n)
+            The samples.
+        bounds : (K, P)
+            Lower bounds of all distances [m].
+        margin : float
+            [m].
+        decide : sequence of bool
+            Which pairs do.
+
+        Returns
+        -------
+        met : (K,)
+        left : list of (int, int, float)
+            Sample, pair and distance of others that are closer, as far as they were looked at.
+        """
+        rows, pairs = np.nonzero(bounds < margin)
+        least = bounds[rows, pairs]
+        # Of each sample what seems nearest first: it decides, as a rule.
+        order = np.lexsort((least, rows))
+        found, left = np.zeros(len(q), dtype=bool), []
+        placed = met = -1
+        # Lists: with arrays for each sample Python would take longer than the distances.
+        wanted = zip(*(part[order].tolist() for part in (rows, pairs, least)), strict=True)
+        for row, pair, bound in wanted:
+            if row == met:
+                continue
+            if row != placed:
+                self.place(q[row])
+                placed = row
+            value = self.distance(pair, bound)
+            if value < margin:
+                if decide[pair]:
+                    found[row], met = True, row
+                else:
+                    left.append((row, pair, value))
+        return found, left
 
     def contacts(self, q: Array, rows: Ints, pairs: Ints, bounds: Array) -> "Contacts":
         """Return distances with derivatives of many pairs at many samples.

@@ -318,7 +318,7 @@ class CollisionModel:
         """
         if q.shape != (self.robot.dof,) or not math.isfinite(q.dot(q)):
             self.robot.configuration(q)
-        return self._near.closer(q, self.hulls.lower_bounds(q[None], margin)[0], margin)
+        return bool(self._near.closer(q[None], margin)[0])
 
     def colliding(self, q_samples: Array, margin: float = 0.0) -> npt.NDArray[np.bool_]:
         """Return at which of many configurations (K, n) `collides` holds, (K,).
@@ -328,7 +328,7 @@ class CollisionModel:
         RobotError
             The shape is not (K, n), or a number is not finite.
         """
-        return self._near.closer_samples(self.samples(q_samples), margin)
+        return self._near.closer(self.samples(q_samples), margin)
 
     def touching(self, q: npt.ArrayLike) -> tuple[Closest, ...]:
         """Return all pairs that overlap at `q`, the deepest first; see also `srdf_line`.

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Flags
 from selfmotion.collision import levers
 from selfmotion.collision.bodies import Body
 from selfmotion.collision.distances import HullDistances, Ints
@@ -70,25 +69,13 @@ class PairDistances:
                 values[row, pair] = hulls if far else self.meshes.refine(places, pair, hulls)
         return values
 
-    def closer(self, q: Array, bounds: Array, margin: float) -> bool:
-        """Whether a pair is closer than the margin at q (n,), with lower bounds (P,) known."""
-        places = self.hulls.place(q)
-        met, left = self._by_hulls(bounds, margin)
-        return met or any(
-            self.meshes.refine(places, pair, hulls, margin) < margin for hulls, pair in left
-        )
-
-    def closer_samples(self, q: Array, margin: float) -> npt.NDArray[np.bool_]:
+    def closer(self, q: Array, margin: float) -> Flags:
         """Return at which samples (K, n) a pair is closer than the margin, (K,)."""
         bounds = self.hulls.lower_bounds(q, margin)
-        found = np.zeros(len(q), dtype=bool)
+        found, open_ = self.hulls.closer(q, bounds, margin, self.meshes.hulls_decide)
         undecided: dict[int, list[tuple[int, float]]] = {}
-        for row in np.flatnonzero((bounds < margin).any(axis=1)).tolist():
-            self.hulls.place(q[row])
-            met, left = self._by_hulls(bounds[row], margin)
-            found[row] = met
-            for hulls, pair in left:
-                undecided.setdefault(pair, []).append((row, hulls))
+        for row, pair, hulls in open_:
+            undecided.setdefault(pair, []).append((row, hulls))
         # What is deepest inside decides first, as a rule.
         for pair, near in sorted(undecided.items(), key=lambda item: min(h for _, h in item[1])):
             looked = [(row, hulls) for row, hulls in near if not found[row]]
@@ -96,25 +83,7 @@ class PairDistances:
             found[rows] = self._by_meshes(pair, q[rows], [hulls for _, hulls in looked], margin)
         return found
 
-    def _by_hulls(self, bounds: Array, margin: float) -> tuple[bool, list[tuple[float, int]]]:
-        """Return whether a pair is closer than the margin, as placed; else what hulls leave open.
-
-        The distance of the hulls, and the pair; the deepest first.
-        """
-        near = np.flatnonzero(bounds < margin)
-        near = near[np.argsort(bounds[near])]
-        left = []
-        for pair, bound in zip(near.tolist(), bounds[near].tolist(), strict=True):
-            hulls = self.hulls.distance(pair, bound)
-            if hulls < margin:
-                if self.meshes.hulls_decide[pair]:
-                    return True, []
-                left.append((hulls, pair))
-        return False, sorted(left)
-
-    def _by_meshes(
-        self, pair: int, q: Array, hulls: Sequence[float], margin: float
-    ) -> npt.NDArray[np.bool_]:
+    def _by_meshes(self, pair: int, q: Array, hulls: Sequence[float], margin: float) -> Flags:
         """Return where a pair whose hulls are closer than the margin is so itself, (K,).
 
         Configurations (K, n) in which the bodies are alike to each other are looked at once: along
@@ -129,7 +98,7 @@ class PairDistances:
         return np.array(closer, dtype=bool)[which.reshape(-1)]
 
     @cached_property
-    def _moving(self) -> npt.NDArray[np.bool_]:
+    def _moving(self) -> Flags:
         """Which joints move one body of each pair and not the other, (P, n)."""
         first, second = levers.moved_by(self._bodies, self._robot)[self._pairs.T]
         return np.asarray(first != second)

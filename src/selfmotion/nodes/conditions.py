@@ -121,9 +121,20 @@ class NodeConditions:
 
     def broken(self, samples: Samples) -> Flags:
         """Return at which of other samples a condition is beyond its tolerance, (S,)."""
+        return self._above(samples, [item.tolerance for item in self.constraints])
+
+    def along(self, samples: CheckedSamples, near: float) -> Flags:
+        """Return in the middle of which intervals a condition is kept by less than `near`, (N,)."""
+        return self._above(samples, [-near] * len(self.constraints))[1::2]
+
+    def _above(self, samples: Samples, levels: Sequence[float]) -> Flags:
+        """Return at which samples a condition is above its constraint's level, (S,)."""
         found = np.zeros(len(samples.nodes), dtype=np.bool_)
-        for item in self.constraints:
-            found |= (item.residual(samples) > item.tolerance).any(axis=1)
+        for item, level in zip(self.constraints, levels, strict=True):
+            if isinstance(item, BoundClearance):
+                found |= item.above(samples, level)
+            else:
+                found |= (item.residual(samples) > level).any(axis=1)
         return found
 
     @property

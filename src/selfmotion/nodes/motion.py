@@ -201,7 +201,7 @@ class NodeMotion:
     @cached_property
     def along(self) -> Flags:
         """On which intervals a condition binds, (N,)."""
-        return np.asarray(np.any(self.h[:-1, self.h.shape[1] // 2 :] > -_ALONG, axis=1))
+        return self.grid.conditions.along(self.samples.checked, _ALONG)
 
     @property
     def ends_of_limits(self) -> Flags:

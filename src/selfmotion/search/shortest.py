@@ -36,6 +36,8 @@ from selfmotion.search.waypoints import Waypoints
 _DAMPING = 1e-3
 # A joint that is held at its limit.
 _HELD = 1e6
+# Distances beyond what is wanted do not count: over so little they level off [m].
+_LEVELLED = 1e-9
 # Shorter steps are tried so often, each by this factor.
 _TRIES, _SHORTER = 5, 0.4
 
@@ -232,4 +234,4 @@ def _least(bases: Array, slope: Array, own: Array, between: Array, state: _State
 def _smooth(model: CollisionModel, distance: float) -> tuple[ClearanceModel, float]:
     """Return the distances that have slopes, and what is wanted of them [m]."""
     wanted = distance + NEAR_BODIES
-    return ClearanceModel(model, wanted), wanted
+    return ClearanceModel(model, wanted, width=_LEVELLED), wanted
