@@ -138,7 +138,7 @@ class EndVelocity(_EndRate, order=1, at_start=False):
         """See `Constraint.check`: a motion ends at rest only where its path does."""
         if np.any(self.target(follows.robot)):
             return
-        speed = float(np.abs(follows.twist(follows.duration)).max())
+        speed = float(np.abs(follows.twists(np.array([follows.duration]))).max())
         if speed > STILL:
             raise ProblemError(
                 f"the motion cannot end at rest: the path ends at {speed:.3g} m/s or rad/s; give "
@@ -167,7 +167,7 @@ class StartVelocity(_EndRate, order=1, at_start=True):
         if start is None:
             raise ProblemError("a start velocity needs a given start (start=)")
         asked = follows.jacobian(start) @ self.target(robot)
-        twist = follows.twist(0.0)
+        twist = follows.twists(np.zeros(1))[0]
         row = int(np.argmax(np.abs(asked - twist)))
         if abs(asked[row] - twist[row]) > _NEAR_END:
             begins = round(float(twist[row]), 9) + 0.0

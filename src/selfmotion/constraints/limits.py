@@ -221,7 +221,7 @@ class BoundLimits:
         joints = np.flatnonzero(np.isfinite(lower) | np.isfinite(upper))
         scale = np.ones(len(joints)) if order == 0 else upper[joints]
         names = tuple(robot.joint_names[k] for k in joints)
-        units = tuple(map(robot.unit_of, names))
+        units = tuple("rad" if turns else "m" for turns in robot.is_revolute[joints].tolist())
         sides = lower[joints], upper[joints]
         return cls(limits.name, order, joints, names, units, *sides, scale, margin)
 

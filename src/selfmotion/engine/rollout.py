@@ -47,7 +47,7 @@ class Rollout:
         # What `polished` works on: one stage, at a node.
         self._node_table, self._node, self._node_tips = self._new_table(1)
         for f, item in enumerate(follows.items):
-            self.aim(item.path.samples(grid.stage_times), f)
+            self.aim(item.target(grid.stage_times), f)
         self._at.step[:, 0] = grid.stage_steps
 
     @property

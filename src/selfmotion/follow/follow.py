@@ -1,8 +1,9 @@
 """A tip that follows a path, in the rows that are prescribed: as asked for, and on an arm."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array, ProblemError, shown
@@ -91,20 +92,29 @@ class BoundFollow:
     chain: Chain
     path: Path
     task: Task
+    _last: list[PathSamples] = field(default_factory=list, init=False, repr=False)
 
     def target(self, t: Array) -> PathSamples:
-        """Return where the tip has to be at times t (K,), and how it moves."""
-        return self.path.samples(t)
+        """Return where the tip has to be at times t (K,), and how it moves.
+
+        Those of the last times are kept: many motions are looked at on the same grid.
+        """
+        for kept in self._last:
+            if np.array_equal(kept.t, t):
+                return kept
+        found = self.path.samples(t)
+        self._last[:] = [found]
+        return found
 
     def jacobian(self, q: Array) -> Array:
         """Return the prescribed rows of the Jacobian at q (n,), (m, n); q is not checked."""
         jacobian, rotation, _ = self.chain.at(q)
         return self.task.select(jacobian, rotation)
 
-    def twist(self, t: float) -> Array:
-        """Return the prescribed rows of the path's twist at t [s], (m,) [m/s, rad/s]."""
-        target = self.path.samples(t)
-        return self.task.select(target.twist[0][:, None], target.rotation[0])[:, 0]
+    def twists(self, t: Array) -> Array:
+        """Return the prescribed rows of the path's twists at times t (K,), (K, m) [m/s, rad/s]."""
+        target = self.target(t)
+        return self.task.select_along(target.twist[:, :, None], target.rotation)[:, :, 0]
 
     def error(self, t: float, q: Array) -> Array:
         """Return what takes the tip at q (n,) to its path at t [s], in the rows, (m,) [m, rad]."""

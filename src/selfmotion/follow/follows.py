@@ -109,9 +109,9 @@ class Follows:
         """Names of the rows, (m)."""
         return tuple(name for item in self.items for name in item.task.row_names)
 
-    def twist(self, t: float) -> Array:
-        """Return the prescribed rows of the paths' twists at t [s], (m,) [m/s, rad/s]."""
-        return np.concatenate([item.twist(t) for item in self.items])
+    def twists(self, t: Array) -> Array:
+        """Return the prescribed rows of the paths' twists at times t (K,), (K, m) [m/s, rad/s]."""
+        return np.concatenate([item.twists(t) for item in self.items], axis=1)
 
     def jacobian(self, q: Array) -> Array:
         """Return the prescribed rows of all Jacobians at q (n,), (m, n); q is not checked."""

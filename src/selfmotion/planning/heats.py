@@ -70,7 +70,7 @@ class Heats:
                 self._progress(f"heat {heat}", number, len(running))
                 # What lies where another one has arrived would arrive there, too.
                 here, first = session.rolled.nodes, heat == 1
-                if first and any(self._apart(here, other) <= ONE_VALLEY for other in optima):
+                if first and optima and self._apart(here, np.array(optima)).min() <= ONE_VALLEY:
                     self._forget(session)
                     continue
                 session.minimize(evaluations)
@@ -103,12 +103,14 @@ class Heats:
             if merit > best + (HOPELESS - 1.0) * abs(best):
                 break
             motion = session.rolled.nodes
-            if all(self._apart(motion, other) > SAME_OPTIMUM for other in motions):
+            if not motions or self._apart(motion, np.array(motions)).min() > SAME_OPTIMUM:
                 kept.append((merit, session))
                 motions.append(motion)
         self._merits = kept
 
-    def _apart(self, motion: Array, other: Array) -> float:
-        difference = motion - other
+    def _apart(self, motion: Array, others: Array) -> Array:
+        """Return how far a motion (N, n) is from each of others (K, N, n), up to turns, (K,)."""
+        difference = others - motion
         turns = np.round(difference / (2.0 * np.pi))
-        return float(np.abs(difference - 2.0 * np.pi * turns * self._turning).max())
+        away = np.abs(difference - 2.0 * np.pi * turns * self._turning)
+        return np.asarray(away.max(axis=(1, 2)))

@@ -15,7 +15,7 @@ from selfmotion.search import carried
 
 
 def most_promising(
-    problem: Problem, starts: Sequence[Array], grid: Grid, apart: Callable[[Array, Array], float]
+    problem: Problem, starts: Sequence[Array], grid: Grid, apart: Callable[[Array, Array], Array]
 ) -> list[Array]:
     """Return starts (n,), the best first, and those last that are near a better one.
 
@@ -30,27 +30,27 @@ def most_promising(
     grid : Grid
         At whose nodes to look, few.
     apart : callable
-        How far two motions (N, n) are from each other [rad or m].
+        How far a motion (N, n) is from each of others (K, N, n), (K,) [rad or m].
     """
     motions, arrived = carried(problem.follows, np.array(starts), grid.nodes)
     merits = np.full(len(starts), np.inf)
-    twists = np.array([problem.follows.twist(float(t)) for t in grid.nodes])
+    twists = problem.follows.twists(grid.nodes)
+    sampling = Sampling.trapezoidal(grid.nodes)
     for k in np.flatnonzero(arrived):
-        merits[k] = _merit(problem, motions[k], twists, grid)
+        merits[k] = _merit(problem, motions[k], twists, grid, sampling)
     valleys: list[int] = []
     slopes: list[int] = []
     for k in np.argsort(merits, kind="stable"):
-        alone = arrived[k] and all(apart(motions[k], motions[i]) > ONE_VALLEY for i in valleys)
+        alone = arrived[k] and bool((apart(motions[k], motions[valleys]) > ONE_VALLEY).all())
         (valleys if alone else slopes).append(int(k))
     return [starts[k] for k in (*valleys, *slopes)]
 
 
-def _merit(problem: Problem, q: Array, twists: Array, grid: Grid) -> float:
+def _merit(problem: Problem, q: Array, twists: Array, grid: Grid, sampling: Sampling) -> float:
     """Return what a motion q (N, n) along the path costs, and more where it violates something.
 
-    `twists` (N, m) are those of the path at the grid's nodes.
+    `twists` (N, m) are those of the path at the grid's nodes, which are the samples.
     """
-    sampling = Sampling.trapezoidal(grid.nodes)
     still = Samples.along(problem.follows, sampling, q, np.zeros_like(q))
     J = still.task_jacobian
     gram = J @ J.transpose(0, 2, 1)
