@@ -3,6 +3,9 @@
 The tool's motion is that of a random smooth joint motion of a Fetch, within limits and clear of
 itself, in which the lift goes a long way; then it is forgotten. Prints whether each path is
 followed again, by a motion that is verified at all times, and how far the lift goes in it.
+
+Then two paths of a Fetch are planned at several prices of a metre of the lift, each from nothing:
+what a motion costs at its price, and by how much another one's would have been cheaper there.
 """
 
 from __future__ import annotations
@@ -13,10 +16,11 @@ import time
 from pathlib import Path
 
 import numpy as np
+import suite
 from scipy.interpolate import PchipInterpolator
 
 import selfmotion as sm
-from selfmotion.basics import Array
+from selfmotion.basics import Array, silent
 
 DATA = Path(__file__).parent / "data"
 DURATION, WAYPOINTS, KNOTS = 30.0, 60, 5
@@ -24,6 +28,8 @@ DURATION, WAYPOINTS, KNOTS = 30.0, 60, 5
 LONG_WAY, LARGEST = 0.3, 0.5
 # From limits [rad or m], and from itself [m]; and a share of the limits of speed.
 EDGE, CLEAR, SPEED = 0.02, 2e-3, 0.8
+# What a metre of the lift counts [rad].
+PRICES = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
 
 def known_motion(robot: sm.RobotModel, model: sm.CollisionModel, number: int) -> Array:
@@ -47,6 +53,25 @@ def known_motion(robot: sm.RobotModel, model: sm.CollisionModel, number: int) ->
 def way_of(x: Array) -> float:
     """Return how far a joint goes in all."""
     return float(np.abs(np.diff(x)).sum())
+
+
+def at_prices(name: str) -> None:
+    """Print what motions along a path of the suite cost, made at several prices of a metre."""
+    problem = suite.load(DATA / name)
+    slides = np.array([problem.robot.is_prismatic(joint) for joint in problem.robot.joint_names])
+    ways = {}
+    for price in PRICES:
+        _, q = suite.plan(problem, 0, silent, metre=price)
+        moved = np.abs(np.diff(q, axis=0)).sum(axis=0)
+        ways[price] = np.array([moved[~slides].sum(), moved[slides].sum()])
+    for price, way in ways.items():
+        costs = [float(each @ (1.0, price)) for each in ways.values()]
+        own = float(way @ (1.0, price))
+        print(
+            f"{name}, {price:5.1f} rad a metre: {way[0]:6.2f} rad + {way[1]:.3f} m, "
+            f"{100 * (own / min(costs) - 1):.1f} % above the best of all at that price",
+            flush=True,
+        )
 
 
 def main() -> int:
@@ -81,6 +106,8 @@ def main() -> int:
             flush=True,
         )
     print(f"{found} of {count} found, {np.median(seconds):.1f} s in the median")
+    for name in ("fetch__circle", "fetch__s"):
+        at_prices(name)
     return int(found < count)
 
 

@@ -133,8 +133,12 @@ def _beside(folder: Path, name: str) -> Path:
     return next(place / name for place in places if (place / name).is_file())
 
 
-def plan(problem: PathProblem, seed: int, progress: Progress) -> tuple[sm.Plan, Array]:
+def plan(
+    problem: PathProblem, seed: int, progress: Progress, metre: float = METRE
+) -> tuple[sm.Plan, Array]:
     """Plan a short joint path that keeps the folder's criteria; return it at the waypoints, too.
+
+    A metre of a prismatic joint counts `metre` [rad].
 
     The suite times its paths arbitrarily: what counts is the step from waypoint to waypoint. So the
     path is slowed down until steps say more than the arm's limits of speed.
@@ -155,7 +159,7 @@ def plan(problem: PathProblem, seed: int, progress: Progress) -> tuple[sm.Plan, 
     ]
     if criteria["collision_free"]:
         constraints.append(sm.Clearance(problem.obstacles, CLEARANCE, disabled=problem.disabled))
-    weights = [METRE if robot.is_prismatic(name) else 1.0 for name in robot.joint_names]
+    weights = [metre if robot.is_prismatic(name) else 1.0 for name in robot.joint_names]
     length = sm.PathLength(smoothing=0.005 / slower, joint_weights=weights)
     asked = sm.Problem(
         robot,

@@ -15,8 +15,8 @@ from support.paths import line_of
 ON_PATH = 1e-9
 
 
-def apart(motion: Array, other: Array) -> float:
-    return float(np.abs(motion - other).max())
+def apart(motion: Array, others: Array) -> Array:
+    return np.asarray(np.abs(others - motion).max(axis=(1, 2)))
 
 
 def test_carried_motions_follow_the_path_and_unlike_ones_come_first() -> None:
@@ -33,8 +33,7 @@ def test_carried_motions_follow_the_path_and_unlike_ones_come_first() -> None:
             assert max(sm.Task.POSE.miss(problem.path.pose(float(t)), robot.pose(q))) < ON_PATH
     # Where the first one comes that is near one before, only such or impassable ones follow.
     alone = [
-        bool(arrived[k])
-        and all(apart(motions[k], motions[i]) > ONE_VALLEY for i in range(k) if arrived[i])
+        bool(arrived[k]) and bool((apart(motions[k], motions[:k][arrived[:k]]) > ONE_VALLEY).all())
         for k in range(len(ranked))
     ]
     assert alone == sorted(alone, reverse=True)

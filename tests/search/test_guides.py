@@ -5,7 +5,9 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.search import shortest_along
 from selfmotion.search.guides import search_times
+from support.stretching import DURATION, rounded_problem, stretching
 
 
 def level(x: float, y: float) -> pin.SE3:
@@ -33,3 +35,17 @@ def test_the_search_looks_as_the_tool_moves_on() -> None:
     # 0.02 m, by interpolation between 2,000 looks.
     assert strides.max() < 0.022
     assert np.sum((t > 1.0) & (t < 5.0)) < 0.1 * len(t)
+
+
+def test_a_chain_passes_beside_a_pose_that_rounding_puts_out_of_reach() -> None:
+    t = np.linspace(0.0, DURATION, 33)
+    problem = rounded_problem(costs=[sm.PathLength()])
+    found = shortest_along(problem, t, stretching(t), t, (1.0, 0.3))
+    assert found is not None
+    where, q = found
+    moved = where != t
+    # A little later than the middle; all else where it was asked for.
+    assert np.flatnonzero(moved).tolist() == [16]
+    assert t[16] < where[16] < t[17]
+    for time, here in zip(where, q, strict=True):
+        assert problem.follows.only.miss(problem.path.pose(float(time)), here)[0] < 1e-9

@@ -90,3 +90,13 @@ def test_from_near_by_it_arrives_at_poses_that_are_all_but_singular(short: float
     # What is beyond is not reached in any number of steps.
     beyond = np.concatenate([robot.pose(stretched).translation * (1.0 + 1e-3), np.eye(3).ravel()])
     assert not manifold.project(begun[None], beyond)[1].any()
+
+
+def test_each_of_many_targets_is_given_the_steps_that_it_needs() -> None:
+    robot = robot_named("planar_3r")
+    free = np.full(robot.dof, np.inf)
+    manifold = Manifold(standing(robot, sm.Task.PLANAR), -free, free)
+    places = robot.pose(np.zeros(robot.dof)).translation * np.array([[0.7], [1.0 - 1e-9], [0.8]])
+    targets = np.hstack([places, np.tile(np.eye(3).ravel(), (3, 1))])
+    begun = np.tile([0.05, -0.03, 0.02], (3, 1))
+    assert manifold.project(begun, targets)[1].all()

@@ -36,9 +36,12 @@ class Grid:
         ]
         return cls(read_only(np.append(np.concatenate(pieces), knots[-1])))
 
-    def halved(self, where: npt.NDArray[np.bool_] | None = None) -> "Grid":
-        """Return the grid with every step cut in two, or those `where` (N,) says so."""
-        middles = 0.5 * (self.nodes[:-1] + self.nodes[1:])
+    def halved(self, where: npt.NDArray[np.bool_] | None = None, share: float = 0.5) -> "Grid":
+        """Return the grid with every step cut in two, or those `where` (N,) says so.
+
+        The first part of each is this share of it.
+        """
+        middles = (1.0 - share) * self.nodes[:-1] + share * self.nodes[1:]
         cut = middles if where is None else middles[where]
         return Grid(read_only(np.sort(np.concatenate([self.nodes, cut]))))
 

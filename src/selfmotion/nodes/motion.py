@@ -24,6 +24,9 @@ from selfmotion.problem import Problem
 
 # A limit binds between two nodes where it is this near [units of h].
 _ALONG = 1e-5
+# Accelerations that differ from the differences of velocities by more than the largest of these
+# times this are those of a pose that is all but singular, and are damped by this much.
+_WILD, _DAMPING = 1.0, 1e-2
 
 
 class NodeGrid:
@@ -316,11 +319,27 @@ class NodeMotion:
             near[which] = side[which]
         bases = self.charts.bases
         qdd += (bases @ (np.swapaxes(bases, 1, 2) @ near[:, :, None]))[:, :, 0]
+        self._calm(qdd, near)
         for order, node in zip(problem.rest_orders, (0, -1), strict=True):
             if order > 1:
                 qdd[node] = 0.0
         names = problem.robot.joint_names
         return Trajectory(t, read_only(place.q), read_only(place.qd), names, read_only(qdd))
+
+    def _calm(self, qdd: Array, near: Array) -> None:
+        """Damp q̈ where a pose is all but singular, so that the quintic does not waver there.
+
+        q̈ = a + J⁺ J (q̈ - a) with the differences a of q̇, `near` (N + 1, n), and the damped J⁺.
+        """
+        away = np.abs(qdd - near).max(axis=1)
+        wild = away > _WILD * np.abs(near).max()
+        if wild.any():
+            rows = self.grid.problem.follows.jacobians(self.place.q[wild])
+            lack = rows @ (qdd - near)[wild][:, :, None]
+            gram = rows @ rows.transpose(0, 2, 1) + _DAMPING**2 * np.eye(rows.shape[1])
+            qdd[wild] = (
+                near[wild] + (rows.transpose(0, 2, 1) @ np.linalg.solve(gram, lack))[:, :, 0]
+            )
 
     def on(self, grid: NodeGrid) -> "NodeMotion | None":
         """Return the motion on other nodes."""

@@ -48,7 +48,7 @@ def along_chain(
         found = shortest_along(problem, t, q, finer.nodes, stages)
         if found is None:
             return None
-        t, q = finer.nodes, found
+        t, q = found
         grid = NodeGrid(problem, t, constraints, free=True, counts=effort.counts)
         motion = _through(grid, q)
         if motion is None:
@@ -58,7 +58,7 @@ def along_chain(
             none = np.zeros(0, dtype=np.int64)
             prices = np.zeros((len(motion.grid.t), 0))
             return MotionOnNodes(motion, Status.PRECISION, none, prices, (), None, is_chain=True)
-        finer = finer.halved(np.convolve(broken, np.ones(3), "same") > 0.0)
+        finer = Grid(t).halved(np.convolve(broken, np.ones(3), "same") > 0.0)
     return None
 
 

@@ -12,6 +12,7 @@ from selfmotion.motion import Grid, NodeNullMotion, NullMotion
 from selfmotion.nodes import NodeMotion, Optimum
 from selfmotion.optimise import Status
 from selfmotion.planning.settings import LEAST_SAVING
+from selfmotion.search import BESIDE
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +111,10 @@ class MotionOnNodes:
         for _ in range(1, times):
             finer = Grid(finer).halved().nodes
         motion = self.motion.on(self.motion.grid.on(finer))
+        if motion is None:
+            # Beside a singular pose the path may be out of reach, by next to nothing.
+            finer = Grid(t).halved(where, BESIDE).nodes
+            motion = self.motion.on(self.motion.grid.on(finer))
         if motion is None:
             return self
         # Prices are of conditions at nodes: the more there are, the less each counts.

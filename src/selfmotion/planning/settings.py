@@ -70,7 +70,7 @@ FIRST_EVALUATIONS = 16
 # Sequences are not worth refining when dearer by this factor than one that keeps all constraints.
 DEARER = 1.25
 # The same where that is the chain of a sequence itself, on which optimising gains next to nothing.
-DEARER_CHAIN = 1.01
+DEARER_CHAIN = 1.005
 # Steps of the rough motions.
 ROUGH_STEPS = 12
 # Heats: so many starts at most, optimised with so many evaluations of the cost more.

@@ -20,7 +20,11 @@ from selfmotion.search.sequences import (
     Sequence as Sequence,
     best_sequences as best_sequences,
 )
-from selfmotion.search.settings import LAST_SMOOTHINGS as LAST_SMOOTHINGS, SPACING as SPACING
+from selfmotion.search.settings import (
+    BESIDE as BESIDE,
+    LAST_SMOOTHINGS as LAST_SMOOTHINGS,
+    SPACING as SPACING,
+)
 from selfmotion.search.single_poses import SinglePoses as SinglePoses
 from selfmotion.search.starts import (
     Admits as Admits,

@@ -17,6 +17,7 @@ from selfmotion.search.nodes import Admissible
 from selfmotion.search.sampled import sampled_sequences
 from selfmotion.search.sequences import Sequence, best_sequences
 from selfmotion.search.settings import (
+    BESIDE,
     CHAIN_EDGE,
     CHAIN_SPEED,
     FEWEST,
@@ -87,25 +88,36 @@ def guides(
 
 def shortest_along(
     problem: Problem, t: Array, q: Array, where: Array, smoothings: abc.Sequence[float]
-) -> Array | None:
-    """Return the shortest configurations at times `where` (K,) near those q (W, n) at t, (K, n).
+) -> tuple[Array, Array] | None:
+    """Return the shortest configurations near those q (W, n) at t, at times `where`, (K,), (K, n).
 
-    In stages with these δ, see `Shortest.near`. None where one between two others does not come
-    onto the path or meets something.
+    In stages with these δ, see `Shortest.near`. Where nothing near comes onto the path, it is tried
+    a little later instead: at a singular pose rounding may put it beyond reach, by next to nothing.
+    None where that does not help, or one meets something.
     """
     weights, asked = _weights(problem), problem.envelope
     edge = np.minimum(CHAIN_EDGE, 1e-2 * (asked.upper - asked.lower))
     limits = asked.lower + edge, asked.upper - edge
     waypoints = OnPath(problem.follows, where, *limits)
-    near = np.column_stack([np.interp(where, t, joint) for joint in q.T])
-    here, arrived = waypoints.project_each(near, np.arange(len(where)))
-    if not arrived.all():
+    here, arrived = waypoints.project_each(_between(t, q, where), np.arange(len(where)))
+    if not arrived[[0, -1]].all():
         return None
+    if not arrived.all():
+        where = np.where(arrived, where, where + BESIDE * np.diff(where, append=where[-1]))
+        waypoints = OnPath(problem.follows, where, *limits)
+        here, arrived = waypoints.project_each(_between(t, q, where), np.arange(len(where)))
+        if not arrived.all():
+            return None
     bodies = tuple((model, distance + MARGIN) for model, distance in asked.bodies)
     bounds = Admissible(*limits, problem.robot.is_revolute, bodies)
     largest = np.minimum(CHAIN_SPEED * asked.speed * np.diff(where)[:, None], np.pi)
     here = Shortest(waypoints, bounds, largest, weights).near(here, smoothings)
-    return here if bounds.keep(here).all() else None
+    return (where, here) if bounds.keep(here).all() else None
+
+
+def _between(t: Array, q: Array, where: Array) -> Array:
+    """Return what lies straight between configurations q (W, n) at t, at times `where`, (K, n)."""
+    return np.column_stack([np.interp(where, t, joint) for joint in q.T])
 
 
 def asks_length(problem: Problem) -> bool:

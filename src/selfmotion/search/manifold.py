@@ -1,9 +1,8 @@
 """Newton's method onto the self-motions of many poses at once."""
 
 import numpy as np
-import numpy.typing as npt
 
-from selfmotion.basics import Array, RobotError
+from selfmotion.basics import Array, Flags, RobotError
 from selfmotion.follow import Follows
 from selfmotion.search import projection
 from selfmotion.search.settings import FAR_STEPS, LONGEST_CORRECTION, NEAR_STEPS
@@ -40,14 +39,14 @@ class Manifold:
         # Copies: kernels are compiled anew for what may not be written to.
         self._limits = np.array(lower), np.array(upper)
         self.chains = tuple(item.chain.arrays for item in follows.items)
-        self.revolute: npt.NDArray[np.bool_] = follows.robot.is_revolute
+        self.revolute: Flags = follows.robot.is_revolute
         self.layout = follows.layout
         self._check()
 
-    def project(
-        self, q: Array, target: Array, *, far: bool = False
-    ) -> tuple[Array, npt.NDArray[np.bool_]]:
+    def project(self, q: Array, target: Array, *, far: bool = False) -> tuple[Array, Flags]:
         """Return the configurations (K, n) that Newton's method reaches, and where it does, (K,).
+
+        From where it reaches none of its target, it is given more steps.
 
         Parameters
         ----------
@@ -58,21 +57,25 @@ class Manifold:
             Whether q is any configuration instead of one near the solution.
         """
         wanted = np.array(np.broadcast_to(target, (len(q), np.shape(target)[-1])), order="C")
+        found, arrived = self._within(q, wanted, FAR_STEPS if far else NEAR_STEPS)
         # Near singular poses Newton's method takes many steps, from near as well.
-        for steps in (FAR_STEPS,) if far else (NEAR_STEPS, FAR_STEPS):
-            found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
-            projection.project_all(
-                found,
-                wanted,
-                self.chains,
-                self.layout,
-                *self._limits,
-                LONGEST_CORRECTION,
-                steps,
-                arrived,
-            )
-            if arrived.any():
-                break
+        alone = ~arrived if np.ndim(target) == 2 else np.full(len(q), not arrived.any())
+        if not far and alone.any():
+            found[alone], arrived[alone] = self._within(q[alone], wanted[alone], FAR_STEPS)
+        return found, arrived
+
+    def _within(self, q: Array, targets: Array, steps: int) -> tuple[Array, Flags]:
+        found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
+        projection.project_all(
+            found,
+            targets,
+            self.chains,
+            self.layout,
+            *self._limits,
+            LONGEST_CORRECTION,
+            steps,
+            arrived,
+        )
         return found, arrived
 
     def _check(self) -> None:

@@ -17,11 +17,13 @@ from selfmotion.search.settings import (
     BEGINNINGS,
     BEGUN,
     DRIFT,
+    LOOKED_AT,
     PARENTS,
     PARENTS_APART,
     RING_GAIN,
     RING_ROUNDS,
     RINGS,
+    SMOOTHINGS,
     STRAYED,
     STRAYS,
 )
@@ -130,6 +132,7 @@ def sampled_sequences(
     )
     bounds, layers, turning = nodes.bounds, nodes.layers, nodes.bounds.turning
     length = Length(weights)
+    measure = measure or length
     chains = best_chains(layers, largest_step, turning, length)
     if chains.blocked is not None:
         time = float(t[chains.blocked])
@@ -139,13 +142,21 @@ def sampled_sequences(
             time=time,
             reason=reason,
         )
-    found = diverse_chains(layers, chains, largest_step, turning, count, length)
-    if measure is not None:
-        measure = measure.at_pace_of(connected(layers, found[0], turning))
+    if isinstance(measure, Length):
+        found = diverse_chains(layers, chains, largest_step, turning, LOOKED_AT, measure)
+        rough = [connected(layers, chain, turning) for chain in found]
+        shortest = Shortest(waypoints, bounds, largest_step, measure.weights)
+        for number, q in enumerate(rough):
+            progress("search: shortening sequence", number + 1, len(rough))
+            rough[number] = shortest.near(q, SMOOTHINGS[:1])
+        # Length among the samples says little of that of the shortest chain near, this says much.
+        rough = [item.q for item in ranked(t, rough, turning, weights, measure)[:count]]
+    else:
+        one = chains.back(len(t) - 1, int(np.argmin(chains.cost[-1])))
+        measure = measure.at_pace_of(connected(layers, one, turning))
         chains = best_chains(layers, largest_step, turning, measure)
         found = diverse_chains(layers, chains, largest_step, turning, count, measure)
-    measure = measure or length
-    rough = [connected(layers, chain, turning) for chain in found]
+        rough = [connected(layers, chain, turning) for chain in found]
     for number, q in enumerate(rough):
         progress("search: shortening sequence", number + 1, len(rough))
         rough[number] = _shortened(waypoints, bounds, q, largest_step, measure)

@@ -43,7 +43,7 @@ FAR_STEPS = 60
 # Motions begin at so many times, evenly, from so many configurations each: of those that inverse
 # kinematics finds from so many seeds.
 BEGINNINGS = 7
-BEGUN = 30
+BEGUN = 45
 BEGINNING_SEEDS = 200
 # Constant null motions drift so far over the whole path [rad or m], one standard deviation; every
 # other motion has none.
@@ -65,8 +65,10 @@ RING_GAIN = 5e-3
 # δ, one stage after the other, as multiples of the chain's mean step; rounds of each at most, and
 # the gain below which a stage ends.
 SMOOTHINGS = (10.0, 3.0, 1.0, 0.3, 0.1)
+# So many chains go through the first stage, after which it shows which are worth the others.
+LOOKED_AT = 8
 SHORTENING_ROUNDS = 20
-SHORTENING_GAIN = 3e-4
+SHORTENING_GAIN = 1e-3
 # Rounds go so many times as far as their quadratics say, which are never below what they stand for.
 FURTHER = 1.6
 # No joint moves farther in a round than this [rad or m], and in the first one.
@@ -131,6 +133,9 @@ MARGIN = 2.5e-4
 # far from limits [rad or m] and at this share of the largest speeds: between waypoints it bulges.
 CHAIN_EDGE = 5e-4
 CHAIN_SPEED = 0.95
+# A node that does not come onto the path is put so far towards the next one; not in the middle,
+# where a halved grid would have one of the same times again.
+BESIDE = 0.3
 LAST_SMOOTHINGS = (3.0, 1.0, 0.3, 0.1, 0.03)
 # The jagged chain of samples is smoothed by a spline with this many of them per interval.
 SMOOTHING = 3
