@@ -1,5 +1,8 @@
 """Stages are shown in terminals and logs."""
 
+import io
+import time
+
 import pytest
 from rich.console import Console
 
@@ -21,7 +24,23 @@ def test_stages_are_shown_in_terminals_and_logs(terminal: bool) -> None:
         assert lines == ["start (of 24)", "no motion passes t = 2 s", "checking"]
 
 
-def open_nothing() -> object:
-    import io
+def test_long_stages_say_how_long_they_will_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    shown = io.StringIO()
+    with StageDisplay(Console(force_terminal=True, width=100, file=shown)) as display:
+        for number in range(1, 5):
+            display.stage("long", number, 10)
+            now[0] += 0.5
+        display._progress.refresh()
+        for number in range(1, 5):
+            display.stage("short", number, 10)
+            now[0] += 0.05
+        display._progress.refresh()
+    # Three of ten took 1.5 s, so that seven will take 3.5.
+    assert "long 4 of 10, about 4 s left" in shown.getvalue()
+    assert "short 4 of 10 " in shown.getvalue()
 
+
+def open_nothing() -> io.StringIO:
     return io.StringIO()

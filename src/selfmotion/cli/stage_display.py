@@ -1,5 +1,6 @@
 """Which stage is running: a bar on a terminal, a line per stage in a log."""
 
+import time
 from types import TracebackType
 from typing import Self
 
@@ -14,6 +15,9 @@ from rich.progress import (
 )
 
 from selfmotion.optimise import Iteration
+
+# Of shorter stages it is not said how long they will last [s].
+_WORTH_SAYING = 2.0
 
 
 class Display:
@@ -65,18 +69,25 @@ class StageDisplay(Display):
             BarColumn(),
             TimeElapsedColumn(),
         )
-        self._stage = self._count = self._cost = ""
+        self._stage = self._count = self._cost = self._left = ""
+        self._began = 0.0
 
     def stage(self, stage: str, done: int, total: int) -> None:
-        """Show that number `done` of `total` in a stage has begun; of 0, news that stay."""
+        """Show that number `done` of `total` in a stage has begun; of 0, news that stay.
+
+        How long the others will last, if as long as those before.
+        """
         if total == 0:
             self._console.print(stage, markup=False, highlight=False, soft_wrap=True)
             return
         if stage != self._stage:
-            self._stage, self._cost = stage, ""
+            self._stage, self._cost, self._began = stage, "", time.monotonic()
             if not self._console.is_terminal:
                 self._console.print(f"{stage} (of {total})" if total > 1 else stage, markup=False)
         self._count = f" {done} of {total}" if total > 1 else ""
+        spent = time.monotonic() - self._began
+        left = spent * (total - done + 1) / (done - 1) if done > 1 else 0.0
+        self._left = f", about {left:.0f} s left" if spent + left > _WORTH_SAYING else ""
         self._progress.update(self._bar, completed=done - 1, total=total if total > 1 else None)
         self._describe()
 
@@ -86,4 +97,5 @@ class StageDisplay(Display):
         self._describe()
 
     def _describe(self) -> None:
-        self._progress.update(self._bar, description=self._stage + self._count + self._cost)
+        said = self._stage + self._count + self._left + self._cost
+        self._progress.update(self._bar, description=said)
