@@ -100,8 +100,8 @@ def build() -> ca.Function:
     motion = ca.SX.sym("Q", 7, count)
     step = motion[:, 1:] - motion[:, :-1]
     cost = 0.5 * ca.sum2(ca.sum1(step**2) / ca.DM(np.diff(t)).T)
-    off = ca.horzcat(*[error(motion[:, k], rotations[k], positions[k]) for k in range(1, count)])
-    program = {"x": ca.vec(motion), "f": cost, "g": ca.vec(off)}
+    poses = [error(motion[:, k], rotations[k], positions[k]) for k in range(1, count)]
+    program = {"x": ca.vec(motion), "f": cost, "g": ca.vec(ca.horzcat(*poses))}
     solver = ca.nlpsol("solver", "ipopt", program, OPTIONS)
     # --8<-- [end:follow]
     return solver
@@ -118,8 +118,11 @@ for name, guess in (
 ):
 
     def solve(guess: np.ndarray = guess) -> np.ndarray:
+        # --8<-- [start:solve]
         bounds = {"lbx": least.ravel(), "ubx": most.ravel(), "lbg": 0, "ubg": 0}
-        return np.array(solver(x0=guess.ravel(), **bounds)["x"]).reshape(count, 7)
+        found = solver(x0=guess.ravel(), **bounds)["x"]
+        # --8<-- [end:solve]
+        return np.array(found).reshape(count, 7)
 
     solve()
     status = solver.stats()["return_status"]

@@ -21,11 +21,12 @@ def track(sub_steps: int) -> np.ndarray:
     # --8<-- [start:follow]
     arm = pink.Configuration(model, model.createData(), start())
     hand = FrameTask("panda_hand", position_cost=1.0, orientation_cost=1.0)
-    tasks, step, motion = [hand, DampingTask(cost=1e-4)], (t[1] - t[0]) / sub_steps, []
+    slow = DampingTask(cost=1e-4)
+    step, motion = (t[1] - t[0]) / sub_steps, []
     for position, quaternion in zip(positions, quaternions, strict=True):
         hand.set_target(pin.SE3(rotation(quaternion), position))
         for _ in range(sub_steps):
-            speeds = pink.solve_ik(arm, tasks, step, solver="daqp")
+            speeds = pink.solve_ik(arm, [hand, slow], step, solver="daqp")
             arm.integrate_inplace(speeds, step)
         motion.append(arm.q.copy())
     # --8<-- [end:follow]
