@@ -1,6 +1,6 @@
-"""The pictures of the method and of how-tos, drawn from plans while the site is built.
+"""The pictures of the method and of pages that run, drawn from plans while the site is built.
 
-Those of a how-to are of what its own code makes.
+Those of a page are of what its own code makes.
 """
 
 import io
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
 
 _STYLE = {"svg.fonttype": "none", "svg.hashsalt": "selfmotion", "font.size": 9.0}
 _SIZE = (6.4, 3.0)
-# Of how-tos: no wider than a telephone's text is, twice.
+# Of pages: no wider than a telephone's text is, twice.
 _NARROW = 5.2
 _BLUE, _ORANGE, _GREEN, _GREY = "#4269d0", "#e8871e", "#3ca951", "#b0b7c3"
 
 
-def draw_all(how_tos: Mapping[str, "Page"]) -> dict[str, str]:
-    """Return name → SVG; the first one of a how-to has the name of its page."""
+def draw_all(pages: Mapping[str, "Page"]) -> dict[str, str]:
+    """Return name → SVG; the first one of a page has its name."""
     plan = sm.plan(sm.sample_problem())
     return {
         "self_motion": self_motion(),
         "speeds": speeds(plan),
         "convergence": convergence(),
         "path_error": path_error(plan),
-        **{name: draw(how_tos[name]) for name, draw in _OF_HOW_TOS.items()},
-        "weave": weave(how_tos["seam"]),
+        **{name: draw(pages[name]) for name, draw in _OF_PAGES.items()},
+        "weave": weave(pages["seam"]),
     }
 
 
@@ -327,6 +327,30 @@ def realtime(page: "Page") -> str:
     return _svg(figure)
 
 
+def from_other_tools(page: "Page") -> str:
+    """Draw where joints are in their ranges: each instant planned alone, and all at once."""
+    motions = {
+        "pseudo-inverse, instant by instant": page.names["tracked"],
+        "selfmotion, the whole path": page.names["plan"],
+    }
+    figure = Figure(figsize=(_NARROW, 5.0), layout="constrained")
+    for axes, (title, plan) in zip(figure.subplots(2, 1), motions.items(), strict=True):
+        robot, motion = plan.robot, plan.trajectory
+        t = np.linspace(0.0, motion.duration, 401)
+        share = 100.0 * (motion(t) - robot.lower) / (robot.upper - robot.lower)
+        beyond = ((share < 0.0) | (share > 100.0)).any(axis=0)
+        for k in range(robot.dof):
+            axes.plot(t, share[:, k], linewidth=2.5 if beyond[k] else 1.2)
+        for limit in (0.0, 100.0):
+            axes.axhline(limit, color="black", linestyle="dashed", linewidth=1)
+        axes.set(title=title, ylabel="joint, in its range [%]", xlim=(0, t[-1]), ylim=(-12, 112))
+    figure.axes[1].set_xlabel("t [s]")
+    names = page.names["panda"].joint_names
+    figure.legend(axes.lines[: len(names)], names, frameon=False, ncols=4, fontsize=8,
+                  loc="outside lower center")  # fmt: skip
+    return _svg(figure)
+
+
 def places(page: "Page") -> str:
     """Return the map of what the places of the page about them cost."""
     written = page.folder / "out" / "places" / "index.html"
@@ -336,7 +360,7 @@ def places(page: "Page") -> str:
     return shown.group()
 
 
-_OF_HOW_TOS: Mapping[str, Callable[["Page"], str]] = {
+_OF_PAGES: Mapping[str, Callable[["Page"], str]] = {
     "seam": seam,
     "relaxations": relaxations,
     "limits": limits,
@@ -344,6 +368,7 @@ _OF_HOW_TOS: Mapping[str, Callable[["Page"], str]] = {
     "cam": cam,
     "controllers": controllers,
     "check": check,
+    "from_other_tools": from_other_tools,
     "realtime": realtime,
     "places": places,
 }

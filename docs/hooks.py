@@ -52,8 +52,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for name in BESIDE:
         files.append(File.generated(config, name, abs_src_path=str(DOCS / name)))
     ran = shown.run_all()
-    with shown.run_how_tos() as how_tos:
-        drawn = drawings.draw_all(how_tos)
+    with shown.run_pages() as pages:
+        drawn = drawings.draw_all(pages)
     made: dict[str, str] = {
         "examples.md": examples_page(ran),
         "gallery.md": gallery_page(ran),
@@ -62,8 +62,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     }
     for name, content in made.items():
         files.append(File.generated(config, name, content=content))
-    for name, page in how_tos.items():
-        files.get_file_from_path(f"howto/{name}.md").content_string = page.text
+    for page in pages.values():
+        address = page.file.relative_to(shown.PAGES).as_posix()
+        files.get_file_from_path(address).content_string = page.text
     return files
 
 

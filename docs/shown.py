@@ -1,4 +1,4 @@
-"""What the site shows of examples and how-tos: each is run while the site is built."""
+"""What the site shows of examples and of pages with code: each is run while the site is built."""
 
 import io
 import os
@@ -17,8 +17,13 @@ import selfmotion as sm
 from selfmotion.cli import app
 from selfmotion.replay import write_replay
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
-HOWTOS = Path(__file__).parent / "pages" / "howto"
+ROOT = Path(__file__).parent.parent
+EXAMPLES = ROOT / "examples"
+PAGES = Path(__file__).parent / "pages"
+# Pages that show below each of their blocks what it prints.
+PRINTING = (*sorted(PAGES.glob("howto/*.md")), PAGES / "from_other_tools.md")
+# Folders of the repository that pages and examples name files of.
+_BESIDE = ("examples", "benchmarks")
 # A block of a page: its language, what is said of it, and its text.
 BLOCK = re.compile(r"^```(\w*)([^\n]*)\n(.*?)^```\n", re.DOTALL | re.MULTILINE)
 _TITLE = re.compile(r'title="([^"]*)"')
@@ -79,6 +84,7 @@ class Page:
 
     Attributes
     ----------
+    file : Path
     text : str
         Of the page, below each block what it printed.
     names : dict
@@ -87,6 +93,7 @@ class Page:
         Where its files are.
     """
 
+    file: Path
     text: str
     names: dict[str, object]
     folder: Path
@@ -115,7 +122,8 @@ def run_page(file: Path, *, not_run: Collection[str] = ()) -> Page:
     Files are those that the page shows, each by its title. Commands of `not_run` are passed over.
     """
     text = file.read_text()
-    Path("examples").symlink_to(EXAMPLES)
+    for name in _BESIDE:
+        Path(name).symlink_to(ROOT / name)
     for _, said, content in BLOCK.findall(text):
         if title := _TITLE.search(said):
             Path(title[1]).write_text(content)
@@ -140,7 +148,7 @@ def run_page(file: Path, *, not_run: Collection[str] = ()) -> Page:
         printed = printed.replace(f"{Path.cwd()}/", "").strip()
         return f'{block[0]}\n````text title="prints"\n{printed}\n````\n' if printed else block[0]
 
-    return Page(BLOCK.sub(with_output, text), names, Path.cwd())
+    return Page(file, BLOCK.sub(with_output, text), names, Path.cwd())
 
 
 def _session(commands: Sequence[Sequence[str]]) -> str:
@@ -174,11 +182,11 @@ def _run(name: str) -> Shown:
 
 
 @contextmanager
-def run_how_tos() -> Iterator[dict[str, Page]]:
-    """Run every how-to, each in an empty folder that is there until the end."""
+def run_pages() -> Iterator[dict[str, Page]]:
+    """Run the pages that show what they print, each in an empty folder, there until the end."""
     with tempfile.TemporaryDirectory() as folder:
         found = {}
-        for page in sorted(HOWTOS.glob("*.md")):
+        for page in PRINTING:
             own = Path(folder) / page.stem
             own.mkdir()
             with _within(own):

@@ -78,14 +78,6 @@ E = ca.mtimes(goal, turn.T)
 angular = 0.5 * ca.vertcat(E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1])
 error = ca.Function("error", [q, goal, point], [ca.vertcat(point - place, angular)])
 slope = ca.Function("slope", [q, goal, point], [ca.jacobian(error(q, goal, point), q)])
-tip = ca.Function("tip", [q], [turn, place])
-
-
-def pose(configuration: np.ndarray) -> np.ndarray:
-    found = np.eye(4)
-    turn, place = tip(configuration)
-    found[:3, :3], found[:3, 3] = np.array(turn), np.array(place).ravel()
-    return found
 
 
 def tracked(drawn: float) -> np.ndarray:
@@ -104,12 +96,15 @@ def tracked(drawn: float) -> np.ndarray:
 
 def build() -> ca.Function:
     """Return the solver for this path."""
+    # --8<-- [start:follow]
     motion = ca.SX.sym("Q", 7, count)
     step = motion[:, 1:] - motion[:, :-1]
     cost = 0.5 * ca.sum2(ca.sum1(step**2) / ca.DM(np.diff(t)).T)
-    off = ca.horzcat(*[error(motion[:, k], rotations[k], positions[k]) for k in range(1, count)])
-    program = {"x": ca.vec(motion), "f": cost, "g": ca.vec(off)}
-    return ca.nlpsol("solver", "ipopt", program, OPTIONS)
+    poses = [error(motion[:, k], rotations[k], positions[k]) for k in range(1, count)]
+    program = {"x": ca.vec(motion), "f": cost, "g": ca.vec(ca.horzcat(*poses))}
+    solver = ca.nlpsol("solver", "ipopt", program, OPTIONS)
+    # --8<-- [end:follow]
+    return solver
 
 
 began = time.perf_counter()
@@ -123,10 +118,13 @@ for name, guess in (
 ):
 
     def solve(guess: np.ndarray = guess) -> np.ndarray:
+        # --8<-- [start:solve]
         bounds = {"lbx": least.ravel(), "ubx": most.ravel(), "lbg": 0, "ubg": 0}
-        return np.array(solver(x0=guess.ravel(), **bounds)["x"]).reshape(count, 7)
+        found = solver(x0=guess.ravel(), **bounds)["x"]
+        # --8<-- [end:solve]
+        return np.array(found).reshape(count, 7)
 
     solve()
     status = solver.stats()["return_status"]
     settings = f"IPOPT from {name}: {status}, built in {built:.1f} s besides"
-    report("CasADi", settings, solve, pose, PATH)
+    report("CasADi", settings, solve)

@@ -1,4 +1,4 @@
-"""What the peers' programs share: the path, and how a motion is measured. Needs NumPy only."""
+"""What the peers' programs share: path, start and arm, and a clock. Needs NumPy only."""
 
 from __future__ import annotations
 
@@ -34,40 +34,18 @@ def rotation(quaternion: np.ndarray) -> np.ndarray:
     )
 
 
-def report(
-    name: str,
-    settings: str,
-    solve: Callable[[], np.ndarray],
-    pose: Callable[[np.ndarray], np.ndarray],
-    path: str,
-    repeats: int = 3,
-) -> None:
-    """Time `solve` (best of `repeats`), measure its motion, and print one JSON line.
+def report(name: str, settings: str, solve: Callable[[], np.ndarray], repeats: int = 3) -> None:
+    """Time `solve` (best of `repeats`), and print its motion (K, 7) as one JSON line.
 
-    The cost is Σ ½ |Δq|²/Δt over the waypoints [rad²/s]; errors are those at the waypoints.
+    It is judged by `run_peers.py`, as that of all tools. A motion that stops early has fewer rows
+    than the path has waypoints.
     """
-    t, positions, quaternions = waypoints(path)
     seconds = []
     for _ in range(repeats):
         began = time.perf_counter()
         q = solve()
         seconds.append(time.perf_counter() - began)
-    poses = np.array([pose(x) for x in q])
-    misses = np.linalg.norm(poses[:, :3, 3] - positions, axis=1)
-    angles = [
-        np.arccos(np.clip((np.trace(rotation(u) @ p[:3, :3].T) - 1) / 2, -1, 1))
-        for u, p in zip(quaternions, poses, strict=True)
-    ]
-    steps = np.diff(q, axis=0)
-    result = {
-        "name": name,
-        "settings": settings,
-        "path": path,
-        "seconds": min(seconds),
-        "cost": float(np.sum(0.5 * np.sum(steps**2, axis=1) / np.diff(t))),
-        "position_error": float(misses.max()),
-        "rotation_error": float(np.max(angles)),
-    }
+    result = {"name": name, "settings": settings, "seconds": min(seconds), "q": q.tolist()}
     sys.stdout.write(json.dumps(result) + "\n")
 
 

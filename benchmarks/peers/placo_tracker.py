@@ -16,18 +16,14 @@ def set_joints(q: np.ndarray) -> None:
     robot.update_kinematics()
 
 
-def pose(q: np.ndarray) -> np.ndarray:
-    set_joints(q)
-    return np.array(robot.get_T_world_frame("panda_hand"))
-
-
 def track(sub_steps: int) -> np.ndarray:
+    # --8<-- [start:follow]
     set_joints(start())
     solver = placo.KinematicsSolver(robot)
     solver.mask_fbase(True)
     solver.enable_joint_limits(True)
     frame = np.eye(4)
-    task = solver.add_frame_task("panda_hand", pose(start()))
+    task = solver.add_frame_task("panda_hand", frame)
     task.configure("tool", "soft", 1.0, 1.0)
     solver.add_regularization_task(1e-6)
     motion = []
@@ -38,8 +34,9 @@ def track(sub_steps: int) -> np.ndarray:
             solver.solve(True)
             robot.update_kinematics()
         motion.append([robot.get_joint(name) for name in names])
+    # --8<-- [end:follow]
     return np.array(motion)
 
 
 for steps in (1, 5):
-    report("placo", f"{steps} sub-steps per waypoint", lambda n=steps: track(n), pose, PATH)
+    report("placo", f"{steps} sub-steps per waypoint", lambda n=steps: track(n))

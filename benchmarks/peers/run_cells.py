@@ -80,7 +80,7 @@ def puzzle() -> list[dict[str, str]]:
     said = f"shortest, collisions on; {plan.certificate.verdict.split(' (')[0]}"
     rows = [puzzle_row("selfmotion", said, problem, q, off(problem, dense, smooth), seconds)]
     for item in peer(
-        "tesseract_whole_path.py", ["tesseract-robotics==0.5.1", "numpy"], OUT / "given.json"
+        "tesseract_whole_path.py", ["tesseract-robotics==0.5.1", "numpy==2.4.6"], OUT / "given.json"
     ):
         order = [item["joints"].index(name) for name in names]
         q = np.array(item["q"])[:, order]

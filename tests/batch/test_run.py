@@ -351,6 +351,8 @@ def test_refusals_say_why_in_a_few_words(reference: sm.Batch, grid: Path, tmp_pa
     assert (near.verified, near.reason) == (True, "")
     assert near.margin is not None
     assert near.margin > 0.0
+    assert near.margin_unit == "rad"
+    assert away.margin_unit in ("", "rad")
     assert not away.verified
     assert away.reason in ("out of reach", "no way through", "ends on the way")
 

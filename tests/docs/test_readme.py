@@ -39,8 +39,8 @@ def commands(page: str) -> list[list[str]]:
     return [words for words in (shlex.split(line, comments=True) for line in lines) if words]
 
 
-# Those of how-tos run while the site is built, by the same function: see `test_site.py`.
-RUN = [page for page in PAGES if blocks(page) and not page.startswith("docs/pages/howto/")]
+# The others run while the site is built, by the same function: see `test_site.py`.
+RUN = [page for page in PAGES if blocks(page) and ROOT / page not in shown.PRINTING]
 
 
 @pytest.mark.parametrize("page", RUN)
@@ -76,6 +76,26 @@ def test_what_blocks_print_is_below_them(tmp_path: Path, monkeypatch: pytest.Mon
     told = shown.run_page(page)
     assert told.text.endswith('```\n\n````text title="prints"\n6\n7\n````\n\nEnd.\n')
     assert told.names["k"] == 7
+
+
+def unmarked(text: str) -> list[str]:
+    """Return the sections that a page takes from files which do not mark them."""
+    found = []
+    for file, name in re.findall(r'^--8<-- "([^":]+):([^"]+)"$', text, re.MULTILINE):
+        whole = (ROOT / file).read_text()
+        section = re.search(rf"8<-- \[start:{name}\](.*?)8<-- \[end:{name}\]", whole, re.DOTALL)
+        if section is None or len(section[1].splitlines()) < 3:
+            found.append(f"{file}:{name}")
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_what_pages_take_from_files_is_marked_there(page: str) -> None:
+    assert unmarked((ROOT / page).read_text()) == []
+
+
+def test_a_section_that_is_not_marked_is_told() -> None:
+    assert unmarked('--8<-- "README.md:first"\n--8<-- "README.md:last"\n') == ["README.md:last"]
 
 
 def test_what_is_not_run_is_there() -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import shown
 
 import selfmotion as sm
 from selfmotion import realtime, replay, testing
@@ -74,10 +75,10 @@ def test_every_example_is_shown_with_its_output(site: Path, name: str) -> None:
     assert len(re.sub(r"<[^>]*>", "", printed).strip()) > 20
 
 
-@pytest.mark.parametrize("page", sorted((ROOT / "docs/pages/howto").glob("*.md")), ids=str)
-def test_every_how_to_shows_what_its_code_makes(site: Path, page: Path) -> None:
+@pytest.mark.parametrize("page", shown.PRINTING, ids=lambda page: page.stem)
+def test_every_page_that_runs_shows_what_its_code_makes(site: Path, page: Path) -> None:
     """What each block prints that prints anything, and pictures that say what they show."""
-    text = (site / "howto" / f"{page.stem}.html").read_text()
+    text = (site / page.relative_to(shown.PAGES).with_suffix(".html")).read_text()
     asked = re.findall(r"^```(?:python|console)\n(.*?)^```", page.read_text(), re.DOTALL | re.M)
     talks = [code for code in asked if "print(" in code or code.startswith("selfmotion plan")]
     assert text.count('<span class="filename">prints</span>') >= len(talks)
@@ -124,7 +125,8 @@ def test_pages_are_seen_whole(site: Path, browser: Any) -> None:
     """What is read stays within the page; replays, too. Their insides have tests of their own."""
     page = browser.new_page()
     page.route("**/replays/*.html", lambda route: route.fulfill(body="a replay"))
-    for name in ("gallery", "index", "howto/relaxations", "howto/retiming", "method", "api/plan"):
+    how_tos = ("howto/relaxations", "howto/retiming", "from_other_tools")
+    for name in ("gallery", "index", *how_tos, "method", "api/plan"):
         page.goto((site / f"{name}.html").as_uri())
         for width in WIDTHS:
             texts = ("article h1", "article h2", "article p", "article img")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from support.arms import robot_named
 
 PLANAR = Path(sm.load_robot("planar_3r").urdf.source)
 
@@ -33,6 +34,18 @@ def test_broken_urdfs_are_refused(tmp_path: Path, old: str, new: str, message: s
     file.write_text(text.replace(old, new) if old == "robot" else text.replace(old, new, 1))
     with pytest.raises(sm.RobotError, match=message):
         sm.load_robot(file)
+
+
+@pytest.mark.parametrize("name", sm.NAMED_ARMS)
+def test_named_arms_are_called_by_their_names(name: str) -> None:
+    """Also where their URDFs call them otherwise."""
+    assert robot_named(name).name == name
+
+
+def test_other_arms_are_called_as_their_urdfs_say(tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(PLANAR.read_text().replace('name="planar_3r"', 'name="mine"', 1))
+    assert sm.load_robot(file).name == "mine"
 
 
 def test_a_sound_copy_is_accepted(tmp_path: Path) -> None:

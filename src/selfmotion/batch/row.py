@@ -35,6 +35,8 @@ class Row:
         motion, else the cost.
     margin : float or None
         Smallest distance of a joint from its position limits [rad or m]; None without a plan.
+    margin_unit : str
+        Its unit, by the joint.
     clearance : float or None
         Smallest distance between bodies [m]; None where it was not asked for.
     ends : float or None
@@ -58,6 +60,7 @@ class Row:
     evaluations: int = 0
     aim: float = float("inf")
     margin: float | None = None
+    margin_unit: str = ""
     clearance: float | None = None
     ends: float | None = None
     seconds: float = 0.0

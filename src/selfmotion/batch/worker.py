@@ -52,6 +52,7 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
         what = f"{type(error).__name__}: {error}"
         return {"error": what, "fault": True, "seconds": time.perf_counter() - began}, b""
     report, certificate, duration = found.report, found.certificate, found.trajectory.duration
+    nearest = {certificate.limit_margin.name} & set(found.robot.joint_names)
     is_part = bool(report.ending)
     aim = duration if task["options"]["goal"] == "fastest" else report.cost
     row = {
@@ -59,6 +60,7 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
         "verdict": certificate.verdict,
         "reason": _reason(found),
         "margin": certificate.limit_margin.value,
+        "margin_unit": found.robot.unit_of(*nearest),
         "clearance": None if certificate.clearance is None else certificate.clearance.value,
         "cost": report.cost,
         "initial_cost": report.initial_cost,

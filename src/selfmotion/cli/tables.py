@@ -229,7 +229,8 @@ def show_batch(batch: "Batch", console: Console) -> None:
         outcome = ["-", "-", "-", "-"]
         if not row.error:
             near = "-" if row.clearance is None else f"{1e3 * row.clearance:.4g} mm"
-            outcome = [row.outcome, f"{row.duration:.4g} s", _number(row.margin), near]
+            margin = "-" if row.margin is None else f"{row.margin:.4g} {row.margin_unit}"
+            outcome = [row.outcome, f"{row.duration:.4g} s", margin, near]
         table.add_row(escape(row.name), *values, *outcome, row.reason or "yes")
     console.print(table)
     verified = sum(row.verified for row in batch.rows)

@@ -21,6 +21,7 @@ from selfmotion.robot import (
     load_robot,
     mounting_of,
     moving_joints,
+    names_of,
 )
 
 
@@ -104,8 +105,7 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
         table["parts"] = {part.name: _part(part) for part in robot.urdf.parts}
         table["lock"] = dict(robot.locked)
         return table
-    names = [name for name, arm in NAMED_ARMS.items() if str(source).endswith(arm.urdf)]
-    named = next((name for name in names if _is_named(robot, name)), None)
+    named = next((name for name in names_of(str(source)) if _is_named(robot, name)), None)
     if named is not None:
         table["name"] = named
     elif source.suffix == ".urdf" and source.is_file() and not robot.urdf.has_changed():

@@ -33,7 +33,11 @@ from selfmotion.robot.mounting import (
     UrdfShape as UrdfShape,
     mounting_of as mounting_of,
 )
-from selfmotion.robot.named import NAMED_ARMS as NAMED_ARMS, NAMED_PARTS as NAMED_PARTS
+from selfmotion.robot.named import (
+    NAMED_ARMS as NAMED_ARMS,
+    NAMED_PARTS as NAMED_PARTS,
+    names_of as names_of,
+)
 from selfmotion.robot.placements import (
     compose as compose,
     placements as placements,

@@ -11,6 +11,7 @@ from selfmotion.basics import RobotError, as_number, nearest, read_only
 from selfmotion.robot.full_model import full_model, name_links
 from selfmotion.robot.held import locked_configuration
 from selfmotion.robot.model import RobotModel
+from selfmotion.robot.named import names_of
 from selfmotion.robot.urdf import Urdf, UrdfJoint, parse_urdf
 
 # A joint that is held may be this far beyond its limits [rad or m]: rounding of a file.
@@ -48,7 +49,8 @@ def build_robot(
     velocity = np.array(model.velocityLimit, dtype=np.float64)
     effort = np.array(model.upperEffortLimit, dtype=np.float64)
     return RobotModel(
-        name=model.name,
+        # Its URDF may call an arm anything, as UF_ROBOT.
+        name=next(iter(names_of(urdf.source)), model.name),
         tools=tuple(tools),
         reference=reference,
         joint_names=names,

@@ -80,6 +80,11 @@ def published(name: str) -> Mapping[str, Any]:
     return {kind: limits[kind] for kind in ("acceleration", "jerk") if kind in limits}
 
 
+def names_of(source: str) -> list[str]:
+    """Return the names of arms whose URDF is the file that another one came from."""
+    return [name for name, arm in NAMED_ARMS.items() if source.endswith(arm.urdf)]
+
+
 def read_named(arm: NamedArm) -> Urdf:
     """Return the URDF of an arm that is known by name."""
     for folder in _OWN_ARMS:
