@@ -74,38 +74,23 @@ def test_tangents_and_pullbacks_are_central_differences(case: Case) -> None:
     assert abs(np.sum(wrong * step) - expected) > 1e-4
 
 
-def test_null_motions_are_added_where_charts_begin(case: Case) -> None:
-    """What is known of ν = 0 and of ε there is what eq. 4 says of both."""
+def test_charts_around_nodes_are_of_the_same_motion(case: Case) -> None:
+    """What of ε does not act is left out, and what is known there is what eq. 4 says anew."""
     motion = nodes_of(problem_of(case))
-    rng = np.random.default_rng(8)
-    nu = rng.normal(size=motion.nu.shape)
-    none = np.zeros_like(nu)
-    rests, expected = (motion.charts.at(none, each) for each in (none, nu))
-    assert rests is not None
-    assert expected is not None
-    found = motion.charts.moving(rests, nu)
-    for own, other in (
-        (found.q, expected.q),
-        (found.qd, expected.qd),
-        (found.tangents, expected.tangents),
-    ):
-        np.testing.assert_allclose(own, other, atol=1e-9)
-    by_q, by_qd = rng.normal(size=(2, *found.q.shape))
-    slopes = [motion.charts.pulled(place, by_q, by_qd) for place in (found, expected)]
+    step, r = random_step(motion, 5, 0.05), motion.nu.shape[1]
+    there = moved(motion, step)
+    charts, nu, place = there.charts.centred(step[:, :r], there.epsilon)
+    again = charts.at(np.zeros_like(nu), nu)
+    for one in (place, again):
+        np.testing.assert_allclose(one.q, there.place.q, atol=ON_PATH)
+        np.testing.assert_allclose(one.qd, there.place.qd, atol=1e-9)
+        np.testing.assert_allclose(one.tangents, charts.bases, atol=1e-9)
+    by_q, by_qd = np.random.default_rng(8).normal(size=(2, *place.q.shape))
+    slopes = [charts.pulled(one, by_q, by_qd) for one in (place, again)]
     np.testing.assert_allclose(slopes[0], slopes[1], atol=1e-8 * np.abs(slopes[1]).max())
-
-
-def test_charts_around_a_motion_are_of_the_same_motion(case: Case) -> None:
-    motion = nodes_of(problem_of(case))
-    motion = moved(motion, random_step(motion, 5, 0.05))
-    around = centred(motion)
-    again = around.grid.motion(around.charts, around.nu)
-    assert again is not None
-    np.testing.assert_allclose(again.place.q, motion.place.q, atol=ON_PATH)
-    np.testing.assert_allclose(again.place.qd, motion.place.qd, atol=1e-9)
-    jacobians = np.array([motion.grid.problem.follows.jacobian(q) for q in again.place.q])
-    np.testing.assert_allclose(jacobians @ around.charts.bases, 0.0, atol=1e-9)
-    unit = np.swapaxes(around.charts.bases, 1, 2) @ around.charts.bases
+    jacobians = np.array([motion.grid.problem.follows.jacobian(q) for q in place.q])
+    np.testing.assert_allclose(jacobians @ charts.bases, 0.0, atol=1e-9)
+    unit = np.swapaxes(charts.bases, 1, 2) @ charts.bases
     np.testing.assert_allclose(unit, np.broadcast_to(np.eye(unit.shape[1]), unit.shape), atol=1e-12)
 
 

@@ -42,7 +42,7 @@ def moved(motion: NodeMotion, step: Array) -> NodeMotion:
 
 def centred(motion: NodeMotion) -> NodeMotion:
     """Return the same nodes with charts around them."""
-    found = motion.recentred()
+    found = motion.grid.near(motion.place.q, motion.place.qd)
     assert found is not None
     return found
 

@@ -1,6 +1,7 @@
 """All nodes of a motion at once: where they are on their self-motion manifolds, and eq. 4 there."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class Charts:
     ----------
     manifolds : Manifolds
     q : (N + 1, n)
-        The reference: z = 0.
+        The reference: z = 0 where that is on the path, else next to it.
     bases : (N + 1, n, r)
         N0, orthonormal bases of the null spaces there.
     """
@@ -55,14 +56,34 @@ class Charts:
 
     def at(self, z: Array, nu: Array) -> Place | None:
         """Return the nodes at z and ν, (N + 1, r) each; None where one is not to be had."""
+        return self._looked(z, self.null_motions(nu), centred=False)
+
+    def centred(self, z: Array, epsilon: Array) -> "Centred | None":
+        """Return charts around the nodes at z (N + 1, r), with what of ε (N + 1, n) acts there.
+
+        None where a node is not to be had.
+        """
+        place = self._looked(z, epsilon, centred=True)
+        if place is None:
+            return None
+        around = Charts(self.manifolds, place.q, place.tangents)
+        own = self.manifolds.rates(place.table)[1]
+        nu = (np.swapaxes(place.tangents, 1, 2) @ own[:, :, None])[:, :, 0]
+        return Centred(around, nu, place)
+
+    def null_motions(self, nu: Array) -> Array:
+        """Return ε = N0 ν, (N + 1, n)."""
+        return np.asarray((self.bases @ nu[:, :, None])[:, :, 0])
+
+    def _looked(self, z: Array, epsilon: Array, *, centred: bool) -> Place | None:
         own, bases = self.manifolds, self.bases
-        q = self.q + (bases @ z[:, :, None])[:, :, 0]
-        table = own.table()
-        qd, epsilon = own.rates(table)
-        epsilon[:] = (bases @ nu[:, :, None])[:, :, 0]
-        tangents = np.empty_like(bases)
+        q, table, tangents = self.q + self.null_motions(z), own.table(), np.empty_like(bases)
+        qd, null_motions = own.rates(table)
+        null_motions[:] = epsilon
         z = np.ascontiguousarray(z)
-        failed = look(q, z, bases, self.q, own.targets, own.chains, own.layout, table, tangents)
+        failed = look(
+            q, z, bases, self.q, own.targets, own.chains, own.layout, table, tangents, centred
+        )
         if failed >= 0:
             return None
         return Place(q, np.array(qd), tangents, table)
@@ -84,24 +105,20 @@ class Charts:
         )
         return out
 
-    def moving(self, place: Place, nu: Array) -> Place:
-        """Return the reference, given as the `place` of ν = 0, with null motions ν (N + 1, r).
 
-        N0 is what J takes to 0 there, so that eq. 4 adds ε = N0 ν to q̇ and leaves all else. Takes
-        over the table of that place.
-        """
-        added = (self.bases @ nu[:, :, None])[:, :, 0]
-        qd, epsilon = self.manifolds.rates(place.table)
-        qd += added
-        epsilon[:] = added
-        return Place(place.q, np.array(qd), self.bases, place.table)
+class Centred(NamedTuple):
+    """Nodes at the reference of their charts.
 
-    def recentred(self, place: Place) -> tuple["Charts", Array]:
-        """Return the charts around a place, and its ν there."""
-        bases = orthonormal(place.tangents)
-        _, epsilon = self.manifolds.rates(place.table)
-        nu = np.einsum("knr,kn->kr", bases, epsilon)
-        return Charts(self.manifolds, place.q, bases), nu
+    Attributes
+    ----------
+    charts : Charts
+    nu : (N + 1, r)
+    place : Place
+    """
+
+    charts: Charts
+    nu: Array
+    place: Place
 
 
 class Manifolds:
@@ -116,8 +133,7 @@ class Manifolds:
 
     def __init__(self, follows: Follows, t: Array) -> None:
         self.follows, self.t = follows, t
-        self.chains = tuple(item.chain.arrays for item in follows.items)
-        self.layout = follows.layout
+        self.chains, self.layout = follows.chains, follows.layout
         self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
         self.work = np.zeros(kernels.space_size(*self._sizes))
         self.no_error = np.zeros((len(follows.items), 6))
@@ -140,15 +156,9 @@ class Manifolds:
         """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
         return kernels.rates_of(table, self.follows.robot.dof)
 
-    def charts(self, q: Array) -> tuple[Charts, Place] | None:
-        """Return charts around a motion near the path, q (N + 1, n), and its place at ν = 0.
-
-        None where a node does not come onto its manifold.
-        """
-        bases = carried_bases(self.follows, q)
-        charts, none = Charts(self, q, bases), np.zeros((len(q), bases.shape[2]))
-        place = charts.at(none, none)
-        return None if place is None else (charts.recentred(place)[0], place)
+    def charts(self, q: Array) -> Charts:
+        """Return charts around a motion near the path, q (N + 1, n)."""
+        return Charts(self, q, carried_bases(self.follows, q))
 
     def accelerations(self, q: Array, qd: Array) -> Array:
         """Return the least q̈ by which motions q, q̇ (N + 1, n) follow the path: J⁺(ẍ - J̇q̇).

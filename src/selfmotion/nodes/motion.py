@@ -78,10 +78,8 @@ class NodeGrid:
         self._constraints = tuple(constraints)
         r = follows.robot.dof - follows.dimension
         held: list[Ints] = [] if free else [np.arange(r)]
-        rests = problem.rests
-        for rest, node in zip(rests, (0, len(t) - 1), strict=True):
-            if rest:
-                held.append(2 * r * node + r + np.arange(r))
+        self._resting = np.array([0, len(t) - 1])[np.array(problem.rests)]
+        held += [2 * r * node + r + np.arange(r) for node in self._resting]
         self.held = np.concatenate([np.zeros(0, dtype=np.int64), *held])
 
     @property
@@ -117,13 +115,14 @@ class NodeGrid:
 
     def near(self, q: Array, qd: Array) -> "NodeMotion | None":
         """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇, or None."""
-        found = self.manifolds.charts(q)
-        if found is None:
-            return None
-        charts, place = found
-        nu = np.einsum("knr,kn->kr", charts.bases, qd)
-        nu.reshape(-1)[self._rates] = 0.0
-        return self.at(charts, nu, charts.moving(place, nu))
+        return self.around(self.manifolds.charts(q), qd)
+
+    def around(self, charts: Charts, qd: Array) -> "NodeMotion | None":
+        """Return the motion at z = 0 of charts whose velocities are nearest to q̇, or None."""
+        epsilon = qd.copy()
+        epsilon[self._resting] = 0.0
+        found = charts.centred(np.zeros((len(qd), charts.bases.shape[2])), epsilon)
+        return None if found is None else self.at(*found)
 
     def motion_towards(self, start: Array, wanted: Array, time: float) -> "NodeMotion | None":
         """Return a motion from a start (n,) whose self-motion goes towards `wanted` (n,).
@@ -137,18 +136,6 @@ class NodeGrid:
         if follow(start, wanted, share, own.targets, own.chains, own.layout, q) >= 0:
             return None
         return self.near(q, np.asarray(np.gradient(q, self.t, axis=0)))
-
-    @property
-    def _rates(self) -> Ints:
-        """Numbers of the ν (N + 1, r), in one row, that are held at 0."""
-        r = self.manifolds.follows.robot.dof - self.manifolds.follows.dimension
-        node, which = np.divmod(self.held, 2 * r)
-        return np.asarray((node * r + which - r)[which >= r])
-
-    def motion(self, charts: Charts, nu: Array) -> "NodeMotion | None":
-        """Return the motion at the reference of charts; None where there is none."""
-        place = charts.at(np.zeros_like(nu), nu)
-        return None if place is None else self.at(charts, nu, place)
 
     def at(self, charts: Charts, nu: Array, place: Place) -> "NodeMotion":
         """Return the motion of a place."""
@@ -261,7 +248,7 @@ class NodeMotion:
     @property
     def epsilon(self) -> Array:
         """The null motion ε at the nodes, (N + 1, n)."""
-        return np.asarray((self.charts.bases @ self.nu[:, :, None])[:, :, 0])
+        return self.charts.null_motions(self.nu)
 
     def forget(self) -> None:
         """Let go of what can be computed anew: most of the memory that a long path takes."""
@@ -286,18 +273,7 @@ class NodeMotion:
                 part = slice(first, last + 1)
                 sides: Any = ((1, qd[first]), (1, qd[last]))
                 qd[part] = CubicSpline(t[part], q[part], bc_type=sides)(t[part], 1)
-        return self.grid.near(q, qd)
-
-    def recentred(self) -> "NodeMotion | None":
-        """Return the same motion, with charts around it; None where rounding forbids."""
-        charts, nu = self.charts.recentred(self.place)
-        # Anew: derivatives at fixed ε are others, since ε has lost what did not act.
-        found = self.grid.motion(charts, nu)
-        if found is not None:
-            # Costs and conditions are those of the same motion.
-            names = [name for name in ("terms", "aim", "h", "c", "orders") if name in self.__dict__]
-            found.__dict__.update({name: self.__dict__[name] for name in names})
-        return found
+        return self.grid.around(self.charts, qd)
 
     @cached_property
     def trajectory(self) -> Trajectory:

@@ -28,7 +28,7 @@ _INWARD = 0.995
 _SHARE, _SHORTEST = 1e-4, 1e-6
 # Motions that cost nothing, as of a joint whose axis the tool is on, are left alone: the matrix has
 # this share of its usual entry more on the diagonal, which is above rounding there.
-_FLAT = 1e-13
+_FLAT = 1e-11
 # One that is not positive definite gets this share of its largest entry on the diagonal, or a
 # third of what the last one needed; then more by this factor, again and again.
 _SHIFT, _LESS, _MORE = 1e-6, 1.0 / 3.0, 8.0
@@ -238,7 +238,7 @@ class _Solver:
         self, gradient: Array, gap: Array, step: Array, by_slack: Array, by_price: Array
     ) -> Status | None:
         """Go along a step as far as it does what it promises."""
-        motion, r = self.motion, step.shape[1] // 2
+        motion, charts, r = self.motion, self.motion.charts, step.shape[1] // 2
         off = float(np.abs(gap).sum() + np.abs(motion.c).sum())
         slope = float((gradient * step).sum()) - self._barrier * float(
             (by_slack / self._slacks).sum()
@@ -251,20 +251,17 @@ class _Solver:
         farthest = float(np.abs(step[:, :r]).max())
         length = min(_longest(self._slacks, by_slack), _FARTHEST / max(farthest, _FARTHEST))
         while length >= _SHORTEST and self._tiny < _STUCK:
-            nu = motion.nu + length * step[:, r:]
-            place = motion.charts.at(length * step[:, :r], nu)
-            if place is not None:
-                new = motion.grid.at(motion.charts, nu, place)
+            epsilon = charts.null_motions(motion.nu + length * step[:, r:])
+            found = charts.centred(length * step[:, :r], epsilon)
+            if found is not None:
+                new = motion.grid.at(*found)
                 h = new.wanted[:, self._columns]
                 slacks = np.maximum(self._slacks + length * by_slack, -h)
                 gained = merit - self._merit(new, slacks, h + slacks)
                 # Written so that NaN is no gain; what is below rounding is none to look for.
                 rounding = 1e-13 * abs(merit)
-                centred = None
                 if gained >= -_SHARE * length * min(promise, 0.0) - rounding:
-                    centred = new.recentred()
-                if centred is not None:
-                    self.motion, self._slacks = centred, slacks
+                    self.motion, self._slacks = new, slacks
                     share = _longest(self._prices, by_price)
                     self._prices = self._prices + share * by_price
                     self._length = length

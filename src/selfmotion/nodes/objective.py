@@ -24,9 +24,9 @@ from selfmotion.nodes.charts import Charts, orthonormal
 from selfmotion.nodes.hermite import Hermite, HermiteSamples, PlacedLater
 from selfmotion.nodes.smoothness import Smoothing
 
-# Differences along a manifold are taken this far to both sides [rad or m]: their error is about
-# its square, and rounding's is 1e-12 over it.
-_REACH = 1e-4
+# Differences along a manifold are taken this far to both sides [rad or m]: nodes are as near to it
+# there as they have to be, and come onto it in one step. Rounding's error is 1e-16 over it.
+_REACH = 1e-6
 # Those of costs are taken to one side, so far [rad, m and their rates]: they are second derivatives
 # of a matrix that need not be exact.
 _NEAR = 1e-6
