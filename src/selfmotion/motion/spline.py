@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 
@@ -90,19 +91,18 @@ class Spline:
         """
         if len(self.t) <= _LOT:
             return self._derivatives[order][:, k]
-        return self._differentiated(k, order)
+        return next(islice(self._differentiated(k), order, None))
 
     @cached_property
     def _derivatives(self) -> list[Array]:
         """The pieces of all orders, of a motion with few samples."""
-        every = np.arange(len(self.t) - 1)
-        return [self._differentiated(every, order) for order in range(4)]
+        return list(self._differentiated(np.arange(len(self.t) - 1)))
 
-    def _differentiated(self, k: Ints, order: int) -> Array:
-        pieces = self._of(k)
-        for _ in range(order):
-            pieces = differentiated(pieces) / (self.t[k + 1] - self.t[k])[..., None]
-        return pieces
+    def _differentiated(self, k: Ints) -> Iterator[Array]:
+        pieces, steps = self._of(k), (self.t[k + 1] - self.t[k])[..., None]
+        for _ in range(4):
+            yield pieces
+            pieces = differentiated(pieces) / steps
 
     def _of(self, k: Ints) -> Array:
         """Return the coefficients of q in some of the intervals (I,), (m, I, n)."""

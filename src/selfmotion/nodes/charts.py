@@ -137,11 +137,18 @@ class Manifolds:
         self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
         self.work = np.zeros(kernels.space_size(*self._sizes))
         self.no_error = np.zeros((len(follows.items), 6))
-        targets = [item.target(t) for item in follows.items]
-        self._paths = [
-            np.hstack([one.translation, one.rotation.reshape(len(t), 9), one.twist])
-            for one in targets
-        ]
+        # At the nodes, and a moment before and after: one step back, one on; at the ends of the path
+        # both inside.
+        step, end = _STEP * t[-1], t[-1]
+        self._steps = step * np.array([0.0, -1.0, 1.0])[:, None] * np.ones(len(t))
+        self._steps[1:, t <= step] = step * np.array([1.0, 2.0])[:, None]
+        self._steps[1:, t >= end - step] = step * np.array([-2.0, -1.0])[:, None]
+        self._twists, self._paths = [], []
+        for item in follows.items:
+            all_times = item.target((t + self._steps).ravel())
+            self._twists.append(all_times.twist)
+            parts = all_times.translation, all_times.rotation.reshape(-1, 9), all_times.twist
+            self._paths.append(np.hstack([part[: len(t)] for part in parts]))
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
 
     def table(self) -> Array:
@@ -166,37 +173,19 @@ class Manifolds:
         J q̈ is the rate of ẋ - J q̇ along the motion at fixed q̇: a central difference, which at marks
         of the path, where it may jump, is the mean of both sides.
         """
-        step, end = _STEP * self.t[-1], self.t[-1]
-        # One step back, one on; at the ends of the path both inside.
-        steps = step * np.array([-1.0, 1.0])[:, None] * np.ones(len(self.t))
-        steps[:, self.t <= step] = step * np.array([1.0, 2.0])[:, None]
-        steps[:, self.t >= end - step] = step * np.array([-2.0, -1.0])[:, None]
-        before, after = self._unmet(q, qd, steps)
-        right = ((after - before) / (steps[1] - steps[0])[:, None])[:, :, None]
-        rows = self._rows(q)[0]
-        turned = np.swapaxes(rows, 1, 2)
-        return np.asarray((turned @ np.linalg.solve(rows @ turned, right))[:, :, 0])
-
-    def _unmet(self, q: Array, qd: Array, steps: Array) -> Array:
-        """Return ẋ - J q̇ so much later (2, N + 1), at t + s and q + q̇ s, (2, N + 1, m)."""
-        moved = (q + steps[:, :, None] * qd).reshape(-1, q.shape[1])
-        rows, rotations = self._rows(moved)
-        twists = []
-        for item, rotation in zip(self.follows.items, rotations, strict=True):
-            twist = item.target((self.t + steps).ravel()).twist[:, :, None]
-            twists.append(item.task.select_along(twist, rotation)[:, :, 0])
-        rates = np.tile(qd, (len(steps), 1))[:, :, None]
-        found = np.concatenate(twists, axis=1) - (rows @ rates)[:, :, 0]
-        return found.reshape(len(steps), len(self.t), -1)
-
-    def _rows(self, q: Array) -> tuple[Array, list[Array]]:
-        """Return the rows of all Jacobians at q (K, n), (K, m, n), and the tips' rotations."""
-        found, rotations = [], []
-        for item in self.follows.items:
-            jacobian, rotation, _ = item.chain.along(q)
-            found.append(item.task.select_along(jacobian, rotation))
-            rotations.append(rotation)
-        return np.concatenate(found, axis=1), rotations
+        steps, (count, n) = self._steps, q.shape
+        moved = (q + steps[:, :, None] * qd).reshape(-1, n)
+        all_rows, twists = [], []
+        for item, twist in zip(self.follows.items, self._twists, strict=True):
+            jacobian, rotation, _ = item.chain.along(moved)
+            all_rows.append(item.task.select_along(jacobian, rotation))
+            twists.append(item.task.select_along(twist[:, :, None], rotation)[:, :, 0])
+        rows = np.concatenate(all_rows, axis=1).reshape(len(steps), count, -1, n)
+        unmet = np.concatenate(twists, axis=1).reshape(len(steps), count, -1)
+        unmet = unmet - (rows @ qd[:, :, None])[:, :, :, 0]
+        right = ((unmet[2] - unmet[1]) / (steps[2] - steps[1])[:, None])[:, :, None]
+        turned = np.swapaxes(rows[0], 1, 2)
+        return np.asarray((turned @ np.linalg.solve(rows[0] @ turned, right))[:, :, 0])
 
 
 def orthonormal(tangents: Array) -> Array:

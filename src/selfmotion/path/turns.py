@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array
-from selfmotion.task import exponentials, left, turn
+from selfmotion.task import turn, turning
 
 
 class Turning:
@@ -43,4 +43,5 @@ class Turning:
         vectors = ((cubic * s + square) * s + slope) * s + none
         rates = (3.0 * cubic * s + 2.0 * square) * s + slope
         first = self._first[k]
-        return first @ exponentials(vectors), turn(first, left(vectors, rates))
+        turned, angular = turning(vectors, rates)
+        return first @ turned, turn(first, angular)
