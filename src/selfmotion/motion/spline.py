@@ -67,6 +67,12 @@ class Spline:
         """Return the motion or a derivative at times t (…), (…, n)."""
         return _by_lots(lambda part: self._at(part, order), t)
 
+    def within(self, shares: Array, order: int) -> Array:
+        """Return the same at these shares (S,) of each interval, then at the end, (…, n)."""
+        inner = [evaluated(self.pieces(k, order)[:, :, None], shares[:, None]) for k in self.lots()]
+        n = self.q.shape[1]
+        return np.vstack([*(lot.reshape(-1, n) for lot in inner), self._at(self.t[-1:], order)])
+
     def _at(self, t: Array, order: int) -> Array:
         k, s = self.place(t)
         return evaluated(self.pieces(k, order), s[..., None])

@@ -5,6 +5,7 @@ only the nodes keep would let the motion be faster between them.
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -110,7 +111,7 @@ class NodeConditions:
     def residuals(self, samples: CheckedSamples) -> Array:
         """Return h, (N + 1, C)."""
         tables = [item.residual(samples) for item in self.constraints]
-        self._counts = [table.shape[1] for table in tables]
+        self._counts = self._counts or [table.shape[1] for table in tables]
         half, first = sum(self._counts), 0
         found = np.full((len(self.spline.t), 2 * half), _NONE)
         for table, own in zip(tables, self._counts, strict=True):
@@ -126,7 +127,7 @@ class NodeConditions:
             found |= (item.residual(samples) > item.tolerance).any(axis=1)
         return found
 
-    @property
+    @cached_property
     def tolerances(self) -> Array:
         """What h may be and still count as kept, (C,)."""
         each = [item.tolerance for item in self.constraints]

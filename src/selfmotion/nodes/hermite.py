@@ -273,18 +273,21 @@ class QuinticSamples(_WithRates):
     Parameters
     ----------
     follows : Follows
-    sampling : Sampling
+    spline : Hermite
+        Of the same nodes.
     trajectory : Trajectory
     """
 
+    _shares: Array
     _trajectory: Trajectory
 
-    def __init__(self, follows: Follows, sampling: Sampling, trajectory: Trajectory) -> None:
-        super().__init__(follows, sampling, trajectory(sampling.t), trajectory(sampling.t, 1))
+    def __init__(self, follows: Follows, spline: Hermite, trajectory: Trajectory) -> None:
+        object.__setattr__(self, "_shares", spline.shares_within)
         object.__setattr__(self, "_trajectory", trajectory)
+        super().__init__(follows, spline.sampling, self._of_order(0), self._of_order(1))
 
     def _of_order(self, order: int) -> Array:
-        return np.asarray(self._trajectory(self.t, order))
+        return self._trajectory.within(self._shares, order)
 
 
 def weighted(shares: Array, changes: Array) -> Array:

@@ -106,15 +106,11 @@ class NodeGrid:
             continuous=continuous,
         )
 
-    def motion_near(self, trajectory: Trajectory) -> "NodeMotion | None":
-        """Return the motion whose nodes are those nearest to another one's.
-
-        None where a node does not come onto its manifold, or a given start is not that of it.
-        """
-        return self.near(trajectory(self.t), trajectory(self.t, 1))
-
     def near(self, q: Array, qd: Array) -> "NodeMotion | None":
-        """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇, or None."""
+        """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇.
+
+        None where a node does not come onto its manifold.
+        """
         return self.around(self.manifolds.charts(q), qd)
 
     def around(self, charts: Charts, qd: Array) -> "NodeMotion | None":
@@ -178,7 +174,7 @@ class NodeMotion:
     def exact(self) -> QuinticSamples:
         """The `trajectory`, which is on its path between the nodes, at the spline's samples."""
         grid = self.grid
-        return QuinticSamples(grid.problem.follows, grid.spline.sampling, self.trajectory)
+        return QuinticSamples(grid.problem.follows, grid.spline, self.trajectory)
 
     @cached_property
     def exact_terms(self) -> dict[str, float]:

@@ -204,7 +204,8 @@ class _Solver:
         right[self.motion.grid.held] = 0.0
         wide = bool(rows.shape[1] or by_jumps.shape[2])
         largest = float(np.abs(curved).max() + np.abs(intervals).max())
-        usual = float(np.median(np.abs(np.diagonal(intervals, axis1=1, axis2=2))))
+        diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
+        usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])
         shift = _FLAT * usual
         while shift <= 1e6 * largest:
             matrix = Banded(count, size, 2 if wide else 1)
@@ -227,10 +228,9 @@ class _Solver:
 
     def _others(self, rows: Array, gap: Array, step: Array) -> tuple[Array, Array]:
         """Return the steps of slacks and prices that go with one of the coordinates."""
-        size = step.shape[1]
-        padded = np.pad(step, ((1, 1), (0, 0)))
-        near = np.concatenate([padded[:-2], step, padded[2:]], axis=1).reshape(-1, 3 * size, 1)
-        by_slack = -gap - (rows @ near)[:, :, 0]
+        near = np.zeros((len(step), 3, step.shape[1]))
+        near[1:, 0], near[:, 1], near[:-1, 2] = step[:-1], step, step[1:]
+        by_slack = -gap - (rows @ near.reshape(len(step), -1, 1))[:, :, 0]
         by_price = (self._barrier - self._prices * by_slack) / self._slacks - self._prices
         return by_slack, by_price
 
