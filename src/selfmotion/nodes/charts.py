@@ -137,8 +137,8 @@ class Manifolds:
         self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
         self.work = np.zeros(kernels.space_size(*self._sizes))
         self.no_error = np.zeros((len(follows.items), 6))
-        # At the nodes, and a moment before and after: one step back, one on; at the ends of the path
-        # both inside.
+        # At the nodes, and a moment before and after: one step back, one on; at the ends of the
+        # path both inside.
         step, end = _STEP * t[-1], t[-1]
         self._steps = step * np.array([0.0, -1.0, 1.0])[:, None] * np.ones(len(t))
         self._steps[1:, t <= step] = step * np.array([1.0, 2.0])[:, None]
