@@ -79,8 +79,11 @@ def test_charts_around_nodes_are_of_the_same_motion(case: Case) -> None:
     motion = nodes_of(problem_of(case))
     step, r = random_step(motion, 5, 0.05), motion.nu.shape[1]
     there = moved(motion, step)
-    charts, nu, place = there.charts.centred(step[:, :r], there.epsilon)
+    found = there.charts.centred(step[:, :r], there.epsilon)
+    assert found is not None
+    charts, nu, place = found
     again = charts.at(np.zeros_like(nu), nu)
+    assert again is not None
     for one in (place, again):
         np.testing.assert_allclose(one.q, there.place.q, atol=ON_PATH)
         np.testing.assert_allclose(one.qd, there.place.qd, atol=1e-9)
@@ -92,6 +95,20 @@ def test_charts_around_nodes_are_of_the_same_motion(case: Case) -> None:
     np.testing.assert_allclose(jacobians @ charts.bases, 0.0, atol=1e-9)
     unit = np.swapaxes(charts.bases, 1, 2) @ charts.bases
     np.testing.assert_allclose(unit, np.broadcast_to(np.eye(unit.shape[1]), unit.shape), atol=1e-12)
+
+
+def test_other_null_motions_of_the_same_nodes_change_nothing_else(case: Case) -> None:
+    motion = centred(nodes_of(problem_of(case)))
+    wanted, none = np.random.default_rng(9).normal(size=motion.place.q.shape), 0.0 * motion.nu
+    found = motion.charts.moving(motion.place, wanted)
+    expected = motion.charts.centred(none, wanted)
+    assert expected is not None
+    np.testing.assert_allclose(found.nu, expected.nu, atol=1e-9)
+    for name in ("q", "qd", "tangents"):
+        own, other = (getattr(one.place, name) for one in (found, expected))
+        np.testing.assert_allclose(own, other, atol=1e-9)
+    slopes = [each.charts.pulled(each.place, wanted, wanted[::-1]) for each in (found, expected)]
+    np.testing.assert_allclose(slopes[0], slopes[1], atol=1e-8 * np.abs(slopes[1]).max())
 
 
 def test_towards_a_configuration(case: Case) -> None:

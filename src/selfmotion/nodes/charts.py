@@ -34,6 +34,21 @@ class Place:
     table: Array
 
 
+class Centred(NamedTuple):
+    """Nodes at the reference of their charts.
+
+    Attributes
+    ----------
+    charts : Charts
+    nu : (N + 1, r)
+    place : Place
+    """
+
+    charts: "Charts"
+    nu: Array
+    place: Place
+
+
 @dataclass(frozen=True, eq=False)
 class Charts:
     """Charts of the self-motion manifolds of all nodes, around a motion on the path.
@@ -58,7 +73,7 @@ class Charts:
         """Return the nodes at z and ν, (N + 1, r) each; None where one is not to be had."""
         return self._looked(z, self.null_motions(nu), centred=False)
 
-    def centred(self, z: Array, epsilon: Array) -> "Centred | None":
+    def centred(self, z: Array, epsilon: Array) -> Centred | None:
         """Return charts around the nodes at z (N + 1, r), with what of ε (N + 1, n) acts there.
 
         None where a node is not to be had.
@@ -71,13 +86,25 @@ class Charts:
         nu = (np.swapaxes(place.tangents, 1, 2) @ own[:, :, None])[:, :, 0]
         return Centred(around, nu, place)
 
+    def moving(self, place: Place, qd: Array) -> Centred:
+        """Return the nodes at their `place` at the reference, as fast as q̇ (N + 1, n) in its span.
+
+        J takes N0 to 0, so that another null motion changes q̇ by as much, and nothing else.
+        """
+        nu = (np.swapaxes(self.bases, 1, 2) @ qd[:, :, None])[:, :, 0]
+        table, epsilon = place.table.copy(), self.null_motions(nu)
+        rates, before = self.manifolds.rates(table)
+        rates += epsilon - before
+        before[:] = epsilon
+        return Centred(self, nu, Place(place.q, np.array(rates), place.tangents, table))
+
     def null_motions(self, nu: Array) -> Array:
         """Return ε = N0 ν, (N + 1, n)."""
         return np.asarray((self.bases @ nu[:, :, None])[:, :, 0])
 
     def _looked(self, z: Array, epsilon: Array, *, centred: bool) -> Place | None:
         own, bases = self.manifolds, self.bases
-        q, table, tangents = self.q + self.null_motions(z), own.table(), np.empty_like(bases)
+        q, table, tangents = np.empty_like(self.q), own.table(), np.empty_like(bases)
         qd, null_motions = own.rates(table)
         null_motions[:] = epsilon
         z = np.ascontiguousarray(z)
@@ -104,21 +131,6 @@ class Charts:
             out,
         )
         return out
-
-
-class Centred(NamedTuple):
-    """Nodes at the reference of their charts.
-
-    Attributes
-    ----------
-    charts : Charts
-    nu : (N + 1, r)
-    place : Place
-    """
-
-    charts: Charts
-    nu: Array
-    place: Place
 
 
 class Manifolds:

@@ -51,13 +51,13 @@ def look(
     tangents: Array,
     centred: bool,
 ) -> int:
-    """Put each of q (K, n) onto its manifold at its coordinates z (K, r), and evaluate eq. 4 there.
+    """Put nodes onto their manifolds at coordinates z (K, r), and evaluate eq. 4 there.
 
     For charts with `bases` (K, n, r) and `references` (K, n), and `targets` (K, 12 F). Rows of the
-    `table` hold paths and null motions already; q, q̇ and all else is set, and T in `tangents`
-    (K, n, r). Or, `centred`, an orthonormal basis of the null space instead of T, and of ε what is
-    in it: the same motion in charts around it. Returns the first node for which that is impossible,
-    or -1.
+    `table` hold paths and null motions already; q̇ and all else is set, q (K, n), and T in
+    `tangents` (K, n, r). Or, `centred`, an orthonormal basis of the null space instead of T, and of
+    ε what is in it: the same motion in charts around it. Returns the first node for which that is
+    impossible, or -1.
     """
     (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
     tips = layout.shape[0]
@@ -68,6 +68,10 @@ def look(
     for k in range(count):
         # Views: slices are counted references, which take as long as what is done with them.
         here, off = view(q[k], 0, (n,)), np.inf
+        for j in range(n):
+            here[j] = references[k, j]
+            for x in range(r):
+                here[j] += bases[k, j, x] * coordinates[k, x]
         for _ in range(_STEPS):
             place_tips(here, chains, turns, places, rotations, positions, jacobians)
             off = approach(

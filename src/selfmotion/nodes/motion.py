@@ -111,14 +111,19 @@ class NodeGrid:
 
         None where a node does not come onto its manifold.
         """
-        return self.around(self.manifolds.charts(q), qd)
-
-    def around(self, charts: Charts, qd: Array) -> "NodeMotion | None":
-        """Return the motion at z = 0 of charts whose velocities are nearest to q̇, or None."""
-        epsilon = qd.copy()
-        epsilon[self._resting] = 0.0
-        found = charts.centred(np.zeros((len(qd), charts.bases.shape[2])), epsilon)
+        charts = self.manifolds.charts(q)
+        found = charts.centred(np.zeros((len(q), charts.bases.shape[2])), self._free(qd))
         return None if found is None else self.at(*found)
+
+    def moving(self, motion: "NodeMotion", qd: Array) -> "NodeMotion":
+        """Return the motion through the same nodes whose velocities are nearest to q̇."""
+        return self.at(*motion.charts.moving(motion.place, self._free(qd)))
+
+    def _free(self, qd: Array) -> Array:
+        """Return what velocities are where the arm does not rest."""
+        found = qd.copy()
+        found[self._resting] = 0.0
+        return found
 
     def motion_towards(self, start: Array, wanted: Array, time: float) -> "NodeMotion | None":
         """Return a motion from a start (n,) whose self-motion goes towards `wanted` (n,).
@@ -252,12 +257,11 @@ class NodeMotion:
             self.__dict__.pop(name, None)
         self.samples.forget()
 
-    def smoothed(self) -> "NodeMotion | None":
+    def smoothed(self) -> "NodeMotion":
         """Return the motion through the same nodes, as fast there as a spline through them.
 
         Where few nodes are, the velocities that are best by the samples of the cost waver about
         those of a smooth motion through the same nodes, which differ by next to nothing in cost.
-        None where a node does not come onto its manifold.
         """
         from scipy.interpolate import CubicSpline
 
@@ -269,7 +273,7 @@ class NodeMotion:
                 part = slice(first, last + 1)
                 sides: Any = ((1, qd[first]), (1, qd[last]))
                 qd[part] = CubicSpline(t[part], q[part], bc_type=sides)(t[part], 1)
-        return self.grid.around(self.charts, qd)
+        return self.grid.moving(self, qd)
 
     @cached_property
     def trajectory(self) -> Trajectory:

@@ -101,12 +101,16 @@ class _Solver:
         motion = self.motion
         motion.grid.counts.gradients += 1
         slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
-        gradient = motion.charts.pulled(motion.place, slopes[:, 0], slopes[:, 1])
+        by_both, by_prices, continuity = slopes, slopes, motion.grid.continuity
+        if continuity is not None:
+            by_both = slopes + scattered(continuity.slopes(motion.samples))
+        gradient = motion.charts.pulled(motion.place, by_both[:, 0], by_both[:, 1])
         gradient.reshape(-1)[motion.grid.held] = 0.0
-        if self._is_there(gradient):
-            stops = told(Step(motion, float(np.linalg.norm(gradient)), self._length))
-            return Status.STOPPED if stops else Status.CONVERGED
-        by_prices = slopes
+        is_there = self._is_there(gradient)
+        if told(Step(motion, float(np.linalg.norm(gradient)), self._length)):
+            return Status.STOPPED
+        if is_there:
+            return Status.CONVERGED
         if self._columns.size:
             prices = np.zeros_like(motion.h)
             prices[:, self._columns] = self._prices
@@ -116,12 +120,7 @@ class _Solver:
         around = Around.of(motion.charts, motion.nu, by_prices)
         if around is None:
             return Status.GRADIENT
-        jumps, by_jumps = self._jumps(around)
-        gradient += spread((by_jumps @ jumps[:, :, None])[:, :, 0])
-        gradient.reshape(-1)[motion.grid.held] = 0.0
-        if told(Step(motion, float(np.linalg.norm(gradient)), self._length)):
-            return Status.STOPPED
-        rows = self._rows(around)
+        rows, by_jumps = self._rows(around), self._by_jumps(around)
         ends = motion.grid.ends.border(motion.c, around.changes, motion.grid.held)
         intervals = motion.grid.cost.curvature(motion.samples, motion.partials, around.changes)
         gap = motion.wanted[:, self._columns] + self._slacks
@@ -170,14 +169,12 @@ class _Solver:
         motion = self.motion
         return motion.grid.conditions.rows(motion.samples.checked, around.changes, self._columns)
 
-    def _jumps(self, around: Around) -> tuple[Array, Array]:
-        """Return what jumps of q̈ weigh, (N + 1, j), and its derivatives by w, (N + 1, 6r, j)."""
-        motion, (count, _, _, size) = self.motion, around.changes.shape
-        continuity = motion.grid.continuity
+    def _by_jumps(self, around: Around) -> Array:
+        """Return the derivatives by w of what jumps of q̈ weigh, (N + 1, 6r, j)."""
+        continuity, (count, _, _, size) = self.motion.grid.continuity, around.changes.shape
         if continuity is None:
-            return np.zeros((count, 0)), np.zeros((count, 3 * size, 0))
-        tangents = continuity.tangents(around.changes)
-        return continuity.jumps(motion.samples), np.swapaxes(tangents, 1, 2)
+            return np.zeros((count, 3 * size, 0))
+        return np.swapaxes(continuity.tangents(around.changes), 1, 2)
 
     def _solved(self, gap: Array) -> bool:
         """Whether the problem with the present barrier is solved well enough."""

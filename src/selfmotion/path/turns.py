@@ -39,7 +39,7 @@ class Turning:
         """Return orientations (K, 3, 3) and angular velocities (K, 3) at times, world axes."""
         k: npt.NDArray[np.intp] = np.searchsorted(self.x[1:-1], t, side="right")
         s = (t - self.x[k])[:, None]
-        cubic, square, slope, none = self.c[:, k]
+        cubic, square, slope, none = self.c.take(k, axis=1)
         vectors = ((cubic * s + square) * s + slope) * s + none
         rates = (3.0 * cubic * s + 2.0 * square) * s + slope
         first = self._first[k]
