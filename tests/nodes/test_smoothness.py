@@ -43,8 +43,9 @@ def test_tangents_are_central_differences(case: Case, rest: bool) -> None:
     by = scattered(continuity.slopes(motion.samples))
     pulled = charts.pulled(motion.place, by[:, 0], by[:, 1])
     jumps = continuity.jumps(motion.samples)
-    size = np.abs(pulled).max() * step.size
-    assert float(np.sum(pulled * step)) == pytest.approx(np.sum(jumps * found), abs=ALIKE * size)
+    # Rounding of what hardly jumps is all there is to see.
+    allowed = ALIKE * np.abs(jumps).max() * np.abs(found).max() * step.size + 1e-12
+    assert float(np.sum(pulled * step)) == pytest.approx(np.sum(jumps * found), abs=allowed)
 
 
 def test_jumps_are_those_of_the_spline(panda: sm.RobotModel) -> None:
