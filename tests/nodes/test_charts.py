@@ -43,7 +43,7 @@ def test_accelerations_are_those_of_the_path(case: Case) -> None:
     motion = nodes_of(problem_of(case), 8)
     motion = centred(moved(motion, random_step(motion, 5, 0.05)))
     q, qd, t = motion.place.q[1:-1], motion.place.qd[1:-1], motion.grid.t[1:-1]
-    qdd = motion.grid.manifolds.accelerations(motion.place.q, motion.place.qd)[1:-1]
+    qdd = motion.grid.manifolds.accelerations(motion.place)[1:-1]
     null = motion.charts.bases[1:-1, :, 0]
     item, errors = motion.grid.problem.follows.items[0], []
     for step in np.array([2e-2, 1e-2]) / max(1.0, np.abs(qd).max()):

@@ -41,6 +41,7 @@ from selfmotion.kernels.table import (
     columns as columns,
     path_of as path_of,
     rates_of as rates_of,
+    rows_along as rows_along,
     stage_of as stage_of,
     tip_of as tip_of,
     view as view,

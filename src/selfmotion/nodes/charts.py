@@ -149,17 +149,18 @@ class Manifolds:
         self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
         self.work = np.zeros(kernels.space_size(*self._sizes))
         self.no_error = np.zeros((len(follows.items), 6))
-        # At the nodes, and a moment before and after: one step back, one on; at the ends of the
-        # path both inside.
+        # A moment before each node and after: one step back, one on; at the ends of the path both
+        # inside.
         step, end = _STEP * t[-1], t[-1]
-        self._steps = step * np.array([0.0, -1.0, 1.0])[:, None] * np.ones(len(t))
-        self._steps[1:, t <= step] = step * np.array([1.0, 2.0])[:, None]
-        self._steps[1:, t >= end - step] = step * np.array([-2.0, -1.0])[:, None]
+        self._steps = step * np.array([-1.0, 1.0])[:, None] * np.ones(len(t))
+        self._steps[:, t <= step] = step * np.array([1.0, 2.0])[:, None]
+        self._steps[:, t >= end - step] = step * np.array([-2.0, -1.0])[:, None]
+        times = np.concatenate([t, *(t + self._steps)])
         self._twists, self._paths = [], []
         for item in follows.items:
-            all_times = item.target((t + self._steps).ravel())
-            self._twists.append(all_times.twist)
-            parts = all_times.translation, all_times.rotation.reshape(-1, 9), all_times.twist
+            own = item.target(times)
+            self._twists.append(own.twist[len(t) :])
+            parts = own.translation, own.rotation.reshape(-1, 9), own.twist
             self._paths.append(np.hstack([part[: len(t)] for part in parts]))
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
 
@@ -179,25 +180,24 @@ class Manifolds:
         """Return charts around a motion near the path, q (N + 1, n)."""
         return Charts(self, q, carried_bases(self.follows, q))
 
-    def accelerations(self, q: Array, qd: Array) -> Array:
-        """Return the least q̈ by which motions q, q̇ (N + 1, n) follow the path: J⁺(ẍ - J̇q̇).
+    def accelerations(self, place: Place) -> Array:
+        """Return the least q̈ by which nodes follow the path, (N + 1, n): J⁺(ẍ - J̇q̇).
 
         J q̈ is the rate of ẋ - J q̇ along the motion at fixed q̇: a central difference, which at marks
         of the path, where it may jump, is the mean of both sides.
         """
-        steps, (count, n) = self._steps, q.shape
-        moved = (q + steps[:, :, None] * qd).reshape(-1, n)
-        all_rows, twists = [], []
+        steps, (count, n) = self._steps, place.q.shape
+        moved, rates = place.q + steps[:, :, None] * place.qd, np.tile(place.qd, (2, 1))[:, :, None]
+        unmet = []
         for item, twist in zip(self.follows.items, self._twists, strict=True):
-            jacobian, rotation, _ = item.chain.along(moved)
-            all_rows.append(item.task.select_along(jacobian, rotation))
-            twists.append(item.task.select_along(twist[:, :, None], rotation)[:, :, 0])
-        rows = np.concatenate(all_rows, axis=1).reshape(len(steps), count, -1, n)
-        unmet = np.concatenate(twists, axis=1).reshape(len(steps), count, -1)
-        unmet = unmet - (rows @ qd[:, :, None])[:, :, :, 0]
-        right = ((unmet[2] - unmet[1]) / (steps[2] - steps[1])[:, None])[:, :, None]
-        turned = np.swapaxes(rows[0], 1, 2)
-        return np.asarray((turned @ np.linalg.solve(rows[0] @ turned, right))[:, :, 0])
+            jacobian, rotation, _ = item.chain.along(moved.reshape(-1, n))
+            off = twist[:, :, None] - jacobian @ rates
+            unmet.append(item.task.select_along(off, rotation)[:, :, 0])
+        before, after = np.concatenate(unmet, axis=1).reshape(2, count, -1)
+        right = ((after - before) / (steps[1] - steps[0])[:, None])[:, :, None]
+        rows = kernels.rows_along(place.table, n, right.shape[1])
+        turned = np.swapaxes(rows, 1, 2)
+        return np.asarray((turned @ np.linalg.solve(rows @ turned, right))[:, :, 0])
 
 
 def orthonormal(tangents: Array) -> Array:

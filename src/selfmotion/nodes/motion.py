@@ -283,7 +283,7 @@ class NodeMotion:
         and α is that of the side along the limit. q̈ is 0 where the arm rests.
         """
         problem, t, place = self.grid.problem, self.grid.t, self.place
-        qdd = self.grid.manifolds.accelerations(place.q, place.qd)
+        qdd = self.grid.manifolds.accelerations(place)
         along = self.along
         before, after = np.append(False, along), np.append(along, False)
         sides = self.grid.spline.accelerations(self.samples.ends)
