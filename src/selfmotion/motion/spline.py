@@ -69,9 +69,12 @@ class Spline:
 
     def within(self, shares: Array, order: int) -> Array:
         """Return the same at these shares (S,) of each interval, then at the end, (…, n)."""
-        inner = [evaluated(self.pieces(k, order)[:, :, None], shares[:, None]) for k in self.lots()]
-        n = self.q.shape[1]
-        return np.vstack([*(lot.reshape(-1, n) for lot in inner), self._at(self.t[-1:], order)])
+        found = []
+        for k in self.lots():
+            pieces = self.pieces(k, order)
+            each = np.tensordot(shares[:, None] ** np.arange(len(pieces)), pieces, 1)
+            found.append(each.swapaxes(0, 1).reshape(-1, pieces.shape[-1]))
+        return np.concatenate([*found, self._at(self.t[-1:], order)])
 
     def _at(self, t: Array, order: int) -> Array:
         k, s = self.place(t)

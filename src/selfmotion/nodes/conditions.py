@@ -10,7 +10,13 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints
-from selfmotion.constraints import BoundClearance, BoundConstraint, NodeTangents, linearised
+from selfmotion.constraints import (
+    BoundClearance,
+    BoundConstraint,
+    BoundLimits,
+    NodeTangents,
+    linearised,
+)
 from selfmotion.costs import Samples
 from selfmotion.nodes.hermite import CheckedSamples, Hermite, weighted
 
@@ -160,6 +166,9 @@ class NodeConditions:
         """Return the highest derivative of q that each condition depends on, (C,)."""
         found = [np.zeros(0, dtype=np.int64)]
         for item in self.constraints:
+            if isinstance(item, BoundLimits):
+                found.append(np.full(2 * len(item.joints), item.order))
+                continue
             known = linearised(item, samples, self._units)
             own = known.count // (2 * len(self.spline.t) - 1)
             if isinstance(item, BoundClearance):

@@ -111,8 +111,11 @@ class NodeGrid:
 
         None where a node does not come onto its manifold.
         """
-        charts = self.manifolds.charts(q)
-        found = charts.centred(np.zeros((len(q), charts.bases.shape[2])), self._free(qd))
+        return self.around(self.manifolds.charts(q), qd)
+
+    def around(self, charts: Charts, qd: Array) -> "NodeMotion | None":
+        """Return the motion at z = 0 of charts whose velocities are nearest to q̇, or None."""
+        found = charts.centred(np.zeros((len(qd), charts.bases.shape[2])), self._free(qd))
         return None if found is None else self.at(*found)
 
     def moving(self, motion: "NodeMotion", qd: Array) -> "NodeMotion":
@@ -302,5 +305,8 @@ class NodeMotion:
         """Return the motion on other nodes."""
         from scipy.interpolate import CubicHermiteSpline
 
-        spline = CubicHermiteSpline(self.grid.t, self.place.q, self.place.qd)
-        return grid.near(spline(grid.t), spline(grid.t, 1))
+        t, place = self.grid.t, self.place
+        spline = CubicHermiteSpline(t, place.q, place.qd)
+        # What is nearly a basis will do for charts to begin with, and turns as those around it do.
+        bases = self.charts.bases[np.searchsorted(t, grid.t, side="right") - 1]
+        return grid.around(Charts(grid.manifolds, spline(grid.t), bases), spline(grid.t, 1))
