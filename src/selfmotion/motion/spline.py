@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
 
 import numpy as np
 
@@ -98,20 +97,23 @@ class Spline:
 
         s goes from 0 to 1 in each.
         """
-        if len(self.t) <= _LOT:
-            return self._derivatives[order][:, k]
-        return next(islice(self._differentiated(k), order, None))
+        if len(self.t) > _LOT:
+            return self._differentiated(k, order)
+        if order not in self._derivatives:
+            every = np.arange(len(self.t) - 1)
+            self._derivatives[order] = self._differentiated(every, order)
+        return self._derivatives[order][:, k]
 
     @cached_property
-    def _derivatives(self) -> list[Array]:
-        """The pieces of all orders, of a motion with few samples."""
-        return list(self._differentiated(np.arange(len(self.t) - 1)))
+    def _derivatives(self) -> dict[int, Array]:
+        """The pieces of some orders, of a motion with few samples."""
+        return {}
 
-    def _differentiated(self, k: Ints) -> Iterator[Array]:
-        pieces, steps = self._of(k), (self.t[k + 1] - self.t[k])[..., None]
-        for _ in range(4):
-            yield pieces
-            pieces = differentiated(pieces) / steps
+    def _differentiated(self, k: Ints, order: int) -> Array:
+        if order == 0:
+            return self._of(k)
+        steps = (self.t[k + 1] - self.t[k])[..., None]
+        return differentiated(self._differentiated(k, order - 1)) / steps
 
     def _of(self, k: Ints) -> Array:
         """Return the coefficients of q in some of the intervals (I,), (m, I, n)."""
