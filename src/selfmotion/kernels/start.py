@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, called, kernel
+from selfmotion.basics import Array, inlined, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
 from selfmotion.kernels.tool import errors_and_rows, rows_of
@@ -38,7 +38,7 @@ def approach_start(
     )
 
 
-@called
+@inlined
 def approach(
     q: Array,
     jacobians: Array,

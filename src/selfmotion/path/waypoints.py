@@ -196,6 +196,8 @@ class Waypoints(Path, kind="waypoints"):
 
     def _warp(self, t: Array) -> tuple[Array, Array]:
         """Return the time τ on the splines and dτ/dt: τ = t, but resting at the corners."""
+        if not self._stops.any():
+            return t, np.ones_like(t)
         k, h, (a, c3, c4, c5) = self._warps(t)
         u = (t - self._t[k]) / h
         tau = a * u + u**3 * (c3 + u * (c4 + u * c5))
@@ -222,12 +224,11 @@ class Waypoints(Path, kind="waypoints"):
         position, rotation = np.empty((len(t), 3)), np.empty((len(t), 3, 3))
         twist = np.empty((len(t), 6))
         for index, (line, turn) in enumerate(splines):
-            here = piece == index
-            if not np.any(here):
-                continue
-            position[here] = line(tau[here])
-            twist[here, :3] = line(tau[here], 1)
-            rotation[here], twist[here, 3:] = turn.at(tau[here])
+            here: Any = slice(None) if len(splines) == 1 else np.flatnonzero(piece == index)
+            own = tau[here]
+            if len(own):
+                position[here], twist[here, :3] = line(own), line(own, 1)
+                rotation[here], twist[here, 3:] = turn.at(own)
         return PathSamples(t, position, rotation, twist * slope[:, None])
 
     def series(self, middle: Array, half: Array) -> PathSeries:
