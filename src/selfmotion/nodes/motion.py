@@ -275,7 +275,8 @@ class NodeMotion:
             if last - first > 1:
                 part = slice(first, last + 1)
                 sides: Any = ((1, qd[first]), (1, qd[last]))
-                qd[part] = CubicSpline(t[part], q[part], bc_type=sides)(t[part], 1)
+                # The coefficients of first order: the slopes at all nodes but the last.
+                qd[first:last] = CubicSpline(t[part], q[part], bc_type=sides).c[2]
         return self.grid.moving(self, qd)
 
     @cached_property

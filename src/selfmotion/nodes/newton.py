@@ -196,9 +196,11 @@ class _Solver:
         count, size = gradient.shape
         ratio = self._prices / self._slacks
         turned = np.swapaxes(rows, 1, 2)
-        pressure = (self._barrier / self._slacks + ratio * gap)[:, :, None]
-        right = (gradient + spread((turned @ pressure)[:, :, 0])).ravel()
-        right[self.motion.grid.held] = 0.0
+        right = gradient.flatten()
+        if rows.shape[1]:
+            pressure = (self._barrier / self._slacks + ratio * gap)[:, :, None]
+            right += spread((turned @ pressure)[:, :, 0]).ravel()
+            right[self.motion.grid.held] = 0.0
         wide = bool(rows.shape[1] or by_jumps.shape[2])
         largest = float(np.abs(curved).max() + np.abs(intervals).max())
         diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
@@ -225,6 +227,8 @@ class _Solver:
 
     def _others(self, rows: Array, gap: Array, step: Array) -> tuple[Array, Array]:
         """Return the steps of slacks and prices that go with one of the coordinates."""
+        if not gap.size:
+            return gap, gap
         near = np.zeros((len(step), 3, step.shape[1]))
         near[1:, 0], near[:, 1], near[:-1, 2] = step[:-1], step, step[1:]
         by_slack = -gap - (rows @ near.reshape(len(step), -1, 1))[:, :, 0]
@@ -280,4 +284,6 @@ class _Solver:
 def _longest(values: Array, step: Array) -> float:
     """Return the share of a step, at most 1, that keeps positive values well above 0."""
     falling = step < 0.0
-    return float(np.min(_INWARD * -values[falling] / step[falling], initial=1.0))
+    if not falling.any():
+        return 1.0
+    return min(1.0, float(np.min(_INWARD * -values[falling] / step[falling])))

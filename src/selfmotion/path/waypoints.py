@@ -196,8 +196,6 @@ class Waypoints(Path, kind="waypoints"):
 
     def _warp(self, t: Array) -> tuple[Array, Array]:
         """Return the time τ on the splines and dτ/dt: τ = t, but resting at the corners."""
-        if not self._stops.any():
-            return t, np.ones_like(t)
         k, h, (a, c3, c4, c5) = self._warps(t)
         u = (t - self._t[k]) / h
         tau = a * u + u**3 * (c3 + u * (c4 + u * c5))
