@@ -43,7 +43,7 @@ def test_accelerations_are_those_of_the_path(case: Case) -> None:
     motion = nodes_of(problem_of(case), 8)
     motion = centred(moved(motion, random_step(motion, 5, 0.05)))
     q, qd, t = motion.place.q[1:-1], motion.place.qd[1:-1], motion.grid.t[1:-1]
-    qdd = motion.grid.manifolds.accelerations(motion.place.q, motion.place.qd)[1:-1]
+    qdd = motion.grid.manifolds.accelerations(motion.place)[1:-1]
     null = motion.charts.bases[1:-1, :, 0]
     item, errors = motion.grid.problem.follows.items[0], []
     for step in np.array([2e-2, 1e-2]) / max(1.0, np.abs(qd).max()):
@@ -74,39 +74,41 @@ def test_tangents_and_pullbacks_are_central_differences(case: Case) -> None:
     assert abs(np.sum(wrong * step) - expected) > 1e-4
 
 
-def test_null_motions_are_added_where_charts_begin(case: Case) -> None:
-    """What is known of ν = 0 and of ε there is what eq. 4 says of both."""
+def test_charts_around_nodes_are_of_the_same_motion(case: Case) -> None:
+    """What of ε does not act is left out, and what is known there is what eq. 4 says anew."""
     motion = nodes_of(problem_of(case))
-    rng = np.random.default_rng(8)
-    nu = rng.normal(size=motion.nu.shape)
-    none = np.zeros_like(nu)
-    rests, expected = (motion.charts.at(none, each) for each in (none, nu))
-    assert rests is not None
-    assert expected is not None
-    found = motion.charts.moving(rests, nu)
-    for own, other in (
-        (found.q, expected.q),
-        (found.qd, expected.qd),
-        (found.tangents, expected.tangents),
-    ):
-        np.testing.assert_allclose(own, other, atol=1e-9)
-    by_q, by_qd = rng.normal(size=(2, *found.q.shape))
-    slopes = [motion.charts.pulled(place, by_q, by_qd) for place in (found, expected)]
-    np.testing.assert_allclose(slopes[0], slopes[1], atol=1e-8 * np.abs(slopes[1]).max())
-
-
-def test_charts_around_a_motion_are_of_the_same_motion(case: Case) -> None:
-    motion = nodes_of(problem_of(case))
-    motion = moved(motion, random_step(motion, 5, 0.05))
-    around = centred(motion)
-    again = around.grid.motion(around.charts, around.nu)
+    step, r = random_step(motion, 5, 0.05), motion.nu.shape[1]
+    there = moved(motion, step)
+    found = there.charts.centred(step[:, :r], there.epsilon)
+    assert found is not None
+    charts, nu, place = found
+    again = charts.at(np.zeros_like(nu), nu)
     assert again is not None
-    np.testing.assert_allclose(again.place.q, motion.place.q, atol=ON_PATH)
-    np.testing.assert_allclose(again.place.qd, motion.place.qd, atol=1e-9)
-    jacobians = np.array([motion.grid.problem.follows.jacobian(q) for q in again.place.q])
-    np.testing.assert_allclose(jacobians @ around.charts.bases, 0.0, atol=1e-9)
-    unit = np.swapaxes(around.charts.bases, 1, 2) @ around.charts.bases
+    for one in (place, again):
+        np.testing.assert_allclose(one.q, there.place.q, atol=ON_PATH)
+        np.testing.assert_allclose(one.qd, there.place.qd, atol=1e-9)
+        np.testing.assert_allclose(one.tangents, charts.bases, atol=1e-9)
+    by_q, by_qd = np.random.default_rng(8).normal(size=(2, *place.q.shape))
+    slopes = [charts.pulled(one, by_q, by_qd) for one in (place, again)]
+    np.testing.assert_allclose(slopes[0], slopes[1], atol=1e-8 * np.abs(slopes[1]).max())
+    jacobians = np.array([motion.grid.problem.follows.jacobian(q) for q in place.q])
+    np.testing.assert_allclose(jacobians @ charts.bases, 0.0, atol=1e-9)
+    unit = np.swapaxes(charts.bases, 1, 2) @ charts.bases
     np.testing.assert_allclose(unit, np.broadcast_to(np.eye(unit.shape[1]), unit.shape), atol=1e-12)
+
+
+def test_other_null_motions_of_the_same_nodes_change_nothing_else(case: Case) -> None:
+    motion = centred(nodes_of(problem_of(case)))
+    wanted, none = np.random.default_rng(9).normal(size=motion.place.q.shape), 0.0 * motion.nu
+    found = motion.charts.moving(motion.place, wanted)
+    expected = motion.charts.centred(none, wanted)
+    assert expected is not None
+    np.testing.assert_allclose(found.nu, expected.nu, atol=1e-9)
+    for name in ("q", "qd", "tangents"):
+        own, other = (getattr(one.place, name) for one in (found, expected))
+        np.testing.assert_allclose(own, other, atol=1e-9)
+    slopes = [each.charts.pulled(each.place, wanted, wanted[::-1]) for each in (found, expected)]
+    np.testing.assert_allclose(slopes[0], slopes[1], atol=1e-8 * np.abs(slopes[1]).max())
 
 
 def test_towards_a_configuration(case: Case) -> None:

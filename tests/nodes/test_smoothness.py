@@ -5,6 +5,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.nodes import NodeMotion
+from selfmotion.nodes.objective import scattered
 from support.arms import PANDA_HOME, Case
 from support.nodes import around_of, nodes_of, problem_of
 
@@ -38,6 +39,13 @@ def test_tangents_are_central_differences(case: Case, rest: bool) -> None:
     near = np.concatenate([padded[:-2], step, padded[2:]], axis=1)
     found = (tangents @ near[:, :, None])[:, :, 0]
     np.testing.assert_allclose(found, expected, atol=ALIKE * np.abs(expected).max())
+    # So are the slopes of half the squares.
+    by = scattered(continuity.slopes(motion.samples))
+    pulled = charts.pulled(motion.place, by[:, 0], by[:, 1])
+    jumps = continuity.jumps(motion.samples)
+    # Rounding of what hardly jumps is all there is to see.
+    allowed = ALIKE * np.abs(jumps).max() * np.abs(found).max() * step.size + 1e-12
+    assert float(np.sum(pulled * step)) == pytest.approx(np.sum(jumps * found), abs=allowed)
 
 
 def test_jumps_are_those_of_the_spline(panda: sm.RobotModel) -> None:

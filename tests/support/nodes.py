@@ -26,7 +26,8 @@ def nodes_of(problem: sm.Problem, count: int = 12, *, free: bool = False) -> Nod
     trajectory = Trajectory(still.grid.nodes, still.q, still.qd, problem.robot.joint_names)
     constraints = problem.bind_constraints(start, still.end)
     t = np.linspace(0.0, problem.path.duration, count + 1)
-    motion = NodeGrid(problem, t, constraints, free=free, counts=Counts()).motion_near(trajectory)
+    grid = NodeGrid(problem, t, constraints, free=free, counts=Counts())
+    motion = grid.near(trajectory(t), trajectory(t, 1))
     assert motion is not None
     return motion
 
@@ -42,7 +43,7 @@ def moved(motion: NodeMotion, step: Array) -> NodeMotion:
 
 def centred(motion: NodeMotion) -> NodeMotion:
     """Return the same nodes with charts around them."""
-    found = motion.recentred()
+    found = motion.grid.near(motion.place.q, motion.place.qd)
     assert found is not None
     return found
 

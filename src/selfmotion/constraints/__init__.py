@@ -25,6 +25,7 @@ from selfmotion.constraints.ends import (
 )
 from selfmotion.constraints.envelope import Envelope as Envelope
 from selfmotion.constraints.limits import (
+    BoundLimits as BoundLimits,
     JointAccelerationLimits as JointAccelerationLimits,
     JointJerkLimits as JointJerkLimits,
     JointPositionLimits as JointPositionLimits,

@@ -24,12 +24,11 @@ from selfmotion.path import Path, PathSamples
 from selfmotion.task import (
     SMALL_TURN,
     Relaxation,
-    exponentials,
-    left,
     left_derivative,
     left_matrices,
     skews,
     turn,
+    turning,
 )
 
 _DEGREE = 3
@@ -112,10 +111,10 @@ class Deviation:
         rows, rates = self._rows(self._bent(c))
         rotation, twist = nominal.rotation, nominal.twist.copy()
         twist[:, :3] += self._to_world(rows[:, :3], rates[:, :3])
-        turned = rotation @ exponentials(rows[:, 3:])
-        twist[:, 3:] += turn(rotation, left(rows[:, 3:], rates[:, 3:]))
+        turned, angular = turning(rows[:, 3:], rates[:, 3:])
+        twist[:, 3:] += turn(rotation, angular)
         translation = nominal.translation + self._shift(rows[:, :3])
-        return PathSamples(nominal.t, translation, turned, twist)
+        return PathSamples(nominal.t, translation, rotation @ turned, twist)
 
     def matrix(self, c: Array) -> Array:
         """Return ∂target/∂c, (S, 12, size): [∂p; world rotation vector of ∂R; ∂twist]."""

@@ -62,6 +62,8 @@ class Objective:
         self._evaluation: Evaluation | None = None
         self._terms: dict[str, float] = {}
         self._first = rollout.first_target
+        # Whether the rollout holds the motion of x = 0.
+        self._is_rolled = False
 
     @classmethod
     def of(
@@ -96,12 +98,12 @@ class Objective:
         around : (S, n), optional
             The null motion of x = 0; by default that of `still`.
         rollout : Rollout, optional
-            One on this grid that nobody else uses any more; by default a new one.
+            That of `still`, on this grid, which nobody else uses any more; by default a new one.
         """
         follows, grid = problem.follows, grid or still.grid
         t = grid.stage_times
         start: Start = FreeStart(follows, still.start) if free else FixedStart(still.start)
-        return cls(
+        found = cls(
             rollout or Rollout(follows, grid, damping=problem.damping_law),
             null_motion_table(problem, t, still, null_motion or problem.null_motion, around),
             problem.all_costs,
@@ -110,6 +112,8 @@ class Objective:
             Conditions(constraints, grid),
             Counts() if counts is None else counts,
         )
+        found._is_rolled = rollout is not None and not (start.size or found._deviation.size)
+        return found
 
     @property
     def grid(self) -> Grid:
@@ -274,7 +278,9 @@ class Objective:
         start = self.start.configuration(z, first)
         if start is None:
             return
-        if self.rollout.run(start, self.null_motion.epsilon(coefficients)) is not None:
+        is_rolled, self._is_rolled = self._is_rolled and not x.any(), False
+        epsilon = self.null_motion.epsilon(coefficients)
+        if not is_rolled and self.rollout.run(start, epsilon) is not None:
             return
         self._terms = self._costs.values(self.rollout.samples())
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -131,18 +131,11 @@ class StillMotion:
         times = [time for time in (first, self.broken) if time is not None]
         return min(times) if times else None
 
-    def frame(self, t: Array, space: str) -> Array | None:
-        """Return the basis R at times t (S,) of a null motion's space, (S, n, r).
-
-        None for the identity; else the null space along this motion, transported: n × 0 where no
-        self-motion is left.
-        """
-        problem = self.problem
-        if space == "joint":
-            return None
-        if problem.robot.dof == problem.follows.dimension:
-            return np.zeros((len(t), problem.robot.dof, 0))
-        return self._transported(t)
+    def frame(self, t: Array) -> Array:
+        """Return the null space along this motion at times t (S,), transported, (S, n, r)."""
+        n = self.problem.robot.dof
+        none = n == self.problem.follows.dimension
+        return np.zeros((len(t), n, 0)) if none else self._transported(t)
 
     @cached_property
     def _transported(self) -> TransportedFrame:
@@ -163,10 +156,12 @@ def null_motion_table(
 
     Around (S, n) is the null motion of x = 0, by default the guide's.
     """
-    frame = still.frame(t, motion.space)
-    if around is None and still.guide is not None:
-        around = problem.brought_to_rest(t, still.guide(t))
-    rows = problem.robot.dof if frame is None else frame.shape[2]
+    n, is_joint = problem.robot.dof, motion.space == "joint"
+    if around is None:
+        guide = still.guide
+        around = np.zeros((len(t), n)) if guide is None else problem.brought_to_rest(t, guide(t))
+    frame = None if is_joint else partial(still.frame, t)
+    rows = n if is_joint else n - problem.follows.dimension
     return NullMotionTable(problem.null_functions(t, motion), frame, rows, around)
 
 

@@ -104,6 +104,15 @@ class Follows:
             [(f.task.rows, f.task.tool_axes, f.chain.joints) for f in self.items], self.robot.dof
         )
 
+    @cached_property
+    def chains(self) -> Array:
+        """What compiled kernels need of the chains, (F, c + 1, 6, 3): their tables, filled up."""
+        tables = [item.chain.arrays.table for item in self.items]
+        found = np.zeros((len(tables), max(map(len, tables)), *tables[0].shape[1:]))
+        for own, table in zip(found, tables, strict=True):
+            own[: len(table)] = table
+        return found
+
     @property
     def row_names(self) -> tuple[str, ...]:
         """Names of the rows, (m)."""

@@ -15,7 +15,9 @@ given: who has no damping, or a path that does not move, does not wait for their
 
 from selfmotion.kernels.algebra import (
     cholesky as cholesky,
+    finite as finite,
     gram as gram,
+    respond as respond,
     solve_cholesky as solve_cholesky,
 )
 from selfmotion.kernels.backward import (
@@ -30,7 +32,6 @@ from selfmotion.kernels.damping import Law as Law
 from selfmotion.kernels.forward import (
     advance as advance,
     at_tip as at_tip,
-    evaluate as evaluate,
 )
 from selfmotion.kernels.null_space import factor_damped as factor_damped, transport as transport
 from selfmotion.kernels.start import approach as approach, approach_start as approach_start
@@ -40,6 +41,7 @@ from selfmotion.kernels.table import (
     columns as columns,
     path_of as path_of,
     rates_of as rates_of,
+    rows_along as rows_along,
     stage_of as stage_of,
     tip_of as tip_of,
     view as view,

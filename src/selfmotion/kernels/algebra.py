@@ -1,6 +1,6 @@
 """Small dense algebra, compiled: vectors of three, Gram matrices, Cholesky, eigenvectors."""
 
-from math import sqrt
+from math import isfinite, sqrt
 
 from selfmotion.basics import Array, called, inlined
 
@@ -117,12 +117,23 @@ def solve_cholesky(factor: Array, b: Array) -> None:
 
 
 @inlined
+def finite(a: Array) -> bool:
+    """Whether all numbers are."""
+    total = 0.0
+    for k in range(a.shape[0]):
+        total += a[k]
+    return isfinite(total)
+
+
+@inlined
 def respond(jacobian: Array, factor: Array, y: Array, epsilon: Array, qd: Array) -> None:
     """Solve eq. 4: replace y = u by A⁻¹(u - Jε), and set q̇ = Jᵀy + ε."""
     m, n = jacobian.shape
     for i in range(m):
+        total = y[i]
         for k in range(n):
-            y[i] -= jacobian[i, k] * epsilon[k]
+            total -= jacobian[i, k] * epsilon[k]
+        y[i] = total
     solve_cholesky(factor, y)
     for k in range(n):
         total = epsilon[k]

@@ -1,7 +1,5 @@
 """One stage of eq. 4 forward."""
 
-from math import isfinite
-
 from selfmotion.basics import Array, called, inlined, kernel
 from selfmotion.basics.layout import KIND, Layout
 from selfmotion.kernels.algebra import (
@@ -9,6 +7,7 @@ from selfmotion.kernels.algebra import (
     angular,
     cholesky,
     cross,
+    finite,
     gram,
     linear,
     plus,
@@ -100,15 +99,6 @@ def at_tip(base_jacobian: Array, translation: Array, out: Array) -> None:
         v = plus(linear(base_jacobian, k), 1.0, cross(turning, x))
         out[0, k], out[1, k], out[2, k] = v
         out[3, k], out[4, k], out[5, k] = turning
-
-
-@inlined
-def finite(a: Array) -> bool:
-    """Whether all numbers are."""
-    total = 0.0
-    for k in range(a.shape[0]):
-        total += a[k]
-    return isfinite(total)
 
 
 @inlined

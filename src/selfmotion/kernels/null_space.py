@@ -42,21 +42,25 @@ def transport(first: Array, jacobians: Array, pivot: float, bases: Array) -> Non
         factor_damped(jacobian, pivot, factor)
         for x in range(r):
             for i in range(m):
-                y[i] = 0.0
+                total = 0.0
                 for k in range(n):
-                    y[i] += jacobian[i, k] * basis[k, x]
+                    total += jacobian[i, k] * basis[k, x]
+                y[i] = total
             solve_cholesky(factor, y)
             for k in range(n):
+                total = basis[k, x]
                 for i in range(m):
-                    basis[k, x] -= jacobian[i, k] * y[i]
+                    total -= jacobian[i, k] * y[i]
+                basis[k, x] = total
         for _ in range(_POLAR):
             off = 0.0
             for a in range(r):
                 for b in range(r):
-                    inner[a, b] = 0.0
+                    total = 0.0
                     for k in range(n):
-                        inner[a, b] += basis[k, a] * basis[k, b]
-                    off = max(off, abs(inner[a, b] - (1.0 if a == b else 0.0)))
+                        total += basis[k, a] * basis[k, b]
+                    inner[a, b] = total
+                    off = max(off, abs(total - (1.0 if a == b else 0.0)))
             if not off > 1e-12:
                 break
             for k in range(n):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from selfmotion.basics import Array, called, kernel
+from selfmotion.basics import Array, inlined, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels.algebra import cholesky, gram, solve_cholesky
 from selfmotion.kernels.tool import errors_and_rows, rows_of
@@ -38,7 +38,7 @@ def approach_start(
     )
 
 
-@called
+@inlined
 def approach(
     q: Array,
     jacobians: Array,
@@ -63,10 +63,11 @@ def approach(
     m, r, n = rows_of(layout), null.shape[1], q.shape[0]
     errors_and_rows(layout, target, jacobians, rotations, translations, b, system)
     for i in range(r):
-        b[m + i] = z[i]
+        total = z[i]
         for k in range(n):
             system[m + i, k] = null[k, i]
-            b[m + i] -= null[k, i] * (q[k] - reference[k])
+            total -= null[k, i] * (q[k] - reference[k])
+        b[m + i] = total
     largest = 0.0
     for i in range(m + r):
         # Written so that NaN stays.
@@ -77,6 +78,8 @@ def approach(
         return -1.0 if largest < np.inf else np.nan
     solve_cholesky(factor, b)
     for k in range(n):
+        total = q[k]
         for i in range(m + r):
-            q[k] += system[i, k] * b[i]
+            total += system[i, k] * b[i]
+        q[k] = total
     return largest

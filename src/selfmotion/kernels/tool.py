@@ -141,7 +141,7 @@ def pointing_coefficients(sine: float, cosine: float) -> tuple[float, float]:
     return angle / sine, (angle * cosine - sine) / (sine * sine * sine)
 
 
-@called
+@inlined
 def errors_and_rows(
     layout: Layout,
     target: Array,

@@ -1,6 +1,8 @@
 """A null motion at stages of a motion: from coefficients x to ε, and back."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,8 +17,8 @@ class NullMotionTable:
     ----------
     functions : (S, K)
         φ at the stages.
-    frame : (S, n, r) or None
-        R at the stages; None for the identity.
+    frame : callable or None
+        Returns R at the stages, (S, n, r), once it counts; None for the identity.
     rows : int
         Rows of E: r, or n where there is no frame.
     offset : (S, n) or None
@@ -24,9 +26,13 @@ class NullMotionTable:
     """
 
     functions: Array
-    frame: Array | None
+    frame: Callable[[], Array] | None
     rows: int
     offset: Array | None = None
+
+    @cached_property
+    def _frame(self) -> Array | None:
+        return self.frame and self.frame()
 
     @property
     def size(self) -> int:
@@ -35,20 +41,22 @@ class NullMotionTable:
 
     def epsilon(self, x: Array) -> Array:
         """Return ε at the stages for coefficients `x`, (S, n)."""
+        if self.offset is not None and not x.any():
+            return self.offset
         inner: Array = self.functions @ x.reshape(self.rows, self.functions.shape[1]).T
-        outer = inner if self.frame is None else np.einsum("snr,sr->sn", self.frame, inner)
+        outer = inner if self._frame is None else np.einsum("snr,sr->sn", self._frame, inner)
         return outer if self.offset is None else outer + self.offset
 
     def pullback(self, epsilon_gradient: Array) -> Array:
         """Return ∂F/∂x for ∂F/∂ε (S, n): the transpose of the linear part of `epsilon`."""
         inner = epsilon_gradient
-        if self.frame is not None:
-            inner = np.einsum("snr,sn->sr", self.frame, inner)
+        if self._frame is not None:
+            inner = np.einsum("snr,sn->sr", self._frame, inner)
         return np.asarray((inner.T @ self.functions).ravel())
 
     def matrix(self, before: int = 0, after: int = 0) -> Array:
         """Return ∂ε/∂x at the stages, (S, n, size), between as many columns of zeros."""
-        frame = np.eye(self.rows)[None] if self.frame is None else self.frame
+        frame = np.eye(self.rows)[None] if self._frame is None else self._frame
         (stages, count), n = self.functions.shape, frame.shape[1]
         full = np.zeros((stages, n, before + self.size + after))
         own = full[:, :, before : before + self.size].reshape(stages, n, self.rows, count)

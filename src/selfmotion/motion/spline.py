@@ -66,6 +66,15 @@ class Spline:
         """Return the motion or a derivative at times t (…), (…, n)."""
         return _by_lots(lambda part: self._at(part, order), t)
 
+    def within(self, shares: Array, order: int) -> Array:
+        """Return the same at these shares (S,) of each interval, then at the end, (…, n)."""
+        found = []
+        for k in self.lots():
+            pieces = self.pieces(k, order)
+            each = np.tensordot(shares[:, None] ** np.arange(len(pieces)), pieces, 1)
+            found.append(each.swapaxes(0, 1).reshape(-1, pieces.shape[-1]))
+        return np.concatenate([*found, self._at(self.t[-1:], order)])
+
     def _at(self, t: Array, order: int) -> Array:
         k, s = self.place(t)
         return evaluated(self.pieces(k, order), s[..., None])
@@ -88,21 +97,23 @@ class Spline:
 
         s goes from 0 to 1 in each.
         """
-        if len(self.t) <= _LOT:
-            return self._derivatives[order][:, k]
-        return self._differentiated(k, order)
+        if len(self.t) > _LOT:
+            return self._differentiated(k, order)
+        if order not in self._derivatives:
+            every = np.arange(len(self.t) - 1)
+            self._derivatives[order] = self._differentiated(every, order)
+        return self._derivatives[order][:, k]
 
     @cached_property
-    def _derivatives(self) -> list[Array]:
-        """The pieces of all orders, of a motion with few samples."""
-        every = np.arange(len(self.t) - 1)
-        return [self._differentiated(every, order) for order in range(4)]
+    def _derivatives(self) -> dict[int, Array]:
+        """The pieces of some orders, of a motion with few samples."""
+        return {}
 
     def _differentiated(self, k: Ints, order: int) -> Array:
-        pieces = self._of(k)
-        for _ in range(order):
-            pieces = differentiated(pieces) / (self.t[k + 1] - self.t[k])[..., None]
-        return pieces
+        if order == 0:
+            return self._of(k)
+        steps = (self.t[k + 1] - self.t[k])[..., None]
+        return differentiated(self._differentiated(k, order - 1)) / steps
 
     def _of(self, k: Ints) -> Array:
         """Return the coefficients of q in some of the intervals (I,), (m, I, n)."""

@@ -245,6 +245,10 @@ class Trajectory:
             )
         return self._spline.at(times, order)
 
+    def within(self, shares: Array, order: int = 0) -> Array:
+        """Return the same at these shares (S,) of each interval in turn, and at the end, (…, n)."""
+        return self._spline.within(shares, order)
+
     def polynomials(self, middle: Array, half: Array) -> Array:
         """Return the motion on intervals without samples, as polynomials of u, (m, I, n).
 

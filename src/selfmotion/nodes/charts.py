@@ -1,6 +1,7 @@
 """All nodes of a motion at once: where they are on their self-motion manifolds, and eq. 4 there."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +34,21 @@ class Place:
     table: Array
 
 
+class Centred(NamedTuple):
+    """Nodes at the reference of their charts.
+
+    Attributes
+    ----------
+    charts : Charts
+    nu : (N + 1, r)
+    place : Place
+    """
+
+    charts: "Charts"
+    nu: Array
+    place: Place
+
+
 @dataclass(frozen=True, eq=False)
 class Charts:
     """Charts of the self-motion manifolds of all nodes, around a motion on the path.
@@ -44,7 +60,7 @@ class Charts:
     ----------
     manifolds : Manifolds
     q : (N + 1, n)
-        The reference: z = 0.
+        The reference: z = 0 where that is on the path, else next to it.
     bases : (N + 1, n, r)
         N0, orthonormal bases of the null spaces there.
     """
@@ -55,14 +71,46 @@ class Charts:
 
     def at(self, z: Array, nu: Array) -> Place | None:
         """Return the nodes at z and ν, (N + 1, r) each; None where one is not to be had."""
+        return self._looked(z, self.null_motions(nu), centred=False)
+
+    def centred(self, z: Array, epsilon: Array) -> Centred | None:
+        """Return charts around the nodes at z (N + 1, r), with what of ε (N + 1, n) acts there.
+
+        None where a node is not to be had.
+        """
+        place = self._looked(z, epsilon, centred=True)
+        if place is None:
+            return None
+        around = Charts(self.manifolds, place.q, place.tangents)
+        own = self.manifolds.rates(place.table)[1]
+        nu = (np.swapaxes(place.tangents, 1, 2) @ own[:, :, None])[:, :, 0]
+        return Centred(around, nu, place)
+
+    def moving(self, place: Place, qd: Array) -> Centred:
+        """Return the nodes at their `place` at the reference, as fast as q̇ (N + 1, n) in its span.
+
+        J takes N0 to 0, so that another null motion changes q̇ by as much, and nothing else.
+        """
+        nu = (np.swapaxes(self.bases, 1, 2) @ qd[:, :, None])[:, :, 0]
+        table, epsilon = place.table.copy(), self.null_motions(nu)
+        rates, before = self.manifolds.rates(table)
+        rates += epsilon - before
+        before[:] = epsilon
+        return Centred(self, nu, Place(place.q, np.array(rates), place.tangents, table))
+
+    def null_motions(self, nu: Array) -> Array:
+        """Return ε = N0 ν, (N + 1, n)."""
+        return np.asarray((self.bases @ nu[:, :, None])[:, :, 0])
+
+    def _looked(self, z: Array, epsilon: Array, *, centred: bool) -> Place | None:
         own, bases = self.manifolds, self.bases
-        q = self.q + (bases @ z[:, :, None])[:, :, 0]
-        table = own.table()
-        qd, epsilon = own.rates(table)
-        epsilon[:] = (bases @ nu[:, :, None])[:, :, 0]
-        tangents = np.empty_like(bases)
+        q, table, tangents = np.empty_like(self.q), own.table(), np.empty_like(bases)
+        qd, null_motions = own.rates(table)
+        null_motions[:] = epsilon
         z = np.ascontiguousarray(z)
-        failed = look(q, z, bases, self.q, own.targets, own.chains, own.layout, table, tangents)
+        failed = look(
+            q, z, bases, self.q, own.targets, own.chains, own.layout, table, tangents, centred
+        )
         if failed >= 0:
             return None
         return Place(q, np.array(qd), tangents, table)
@@ -84,25 +132,6 @@ class Charts:
         )
         return out
 
-    def moving(self, place: Place, nu: Array) -> Place:
-        """Return the reference, given as the `place` of ν = 0, with null motions ν (N + 1, r).
-
-        N0 is what J takes to 0 there, so that eq. 4 adds ε = N0 ν to q̇ and leaves all else. Takes
-        over the table of that place.
-        """
-        added = (self.bases @ nu[:, :, None])[:, :, 0]
-        qd, epsilon = self.manifolds.rates(place.table)
-        qd += added
-        epsilon[:] = added
-        return Place(place.q, np.array(qd), self.bases, place.table)
-
-    def recentred(self, place: Place) -> tuple["Charts", Array]:
-        """Return the charts around a place, and its ν there."""
-        bases = orthonormal(place.tangents)
-        _, epsilon = self.manifolds.rates(place.table)
-        nu = np.einsum("knr,kn->kr", bases, epsilon)
-        return Charts(self.manifolds, place.q, bases), nu
-
 
 class Manifolds:
     """The self-motion manifolds of a path at given times.
@@ -116,16 +145,23 @@ class Manifolds:
 
     def __init__(self, follows: Follows, t: Array) -> None:
         self.follows, self.t = follows, t
-        self.chains = tuple(item.chain.arrays for item in follows.items)
-        self.layout = follows.layout
+        self.chains, self.layout = follows.chains, follows.layout
         self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
         self.work = np.zeros(kernels.space_size(*self._sizes))
         self.no_error = np.zeros((len(follows.items), 6))
-        targets = [item.target(t) for item in follows.items]
-        self._paths = [
-            np.hstack([one.translation, one.rotation.reshape(len(t), 9), one.twist])
-            for one in targets
-        ]
+        # A moment before each node and after: one step back, one on; at the ends of the path both
+        # inside.
+        step, end = _STEP * t[-1], t[-1]
+        self._steps = step * np.array([-1.0, 1.0])[:, None] * np.ones(len(t))
+        self._steps[:, t <= step] = step * np.array([1.0, 2.0])[:, None]
+        self._steps[:, t >= end - step] = step * np.array([-2.0, -1.0])[:, None]
+        times = np.concatenate([t, *(t + self._steps)])
+        self._twists, self._paths = [], []
+        for item in follows.items:
+            own = item.target(times)
+            self._twists.append(own.twist[len(t) :])
+            parts = own.translation, own.rotation.reshape(-1, 9), own.twist
+            self._paths.append(np.hstack([part[: len(t)] for part in parts]))
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
 
     def table(self) -> Array:
@@ -140,53 +176,28 @@ class Manifolds:
         """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
         return kernels.rates_of(table, self.follows.robot.dof)
 
-    def charts(self, q: Array) -> tuple[Charts, Place] | None:
-        """Return charts around a motion near the path, q (N + 1, n), and its place at ν = 0.
+    def charts(self, q: Array) -> Charts:
+        """Return charts around a motion near the path, q (N + 1, n)."""
+        return Charts(self, q, carried_bases(self.follows, q))
 
-        None where a node does not come onto its manifold.
-        """
-        bases = carried_bases(self.follows, q)
-        charts, none = Charts(self, q, bases), np.zeros((len(q), bases.shape[2]))
-        place = charts.at(none, none)
-        return None if place is None else (charts.recentred(place)[0], place)
-
-    def accelerations(self, q: Array, qd: Array) -> Array:
-        """Return the least q̈ by which motions q, q̇ (N + 1, n) follow the path: J⁺(ẍ - J̇q̇).
+    def accelerations(self, place: Place) -> Array:
+        """Return the least q̈ by which nodes follow the path, (N + 1, n): J⁺(ẍ - J̇q̇).
 
         J q̈ is the rate of ẋ - J q̇ along the motion at fixed q̇: a central difference, which at marks
         of the path, where it may jump, is the mean of both sides.
         """
-        step, end = _STEP * self.t[-1], self.t[-1]
-        # One step back, one on; at the ends of the path both inside.
-        steps = step * np.array([-1.0, 1.0])[:, None] * np.ones(len(self.t))
-        steps[:, self.t <= step] = step * np.array([1.0, 2.0])[:, None]
-        steps[:, self.t >= end - step] = step * np.array([-2.0, -1.0])[:, None]
-        before, after = self._unmet(q, qd, steps)
+        steps, (count, n) = self._steps, place.q.shape
+        moved, rates = place.q + steps[:, :, None] * place.qd, np.tile(place.qd, (2, 1))[:, :, None]
+        unmet = []
+        for item, twist in zip(self.follows.items, self._twists, strict=True):
+            jacobian, rotation, _ = item.chain.along(moved.reshape(-1, n))
+            off = twist[:, :, None] - jacobian @ rates
+            unmet.append(item.task.select_along(off, rotation)[:, :, 0])
+        before, after = np.concatenate(unmet, axis=1).reshape(2, count, -1)
         right = ((after - before) / (steps[1] - steps[0])[:, None])[:, :, None]
-        rows = self._rows(q)[0]
+        rows = kernels.rows_along(place.table, n, right.shape[1])
         turned = np.swapaxes(rows, 1, 2)
         return np.asarray((turned @ np.linalg.solve(rows @ turned, right))[:, :, 0])
-
-    def _unmet(self, q: Array, qd: Array, steps: Array) -> Array:
-        """Return ẋ - J q̇ so much later (2, N + 1), at t + s and q + q̇ s, (2, N + 1, m)."""
-        moved = (q + steps[:, :, None] * qd).reshape(-1, q.shape[1])
-        rows, rotations = self._rows(moved)
-        twists = []
-        for item, rotation in zip(self.follows.items, rotations, strict=True):
-            twist = item.target((self.t + steps).ravel()).twist[:, :, None]
-            twists.append(item.task.select_along(twist, rotation)[:, :, 0])
-        rates = np.tile(qd, (len(steps), 1))[:, :, None]
-        found = np.concatenate(twists, axis=1) - (rows @ rates)[:, :, 0]
-        return found.reshape(len(steps), len(self.t), -1)
-
-    def _rows(self, q: Array) -> tuple[Array, list[Array]]:
-        """Return the rows of all Jacobians at q (K, n), (K, m, n), and the tips' rotations."""
-        found, rotations = [], []
-        for item in self.follows.items:
-            jacobian, rotation, _ = item.chain.along(q)
-            found.append(item.task.select_along(jacobian, rotation))
-            rotations.append(rotation)
-        return np.concatenate(found, axis=1), rotations
 
 
 def orthonormal(tangents: Array) -> Array:

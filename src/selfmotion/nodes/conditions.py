@@ -5,11 +5,18 @@ only the nodes keep would let the motion be faster between them.
 """
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints
-from selfmotion.constraints import BoundClearance, BoundConstraint, NodeTangents, linearised
+from selfmotion.constraints import (
+    BoundClearance,
+    BoundConstraint,
+    BoundLimits,
+    NodeTangents,
+    linearised,
+)
 from selfmotion.costs import Samples
 from selfmotion.nodes.hermite import CheckedSamples, Hermite, weighted
 
@@ -110,7 +117,7 @@ class NodeConditions:
     def residuals(self, samples: CheckedSamples) -> Array:
         """Return h, (N + 1, C)."""
         tables = [item.residual(samples) for item in self.constraints]
-        self._counts = [table.shape[1] for table in tables]
+        self._counts = self._counts or [table.shape[1] for table in tables]
         half, first = sum(self._counts), 0
         found = np.full((len(self.spline.t), 2 * half), _NONE)
         for table, own in zip(tables, self._counts, strict=True):
@@ -137,7 +144,7 @@ class NodeConditions:
                 found |= (item.residual(samples) > level).any(axis=1)
         return found
 
-    @property
+    @cached_property
     def tolerances(self) -> Array:
         """What h may be and still count as kept, (C,)."""
         each = [item.tolerance for item in self.constraints]
@@ -170,6 +177,9 @@ class NodeConditions:
         """Return the highest derivative of q that each condition depends on, (C,)."""
         found = [np.zeros(0, dtype=np.int64)]
         for item in self.constraints:
+            if isinstance(item, BoundLimits):
+                found.append(np.full(2 * len(item.joints), item.order))
+                continue
             known = linearised(item, samples, self._units)
             own = known.count // (2 * len(self.spline.t) - 1)
             if isinstance(item, BoundClearance):

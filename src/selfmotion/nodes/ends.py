@@ -31,6 +31,8 @@ class Border(NamedTuple):
         For the step that knows nothing of them and what each of them moves, side by side.
         """
         step, moved = solved[:, 0], solved[:, 1:]
+        if not len(self.c):
+            return step, self.c
         turned = self.columns.T
         # Least squares: what is held may be asked for as well.
         prices = np.asarray(np.linalg.lstsq(turned @ moved, turned @ step + self.c)[0], float)
@@ -44,20 +46,21 @@ class NodeEnds:
     ----------
     items : sequence of BoundEnd
         None of accelerations, see `takes`.
+
+    Attributes
+    ----------
+    count : int
+        How many numbers have to be 0: E.
     """
 
     def __init__(self, items: Sequence[BoundEnd]) -> None:
         self._items = tuple(items)
+        self.count = sum(len(item.orders) * item.null.shape[1] for item in items)
 
     @staticmethod
     def takes(item: object) -> bool:
         """Whether a condition is one of positions and velocities at the ends."""
         return isinstance(item, BoundEnd) and max(item.orders) < 2
-
-    @property
-    def count(self) -> int:
-        """How many numbers have to be 0: E."""
-        return sum(len(item.orders) * item.null.shape[1] for item in self._items)
 
     def residuals(self, samples: HermiteSamples) -> Array:
         """Return c, (E,)."""
@@ -76,7 +79,8 @@ class NodeEnds:
         """Return what is off, c (E,), with its derivatives; nothing moves what is `held`."""
         count, _, _, size = changes.shape
         by_node = np.zeros((count, size, self.count))
-        by_node[[0, -1]] = np.moveaxis(self.rows(changes), 0, 2)
+        if self.count:
+            by_node[[0, -1]] = np.moveaxis(self.rows(changes), 0, 2)
         columns = by_node.reshape(count * size, self.count)
         columns[held] = 0.0
         return Border(c, columns)

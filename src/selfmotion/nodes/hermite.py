@@ -13,8 +13,10 @@ from selfmotion.motion import Sampling, Trajectory
 # Gauss points on each interval: ∫ of the square of a quadratic is exact, and no motion of the nodes
 # is without cost at all of them.
 _ROOT = 0.5 * np.sqrt(0.6)
-_POINTS, _WEIGHTS = np.array([0.5 - _ROOT, 0.5, 0.5 + _ROOT]), np.array([5.0, 8.0, 5.0]) / 18.0
-_SAMPLES = 4
+_WEIGHTS = np.array([0.0, 5.0, 8.0, 5.0]) / 18.0
+# Where an interval's samples are: its first node, then these.
+SHARES = np.array([0.0, 0.5 - _ROOT, 0.5, 0.5 + _ROOT])
+_SAMPLES = len(SHARES)
 # q̈ and the jerk of the right, then the left end of an interval of length 1, by q, q̇ of both ends.
 _ENDS = {
     2: np.array([[6.0, 2.0, -6.0, 4.0], [-6.0, -4.0, 6.0, -2.0]]),
@@ -22,6 +24,21 @@ _ENDS = {
 }
 # Which of an interval's samples is in its middle.
 _MIDDLE = 2
+
+
+def _unit(s: Array) -> tuple[Array, ...]:
+    """Return what `Hermite.bases` are on an interval of length 1, at shares s (S,), (S, 4) each."""
+    one = np.ones_like(s)
+    tables = (
+        (1 - s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (3 - 2 * s), s**2 * (s - 1)),
+        (6 * s * (s - 1), (1 - s) * (1 - 3 * s), 6 * s * (1 - s), s * (3 * s - 2)),
+        (12 * s - 6, 6 * s - 4, 6 - 12 * s, 6 * s - 2),
+        (12 * one, 6 * one, -12 * one, 6 * one),
+    )
+    return tuple(np.stack(table, axis=1) for table in tables)
+
+
+_UNIT = _unit(SHARES)
 
 
 class Hermite:
@@ -47,9 +64,8 @@ class Hermite:
 
     def __init__(self, t: Array) -> None:
         self.t, self.steps = t, np.diff(t)
-        shares, weights = self.shares_within, np.append(0.0, _WEIGHTS)
         h = self.steps[:, None]
-        times, each = (t[:-1, None] + h * shares).ravel(), (h * weights).ravel()
+        times, each = (t[:-1, None] + h * SHARES).ravel(), (h * _WEIGHTS).ravel()
         times = np.append(times, t[-1])
         self.sampling = Sampling(times, np.append(each, 0.0), np.arange(len(times)))
         self.checked = Sampling.trapezoidal(times[::_MIDDLE])
@@ -61,29 +77,12 @@ class Hermite:
         From q, q̇ at the left and q, q̇ at the right end; at the node itself it is the derivative of
         the interval that begins there.
         """
-        s, h = self.shares_within, self.steps[:, None]
-        one = np.ones_like(s)
-        tables = (
-            (1 - s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (3 - 2 * s), s**2 * (s - 1)),
-            (6 * s * (s - 1), (1 - s) * (1 - 3 * s), 6 * s * (1 - s), s * (3 * s - 2)),
-            (12 * s - 6, 6 * s - 4, 6 - 12 * s, 6 * s - 2),
-            (12 * one, 6 * one, -12 * one, 6 * one),
-        )
-        return tuple(
-            np.stack(
-                [
-                    x / h ** (order - is_rate)
-                    for x, is_rate in zip(table, (0, 1, 0, 1), strict=True)
-                ],
-                axis=2,
-            )
-            for order, table in enumerate(tables)
-        )
-
-    @property
-    def shares_within(self) -> Array:
-        """Where an interval's samples are, as shares of it, (4,)."""
-        return np.append(0.0, _POINTS)
+        h, inverse = self.steps, 1.0 / self.steps
+        square = inverse * inverse
+        powers = np.stack([square * inverse, square, inverse, np.ones_like(h), h], axis=1)
+        # By q it is 1/h to the order, by q̇ one less.
+        each = (powers[:, [3 - order, 4 - order] * 2] for order in range(4))
+        return tuple(power[:, None] * table for power, table in zip(each, _UNIT, strict=True))
 
     @cached_property
     def between(self) -> tuple[Array, ...]:
@@ -149,12 +148,12 @@ class PlacedLater(Samples):
     ----------
     follows : Follows
     sampling : Sampling
-    q, qd : (S, n)
+    given : arrays
+        By name: q and q̇ (S, n), where they are not known otherwise.
     """
 
-    def __init__(self, follows: Follows, sampling: Sampling, q: Array, qd: Array) -> None:
-        given = {"sampling": sampling, "follows": follows, "q": read_only(q), "qd": read_only(qd)}
-        for name, value in given.items():
+    def __init__(self, follows: Follows, sampling: Sampling, **given: Array) -> None:
+        for name, value in {"sampling": sampling, "follows": follows, **given}.items():
             object.__setattr__(self, name, value)
 
     @cached_property
@@ -174,6 +173,16 @@ class PlacedLater(Samples):
 
 class _WithRates(PlacedLater, ABC):
     """A motion whose derivatives are known; those of splines at nodes are means of both sides."""
+
+    @cached_property
+    def q(self) -> Array:
+        """Joint coordinates, (S, n)."""
+        return read_only(self._of_order(0))
+
+    @cached_property
+    def qd(self) -> Array:
+        """Joint velocities, (S, n)."""
+        return read_only(self._of_order(1))
 
     @cached_property
     def qdd(self) -> Array:
@@ -216,7 +225,7 @@ class HermiteSamples(_WithRates):
         given = {"spline": spline, "_at_nodes": (q, qd), "ends": ends}
         for name, value in given.items():
             object.__setattr__(self, name, value)
-        super().__init__(follows, spline.sampling, self._of_order(0), self._of_order(1))
+        super().__init__(follows, spline.sampling)
 
     @cached_property
     def checked(self) -> "CheckedSamples":
@@ -225,7 +234,7 @@ class HermiteSamples(_WithRates):
 
     def forget(self) -> None:
         """Let go of what can be computed anew."""
-        for name in ("checked", "qdd", "qddd", "_placed"):
+        for name in ("checked", "q", "qd", "qdd", "qddd", "_placed"):
             self.__dict__.pop(name, None)
 
     def _of_order(self, order: int) -> Array:
@@ -255,8 +264,7 @@ class CheckedSamples(_WithRates):
 
     def __init__(self, samples: HermiteSamples) -> None:
         object.__setattr__(self, "_samples", samples)
-        spline = samples.spline
-        super().__init__(samples.follows, spline.checked, self._of_order(0), self._of_order(1))
+        super().__init__(samples.follows, samples.spline.checked)
 
     def _of_order(self, order: int) -> Array:
         samples = self._samples
@@ -273,18 +281,21 @@ class QuinticSamples(_WithRates):
     Parameters
     ----------
     follows : Follows
-    sampling : Sampling
+    spline : Hermite
+        Of the same nodes.
     trajectory : Trajectory
     """
 
+    _shares: Array
     _trajectory: Trajectory
 
-    def __init__(self, follows: Follows, sampling: Sampling, trajectory: Trajectory) -> None:
-        super().__init__(follows, sampling, trajectory(sampling.t), trajectory(sampling.t, 1))
+    def __init__(self, follows: Follows, spline: Hermite, trajectory: Trajectory) -> None:
+        object.__setattr__(self, "_shares", SHARES)
         object.__setattr__(self, "_trajectory", trajectory)
+        super().__init__(follows, spline.sampling)
 
     def _of_order(self, order: int) -> Array:
-        return np.asarray(self._trajectory(self.t, order))
+        return self._trajectory.within(self._shares, order)
 
 
 def weighted(shares: Array, changes: Array) -> Array:

@@ -7,6 +7,8 @@ is the null motion of eq. 4. With B = [J; N0ᵀ],
     ∂q/∂z = T = B⁻¹ [0; I],    ∂q̇/∂ν = (I - J⁺J) N0,    ∂q̇/∂z = (∂q̇/∂q) T.
 """
 
+from math import sqrt
+
 import numpy as np
 
 from selfmotion.basics import Array, inlined, kernel
@@ -16,16 +18,19 @@ from selfmotion.kernels import (
     approach,
     cholesky,
     errors_and_rows,
-    evaluate,
+    finite,
     gram,
     pull_stage,
+    respond,
     rows_of,
+    select,
     solve_cholesky,
     space_of,
     stage_of,
     tip_of,
+    view,
 )
-from selfmotion.robot import ChainArrays, place_tips
+from selfmotion.robot import place_tips
 
 # A node this near to its place [m, rad] is there; Newton's method is quadratic from nearby.
 _THERE, _STEPS = 1e-12, 12
@@ -40,16 +45,19 @@ def look(
     bases: Array,
     references: Array,
     targets: Array,
-    chains: tuple[ChainArrays, ...],
+    chains: Array,
     layout: Layout,
     table: Array,
     tangents: Array,
+    centred: bool,
 ) -> int:
-    """Put each of q (K, n) onto its manifold at its coordinates z (K, r), and evaluate eq. 4 there.
+    """Put nodes onto their manifolds at coordinates z (K, r), and evaluate eq. 4 there.
 
     For charts with `bases` (K, n, r) and `references` (K, n), and `targets` (K, 12 F). Rows of the
-    `table` hold paths and null motions already; q, q̇ and all else is set, and T in `tangents`
-    (K, n, r). Returns the first node for which that is impossible, or -1.
+    `table` hold paths and null motions already; q̇ and all else is set, q (K, n), and T in
+    `tangents` (K, n, r). Or, `centred`, an orthonormal basis of the null space instead of T, and of
+    ε what is in it: the same motion in charts around it. Returns the first node for which that is
+    impossible, or -1.
     """
     (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
     tips = layout.shape[0]
@@ -58,19 +66,24 @@ def look(
     jacobians = np.zeros((tips, 6, n))
     system, factor, b = np.empty((n, n)), np.empty((n, n)), np.empty(n)
     for k in range(count):
-        off = np.inf
+        # Views: slices are counted references, which take as long as what is done with them.
+        here, off = view(q[k], 0, (n,)), np.inf
+        for j in range(n):
+            here[j] = references[k, j]
+            for x in range(r):
+                here[j] += bases[k, j, x] * coordinates[k, x]
         for _ in range(_STEPS):
-            place_tips(q[k], chains, turns, places, rotations, positions, jacobians)
+            place_tips(here, chains, turns, places, rotations, positions, jacobians)
             off = approach(
-                q[k],
+                here,
                 jacobians,
                 rotations,
                 positions,
-                targets[k],
+                view(targets[k], 0, (12 * tips,)),
                 layout,
-                bases[k],
-                references[k],
-                coordinates[k],
+                view(bases[k], 0, (n, r)),
+                view(references[k], 0, (n,)),
+                view(coordinates[k], 0, (r,)),
                 b,
                 system,
                 factor,
@@ -85,28 +98,66 @@ def look(
                 b[i] = 1.0 if i == m + x else 0.0
             solve_cholesky(factor, b)
             for j in range(n):
-                tangents[k, j, x] = 0.0
+                total = 0.0
                 for i in range(n):
-                    tangents[k, j, x] += system[i, j] * b[i]
+                    total += system[i, j] * b[i]
+                tangents[k, j, x] = total
         row = table[k]
         at = stage_of(row, n, m)
+        if centred:
+            _centre(tangents[k], at.epsilon, b)
         for j in range(n):
             at.q[j] = q[k, j]
+        # The rows of B, and of the factor of BBᵀ, begin with those of J and of JJᵀ.
+        for i in range(m):
+            for j in range(n):
+                at.task_jacobian[i, j] = system[i, j]
+            for j in range(i + 1):
+                at.factor[i, j] = factor[i, j]
         for f in range(tips):
-            _note(tip_of(row, f, n, m), rotations[f], positions[f], jacobians[f])
-        if not evaluate(row, n, layout, 0.0, None):
+            tip = tip_of(row, f, n, m)
+            _note(tip, rotations[f], positions[f], jacobians[f])
+            select(layout, f, tip.rotation, tip.command, at.y)
+        respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)
+        if not finite(at.qd):
             return k
     return -1
 
 
 @inlined
+def _centre(tangents: Array, epsilon: Array, rest: Array) -> None:
+    """Make tangents (n, r) orthonormal by Gram-Schmidt, and ε what of it they span."""
+    n, r = tangents.shape
+    for j in range(n):
+        rest[j] = epsilon[j]
+    for x in range(r):
+        for y in range(x):
+            share = 0.0
+            for j in range(n):
+                share += tangents[j, y] * tangents[j, x]
+            for j in range(n):
+                tangents[j, x] -= share * tangents[j, y]
+        square, share = 0.0, 0.0
+        for j in range(n):
+            square += tangents[j, x] * tangents[j, x]
+            share += tangents[j, x] * rest[j]
+        length = sqrt(square)
+        for j in range(n):
+            rest[j] -= share / square * tangents[j, x]
+            tangents[j, x] /= length
+    for j in range(n):
+        epsilon[j] -= rest[j]
+
+
+@inlined
 def _note(tip: Tip, turn: Array, place: Array, six: Array) -> None:
-    """Set where a tip is, and its Jacobian."""
+    """Set where a tip is, its Jacobian, and that its command is its path's twist."""
     for i in range(3):
         tip.translation[i] = place[i]
         for j in range(3):
             tip.rotation[i, j] = turn[i, j]
     for i in range(6):
+        tip.command[i] = tip.target_twist[i]
         for j in range(six.shape[1]):
             tip.jacobian[i, j] = six[i, j]
 
@@ -146,7 +197,7 @@ def follow(
     wanted: Array,
     share: Array,
     targets: Array,
-    chains: tuple[ChainArrays, ...],
+    chains: Array,
     layout: Layout,
     q: Array,
 ) -> int:

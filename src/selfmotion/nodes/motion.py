@@ -81,10 +81,8 @@ class NodeGrid:
         self._constraints = tuple(constraints)
         r = follows.robot.dof - follows.dimension
         held: list[Ints] = [] if free else [np.arange(r)]
-        rests = problem.rests
-        for rest, node in zip(rests, (0, len(t) - 1), strict=True):
-            if rest:
-                held.append(2 * r * node + r + np.arange(r))
+        self._resting = np.array([0, len(t) - 1])[np.array(problem.rests)]
+        held += [2 * r * node + r + np.arange(r) for node in self._resting]
         self.held = np.concatenate([np.zeros(0, dtype=np.int64), *held])
 
     @property
@@ -111,22 +109,27 @@ class NodeGrid:
             continuous=continuous,
         )
 
-    def motion_near(self, trajectory: Trajectory) -> "NodeMotion | None":
-        """Return the motion whose nodes are those nearest to another one's.
-
-        None where a node does not come onto its manifold, or a given start is not that of it.
-        """
-        return self.near(trajectory(self.t), trajectory(self.t, 1))
-
     def near(self, q: Array, qd: Array) -> "NodeMotion | None":
-        """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇, or None."""
-        found = self.manifolds.charts(q)
-        if found is None:
-            return None
-        charts, place = found
-        nu = np.einsum("knr,kn->kr", charts.bases, qd)
-        nu.reshape(-1)[self._rates] = 0.0
-        return self.at(charts, nu, charts.moving(place, nu))
+        """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇.
+
+        None where a node does not come onto its manifold.
+        """
+        return self.around(self.manifolds.charts(q), qd)
+
+    def around(self, charts: Charts, qd: Array) -> "NodeMotion | None":
+        """Return the motion at z = 0 of charts whose velocities are nearest to q̇, or None."""
+        found = charts.centred(np.zeros((len(qd), charts.bases.shape[2])), self._free(qd))
+        return None if found is None else self.at(*found)
+
+    def moving(self, motion: "NodeMotion", qd: Array) -> "NodeMotion":
+        """Return the motion through the same nodes whose velocities are nearest to q̇."""
+        return self.at(*motion.charts.moving(motion.place, self._free(qd)))
+
+    def _free(self, qd: Array) -> Array:
+        """Return what velocities are where the arm does not rest."""
+        found = qd.copy()
+        found[self._resting] = 0.0
+        return found
 
     def motion_towards(self, start: Array, wanted: Array, time: float) -> "NodeMotion | None":
         """Return a motion from a start (n,) whose self-motion goes towards `wanted` (n,).
@@ -140,18 +143,6 @@ class NodeGrid:
         if follow(start, wanted, share, own.targets, own.chains, own.layout, q) >= 0:
             return None
         return self.near(q, np.asarray(np.gradient(q, self.t, axis=0)))
-
-    @property
-    def _rates(self) -> Ints:
-        """Numbers of the ν (N + 1, r), in one row, that are held at 0."""
-        r = self.manifolds.follows.robot.dof - self.manifolds.follows.dimension
-        node, which = np.divmod(self.held, 2 * r)
-        return np.asarray((node * r + which - r)[which >= r])
-
-    def motion(self, charts: Charts, nu: Array) -> "NodeMotion | None":
-        """Return the motion at the reference of charts; None where there is none."""
-        place = charts.at(np.zeros_like(nu), nu)
-        return None if place is None else self.at(charts, nu, place)
 
     def at(self, charts: Charts, nu: Array, place: Place) -> "NodeMotion":
         """Return the motion of a place."""
@@ -194,7 +185,7 @@ class NodeMotion:
     def exact(self) -> QuinticSamples:
         """The `trajectory`, which is on its path between the nodes, at the spline's samples."""
         grid = self.grid
-        return QuinticSamples(grid.problem.follows, grid.spline.sampling, self.trajectory)
+        return QuinticSamples(grid.problem.follows, grid.spline, self.trajectory)
 
     @cached_property
     def exact_terms(self) -> dict[str, float]:
@@ -264,7 +255,7 @@ class NodeMotion:
     @property
     def epsilon(self) -> Array:
         """The null motion ε at the nodes, (N + 1, n)."""
-        return np.asarray((self.charts.bases @ self.nu[:, :, None])[:, :, 0])
+        return self.charts.null_motions(self.nu)
 
     def forget(self) -> None:
         """Let go of what can be computed anew: most of the memory that a long path takes."""
@@ -272,12 +263,11 @@ class NodeMotion:
             self.__dict__.pop(name, None)
         self.samples.forget()
 
-    def smoothed(self) -> "NodeMotion | None":
+    def smoothed(self) -> "NodeMotion":
         """Return the motion through the same nodes, as fast there as a spline through them.
 
         Where few nodes are, the velocities that are best by the samples of the cost waver about
         those of a smooth motion through the same nodes, which differ by next to nothing in cost.
-        None where a node does not come onto its manifold.
         """
         from scipy.interpolate import CubicSpline
 
@@ -288,19 +278,9 @@ class NodeMotion:
             if last - first > 1:
                 part = slice(first, last + 1)
                 sides: Any = ((1, qd[first]), (1, qd[last]))
-                qd[part] = CubicSpline(t[part], q[part], bc_type=sides)(t[part], 1)
-        return self.grid.near(q, qd)
-
-    def recentred(self) -> "NodeMotion | None":
-        """Return the same motion, with charts around it; None where rounding forbids."""
-        charts, nu = self.charts.recentred(self.place)
-        # Anew: derivatives at fixed ε are others, since ε has lost what did not act.
-        found = self.grid.motion(charts, nu)
-        if found is not None:
-            # Costs and conditions are those of the same motion.
-            names = [name for name in ("terms", "aim", "h", "c", "orders") if name in self.__dict__]
-            found.__dict__.update({name: self.__dict__[name] for name in names})
-        return found
+                # The coefficients of first order: the slopes at all nodes but the last.
+                qd[first:last] = CubicSpline(t[part], q[part], bc_type=sides).c[2]
+        return self.grid.moving(self, qd)
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -310,7 +290,7 @@ class NodeMotion:
         and α is that of the side along the limit. q̈ is 0 where the arm rests.
         """
         problem, t, place = self.grid.problem, self.grid.t, self.place
-        qdd = self.grid.manifolds.accelerations(place.q, place.qd)
+        qdd = self.grid.manifolds.accelerations(place)
         along = self.along
         before, after = np.append(False, along), np.append(along, False)
         sides = self.grid.spline.accelerations(self.samples.ends)
@@ -345,5 +325,8 @@ class NodeMotion:
         """Return the motion on other nodes."""
         from scipy.interpolate import CubicHermiteSpline
 
-        spline = CubicHermiteSpline(self.grid.t, self.place.q, self.place.qd)
-        return grid.near(spline(grid.t), spline(grid.t, 1))
+        t, place = self.grid.t, self.place
+        spline = CubicHermiteSpline(t, place.q, place.qd)
+        # What is nearly a basis will do for charts to begin with, and turns as those around it do.
+        bases = self.charts.bases[np.searchsorted(t, grid.t, side="right") - 1]
+        return grid.around(Charts(grid.manifolds, spline(grid.t), bases), spline(grid.t, 1))

@@ -28,7 +28,7 @@ _INWARD = 0.995
 _SHARE, _SHORTEST = 1e-4, 1e-6
 # Motions that cost nothing, as of a joint whose axis the tool is on, are left alone: the matrix has
 # this share of its usual entry more on the diagonal, which is above rounding there.
-_FLAT = 1e-13
+_FLAT = 1e-11
 # One that is not positive definite gets this share of its largest entry on the diagonal, or a
 # third of what the last one needed; then more by this factor, again and again.
 _SHIFT, _LESS, _MORE = 1e-6, 1.0 / 3.0, 8.0
@@ -101,12 +101,16 @@ class _Solver:
         motion = self.motion
         motion.grid.counts.gradients += 1
         slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
-        gradient = motion.charts.pulled(motion.place, slopes[:, 0], slopes[:, 1])
+        by_both, by_prices, continuity = slopes, slopes, motion.grid.continuity
+        if continuity is not None:
+            by_both = slopes + scattered(continuity.slopes(motion.samples))
+        gradient = motion.charts.pulled(motion.place, by_both[:, 0], by_both[:, 1])
         gradient.reshape(-1)[motion.grid.held] = 0.0
-        if self._is_there(gradient):
-            stops = told(Step(motion, float(np.linalg.norm(gradient)), self._length))
-            return Status.STOPPED if stops else Status.CONVERGED
-        by_prices = slopes
+        is_there = self._is_there(gradient)
+        if told(Step(motion, float(np.linalg.norm(gradient)), self._length)):
+            return Status.STOPPED
+        if is_there:
+            return Status.CONVERGED
         if self._columns.size:
             prices = np.zeros_like(motion.h)
             prices[:, self._columns] = self._prices
@@ -116,12 +120,7 @@ class _Solver:
         around = Around.of(motion.charts, motion.nu, by_prices)
         if around is None:
             return Status.GRADIENT
-        jumps, by_jumps = self._jumps(around)
-        gradient += spread((by_jumps @ jumps[:, :, None])[:, :, 0])
-        gradient.reshape(-1)[motion.grid.held] = 0.0
-        if told(Step(motion, float(np.linalg.norm(gradient)), self._length)):
-            return Status.STOPPED
-        rows = self._rows(around)
+        rows, by_jumps = self._rows(around), self._by_jumps(around)
         ends = motion.grid.ends.border(motion.c, around.changes, motion.grid.held)
         intervals = motion.grid.cost.curvature(motion.samples, motion.partials, around.changes)
         gap = motion.wanted[:, self._columns] + self._slacks
@@ -170,14 +169,12 @@ class _Solver:
         motion = self.motion
         return motion.grid.conditions.rows(motion.samples.checked, around.changes, self._columns)
 
-    def _jumps(self, around: Around) -> tuple[Array, Array]:
-        """Return what jumps of q̈ weigh, (N + 1, j), and its derivatives by w, (N + 1, 6r, j)."""
-        motion, (count, _, _, size) = self.motion, around.changes.shape
-        continuity = motion.grid.continuity
+    def _by_jumps(self, around: Around) -> Array:
+        """Return the derivatives by w of what jumps of q̈ weigh, (N + 1, 6r, j)."""
+        continuity, (count, _, _, size) = self.motion.grid.continuity, around.changes.shape
         if continuity is None:
-            return np.zeros((count, 0)), np.zeros((count, 3 * size, 0))
-        tangents = continuity.tangents(around.changes)
-        return continuity.jumps(motion.samples), np.swapaxes(tangents, 1, 2)
+            return np.zeros((count, 3 * size, 0))
+        return np.swapaxes(continuity.tangents(around.changes), 1, 2)
 
     def _solved(self, gap: Array) -> bool:
         """Whether the problem with the present barrier is solved well enough."""
@@ -199,12 +196,15 @@ class _Solver:
         count, size = gradient.shape
         ratio = self._prices / self._slacks
         turned = np.swapaxes(rows, 1, 2)
-        pressure = (self._barrier / self._slacks + ratio * gap)[:, :, None]
-        right = (gradient + spread((turned @ pressure)[:, :, 0])).ravel()
-        right[self.motion.grid.held] = 0.0
+        right = gradient.flatten()
+        if rows.shape[1]:
+            pressure = (self._barrier / self._slacks + ratio * gap)[:, :, None]
+            right += spread((turned @ pressure)[:, :, 0]).ravel()
+            right[self.motion.grid.held] = 0.0
         wide = bool(rows.shape[1] or by_jumps.shape[2])
         largest = float(np.abs(curved).max() + np.abs(intervals).max())
-        usual = float(np.median(np.abs(np.diagonal(intervals, axis1=1, axis2=2))))
+        diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
+        usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])
         shift = _FLAT * usual
         while shift <= 1e6 * largest:
             matrix = Banded(count, size, 2 if wide else 1)
@@ -227,10 +227,11 @@ class _Solver:
 
     def _others(self, rows: Array, gap: Array, step: Array) -> tuple[Array, Array]:
         """Return the steps of slacks and prices that go with one of the coordinates."""
-        size = step.shape[1]
-        padded = np.pad(step, ((1, 1), (0, 0)))
-        near = np.concatenate([padded[:-2], step, padded[2:]], axis=1).reshape(-1, 3 * size, 1)
-        by_slack = -gap - (rows @ near)[:, :, 0]
+        if not gap.size:
+            return gap, gap
+        near = np.zeros((len(step), 3, step.shape[1]))
+        near[1:, 0], near[:, 1], near[:-1, 2] = step[:-1], step, step[1:]
+        by_slack = -gap - (rows @ near.reshape(len(step), -1, 1))[:, :, 0]
         by_price = (self._barrier - self._prices * by_slack) / self._slacks - self._prices
         return by_slack, by_price
 
@@ -238,7 +239,7 @@ class _Solver:
         self, gradient: Array, gap: Array, step: Array, by_slack: Array, by_price: Array
     ) -> Status | None:
         """Go along a step as far as it does what it promises."""
-        motion, r = self.motion, step.shape[1] // 2
+        motion, charts, r = self.motion, self.motion.charts, step.shape[1] // 2
         off = float(np.abs(gap).sum() + np.abs(motion.c).sum())
         slope = float((gradient * step).sum()) - self._barrier * float(
             (by_slack / self._slacks).sum()
@@ -251,20 +252,17 @@ class _Solver:
         farthest = float(np.abs(step[:, :r]).max())
         length = min(_longest(self._slacks, by_slack), _FARTHEST / max(farthest, _FARTHEST))
         while length >= _SHORTEST and self._tiny < _STUCK:
-            nu = motion.nu + length * step[:, r:]
-            place = motion.charts.at(length * step[:, :r], nu)
-            if place is not None:
-                new = motion.grid.at(motion.charts, nu, place)
+            epsilon = charts.null_motions(motion.nu + length * step[:, r:])
+            found = charts.centred(length * step[:, :r], epsilon)
+            if found is not None:
+                new = motion.grid.at(*found)
                 h = new.wanted[:, self._columns]
                 slacks = np.maximum(self._slacks + length * by_slack, -h)
                 gained = merit - self._merit(new, slacks, h + slacks)
                 # Written so that NaN is no gain; what is below rounding is none to look for.
                 rounding = 1e-13 * abs(merit)
-                centred = None
                 if gained >= -_SHARE * length * min(promise, 0.0) - rounding:
-                    centred = new.recentred()
-                if centred is not None:
-                    self.motion, self._slacks = centred, slacks
+                    self.motion, self._slacks = new, slacks
                     share = _longest(self._prices, by_price)
                     self._prices = self._prices + share * by_price
                     self._length = length
@@ -286,4 +284,6 @@ class _Solver:
 def _longest(values: Array, step: Array) -> float:
     """Return the share of a step, at most 1, that keeps positive values well above 0."""
     falling = step < 0.0
-    return float(np.min(_INWARD * -values[falling] / step[falling], initial=1.0))
+    if not falling.any():
+        return 1.0
+    return min(1.0, float(np.min(_INWARD * -values[falling] / step[falling])))

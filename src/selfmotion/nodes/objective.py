@@ -14,6 +14,7 @@ along the manifold.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,12 +22,12 @@ from selfmotion.basics import Array
 from selfmotion.costs import Cost, Partials, Samples
 from selfmotion.follow import Follows
 from selfmotion.nodes.charts import Charts, orthonormal
-from selfmotion.nodes.hermite import Hermite, HermiteSamples, PlacedLater
+from selfmotion.nodes.hermite import SHARES, Hermite, HermiteSamples, PlacedLater
 from selfmotion.nodes.smoothness import Smoothing
 
-# Differences along a manifold are taken this far to both sides [rad or m]: their error is about
-# its square, and rounding's is 1e-12 over it.
-_REACH = 1e-4
+# Differences along a manifold are taken this far to both sides [rad or m]: nodes are as near to it
+# there as they have to be, and come onto it in one step. Rounding's error is 1e-16 over it.
+_REACH = 1e-6
 # Those of costs are taken to one side, so far [rad, m and their rates]: they are second derivatives
 # of a matrix that need not be exact.
 _NEAR = 1e-6
@@ -57,15 +58,20 @@ class NodeCost:
     ) -> None:
         self._spline, self._costs = spline, tuple(costs)
         self._bent = tuple(cost for cost in costs if not cost.is_quadratic)
-        self._forms: list[tuple[Array, Array]] = []
-        for cost in (cost for cost in costs if cost.is_quadratic):
-            for order, weight in cost.curvature(follows.robot.dof).items():
-                self._forms.append((self._stiffness(order, spline.weights), weight))
+        self._dof = follows.robot.dof
         self._smoothing: tuple[Array, Array] | None = None
         if smoothing is not None:
             stiffness = self._stiffness(2, spline.weights * smoothing.shares)
             self._smoothing = stiffness, smoothing.weight
-            self._forms.append(self._smoothing)
+
+    @cached_property
+    def _forms(self) -> list[tuple[Array, Array]]:
+        """K and W of all that is quadratic, see `_stiffness`."""
+        found = [] if self._smoothing is None else [self._smoothing]
+        for cost in (cost for cost in self._costs if cost.is_quadratic):
+            for order, weight in cost.curvature(self._dof).items():
+                found.append((self._stiffness(order, self._spline.weights), weight))
+        return found
 
     def _stiffness(self, order: int, weights: Array) -> Array:
         """Return K of ½ Σ K_ab x_aᵀWx_b for the ends x of each interval, (N, 4, 4)."""
@@ -145,12 +151,12 @@ class NodeCost:
         )
         # Along the self-motion at the samples: between what it is at the nodes.
         left, right = both[:, None, 0, :, :r], both[:, None, 2, :, 2 * r : 3 * r]
-        share = spline.shares_within[:, None, None]
+        share = SHARES[:, None, None]
         along = orthonormal((left + share * (right - left)).reshape(-1, n, r))
         turned = np.swapaxes(along, 1, 2)
         moved = turned @ by_q
         directions = np.concatenate([along, along[-1:]])
-        found = np.zeros((count * len(spline.shares_within), size, size))
+        found = np.zeros((count * len(SHARES), size, size))
         for x in range(r):
             changed = self._changed(samples, here, directions[:, :, x], 0.0)
             if changed.q is not None:
@@ -172,8 +178,8 @@ class NodeCost:
         self, samples: HermiteSamples, here: Partials, q: Array | float, qd: Array | float
     ) -> Partials:
         """Return how the derivatives `here` of bent costs change in directions of q and q̇."""
-        moved = samples.q + _NEAR * q, samples.qd + _NEAR * qd
-        shifted = PlacedLater(samples.follows, samples.sampling, *moved)
+        moved = {"q": samples.q + _NEAR * q, "qd": samples.qd + _NEAR * qd}
+        shifted = PlacedLater(samples.follows, samples.sampling, **moved)
         there = _summed([cost.gradient(shifted) for cost in self._bent])
         parts = {}
         for name in ("q", "qd"):

@@ -82,6 +82,12 @@ class Continuity:
         before[0] = after[-1] = 0.0
         return np.asarray((self._scales @ (before - after)[:, :, None])[:, :, 0])
 
+    def slopes(self, samples: HermiteSamples) -> Array:
+        """Return the derivatives of half their squares by q, q̇ of intervals' ends, (N, 4, n)."""
+        by = (np.swapaxes(self._scales, 1, 2) @ self.jumps(samples)[:, :, None])[:, None, :, 0]
+        before, after = self._spline.at_ends(2)
+        return np.asarray(before[:, :, None] * by[1:] - after[:, :, None] * by[:-1])
+
     def tangents(self, changes: Array) -> Array:
         """Return their derivatives by w of each node's neighbours and its own, (N + 1, n, 6r).
 

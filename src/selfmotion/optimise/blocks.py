@@ -67,10 +67,9 @@ class Banded:
         return np.asarray(found + np.triu(found, 1).T)
 
     def solve(self, right: Array) -> Array | None:
-        """Return the solution for a right side (K s,); None where it is not positive definite."""
-        from scipy.linalg import LinAlgError, solveh_banded
+        """Return the solution for right sides (K s,) or (K s, c); None if not positive definite."""
+        from scipy.linalg.lapack import dpbsv
 
-        try:
-            return np.asarray(solveh_banded(self._table, right, check_finite=False))
-        except LinAlgError:
-            return None
+        # `solveh_banded` looks at what it is given for as long as this takes.
+        _, solved, wrong = dpbsv(self._table, right)
+        return None if wrong else np.asarray(solved)

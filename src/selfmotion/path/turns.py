@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from selfmotion.basics import Array
-from selfmotion.task import exponentials, left, turn
+from selfmotion.task import turn, turning
 
 
 class Turning:
@@ -39,8 +39,9 @@ class Turning:
         """Return orientations (K, 3, 3) and angular velocities (K, 3) at times, world axes."""
         k: npt.NDArray[np.intp] = np.searchsorted(self.x[1:-1], t, side="right")
         s = (t - self.x[k])[:, None]
-        cubic, square, slope, none = self.c[:, k]
+        cubic, square, slope, none = self.c.take(k, axis=1)
         vectors = ((cubic * s + square) * s + slope) * s + none
         rates = (3.0 * cubic * s + 2.0 * square) * s + slope
         first = self._first[k]
-        return first @ exponentials(vectors), turn(first, left(vectors, rates))
+        turned, angular = turning(vectors, rates)
+        return first @ turned, turn(first, angular)

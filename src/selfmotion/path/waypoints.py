@@ -222,12 +222,11 @@ class Waypoints(Path, kind="waypoints"):
         position, rotation = np.empty((len(t), 3)), np.empty((len(t), 3, 3))
         twist = np.empty((len(t), 6))
         for index, (line, turn) in enumerate(splines):
-            here = piece == index
-            if not np.any(here):
-                continue
-            position[here] = line(tau[here])
-            twist[here, :3] = line(tau[here], 1)
-            rotation[here], twist[here, 3:] = turn.at(tau[here])
+            here: Any = slice(None) if len(splines) == 1 else np.flatnonzero(piece == index)
+            own = tau[here]
+            if len(own):
+                position[here], twist[here, :3] = line(own), line(own, 1)
+                rotation[here], twist[here, 3:] = turn.at(own)
         return PathSamples(t, position, rotation, twist * slope[:, None])
 
     def series(self, middle: Array, half: Array) -> PathSeries:

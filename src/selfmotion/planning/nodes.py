@@ -6,7 +6,6 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.constraints import BoundConstraint
-from selfmotion.motion import Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.effort import Effort
@@ -83,17 +82,19 @@ class NodeDescent:
         )
 
     def near(
-        self, trajectories: Sequence[Trajectory], t: Array, dearest: float = np.inf
+        self, motions: Sequence[tuple[Array, Array]], t: Array, dearest: float = np.inf
     ) -> MotionOnNodes | None:
-        """Return the best motion near the cheapest of some, on nodes at some times.
+        """Return the best motion near the cheapest of some, on nodes at times t (N + 1,).
+
+        For q and q̇ (N + 1, n) of each there.
 
         Where what is best freely breaks conditions, also near motions from its start whose
         self-motion goes towards the middle of the joints' limits. None where there is none that
         keeps them, or it would cost more than `dearest`.
         """
         grid = self.grid(t)
-        motions = [grid.motion_near(trajectory) for trajectory in trajectories]
-        motion = min((one for one in motions if one), key=aim_of, default=None)
+        near = [grid.near(q, qd) for q, qd in motions]
+        motion = min((one for one in near if one), key=aim_of, default=None)
         return None if motion is None else self.best_near(motion, dearest)
 
     def best_near(self, motion: NodeMotion, dearest: float = np.inf) -> MotionOnNodes | None:

@@ -98,7 +98,7 @@ class MotionOnNodes:
     def smoothed(self, dearest: float) -> "MotionOnNodes | None":
         """Return it with smooth velocities; None where it costs more then, or breaks conditions."""
         motion = self.motion.smoothed()
-        if motion is None or not motion.exact_cost <= dearest or motion.broken().any():
+        if not motion.exact_cost <= dearest or motion.broken().any():
             return None
         motion.forget()
         return replace(self, motion=motion)

@@ -180,15 +180,15 @@ class Session:
         def optimum(descent: NodeDescent) -> MotionOnNodes | None:
             if before is not None:
                 return descent.again(before)
-            rolled = self.rolled
-            if not np.isfinite(rolled.objective.value(rolled.x)):
+            objective, warm = self.rolled.objective, self._warm
+            if not np.isfinite(objective.value(self.rolled.x)):
                 return None
-            here, t = self.motion().trajectory, rolled.objective.grid.nodes
-            warm = self._warm
-            if warm is None or warm.trajectory.t[-1] != warm.path.duration:
-                return descent.near([here], t, dearest)
-            known = slower(warm.trajectory, pace_of(warm, start.problem))
-            return descent.near([known, here], t, dearest)
+            samples, grid = objective.samples(self.rolled.x), objective.grid
+            motions = [(samples.q[grid.node_stages], samples.qd[grid.node_stages])]
+            if warm is not None and warm.trajectory.t[-1] == warm.path.duration:
+                known = slower(warm.trajectory, pace_of(warm, start.problem))
+                motions.insert(0, (known(grid.nodes), known(grid.nodes, 1)))
+            return descent.near(motions, grid.nodes, dearest)
 
         self._by_nodes(optimum)
         return self.on_nodes is not None

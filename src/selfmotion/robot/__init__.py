@@ -44,7 +44,7 @@ from selfmotion.robot.placements import (
 )
 from selfmotion.robot.tip_places import place_tips as place_tips
 from selfmotion.robot.tool_rates import ToolRates as ToolRates
-from selfmotion.robot.tree_arrays import ChainArrays as ChainArrays, TreeArrays as TreeArrays
+from selfmotion.robot.tree_arrays import TreeArrays as TreeArrays
 from selfmotion.robot.urdf import (
     TOOL_JOINT as TOOL_JOINT,
     Urdf as Urdf,

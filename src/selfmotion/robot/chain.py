@@ -220,11 +220,11 @@ class Chain:
 
     def along(self, q: Array) -> tuple[Array, Array, Array]:
         """Return the same at many configurations (K, n): (K, 6, n), (K, 3, 3) and (K, 3)."""
-        jacobians = np.zeros((len(q), 6, self.dof))
-        rotations, translations = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
+        jacobians = np.zeros((len(q), 1, 6, self.dof))
+        rotations, translations = np.empty((len(q), 1, 3, 3)), np.empty((len(q), 1, 3))
         # A copy: kernels are compiled anew for what may not be written to.
-        place_along(np.array(q), self.arrays, jacobians, rotations, translations)
-        return jacobians, rotations, translations
+        place_along(np.array(q), self._table, jacobians, rotations, translations)
+        return jacobians[:, 0], rotations[:, 0], translations[:, 0]
 
     def rooted(self) -> tuple[Any, int]:
         """Return a model in which the base is the world, and the tip's frame there.
@@ -268,8 +268,13 @@ class Chain:
         return [(joint, -1) for joint in up[:both:-1]] + [(joint, 1) for joint in down[both + 1 :]]
 
     @cached_property
+    def _table(self) -> Array:
+        """That of `arrays`, for this chain alone, (1, c + 1, 6, 3)."""
+        return self.arrays.table[None]
+
+    @cached_property
     def arrays(self) -> ChainArrays:
-        """What compiled kinematics need."""
+        """Its joints and its tip as arrays."""
         model, frames = self.model, self.model.frames
         place = frames[self.base].placement.inverse()
         places = []

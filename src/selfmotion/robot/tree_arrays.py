@@ -9,6 +9,10 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, Flags, Ints
 
+# What a chain's table tells of a joint, (6, 3): its coordinate, or -1 for the tip, and whether it
+# turns; its axis; where it is in the frame of the joint before, and how it is turned there.
+JOINT, AXIS, POSITION, ROTATION = 0, 1, 2, 3
+
 
 class TreeArrays(NamedTuple):
     """What compiled kinematics need of c joints; see `placements`.
@@ -35,7 +39,7 @@ class TreeArrays(NamedTuple):
 
 
 class ChainArrays(NamedTuple):
-    """What compiled kinematics need of a chain.
+    """A chain's joints and its tip.
 
     Attributes
     ----------
@@ -48,6 +52,18 @@ class ChainArrays(NamedTuple):
     tree: TreeArrays
     tip_rotation: Array
     tip_position: Array
+
+    @property
+    def table(self) -> Array:
+        """What compiled kinematics need, of each joint, then of the tip: (c + 1, 6, 3)."""
+        tree, count = self.tree, len(self.tree.joints)
+        found = np.zeros((count + 1, 6, 3))
+        found[:, JOINT, 0] = [*tree.joints, -1.0]
+        found[:count, JOINT, 1] = tree.is_revolute
+        found[:count, AXIS] = tree.axes
+        found[:, POSITION] = [*tree.positions, self.tip_position]
+        found[:, ROTATION:] = [*tree.rotations, self.tip_rotation]
+        return found
 
     @property
     def link_lengths(self) -> Array:

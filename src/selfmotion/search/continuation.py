@@ -4,7 +4,7 @@ import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints, inlined, kernel
 from selfmotion.basics.layout import Layout
-from selfmotion.robot import ChainArrays, place_tips
+from selfmotion.robot import place_tips
 from selfmotion.search.edges import wrapped
 from selfmotion.search.projection import CONVERGED, correct
 from selfmotion.search.settings import ALIGNED, CORRECTIONS, SMALLEST_STEP
@@ -18,7 +18,7 @@ def walk(
     start: Array,
     tangent: Array,
     target: Array,
-    chains: tuple[ChainArrays, ...],
+    chains: Array,
     revolute: Flags,
     layout: Layout,
     spacing: float,

@@ -23,8 +23,8 @@ class Manifold:
     Attributes
     ----------
     revolute : (n,)
-    chains : tuple of ChainArrays
-        What compiled kinematics need: `Chain.arrays` of each tip.
+    chains : (F, c + 1, 6, 3)
+        See `Follows.chains`.
     layout : (1, 9 + n)
         See `Follows.layout`.
 
@@ -38,7 +38,7 @@ class Manifold:
         self.follows, self.robot = follows, follows.robot
         # Copies: kernels are compiled anew for what may not be written to.
         self._limits = np.array(lower), np.array(upper)
-        self.chains = tuple(item.chain.arrays for item in follows.items)
+        self.chains = follows.chains
         self.revolute: Flags = follows.robot.is_revolute
         self.layout = follows.layout
         self._check()

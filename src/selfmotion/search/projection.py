@@ -11,7 +11,7 @@ from selfmotion.kernels import (
     rows_of,
     solve_cholesky,
 )
-from selfmotion.robot import ChainArrays, place_tips
+from selfmotion.robot import place_tips
 
 # A Newton correction of this size [rad or m] leaves an error of its square.
 CONVERGED = 1e-6
@@ -76,7 +76,7 @@ def stopped(q: Array, lower: Array, upper: Array, held: Flags) -> bool:
 def project_all(
     q: Array,
     targets: Array,
-    chains: tuple[ChainArrays, ...],
+    chains: Array,
     layout: Layout,
     lower: Array,
     upper: Array,

@@ -11,7 +11,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, Ints, called, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels import cholesky, errors_and_rows, gram, rows_of, solve_cholesky
-from selfmotion.robot import ChainArrays, place_tips
+from selfmotion.robot import place_tips
 from selfmotion.search.projection import CONVERGED, correct, stopped
 from selfmotion.search.settings import LITTLE_GAIN, LITTLE_GAINS
 
@@ -26,7 +26,7 @@ def project_relaxed(
     q: Array,
     deviation: Array,
     target: Array,
-    chains: tuple[ChainArrays, ...],
+    chains: Array,
     layout: Layout,
     lower: Array,
     upper: Array,
@@ -80,7 +80,7 @@ def approach_all(
     q: Array,
     deviation: Array,
     target: Array,
-    chains: tuple[ChainArrays, ...],
+    chains: Array,
     layout: Layout,
     lower: Array,
     upper: Array,

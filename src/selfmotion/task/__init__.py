@@ -20,10 +20,9 @@ from selfmotion.task.se3 import (
 )
 from selfmotion.task.turns import (
     SMALL_TURN as SMALL_TURN,
-    exponentials as exponentials,
-    left as left,
     left_derivative as left_derivative,
     left_matrices as left_matrices,
     skews as skews,
     turn as turn,
+    turning as turning,
 )

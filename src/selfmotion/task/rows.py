@@ -99,7 +99,7 @@ class Task(Enum):
         if self.tool_axes:
             turned = rotations.transpose(0, 2, 1) @ twists[:, 3:]
             twists = np.concatenate([twists[:, :3], turned], axis=1)
-        return np.ascontiguousarray(twists[:, self.rows])
+        return twists if self.dimension == 6 else np.ascontiguousarray(twists[:, self.rows])
 
     def twist_error(self, target: pin.SE3, actual: pin.SE3) -> Array:
         """Return the twist that takes `actual` to `target` in unit time, world axes, (6,) [m, rad].

@@ -8,49 +8,59 @@ from selfmotion.basics import Array
 SMALL_TURN = 5e-2
 
 
-def exponentials(vectors: Array) -> Array:
-    """Return exp([δ]×) for rotation vectors (S, 3), (S, 3, 3)."""
-    from scipy.spatial.transform import Rotation
+def turning(vectors: Array, rates: Array) -> tuple[Array, Array]:
+    """Return exp([δ]×), (S, 3, 3), and its angular velocity Jl(δ) δ̇, (S, 3)."""
+    angle = _angles(vectors)
+    a, b = _left_weights(angle)
+    delta, outer = skews(vectors), vectors[:, :, None] * vectors[:, None, :]
+    # sin θ / θ [δ]× + a [δ]×² + I, with [δ]×² = δδᵀ - θ² I.
+    sine, cosine = 1.0 - b * angle**2, 1.0 - a * angle**2
+    turned = sine[:, None, None] * delta + a[:, None, None] * outer
+    turned.reshape(-1, 9)[:, ::4] += cosine[:, None]
+    once = turn(delta, rates)
+    return turned, rates + a[:, None] * once + b[:, None] * turn(delta, once)
 
-    return np.asarray(Rotation.from_rotvec(vectors).as_matrix())
+
+def _angles(vectors: Array) -> Array:
+    return np.asarray(np.sqrt(np.einsum("si,si->s", vectors, vectors)))
 
 
-def _left_weights(vectors: Array) -> tuple[Array, Array, Array, Array]:
-    """Return a = (1 - cos θ)/θ², b = (θ - sin θ)/θ³, a'/θ and b'/θ at θ = |δ|."""
-    angle = np.linalg.norm(vectors, axis=1)
-    small = angle < SMALL_TURN
+def _left_weights(angle: Array) -> tuple[Array, Array]:
+    """Return a = (1 - cos θ)/θ² and b = (θ - sin θ)/θ³."""
+    small, square = angle < SMALL_TURN, angle**2
+    safe = np.where(small, 1.0, angle)
+    a = (1.0 - np.cos(safe)) / safe**2
+    b = (safe - np.sin(safe)) / safe**3
+    return (
+        np.where(small, 0.5 - square / 24.0 + square**2 / 720.0, a),
+        np.where(small, 1.0 / 6.0 - square / 120.0 + square**2 / 5040.0, b),
+    )
+
+
+def _left_slopes(angle: Array) -> tuple[Array, Array]:
+    """Return a'/θ and b'/θ."""
+    small, square = angle < SMALL_TURN, angle**2
     safe = np.where(small, 1.0, angle)
     sine, cosine = np.sin(safe), np.cos(safe)
-    a = np.where(small, 0.5 - angle**2 / 24.0 + angle**4 / 720.0, (1.0 - cosine) / safe**2)
-    b = np.where(small, 1.0 / 6.0 - angle**2 / 120.0 + angle**4 / 5040.0, (safe - sine) / safe**3)
-    by_a = np.where(
-        small,
-        -1.0 / 12.0 + angle**2 / 180.0 - angle**4 / 6720.0,
-        (safe * sine - 2.0 * (1.0 - cosine)) / safe**4,
+    by_a = (safe * sine - 2.0 * (1.0 - cosine)) / safe**4
+    by_b = (3.0 * sine - 2.0 * safe - safe * cosine) / safe**5
+    return (
+        np.where(small, -1.0 / 12.0 + square / 180.0 - square**2 / 6720.0, by_a),
+        np.where(small, -1.0 / 60.0 + square / 1260.0 - square**2 / 60480.0, by_b),
     )
-    by_b = np.where(
-        small,
-        -1.0 / 60.0 + angle**2 / 1260.0 - angle**4 / 60480.0,
-        (3.0 * sine - 2.0 * safe - safe * cosine) / safe**5,
-    )
-    return a, b, by_a, by_b
 
 
 def left_matrices(vectors: Array) -> Array:
     """Return Jl(δ) = I + a [δ]× + b [δ]×², (S, 3, 3)."""
-    a, b, _, _ = _left_weights(vectors)
+    a, b = _left_weights(_angles(vectors))
     cross = skews(vectors)
     return np.asarray(np.eye(3) + a[:, None, None] * cross + b[:, None, None] * cross @ cross)
 
 
-def left(vectors: Array, rates: Array) -> Array:
-    """Return Jl(δ) δ̇: the angular velocity of exp([δ]×), (S, 3)."""
-    return turn(left_matrices(vectors), rates)
-
-
 def left_derivative(vectors: Array, rates: Array) -> Array:
     """Return ∂(Jl(δ) v)/∂δ at v = δ̇, (S, 3, 3)."""
-    a, b, by_a, by_b = _left_weights(vectors)
+    angle = _angles(vectors)
+    (a, b), (by_a, by_b) = _left_weights(angle), _left_slopes(angle)
     delta, v = skews(vectors), skews(rates)
     once = turn(delta, rates)
     twice = turn(delta, once)
