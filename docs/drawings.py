@@ -351,6 +351,26 @@ def from_other_tools(page: "Page") -> str:
     return _svg(figure)
 
 
+def follow(page: "Page") -> str:
+    """Draw some segments that came back to a controller, and what it did of each."""
+    joints = len(page.names["home"])
+    figure, axes = _axes()
+    figure.set_size_inches(_NARROW, 3.0)
+    segments = [np.array(each) for each in page.names["segments"]]
+    fastest = int(np.abs(segments[20][:, 1 + joints : 1 + 2 * joints]).max(axis=0).argmax())
+    shown = segments[20:24]
+    for now, after in zip(shown, segments[21:25], strict=True):
+        t, speed = 1e3 * now[:, 0], now[:, 1 + joints + fastest]
+        done = t <= 1e3 * after[0, 0] + 1e-9
+        label = now is shown[0]
+        axes.plot(t, speed, color=_ORANGE, linewidth=1, label="a segment" if label else "")
+        axes.plot(t[done], speed[done], color=_BLUE, linewidth=3, label="done" if label else "")
+        axes.plot(t[:1], speed[:1], "o", color=_BLUE, label="it comes" if label else "")
+    axes.set(xlabel="t [ms]", ylabel=f"speed of joint {fastest + 1} [rad/s]")
+    axes.legend(frameon=False)
+    return _svg(figure)
+
+
 def places(page: "Page") -> str:
     """Return the map of what the places of the page about them cost."""
     written = page.folder / "out" / "places" / "index.html"
@@ -368,6 +388,7 @@ _OF_PAGES: Mapping[str, Callable[["Page"], str]] = {
     "cam": cam,
     "controllers": controllers,
     "check": check,
+    "follow": follow,
     "from_other_tools": from_other_tools,
     "realtime": realtime,
     "places": places,
