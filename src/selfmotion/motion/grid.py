@@ -78,7 +78,7 @@ class Grid:
 
     def derivative(self, values: Array) -> Array:
         """Return the derivative at the nodes of what has these values (N + 1, n) there."""
-        return np.asarray(Sampling.trapezoidal(self.nodes).differentiation(1) @ values)
+        return np.asarray(self.sampling.differentiation(1)[self.node_stages] @ values)
 
     @cached_property
     def weights(self) -> Array:

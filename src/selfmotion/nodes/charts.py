@@ -7,7 +7,6 @@ import numpy as np
 
 from selfmotion import kernels
 from selfmotion.basics import Array
-from selfmotion.engine import carried_bases
 from selfmotion.follow import Follows
 from selfmotion.nodes.kernels import look, pull
 
@@ -73,12 +72,13 @@ class Charts:
         """Return the nodes at z and ν, (N + 1, r) each; None where one is not to be had."""
         return self._looked(z, self.null_motions(nu), centred=False)
 
-    def centred(self, z: Array, epsilon: Array) -> Centred | None:
+    def centred(self, z: Array, epsilon: Array, *, carried: bool = False) -> Centred | None:
         """Return charts around the nodes at z (N + 1, r), with what of ε (N + 1, n) acts there.
 
+        Of the bases, only the first need be known where they are to be `carried` from node to node.
         None where a node is not to be had.
         """
-        place = self._looked(z, epsilon, centred=True)
+        place = self._looked(z, epsilon, centred=True, carried=carried)
         if place is None:
             return None
         around = Charts(self.manifolds, place.q, place.tangents)
@@ -102,15 +102,16 @@ class Charts:
         """Return ε = N0 ν, (N + 1, n)."""
         return np.asarray((self.bases @ nu[:, :, None])[:, :, 0])
 
-    def _looked(self, z: Array, epsilon: Array, *, centred: bool) -> Place | None:
+    def _looked(
+        self, z: Array, epsilon: Array, *, centred: bool, carried: bool = False
+    ) -> Place | None:
         own, bases = self.manifolds, self.bases
         q, table, tangents = np.empty_like(self.q), own.table(), np.empty_like(bases)
         qd, null_motions = own.rates(table)
         null_motions[:] = epsilon
         z = np.ascontiguousarray(z)
-        failed = look(
-            q, z, bases, self.q, own.targets, own.chains, own.layout, table, tangents, centred
-        )
+        given = own.targets, own.chains, own.layout
+        failed = look(q, z, bases, self.q, *given, table, tangents, centred, carried)
         if failed >= 0:
             return None
         return Place(q, np.array(qd), tangents, table)
@@ -176,9 +177,16 @@ class Manifolds:
         """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
         return kernels.rates_of(table, self.follows.robot.dof)
 
-    def charts(self, q: Array) -> Charts:
-        """Return charts around a motion near the path, q (N + 1, n)."""
-        return Charts(self, q, carried_bases(self.follows, q))
+    def near(self, q: Array, epsilon: Array) -> Centred | None:
+        """Return charts around the nodes nearest to q, with what of ε acts there, (N + 1, n) each.
+
+        Their bases turn no more than they must from each node to the next. None where a node does
+        not come onto its manifold.
+        """
+        n, m, _ = self._sizes
+        bases = np.zeros((len(q), n, n - m))
+        bases[0] = self.follows.null_basis(q[0])
+        return Charts(self, q, bases).centred(np.zeros((len(q), n - m)), epsilon, carried=True)
 
     def accelerations(self, place: Place) -> Array:
         """Return the least q̈ by which nodes follow the path, (N + 1, n): J⁺(ẍ - J̇q̇).

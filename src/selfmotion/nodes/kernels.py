@@ -50,14 +50,16 @@ def look(
     table: Array,
     tangents: Array,
     centred: bool,
+    carried: bool,
 ) -> int:
     """Put nodes onto their manifolds at coordinates z (K, r), and evaluate eq. 4 there.
 
     For charts with `bases` (K, n, r) and `references` (K, n), and `targets` (K, 12 F). Rows of the
     `table` hold paths and null motions already; q̇ and all else is set, q (K, n), and T in
     `tangents` (K, n, r). Or, `centred`, an orthonormal basis of the null space instead of T, and of
-    ε what is in it: the same motion in charts around it. Returns the first node for which that is
-    impossible, or -1.
+    ε what is in it: the same motion in charts around it. Where bases are to be `carried`, the first
+    is that of the first node, and each other one becomes what is found at the node before. Returns
+    the first node for which that is impossible, or -1.
     """
     (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
     tips = layout.shape[0]
@@ -68,6 +70,10 @@ def look(
     for k in range(count):
         # Views: slices are counted references, which take as long as what is done with them.
         here, off = view(q[k], 0, (n,)), np.inf
+        if carried and k > 0:
+            for j in range(n):
+                for x in range(r):
+                    bases[k, j, x] = tangents[k - 1, j, x]
         for j in range(n):
             here[j] = references[k, j]
             for x in range(r):

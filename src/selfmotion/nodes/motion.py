@@ -114,7 +114,8 @@ class NodeGrid:
 
         None where a node does not come onto its manifold.
         """
-        return self.around(self.manifolds.charts(q), qd)
+        found = self.manifolds.near(q, self._free(qd))
+        return None if found is None else self.at(*found)
 
     def around(self, charts: Charts, qd: Array) -> "NodeMotion | None":
         """Return the motion at z = 0 of charts whose velocities are nearest to q̇, or None."""

@@ -202,17 +202,20 @@ class Waypoints(Path, kind="waypoints"):
         slope = a + u**2 * (3 * c3 + u * (4 * c4 + 5 * u * c5))
         return self._t[k] + h * tau, slope
 
-    def _warps(self, t: Array) -> tuple[Ints, Array, tuple[Array, Array, Array, Array]]:
-        """Return the legs of times (K,), how long they last, and τ's coefficients of u, u³, u⁴, u⁵.
+    def _warps(self, t: Array) -> tuple[Ints, Array, Array]:
+        """Return the legs of times (K,), how long they last, and their `_warp_powers`, (4, K)."""
+        k = np.searchsorted(self._t[1:-1], t, side="right")
+        return k, self._t[k + 1] - self._t[k], self._warp_powers.take(k, axis=1)
+
+    @cached_property
+    def _warp_powers(self) -> Array:
+        """The coefficients of u, u³, u⁴, u⁵ in τ on each leg, (4, N - 1).
 
         Next to a corner τ is the quintic between the waypoints' times with slope 0 at the corner,
         1 at the other end, and no acceleration at either.
         """
-        k = np.clip(np.searchsorted(self._t, t, side="right") - 1, 0, len(self._t) - 2)
-        a, b = 1.0 * ~self._stops[k], 1.0 * ~self._stops[k + 1]
-        higher = 10 - 6 * a - 4 * b, -15 + 8 * a + 7 * b, 6 - 3 * a - 3 * b
-        first, third, fourth, fifth = (np.asarray(item, dtype=np.float64) for item in (a, *higher))
-        return k, self._t[k + 1] - self._t[k], (first, third, fourth, fifth)
+        a, b = 1.0 * ~self._stops[:-1], 1.0 * ~self._stops[1:]
+        return np.stack([a, 10 - 6 * a - 4 * b, -15 + 8 * a + 7 * b, 6 - 3 * a - 3 * b])
 
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
