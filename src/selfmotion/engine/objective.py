@@ -147,9 +147,8 @@ class Objective:
 
         Exact for the discretised motion; NaN where it breaks down.
         """
-        self._run(x)
         self.counts.gradients += 1
-        if not np.isfinite(sum(self._terms.values())):
+        if not np.isfinite(self.value(x)):
             return np.full(self.size, np.nan)
         by_epsilon, by_start, by_target = self.rollout.pullback(
             *self._costs.cotangents(self.rollout.samples())
@@ -157,9 +156,9 @@ class Objective:
         by_z, by_pose = self.start.tangent()
         parts = [by_start @ by_z, self.null_motion.pullback(by_epsilon)]
         if self._deviation.size:
-            target, own = self._deviation.matrix(self.parts(x)[2]), by_target[:, :12]
+            own = by_target[:, :12]
             own[0, :6] += by_start @ by_pose[:, :6]
-            parts.append(np.tensordot(own, target, 2))
+            parts.append(np.tensordot(own, self._deviation.matrix(self.parts(x)[2]), 2))
         return np.concatenate(parts)
 
     def require_finite(self, x: Array) -> None:
@@ -199,8 +198,8 @@ class Objective:
             names = self.rollout.robot.joint_names
             trajectory = Trajectory(t, q, qd, names, self.grid.derivative(qd))
             self.counts.jacobians += self.rollout.jacobian_evaluations - before
-            damped = self.rollout.damped
-            self._evaluation = Evaluation(x.copy(), dict(self._terms), trajectory, damped)
+            terms, damped = dict(self._terms), self.rollout.damped
+            self._evaluation = Evaluation(x.copy(), terms, trajectory, damped)
         return self._evaluation
 
     def violations(self, x: Array) -> tuple[str, ...]:
@@ -213,8 +212,7 @@ class Objective:
 
     def condition_rows(self, x: Array) -> Rows:
         """Return ∂h/∂x of all conditions at x; it stays what it is when others are looked at."""
-        tangents = self.node_tangents(x)
-        return self.constraints.rows(self.samples(x), tangents)
+        return self.constraints.rows(self.samples(x), self.node_tangents(x))
 
     def metric(self, x: Array) -> Array:
         """Return the Gauss-Newton matrix of quadratic costs, (size, size).
@@ -250,8 +248,8 @@ class Objective:
         if self._deviation.size:
             c = self.parts(x)[2]
             moved = self._deviation.matrix(c)[:, :6]
-            rows = samples.task.dimension
-            tangent[:, :rows, -len(c) :] += samples.task.select_along(moved, samples.rotation)
+            own = samples.task.select_along(moved, samples.rotation)
+            tangent[:, : own.shape[1], -len(c) :] += own
         return np.asarray(tangent)
 
     def _run(self, x: Array) -> None:
@@ -271,10 +269,9 @@ class Objective:
 
     def _evaluate(self, x: Array) -> None:
         z, coefficients, c = self.parts(x)
-        first = self._first
         if self._deviation.size:
             self.rollout.aim(self._deviation.target(c))
-            first = self.rollout.first_target
+        first = self.rollout.first_target if self._deviation.size else self._first
         start = self.start.configuration(z, first)
         if start is None:
             return
@@ -286,21 +283,18 @@ class Objective:
 
     def _sensitivities(self, x: Array) -> tuple[Array, Array]:
         """Return ∂q/∂[z | x | c] and ∂q̇/∂[z | x | c] at the stages, (S, n, size)."""
-        if self._tangents is None:
-            self._tangents = self._differentiated(x)
-        return self._tangents
-
-    def _differentiated(self, x: Array) -> tuple[Array, Array]:
+        if self._tangents is not None:
+            return self._tangents
         first = self.start.size
         last = first + self.null_motion.size
-        epsilon_matrix = self.null_motion.matrix(first, self.size - last)
+        epsilon_matrix, target_matrix = self.null_motion.matrix(first, self.size - last), None
         stages, n, _ = epsilon_matrix.shape
         start_matrix = np.zeros((n, self.size))
         start_matrix[:, :first], by_pose = self.start.tangent()
-        if not self._deviation.size:
-            return self.rollout.sensitivities(epsilon_matrix, start_matrix)
-        # The first tip's path is the one that is relaxed.
-        target_matrix = np.zeros((stages, 12 * len(self.rollout.follows.items), self.size))
-        target_matrix[:, :12, last:] = self._deviation.matrix(x[last:])
-        start_matrix[:, last:] = by_pose[:, :6] @ target_matrix[0, :6, last:]
-        return self.rollout.sensitivities(epsilon_matrix, start_matrix, target_matrix)
+        if self._deviation.size:
+            # The first tip's path is the one that is relaxed.
+            target_matrix = np.zeros((stages, 12 * len(self.rollout.follows.items), self.size))
+            target_matrix[:, :12, last:] = self._deviation.matrix(x[last:])
+            start_matrix[:, last:] = by_pose[:, :6] @ target_matrix[0, :6, last:]
+        self._tangents = self.rollout.sensitivities(epsilon_matrix, start_matrix, target_matrix)
+        return self._tangents

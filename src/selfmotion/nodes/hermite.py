@@ -222,8 +222,7 @@ class HermiteSamples(_WithRates):
 
     def __init__(self, follows: Follows, spline: Hermite, q: Array, qd: Array) -> None:
         ends = np.stack([q[:-1], qd[:-1], q[1:], qd[1:]], axis=1)
-        given = {"spline": spline, "_at_nodes": (q, qd), "ends": ends}
-        for name, value in given.items():
+        for name, value in (("spline", spline), ("_at_nodes", (q, qd)), ("ends", ends)):
             object.__setattr__(self, name, value)
         super().__init__(follows, spline.sampling)
 
@@ -286,16 +285,14 @@ class QuinticSamples(_WithRates):
     trajectory : Trajectory
     """
 
-    _shares: Array
     _trajectory: Trajectory
 
     def __init__(self, follows: Follows, spline: Hermite, trajectory: Trajectory) -> None:
-        object.__setattr__(self, "_shares", SHARES)
         object.__setattr__(self, "_trajectory", trajectory)
         super().__init__(follows, spline.sampling)
 
     def _of_order(self, order: int) -> Array:
-        return self._trajectory.within(self._shares, order)
+        return self._trajectory.within(SHARES, order)
 
 
 def weighted(shares: Array, changes: Array) -> Array:

@@ -223,7 +223,7 @@ class Chain:
         jacobians = np.zeros((len(q), 1, 6, self.dof))
         rotations, translations = np.empty((len(q), 1, 3, 3)), np.empty((len(q), 1, 3))
         # A copy: kernels are compiled anew for what may not be written to.
-        place_along(np.array(q), self._table, jacobians, rotations, translations)
+        place_along(np.array(q), self.arrays.table[None], jacobians, rotations, translations)
         return jacobians[:, 0], rotations[:, 0], translations[:, 0]
 
     def rooted(self) -> tuple[Any, int]:
@@ -266,11 +266,6 @@ class Chain:
         up, down = (list(supports[frames[frame].parentJoint]) for frame in (self.base, self.tip))
         both = sum(1 for a, b in zip(up, down, strict=False) if a == b) - 1
         return [(joint, -1) for joint in up[:both:-1]] + [(joint, 1) for joint in down[both + 1 :]]
-
-    @cached_property
-    def _table(self) -> Array:
-        """That of `arrays`, for this chain alone, (1, c + 1, 6, 3)."""
-        return self.arrays.table[None]
 
     @cached_property
     def arrays(self) -> ChainArrays:
