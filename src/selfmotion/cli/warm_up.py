@@ -14,8 +14,10 @@ from selfmotion.basics import read_only
 from selfmotion.cli.app import app, stages, terminal
 from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.collision.kernels import winding_number
+from selfmotion.engine import Counts
 from selfmotion.job.exchange import improved
 from selfmotion.job.stops import Stops
+from selfmotion.nodes import NodeGrid
 from selfmotion.task import SE3
 
 
@@ -87,6 +89,8 @@ def small_works() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "a global search", plan(free, search=sm.Search(mode="global"))
     yield "self-motion curves", plan(replace(free, task="pose"), search=sm.Search(mode="global"))
     yield "several tips and moving frames", plan(_carried())
+    nodes = NodeGrid(given, np.linspace(0.0, 4.0, 5), (), free=False, counts=Counts())
+    yield "limits on the way", lambda: nodes.motion_towards(home, home, 1.0)
     yield "orders of many seams", lambda: improved(_two_stops())
     yield "moves", lambda: sm.move(arm, home, home + 0.3, clearance=box)
     yield "a replanner", lambda: realtime.warm_up(realtime.Replanner(arm, "position"))
