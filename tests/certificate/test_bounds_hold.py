@@ -10,10 +10,10 @@ from selfmotion.basics import Array
 from selfmotion.certificate import Stretch
 from selfmotion.certificate.bounding import Bounded, _measured
 from selfmotion.certificate.path_error import _PathErrors
-from selfmotion.certificate.quantity import _Shares
+from selfmotion.certificate.quantity import Shares
 from selfmotion.follow import BoundFollow
+from selfmotion.testing.majorants import check_majorants
 from support.arms import robot_named
-from support.majorants import check_majorants
 from support.two_arms import baxter_with_both_arms
 
 ROUNDING = 1e-9
@@ -57,14 +57,14 @@ def kinds(robot: sm.RobotModel, motion: sm.Trajectory) -> dict[str, Bounded]:
         limits = sm.ToolLimits(1.0, 1.0, 10.0, 10.0)
         return {
             "relative": _PathErrors(follow, given, ()),
-            "relative rates": _Shares(limits.quantity(robot)),
+            "relative rates": Shares(limits.quantity(robot)),
         }
     return {
         "path": _PathErrors(follow, given, ()),
         "pointing": _PathErrors(replace(follow, task=pointing), given, ()),
         "relaxed": _PathErrors(follow, given, free),
     } | {
-        name: _Shares(constraint.quantity(robot))
+        name: Shares(constraint.quantity(robot))
         for name, constraint in {
             "joint": sm.Band(sm.JointCoordinate(robot.joint_names[2]), 0.1, 0.5),
             "height": sm.Band(sm.FrameCoordinate(robot.joint_names[4]), 0.2, 0.5),

@@ -12,9 +12,9 @@ import selfmotion as sm
 from selfmotion.certificate import Stretch
 from selfmotion.certificate.feed import _Along, _rounded_down
 from selfmotion.path import section_at_rest
+from selfmotion.testing.majorants import check_majorants
 from support.arms import PANDA_HOME
 from support.gantries import gantry
-from support.majorants import check_majorants
 
 
 def saddle(feed: float, **options) -> sm.Feed:

@@ -142,6 +142,21 @@ def assert_derivatives(objective: Objective) -> None:
     np.testing.assert_allclose(tangents.qd @ direction, expected, atol=1e-6 * scale)
 
 
+@pytest.mark.parametrize(("task", "name"), CASES)
+def test_a_pullback_is_what_the_matrix_says(task: str, name: str) -> None:
+    """Also with a deviation at c = 0."""
+    robot, t = robot_named("panda"), np.linspace(0.0, 1.5, 13)
+    path = turning_path(robot, start_of(robot, task))
+    rng = np.random.default_rng(9)
+    size = Deviation(path, TASKS[task][name], t, (True, False)).size
+    around = 0.3 * rng.normal(size=size)
+    deviation = Deviation(path, TASKS[task][name], t, (True, False), around=around)
+    c, cotangents = rng.normal(size=size), rng.normal(size=(len(t), 12))
+    expected = np.tensordot(cotangents, deviation.matrix(c), 2)
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(deviation.pullback(c, cotangents), expected, atol=1e-12 * scale)
+
+
 @pytest.mark.parametrize("free", [False, True])
 def test_the_metric_counts_the_path_error_of_a_damped_motion(free: bool) -> None:
     """∫ Σ (∂y/∂x)ᵀ W (∂y/∂x) dt over q, q̇ and the error S e, by central differences of motions."""

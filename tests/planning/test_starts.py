@@ -4,9 +4,11 @@ import dataclasses
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
 import selfmotion as sm
 from selfmotion.planning.standing import score
+from support.arms import robot_named
 
 Circle = Callable[..., sm.Problem]
 
@@ -39,3 +41,46 @@ def test_of_two_that_violate_constraints_the_nearer_is_kept() -> None:
     """A cheap motion through a body is no better start than a dearer one that touches it."""
     through, touching, free = Found(1.0, 50.0), Found(2.0, 0.1), Found(9.0, 0.0)
     assert sorted((through, touching, free), key=score) == [free, touching, through]
+
+
+BANDS = {
+    "cone": sm.Relaxation(("rx", "ry"), 0.2),
+    "stick-out": sm.Relaxation("z", 5e-3, axes="tool"),
+    "turn": sm.Relaxation("rz"),
+}
+
+
+@pytest.mark.parametrize("name", BANDS)
+def test_motions_that_begin_beside_a_relaxed_path_are_gone_on_with(
+    name: str, panda_circle: Circle
+) -> None:
+    """Rough optima make use of the bands from the first pose on, and lead to a plan from there."""
+    free = dataclasses.replace(panda_circle(), start=None)
+    relaxed = dataclasses.replace(free, relaxations=[BANDS[name]])
+    plan = sm.plan(relaxed)
+    assert plan.certificate.verified, plan.certificate.verdict
+    outcomes = {attempt.name: attempt.outcome for attempt in plan.report.attempts}
+    assert outcomes["starts"] == "all constraints are met"
+    assert "global search" not in outcomes
+    # The path itself is one of what is allowed; optima of one valley agree to this.
+    assert plan.report.cost <= sm.plan(free).report.cost * (1.0 + 1e-3)
+
+
+def test_a_motion_that_takes_the_arm_into_itself_is_passed_over_for_another() -> None:
+    """A path of which the cheapest motion does: number 41 of `make bench-starts`."""
+    start = [
+        [0.4700355675781523, 0.8537355921741101, 0.2240582599829922, -0.07655730776130869],
+        [-0.07905675572007381, -0.212106666619445, 0.9740435264148128, -0.061082667649131284],
+        [0.8790998774806541, -0.4755484209107517, -0.03220411127153957, -0.4265958065050183],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+    center = [-0.1580378732556933, -0.02460255901258996, -0.3915036403927299]
+    normal = [-0.5276985537584152, -0.6121715290793273, -0.5888805102446127]
+    ur5 = robot_named("ur5")
+    problem = sm.Problem(ur5, sm.Circle(start, center, normal, 4.0), "pointing")
+    careless = sm.plan(dataclasses.replace(problem, collision=None))
+    assert not problem.keeps_off_itself(careless.trajectory.q)
+    plan = sm.plan(problem)
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert plan.report.cost > careless.report.cost
+    assert not any("itself" in attempt.name for attempt in plan.report.attempts)

@@ -251,6 +251,27 @@ class Deaf(SlowElbow, kind="deaf"):
         return SlowJudge(np.inf)
 
 
+@dataclass(frozen=True)
+class ElbowBand(sm.Constraint, kind="elbow band"):
+    """|q3 + 2 q4| ≤ limit [rad], whose series counts joint 4 as often as it says."""
+
+    limit: float
+    times: float
+
+    def quantity(self, robot: sm.RobotModel) -> sm.Quantity:
+        row = np.array([0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0])
+        return sm.Quantity.between(
+            "q3 + 2 q4",
+            -self.limit,
+            self.limit,
+            values=lambda q, qd, qdd: q @ row,
+            derivatives=lambda q, qd, qdd: (np.tile(row, (len(q), 1)),),
+            series=lambda stretch: (
+                stretch.chain().joints[2] + self.times * stretch.chain().joints[3]
+            ),
+        )
+
+
 class Lazy:
     def minimize(self, function: sm.Function, x0: Array, *_: object, **__: object) -> sm.Minimum:
         return sm.Minimum(x0, function.value(x0), np.eye(len(x0)), (), sm.Status.CONVERGED)
@@ -269,6 +290,16 @@ def test_checkers_refuse_what_is_wrong(problem: sm.Problem) -> None:
             check()
     with pytest.raises(ValueError, match="read-only"):
         testing.check_cost(WritesToSamples())
+
+
+def test_a_series_that_is_no_majorant_is_refused(problem: sm.Problem) -> None:
+    """What a verdict says with it would be no proof; one that counts too much is only loose."""
+    free = dataclasses.replace(problem, constraints=())
+    for times in (2.0, 3.0):
+        testing.check_constraint(ElbowBand(6.0, times), free)
+    for times in (0.0, 1.0, 1.9):
+        with pytest.raises(AssertionError, match=r"'q3 \+ 2 q4': series\(\) is no majorant"):
+            testing.check_constraint(ElbowBand(6.0, times), free)
 
 
 def test_our_own_keep_the_laws_that_users_are_given(problem: sm.Problem) -> None:

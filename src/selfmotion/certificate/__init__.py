@@ -1,7 +1,7 @@
 """Re-checks finished motions: the path, and each requirement."""
 
 from selfmotion.certificate.apart import KeepsApart as KeepsApart
-from selfmotion.certificate.bounding import Stretch as Stretch
+from selfmotion.certificate.bounding import Bounded as Bounded, Stretch as Stretch
 from selfmotion.certificate.check import certify as certify
 from selfmotion.certificate.ends import (
     QUANTITIES as QUANTITIES,
@@ -25,6 +25,7 @@ from selfmotion.certificate.quantity import (
     Column as Column,
     Quantity as Quantity,
     QuantityKept as QuantityKept,
+    Shares as Shares,
 )
 from selfmotion.certificate.requirement import (
     FinishedMotion as FinishedMotion,

@@ -195,7 +195,7 @@ class QuantityKept(Requirement):
         quantity, t = self.quantity, motion.trajectory.t
         if not len(quantity.limited):
             return Finding(self.name, "nothing", float(t[0]), 0.0, 1.0, True, "not limited")
-        found = bounded(_Shares(quantity), motion.robot, motion.trajectory, t)
+        found = bounded(Shares(quantity), motion.robot, motion.trajectory, t)
         worst = int(np.argmax(np.where(np.isnan(found.values), np.inf, found.values)))
         column, share = int(quantity.limited[worst]), float(found.values[worst])
         time, subject = float(found.times[worst]), quantity.columns[column].subject
@@ -224,8 +224,13 @@ class QuantityKept(Requirement):
         )
 
 
-class _Shares(Bounded):
-    """What of its limits a quantity uses, a block for each column that has one."""
+class Shares(Bounded):
+    """What of its limits a quantity uses, a block for each column that has one.
+
+    Parameters
+    ----------
+    quantity : Quantity
+    """
 
     def __init__(self, quantity: Quantity) -> None:
         self._quantity, self._limited = quantity, quantity.limited

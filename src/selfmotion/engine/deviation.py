@@ -105,6 +105,10 @@ class Deviation:
     def _nominal(self) -> PathSamples:
         return self._path.samples(self._t)
 
+    def whole(self, c: Array) -> Array:
+        """Return the deviation of c with that of c = 0, (size,)."""
+        return self._around + c
+
     def target(self, c: Array) -> PathSamples:
         """Return the poses and twists that the tool follows."""
         nominal = self._nominal
@@ -123,13 +127,8 @@ class Deviation:
         rows, rates = self._rows(bent)
         by_rows, by_rates = np.zeros((stages, 6, self.size)), np.zeros((stages, 6, self.size))
         first = 0
-        for group, (s, sd, g, h, third, along) in zip(self._groups, bent, strict=True):
-            # ∂δ/∂s = g I + h s sᵀ, which is ∂δ̇/∂ṡ as well; ∂δ̇/∂s is its derivative in time.
-            eye = np.eye(len(group.indices))
-            outer, mixed = s[:, :, None] * s[:, None, :], s[:, :, None] * sd[:, None, :]
-            by_s = g[:, None, None] * eye + h[:, None, None] * outer
-            change = (h * along)[:, None, None] * eye + (third * along)[:, None, None] * outer
-            change += h[:, None, None] * (mixed + mixed.transpose(0, 2, 1))
+        for group, one in zip(self._groups, bent, strict=True):
+            by_s, change = _slopes(one)
             part = slice(first, first + group.size)
             shape = (stages, len(group.indices), group.size)
             direct = by_s[:, :, :, None] * group.values[:, None, None, :]
@@ -147,6 +146,32 @@ class Deviation:
         turning = left_derivative(rows[:, 3:], rates[:, 3:]) @ by_rows[:, 3:]
         result[:, 9:12] = rotation @ (turning + jacobian @ by_rates[:, 3:])
         return result
+
+    def pullback(self, c: Array, cotangents: Array) -> Array:
+        """Return Σ cotangentsᵀ ∂target/∂c for cotangents (S, 12) in the order of `matrix`."""
+        bent, nominal = self._bent(c), self._nominal
+        rows, rates = self._rows(bent)
+        back = nominal.rotation.transpose(0, 2, 1)
+        by_rows, by_rates = np.empty((len(cotangents), 6)), np.empty((len(cotangents), 6))
+        place, rate = cotangents[:, :3], cotangents[:, 6:9]
+        if self._in_tool_axes:
+            spin = skews(nominal.twist[:, 3:])
+            place, rate = turn(back, place - turn(spin, rate)), turn(back, rate)
+        by_rows[:, :3], by_rates[:, :3] = place, rate
+        tilt, spun = turn(back, cotangents[:, 3:6]), turn(back, cotangents[:, 9:])
+        jacobian = left_matrices(rows[:, 3:]).transpose(0, 2, 1)
+        slope = left_derivative(rows[:, 3:], rates[:, 3:]).transpose(0, 2, 1)
+        by_rows[:, 3:] = turn(jacobian, tilt) + turn(slope, spun)
+        by_rates[:, 3:] = turn(jacobian, spun)
+        parts = [np.zeros(0)]
+        for group, one in zip(self._groups, bent, strict=True):
+            # Both matrices are symmetric.
+            by_s, change = _slopes(one)
+            own, moving = by_rows[:, group.indices], by_rates[:, group.indices]
+            direct = np.einsum("sij,sj->si", by_s, own) + np.einsum("sij,sj->si", change, moving)
+            along = np.einsum("sij,sj->si", by_s, moving)
+            parts.append((direct.T @ group.values + along.T @ group.rates).ravel())
+        return np.concatenate(parts)
 
     def nearest(self, rows: Array) -> Array:
         """Return c (size,) whose deviations are nearest to some rows (S, 6), which are in band."""
@@ -168,7 +193,7 @@ class Deviation:
 
     def _bent(self, c: Array) -> list[_Bent]:
         """Return the groups' splines and what the sine makes of them."""
-        bent, first, total = [], 0, self._around + c
+        bent, first, total = [], 0, self.whole(c)
         for group in self._groups:
             part = total[first : first + group.size].reshape(len(group.indices), -1)
             first += group.size
@@ -230,6 +255,17 @@ def _group(
     values[inside] = spline(t[inside])
     rates[inside] = spline(t[inside], 1)
     return _Group(item.indices, item.band, values @ kept, rates @ kept)
+
+
+def _slopes(bent: _Bent) -> tuple[Array, Array]:
+    """Return ∂δ/∂s = g I + h s sᵀ, which is ∂δ̇/∂ṡ as well, and its derivative in time ∂δ̇/∂s."""
+    s, sd, g, h, third, along = bent
+    eye = np.eye(s.shape[1])
+    outer, mixed = s[:, :, None] * s[:, None, :], s[:, :, None] * sd[:, None, :]
+    by_s = g[:, None, None] * eye + h[:, None, None] * outer
+    change = (h * along)[:, None, None] * eye + (third * along)[:, None, None] * outer
+    change += h[:, None, None] * (mixed + mixed.transpose(0, 2, 1))
+    return by_s, change
 
 
 def _squash(s: Array, band: float) -> tuple[Array, Array, Array]:

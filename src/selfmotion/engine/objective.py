@@ -57,8 +57,9 @@ class Objective:
         self._deviation = deviation
         self._costs = CostIntegrals(costs, rollout.grid)
         self._at: Array | None = None
-        # ∂q/∂x and ∂q̇/∂x there, and the evaluation, once they were asked for.
+        # ∂q/∂x and ∂q̇/∂x there, the gradient and the evaluation, once they were asked for.
         self._tangents: tuple[Array, Array] | None = None
+        self._gradient: Array | None = None
         self._evaluation: Evaluation | None = None
         self._terms: dict[str, float] = {}
         self._first = rollout.first_target
@@ -136,6 +137,10 @@ class Objective:
         last = first + self.null_motion.size
         return x[:first], x[first:last], x[last:]
 
+    def deviation(self, x: Array) -> Array | None:
+        """Return the tool's deviation at x as `Deviation` has it; None where none is allowed."""
+        return self._deviation.whole(self.parts(x)[2]) if self._deviation.size else None
+
     def value(self, x: Array) -> float:
         """Return the cost at x; infinite where the motion breaks down."""
         self._run(x)
@@ -147,9 +152,15 @@ class Objective:
 
         Exact for the discretised motion; NaN where it breaks down.
         """
-        self.counts.gradients += 1
-        if not np.isfinite(self.value(x)):
-            return np.full(self.size, np.nan)
+        value = self.value(x)
+        if self._gradient is None:
+            self.counts.gradients += 1
+            none = np.full(self.size, np.nan)
+            self._gradient = self._pulled_back(x) if np.isfinite(value) else none
+        return self._gradient.copy()
+
+    def _pulled_back(self, x: Array) -> Array:
+        """Return the gradient at x, whose motion the rollout holds."""
         by_epsilon, by_start, by_target = self.rollout.pullback(
             *self._costs.cotangents(self.rollout.samples())
         )
@@ -158,7 +169,7 @@ class Objective:
         if self._deviation.size:
             own = by_target[:, :12]
             own[0, :6] += by_start @ by_pose[:, :6]
-            parts.append(np.tensordot(own, self._deviation.matrix(self.parts(x)[2]), 2))
+            parts.append(self._deviation.pullback(self.parts(x)[2], own))
         return np.concatenate(parts)
 
     def require_finite(self, x: Array) -> None:
@@ -258,7 +269,7 @@ class Objective:
             return
         self.counts.evaluated()
         # An interruption on the way must not leave half a motion as that of x.
-        self._at = self._tangents = self._evaluation = None
+        self._at = self._tangents = self._gradient = self._evaluation = None
         self._terms = dict.fromkeys(self._costs.names, np.inf)
         before = self.rollout.jacobian_evaluations
         try:

@@ -10,7 +10,7 @@ import numpy as np
 from selfmotion.basics import Array, BreakdownError, Progress, SelfmotionError
 from selfmotion.certificate import Tolerance
 from selfmotion.engine import Guide
-from selfmotion.motion import Grid, Trajectory
+from selfmotion.motion import Grid
 from selfmotion.optimise import Status
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
@@ -23,6 +23,7 @@ from selfmotion.planning.refusal import leaves_path
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import FREE_PART_EVALUATIONS, PART_EVALUATIONS, SHORTER_PARTS
+from selfmotion.planning.standing import RolledMotion, Standing
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt
 from selfmotion.search import Obstruction, Reach, SequenceGuide, reachable
@@ -88,6 +89,7 @@ class Draft:
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(self.search.rng)
         self._reaches: dict[float, Reach] = {}
+        self._clear: dict[Standing, bool] = {}
 
     @property
     def is_free(self) -> bool:
@@ -155,13 +157,15 @@ class Draft:
             return None
         return Session(begun)
 
-    def resumed(self, rough: Sequence[Trajectory]) -> list[Session]:
+    def resumed(self, rough: Sequence[RolledMotion]) -> list[Session]:
         """Return sessions that begin at rough motions, the best first."""
         sessions = []
         for motion in rough:
-            session = self.begin(motion.q[0], free=True)
+            trajectory = motion.evaluation().trajectory
+            # Where rows are relaxed it begins beside the path.
+            session = self.begin(trajectory.q[0], free=True, deviation=motion.deviation)
             if session is not None:
-                session.resume(motion)
+                session.resume(trajectory)
                 sessions.append(session)
         return sorted(sessions, key=Session.merit)
 
@@ -170,12 +174,36 @@ class Draft:
     ) -> None:
         """Optimise a session; keep it if it is the best one and may be chosen."""
         # What is only compared with is optimised to the end.
-        known = None if self.is_unmet or not chosen else self.best
-        dearest = np.inf if known is None else known.standing.cost
+        known = self.dearest if chosen else np.inf
         try:
-            session.minimize(evaluations, dearest=dearest)
+            session.minimize(evaluations, dearest=known)
         except KeyboardInterrupt:
             session.end(Status.INTERRUPTED)
+        self._note(session, chosen=chosen)
+
+    def optimise_on_nodes(self, session: Session) -> bool:
+        """Do so on nodes alone; return whether that is all there is to do with it."""
+        if self.is_over:
+            return False
+        try:
+            done = session.take_nodes(self.dearest) or session.is_hopeless
+        except KeyboardInterrupt:
+            session.end(Status.INTERRUPTED)
+            done = True
+        if done:
+            self._note(session)
+        return done
+
+    @property
+    def dearest(self) -> float:
+        """What a motion costs that is known and will do; inf where there is none."""
+        best = self.best
+        if best is None or best.violations or not self._is_clear(best):
+            return np.inf
+        return best.standing.cost
+
+    def _note(self, session: Session, *, chosen: bool = True) -> None:
+        """Keep what came of a session, if it may be `chosen`."""
         if session.is_hopeless:
             return
         if chosen:
@@ -185,8 +213,20 @@ class Draft:
 
     def consider(self, session: Session) -> None:
         """Keep a session if it is the best one."""
-        if self.best is None or session.score() < self.best.score():
+        if self.best is None or self._order(session) < self._order(self.best):
             self.best = session
+
+    def _order(self, session: Session) -> tuple[bool, bool, float]:
+        """Return what ranks motions: what takes the arm into itself comes behind what does not."""
+        violated, cost = session.score()
+        return violated, not violated and not self._is_clear(session), cost
+
+    def _is_clear(self, session: Session) -> bool:
+        """Whether a motion keeps the arm apart from itself where only the default asks it to."""
+        standing = session.standing
+        if standing not in self._clear:
+            self._clear[standing] = self.problem.keeps_off_itself(session.motion().trajectory.q)
+        return self._clear[standing]
 
     def reach(self, suspect: float = 0.0) -> Reach:
         """Return how far single poses are in reach, after a closer look at a time [s].

@@ -11,13 +11,14 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, Progress
-from selfmotion.motion import Grid, Trajectory
+from selfmotion.motion import Grid
 from selfmotion.optimise import Status
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.promise import most_promising
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import HEATS, HOPELESS, ONE_VALLEY, ROUGH_STEPS, SAME_OPTIMUM
+from selfmotion.planning.standing import RolledMotion
 from selfmotion.problem import Problem
 
 
@@ -40,9 +41,9 @@ class Heats:
         self._merits: list[tuple[float, Session]] = []
 
     @property
-    def ranked(self) -> list[Trajectory]:
+    def ranked(self) -> list[RolledMotion]:
         """The motions that were found so far, the best first."""
-        return [session.motion().trajectory for _, session in self._merits]
+        return [session.rolled for _, session in self._merits]
 
     def run(self, starts: Sequence[Array], finalists: int) -> None:
         """Leave the best `finalists` of the starts (n,), or fewer where they became the same."""
@@ -63,7 +64,7 @@ class Heats:
                 continue
             self._note(Session(begun))
         for heat, (most, evaluations) in enumerate(HEATS, 1):
-            del self._merits[max(most, finalists) :]
+            self._merits = self._foremost(max(most, finalists))
             running = [session for _, session in self._merits]
             optima: list[Array] = []
             for number, session in enumerate(running, 1):
@@ -80,7 +81,7 @@ class Heats:
                 self._forget(session)
                 self._note(session)
             self._drop()
-        del self._merits[finalists:]
+        self._merits = self._foremost(finalists)
 
     def _forget(self, session: Session) -> None:
         self._merits = [pair for pair in self._merits if pair[1] is not session]
@@ -94,12 +95,29 @@ class Heats:
             self._merits.append((merit, session))
             self._merits.sort(key=lambda pair: pair[0])
 
+    def _foremost(self, count: int) -> list[tuple[float, Session]]:
+        """Return the best ones; those that take the arm into itself only where others are few."""
+        if len(self._merits) <= count:
+            return self._merits
+        clear: list[tuple[float, Session]] = []
+        met: list[tuple[float, Session]] = []
+        for pair in self._merits:
+            if len(clear) == count:
+                break
+            (clear if self._is_clear(pair[1]) else met).append(pair)
+        return [*clear, *met][:count]
+
+    def _is_clear(self, session: Session) -> bool:
+        return self._problem.keeps_off_itself(session.rolled.nodes)
+
     def _drop(self) -> None:
         """Drop what became the same as a better one, and what costs much more than the best."""
         kept: list[tuple[float, Session]] = []
         motions: list[Array] = []
+        ranked = (merit for merit, session in self._merits if self._is_clear(session))
+        # Of what will be refused, the cost says nothing of what is wanted.
+        best = next(ranked, self._merits[0][0] if self._merits else np.inf)
         for merit, session in self._merits:
-            best = self._merits[0][0]
             if merit > best + (HOPELESS - 1.0) * abs(best):
                 break
             motion = session.rolled.nodes

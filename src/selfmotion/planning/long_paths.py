@@ -67,16 +67,15 @@ def _optimise(draft: Draft, posture: Array, ended: Status | None) -> None:
     if ended is not None:
         descent.end(ended)
     motion = _near(descent, problem, start, posture)
-    dearest = np.inf if draft.is_unmet or draft.best is None else draft.best.standing.cost
     if motion is None:
         return
     try:
-        found = descent.best_near(motion, dearest)
+        found = descent.best_near(motion, draft.dearest)
     except KeyboardInterrupt:
         found, ended = descent.latest, Status.INTERRUPTED
         if found is None:
             raise
-    if found is None or found.cost >= dearest:
+    if found is None or found.cost >= draft.dearest:
         return
     # Of its velocities eq. 4 keeps the self-motion.
     rates, grid = partial(motion.trajectory, order=1), Grid(motion.grid.t)
@@ -111,7 +110,8 @@ def _postures(draft: Draft) -> tuple[list[Array], Status | None]:
     except SelfmotionError:
         return [], None
     motions = [] if inner.best is None else [inner.best.motion().trajectory]
-    motions += [] if inner.heats is None else inner.heats.ranked
+    rough = [] if inner.heats is None else inner.heats.ranked
+    motions += [motion.evaluation().trajectory for motion in rough]
     found: list[Array] = []
     for motion in motions:
         weights = Sampling.trapezoidal(motion.t).weights

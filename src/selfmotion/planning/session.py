@@ -157,13 +157,15 @@ class Session:
         objective, wanted = self.rolled.objective, self.rolled.null_motion
         if not np.isfinite(objective.value(self.rolled.x)):
             objective.require_finite(self.rolled.x)
-        if evaluations is None and self._take_rough_minimum():
+        # It is a long way from far outside the constraints, which another motion spares.
+        restores = dearest == np.inf
+        if evaluations is None and self._take_rough_minimum(restores=restores):
             spent, status = self.is_spent, self.status
             self.rolled = self.rolled.with_null_motion(wanted)
             if spent:
                 self.end(status)
         if self._ended is None:
-            self._descend(evaluations)
+            self._descend(evaluations, restores=restores)
         self.rolled = self.rolled.closed()
         self.rolled = self.rolled.judged()
 
@@ -219,14 +221,14 @@ class Session:
         self.is_hopeless = descent.is_hopeless
         self.on_nodes = found or self.on_nodes
 
-    def _descend(self, evaluations: int | None) -> None:
+    def _descend(self, evaluations: int | None, *, restores: bool) -> None:
         """Minimise from where the motion is; by a finer null motion where this one gets stuck."""
         wanted, before = self.beginning.problem.null_motion, self.rolled
         # Where more freedom is taken anyway if it pays, it is a shorter way than restoration.
         refines = wanted.gain < np.inf and before.null_motion == wanted
         refines &= before.minimum is None and evaluations is None
-        self._take_minimum(evaluations, restores=not refines)
-        if not refines or self.status is not Status.INFEASIBLE:
+        self._take_minimum(evaluations, restores=restores and not refines)
+        if not (restores and refines) or self.status is not Status.INFEASIBLE:
             return
         stuck = self.rolled
         self._tried = wanted.detours(before.objective.null_motion.rows)[0]
@@ -240,7 +242,7 @@ class Session:
         else:
             self._take_minimum()
 
-    def _take_rough_minimum(self) -> bool:
+    def _take_rough_minimum(self, *, restores: bool) -> bool:
         """Go to the optimum of a rougher null motion, which leads to that wanted; return whether.
 
         That is sought where conditions are violated at x = 0: with many coefficients, steps would
@@ -253,7 +255,7 @@ class Session:
         if rough is None:
             return False
         self.rolled = rough
-        self._take_minimum()
+        self._take_minimum(restores=restores)
         if self.status is Status.INFEASIBLE:
             self.rolled = before
             return False

@@ -119,6 +119,11 @@ class RolledMotion:
         return self.objective.parts(self.x)[1].copy()
 
     @property
+    def deviation(self) -> Array | None:
+        """The tool's deviation from its path, as `Deviation` has it; None where none is allowed."""
+        return self.objective.deviation(self.x)
+
+    @property
     def steps(self) -> int:
         """Of its grid."""
         return self.objective.grid.steps

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from selfmotion.basics import Array
-from selfmotion.motion import Trajectory
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.heats import Heats
 from selfmotion.planning.session import Session
+from selfmotion.planning.standing import RolledMotion
 from selfmotion.search import start_candidates
 
 
@@ -24,16 +24,36 @@ def optimise_starts(draft: Draft, starts: int, finalists: int) -> None:
     candidates = start_candidates(problem.follows.for_robot(arm), starts, draft.rng, admits)
     rough = _rough(draft, candidates, finalists) if len(candidates) > finalists else []
     draft.waiting = sessions = draft.resumed(rough) if rough else _sessions(draft, candidates)
-    for number, session in enumerate(sessions, 1):
-        draft.progress("optimising start", number, len(sessions))
-        draft.optimise(session)
-        # What nothing can reach, no other start will.
-        if draft.is_over or draft.is_out_of_reach():
-            break
+    _optimise_each(draft, sessions)
     draft.waiting = ()
 
 
-def _rough(draft: Draft, candidates: list[Array], finalists: int) -> list[Trajectory]:
+def _optimise_each(draft: Draft, sessions: Sequence[Session]) -> None:
+    """Optimise on nodes first: where that leads to a motion, no long way to another is worth it."""
+    count, done, told = len(sessions), 0, 0
+    left: list[Session] = []
+    for session in sessions:
+        if told == done:
+            told += 1
+            draft.progress("optimising start", told, count)
+        if draft.optimise_on_nodes(session):
+            done += 1
+        else:
+            left.append(session)
+    for session in left:
+        if draft.is_over:
+            break
+        if told == done:
+            told += 1
+            draft.progress("optimising start", told, count)
+        draft.optimise(session)
+        done += 1
+        # What nothing can reach, no other start will.
+        if draft.is_out_of_reach():
+            break
+
+
+def _rough(draft: Draft, candidates: list[Array], finalists: int) -> list[RolledMotion]:
     """Return the best rough motions; none where these all break down."""
     draft.heats = Heats(draft.problem, draft.effort, draft.progress)
     draft.heats.run(candidates, finalists)

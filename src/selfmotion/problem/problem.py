@@ -204,6 +204,15 @@ class Problem:
             return None
         return self.collision
 
+    def keeps_off_itself(self, q: Array) -> bool:
+        """Whether configurations (K, n) keep the arm apart from itself by its meshes.
+
+        Where only the default asks it to: what constraints ask is for the optimisation to keep.
+        """
+        if self.own_collision is None:
+            return True
+        return all(model.worst(q).value >= far for model, far in self.envelope.bodies)
+
     @property
     def all_constraints(self) -> tuple[Constraint, ...]:
         """The constraints that ask something, with `own_collision` last where there is one."""

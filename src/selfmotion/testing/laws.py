@@ -9,11 +9,18 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, Saved, restore
-from selfmotion.certificate import Finding, FinishedMotion, Requirement
+from selfmotion.certificate import (
+    Finding,
+    FinishedMotion,
+    QuantityKept,
+    Requirement,
+    Shares,
+    Stretch,
+)
 from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost
 from selfmotion.engine import Objective, StillMotion
-from selfmotion.motion import Grid, NullMotion, PolynomialNullMotion
+from selfmotion.motion import Grid, NullMotion, PolynomialNullMotion, Trajectory
 from selfmotion.optimise import Iteration, Minimum, Optimizer
 from selfmotion.path import Line, Path
 from selfmotion.problem import Problem
@@ -21,6 +28,7 @@ from selfmotion.robot import RobotModel, load_robot
 from selfmotion.search import start_candidates
 from selfmotion.task import Task, exp3, log3
 from selfmotion.testing.functions import Bowl, Valley
+from selfmotion.testing.majorants import check_majorants
 
 # Exact gradients against central differences of F, relative to the largest entry.
 GRADIENT = 1e-6
@@ -31,6 +39,8 @@ MINIMUM = 1e-4
 # So many starts are looked for where none is given.
 _STARTS = 8
 _STEPS = 10
+# So many intervals of each motion tell whether series are majorants.
+_INTERVALS = 8
 
 
 def check_path(path: Path) -> None:
@@ -116,7 +126,9 @@ def check_constraint(constraint: Constraint, problem: Problem) -> None:
     """Check a constraint: its derivatives, and that its requirement says what its conditions say.
 
     Motions of growing self-motion are made; where the conditions are kept at all nodes, the
-    requirement has to be kept there, and some of the motions have to be refused.
+    requirement has to be kept there, and some of the motions have to be refused. The `series` of a
+    `Quantity` has to be above its derivatives along them: a verdict is a proof only as far as that
+    is so everywhere, of which this is a sample.
 
     Parameters
     ----------
@@ -226,12 +238,31 @@ def _judges_alike(
         worst = float(np.max(np.abs(h) if bound.equality else h))
         found = requirement.judge(FinishedMotion(robot, objective.at(x).trajectory))
         _require(isinstance(found, Finding), f"judge() returned {found!r}, expected a Finding")
+        if isinstance(requirement, QuantityKept) and requirement.quantity.series is not None:
+            _majorised(requirement, robot, objective.at(x).trajectory, rng)
         _require(
             found.kept or not worst <= -bound.tolerance or bound.equality,
             f"'{bound.name}' is kept at all nodes (h ≤ {worst:.3g}), but judged: {found.text}",
         )
         refused += not found.kept
     _require(refused > 0, f"requirement '{requirement.name}' accepts every motion that was tried")
+
+
+def _majorised(
+    requirement: QuantityKept, robot: RobotModel, trajectory: Trajectory, rng: np.random.Generator
+) -> None:
+    """Require that a quantity's series is above its derivatives on intervals of a motion."""
+    shares = Shares(requirement.quantity)
+    if not len(shares.blocks):
+        return
+    t = trajectory.t
+    first = t[rng.choice(len(t) - 1, min(_INTERVALS, len(t) - 1), replace=False)]
+    step = np.array([t[np.searchsorted(t, time, "right")] - time for time in first])
+    ends = np.sort(rng.random((2, len(first))), axis=0) * step + first
+    stretch = Stretch(robot, trajectory, np.stack(ends, axis=1))
+    known = shares.series(stretch)
+    if known is not None:
+        check_majorants(shares, stretch, f"constraint '{requirement.name}'")
 
 
 def _problem(robot: RobotModel, task: Task, **options: Any) -> Problem:
