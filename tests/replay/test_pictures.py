@@ -67,6 +67,7 @@ def test_no_browser_is_said_clearly(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@needs_browser
 def test_pictures_fail_before_work(tmp_path, monkeypatch):
     planar_plan().save(tmp_path / "a.npz")
     asked = ("replay", tmp_path / "a.npz", "--html", tmp_path / "a.html")
