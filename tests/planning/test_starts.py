@@ -28,6 +28,7 @@ class Found:
 
     cost: float
     penalty: float
+    keeps_off_itself: bool = True
 
     @property
     def violations(self) -> tuple[str, ...]:
@@ -40,7 +41,8 @@ class Found:
 def test_of_two_that_violate_constraints_the_nearer_is_kept() -> None:
     """A cheap motion through a body is no better start than a dearer one that touches it."""
     through, touching, free = Found(1.0, 50.0), Found(2.0, 0.1), Found(9.0, 0.0)
-    assert sorted((through, touching, free), key=score) == [free, touching, through]
+    itself = Found(0.5, 0.0, keeps_off_itself=False)
+    assert sorted((through, touching, free, itself), key=score) == [free, itself, touching, through]
 
 
 BANDS = {

@@ -73,6 +73,15 @@ class Conditions:
         """Whether a constraint is an equality."""
         return any(item.equality for item in self.constraints)
 
+    def require_finite(self, samples: Samples) -> None:
+        """Raise ProblemError where a condition has no finite value on a motion."""
+        for item in self.constraints:
+            if not np.all(np.isfinite(item.residual(samples))):
+                raise ProblemError(
+                    f"constraint '{item.name}': its residual is not finite on the motion at the "
+                    f"start; expected numbers wherever the arm may be"
+                )
+
     def penalty(self, samples: Samples) -> float:
         """Return about 10 for each constraint that is violated, 0 where all are kept."""
         total = 0.0

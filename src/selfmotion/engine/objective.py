@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array
 from selfmotion.constraints import BoundConstraint, NodeTangents
 from selfmotion.costs import Cost, Samples
 from selfmotion.engine.conditions import Conditions
@@ -57,7 +57,7 @@ class Objective:
         self._deviation = deviation
         self._costs = CostIntegrals(costs, rollout.grid)
         self._at: Array | None = None
-        # ∂q/∂x and ∂q̇/∂x there, the gradient and the evaluation, once they were asked for.
+        # ∂q/∂x and ∂q̇/∂x there, gradient and evaluation, once they were asked for.
         self._tangents: tuple[Array, Array] | None = None
         self._gradient: Array | None = None
         self._evaluation: Evaluation | None = None
@@ -144,23 +144,22 @@ class Objective:
     def value(self, x: Array) -> float:
         """Return the cost at x; infinite where the motion breaks down."""
         self._run(x)
-        total = sum(self._terms.values())
-        return total if np.isfinite(total) else np.inf
+        return total if np.isfinite(total := sum(self._terms.values())) else np.inf
 
     def gradient(self, x: Array) -> Array:
         """Return the gradient of `value` at x, (size,).
 
         Exact for the discretised motion; NaN where it breaks down.
         """
-        value = self.value(x)
+        self._run(x)
         if self._gradient is None:
             self.counts.gradients += 1
-            none = np.full(self.size, np.nan)
-            self._gradient = self._pulled_back(x) if np.isfinite(value) else none
+            self._gradient = self._pulled_back(x)
         return self._gradient.copy()
 
     def _pulled_back(self, x: Array) -> Array:
-        """Return the gradient at x, whose motion the rollout holds."""
+        if not np.isfinite(self.value(x)):
+            return np.full(self.size, np.nan)
         by_epsilon, by_start, by_target = self.rollout.pullback(
             *self._costs.cotangents(self.rollout.samples())
         )
@@ -175,16 +174,9 @@ class Objective:
     def require_finite(self, x: Array) -> None:
         """Raise ProblemError where a cost or a condition has no finite value at x; says when."""
         samples = self.samples(x)
-        if not np.all(np.isfinite(samples.q)):
-            return
-        self._costs.require_finite(samples)
-        for item in self.constraints.constraints:
-            h = item.residual(samples)
-            if not np.all(np.isfinite(h)):
-                raise ProblemError(
-                    f"constraint '{item.name}': its residual is not finite on the motion at the "
-                    f"start; expected numbers wherever the arm may be"
-                )
+        if np.all(np.isfinite(samples.q)):
+            self._costs.require_finite(samples)
+            self.constraints.require_finite(samples)
 
     def slope(self, x: Array, direction: Array) -> float:
         """Return the derivative of `value` at x along `direction`."""
@@ -209,8 +201,8 @@ class Objective:
             names = self.rollout.robot.joint_names
             trajectory = Trajectory(t, q, qd, names, self.grid.derivative(qd))
             self.counts.jacobians += self.rollout.jacobian_evaluations - before
-            terms, damped = dict(self._terms), self.rollout.damped
-            self._evaluation = Evaluation(x.copy(), terms, trajectory, damped)
+            terms = dict(self._terms)
+            self._evaluation = Evaluation(x.copy(), terms, trajectory, self.rollout.damped)
         return self._evaluation
 
     def violations(self, x: Array) -> tuple[str, ...]:
@@ -232,19 +224,16 @@ class Objective:
         (that of ½ q̇ᵀq̇ where none does), and likewise over the pose error; and |∂F/∂c| for what
         keeps a deviation within its band. Its inverse starts the quasi-Newton method.
         """
-        self._run(x)
         by_q, by_qd = self._sensitivities(x)
         metric = self._costs.curvature(by_q, by_qd, lambda: self._error_tangent(x, by_q))
         if self._deviation.size:
             # sin s bends as much as it rises: without it, steps would go round many times.
             slope = np.abs(self.parts(self.gradient(x))[2]) * self._deviation.banded
-            last = self.size - len(slope)
-            metric[last:, last:] += np.diag(slope)
+            metric[-len(slope) :, -len(slope) :] += np.diag(slope)
         return metric
 
     def node_tangents(self, x: Array) -> NodeTangents:
         """Return how the motion at the nodes changes with the decision vector, at x."""
-        self._run(x)
         by_q, by_qd = self._sensitivities(x)
         sampling = self.grid.sampling
         return NodeTangents(by_q[sampling.nodes], by_qd[sampling.nodes], sampling)
@@ -258,8 +247,7 @@ class Objective:
         tangent = -(samples.task_jacobian @ by_q)
         if self._deviation.size:
             c = self.parts(x)[2]
-            moved = self._deviation.matrix(c)[:, :6]
-            own = samples.task.select_along(moved, samples.rotation)
+            own = samples.task.select_along(self._deviation.matrix(c)[:, :6], samples.rotation)
             tangent[:, : own.shape[1], -len(c) :] += own
         return np.asarray(tangent)
 
@@ -294,6 +282,7 @@ class Objective:
 
     def _sensitivities(self, x: Array) -> tuple[Array, Array]:
         """Return ∂q/∂[z | x | c] and ∂q̇/∂[z | x | c] at the stages, (S, n, size)."""
+        self._run(x)
         if self._tangents is not None:
             return self._tangents
         first = self.start.size

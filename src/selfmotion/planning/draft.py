@@ -18,12 +18,12 @@ from selfmotion.planning.finish import finish
 from selfmotion.planning.heats import Heats
 from selfmotion.planning.known import Known, Proved
 from selfmotion.planning.largest_part import LargestPart, largest_part, shorter_part
-from selfmotion.planning.refinement import settle
+from selfmotion.planning.refinement import settle_both
 from selfmotion.planning.refusal import leaves_path
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import FREE_PART_EVALUATIONS, PART_EVALUATIONS, SHORTER_PARTS
-from selfmotion.planning.standing import RolledMotion, Standing
+from selfmotion.planning.standing import RolledMotion
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt
 from selfmotion.search import Obstruction, Reach, SequenceGuide, reachable
@@ -89,7 +89,6 @@ class Draft:
     def __post_init__(self) -> None:
         self.rng = np.random.default_rng(self.search.rng)
         self._reaches: dict[float, Reach] = {}
-        self._clear: dict[Standing, bool] = {}
 
     @property
     def is_free(self) -> bool:
@@ -179,30 +178,16 @@ class Draft:
             session.minimize(evaluations, dearest=known)
         except KeyboardInterrupt:
             session.end(Status.INTERRUPTED)
-        self._note(session, chosen=chosen)
-
-    def optimise_on_nodes(self, session: Session) -> bool:
-        """Do so on nodes alone; return whether that is all there is to do with it."""
-        if self.is_over:
-            return False
-        try:
-            done = session.take_nodes(self.dearest) or session.is_hopeless
-        except KeyboardInterrupt:
-            session.end(Status.INTERRUPTED)
-            done = True
-        if done:
-            self._note(session)
-        return done
+        self.note(session, chosen=chosen)
 
     @property
     def dearest(self) -> float:
         """What a motion costs that is known and will do; inf where there is none."""
         best = self.best
-        if best is None or best.violations or not self._is_clear(best):
-            return np.inf
-        return best.standing.cost
+        will_do = best is not None and not best.violations and best.standing.keeps_off_itself
+        return best.standing.cost if best is not None and will_do else np.inf
 
-    def _note(self, session: Session, *, chosen: bool = True) -> None:
+    def note(self, session: Session, *, chosen: bool = True) -> None:
         """Keep what came of a session, if it may be `chosen`."""
         if session.is_hopeless:
             return
@@ -213,20 +198,8 @@ class Draft:
 
     def consider(self, session: Session) -> None:
         """Keep a session if it is the best one."""
-        if self.best is None or self._order(session) < self._order(self.best):
+        if self.best is None or session.score() < self.best.score():
             self.best = session
-
-    def _order(self, session: Session) -> tuple[bool, bool, float]:
-        """Return what ranks motions: what takes the arm into itself comes behind what does not."""
-        violated, cost = session.score()
-        return violated, not violated and not self._is_clear(session), cost
-
-    def _is_clear(self, session: Session) -> bool:
-        """Whether a motion keeps the arm apart from itself where only the default asks it to."""
-        standing = session.standing
-        if standing not in self._clear:
-            self._clear[standing] = self.problem.keeps_off_itself(session.motion().trajectory.q)
-        return self._clear[standing]
 
     def reach(self, suspect: float = 0.0) -> Reach:
         """Return how far single poses are in reach, after a closer look at a time [s].
@@ -261,7 +234,7 @@ class Draft:
 
     def prove(self, best: Session) -> None:
         """Let the best motion be what the plan is made of, on grids that are fine enough."""
-        rival_cost = self._settle(best, self.rival)
+        rival_cost = settle_both(best, self.rival, self.progress)
         self.proved = self._proved(LargestPart(self.problem, best, ""), rival_cost)
 
     def is_free_by_meshes(self) -> bool:
@@ -293,7 +266,7 @@ class Draft:
         found = largest_part(self.problem, known, effort)
         if found is None:
             return False
-        self._settle(found.session, None)
+        settle_both(found.session, None, self.progress)
         self.proved = self._proved(found)
         for _ in range(SHORTER_PARTS):
             # Besides that it ends, nothing should be wrong with it.
@@ -302,7 +275,7 @@ class Draft:
             if (shorter := shorter_part(self.problem, found, effort)) is None:
                 break
             found = shorter
-            self._settle(found.session, None)
+            settle_both(found.session, None, self.progress)
             proved = self._proved(found)
             if len(proved.finished.certificate.failures) < 2:
                 self.proved = proved
@@ -312,21 +285,6 @@ class Draft:
         """Return a motion on the first grid that holds the tolerance, with its check."""
         finished = finish(self.problem, part, self.tolerance, self.progress)
         return Proved(part, finished, rival_cost)
-
-    def _settle(self, best: Session, rival: Session | None) -> float | None:
-        """Go on to finer grids, also with what the best one is compared with; return its cost."""
-        try:
-            self.progress("finer grid", 1, 1)
-            settle(best)
-            if rival is not None and rival is not best and not best.cut_short:
-                settle(rival)
-                if rival.cut_short:
-                    best.end(rival.status)
-                violated, cost = rival.score()
-                return None if violated else cost
-        except KeyboardInterrupt:
-            best.end(Status.INTERRUPTED)
-        return None
 
     def interrupted(self) -> None:
         """Make the best that is known the outcome; raise KeyboardInterrupt where nothing is."""

@@ -104,17 +104,14 @@ class Heats:
         for pair in self._merits:
             if len(clear) == count:
                 break
-            (clear if self._is_clear(pair[1]) else met).append(pair)
+            (clear if pair[1].rolled.keeps_off_itself else met).append(pair)
         return [*clear, *met][:count]
-
-    def _is_clear(self, session: Session) -> bool:
-        return self._problem.keeps_off_itself(session.rolled.nodes)
 
     def _drop(self) -> None:
         """Drop what became the same as a better one, and what costs much more than the best."""
         kept: list[tuple[float, Session]] = []
         motions: list[Array] = []
-        ranked = (merit for merit, session in self._merits if self._is_clear(session))
+        ranked = (merit for merit, session in self._merits if session.rolled.keeps_off_itself)
         # Of what will be refused, the cost says nothing of what is wanted.
         best = next(ranked, self._merits[0][0] if self._merits else np.inf)
         for merit, session in self._merits:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -78,6 +79,11 @@ class MotionOnNodes:
     def cost(self) -> float:
         """F."""
         return self.motion.exact_cost
+
+    @cached_property
+    def keeps_off_itself(self) -> bool:
+        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
+        return self.motion.grid.problem.keeps_off_itself(self.motion.place.q)
 
     @property
     def violations(self) -> tuple[str, ...]:

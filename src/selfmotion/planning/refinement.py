@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from selfmotion.basics import Progress
 from selfmotion.motion import NullMotion
 from selfmotion.optimise import Status
 from selfmotion.planning.session import Session
@@ -12,6 +13,24 @@ from selfmotion.planning.standing import relative_change
 
 # After these there is nothing to go on from.
 _ADRIFT = (Status.UNBOUNDED, Status.GRADIENT)
+
+
+def settle_both(best: Session, rival: Session | None, progress: Progress) -> float | None:
+    """Settle a motion, and what it is compared with; return what the latter costs, if it will do.
+
+    An interruption ends both as they are.
+    """
+    try:
+        progress("finer grid", 1, 1)
+        settle(best)
+        if rival is not None and rival is not best and not best.cut_short:
+            settle(rival)
+            if rival.cut_short:
+                best.end(rival.status)
+            return None if rival.violations else rival.standing.cost
+    except KeyboardInterrupt:
+        best.end(Status.INTERRUPTED)
+    return None
 
 
 def settle(session: Session) -> None:

@@ -55,4 +55,4 @@ def _is_hopeless(draft: Draft, guide: SequenceGuide, session: Session, best: Ses
     least = draft.sequences[0].sequence.cost
     share = DEARER_CHAIN if best.of_chain else DEARER
     dearer = guide.sequence.cost > least + (share - 1.0) * abs(least)
-    return dearer and session.merit() > best.score()[1]
+    return dearer and session.merit() > best.score()[-1]

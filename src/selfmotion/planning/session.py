@@ -110,8 +110,8 @@ class Session:
         """Return the cost, much larger where constraints are violated: for ranking."""
         return self.standing.merit()
 
-    def score(self) -> tuple[bool, float]:
-        """Return whether constraints are violated, then the cost: the smaller, the better."""
+    def score(self) -> tuple[bool, bool, float]:
+        """Return what ranks it among others: the smaller, the better; see `score`."""
         return score(self.standing)
 
     def take_chain(self, guide: SequenceGuide) -> None:

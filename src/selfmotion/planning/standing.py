@@ -1,6 +1,7 @@
 """A motion that stands: all that is known of it, as one value."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -52,6 +53,10 @@ class Standing(Protocol):
     def cost(self) -> float:
         """F."""
 
+    @property
+    def keeps_off_itself(self) -> bool:
+        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
+
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""
 
@@ -59,13 +64,16 @@ class Standing(Protocol):
         """Return the motion with its costs."""
 
 
-def score(standing: Standing) -> tuple[bool, float]:
-    """Return whether constraints are violated, then the cost: the smaller, the better.
+def score(standing: Standing) -> tuple[bool, bool, float]:
+    """Return what ranks motions, the smaller, the better.
 
-    Of two that violate constraints, the one that does so less is nearer to a motion.
+    Whether constraints are violated, whether the arm meets itself, which would be refused in the
+    end, and the cost. Of two that violate constraints, the one that does so less is nearer to a
+    motion.
     """
-    violated = bool(standing.violations)
-    return violated, standing.merit() if violated else standing.cost
+    if standing.violations:
+        return True, False, standing.merit()
+    return False, not standing.keeps_off_itself, standing.cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +146,11 @@ class RolledMotion:
     def cost(self) -> float:
         """F."""
         return sum(self.objective.terms(self.x).values())
+
+    @cached_property
+    def keeps_off_itself(self) -> bool:
+        """Whether the arm does where only the default asks it to, at the nodes and by meshes."""
+        return self.beginning.problem.keeps_off_itself(self.nodes)
 
     def merit(self) -> float:
         """Return the cost, much larger where constraints are violated: for ranking."""

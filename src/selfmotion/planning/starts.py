@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from selfmotion.basics import Array
+from selfmotion.optimise import Status
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.heats import Heats
 from selfmotion.planning.session import Session
@@ -36,7 +37,7 @@ def _optimise_each(draft: Draft, sessions: Sequence[Session]) -> None:
         if told == done:
             told += 1
             draft.progress("optimising start", told, count)
-        if draft.optimise_on_nodes(session):
+        if _optimise_on_nodes(draft, session):
             done += 1
         else:
             left.append(session)
@@ -51,6 +52,20 @@ def _optimise_each(draft: Draft, sessions: Sequence[Session]) -> None:
         # What nothing can reach, no other start will.
         if draft.is_out_of_reach():
             break
+
+
+def _optimise_on_nodes(draft: Draft, session: Session) -> bool:
+    """Optimise on nodes alone; return whether that is all there is to do with a session."""
+    if draft.is_over:
+        return False
+    try:
+        done = session.take_nodes(draft.dearest) or session.is_hopeless
+    except KeyboardInterrupt:
+        session.end(Status.INTERRUPTED)
+        done = True
+    if done:
+        draft.note(session)
+    return done
 
 
 def _rough(draft: Draft, candidates: list[Array], finalists: int) -> list[RolledMotion]:

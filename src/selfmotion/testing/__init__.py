@@ -7,8 +7,8 @@ with the law, the place and both numbers. All seeds are fixed.
 >>> check_cost(sm.InverseManipulability(0.01))
 """
 
+from selfmotion.testing.constraints import check_constraint as check_constraint
 from selfmotion.testing.laws import (
-    check_constraint as check_constraint,
     check_cost as check_cost,
     check_null_motion as check_null_motion,
     check_optimizer as check_optimizer,

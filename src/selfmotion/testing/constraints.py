@@ -1,0 +1,140 @@
+"""The laws of constraints: derivatives, what is judged by what is asked, and series."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.certificate import (
+    Finding,
+    FinishedMotion,
+    QuantityKept,
+    Requirement,
+    Shares,
+    Stretch,
+)
+from selfmotion.constraints import Constraint
+from selfmotion.engine import Objective, StillMotion
+from selfmotion.motion import Grid, Trajectory
+from selfmotion.problem import Problem
+from selfmotion.robot import RobotModel
+from selfmotion.search import start_candidates
+from selfmotion.testing.checks import GRADIENT, require, require_gradient, saved
+from selfmotion.testing.majorants import check_majorants
+
+# So many starts are looked for where none is given.
+_STARTS = 8
+_STEPS = 10
+# So many intervals of each motion tell whether series are majorants.
+_INTERVALS = 8
+
+
+def check_constraint(constraint: Constraint, problem: Problem) -> None:
+    """Check a constraint: its derivatives, and that its requirement says what its conditions say.
+
+    Motions of growing self-motion are made; where the conditions are kept at all nodes, the
+    requirement has to be kept there, and some of the motions have to be refused. The `series` of a
+    `Quantity` has to be above its derivatives along them: a verdict is a proof only as far as that
+    is so everywhere, of which this is a sample.
+
+    Parameters
+    ----------
+    constraint : Constraint
+    problem : Problem
+        On which it can be kept and broken; its own constraints are left out.
+
+    Raises
+    ------
+    AssertionError
+        A law is broken; says which one.
+    """
+    robot = problem.robot
+    # Conditions on the velocity at the ends have to be broken here.
+    problem = replace(problem, rest=False)
+    constraint.check(problem.follows)
+    start = problem.given_start
+    if start is None:
+        start = start_candidates(problem.follows, _STARTS, np.random.default_rng(0))[0]
+    grid = Grid.aligned(problem.knots, _STEPS * max(1, problem.null_motion.fewest_steps // 4))
+    still = StillMotion.on(problem, start, grid)
+    bound = constraint.bind(problem.follows, still.start, still.end)
+    objective = Objective.of(problem, still, free=True, constraints=[bound])
+    requirement = constraint.requirement(robot)
+    require(isinstance(requirement, Requirement), f"requirement() returned {requirement!r}")
+    rng = np.random.default_rng(1)
+    x = 0.02 * rng.normal(size=objective.size)
+    weights = rng.normal(size=bound.residual(objective.samples(x)).shape)
+
+    def weighed(x: Array) -> float:
+        return float(np.sum(weights * bound.residual(objective.samples(x))))
+
+    tangents = bound.tangents(objective.samples(x), objective.node_tangents(x))
+    shape = (*weights.shape, objective.size)
+    told = f"constraint '{bound.name}': tangents() has shape {np.shape(tangents)}, expected {shape}"
+    require(np.shape(tangents) == shape, told)
+    exact = np.tensordot(weights, tangents, weights.ndim)
+    require_gradient(weighed, lambda _: exact, x, f"constraint '{bound.name}'")
+    _known_on_demand(objective, bound.name, tangents.reshape(-1, objective.size), x)
+    _judges_alike(objective, bound, requirement, robot, rng)
+    saved(constraint, Constraint)
+
+
+def _known_on_demand(objective: Objective, name: str, table: Array, x: Array) -> None:
+    """Require that derivatives computed as far as they are asked for are those of the table."""
+    objective.conditions(x)
+    rows = objective.condition_rows(x)
+    ones, scale = np.ones(objective.size), max(1.0, float(np.abs(table).max(initial=0.0)))
+    for found, expected in (
+        (rows.picked(np.arange(len(table))), table),
+        (rows.along(ones), table @ ones),
+    ):
+        off = float(np.abs(found - expected).max(initial=0.0))
+        require(
+            off <= GRADIENT * scale,
+            f"constraint '{name}': linearised_at() is {off:.2e} off what tangents() says",
+        )
+
+
+def _judges_alike(
+    objective: Objective,
+    bound: Any,
+    requirement: Requirement,
+    robot: RobotModel,
+    rng: np.random.Generator,
+) -> None:
+    """Check that what the conditions allow is kept, and that not every motion is."""
+    refused = 0
+    for size in np.geomspace(1e-3, 10.0, 16):
+        x = size * rng.normal(size=objective.size)
+        if not np.isfinite(sum(objective.terms(x).values())):
+            continue
+        h = bound.residual(objective.samples(x))
+        worst = float(np.max(np.abs(h) if bound.equality else h))
+        found = requirement.judge(FinishedMotion(robot, objective.at(x).trajectory))
+        require(isinstance(found, Finding), f"judge() returned {found!r}, expected a Finding")
+        if isinstance(requirement, QuantityKept) and requirement.quantity.series is not None:
+            _majorised(requirement, robot, objective.at(x).trajectory, rng)
+        require(
+            found.kept or not worst <= -bound.tolerance or bound.equality,
+            f"'{bound.name}' is kept at all nodes (h ≤ {worst:.3g}), but judged: {found.text}",
+        )
+        refused += not found.kept
+    require(refused > 0, f"requirement '{requirement.name}' accepts every motion that was tried")
+
+
+def _majorised(
+    requirement: QuantityKept, robot: RobotModel, trajectory: Trajectory, rng: np.random.Generator
+) -> None:
+    """Require that a quantity's series is above its derivatives on intervals of a motion."""
+    shares = Shares(requirement.quantity)
+    if not len(shares.blocks):
+        return
+    t = trajectory.t
+    first = t[rng.choice(len(t) - 1, min(_INTERVALS, len(t) - 1), replace=False)]
+    step = np.array([t[np.searchsorted(t, time, "right")] - time for time in first])
+    ends = np.sort(rng.random((2, len(first))), axis=0) * step + first
+    stretch = Stretch(robot, trajectory, np.stack(ends, axis=1))
+    known = shares.series(stretch)
+    if known is not None:
+        check_majorants(shares, stretch, f"constraint '{requirement.name}'")
