@@ -13,9 +13,7 @@ from selfmotion.engine.rollout import Rollout
 
 # All stages of a plan from a free start, compared with the global search.
 STAGES = (
-    "start",
-    "heat 1",
-    "heat 2",
+    "rough motions",
     "optimising start",
     "search: self-motions at waypoint",
     "search: what is free at waypoint",
@@ -25,6 +23,10 @@ STAGES = (
     "finer grid",
     "checking",
 )
+
+
+# The same without nodes, up to there.
+HEATS = ("start", "heat 1", "heat 2", "optimising start")
 
 
 def level(x: float, y: float) -> pin.SE3:
@@ -63,10 +65,28 @@ def test_each_stage_is_told_in_order(problem: sm.Problem) -> None:
     told: list[tuple[str, int, int]] = []
     plan(problem, progress=lambda *now: told.append(now))
     assert tuple(dict.fromkeys(stage for stage, _, _ in told)) == STAGES
-    for stage in STAGES[:-2]:
+    for stage in STAGES[2:-2]:
         numbers = [(done, total) for name, done, total in told if name == stage]
         total = numbers[0][1]
         assert numbers == [(k, total) for k in range(1, total + 1)]
+
+
+def without_nodes(problem: sm.Problem) -> sm.Problem:
+    return dataclasses.replace(problem, null_motion=sm.PolynomialNullMotion())
+
+
+def test_heats_are_told_in_order(problem: sm.Problem) -> None:
+    told: list[str] = []
+    plan(without_nodes(problem), progress=lambda stage, *_: told.append(stage))
+    assert tuple(dict.fromkeys(told))[: len(HEATS)] == HEATS
+
+
+@pytest.mark.parametrize("stage", HEATS)
+def test_an_interruption_of_heats_yields_the_best_so_far(problem: sm.Problem, stage: str) -> None:
+    number = 2 if stage == "start" else 1
+    found = plan(without_nodes(problem), progress=interrupt_at(stage, number))
+    assert found.report.status is sm.Status.INTERRUPTED
+    assert found.certificate.position_error.value < 1e-3
 
 
 @pytest.mark.parametrize("stage", STAGES)
@@ -74,7 +94,7 @@ def test_an_interruption_at_any_stage_yields_the_best_so_far(
     problem: sm.Problem, stage: str
 ) -> None:
     # The first start may be the only one that is worth optimising.
-    alone = ("heat 2", "optimising start", "finer grid", "checking")
+    alone = ("optimising start", "finer grid", "checking")
     number = 1 if stage in alone else 2
     found = plan(problem, progress=interrupt_at(stage, number))
     assert found.report.status is sm.Status.INTERRUPTED
@@ -84,8 +104,10 @@ def test_an_interruption_at_any_stage_yields_the_best_so_far(
 
 def test_without_a_motion_an_interruption_is_one(problem: sm.Problem) -> None:
     with pytest.raises(KeyboardInterrupt):
-        plan(problem, progress=interrupt_at("start", 1))
-    for stage in STAGES[4:8]:
+        plan(problem, progress=interrupt_at("rough motions", 1))
+    with pytest.raises(KeyboardInterrupt):
+        plan(without_nodes(problem), progress=interrupt_at("start", 1))
+    for stage in STAGES[2:6]:
         with pytest.raises(KeyboardInterrupt):
             plan(problem, search=GLOBAL, progress=interrupt_at(stage, 1))
 
@@ -116,13 +138,8 @@ def test_an_interruption_within_any_rollout(
     monkeypatch.setattr(Rollout, "run", counted)
     plan(problem)
     total = calls[0]
-    # The first is the motion at x = 0 of the first start.
-    for at[0] in (1, *np.unique(np.linspace(2, total, 25).astype(int))):
+    for at[0] in np.unique(np.linspace(1, total, 25).astype(int)):
         calls[0] = 0
-        if at[0] == 1:
-            with pytest.raises(KeyboardInterrupt):
-                plan(problem)
-            continue
         found = plan(problem)
         assert found.report.status is sm.Status.INTERRUPTED
         assert np.isfinite(found.report.cost)
@@ -134,21 +151,19 @@ def test_a_callback_stops_all_starts(problem: sm.Problem) -> None:
 
     def stop(iteration: sm.Iteration) -> bool:
         costs.append(iteration.cost)
-        # Each start's first iteration has step 0.
-        stop.begun += iteration.step == 0.0
-        return stop.begun == 2
+        return len(costs) == 2
 
-    stop.begun = 0
     found = plan(problem, callback=stop)
     assert found.report.status is sm.Status.STOPPED
-    assert stop.begun == 2
-    assert found.report.cost <= min(costs) * (1.0 + 1e-3)
+    assert len(costs) == 2
+    # On few nodes the cost is a little less than that of the arm's own motion through these.
+    assert found.report.cost < costs[0]
 
 
 def test_an_interruption_of_a_given_start(problem: sm.Problem) -> None:
     start = problem.robot.inverse_kinematics(problem.path.pose(0.0), "planar", rng=0)
     given = dataclasses.replace(problem, start=start)
-    for stage in STAGES[4:]:
+    for stage in STAGES[2:]:
         found = plan(given, progress=interrupt_at(stage, 1))
         assert found.report.status is sm.Status.INTERRUPTED
         np.testing.assert_allclose(found.trajectory.q[0], start, atol=1e-9)

@@ -111,8 +111,9 @@ class Charts:
         null_motions[:] = epsilon
         z = np.ascontiguousarray(z)
         given = own.targets, own.chains, own.layout
-        failed = look(q, z, bases, self.q, *given, table, tangents, centred, carried)
-        if failed >= 0:
+        along = len(q) // own.copies if carried else 0
+        failed = look(q, z, bases, self.q, *given, table, tangents, centred, along)
+        if failed >= 0 and own.copies == 1:
             return None
         return Place(q, np.array(qd), tangents, table)
 
@@ -142,10 +143,13 @@ class Manifolds:
     follows : Follows
     t : (N + 1,)
         Times [s].
+    copies : int
+        Of how many motions these are the nodes, one after the other, at times `t` each. Of several,
+        one that is not to be had leaves the others: q̇ of its nodes that are nowhere is no number.
     """
 
-    def __init__(self, follows: Follows, t: Array) -> None:
-        self.follows, self.t = follows, t
+    def __init__(self, follows: Follows, t: Array, copies: int = 1) -> None:
+        self.follows, self.t, self.copies = follows, np.tile(t, copies), copies
         self.chains, self.layout = follows.chains, follows.layout
         self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
         self.work = np.zeros(kernels.space_size(*self._sizes))
@@ -153,16 +157,19 @@ class Manifolds:
         # A moment before each node and after: one step back, one on; at the ends of the path both
         # inside.
         step, end = _STEP * t[-1], t[-1]
-        self._steps = step * np.array([-1.0, 1.0])[:, None] * np.ones(len(t))
-        self._steps[:, t <= step] = step * np.array([1.0, 2.0])[:, None]
-        self._steps[:, t >= end - step] = step * np.array([-2.0, -1.0])[:, None]
-        times = np.concatenate([t, *(t + self._steps)])
+        steps = step * np.array([-1.0, 1.0])[:, None] * np.ones(len(t))
+        steps[:, t <= step] = step * np.array([1.0, 2.0])[:, None]
+        steps[:, t >= end - step] = step * np.array([-2.0, -1.0])[:, None]
+        times = np.concatenate([t, *(t + steps)])
+        self._steps = np.tile(steps, copies)
         self._twists, self._paths = [], []
         for item in follows.items:
             own = item.target(times)
-            self._twists.append(own.twist[len(t) :])
+            beside = own.twist[len(t) :].reshape(2, len(t), 6)
+            self._twists.append(np.tile(beside, (1, copies, 1)).reshape(-1, 6))
             parts = own.translation, own.rotation.reshape(-1, 9), own.twist
-            self._paths.append(np.hstack([part[: len(t)] for part in parts]))
+            path = np.hstack([part[: len(t)] for part in parts])
+            self._paths.append(np.tile(path, (copies, 1)))
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
 
     def table(self) -> Array:
@@ -185,7 +192,8 @@ class Manifolds:
         """
         n, m, _ = self._sizes
         bases = np.zeros((len(q), n, n - m))
-        bases[0] = self.follows.null_basis(q[0])
+        for first in range(0, len(q), len(q) // self.copies):
+            bases[first] = self.follows.null_basis(q[first])
         return Charts(self, q, bases).centred(np.zeros((len(q), n - m)), epsilon, carried=True)
 
     def accelerations(self, place: Place) -> Array:

@@ -46,26 +46,36 @@ class Hermite:
 
     Samples come four to an interval (its first node, three points), then the last node.
 
+    Of several motions on the same nodes, one after the other, the interval from the end of one to
+    the start of the next is a gap: it weighs nothing, and nothing moves there.
+
     Parameters
     ----------
     t : (N + 1,)
         Times of the nodes [s].
+    copies : int
+        How many motions there are; below, N + 1 nodes are those of all.
 
     Attributes
     ----------
     t : (N + 1,)
     steps : (N,)
         Lengths of the intervals [s].
+    gaps : (K,)
+        Which intervals are gaps.
     sampling : Sampling
         What costs look at.
     checked : Sampling
         What constraints look at: the nodes, and what is between each two.
     """
 
-    def __init__(self, t: Array) -> None:
-        self.t, self.steps = t, np.diff(t)
-        h = self.steps[:, None]
-        times, each = (t[:-1, None] + h * SHARES).ravel(), (h * _WEIGHTS).ravel()
+    def __init__(self, t: Array, copies: int = 1) -> None:
+        self.t, self.steps = np.tile(t, copies), np.diff(np.tile(t, copies))
+        self.gaps = np.arange(1, copies) * len(t) - 1
+        h = self.steps[:, None].copy()
+        h[self.gaps] = 0.0
+        self.steps[self.gaps] = 1.0
+        times, each = (self.t[:-1, None] + h * SHARES).ravel(), (h * _WEIGHTS).ravel()
         times = np.append(times, t[-1])
         self.sampling = Sampling(times, np.append(each, 0.0), np.arange(len(times)))
         self.checked = Sampling.trapezoidal(times[::_MIDDLE])
@@ -106,14 +116,16 @@ class Hermite:
         """How q̈ and the jerk at a node follow from q and q̇ near it, (N + 1, 3, 2) each.
 
         At the node before, at itself and at the next one: as the interval says that begins there;
-        at the last node that which ends.
+        at the last node of a motion that which ends.
         """
         found = []
         for order in (2, 3):
             right, left = (rows.reshape(-1, 2, 2) for rows in self.at_ends(order))
             shares = np.zeros((len(self.t), 3, 2))
             shares[:-1, 1:] = left
-            shares[-1, :2] = right[-1]
+            shares[self.gaps] = 0.0
+            ends = np.append(self.gaps, len(self.t) - 1)
+            shares[ends, :2] = right[ends - 1]
             found.append(shares)
         return found[0], found[1]
 
@@ -222,6 +234,9 @@ class HermiteSamples(_WithRates):
 
     def __init__(self, follows: Follows, spline: Hermite, q: Array, qd: Array) -> None:
         ends = np.stack([q[:-1], qd[:-1], q[1:], qd[1:]], axis=1)
+        if spline.gaps.size:
+            ends[spline.gaps, 2] = ends[spline.gaps, 0]
+            ends[spline.gaps, 1::2] = 0.0
         for name, value in (("spline", spline), ("_at_nodes", (q, qd)), ("ends", ends)):
             object.__setattr__(self, name, value)
         super().__init__(follows, spline.sampling)

@@ -50,17 +50,19 @@ def look(
     table: Array,
     tangents: Array,
     centred: bool,
-    carried: bool,
+    carried: int,
 ) -> int:
     """Put nodes onto their manifolds at coordinates z (K, r), and evaluate eq. 4 there.
 
     For charts with `bases` (K, n, r) and `references` (K, n), and `targets` (K, 12 F). Rows of the
     `table` hold paths and null motions already; q̇ and all else is set, q (K, n), and T in
     `tangents` (K, n, r). Or, `centred`, an orthonormal basis of the null space instead of T, and of
-    ε what is in it: the same motion in charts around it. Where bases are to be `carried`, the first
-    is that of the first node, and each other one becomes what is found at the node before. Returns
-    the first node for which that is impossible, or -1.
+    ε what is in it: the same motion in charts around it. Where bases are to be `carried`, along
+    motions of so many nodes, the first is that of a motion's first node, and each other one becomes
+    what is found at the node before; 0 for none. Returns the first node for which that is
+    impossible, or -1; of all such nodes, q̇ is no number.
     """
+    failed = -1
     (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
     tips = layout.shape[0]
     turns, places = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
@@ -70,7 +72,7 @@ def look(
     for k in range(count):
         # Views: slices are counted references, which take as long as what is done with them.
         here, off = view(q[k], 0, (n,)), np.inf
-        if carried and k > 0:
+        if carried > 0 and k % carried > 0:
             for j in range(n):
                 for x in range(r):
                     bases[k, j, x] = tangents[k - 1, j, x]
@@ -98,7 +100,11 @@ def look(
             if not off >= _THERE:
                 break
         if not 0.0 <= off < _THERE:
-            return k
+            failed = k if failed < 0 else failed
+            nowhere = stage_of(table[k], n, m).qd
+            for j in range(n):
+                nowhere[j] = np.nan
+            continue
         for x in range(r):
             for i in range(n):
                 b[i] = 1.0 if i == m + x else 0.0
@@ -126,8 +132,8 @@ def look(
             select(layout, f, tip.rotation, tip.command, at.y)
         respond(at.task_jacobian, at.factor, at.y, at.epsilon, at.qd)
         if not finite(at.qd):
-            return k
-    return -1
+            failed = k if failed < 0 else failed
+    return failed
 
 
 @inlined

@@ -45,6 +45,8 @@ class NodeGrid:
         Where work is added up.
     continuous : bool
         Whether accelerations are kept from jumping at the nodes.
+    copies : int
+        Of how many motions these are the nodes, one after the other, at times `t` each.
 
     Attributes
     ----------
@@ -67,10 +69,11 @@ class NodeGrid:
         free: bool,
         counts: Counts,
         continuous: bool = False,
+        copies: int = 1,
     ) -> None:
         self.problem, self.free, self.counts = problem, free, counts
         follows = problem.follows
-        self.spline, self.manifolds = Hermite(t), Manifolds(follows, t)
+        self.spline, self.manifolds = Hermite(t, copies), Manifolds(follows, t, copies)
         self.continuity = Continuity(problem, self.spline) if continuous else None
         smoothing = smoothing_at_rest(problem, self.spline)
         self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
@@ -81,7 +84,8 @@ class NodeGrid:
         self._constraints = tuple(constraints)
         r = follows.robot.dof - follows.dimension
         held: list[Ints] = [] if free else [np.arange(r)]
-        self._resting = np.array([0, len(t) - 1])[np.array(problem.rests)]
+        ends = np.array([0, len(t) - 1])[np.array(problem.rests)]
+        self._resting = (ends + len(t) * np.arange(copies)[:, None]).ravel()
         held += [2 * r * node + r + np.arange(r) for node in self._resting]
         self.held = np.concatenate([np.zeros(0, dtype=np.int64), *held])
 
@@ -99,7 +103,12 @@ class NodeGrid:
         """The same with accelerations that are kept from jumping."""
         return self._other(self.t, continuous=True)
 
-    def _other(self, t: Array, *, continuous: bool) -> "NodeGrid":
+    def copied(self, copies: int) -> "NodeGrid":
+        """Return the nodes of so many motions, one after the other."""
+        one = self.t[: len(self.t) // self.manifolds.copies]
+        return self._other(one, continuous=False, copies=copies)
+
+    def _other(self, t: Array, *, continuous: bool, copies: int = 1) -> "NodeGrid":
         return NodeGrid(
             self.problem,
             t,
@@ -107,6 +116,7 @@ class NodeGrid:
             free=self.free,
             counts=self.counts,
             continuous=continuous,
+            copies=copies,
         )
 
     def near(self, q: Array, qd: Array) -> "NodeMotion | None":

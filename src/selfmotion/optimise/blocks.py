@@ -73,3 +73,35 @@ class Banded:
         # `solveh_banded` looks at what it is given for as long as this takes.
         _, solved, wrong = dpbsv(self._table, right)
         return None if wrong else np.asarray(solved)
+
+    def part_solved(
+        self, part: int, parts: int, right: Array, shifts: tuple[float, float, float]
+    ) -> Array | None:
+        """Return the solution of one of `parts` equal parts that know nothing of each other.
+
+        Parameters
+        ----------
+        part, parts : int
+        right : (K s / parts,)
+        shifts : (float, float, float)
+            What is added to the diagonal: a share of its usual entry, and where the part is not
+            positive definite a share of its largest one, then so many times more, again and again.
+
+        Returns
+        -------
+        (K s / parts,) or None
+            None where the part has no finite solution.
+        """
+        from scipy.linalg.lapack import dpbsv
+
+        size = self._table.shape[1] // parts
+        table = self._table[:, part * size : (part + 1) * size].copy()
+        entries = np.abs(table[self._width])
+        shift = shifts[0] * float(np.median(entries))
+        while np.isfinite(shift):
+            table[self._width] += shift
+            _, solved, wrong = dpbsv(table, right)
+            if not wrong:
+                return np.asarray(solved)
+            shift = max(shifts[2] * shift, shifts[1] * float(entries.max()))
+        return None

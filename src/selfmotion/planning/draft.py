@@ -15,15 +15,14 @@ from selfmotion.optimise import Status
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.finish import finish
-from selfmotion.planning.heats import Heats
 from selfmotion.planning.known import Known, Proved
 from selfmotion.planning.largest_part import LargestPart, largest_part, shorter_part
 from selfmotion.planning.refinement import settle_both
 from selfmotion.planning.refusal import leaves_path
+from selfmotion.planning.rough import Ranking, RoughMotion
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import FREE_PART_EVALUATIONS, PART_EVALUATIONS, SHORTER_PARTS
-from selfmotion.planning.standing import RolledMotion
 from selfmotion.problem import Problem
 from selfmotion.result import Attempt
 from selfmotion.search import Obstruction, Reach, SequenceGuide, reachable
@@ -62,7 +61,7 @@ class Draft:
         Why a search was in vain; what would help.
     waiting : sequence of Session
         Complete motions that are not optimised yet.
-    heats : Heats or None
+    rough : Ranking or None
         Rough motions.
     proved : Proved or None
     """
@@ -83,7 +82,7 @@ class Draft:
     failure: SelfmotionError | None = None
     notes: list[str] = field(default_factory=list)
     waiting: Sequence[Session] = ()
-    heats: Heats | None = None
+    rough: Ranking | None = None
     proved: Proved | None = None
 
     def __post_init__(self) -> None:
@@ -156,17 +155,21 @@ class Draft:
             return None
         return Session(begun)
 
-    def resumed(self, rough: Sequence[RolledMotion]) -> list[Session]:
+    def resumed(self, rough: Sequence[RoughMotion]) -> list[Session]:
         """Return sessions that begin at rough motions, the best first."""
-        sessions = []
-        for motion in rough:
-            trajectory = motion.evaluation().trajectory
-            # Where rows are relaxed it begins beside the path.
-            session = self.begin(trajectory.q[0], free=True, deviation=motion.deviation)
-            if session is not None:
-                session.resume(trajectory)
-                sessions.append(session)
-        return sorted(sessions, key=Session.merit)
+        begun = (self.taken_up(motion) for motion in rough)
+        return sorted((one for one in begun if one is not None), key=Session.merit)
+
+    def taken_up(self, motion: RoughMotion) -> Session | None:
+        """Return the session that begins at a rough motion; None where it breaks down at once."""
+        trajectory = motion.trajectory
+        # Where rows are relaxed it begins beside the path.
+        session = self.begin(trajectory.q[0], free=True, deviation=motion.deviation)
+        if session is not None and motion.cost is None:
+            session.resume(trajectory)
+        elif session is not None:
+            session.take_up(trajectory)
+        return session
 
     def optimise(
         self, session: Session, *, chosen: bool = True, evaluations: int | None = None
@@ -288,8 +291,8 @@ class Draft:
 
     def interrupted(self) -> None:
         """Make the best that is known the outcome; raise KeyboardInterrupt where nothing is."""
-        if self.best is None and not self.waiting and self.heats is not None:
-            self.waiting = self.resumed(self.heats.ranked[:1])
+        if self.best is None and not self.waiting and self.rough is not None:
+            self.waiting = self.resumed(self.rough.ranked[:1])
         for session in self.waiting if self.best is None else ():
             session.end(Status.INTERRUPTED)
             self.consider(session)

@@ -11,14 +11,14 @@ from dataclasses import replace
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError, Progress
-from selfmotion.motion import Grid
 from selfmotion.optimise import Status
+from selfmotion.planning.apart import apart_of
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.promise import most_promising
+from selfmotion.planning.rough import RoughMotion, rough_grid
 from selfmotion.planning.session import Session
-from selfmotion.planning.settings import HEATS, HOPELESS, ONE_VALLEY, ROUGH_STEPS, SAME_OPTIMUM
-from selfmotion.planning.standing import RolledMotion
+from selfmotion.planning.settings import HEATS, HOPELESS, ONE_VALLEY, SAME_OPTIMUM
 from selfmotion.problem import Problem
 
 
@@ -35,23 +35,19 @@ class Heats:
     def __init__(self, problem: Problem, effort: Effort, progress: Progress) -> None:
         self._problem, self._progress = problem, progress
         self._effort = replace(effort, callback=None, max_evaluations=None)
-        self._turning = np.array(
-            [not problem.robot.is_prismatic(name) for name in problem.robot.joint_names]
-        )
+        self._apart = apart_of(problem.robot)
         self._merits: list[tuple[float, Session]] = []
 
     @property
-    def ranked(self) -> list[RolledMotion]:
-        """The motions that were found so far, the best first."""
-        return [session.rolled for _, session in self._merits]
+    def ranked(self) -> list[RoughMotion]:
+        """See `Ranking`."""
+        motions = (session.rolled for _, session in self._merits)
+        return [RoughMotion(one.evaluation().trajectory, one.deviation) for one in motions]
 
     def run(self, starts: Sequence[Array], finalists: int) -> None:
-        """Leave the best `finalists` of the starts (n,), or fewer where they became the same."""
+        """See `Ranking`."""
+        grid = rough_grid(self._problem)
         problem = replace(self._problem, null_motion=self._problem.null_motion.rough)
-        steps = max(ROUGH_STEPS, problem.null_motion.fewest_steps)
-        # A path of many waypoints is crossed in strides: what is rough needs not stop at each.
-        knots = problem.knots if len(problem.knots) <= steps else problem.knots[[0, -1]]
-        grid = Grid.aligned(knots, steps)
         first_heat = max(HEATS[0][0], finalists)
         promising = most_promising(problem, starts, grid, self._apart)[:first_heat]
         for number, start in enumerate(promising, 1):
@@ -122,10 +118,3 @@ class Heats:
                 kept.append((merit, session))
                 motions.append(motion)
         self._merits = kept
-
-    def _apart(self, motion: Array, others: Array) -> Array:
-        """Return how far a motion (N, n) is from each of others (K, N, n), up to turns, (K,)."""
-        difference = others - motion
-        turns = np.round(difference / (2.0 * np.pi))
-        away = np.abs(difference - 2.0 * np.pi * turns * self._turning)
-        return np.asarray(away.max(axis=(1, 2)))

@@ -1,6 +1,6 @@
 """Which of many starts are worth a closer look: motions without self-motion, all at once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,13 +9,14 @@ from selfmotion.basics import Array
 from selfmotion.costs import Samples
 from selfmotion.engine import Conditions
 from selfmotion.motion import Grid, Sampling
+from selfmotion.planning.apart import Apart, unlike
 from selfmotion.planning.settings import ONE_VALLEY
 from selfmotion.problem import Problem
 from selfmotion.search import carried
 
 
 def most_promising(
-    problem: Problem, starts: Sequence[Array], grid: Grid, apart: Callable[[Array, Array], Array]
+    problem: Problem, starts: Sequence[Array], grid: Grid, apart: Apart
 ) -> list[Array]:
     """Return starts (n,), the best first, and those last that are near a better one.
 
@@ -30,7 +31,7 @@ def most_promising(
     grid : Grid
         At whose nodes to look, few.
     apart : callable
-        How far a motion (N, n) is from each of others (K, N, n), (K,) [rad or m].
+        How far motions are from each other.
     """
     motions, arrived = carried(problem.follows, np.array(starts), grid.nodes)
     merits = np.full(len(starts), np.inf)
@@ -38,12 +39,10 @@ def most_promising(
     sampling = Sampling.trapezoidal(grid.nodes)
     for k in np.flatnonzero(arrived):
         merits[k] = _merit(problem, motions[k], twists, grid, sampling)
-    valleys: list[int] = []
-    slopes: list[int] = []
-    for k in np.argsort(merits, kind="stable"):
-        alone = arrived[k] and bool((apart(motions[k], motions[valleys]) > ONE_VALLEY).all())
-        (valleys if alone else slopes).append(int(k))
-    return [starts[k] for k in (*valleys, *slopes)]
+    order = np.argsort(merits, kind="stable")
+    followed = order[arrived[order]]
+    valleys, slopes = unlike(motions, followed, apart, ONE_VALLEY)
+    return [starts[k] for k in (*valleys, *slopes, *order[~arrived[order]].tolist())]
 
 
 def _merit(problem: Problem, q: Array, twists: Array, grid: Grid, sampling: Sampling) -> float:

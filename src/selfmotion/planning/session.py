@@ -50,6 +50,7 @@ class Session:
         # A finer null motion than asked for that led nowhere.
         self._tried: NullMotion | None = None
         self._warm: Plan | None = None
+        self._known: Trajectory | None = None
 
     @property
     def beginning(self) -> Beginning:
@@ -100,6 +101,7 @@ class Session:
         """Take the motion as it is; there is no time for another one."""
         self._ended = status
         if self.on_nodes is None:
+            self._resume_known()
             self.rolled = self.rolled.judged()
 
     def motion(self) -> Evaluation:
@@ -137,6 +139,15 @@ class Session:
         """Begin at the null motion of a motion along this path, unless that would be worse."""
         self.rolled = self.rolled.resumed(trajectory)
 
+    def take_up(self, trajectory: Trajectory) -> None:
+        """Begin at a motion along this path: on nodes, or else at its null motion."""
+        self._known = trajectory
+
+    def _resume_known(self) -> None:
+        if self._known is not None:
+            known, self._known = self._known, None
+            self.resume(known)
+
     def minimize(self, evaluations: int | None = None, *, dearest: float = np.inf) -> None:
         """Optimise on the present grid, from the motion that there is.
 
@@ -154,6 +165,7 @@ class Session:
         if self._warm is not None:
             warm, self._warm = self._warm, None
             self.rolled = self.rolled.begun_at(warm)
+        self._resume_known()
         objective, wanted = self.rolled.objective, self.rolled.null_motion
         if not np.isfinite(objective.value(self.rolled.x)):
             objective.require_finite(self.rolled.x)
@@ -187,6 +199,8 @@ class Session:
                 return None
             samples, grid = objective.samples(self.rolled.x), objective.grid
             motions = [(samples.q[grid.node_stages], samples.qd[grid.node_stages])]
+            if self._known is not None:
+                motions = [(self._known(grid.nodes), self._known(grid.nodes, 1))]
             if warm is not None and warm.trajectory.t[-1] == warm.path.duration:
                 known = slower(warm.trajectory, pace_of(warm, start.problem))
                 motions.insert(0, (known(grid.nodes), known(grid.nodes, 1)))

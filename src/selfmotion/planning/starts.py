@@ -1,13 +1,14 @@
 """Motions from many starts: rough ones of all, optimised ones of the best."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from selfmotion.basics import Array
 from selfmotion.optimise import Status
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.heats import Heats
+from selfmotion.planning.rough import OnNodes, Ranking, RoughMotion
 from selfmotion.planning.session import Session
-from selfmotion.planning.standing import RolledMotion
+from selfmotion.planning.settings import DEARER_OPTIMUM
 from selfmotion.search import start_candidates
 
 
@@ -24,16 +25,21 @@ def optimise_starts(draft: Draft, starts: int, finalists: int) -> None:
     admits = problem.envelope.admits if problem.envelope.quantities else None
     candidates = start_candidates(problem.follows.for_robot(arm), starts, draft.rng, admits)
     rough = _rough(draft, candidates, finalists) if len(candidates) > finalists else []
-    draft.waiting = sessions = draft.resumed(rough) if rough else _sessions(draft, candidates)
-    _optimise_each(draft, sessions)
+    draft.waiting = ()
+    if rough:
+        _optimise_each(draft, _resumed(draft, rough), len(rough))
+    else:
+        sessions = _sessions(draft, candidates)
+        _optimise_each(draft, sessions, len(sessions))
     draft.waiting = ()
 
 
-def _optimise_each(draft: Draft, sessions: Sequence[Session]) -> None:
+def _optimise_each(draft: Draft, sessions: Iterable[Session], count: int) -> None:
     """Optimise on nodes first: where that leads to a motion, no long way to another is worth it."""
-    count, done, told = len(sessions), 0, 0
+    done, told = 0, 0
     left: list[Session] = []
     for session in sessions:
+        draft.waiting = (*draft.waiting, session)
         if told == done:
             told += 1
             draft.progress("optimising start", told, count)
@@ -68,11 +74,30 @@ def _optimise_on_nodes(draft: Draft, session: Session) -> bool:
     return done
 
 
-def _rough(draft: Draft, candidates: list[Array], finalists: int) -> list[RolledMotion]:
+def _rough(draft: Draft, candidates: list[Array], finalists: int) -> list[RoughMotion]:
     """Return the best rough motions; none where these all break down."""
-    draft.heats = Heats(draft.problem, draft.effort, draft.progress)
-    draft.heats.run(candidates, finalists)
-    return draft.heats.ranked
+    given = draft.problem, draft.effort, draft.progress
+    kinds: list[Ranking] = [Heats(*given)]
+    if OnNodes.takes(draft.problem, draft.effort, candidates[0]):
+        kinds.insert(0, OnNodes(*given))
+    for kind in kinds:
+        draft.rough = kind
+        kind.run(candidates, finalists)
+        if ranked := kind.ranked:
+            return ranked
+    return []
+
+
+def _resumed(draft: Draft, rough: Sequence[RoughMotion]) -> Iterator[Session]:
+    """Yield sessions that begin at rough motions; of optima, those that may turn out best."""
+    if any(motion.cost is None for motion in rough):
+        yield from draft.resumed(rough)
+        return
+    for motion in rough:
+        if motion.cost is not None and motion.cost <= DEARER_OPTIMUM * draft.dearest:
+            session = draft.taken_up(motion)
+            if session is not None:
+                yield session
 
 
 def _sessions(draft: Draft, starts: Sequence[Array]) -> list[Session]:

@@ -1,0 +1,138 @@
+"""Motions side by side are each what they are alone, and become rough optima."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.engine import Counts
+from selfmotion.nodes import NodeGrid, Step, Together, minimise
+from support.arms import PANDA_HOME, Case
+from support.nodes import problem_of
+
+# Side by side, solvers and sums take another order.
+ROUNDING = 1e-9
+# Of a rough optimum: the next step promised less than 1e-3 of it.
+ROUGH = 2e-3
+INTERVALS, ROUNDS = 8, 6
+
+
+def grid_of(problem: sm.Problem) -> NodeGrid:
+    start = np.array(problem.given_start)
+    t = np.linspace(0.0, problem.path.duration, INTERVALS + 1)
+    bound = problem.bind_constraints(start, start)
+    return NodeGrid(problem, t, bound, free=True, counts=Counts())
+
+
+def motions_of(problem: sm.Problem, count: int = 4, size: float = 0.15) -> Array:
+    """Return motions near the path, each somewhere else on the self-motions, (K, N + 1, n)."""
+    robot, start = problem.robot, np.array(problem.given_start)
+    rng = np.random.default_rng(3)
+    found = []
+    for _ in range(count):
+        null = problem.follows.null_basis(start)
+        q = start + null @ rng.normal(scale=size, size=null.shape[1])
+        found.append(np.tile(q, (INTERVALS + 1, 1)))
+    assert robot.dof == found[0].shape[1]
+    return np.array(found)
+
+
+def advanced(found: Together, rounds: int = ROUNDS) -> Together:
+    for _ in range(rounds):
+        found = found.advanced()
+    return found
+
+
+def agrees(together: Together, motions: Array, grid: NodeGrid, rounds: int) -> bool:
+    for k in range(len(motions)):
+        alone = advanced(Together.near(grid, motions[[k]]), rounds)
+        for name in ("costs", "broken", "merits"):
+            mine, own = getattr(together, name)[k], getattr(alone, name)[0]
+            if not abs(mine - own) <= ROUNDING * max(abs(own), 1e-3):
+                return False
+        if np.abs(together.q[k] - alone.q[0]).max() > 1e3 * ROUNDING:
+            return False
+    return True
+
+
+@pytest.mark.parametrize("rounds", [0, 3])
+def test_each_is_what_it_is_alone(case: Case, rounds: int) -> None:
+    """Whatever is beside it, before Newton's method and after some of its steps."""
+    problem = problem_of(case)
+    grid, motions = grid_of(problem), motions_of(problem)
+    together = advanced(Together.near(grid, motions), rounds)
+    assert agrees(together, motions, grid, rounds)
+    # In another order they are others: the law says something.
+    if rounds == 0 and problem.follows.redundancy and len(np.unique(together.costs.round(9))) > 1:
+        assert not agrees(together, motions[::-1], grid, rounds)
+
+
+LIMITS = {
+    "positions": lambda: [sm.JointPositionLimits(margin=1.0)],
+    "rates": lambda: [sm.JointVelocityLimits(0.1), sm.JointAccelerationLimits(0.1)],
+}
+
+
+@pytest.mark.parametrize("name", ["positions", "rates"])
+@pytest.mark.parametrize("rest", [False, True])
+def test_each_breaks_what_it_breaks_alone(panda: sm.RobotModel, name: str, rest: bool) -> None:
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    problem = sm.Problem(
+        *(panda, path, "position", PANDA_HOME),
+        constraints=LIMITS[name](),
+        costs=[sm.JointVelocity(), sm.InverseManipulability(1e-3)],
+        rest=rest,
+        collision=None,
+    )
+    grid, motions = grid_of(problem), motions_of(problem, size=0.4)
+    together = Together.near(grid, motions)
+    assert (together.broken > 0.0).any()
+    after = advanced(together, 3)
+    assert agrees(after, motions, grid, 3)
+    # Those that go on break less, or cost less.
+    assert ((after.broken < together.broken) | (after.costs <= together.costs)).all()
+    assert (after.broken < together.broken).any()
+
+
+def test_rough_optima_are_near_those_of_newtons_method(case: Case) -> None:
+    problem = problem_of(case)
+    grid, motions = grid_of(problem), motions_of(problem, 3, 0.1)
+    rough = advanced(Together.near(grid, motions), 2 * ROUNDS)
+    found = rough.motion.grid.copied(1)
+    for k in np.flatnonzero(~rough.going):
+        motion = found.near(rough.q[k], rough.qd[k])
+        assert motion is not None
+        assert motion.cost == pytest.approx(rough.costs[k], rel=1e-7)
+
+        def never(step: Step) -> bool:
+            return False
+
+        optimum = minimise(motion, np.zeros(0, dtype=np.int64), never)
+        assert optimum.motion.cost >= (1.0 - ROUGH) * rough.costs[k]
+
+
+def test_one_that_is_not_to_be_had_leaves_the_others(panda: sm.RobotModel) -> None:
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
+    problem = sm.Problem(*(panda, path, "pose", PANDA_HOME), constraints=(), collision=None)
+    grid, motions = grid_of(problem), motions_of(problem)
+    alone = advanced(Together.near(grid, np.delete(motions, 1, axis=0)), 2)
+    motions[1, 3] = np.nan
+    found = Together.near(grid, motions)
+    assert np.isinf(found.merits[1])
+    assert np.isfinite(np.delete(found.merits, 1)).all()
+    beside = advanced(found, 2)
+    np.testing.assert_allclose(np.delete(beside.costs, 1), alone.costs, rtol=ROUNDING)
+    assert np.isinf(beside.merits[1])
+
+
+def test_some_of_them_are_what_they_were(panda: sm.RobotModel) -> None:
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
+    problem = sm.Problem(*(panda, path, "position", PANDA_HOME), constraints=(), collision=None)
+    grid, motions = grid_of(problem), motions_of(problem)
+    found = advanced(Together.near(grid, motions), 1)
+    some = found.picked(np.array([3, 1]))
+    np.testing.assert_array_equal(some.costs, found.costs[[3, 1]])
+    np.testing.assert_array_equal(some.q, found.q[[3, 1]])
+    np.testing.assert_allclose(
+        advanced(some, 2).costs, advanced(found, 2).costs[[3, 1]], rtol=ROUNDING
+    )
