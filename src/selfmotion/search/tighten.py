@@ -1,10 +1,8 @@
 """A chain of samples moved along its self-motion curves to where it is better."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Flags, Ints
 from selfmotion.search.chains import best_chains
 from selfmotion.search.curves import SelfMotion
 from selfmotion.search.measures import Measure
@@ -43,97 +41,104 @@ def tighten(
     fixed = np.zeros(q.shape[1], dtype=bool)
     cost = measure.of(q)
     for spacing in spacings:
-        tangents = (motion.tangent(here, target) for target, here in zip(x, q, strict=True))
-        strips = [_Strip(here, tangent, spacing) for here, tangent in zip(q, tangents, strict=True)]
+        tangents = [motion.tangent(here, target) for target, here in zip(x, q, strict=True)]
+        strips = _Strips(q, tangents, spacing)
         for _ in range(TIGHTENING_ROUNDS):
-            _grow(motion, x, strips, bounds, spacing)
-            layers = [strip.layer() for strip in strips]
-            chains = best_chains(layers, largest_step, fixed, measure)
-            chain = chains.back(len(q) - 1, int(np.argmin(chains.cost[-1])))
+            _grow(motion, x, strips, bounds)
+            chains = best_chains(strips.layers(), largest_step, fixed, measure)
+            strips.choose(chains.back(len(q) - 1, int(np.argmin(chains.cost[-1]))))
             before, cost = cost, float(chains.cost[-1].min())
-            for strip, node in zip(strips, chain, strict=True):
-                strip.choose(node)
             if cost > before - TIGHTENING_GAIN * abs(before):
                 break
-        q = np.array([strip.chosen for strip in strips])
+        q = strips.chosen
     return q
 
 
-def _grow(
-    motion: SelfMotion, x: Array, strips: list["_Strip"], bounds: Admissible, spacing: float
-) -> None:
+def _grow(motion: SelfMotion, x: Array, strips: "_Strips", bounds: Admissible) -> None:
     """Make the samples that the strips need for their next layers, all waypoints at once."""
     while True:
-        wanted = [
-            (waypoint, index, guess)
-            for waypoint, strip in enumerate(strips)
-            for index, guess in strip.wanted()
-        ]
-        if not wanted:
+        waypoints, indices, guesses = strips.wanted()
+        if not len(waypoints):
             return
-        guesses = np.array([guess for *_, guess in wanted])
-        found, arrived = motion.project_all(guesses, x[[waypoint for waypoint, *_ in wanted]])
+        found, arrived = motion.project_all(guesses, x[waypoints])
         # Far corrections lead to another part of the curve, or another curve.
-        arrived &= np.linalg.norm(found - guesses, axis=1) <= 0.5 * spacing
+        arrived &= np.linalg.norm(found - guesses, axis=1) <= 0.5 * strips.spacing
         free = arrived.copy()
         free[arrived] = bounds.keep(found[arrived])
-        for (waypoint, index, _), q, is_there, is_free in zip(
-            wanted, found, arrived, free, strict=True
-        ):
-            strips[waypoint].note(index, q if is_there else None, is_free=bool(is_free))
+        strips.note(waypoints, indices, found, arrived, free)
 
 
-class _Strip:
-    """Samples of one waypoint's curve about a configuration, made when asked for and kept."""
+class _Strips:
+    """Samples of each waypoint's curve about a configuration, made when asked for and kept.
 
-    def __init__(self, q: Array, tangent: Array | None, spacing: float) -> None:
-        self._spacing = spacing
-        # By the number of spacings from the first configuration; None beyond the curve's end.
-        self._samples: dict[int, Array | None] = {0: q}
-        self._free = {0: True}
-        self._tangent = tangent
-        # How far they go to each side so far.
-        self._reach = {-1: 0, 1: 0}
-        self._centre = 0
-        self._indices = [0]
+    They are numbered by the spacings from that configuration, to both sides; at a singular one
+    there are no others.
+    """
+
+    def __init__(self, q: Array, tangents: list[Array | None], spacing: float) -> None:
+        self.spacing = spacing
+        count, n = q.shape
+        # No centre moves farther in all rounds.
+        self._middle = SIDE * (TIGHTENING_ROUNDS + 1)
+        size = 2 * self._middle + 1
+        self._samples = np.full((count, size, n), np.nan)
+        self._free = np.zeros((count, size), dtype=np.bool_)
+        self._samples[:, self._middle], self._free[:, self._middle] = q, True
+        none = np.full(n, np.nan)
+        self._tangents = np.array([none if one is None else one for one in tangents])
+        # How far they go to each side so far, and where the curve goes on.
+        self._reach = {side: np.zeros(count, dtype=np.int64) for side in (-1, 1)}
+        singular = np.array([one is None for one in tangents], dtype=np.bool_)
+        self._goes_on = {side: ~singular for side in (-1, 1)}
+        self._centres = np.zeros(count, dtype=np.int64)
+        self._indices: list[Ints] = []
 
     @property
     def chosen(self) -> Array:
-        """The configuration chosen last."""
-        q = self._samples[self._centre]
-        assert q is not None, "only samples that exist are in a layer"
-        return q
+        """The configurations chosen last, (W, n)."""
+        return self._at(np.arange(len(self._centres)), self._centres)
 
-    def choose(self, node: int) -> None:
-        """Make a node of the last layer the centre of the next one."""
-        self._centre = self._indices[node]
+    def choose(self, nodes: list[int]) -> None:
+        """Make nodes of the last layers the centres of the next ones."""
+        chosen = [own[node] for own, node in zip(self._indices, nodes, strict=True)]
+        self._centres = np.array(chosen, dtype=np.int64)
 
-    def wanted(self) -> Iterator[tuple[int, Array]]:
-        """Yield the index of the next sample to each side that is needed, and about where it is."""
-        for toward, far in self._reach.items():
-            last = self._samples[toward * far]
-            if last is None or self._tangent is None or far >= SIDE + toward * self._centre:
-                continue
-            if far == 0:
-                yield toward, last + toward * self._spacing * self._tangent
-            else:
-                earlier = self._samples[toward * (far - 1)]
-                assert earlier is not None, "the last one was made from it"
-                yield toward * (far + 1), 2.0 * last - earlier
+    def wanted(self) -> tuple[Ints, Ints, Array]:
+        """Return the next samples that are needed: their waypoints, numbers, and about where."""
+        parts = []
+        for side, far in self._reach.items():
+            need = self._goes_on[side] & (far < SIDE + side * self._centres)
+            own = np.flatnonzero(need)
+            last = self._at(own, side * far[own])
+            step = side * self.spacing * self._tangents[own]
+            further = far[own] > 0
+            earlier = self._at(own[further], side * (far[own] - 1)[further])
+            step[further] = last[further] - earlier
+            parts.append((own, side * (far[own] + 1), last + step))
+        waypoints, indices, guesses = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return waypoints, indices, guesses
 
-    def note(self, index: int, q: Array | None, *, is_free: bool) -> None:
-        """Keep a sample, None where there is none."""
-        self._samples[index] = q
-        self._reach[1 if index > 0 else -1] = abs(index)
-        self._free[index] = is_free
+    def note(self, waypoints: Ints, indices: Ints, q: Array, there: Flags, free: Flags) -> None:
+        """Keep samples (K, n), where there are any; and which of them are free."""
+        where = waypoints[there], self._middle + indices[there]
+        self._samples[where], self._free[where] = q[there], free[there]
+        for side, far in self._reach.items():
+            own = np.sign(indices) == side
+            far[waypoints[own]] += 1
+            self._goes_on[side][waypoints[own & ~there]] = False
 
-    def layer(self) -> Array:
-        """Return the free samples about the centre, (K, n), sorted by the first joint."""
-        nodes = []
-        for index in range(self._centre - SIDE, self._centre + SIDE + 1):
-            q = self._samples.get(index)
-            if q is not None and self._free[index]:
-                nodes.append((q[0], index, q))
-        nodes.sort(key=lambda node: node[:2])
-        self._indices = [index for _, index, _ in nodes]
-        return np.array([q for _, _, q in nodes])
+    def layers(self) -> list[Array]:
+        """Return the free samples about the centres, (K, n) each, sorted by the first joint."""
+        near = np.arange(-SIDE, SIDE + 1)
+        self._indices, found = [], []
+        for waypoint, centre in enumerate(self._centres):
+            indices = centre + near
+            indices = indices[self._free[waypoint, self._middle + indices]]
+            q = self._samples[waypoint, self._middle + indices]
+            order = np.argsort(q[:, 0], kind="stable")
+            self._indices.append(indices[order])
+            found.append(q[order])
+        return found
+
+    def _at(self, waypoints: Ints, indices: Ints) -> Array:
+        return np.asarray(self._samples[waypoints, self._middle + indices])
