@@ -6,21 +6,23 @@ from typing import Protocol
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints, Progress
+from selfmotion.basics import Array, Ints, Progress
 from selfmotion.motion import Grid, Trajectory
-from selfmotion.nodes import NodeGrid, Together
+from selfmotion.nodes import NodeGrid, NodeMotion, Together
 from selfmotion.planning.apart import apart_of, unlike
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.for_nodes import takes
+from selfmotion.planning.kept_on_nodes import broken_by
 from selfmotion.planning.settings import (
+    ABOUT_AS_GOOD,
     FIRST_ROUNDS,
     FURTHER,
     HEATS,
-    HOPELESS,
     ONE_VALLEY,
     ROUGH_ROUNDS,
     ROUGH_STEPS,
     SAME_OPTIMUM,
+    SAME_TO_DIGITS,
 )
 from selfmotion.problem import Problem
 from selfmotion.search import carried
@@ -66,6 +68,10 @@ def rough_grid(problem: Problem) -> Grid:
 class OnNodes:
     """Ranks starts by rough optima on nodes, of all of them at once.
 
+    Conditions do not count in these: what keeps them all the same is as good as what is dearer, and
+    what does not becomes dearer. Where none of the cheapest keeps them, that says nothing, and
+    nothing is ranked.
+
     Parameters
     ----------
     problem : Problem
@@ -77,78 +83,92 @@ class OnNodes:
         self._problem, self._effort, self._progress = problem, effort, progress
         self._apart = apart_of(problem.robot)
         self._found: Together | None = None
-        self._order: Ints = np.zeros(0, dtype=np.int64)
-        # Which take the arm into itself, once that was looked at.
-        self._met: Flags = np.zeros(0, dtype=np.bool_)
+        self._ranked: list[RoughMotion] | None = None
 
     @staticmethod
     def takes(problem: Problem, effort: Effort, start: Array) -> bool:
-        """Whether problems are for nodes, and neither bodies nor ends have to be seen to."""
+        """Whether problems are for nodes, and nothing is asked of ends."""
         bound = problem.bind_constraints(start, start, apart=effort.apart)
-        own = problem.own_collision is not None
-        bodies = bool(problem.envelope.bodies) and not own
-        none = not bodies and not any(item.equality for item in bound)
-        return none and takes(problem, effort, bound)
+        return not any(item.equality for item in bound) and takes(problem, effort, bound)
 
     @property
     def ranked(self) -> list[RoughMotion]:
         """See `Ranking`."""
+        if self._ranked is not None:
+            return self._ranked
+        # Interrupted: the cheapest one will do.
         found = self._found
-        if found is None:
+        if found is None or not np.isfinite(found.costs).any():
             return []
-        motions, grid = [], found.motion.grid.copied(1)
-        for k in self._order.tolist():
-            motion = grid.near(found.q[k], found.qd[k])
-            if motion is not None:
-                motions.append(RoughMotion(motion.trajectory, None, float(found.costs[k])))
-        return motions
+        k = int(found.costs.argmin())
+        motion = found.motion.grid.copied(1).near(found.q[k], found.qd[k])
+        return [] if motion is None else [_rough(motion)]
 
     def run(self, starts: Sequence[Array], finalists: int) -> None:
         """See `Ranking`."""
         grid, problem = rough_grid(self._problem), self._problem
         motions, arrived = carried(problem.follows, np.array(starts), grid.nodes)
-        if not arrived.any():
-            return
-        # Of limits, all motions have the same.
-        bound = problem.bind_constraints(*motions[0, [0, -1]], apart=False)
-        nodes = NodeGrid(problem, grid.nodes, bound, free=True, counts=self._effort.counts)
-        self._progress("rough motions", 1, 1 + ROUGH_ROUNDS)
-        found = self._keep(Together.near(nodes, motions[arrived]))
-        alone, near = unlike(found.q, self._order, self._apart, ONE_VALLEY)
-        most = np.array([*alone, *near][: max(HEATS[0][0], finalists)], dtype=np.int64)
-        found = self._keep(found.picked(most))
+        if arrived.any():
+            # Of limits, all motions have the same.
+            bound = problem.bind_constraints(*motions[0, [0, -1]], apart=self._effort.apart)
+            nodes = NodeGrid(problem, grid.nodes, bound, free=True, counts=self._effort.counts)
+            self._progress("rough motions", 1, 1 + ROUGH_ROUNDS)
+            found = self._optima(Together.near(nodes, motions[arrived]), finalists)
+            self._ranked = self._decisive(found, nodes, finalists)
+        else:
+            self._ranked = []
+
+    def _optima(self, found: Together, finalists: int) -> Together:
+        """Return rough optima near the cheapest of motions, near unlike ones first."""
+        self._found = found
+        alone, near = unlike(found.q, _cheapest(found), self._apart, ONE_VALLEY)
+        found = self._picked(found, [*alone, *near], max(HEATS[0][0], finalists))
         for number in range(1, ROUGH_ROUNDS + 1):
             if not found.going.any():
                 break
             self._progress("rough motions", 1 + number, 1 + ROUGH_ROUNDS)
-            found = self._keep(found.advanced())
+            found = self._found = found.advanced()
             if number == FIRST_ROUNDS:
-                found = self._drop(found, max(FURTHER, finalists))
-        if not len(self._met):
-            self._drop(found, finalists)
-        self._order = self._order[:finalists]
-
-    def _keep(self, found: Together) -> Together:
-        """Know motions from now on, whatever interrupts; return them."""
-        merits = found.merits
-        known = self._met if len(self._met) == found.count else np.zeros(found.count, np.bool_)
-        order = np.lexsort((merits, known))
-        self._found, self._order = found, order[np.isfinite(merits[order])]
+                alone, _ = unlike(found.q, _cheapest(found), self._apart, SAME_OPTIMUM)
+                found = self._picked(found, alone, max(FURTHER, finalists))
         return found
 
-    def _drop(self, found: Together, most: int) -> Together:
-        """Keep and return so many at most; those that take the arm into itself last.
+    def _picked(self, found: Together, order: list[int], most: int) -> Together:
+        self._found = found.picked(np.array(order[:most], dtype=np.int64))
+        return self._found
 
-        Not what became the same as a better one, nor what costs much more than the best.
-        """
-        merits, clear, met = found.merits, list[int](), list[int]()
-        for k in unlike(found.q, self._order, self._apart, SAME_OPTIMUM)[0]:
-            best = merits[clear[0]] if clear else np.inf
-            if len(clear) == most or merits[k] > best + (HOPELESS - 1.0) * abs(best):
+    def _decisive(self, found: Together, nodes: NodeGrid, finalists: int) -> list[RoughMotion]:
+        """Return the cheapest motion that keeps all, then others about as cheap; or none."""
+        kept: list[RoughMotion] = []
+        broken: list[RoughMotion] = []
+        dearest = np.inf
+        for k in unlike(found.q, _cheapest(found), self._apart, SAME_OPTIMUM)[0]:
+            if found.costs[k] > dearest or len(kept) + len(broken) == finalists:
                 break
-            # That takes a while; beside one that is clear, others are looked at when they are best.
-            is_clear = bool(clear) or self._problem.keeps_off_itself(found.q[k])
-            (clear if is_clear else met).append(k)
-        kept = np.array([*clear, *met][:most], dtype=np.int64)
-        self._met = np.arange(len(kept)) >= len(clear)
-        return self._keep(found.picked(kept))
+            motion = nodes.near(found.q[k], found.qd[k])
+            # What costs the same to the last digits is one of the arm's mirror images.
+            if motion is None or any(_same(motion.cost, one.cost) for one in kept):
+                continue
+            if broken_by(motion).any():
+                broken.append(_rough(motion))
+            elif self._problem.keeps_off_itself(motion.place.q):
+                kept.append(_rough(motion))
+            else:
+                # An optimum that takes the arm into itself goes on doing that.
+                continue
+            dearest = min(dearest, motion.cost + ABOUT_AS_GOOD * abs(motion.cost))
+        return [*kept, *broken] if kept else []
+
+
+def _cheapest(found: Together) -> Ints:
+    """Return the numbers of motions, the cheapest first, without those that are not to be had."""
+    order = np.argsort(found.costs, kind="stable")
+    return np.asarray(order[np.isfinite(found.costs[order])])
+
+
+def _same(a: float, b: float | None) -> bool:
+    return b is not None and abs(a - b) <= SAME_TO_DIGITS * abs(a)
+
+
+def _rough(motion: NodeMotion) -> RoughMotion:
+    return RoughMotion(motion.trajectory, None, motion.cost)

@@ -8,7 +8,6 @@ from selfmotion.planning.draft import Draft
 from selfmotion.planning.heats import Heats
 from selfmotion.planning.rough import OnNodes, Ranking, RoughMotion
 from selfmotion.planning.session import Session
-from selfmotion.planning.settings import DEARER_OPTIMUM
 from selfmotion.search import start_candidates
 
 
@@ -89,15 +88,14 @@ def _rough(draft: Draft, candidates: list[Array], finalists: int) -> list[RoughM
 
 
 def _resumed(draft: Draft, rough: Sequence[RoughMotion]) -> Iterator[Session]:
-    """Yield sessions that begin at rough motions; of optima, those that may turn out best."""
+    """Yield sessions that begin at rough motions; at optima, only when their turn comes."""
     if any(motion.cost is None for motion in rough):
         yield from draft.resumed(rough)
         return
     for motion in rough:
-        if motion.cost is not None and motion.cost <= DEARER_OPTIMUM * draft.dearest:
-            session = draft.taken_up(motion)
-            if session is not None:
-                yield session
+        session = draft.taken_up(motion)
+        if session is not None:
+            yield session
 
 
 def _sessions(draft: Draft, starts: Sequence[Array]) -> list[Session]:
