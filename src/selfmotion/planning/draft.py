@@ -61,8 +61,8 @@ class Draft:
         Why a search was in vain; what would help.
     waiting : sequence of Session
         Complete motions that are not optimised yet.
-    rough : Ranking or None
-        Rough motions.
+    rankings : list of Ranking
+        Rough motions of starts, by what they were ranked; those of the last one are best.
     proved : Proved or None
     """
 
@@ -82,7 +82,7 @@ class Draft:
     failure: SelfmotionError | None = None
     notes: list[str] = field(default_factory=list)
     waiting: Sequence[Session] = ()
-    rough: Ranking | None = None
+    rankings: list[Ranking] = field(default_factory=list)
     proved: Proved | None = None
 
     def __post_init__(self) -> None:
@@ -291,8 +291,9 @@ class Draft:
 
     def interrupted(self) -> None:
         """Make the best that is known the outcome; raise KeyboardInterrupt where nothing is."""
-        if self.best is None and not self.waiting and self.rough is not None:
-            self.waiting = self.resumed(self.rough.ranked[:1])
+        if self.best is None and not self.waiting:
+            known = (ranking.ranked[:1] for ranking in reversed(self.rankings))
+            self.waiting = self.resumed(next((ranked for ranked in known if ranked), []))
         for session in self.waiting if self.best is None else ():
             session.end(Status.INTERRUPTED)
             self.consider(session)

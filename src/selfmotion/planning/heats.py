@@ -44,7 +44,7 @@ class Heats:
         motions = (session.rolled for _, session in self._merits)
         return [RoughMotion(one.evaluation().trajectory, one.deviation) for one in motions]
 
-    def run(self, starts: Sequence[Array], finalists: int) -> None:
+    def run(self, starts: Sequence[Array], finalists: int) -> bool:
         """See `Ranking`."""
         grid = rough_grid(self._problem)
         problem = replace(self._problem, null_motion=self._problem.null_motion.rough)
@@ -78,6 +78,7 @@ class Heats:
                 self._note(session)
             self._drop()
         self._merits = self._foremost(finalists)
+        return bool(self._merits)
 
     def _forget(self, session: Session) -> None:
         self._merits = [pair for pair in self._merits if pair[1] is not session]

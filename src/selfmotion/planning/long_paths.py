@@ -103,15 +103,14 @@ def _postures(draft: Draft) -> tuple[list[Array], Status | None]:
         rest=False,
     )
     inner = replace(
-        draft, problem=stretch, best=None, failure=None, waiting=(), rough=None, attempts=[]
+        draft, problem=stretch, best=None, failure=None, waiting=(), rankings=[], attempts=[]
     )
     try:
         optimise_starts(inner, draft.search.starts, draft.search.finalists)
     except SelfmotionError:
         return [], None
     motions = [] if inner.best is None else [inner.best.motion().trajectory]
-    rough = [] if inner.rough is None else inner.rough.ranked
-    motions += [motion.trajectory for motion in rough]
+    motions += [motion.trajectory for ranking in inner.rankings for motion in ranking.ranked]
     found: list[Array] = []
     for motion in motions:
         weights = Sampling.trapezoidal(motion.t).weights

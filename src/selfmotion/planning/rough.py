@@ -53,8 +53,11 @@ class Ranking(Protocol):
     def ranked(self) -> list[RoughMotion]:
         """The motions that were found so far, the best first."""
 
-    def run(self, starts: Sequence[Array], finalists: int) -> None:
-        """Leave the best `finalists` of the starts (n,), or fewer where they became the same."""
+    def run(self, starts: Sequence[Array], finalists: int) -> bool:
+        """Leave the best `finalists` of the starts (n,), or fewer where they became the same.
+
+        Returns whether that tells which starts are best.
+        """
 
 
 def rough_grid(problem: Problem) -> Grid:
@@ -83,7 +86,7 @@ class OnNodes:
         self._problem, self._effort, self._progress = problem, effort, progress
         self._apart = apart_of(problem.robot)
         self._found: Together | None = None
-        self._ranked: list[RoughMotion] | None = None
+        self._ranked: list[RoughMotion] = []
 
     @staticmethod
     def takes(problem: Problem, effort: Effort, start: Array) -> bool:
@@ -94,29 +97,27 @@ class OnNodes:
     @property
     def ranked(self) -> list[RoughMotion]:
         """See `Ranking`."""
-        if self._ranked is not None:
-            return self._ranked
-        # Interrupted: the cheapest one will do.
+        # Interrupted, or of those that break conditions: the cheapest one will do.
         found = self._found
-        if found is None or not np.isfinite(found.costs).any():
-            return []
+        if self._ranked or found is None or not np.isfinite(found.costs).any():
+            return self._ranked
         k = int(found.costs.argmin())
         motion = found.motion.grid.copied(1).near(found.q[k], found.qd[k])
         return [] if motion is None else [_rough(motion)]
 
-    def run(self, starts: Sequence[Array], finalists: int) -> None:
+    def run(self, starts: Sequence[Array], finalists: int) -> bool:
         """See `Ranking`."""
         grid, problem = rough_grid(self._problem), self._problem
         motions, arrived = carried(problem.follows, np.array(starts), grid.nodes)
-        if arrived.any():
-            # Of limits, all motions have the same.
-            bound = problem.bind_constraints(*motions[0, [0, -1]], apart=self._effort.apart)
-            nodes = NodeGrid(problem, grid.nodes, bound, free=True, counts=self._effort.counts)
-            self._progress("rough motions", 1, 1 + ROUGH_ROUNDS)
-            found = self._optima(Together.near(nodes, motions[arrived]), finalists)
-            self._ranked = self._decisive(found, nodes, finalists)
-        else:
-            self._ranked = []
+        if not arrived.any():
+            return False
+        # Of limits, all motions have the same.
+        bound = problem.bind_constraints(*motions[0, [0, -1]], apart=self._effort.apart)
+        nodes = NodeGrid(problem, grid.nodes, bound, free=True, counts=self._effort.counts)
+        self._progress("rough motions", 1, 1 + ROUGH_ROUNDS)
+        found = self._optima(Together.near(nodes, motions[arrived]), finalists)
+        self._ranked = self._decisive(found, nodes, finalists)
+        return bool(self._ranked)
 
     def _optima(self, found: Together, finalists: int) -> Together:
         """Return rough optima near the cheapest of motions, near unlike ones first."""

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
+import numpy as np
+
 from selfmotion.basics import Array
 from selfmotion.optimise import Status
 from selfmotion.planning.draft import Draft
@@ -23,20 +25,32 @@ def optimise_starts(draft: Draft, starts: int, finalists: int) -> None:
     arm = problem.envelope.arm(problem.robot)
     admits = problem.envelope.admits if problem.envelope.quantities else None
     candidates = start_candidates(problem.follows.for_robot(arm), starts, draft.rng, admits)
-    rough = _rough(draft, candidates, finalists) if len(candidates) > finalists else []
-    draft.waiting = ()
-    if rough:
-        _optimise_each(draft, _resumed(draft, rough), len(rough))
-    else:
+    ranked = False
+    for ranking in _rankings(draft, candidates) if len(candidates) > finalists else ():
+        draft.rankings = [*draft.rankings, ranking]
+        if ranking.run(candidates, finalists):
+            ranked = True
+            rough = ranking.ranked
+            _optimise_each(draft, _resumed(draft, rough), len(rough))
+            if draft.is_over or draft.dearest < np.inf:
+                break
+    if not ranked:
         sessions = _sessions(draft, candidates)
         _optimise_each(draft, sessions, len(sessions))
-    draft.waiting = ()
+
+
+def _rankings(draft: Draft, candidates: Sequence[Array]) -> list[Ranking]:
+    """Return how to rank starts: the second way where the first says nothing, or leads nowhere."""
+    given = draft.problem, draft.effort, draft.progress
+    nodes = OnNodes.takes(draft.problem, draft.effort, candidates[0])
+    return [*([OnNodes(*given)] if nodes else []), Heats(*given)]
 
 
 def _optimise_each(draft: Draft, sessions: Iterable[Session], count: int) -> None:
     """Optimise on nodes first: where that leads to a motion, no long way to another is worth it."""
     done, told = 0, 0
     left: list[Session] = []
+    draft.waiting = ()
     for session in sessions:
         draft.waiting = (*draft.waiting, session)
         if told == done:
@@ -57,6 +71,7 @@ def _optimise_each(draft: Draft, sessions: Iterable[Session], count: int) -> Non
         # What nothing can reach, no other start will.
         if draft.is_out_of_reach():
             break
+    draft.waiting = ()
 
 
 def _optimise_on_nodes(draft: Draft, session: Session) -> bool:
@@ -71,20 +86,6 @@ def _optimise_on_nodes(draft: Draft, session: Session) -> bool:
     if done:
         draft.note(session)
     return done
-
-
-def _rough(draft: Draft, candidates: list[Array], finalists: int) -> list[RoughMotion]:
-    """Return the best rough motions; none where these all break down."""
-    given = draft.problem, draft.effort, draft.progress
-    kinds: list[Ranking] = [Heats(*given)]
-    if OnNodes.takes(draft.problem, draft.effort, candidates[0]):
-        kinds.insert(0, OnNodes(*given))
-    for kind in kinds:
-        draft.rough = kind
-        kind.run(candidates, finalists)
-        if ranked := kind.ranked:
-            return ranked
-    return []
 
 
 def _resumed(draft: Draft, rough: Sequence[RoughMotion]) -> Iterator[Session]:
