@@ -12,7 +12,8 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.formats import job_of, read_document
-from selfmotion.formats.documents import ANGLES, LENGTHS
+from selfmotion.formats.documents import ANGLES, LENGTHS, in_si
+from selfmotion.formats.schema import json_schema
 from selfmotion.robot import Coordinate
 from support.cells import CELL, written
 from support.shell import complaint
@@ -221,3 +222,15 @@ def test_whatever_is_put_anywhere_is_planned_or_refused_by_name(tmp_path: Path) 
     for line in said:
         assert line.startswith(f"{tmp_path / 'cell.toml'}: ")
         assert "\n" not in line
+
+
+@pytest.mark.parametrize("kind", ["JointVelocityLimits", "JointTorqueLimits", "ToolLimits"])
+def test_a_margin_that_is_a_share_has_no_unit(kind: str) -> None:
+    """Half a degree would be taken for a share of 0.0087."""
+    with pytest.raises(sm.FileFormatError, match="is a share here"):
+        in_si({"constraints": [{"kind": kind, "margin_deg": 0.5}]})
+    found = in_si({"constraints": [{"kind": "JointPositionLimits", "margin_deg": 0.5}]})
+    assert found["constraints"][0]["margin"] == pytest.approx(np.radians(0.5))
+    kinds = json_schema()["$defs"]
+    assert "margin_deg" not in kinds[kind]["properties"]
+    assert "margin_deg" in kinds["JointPositionLimits"]["properties"]

@@ -325,3 +325,45 @@ def test_an_unknown_kind_lists_the_known_ones() -> None:
         sm.FileFormatError, match=r"path kind is 'corkscrew'.*circle.*line.*waypoints"
     ):
         restore(sm.Path, {"kind": "corkscrew"})
+
+
+@dataclass(frozen=True, eq=False)
+class Halfway(sm.JointVelocity):
+    """A quadratic form that tells a multiple of its matrix, or nothing."""
+
+    told: float = 1.0
+
+    def curvature(self, dof: int) -> dict[int, Array]:
+        known = super().curvature(dof)
+        return {order: self.told * matrix for order, matrix in known.items()} if self.told else {}
+
+
+@pytest.mark.parametrize(("told", "right"), [(1.0, True), (0.5, False), (0.0, False)])
+def test_a_quadratic_form_tells_all_that_bends(told: float, right: bool) -> None:
+    cost = Halfway(told=told)
+    if right:
+        testing.check_cost(cost)
+        return
+    with pytest.raises(AssertionError, match="curvature"):
+        testing.check_cost(cost)
+
+
+@dataclass(frozen=True)
+class Misshapen(sm.Constraint):
+    """|q4 + 1.5| ≤ 0.3, with a series of the wrong shape."""
+
+    def quantity(self, robot: sm.RobotModel) -> sm.Quantity:
+        row = np.eye(robot.dof)[3]
+        return sm.Quantity.between(
+            *("elbow", -1.8, -1.2),
+            values=lambda q, qd, qdd: q @ row,
+            derivatives=lambda q, qd, qdd: (np.tile(row, (len(q), 1)),),
+            series=lambda stretch: stretch.chain().joints[3][None],
+        )
+
+
+def test_a_series_of_another_shape_is_named(panda: sm.RobotModel) -> None:
+    circle = sm.Circle.around(panda.pose(PANDA_HOME), 0.1, 4.0)
+    problem = sm.Problem(panda, circle, "position", PANDA_HOME)
+    with pytest.raises(sm.ProblemError, match=r"quantity 'elbow': series\(\) has shape"):
+        testing.check_constraint(Misshapen(), problem)

@@ -245,6 +245,13 @@ class Shares(Bounded):
         known = quantity.series and quantity.series(stretch)
         if known is None:
             return None
+        asked = len(quantity.columns), len(stretch.middle)
+        if np.ndim(known) != 3 or (known.shape[0], known.shape[2]) != asked:
+            raise ProblemError(
+                f"quantity '{quantity.name}': series() has shape {np.shape(known)}, expected "
+                f"({asked[0]}, K + 1, {asked[1]}): a number of each order for each value and "
+                f"interval"
+            )
         known = known[self._limited]
         if np.isfinite(quantity.period):
             far = ~(known[:, 1:].sum(axis=1) < 0.25 * quantity.period)

@@ -32,6 +32,8 @@ _MOVED, _TURNED = ("x", "y", "z"), ("rx", "ry", "rz")
 # Tables whose numbers have no unit; and keys that are shares there, of a feed.
 _UNITLESS = ("optimiser.",)
 _SHARES = ("path.within",)
+# Of limits of position alone a margin is an angle or a length; of all else it is a share.
+_MARGIN, _OF_POSITIONS = "margin", "JointPositionLimits"
 
 
 def read_document(file: Path) -> dict[str, Any]:
@@ -175,6 +177,8 @@ def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
             if key.endswith(suffix):
                 name, factor = key.removesuffix(suffix), scale
                 _check_unit(name, suffix, where, allowed)
+                if is_share(name, table.get("kind")):
+                    raise FileFormatError(f"{where}{key}: '{name}' is a share here, without a unit")
         if name in found:
             raise FileFormatError(f"{where}{key}: '{name}' is given twice, in two units; keep one")
         inner = _inner(value, f"{where}{name}")
@@ -182,6 +186,11 @@ def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
             _check_radians(name, inner, where)
         found[name] = inner if factor is None else _scaled(inner, factor, f"{where}{key}")
     return found
+
+
+def is_share(name: str, kind: object) -> bool:
+    """Whether a key has no unit in a table of some kind, though it has one in others."""
+    return name == _MARGIN and kind != _OF_POSITIONS
 
 
 def _check_unit(name: str, suffix: str, where: str, allowed: Collection[str]) -> None:

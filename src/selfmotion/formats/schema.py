@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from selfmotion.formats.documents import ANGLES, LENGTHS
+from selfmotion.formats.documents import ANGLES, LENGTHS, is_share
 from selfmotion.formats.models import document_model
 from selfmotion.formats.seam_job import JOB, OF_PROBLEM, OF_TABLE, SEAM
 from selfmotion.optimise import QuasiNewton
@@ -117,8 +117,8 @@ def _with_units(node: Any) -> Any:
         return found
     for suffix, names, scale in (("_deg", ANGLES, 180.0 / math.pi), ("_mm", LENGTHS, 1e3)):
         for name in sorted(names & set(keys)):
-            if "$ref" in keys[name]:
-                # A table, whose own keys have units.
+            # A table, whose own keys have units; or a number that has none here.
+            if "$ref" in keys[name] or is_share(name, keys.get("kind", {}).get("const")):
                 continue
             keys[name + suffix] = _scaled(keys[name], scale)
             if name in found.get("required", []):

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from selfmotion.basics import Array
 from selfmotion.costs import Cost
 from selfmotion.engine import Objective, StillMotion
 from selfmotion.motion import Grid, NullMotion, PolynomialNullMotion
@@ -20,6 +21,8 @@ from selfmotion.testing.functions import Bowl, Valley
 TWIST = 1e-6
 # Of an optimiser on functions without noise, relative to their scale.
 MINIMUM = 1e-4
+# Of a quadratic form, relative to its largest derivative.
+CURVATURE = 1e-9
 _STEPS = 10
 
 
@@ -57,7 +60,7 @@ def check_path(path: Path) -> None:
 
 
 def check_cost(cost: Cost, robot: RobotModel | None = None, task: Task | str = Task.POSE) -> None:
-    """Check a cost: one number per sample, exact gradients, arrays left alone, and it can be saved.
+    """Check a cost: one number per sample, exact derivatives, and it can be saved.
 
     Parameters
     ----------
@@ -79,7 +82,30 @@ def check_cost(cost: Cost, robot: RobotModel | None = None, task: Task | str = T
     require(value.shape == samples.t.shape, f"G has shape {value.shape}, expected one per sample")
     require(bool(np.all(np.isfinite(value))), "G is not finite")
     require_gradient(objective.value, objective.gradient, x, f"cost '{cost.name}'")
+    if cost.is_quadratic:
+        _require_curvature(cost, objective, x)
     saved(cost, Cost, robot=problem.robot)
+
+
+def _require_curvature(cost: Cost, objective: Objective, x: Array) -> None:
+    """Require that `curvature` is all that bends: ∂G of one motion less that of another is W Δx."""
+    names, known = ("q", "qd", "qdd", "qddd"), cost.curvature(objective.samples(x).q.shape[1])
+    both = []
+    for motion in (x, -2.0 * x):
+        samples = objective.samples(motion)
+        by = cost.gradient(samples)
+        # Copies: the arrays are the objective's own.
+        slopes = [None if (own := getattr(by, k)) is None else np.array(own) for k in names]
+        both.append(
+            [(np.array(getattr(samples, k)), own) for k, own in zip(names, slopes, strict=True)]
+        )
+    for order, ((q, by), (other, by_other)) in enumerate(zip(*both, strict=True)):
+        weight = known.get(order, np.zeros(2 * q.shape[1:]))
+        after, before = (np.zeros_like(q) if one is None else one for one in (by_other, by))
+        expected = (other - q) @ weight
+        scale = max(float(np.abs(each).max()) for each in (after, before, expected))
+        what = f"cost '{cost.name}': curvature() of order {order} is not that of the gradient"
+        near(after - before, expected, CURVATURE * scale, what)
 
 
 def check_null_motion(motion: NullMotion) -> None:
