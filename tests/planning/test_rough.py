@@ -18,7 +18,7 @@ from support.paths import line_of
 
 # On twelve intervals a cost is right to this share; and Newton's method ends within a tenth of it.
 ROUGH = 2e-2
-ARMS = (("xarm7", "pose"), ("xarm7", "position"), ("ur5", "pointing"), ("planar_3r", "planar"))
+ARMS = (("xarm7", "pose"), ("xarm7", "position"), ("ur5", "pointing"))
 
 
 def effort() -> Effort:

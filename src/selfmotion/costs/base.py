@@ -46,10 +46,14 @@ class Cost(Saved, ABC, family="cost"):
     is_quadratic : bool
         Whether G is of second degree in q and its derivatives, with `curvature` for all that bends:
         Newton's method takes that, and differences of gradients of other costs.
+    is_pointwise : bool
+        Whether G at a sample depends on that sample alone, so that several motions can be looked at
+        as if they were one; no by default. Starts are ranked faster then.
     """
 
     name: str
     is_quadratic: ClassVar[bool] = False
+    is_pointwise: ClassVar[bool] = False
 
     @abstractmethod
     def value(self, samples: Samples) -> Array:

@@ -36,6 +36,8 @@ class KineticEnergy(Cost):
         μ ≥ 0.
     """
 
+    is_pointwise: ClassVar[bool] = True
+
     context: ClassVar[tuple[str, ...]] = ("robot",)
 
     robot: RobotModel
@@ -79,6 +81,8 @@ class GravityTorque(Cost):
     weight : float, (n,) or (n, n)
         W; for example 1 / robot torque limit² as a diagonal.
     """
+
+    is_pointwise: ClassVar[bool] = True
 
     context: ClassVar[tuple[str, ...]] = ("robot",)
 

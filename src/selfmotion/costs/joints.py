@@ -34,6 +34,7 @@ from selfmotion.robot import RobotModel, check_radians
 class _Quadratic(Cost):
     """What the quadratic costs share: the weight W."""
 
+    is_pointwise: ClassVar[bool] = True
     is_quadratic: ClassVar[bool] = True
 
     weight: float | npt.ArrayLike = 1.0
@@ -195,6 +196,8 @@ class JointLimitDistance(Cost):
     power : int
         p, even.
     """
+
+    is_pointwise: ClassVar[bool] = True
 
     lower: npt.ArrayLike | None = None
     upper: npt.ArrayLike | None = None

@@ -1,6 +1,7 @@
 """How much of their limits joints use: a smooth stand-in for the time that a motion needs."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +33,8 @@ class LimitUse(Cost):
     power : float
         p, at least 4.
     """
+
+    is_pointwise: ClassVar[bool] = True
 
     velocity: npt.ArrayLike
     acceleration: npt.ArrayLike = np.inf

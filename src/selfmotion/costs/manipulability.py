@@ -1,6 +1,7 @@
 """Costs of the distance from singular poses; eq. numbers are those of the paper."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,8 @@ class InverseManipulability(Cost):
     mu : float
         μ ≥ 0.
     """
+
+    is_pointwise: ClassVar[bool] = True
 
     mu: float = 1.0
     name: str = "inverse manipulability"
@@ -53,6 +56,8 @@ class Manipulability(Cost):
         μ ≥ 0.
     """
 
+    is_pointwise: ClassVar[bool] = True
+
     mu: float = 1.0
     name: str = "manipulability"
 
@@ -83,6 +88,8 @@ class DirectionalManipulability(Cost):
     mu : float
         μ ≥ 0.
     """
+
+    is_pointwise: ClassVar[bool] = True
 
     direction: npt.ArrayLike
     mu: float = 1.0
@@ -136,6 +143,8 @@ class SmallestSingularValue(Cost):
     power : int
         p ≥ 1; larger is nearer to 1/σ_min.
     """
+
+    is_pointwise: ClassVar[bool] = True
 
     mu: float = 1.0
     power: int = 4

@@ -1,6 +1,7 @@
 """The length of the way in joint space."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,8 @@ class PathLength(Cost):
         w ≥ 0, such as `RobotModel.joint_weights`; 1 for every joint by default, which adds up
         radians only: an arm with prismatic joints has to be given some.
     """
+
+    is_pointwise: ClassVar[bool] = True
 
     smoothing: float = 1e-2
     joint_weights: npt.ArrayLike | None = None

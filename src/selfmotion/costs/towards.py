@@ -28,6 +28,8 @@ class Towards(Cost):
         w ≥ 0.
     """
 
+    is_pointwise: ClassVar[bool] = True
+
     context: ClassVar[tuple[str, ...]] = ("robot",)
 
     robot: RobotModel

@@ -113,7 +113,7 @@ class Charts:
         given = own.targets, own.chains, own.layout
         along = len(q) // own.copies if carried else 0
         failed = look(q, z, bases, self.q, *given, table, tangents, centred, along)
-        if failed >= 0 and own.copies == 1:
+        if failed >= 0 and own.is_whole:
             return None
         return Place(q, np.array(qd), tangents, table)
 
@@ -143,12 +143,14 @@ class Manifolds:
     follows : Follows
     t : (N + 1,)
         Times [s].
-    copies : int
-        Of how many motions these are the nodes, one after the other, at times `t` each. Of several,
-        one that is not to be had leaves the others: q̇ of its nodes that are nowhere is no number.
+    copies : int, optional
+        Of how many motions these are the nodes, one after the other, at times `t` each. There, one
+        that is not to be had leaves the others: q̇ of its nodes that are nowhere is no number. By
+        default they are those of one motion, all of which have to be had.
     """
 
-    def __init__(self, follows: Follows, t: Array, copies: int = 1) -> None:
+    def __init__(self, follows: Follows, t: Array, copies: int | None = None) -> None:
+        self.is_whole, copies = copies is None, copies or 1
         self.follows, self.t, self.copies = follows, np.tile(t, copies), copies
         self.chains, self.layout = follows.chains, follows.layout
         self._sizes = follows.robot.dof, follows.dimension, len(follows.items)

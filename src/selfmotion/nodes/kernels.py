@@ -104,6 +104,8 @@ def look(
             nowhere = stage_of(table[k], n, m).qd
             for j in range(n):
                 nowhere[j] = np.nan
+                for x in range(r):
+                    tangents[k, j, x] = np.nan
             continue
         for x in range(r):
             for i in range(n):

@@ -45,8 +45,9 @@ class NodeGrid:
         Where work is added up.
     continuous : bool
         Whether accelerations are kept from jumping at the nodes.
-    copies : int
-        Of how many motions these are the nodes, one after the other, at times `t` each.
+    copies : int, optional
+        Of how many motions these are the nodes, one after the other, at times `t` each; see
+        `Manifolds`.
 
     Attributes
     ----------
@@ -69,11 +70,13 @@ class NodeGrid:
         free: bool,
         counts: Counts,
         continuous: bool = False,
-        copies: int = 1,
+        copies: int | None = None,
     ) -> None:
         self.problem, self.free, self.counts = problem, free, counts
         follows = problem.follows
-        self.spline, self.manifolds = Hermite(t, copies), Manifolds(follows, t, copies)
+        self.manifolds = Manifolds(follows, t, copies)
+        copies = self.manifolds.copies
+        self.spline = Hermite(t, copies)
         self.continuity = Continuity(problem, self.spline) if continuous else None
         smoothing = smoothing_at_rest(problem, self.spline)
         self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
@@ -103,12 +106,15 @@ class NodeGrid:
         """The same with accelerations that are kept from jumping."""
         return self._other(self.t, continuous=True)
 
-    def copied(self, copies: int) -> "NodeGrid":
-        """Return the nodes of so many motions, one after the other."""
+    def copied(self, copies: int | None) -> "NodeGrid":
+        """Return the nodes of so many motions, one after the other, for `Together`; None: of one.
+
+        Of what belongs to several, `NodeMotion` knows places, samples and costs alone.
+        """
         one = self.t[: len(self.t) // self.manifolds.copies]
         return self._other(one, continuous=False, copies=copies)
 
-    def _other(self, t: Array, *, continuous: bool, copies: int = 1) -> "NodeGrid":
+    def _other(self, t: Array, *, continuous: bool, copies: int | None = None) -> "NodeGrid":
         return NodeGrid(
             self.problem,
             t,

@@ -150,7 +150,9 @@ class NodeCost:
             (bases @ both.reshape(count, 4, -1)).reshape(-1, n, size) for bases in spline.bases[:2]
         )
         # Along the self-motion at the samples: between what it is at the nodes.
-        left, right = both[:, None, 0, :, :r], both[:, None, 2, :, 2 * r : 3 * r]
+        left, right = both[:, None, 0, :, :r], both[:, None, 2, :, 2 * r : 3 * r].copy()
+        # In a gap nothing moves.
+        right[spline.gaps] = left[spline.gaps]
         share = SHARES[:, None, None]
         along = orthonormal((left + share * (right - left)).reshape(-1, n, r))
         turned = np.swapaxes(along, 1, 2)

@@ -7,6 +7,7 @@ by, and of what does not, the cost is a bound from below on what may become of i
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ _SHARES, _DONE, _FARTHEST = (1.0, 0.25, 0.0625), 1e-4, 0.5
 _FLAT, _SHIFT, _MORE = 1e-11, 1e-6, 8.0
 # Samples of an interval; what a place is made of.
 _EACH, _PLACE = 4, ("q", "qd", "tangents", "table")
+_LEAVES = "of several motions, one that is not to be had leaves the others"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,11 +42,14 @@ class Together:
         F of each; inf of one that is not to be had.
     going : (K,)
         Whether Newton's method may still lead somewhere.
+    promised : (K,)
+        By how much the last step was to lower the cost, twice; inf before the first.
     """
 
     motion: NodeMotion
     costs: Array
     going: Flags
+    promised: Array
 
     @classmethod
     def near(cls, grid: NodeGrid, motions: Array) -> "Together":
@@ -52,18 +57,24 @@ class Together:
         many, q = grid.copied(len(motions)), motions.reshape(-1, motions.shape[2])
         begun = many.manifolds.near(q, np.zeros_like(q))
         if begun is None:
-            raise RuntimeError("of several motions, one that is not to be had leaves the others")
-        return cls.of(many.at(*begun), np.ones(len(motions), dtype=np.bool_))
+            raise RuntimeError(_LEAVES)
+        count = len(motions)
+        return cls._of(many.at(*begun), np.ones(count, dtype=np.bool_), np.full(count, np.inf))
 
     @classmethod
-    def of(cls, motion: NodeMotion, going: Flags) -> "Together":
-        """Return the motions of nodes."""
+    def _of(cls, motion: NodeMotion, going: Flags, promised: Array) -> "Together":
+        """Return the motions of nodes, of which those on their way are looked at anew."""
         samples, grid, count = motion.samples, motion.grid, len(going)
-        grid.counts.evaluations += count
+        # That looks at the clock as well.
+        grid.counts.evaluated()
+        grid.counts.evaluations += int(going.sum()) - 1
         each = np.sum([cost.value(samples) for cost in grid.problem.all_costs], axis=0)
-        shares = (samples.weights * each)[:-1].reshape(-1, _EACH).sum(axis=1)
-        costs = np.append(shares, 0.0).reshape(count, -1).sum(axis=1)
-        return cls(motion, np.where(np.isfinite(costs), costs, np.inf), going)
+        # At nodes, and in gaps, a cost may be infinite.
+        shares, counts = np.zeros_like(each), samples.weights > 0.0
+        shares[counts] = samples.weights[counts] * each[counts]
+        costs = np.append(shares[:-1].reshape(-1, _EACH).sum(axis=1), 0.0)
+        costs = costs.reshape(count, -1).sum(axis=1)
+        return cls(motion, np.where(np.isfinite(costs), costs, np.inf), going, promised)
 
     @property
     def count(self) -> int:
@@ -84,14 +95,50 @@ class Together:
         """Return some of them."""
         motion, whole = self.motion, self.motion.place
         grid = motion.grid.copied(len(which))
-        rows = (which[:, None] * len(self.q[0]) + np.arange(len(self.q[0]))).ravel()
+        rows = self._rows(which)
         charts = Charts(grid.manifolds, motion.charts.q[rows], motion.charts.bases[rows])
         place = Place(*(np.ascontiguousarray(getattr(whole, name)[rows]) for name in _PLACE))
         some = grid.at(charts, motion.nu[rows], place)
-        return Together(some, self.costs[which], self.going[which])
+        return Together(some, self.costs[which], self.going[which], self.promised[which])
 
     def advanced(self) -> "Together":
         """Return them after one of Newton's steps with each that is on its way."""
+        which = np.flatnonzero(self.going)
+        if len(which) == self.count:
+            return self._stepped()
+        return self._with(which, self.picked(which)._stepped()) if len(which) else self
+
+    def _with(self, which: Ints, others: "Together") -> "Together":
+        """Return them with others in place of some."""
+        mine, own = self.motion, others.motion
+        rows = self._rows(which)
+
+        def joined(before: Any, after: Any, where: Ints = rows) -> Any:
+            found = before.copy()
+            found[where] = after
+            return found
+
+        charts = Charts(
+            mine.grid.manifolds,
+            joined(mine.charts.q, own.charts.q),
+            joined(mine.charts.bases, own.charts.bases),
+        )
+        place = Place(
+            *(joined(getattr(mine.place, name), getattr(own.place, name)) for name in _PLACE)
+        )
+        return Together(
+            mine.grid.at(charts, joined(mine.nu, own.nu), place),
+            joined(self.costs, others.costs, which),
+            joined(self.going, others.going, which),
+            joined(self.promised, others.promised, which),
+        )
+
+    def _rows(self, which: Ints) -> Ints:
+        """Return which nodes are those of some motions."""
+        size = len(self.motion.nu) // self.count
+        return np.asarray((which[:, None] * size + np.arange(size)).ravel())
+
+    def _stepped(self) -> "Together":
         motion, grid = self.motion, self.motion.grid
         grid.counts.gradients += self.count
         # Beside what is not to be had, others know nothing of that.
@@ -102,7 +149,7 @@ class Together:
         gradient.reshape(-1)[grid.held] = 0.0
         around = Around.of(motion.charts, motion.nu, by)
         if around is None:
-            return self._ended()
+            raise RuntimeError(_LEAVES)
         intervals = grid.cost.curvature(motion.samples, motion.partials, around.changes)
         intervals[grid.spline.gaps] = 0.0
         matrix = Banded(len(gradient), gradient.shape[1], 1)
@@ -118,31 +165,31 @@ class Together:
                 sound[k] = False
             else:
                 step[k] = solved
-        promised = (rights * step).sum(axis=1)
-        return self._moved(step, promised, sound & (promised > _ENOUGH * np.abs(self.costs)))
+        promised = np.where(sound, (rights * step).sum(axis=1), np.inf)
+        going = sound & (promised > _ENOUGH * np.abs(self.costs))
+        if not going.any():
+            return Together(self.motion, self.costs, going, promised)
+        return self._moved(step, promised, going)
 
     def _moved(self, step: Array, promised: Array, going: Flags) -> "Together":
         """Return them along their steps, each as far as it does what it promises."""
-        motion, r, promised = self.motion, self.motion.nu.shape[1], np.where(going, promised, 0.0)
+        motion, r, due = self.motion, self.motion.nu.shape[1], np.where(going, promised, 0.0)
         by_node = step.reshape(self.count, -1, 2, r)
         farthest = np.abs(by_node[:, :, 0]).max(axis=(1, 2))
         most = np.where(going, _FARTHEST / np.maximum(farthest, _FARTHEST), 0.0)
         left, length = going.copy(), most.copy()
-        for share in (*_SHARES, 0.0) if going.any() else ():
+        for share in (*_SHARES, 0.0):
             length[left] = share * most[left]
             flat = (length[:, None, None, None] * by_node).reshape(-1, 2, r)
             epsilon = motion.charts.null_motions(motion.nu + flat[:, 1])
             found = motion.charts.centred(flat[:, 0], epsilon)
             if found is None:
+                raise RuntimeError(_LEAVES)
+            new = Together._of(motion.grid.at(*found), going & (length > 0.0), promised)
+            left[left] = ~(new.costs <= self.costs - _DONE * length * due)[left]
+            if not left.any():
                 break
-            new = Together.of(motion.grid.at(*found), going & (length > 0.0))
-            left[left] = ~(new.costs <= self.costs - _DONE * length * promised)[left]
-            if not left.any() or share == 0.0:
-                return new
-        return self._ended()
-
-    def _ended(self) -> "Together":
-        return Together(self.motion, self.costs, np.zeros_like(self.going))
+        return new
 
     def _each(self, table: Array) -> Array:
         return table.reshape(self.count, -1, table.shape[1])

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints, Progress
+from selfmotion.basics import Array, Flags, Ints, Progress
 from selfmotion.motion import Grid, Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion, Together
 from selfmotion.planning.apart import apart_of, unlike
@@ -15,10 +15,9 @@ from selfmotion.planning.for_nodes import takes
 from selfmotion.planning.kept_on_nodes import broken_by
 from selfmotion.planning.settings import (
     ABOUT_AS_GOOD,
-    FIRST_ROUNDS,
-    FURTHER,
     HEATS,
     ONE_VALLEY,
+    ROUGH_AGREEMENT,
     ROUGH_ROUNDS,
     ROUGH_STEPS,
     SAME_OPTIMUM,
@@ -90,20 +89,27 @@ class OnNodes:
 
     @staticmethod
     def takes(problem: Problem, effort: Effort, start: Array) -> bool:
-        """Whether problems are for nodes, and nothing is asked of ends."""
+        """Whether problems are for nodes, side by side, and nothing is asked of ends.
+
+        Not where accelerations cost: cubics on few nodes say little of them.
+        """
+        costs, dof = problem.all_costs, problem.robot.dof
+        if not all(cost.is_pointwise and max(cost.curvature(dof), default=0) < 2 for cost in costs):
+            return False
         bound = problem.bind_constraints(start, start, apart=effort.apart)
         return not any(item.equality for item in bound) and takes(problem, effort, bound)
 
     @property
     def ranked(self) -> list[RoughMotion]:
         """See `Ranking`."""
-        # Interrupted, or of those that break conditions: the cheapest one will do.
-        found = self._found
-        if self._ranked or found is None or not np.isfinite(found.costs).any():
+        if self._ranked or self._found is None:
             return self._ranked
-        k = int(found.costs.argmin())
-        motion = found.motion.grid.copied(1).near(found.q[k], found.qd[k])
-        return [] if motion is None else [_rough(motion)]
+        # Interrupted, or none is the best for sure: the cheapest one that keeps all will do.
+        known = [(k, self._motion(self._found, k)) for k in _cheapest(self._found)]
+        motions = [motion for _, motion in known if motion is not None]
+        kept = (one for one in motions if not broken_by(one).any())
+        best = next((one for one in kept if self._clear(one)), next(iter(motions), None))
+        return [] if best is None else [_rough(best)]
 
     def run(self, starts: Sequence[Array], finalists: int) -> bool:
         """See `Ranking`."""
@@ -111,60 +117,75 @@ class OnNodes:
         motions, arrived = carried(problem.follows, np.array(starts), grid.nodes)
         if not arrived.any():
             return False
-        # Of limits, all motions have the same.
-        bound = problem.bind_constraints(*motions[0, [0, -1]], apart=self._effort.apart)
-        nodes = NodeGrid(problem, grid.nodes, bound, free=True, counts=self._effort.counts)
-        self._progress("rough motions", 1, 1 + ROUGH_ROUNDS)
-        found = self._optima(Together.near(nodes, motions[arrived]), finalists)
-        self._ranked = self._decisive(found, nodes, finalists)
+        nodes = NodeGrid(problem, grid.nodes, (), free=True, counts=self._effort.counts)
+        total = 1 + ROUGH_ROUNDS
+        self._progress("rough motions", 1, total)
+        found = self._found = Together.near(nodes, motions[arrived])
+        alone, near = unlike(found.q, _cheapest(found), self._apart, ONE_VALLEY)
+        which = [*alone, *near][: max(HEATS[0][0], finalists)]
+        if not which or nodes.cost.bends_by_rates(found.motion.partials):
+            return False
+        found = self._found = found.picked(np.array(which, dtype=np.int64))
+        for number in range(2, total + 1):
+            self._progress("rough motions", number, total)
+            if _hopeful(found).any():
+                found = self._found = found.advanced()
+        self._ranked = self._decisive(found, finalists)
         return bool(self._ranked)
 
-    def _optima(self, found: Together, finalists: int) -> Together:
-        """Return rough optima near the cheapest of motions, near unlike ones first."""
-        self._found = found
-        alone, near = unlike(found.q, _cheapest(found), self._apart, ONE_VALLEY)
-        found = self._picked(found, [*alone, *near], max(HEATS[0][0], finalists))
-        for number in range(1, ROUGH_ROUNDS + 1):
-            if not found.going.any():
-                break
-            self._progress("rough motions", 1 + number, 1 + ROUGH_ROUNDS)
-            found = self._found = found.advanced()
-            if number == FIRST_ROUNDS:
-                alone, _ = unlike(found.q, _cheapest(found), self._apart, SAME_OPTIMUM)
-                found = self._picked(found, alone, max(FURTHER, finalists))
-        return found
+    def _decisive(self, found: Together, finalists: int) -> list[RoughMotion]:
+        """Return the cheapest motion that keeps all, then others about as cheap; or none.
 
-    def _picked(self, found: Together, order: list[int], most: int) -> Together:
-        self._found = found.picked(np.array(order[:most], dtype=np.int64))
-        return self._found
-
-    def _decisive(self, found: Together, nodes: NodeGrid, finalists: int) -> list[RoughMotion]:
-        """Return the cheapest motion that keeps all, then others about as cheap; or none."""
+        None is the cheapest for sure where it is not at its optimum yet, or the nodes are too few.
+        """
         kept: list[RoughMotion] = []
-        broken: list[RoughMotion] = []
+        others: list[RoughMotion] = []
         dearest = np.inf
         for k in unlike(found.q, _cheapest(found), self._apart, SAME_OPTIMUM)[0]:
-            if found.costs[k] > dearest or len(kept) + len(broken) == finalists:
+            if found.costs[k] > dearest or len(kept) + len(others) == finalists:
                 break
-            motion = nodes.near(found.q[k], found.qd[k])
+            motion = self._motion(found, k)
             # What costs the same to the last digits is one of the arm's mirror images.
             if motion is None or any(_same(motion.cost, one.cost) for one in kept):
                 continue
-            if broken_by(motion).any():
-                broken.append(_rough(motion))
-            elif self._problem.keeps_off_itself(motion.place.q):
+            off = abs(motion.exact_cost - motion.cost)
+            if found.going[k] or not off <= ROUGH_AGREEMENT * abs(motion.cost):
+                return []
+            # What got stuck may become better as well.
+            stuck = found.promised[k] > ABOUT_AS_GOOD * abs(motion.cost)
+            if stuck or broken_by(motion).any():
+                others.append(_rough(motion))
+            elif self._clear(motion):
                 kept.append(_rough(motion))
             else:
                 # An optimum that takes the arm into itself goes on doing that.
                 continue
             dearest = min(dearest, motion.cost + ABOUT_AS_GOOD * abs(motion.cost))
-        return [*kept, *broken] if kept else []
+        return [*kept, *others] if kept and not _hopeful(found).any() else []
+
+    def _motion(self, found: Together, k: int) -> NodeMotion | None:
+        """Return one of the motions, with the conditions that are asked of it."""
+        problem, q = self._problem, found.q[k]
+        bound = problem.bind_constraints(q[0], q[-1], apart=self._effort.apart)
+        t = found.motion.grid.t[: len(q)]
+        grid = NodeGrid(problem, t, bound, free=True, counts=self._effort.counts)
+        return grid.near(q, found.qd[k])
+
+    def _clear(self, motion: NodeMotion) -> bool:
+        return self._problem.keeps_off_itself(motion.place.q)
 
 
 def _cheapest(found: Together) -> Ints:
     """Return the numbers of motions, the cheapest first, without those that are not to be had."""
     order = np.argsort(found.costs, kind="stable")
     return np.asarray(order[np.isfinite(found.costs[order])])
+
+
+def _hopeful(found: Together) -> Flags:
+    """Return which motions are on their way, and may come to cost less than what has arrived."""
+    least = found.costs[~found.going].min(initial=np.inf)
+    dearest = least + ABOUT_AS_GOOD * abs(least) if np.isfinite(least) else least
+    return np.asarray(found.going & (found.costs - found.promised < dearest))
 
 
 def _same(a: float, b: float | None) -> bool:

@@ -73,11 +73,11 @@ DEARER = 1.25
 DEARER_CHAIN = 1.005
 # Steps of the rough motions.
 ROUGH_STEPS = 12
-# On nodes: steps of Newton's method, and those after which so many motions go on.
-ROUGH_ROUNDS, FIRST_ROUNDS, FURTHER = 6, 2, 6
+# On nodes: steps of Newton's method.
+ROUGH_ROUNDS = 20
 # Rough optima on nodes whose costs differ by less than this share are worth the same; by less than
 # the second, they are mirror images.
-ABOUT_AS_GOOD, SAME_TO_DIGITS = 5e-3, 1e-9
+ABOUT_AS_GOOD, SAME_TO_DIGITS = 1e-2, 1e-9
 # Heats: so many starts at most, optimised with so many evaluations of the cost more.
 HEATS = ((16, 5), (4, 8))
 # Motions at x = 0 that are this near at all times [rad or m] lie in one valley of the cost, as a

@@ -94,7 +94,7 @@ def _resumed(draft: Draft, rough: Sequence[RoughMotion]) -> Iterator[Session]:
         yield from draft.resumed(rough)
         return
     for motion in rough:
-        session = draft.taken_up(motion)
+        session = None if draft.is_over else draft.taken_up(motion)
         if session is not None:
             yield session
 
