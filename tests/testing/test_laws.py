@@ -349,6 +349,38 @@ def test_a_quadratic_form_tells_all_that_bends(told: float, right: bool) -> None
 
 
 @dataclass(frozen=True)
+class Crowded(sm.Cost):
+    """G = ½ q1², times how many samples there are: beside others it would be another one."""
+
+    is_pointwise = True
+    name: str = "crowded"
+
+    def value(self, samples: sm.Samples) -> Array:
+        return np.asarray(0.5 * len(samples.t) * samples.q[:, 0] ** 2)
+
+    def gradient(self, samples: sm.Samples) -> sm.Partials:
+        by_q = np.zeros_like(samples.q)
+        by_q[:, 0] = len(samples.t) * samples.q[:, 0]
+        return sm.Partials(q=by_q)
+
+
+def test_what_is_pointwise_knows_no_other_samples(panda: sm.RobotModel) -> None:
+    for cost in (
+        sm.JointVelocity(),
+        sm.InverseManipulability(1e-3),
+        sm.Manipulability(1e-3),
+        sm.SmallestSingularValue(1e-3),
+        sm.PathLength(),
+        sm.KineticEnergy(panda),
+        sm.GravityTorque(panda),
+    ):
+        assert cost.is_pointwise
+        testing.check_cost(cost, panda)
+    with pytest.raises(AssertionError, match="is_pointwise"):
+        testing.check_cost(Crowded())
+
+
+@dataclass(frozen=True)
 class Misshapen(sm.Constraint):
     """|q4 + 1.5| ≤ 0.3, with a series of the wrong shape."""
 

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.costs import Cost
+from selfmotion.costs import Cost, Samples
 from selfmotion.engine import Objective, StillMotion
-from selfmotion.motion import Grid, NullMotion, PolynomialNullMotion
+from selfmotion.motion import Grid, NullMotion, PolynomialNullMotion, Sampling
 from selfmotion.optimise import Iteration, Minimum, Optimizer
 from selfmotion.path import Line, Path
 from selfmotion.problem import Problem
@@ -21,7 +21,7 @@ from selfmotion.testing.functions import Bowl, Valley
 TWIST = 1e-6
 # Of an optimiser on functions without noise, relative to their scale.
 MINIMUM = 1e-4
-# Of a quadratic form, relative to its largest derivative.
+# Of a quadratic form, relative to its largest derivative; of G among other samples.
 CURVATURE = 1e-9
 _STEPS = 10
 
@@ -84,7 +84,23 @@ def check_cost(cost: Cost, robot: RobotModel | None = None, task: Task | str = T
     require_gradient(objective.value, objective.gradient, x, f"cost '{cost.name}'")
     if cost.is_quadratic:
         _require_curvature(cost, objective, x)
+    if cost.is_pointwise:
+        _require_pointwise(cost, objective.samples(x))
     saved(cost, Cost, robot=problem.robot)
+
+
+def _require_pointwise(cost: Cost, samples: Samples) -> None:
+    """Require that G at every second sample is what it is among all of them."""
+    rows = np.arange(0, len(samples.t), 2)
+    every = Sampling(samples.t[rows], samples.weights[rows], np.arange(len(rows)))
+    tips = tuple(tip.at(rows) for tip in samples.tips)
+    given = samples.q[rows], samples.qd[rows], samples.follows, tips, samples.task_jacobian[rows]
+    some = Samples(every, *given)
+    # In place of differences between the samples.
+    some.__dict__.update(qdd=samples.qdd[rows], qddd=samples.qddd[rows])
+    whole, part = np.asarray(cost.value(samples)), np.asarray(cost.value(some))
+    what = f"cost '{cost.name}': is_pointwise, but G depends on other samples"
+    near(part, whole[rows], CURVATURE * max(1e-9, float(np.abs(whole).max())), what, some.t)
 
 
 def _require_curvature(cost: Cost, objective: Objective, x: Array) -> None:
