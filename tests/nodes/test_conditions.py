@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 import selfmotion as sm
-from selfmotion.nodes.hermite import Hermite
+from selfmotion.nodes.spline import Hermite
 from support.arms import PANDA_HOME
 from support.nodes import around_of, centred, moved, nodes_of, random_step
 

@@ -18,7 +18,8 @@ from selfmotion.constraints import (
     linearised,
 )
 from selfmotion.costs import Samples
-from selfmotion.nodes.hermite import CheckedSamples, Hermite, weighted
+from selfmotion.nodes.hermite import CheckedSamples
+from selfmotion.nodes.spline import Hermite, weighted
 
 # There is no interval after the last node: its conditions are kept by this much.
 _NONE = -1e3

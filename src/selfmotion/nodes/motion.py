@@ -16,10 +16,11 @@ from selfmotion.motion import Trajectory
 from selfmotion.nodes.charts import Charts, Manifolds, Place
 from selfmotion.nodes.conditions import NodeConditions
 from selfmotion.nodes.ends import NodeEnds
-from selfmotion.nodes.hermite import Hermite, HermiteSamples, QuinticSamples
+from selfmotion.nodes.hermite import HermiteSamples, QuinticSamples
 from selfmotion.nodes.kernels import follow
 from selfmotion.nodes.objective import NodeCost
 from selfmotion.nodes.smoothness import Continuity, smoothing_at_rest
+from selfmotion.nodes.spline import Hermite
 from selfmotion.problem import Problem
 
 # A limit binds between two nodes where it is this near [units of h].

@@ -22,8 +22,9 @@ from selfmotion.basics import Array
 from selfmotion.costs import Cost, Partials, Samples
 from selfmotion.follow import Follows
 from selfmotion.nodes.charts import Charts, orthonormal
-from selfmotion.nodes.hermite import SHARES, Hermite, HermiteSamples, PlacedLater
+from selfmotion.nodes.hermite import HermiteSamples, PlacedLater
 from selfmotion.nodes.smoothness import Smoothing
+from selfmotion.nodes.spline import SHARES, Hermite
 
 # Differences along a manifold are taken this far to both sides [rad or m]: nodes are as near to it
 # there as they have to be, and come onto it in one step. Rounding's error is 1e-16 over it.

@@ -7,7 +7,8 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.costs import JointVelocity
 from selfmotion.costs.base import weight_matrix
-from selfmotion.nodes.hermite import Hermite, HermiteSamples, weighted
+from selfmotion.nodes.hermite import HermiteSamples
+from selfmotion.nodes.spline import Hermite, weighted
 from selfmotion.problem import Problem
 
 # An arm that rests takes about this share of the duration to start and to stop its self-motion;

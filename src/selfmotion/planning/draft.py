@@ -165,10 +165,8 @@ class Draft:
         trajectory = motion.trajectory
         # Where rows are relaxed it begins beside the path.
         session = self.begin(trajectory.q[0], free=True, deviation=motion.deviation)
-        if session is not None and motion.cost is None:
-            session.resume(trajectory)
-        elif session is not None:
-            session.take_up(trajectory)
+        if session is not None:
+            session.resume(trajectory, is_optimum=motion.cost is not None)
         return session
 
     def optimise(

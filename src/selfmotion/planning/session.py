@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
+from selfmotion.basics import Flags
 from selfmotion.engine import Counts, Evaluation
 from selfmotion.motion import NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Status
@@ -101,7 +101,6 @@ class Session:
         """Take the motion as it is; there is no time for another one."""
         self._ended = status
         if self.on_nodes is None:
-            self._resume_known()
             self.rolled = self.rolled.judged()
 
     def motion(self) -> Evaluation:
@@ -135,18 +134,10 @@ class Session:
         """Begin at a plan's motion instead of x = 0, unless that would be worse."""
         self._warm = plan
 
-    def resume(self, trajectory: Trajectory) -> None:
-        """Begin at the null motion of a motion along this path, unless that would be worse."""
+    def resume(self, trajectory: Trajectory, *, is_optimum: bool = False) -> None:
+        """Begin at the null motion of a motion, if no worse; nodes at an optimum as it is."""
         self.rolled = self.rolled.resumed(trajectory)
-
-    def take_up(self, trajectory: Trajectory) -> None:
-        """Begin at a motion along this path: on nodes, or else at its null motion."""
-        self._known = trajectory
-
-    def _resume_known(self) -> None:
-        if self._known is not None:
-            known, self._known = self._known, None
-            self.resume(known)
+        self._known = trajectory if is_optimum else None
 
     def minimize(self, evaluations: int | None = None, *, dearest: float = np.inf) -> None:
         """Optimise on the present grid, from the motion that there is.
@@ -158,14 +149,12 @@ class Session:
         dearest : float
             Of a motion that is known: it ends where it becomes clear that this one will cost more.
         """
-        if self.of_chain or (evaluations is None and self.take_nodes(dearest)):
-            return
-        if self.is_hopeless:
+        on_nodes = self.of_chain or (evaluations is None and self.take_nodes(dearest))
+        if on_nodes or self.is_hopeless:
             return
         if self._warm is not None:
             warm, self._warm = self._warm, None
             self.rolled = self.rolled.begun_at(warm)
-        self._resume_known()
         objective, wanted = self.rolled.objective, self.rolled.null_motion
         if not np.isfinite(objective.value(self.rolled.x)):
             objective.require_finite(self.rolled.x)
@@ -178,14 +167,12 @@ class Session:
                 self.end(status)
         if self._ended is None:
             self._descend(evaluations, restores=restores)
-        self.rolled = self.rolled.closed()
-        self.rolled = self.rolled.judged()
+        self.rolled = self.rolled.closed().judged()
 
     def take_nodes(self, dearest: float = np.inf) -> bool:
         """Go to the optimum on nodes near the motion; return whether that is what stands now."""
         start, before = self.beginning, self.on_nodes
-        led_nowhere = self._tried_nodes and before is None
-        over = self._ended is not None or led_nowhere
+        over = self._ended is not None or (self._tried_nodes and before is None)
         if over or not takes(start.problem, start.effort, start.constraints):
             return False
         # What led nowhere once would do so again.
@@ -296,9 +283,7 @@ class Session:
 
         Where that of the problem is to be had in the end: with it.
         """
-        start = self.beginning
-        wanted = start.problem.null_motion
-        session = Session(start, motion)
+        wanted, session = self.beginning.problem.null_motion, Session(self.beginning, motion)
         session._descent.before, session._descent.history = self._descent.before, self.history
         session.minimize()
         if wanted.gain == np.inf and not (session.violations or session.cut_short):
@@ -306,7 +291,7 @@ class Session:
             session.minimize()
         return session
 
-    def refine(self, where: npt.NDArray[np.bool_] | None = None) -> None:
+    def refine(self, where: Flags | None = None) -> None:
         """Go on with half the step length, everywhere or for some of the steps (N,)."""
         if self.on_nodes is not None:
             self.on_nodes = self.on_nodes.refined(where)
