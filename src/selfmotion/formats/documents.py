@@ -176,9 +176,7 @@ def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
         for suffix, (allowed, scale) in _SUFFIXES.items():
             if key.endswith(suffix):
                 name, factor = key.removesuffix(suffix), scale
-                _check_unit(name, suffix, where, allowed)
-                if is_share(name, table.get("kind")):
-                    raise FileFormatError(f"{where}{key}: '{name}' is a share here, without a unit")
+                _check_unit(name, suffix, where, allowed, table.get("kind"))
         if name in found:
             raise FileFormatError(f"{where}{key}: '{name}' is given twice, in two units; keep one")
         inner = _inner(value, f"{where}{name}")
@@ -188,21 +186,23 @@ def in_si(table: Mapping[str, Any], where: str = "") -> dict[str, Any]:
     return found
 
 
-def is_share(name: str, kind: object) -> bool:
+def is_share(key: str, kind: object) -> bool:
     """Whether a key has no unit in a table of some kind, though it has one in others."""
-    return name == _MARGIN and kind != _OF_POSITIONS
+    is_margin = key.rpartition(".")[2] == _MARGIN
+    return key.endswith(_SHARES) or (is_margin and kind != _OF_POSITIONS)
 
 
-def _check_unit(name: str, suffix: str, where: str, allowed: Collection[str]) -> None:
-    """Refuse a key that is none, or has no such unit."""
-    is_share = f"{where}{name}".endswith(_SHARES)
-    if name in allowed and not where.startswith(_UNITLESS) and not is_share:
+def _check_unit(name: str, suffix: str, where: str, allowed: Collection[str], kind: object) -> None:
+    """Refuse a key that is none, or has no such unit in a table of some kind."""
+    share = is_share(f"{where}{name}", kind)
+    if name in allowed and not where.startswith(_UNITLESS) and not share:
         return
     what = "angle" if suffix == "_deg" else "length"
     near = nearest(name + suffix, [each + suffix for each in allowed], _ALIKE)
     if near and name not in allowed:
         raise FileFormatError(f"{where}{name}{suffix}: unknown key{near}")
     known = "" if name in allowed else f", expected one of: {', '.join(sorted(allowed))}"
+    known = ", it is a share here, without a unit" if share else known
     raise FileFormatError(f"{where}{name}{suffix}: '{name}' is no {what}{known}")
 
 

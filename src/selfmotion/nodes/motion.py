@@ -107,8 +107,8 @@ class NodeGrid:
         """The same with accelerations that are kept from jumping."""
         return self._other(self.t, continuous=True)
 
-    def copied(self, copies: int | None) -> "NodeGrid":
-        """Return the nodes of so many motions, one after the other, for `Together`; None: of one.
+    def copied(self, copies: int) -> "NodeGrid":
+        """Return the nodes of so many motions, one after the other, for `Together`.
 
         Of what belongs to several, `NodeMotion` knows places, samples and costs alone.
         """

@@ -105,8 +105,8 @@ class OnNodes:
         if self._ranked or self._found is None:
             return self._ranked
         # Interrupted, or none is the best for sure: the cheapest one that keeps all will do.
-        known = [(k, self._motion(self._found, k)) for k in _cheapest(self._found)]
-        motions = [motion for _, motion in known if motion is not None]
+        near = (self._motion(self._found, k) for k in _cheapest(self._found))
+        motions = [motion for motion in near if motion is not None]
         kept = (one for one in motions if not broken_by(one).any())
         best = next((one for one in kept if self._clear(one)), next(iter(motions), None))
         return [] if best is None else [_rough(best)]

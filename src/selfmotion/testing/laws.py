@@ -60,7 +60,7 @@ def check_path(path: Path) -> None:
 
 
 def check_cost(cost: Cost, robot: RobotModel | None = None, task: Task | str = Task.POSE) -> None:
-    """Check a cost: one number per sample, exact derivatives, and it can be saved.
+    """Check a cost: one number per sample, exact derivatives, arrays left alone, it is saved.
 
     Parameters
     ----------
