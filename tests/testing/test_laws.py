@@ -364,6 +364,19 @@ class Crowded(sm.Cost):
         return sm.Partials(q=by_q)
 
 
+@dataclass(frozen=True)
+class CrowdedSlope(Crowded):
+    """G = ½ q1², with a gradient that is right only among as many samples as are looked at."""
+
+    def value(self, samples: sm.Samples) -> Array:
+        return np.asarray(0.5 * samples.q[:, 0] ** 2)
+
+    def gradient(self, samples: sm.Samples) -> sm.Partials:
+        by_q = np.zeros_like(samples.q)
+        by_q[:, 0] = samples.q[:, 0] + (len(samples.t) < 40)
+        return sm.Partials(q=by_q)
+
+
 def test_what_is_pointwise_knows_no_other_samples(panda: sm.RobotModel) -> None:
     for cost in (
         sm.JointVelocity(),
@@ -376,8 +389,9 @@ def test_what_is_pointwise_knows_no_other_samples(panda: sm.RobotModel) -> None:
     ):
         assert cost.is_pointwise
         testing.check_cost(cost, panda)
-    with pytest.raises(AssertionError, match="is_pointwise"):
-        testing.check_cost(Crowded())
+    for crowded in (Crowded(), CrowdedSlope()):
+        with pytest.raises(AssertionError, match="is_pointwise"):
+            testing.check_cost(crowded)
 
 
 @dataclass(frozen=True)

@@ -98,9 +98,14 @@ def _require_pointwise(cost: Cost, samples: Samples) -> None:
     some = Samples(every, *given)
     # In place of differences between the samples.
     some.__dict__.update(qdd=samples.qdd[rows], qddd=samples.qddd[rows])
-    whole, part = np.asarray(cost.value(samples)), np.asarray(cost.value(some))
     what = f"cost '{cost.name}': is_pointwise, but G depends on other samples"
-    near(part, whole[rows], CURVATURE * max(1e-9, float(np.abs(whole).max())), what, some.t)
+    pairs = [(np.asarray(cost.value(samples)), np.asarray(cost.value(some)))]
+    whole, part = cost.gradient(samples), cost.gradient(some)
+    names = ("q", "qd", "qdd", "qddd", "error")
+    slopes = ((getattr(whole, name), getattr(part, name)) for name in names)
+    pairs += [(by, own) for by, own in slopes if by is not None and own is not None]
+    for among, alone in pairs:
+        near(alone, among[rows], CURVATURE * max(1e-9, float(np.abs(among).max())), what, some.t)
 
 
 def _require_curvature(cost: Cost, objective: Objective, x: Array) -> None:
