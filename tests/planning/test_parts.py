@@ -11,7 +11,7 @@ import selfmotion as sm
 import selfmotion.testing
 from selfmotion.basics import Array, NoSequenceError, ProblemError
 from selfmotion.path import section_at_rest
-from selfmotion.planning.part_problem import relaxed_along
+from selfmotion.problem import relaxed_along
 from support.arms import robot_named
 
 # The planar arm keeps about this shape, and its first joint turns by so much at most.

@@ -51,7 +51,7 @@ def test_a_motion_that_does_not_rest_is_refused(panda: sm.RobotModel) -> None:
     found = sm.certify(
         panda, plan.path, "pose", plan.trajectory, requirements=[AtRest(start=True, end=True)]
     )
-    assert "where the tool is at rest" in found.verdict
+    assert "moves at the start, where it should rest" in found.verdict
     assert not found.verified
 
 

@@ -10,6 +10,7 @@ from selfmotion.basics.arrays import (
     read_only as read_only,
     shown as shown,
 )
+from selfmotion.basics.digests import digest_of as digest_of, version as version
 from selfmotion.basics.errors import (
     BreakdownError as BreakdownError,
     CollisionError as CollisionError,
@@ -57,5 +58,10 @@ from selfmotion.basics.interruption import (
 from selfmotion.basics.jit import called as called, inlined as inlined, kernel as kernel
 from selfmotion.basics.names import nearest as nearest
 from selfmotion.basics.progress import Progress as Progress, silent as silent
-from selfmotion.basics.saved import Saved as Saved, is_known as is_known, restore as restore
+from selfmotion.basics.saved import (
+    Saved as Saved,
+    description_of as description_of,
+    is_known as is_known,
+    restore as restore,
+)
 from selfmotion.basics.threads import one_blas_thread as one_blas_thread

@@ -102,6 +102,15 @@ def restore(family: type[Saved], description: Mapping[str, Any], **context: Any)
         raise FileFormatError(f"{name} of kind '{kind}': {error}") from error
 
 
+def description_of(value: Saved) -> dict[str, Any]:
+    """Return what tells a value from others: its description, or which one it is without any."""
+    try:
+        return value.to_dict()
+    except (FileFormatError, TypeError):
+        kind = type(value)
+        return {"kind": f"{kind.__module__}.{kind.__qualname__}", "id": id(value)}
+
+
 def is_known(family: type[Saved], description: Mapping[str, Any]) -> bool:
     """Whether the kind of a description is known here."""
     return description.get("kind") in family._known

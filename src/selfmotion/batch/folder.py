@@ -2,16 +2,20 @@
 
 import csv
 import dataclasses
+import hashlib
 import html
 import io
 import json
 import urllib.parse
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from selfmotion.basics import write_bytes, write_text
+from selfmotion.basics import SelfmotionError, write_bytes, write_text
 from selfmotion.batch.maps import labels, maps
-from selfmotion.batch.row import Row
+from selfmotion.batch.row import Row, measured
+from selfmotion.result import load_plan
 
 
 class Folder:
@@ -24,28 +28,41 @@ class Folder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        # Arms and bodies of plans that were read before.
+        self._known: dict[str, Any] = {}
 
     def plan_file(self, name: str) -> Path:
         """Return where a problem's plan is."""
         return self.path / "plans" / f"{name}.npz"
 
     def finished(self, name: str, key: str) -> Row | None:
-        """Return the row of a problem that an earlier run finished; None where it has to be run."""
+        """Return the row of a problem that an earlier run finished; None where it has to be run.
+
+        Its plan is measured again: a row is not believed. Where the file is not the one that was
+        written with the row, it is planned again.
+        """
         file = self._row_file(name)
         if not file.is_file():
             return None
         try:
             values = json.loads(file.read_text(encoding="utf-8"))
             row = Row(file=self.plan_file(name), **values)
-        except (OSError, ValueError, TypeError):
+            if row.key != key or row.fault:
+                return None
+            if row.error:
+                return row
+            if hashlib.sha256(row.file.read_bytes()).hexdigest() != row.digest:
+                return None
+            plan = load_plan(row.file, known=self._known)
+            return None if plan.altered else replace(row, **measured(plan, row.goal))
+        except (OSError, ValueError, TypeError, SelfmotionError):
             return None  # not one of ours, or of another version: it is written anew
-        sound = row.key == key and not row.fault and (bool(row.error) or row.file.is_file())
-        return row if sound else None
 
     def record(self, row: Row, archive: bytes) -> Row:
         """Write plan and row, in this order: a row says that all is there."""
         if archive:
             write_bytes(row.file, archive)
+            row = replace(row, digest=hashlib.sha256(archive).hexdigest())
         values = {k: v for k, v in dataclasses.asdict(row).items() if k != "file"}
         write_text(self._row_file(row.name), json.dumps(values) + "\n")
         return row

@@ -1,7 +1,5 @@
 """What a batch plans: problems with names, or what is wrong with them."""
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,6 +10,7 @@ from selfmotion.basics import FileFormatError, ProblemError, SelfmotionError
 from selfmotion.costs import FunctionCost
 from selfmotion.formats import Job, grid_documents, job_of, read_document
 from selfmotion.problem import Problem, problem_to_dict
+from selfmotion.result import files_of, key_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +55,9 @@ class Item:
         parts = (*paths, job.problem.null_motion, *job.problem.costs)
         own = {type(part).__module__ for part in (*parts, *job.problem.constraints)}
         modules = sorted(name for name in own if not name.startswith(("selfmotion.", "__main__")))
-        options = {**job.settings, "goal": job.goal}
-        return {"problem": problem, "options": options, "modules": modules}
+        options = {**job.settings, "goal": job.goal, "keep": job.keep}
+        files = files_of(job.problem.robot, job.problem.all_constraints, {})
+        return {"problem": problem, "options": options, "modules": modules, "files": files}
 
     def forget(self) -> None:
         """Let go of the task, which is large and not needed any more."""
@@ -70,8 +70,7 @@ class Item:
             task = self.task
         except SelfmotionError as error:
             return f"error: {error}"
-        text = json.dumps(task["problem"], sort_keys=True) + repr(task["options"])
-        return hashlib.sha256(text.encode()).hexdigest()
+        return key_of((task["problem"], repr(task["options"])), task["files"])
 
 
 def grid_items(file: Path, *, allow_code: bool = False) -> list[Item]:

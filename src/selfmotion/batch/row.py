@@ -22,6 +22,10 @@ class Row:
         Its values of the grid.
     file : Path
         The plan's archive; not there where `error` says why.
+    digest : str
+        The SHA-256 of that file.
+    goal : str
+        What was planned for: `Job.goal`.
     error : str
         "" where there is a plan.
     reason : str
@@ -49,6 +53,8 @@ class Row:
     key: str
     file: Path
     settings: Mapping[str, Any] = field(default_factory=dict)
+    digest: str = ""
+    goal: str = "best"
     error: str = ""
     reason: str = "no plan"
     fault: bool = False
@@ -80,3 +86,37 @@ class Row:
         if self.error:
             raise FileFormatError(f"{self.name}: has no plan: {self.error}")
         return load_plan(self.file)
+
+
+def measured(plan: Plan, goal: str) -> dict[str, Any]:
+    """Return what a row says of a plan that was made for a goal (`Job.goal`)."""
+    report, certificate, duration = plan.report, plan.certificate, plan.trajectory.duration
+    nearest = {certificate.limit_margin.name} & set(plan.robot.joint_names)
+    is_part = bool(report.ending)
+    aim = duration if goal == "fastest" else report.cost
+    return {
+        "verified": certificate.verified,
+        "verdict": certificate.verdict,
+        "reason": _reason(plan),
+        "margin": certificate.limit_margin.value,
+        "margin_unit": plan.robot.unit_of(*nearest),
+        "clearance": None if certificate.clearance is None else certificate.clearance.value,
+        "cost": report.cost,
+        "initial_cost": report.initial_cost,
+        "duration": duration,
+        "evaluations": report.evaluations,
+        # What is only a part of the path is not compared with the whole.
+        "aim": float("inf") if is_part else aim,
+        "ends": duration if is_part else None,
+    }
+
+
+def _reason(plan: Plan) -> str:
+    """Say in a few words why a plan is not verified; "" where it is."""
+    certificate = plan.certificate
+    if certificate.verified:
+        return ""
+    if plan.report.ending:
+        return "ends on the way"
+    broken = [item.requirement for item in certificate.findings if not item.kept]
+    return broken[0] if broken else "off the path"

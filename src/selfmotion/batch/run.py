@@ -246,7 +246,8 @@ class _Run:
 
     def _finish(self, item: Item, found: dict[str, Any], archive: bytes) -> None:
         file = self._folder.plan_file(item.name)
-        row = Row(item.name, item.key, file, dict(item.settings), **found)
+        goal = item.task["options"]["goal"] if archive else "best"
+        row = Row(item.name, item.key, file, dict(item.settings), goal=goal, **found)
         self.rows[item.name] = self._folder.record(row, archive)
         item.forget()
         done, total = len(self.rows), len(self._items)

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import InverseKinematicsError, NoSequenceError, SelfmotionError
+from selfmotion.batch.row import measured
 from selfmotion.formats import Job
 from selfmotion.problem import problem_from_dict
-from selfmotion.result import Plan
 
 # Arms and bodies of problems planned before; forgotten when there are many.
 _known: dict[str, Any] = {}
@@ -51,38 +51,8 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
     except Exception as error:
         what = f"{type(error).__name__}: {error}"
         return {"error": what, "fault": True, "seconds": time.perf_counter() - began}, b""
-    report, certificate, duration = found.report, found.certificate, found.trajectory.duration
-    nearest = {certificate.limit_margin.name} & set(found.robot.joint_names)
-    is_part = bool(report.ending)
-    aim = duration if task["options"]["goal"] == "fastest" else report.cost
-    row = {
-        "verified": certificate.verified,
-        "verdict": certificate.verdict,
-        "reason": _reason(found),
-        "margin": certificate.limit_margin.value,
-        "margin_unit": found.robot.unit_of(*nearest),
-        "clearance": None if certificate.clearance is None else certificate.clearance.value,
-        "cost": report.cost,
-        "initial_cost": report.initial_cost,
-        "duration": duration,
-        "evaluations": report.evaluations,
-        # What is only a part of the path is not compared with the whole.
-        "aim": float("inf") if is_part else aim,
-        "ends": duration if is_part else None,
-        "seconds": time.perf_counter() - began,
-    }
-    return row, archive
-
-
-def _reason(plan: Plan) -> str:
-    """Say in a few words why a plan is not verified; "" where it is."""
-    certificate = plan.certificate
-    if certificate.verified:
-        return ""
-    if plan.report.ending:
-        return "ends on the way"
-    broken = [item.requirement for item in certificate.findings if not item.kept]
-    return broken[0] if broken else "off the path"
+    told = measured(found, task["options"]["goal"])
+    return {**told, "seconds": time.perf_counter() - began}, archive
 
 
 def begin_process() -> None:

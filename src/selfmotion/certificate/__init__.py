@@ -4,7 +4,9 @@ from selfmotion.certificate.apart import KeepsApart as KeepsApart
 from selfmotion.certificate.bounding import Bounded as Bounded, Stretch as Stretch
 from selfmotion.certificate.check import certify as certify
 from selfmotion.certificate.ends import (
+    ARRIVED as ARRIVED,
     QUANTITIES as QUANTITIES,
+    STILL_ACCELERATION as STILL_ACCELERATION,
     AtRest as AtRest,
     ClosedMotion as ClosedMotion,
     EndState as EndState,
@@ -32,4 +34,7 @@ from selfmotion.certificate.requirement import (
     Requirement as Requirement,
     approaches as approaches,
 )
-from selfmotion.certificate.verdict import Certificate as Certificate
+from selfmotion.certificate.verdict import (
+    Certificate as Certificate,
+    allowed_text as allowed_text,
+)

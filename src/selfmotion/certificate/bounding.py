@@ -19,7 +19,7 @@ the first bound. That is no proof.
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -52,7 +52,10 @@ class Stretch:
         self.robot, self.trajectory, self.intervals = robot, trajectory, intervals
         self.middle = 0.5 * (intervals[:, 0] + intervals[:, 1])
         self.half = 0.5 * (intervals[:, 1] - intervals[:, 0])
-        self._joints = trajectory.polynomials(self.middle, self.half)
+
+    @cached_property
+    def _joints(self) -> Array:
+        return self.trajectory.polynomials(self.middle, self.half)
 
     def chain(self) -> ChainSeries:
         """Return the majorants of the chain's motion."""

@@ -4,7 +4,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError, Progress, as_several, shown, silent
+from selfmotion.basics import (
+    Array,
+    ProblemError,
+    Progress,
+    as_several,
+    shown,
+    silent,
+    version,
+)
 from selfmotion.certificate.deviation import smallest_singular_values
 from selfmotion.certificate.feed import FeedReached, possible_feeds
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
@@ -118,6 +126,8 @@ def certify(
         damped=damped,
         notes=() if all(check.proved for check in checks) else (_MEASURED,),
         others=tuple((check.position, check.rotation) for check in checks[1:]),
+        motion=trajectory.digest,
+        version=version(),
     )
 
 

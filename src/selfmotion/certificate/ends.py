@@ -45,12 +45,26 @@ class EndState(Requirement):
         return _miss(self.name, motion, reached - self.target, self.order, words, row)
 
 
+# Likewise of an arm at rest, to tell a standstill from a step of acceleration [rad/s² or m/s²].
+STILL_ACCELERATION = 1e-3
+
+
 @dataclass(frozen=True)
 class AtRest(Requirement):
-    """The arm is at rest at the start, at the end, or both: q̇ = 0 there."""
+    """The arm is at rest at the start, at the end, or both: q̇ = 0 there, and q̈ = 0 where asked.
+
+    Attributes
+    ----------
+    start, end : bool
+        At which ends: q̇ = 0 within 1e-6 rad/s or m/s.
+    smooth : (bool, bool)
+        At which of them q̈ = 0 as well, within 1e-3 rad/s² or m/s². It is judged of motions that
+        state accelerations: those of a cubic spline jump at every sample.
+    """
 
     start: bool
     end: bool
+    smooth: tuple[bool, bool] = (False, False)
     name: str = "rest"
 
     @property
@@ -60,18 +74,30 @@ class AtRest(Requirement):
         return (f"rest at {where}",)
 
     def judge(self, motion: FinishedMotion) -> Finding:
-        """See `Requirement.judge`: the fastest joint at an end."""
-        t, qd, names = motion.trajectory.t, motion.trajectory.qd, motion.robot.joint_names
-        ends = [row for row, wanted in ((0, self.start), (-1, self.end)) if wanted]
-        speeds = np.abs(qd[ends])
-        row, worst = np.unravel_index(int(np.argmax(speeds)), speeds.shape)
-        speed, at = float(speeds[row, worst]), ends[int(row)]
+        """See `Requirement.judge`: the joint that is the farthest from rest at an end."""
+        given, found = motion.trajectory, list[Finding]()
+        wanted = ((0, self.start, self.smooth[0]), (-1, self.end, self.smooth[1]))
+        for row, rests, is_smooth in wanted:
+            if rests:
+                found.append(self._judged(motion, given.qd[row], row, 1))
+            if rests and is_smooth and given.qdd is not None:
+                found.append(self._judged(motion, given.qdd[row], row, 2))
+        return max(found, key=lambda item: item.amount / item.allowed)
+
+    def _judged(self, motion: FinishedMotion, rates: Array, row: int, order: int) -> Finding:
+        """Return what there is to say of q̇ or q̈ (n,) at an end."""
+        worst = int(np.argmax(np.abs(rates)))
+        joint, amount = motion.robot.joint_names[worst], float(np.abs(rates[worst]))
+        unit = motion.robot.unit_of(joint) + ("/s", "/s²")[order - 1]
+        allowed = ARRIVED if order == 1 else STILL_ACCELERATION
+        verb = ("moves", "accelerates")[order - 1]
         text = (
-            f"joint '{names[worst]}' {'ends' if at else 'starts'} at {speed:.2e} rad/s or m/s, "
-            f"where the tool is at rest"
+            f"joint '{joint}' {verb} at {'the end' if row else 'the start'}, where it should rest: "
+            f"{amount:.2g} {unit} ({allowed:g} allowed); plan it along a path that rests there, "
+            f"with rest=True"
         )
-        time, kept = float(t[at]), bool(speed <= ARRIVED)
-        return Finding(self.name, names[worst], time, speed, ARRIVED, kept, text)
+        time = float(motion.trajectory.t[row])
+        return Finding(self.name, joint, time, amount, allowed, bool(amount <= allowed), text)
 
 
 @dataclass(frozen=True)

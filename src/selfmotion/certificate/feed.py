@@ -2,17 +2,19 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, series
+from selfmotion.basics import Array, Flags, series
 from selfmotion.certificate.bounding import Bounded, Bounds, Stretch, bounded
 from selfmotion.certificate.deviation import jacobians
 from selfmotion.certificate.findings import Finding
 from selfmotion.certificate.path_error import smooth_between
 from selfmotion.certificate.requirement import FinishedMotion, Requirement
 from selfmotion.follow import BoundFollow
-from selfmotion.path import FeedKept, path_series
+from selfmotion.path import FeedKept, Path, path_series
 
 # Shares of the room that is left are interpolated this well at least.
 _FINE = 1e-3
@@ -20,15 +22,18 @@ _FINE = 1e-3
 _SAME = 1e-3
 # A feed that is asked for no longer than this, as a share of the duration, is asked for nowhere.
 _INSTANT = 1e-9
+# Where a path leaves nothing over, this is what is left [m/s].
+_TINY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class FeedReached(Requirement):
-    """The tool keeps a feed while it is asked for, as the path does but for what that leaves.
+    """The tool keeps a feed while it is asked for: at all times, and not only at nodes.
 
-    With v and v_d the velocities of tool and path, the tool's speed along the path is
-    |v_d| + f/|v_d| with f = (v - v_d)·v_d: it keeps the feed where the path does and |f| is at most
-    |v_d| times what is left over.
+    First the path at that feed is judged by itself: its own speed |v_d| is bounded between its
+    nodes, from below where the feed counts, from above everywhere (`_Pace`). Then the tool: with v
+    and v_d the velocities of tool and path, the tool's speed along the path is |v_d| + f/|v_d| with
+    f = (v - v_d)·v_d: it keeps the feed where |f| is at most |v_d| times what the path leaves over.
 
     Attributes
     ----------
@@ -45,36 +50,72 @@ class FeedReached(Requirement):
     @property
     def remarks(self) -> tuple[str, ...]:
         """See `Requirement.remarks`: whether it is no proof."""
-        path = self.follow.path
-        known = path_series(path, np.array([0.5 * path.duration]), np.array([1e-3 * path.duration]))
-        return () if known else ("feed: judged as measured between marks of the path",)
+        unknown = any(
+            path_series(path, np.array([0.5 * path.duration]), np.array([1e-3 * path.duration]))
+            is None
+            for path in (self.follow.path, self.found.path)
+        )
+        return ("feed: judged as measured between marks of the path",) if unknown else ()
 
     def judge(self, motion: FinishedMotion) -> Finding:
         """See `Requirement.judge`: the slowest speed where the feed counts."""
         found, allowed = self.found, (1.0 - self.found.within) * self.found.asked
         text = f"{self._named(found.time)} is reached up to {found.reached:.4g} m/s"
-        if found.kept:
-            off = next(filter(_is_off, self._speeds(motion)), None)
-            if off is not None:
-                time, text = self._off(off)
-                return self._found(time, allowed, False, text)
-        else:
+        if not found.kept:
             slow = f"for {found.slower:.3g} s, " if found.slower else ""
             text = (
                 f"{text}, but {slow}at t = {found.time:.3f} s it is {found.slowest:.4g} m/s, held "
                 f"by {found.held_by}: ask for {_reached(found):g} m/s, or allow it "
                 f"more (within=)"
             )
-        return self._found(found.time, allowed, found.kept, text)
+            return self._found(found.time, allowed, False, text)
+        pace = self._pace(motion)
+        if pace.off is not None:
+            return self._found(pace.off, allowed, False, self._lost(pace.off))
+        for speeds in self._speeds(motion, pace):
+            if _is_off(speeds):
+                return self._found(*self._off(speeds, pace, allowed))
+        return self._found(found.time, allowed, True, text)
 
     def _found(self, time: float, allowed: float, kept: bool, text: str) -> Finding:
         slowest = self.found.slowest
         return Finding(self.name, "path", time, slowest, allowed, kept, text, at_least=True)
 
-    def _speeds(self, motion: FinishedMotion) -> Iterator[Bounds]:
+    def _pace(self, motion: FinishedMotion) -> "_OwnPace":
+        """Return what is known of the path's own speed, at all times."""
+        found = self.found
+        intervals, counts = found.pieces
+        low, high = ((1.0 + side * found.within) * found.asked for side in (-1.0, 1.0))
+        slowest, fastest = found.asked, 0.0
+        for first, last, is_counted in _runs(intervals, counts):
+            within = _Pace(found.path, low if is_counted else -high, high)
+            edges = np.union1d(intervals[first : last + 1].ravel(), _marks(found, first, last))
+            known = bounded(within, motion.robot, motion.trajectory, edges)
+            # A motion may be so near to a bound that no halving decides.
+            if _is_off(known):
+                own = known.undecided[0][0] if known.undecided else float(known.times[0])
+                return _OwnPace(0.0, self._when(own))
+            speeds = within.speeds(float(known.values[0]))
+            slowest = min(slowest, speeds[0]) if is_counted else slowest
+            fastest = max(fastest, speeds[1])
+        return _OwnPace(max(min(high - fastest, slowest - low), 0.0), None, slowest)
+
+    def _when(self, own: float) -> float:
+        """Return when a time of the path at the feed is passed on the one that is followed [s]."""
+        order = np.argsort(self.found.own)
+        return float(np.interp(own, self.found.own[order], self.found.t[order]))
+
+    def _lost(self, time: float) -> str:
+        return (
+            f"{self._named(time)} is kept by the path where it was laid out, but not in between: "
+            f"near t = {time:.3f} s its own speed changes too fast for that; take a smoother path "
+            f"there (more even distances or times of its rows, a rounded corner)"
+        )
+
+    def _speeds(self, motion: FinishedMotion, pace: "_OwnPace") -> Iterator[Bounds]:
         """Yield what is known of the tool's speed each time that the feed is asked for."""
         edges = smooth_between(self.follow.path, motion.trajectory)
-        along = _Along(self.follow, self.found)
+        along = _Along(self.follow, pace)
         for window in self.found.during:
             if window[1] - window[0] <= _INSTANT * self.follow.path.duration:
                 continue
@@ -84,18 +125,19 @@ class FeedReached(Requirement):
             part = edges[first : max(last, first + 1) + 1]
             yield bounded(along, motion.robot, motion.trajectory, part)
 
-    def _off(self, speeds: Bounds) -> tuple[float, str]:
+    def _off(
+        self, speeds: Bounds, pace: "_OwnPace", allowed: float
+    ) -> tuple[float, float, bool, str]:
         """Return when the tool leaves the path's pace, and what is said of it."""
-        found = self.found
         time = speeds.undecided[0][0] if speeds.undecided else float(speeds.times[0])
-        room = found.slowest * found.left_over / found.asked
-        apart = f"by {speeds.values[0] * room:.2g} m/s " if not speeds.undecided else ""
-        return time, (
+        by = f"by {speeds.values[0] * pace.left_over:.2g} m/s " if not speeds.undecided else ""
+        text = (
             f"{self._named(time)} is kept by the path, but not by '{self.follow.chain.tip_name}', "
-            f"which moves along it faster or slower {apart}at t = {time:.3f} s, where "
-            f"{room:.2g} m/s are left: keep it nearer to the path (fewer relaxed rows, more "
-            f"samples or targets), or allow the feed more (within=)"
+            f"which moves along it faster or slower {by}at t = {time:.3f} s, where "
+            f"{pace.left_over:.2g} m/s are left: keep it nearer to the path (fewer relaxed rows, "
+            f"more samples or targets), or allow the feed more (within=)"
         )
+        return time, allowed, False, text
 
     def _named(self, time: float) -> str:
         """Return the feed in words, and from when to when it is asked for near a time."""
@@ -107,19 +149,106 @@ class FeedReached(Requirement):
         return f"the feed of {self.found.asked:g} m/s{stretch}"
 
 
+class _OwnPace(NamedTuple):
+    """What a path leaves over at a feed [m/s], when it does not keep it itself [s], its slowest."""
+
+    left_over: float
+    off: float | None
+    slowest: float = 0.0
+
+
+def _runs(intervals: Array, counts: Flags) -> Iterator[tuple[int, int, bool]]:
+    """Yield the first and last of intervals (I, 2) in a row that count, or do not."""
+    if not len(intervals):
+        return
+    apart = intervals[1:, 0] != intervals[:-1, 1]
+    cuts = np.flatnonzero(apart | (counts[1:] != counts[:-1])) + 1
+    for first, after in pairwise([0, *cuts.tolist(), len(intervals)]):
+        yield first, after - 1, bool(counts[first])
+
+
+def _marks(found: FeedKept, first: int, last: int) -> Array:
+    intervals, _ = found.pieces
+    marks = np.asarray(found.path.marks)
+    inside = (marks > intervals[first, 0]) & (marks < intervals[last, 1])
+    return np.asarray(marks[inside])
+
+
 def _is_off(speeds: Bounds) -> bool:
     """Return whether a tool is, or may be, faster or slower than is left."""
     # Written so that NaN is.
     return bool(speeds.undecided or not speeds.values[0] <= 1.0)
 
 
-class _Along(Bounded):
-    """(v - v_d)·v_d, as a share of what it may be: what the path leaves over."""
+class _Pace(Bounded):
+    """(|v_d|² - m) / r: at most 1 in size where low ≤ |v_d| ≤ high.
 
-    def __init__(self, follow: BoundFollow, found: FeedKept) -> None:
-        self._follow, self._room = follow, found.slowest * found.left_over
+    With m and r the mean and half the difference of the squares of both. A negative `low` is none:
+    then it is |v_d|² / high².
+
+    Parameters
+    ----------
+    path : Path
+        At the feed.
+    low, high : float
+        [m/s].
+    """
+
+    def __init__(self, path: Path, low: float, high: float) -> None:
+        self._path = path
+        least = low * abs(low)
+        self._mean, self._half = 0.5 * (high**2 + least), 0.5 * (high**2 - least)
         self.blocks = self.of = np.zeros(1, dtype=np.intp)
         self.allowed, self.wanted = np.ones(1), np.full(1, _FINE)
+
+    def speeds(self, size: float) -> tuple[float, float]:
+        """Return the least and the largest speed of a size [m/s]."""
+        least, most = (self._mean + side * size * self._half for side in (-1.0, 1.0))
+        return float(np.sqrt(max(least, 0.0))), float(np.sqrt(most))
+
+    def series(self, stretch: Stretch) -> Array | None:
+        """See `Bounded.series`."""
+        path = path_series(self._path, stretch.middle, stretch.half)
+        if path is None:
+            return None
+        speed = series.derivative(path.translation, stretch.half)
+        # A constant changes the size of the function, but none of its derivatives.
+        return np.asarray(series.product(speed, speed)[None] / self._half)
+
+    def values(self, stretch: Stretch, u: Array) -> Array:
+        """See `Bounded.values`."""
+        twists = self._path.samples(stretch.times(u).ravel()).twist[:, :3]
+        squares = np.einsum("kc,kc->k", twists, twists)
+        found = (squares - self._mean) / self._half
+        return np.asarray(found.reshape(len(stretch.middle), len(u), 1))
+
+    def sizes(self, values: Array, stretch: Stretch) -> Array:
+        """See `Bounded.sizes`."""
+        return np.abs(values)
+
+
+class _Along(Bounded):
+    """(v - v_d)·v_d, as a share of what it may be: |v_d| times what the path leaves over.
+
+    |v_d| is bounded from below on each interval: what it is in the middle, less all that its
+    majorant lets it change by.
+    """
+
+    def __init__(self, follow: BoundFollow, pace: _OwnPace) -> None:
+        self._follow, self._pace = follow, pace
+        self.blocks = self.of = np.zeros(1, dtype=np.intp)
+        self.allowed, self.wanted = np.ones(1), np.full(1, _FINE)
+
+    def _room(self, stretch: Stretch) -> Array:
+        """Return what (v - v_d)·v_d may be on intervals, (I,) [m²/s²]."""
+        slowest = np.full(len(stretch.middle), self._pace.slowest)
+        path = path_series(self._follow.path, stretch.middle, stretch.half)
+        if path is not None:
+            speed = series.derivative(path.translation, stretch.half)
+            middle = self._follow.path.samples(stretch.middle).twist[:, :3]
+            least = np.linalg.norm(middle, axis=1) - speed[1:].sum(axis=0)
+            slowest = np.fmax(slowest, least)
+        return np.asarray(slowest * max(self._pace.left_over, _TINY))
 
     def series(self, stretch: Stretch) -> Array | None:
         """See `Bounded.series`."""
@@ -129,7 +258,7 @@ class _Along(Bounded):
         place, _ = stretch.chain().relative(self._follow.chain)
         speed = series.derivative(path.translation, stretch.half)
         apart = series.derivative(place, stretch.half) + speed
-        return np.asarray(series.product(apart, speed)[None] / self._room)
+        return np.asarray(series.product(apart, speed)[None] / self._room(stretch))
 
     def values(self, stretch: Stretch, u: Array) -> Array:
         """See `Bounded.values`."""
@@ -137,7 +266,8 @@ class _Along(Bounded):
         moved, _ = jacobians(self._follow.chain, stretch.motion(u))
         speed = np.einsum("kcn,kn->kc", moved[:, :3], stretch.motion(u, 1))
         along = np.einsum("kc,kc->k", speed - target, target)
-        return np.asarray(along.reshape(len(stretch.middle), len(u), 1) / self._room)
+        shape = len(stretch.middle), len(u), 1
+        return np.asarray(along.reshape(shape) / self._room(stretch)[:, None, None])
 
     def sizes(self, values: Array, stretch: Stretch) -> Array:
         """See `Bounded.sizes`."""

@@ -12,6 +12,8 @@ from selfmotion.robot import RobotModel
 
 # A jump of acceleration counts as one within this time [s]: no controller looks closer.
 _INSTANT = 1e-6
+# A joint that stands at its limit may be beyond it by rounding [rad or m].
+_ROUNDING = 1e-12
 
 LIMIT_NAMES = (
     "joint position limits",
@@ -80,7 +82,7 @@ class JointLimits(Requirement):
             margins = np.stack([values[0] - self.lower, self.upper - values[1]])
             side, joint = np.unravel_index(int(np.argmin(margins)), margins.shape)
             amount, allowed = float(margins[side, joint]), 0.0
-            kept = bool(amount >= 0.0)
+            kept = bool(amount >= -_ROUNDING)
         else:
             shares = values / np.stack([self.lower, self.upper])
             side, joint = np.unravel_index(int(np.argmax(shares)), shares.shape)

@@ -3,11 +3,25 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import LIMIT_NAMES
 
 # What a reader of a verdict would take to have been checked, unless told otherwise.
+NOT_JUDGED = (
+    "its certificate is of another motion or problem: judge it again, "
+    "replace(plan, certificate=plan.check())"
+)
 _EXPECTED = ("path", "joint limits", "speeds", "accelerations", "self-collision")
+
+
+def allowed_text(tolerance: Tolerance) -> str:
+    """Return what a verdict adds where more is allowed than usual, "" where it is not."""
+    usual = Tolerance()
+    if tolerance.position <= usual.position and tolerance.rotation <= usual.rotation:
+        return ""
+    return f" ({tolerance.position:.2g} m and {tolerance.rotation:.2g} rad are allowed)"
 
 
 @dataclass(frozen=True)
@@ -46,6 +60,11 @@ class Certificate:
         What a reader should know, though it speaks neither for nor against the motion.
     others : tuple of (Extreme, Extreme)
         Errors of position and rotation of what else follows a path, as those of the tool.
+    motion, problem : str
+        Digests of the motion that was judged, and of what it was judged by; "" where a motion was
+        judged that is of no `Problem`.
+    version : str
+        Of the package that judged.
     """
 
     position_error: Extreme
@@ -62,6 +81,16 @@ class Certificate:
     damped: tuple[DampedStretch, ...] = ()
     notes: tuple[str, ...] = ()
     others: tuple[tuple[Extreme, Extreme], ...] = ()
+    motion: str = ""
+    problem: str = ""
+    version: str = ""
+
+    def of_another(self) -> "Certificate":
+        """Return what a motion has that was not judged: this one's tolerance, and no number."""
+        nothing = Extreme(np.nan, np.nan, self.position_error.name)
+        return Certificate(
+            nothing, nothing, nothing, np.nan, 0, self.tolerance, (), (NOT_JUDGED,), covers=()
+        )
 
     @property
     def limit_margin(self) -> Extreme:
@@ -115,6 +144,7 @@ class Certificate:
                 f"verified at all times ({', '.join(self.covers)}): at most "
                 f"{self.position_error.value:.1e} m and {self.rotation_error.value:.1e} rad off "
                 f"the path{', beyond what is relaxed' if self.deviations else ''}"
+                f"{allowed_text(self.tolerance)}"
                 f"{self._others_text}"
                 f"{self._damping_text}{left_out}{''.join(f'; {note}' for note in self.notes)}"
             )

@@ -2,13 +2,13 @@
 
 import sys
 import traceback
-from importlib import metadata
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 
 import selfmotion as sm
+from selfmotion.basics import version
 from selfmotion.cli import tables
 from selfmotion.cli.remedies import in_shell
 from selfmotion.cli.stage_display import StageDisplay
@@ -23,7 +23,7 @@ app = typer.Typer(
 
 def _print_version(asked: bool) -> None:
     if asked:
-        typer.echo(f"selfmotion {metadata.version('selfmotion')}")
+        typer.echo(f"selfmotion {version()}")
         raise typer.Exit
 
 

@@ -77,13 +77,17 @@ def near(robot: sm.RobotModel, motion: sm.Trajectory, asked: Sequence[sm.Require
 
 
 def of_program(file: Path, job: Path, within: sm.Tolerance | None, as_json: bool) -> NoReturn:
-    """Judge a controller's program by the job that it is of, step by step, and end."""
+    """Judge a controller's program by the job that it is of, each step and the whole, and end."""
     if not is_program(file):
         raise sm.ProblemError(f"{file}: is no program of a controller, which {job} could judge")
-    steps = formats.judged_steps(file, sm.load_program(job), within)
-    verified = all(step.verified for step in steps)
+    found = formats.judged_program(file, sm.load_program(job), within)
+    steps, verified = found.steps, found.verified
     if as_json:
-        data = {"verified": verified, "steps": [step._asdict() for step in steps]}
+        data = {
+            "verified": verified,
+            "failures": list(found.failures),
+            "steps": [step._asdict() for step in steps],
+        }
         terminal.print_json(data=data)
     else:
         for step in steps:
@@ -91,6 +95,7 @@ def of_program(file: Path, job: Path, within: sm.Tolerance | None, as_json: bool
             text = f"{step.name}: {step.verdict}"
             terminal.print(text, style=style, markup=False, soft_wrap=True)
         count = sum(not step.verified for step in steps)
-        text = f"not verified: {count} of {len(steps)} steps" if count else "verified, step by step"
+        told = [*([f"{count} of {len(steps)} steps"] if count else []), *found.failures]
+        text = f"not verified: {'; '.join(told)}" if told else "verified: each step, and the whole"
         terminal.print(text, markup=False, soft_wrap=True)
     raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)

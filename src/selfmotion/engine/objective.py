@@ -63,6 +63,8 @@ class Objective:
         self._evaluation: Evaluation | None = None
         self._terms: dict[str, float] = {}
         self._first = rollout.first_target
+        # Which of the first and the last node neither move nor accelerate.
+        self._still_ends: list[int] = []
         # Whether the rollout holds the motion of x = 0.
         self._is_rolled = False
 
@@ -113,6 +115,9 @@ class Objective:
             Conditions(constraints, grid),
             Counts() if counts is None else counts,
         )
+        if problem.damping is None:
+            orders = zip((0, -1), problem.rest_orders, strict=True)
+            found._still_ends = [end for end, order in orders if order > 1]
         found._is_rolled = rollout is not None and not (start.size or found._deviation.size)
         return found
 
@@ -199,7 +204,10 @@ class Objective:
             before = self.rollout.jacobian_evaluations
             t, q, qd = self.rollout.polished()
             names = self.rollout.robot.joint_names
-            trajectory = Trajectory(t, q, qd, names, self.grid.derivative(qd))
+            qdd = self.grid.derivative(qd)
+            # Where the arm comes to rest smoothly that is so by construction; differences are not.
+            qdd[self._still_ends] = 0.0
+            trajectory = Trajectory(t, q, qd, names, qdd)
             self.counts.jacobians += self.rollout.jacobian_evaluations - before
             terms = dict(self._terms)
             self._evaluation = Evaluation(x.copy(), terms, trajectory, self.rollout.damped)

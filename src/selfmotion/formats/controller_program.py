@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path as FilePath
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,24 @@ from selfmotion.robot import RobotModel
 from selfmotion.task import SE3
 
 
+class Switch(NamedTuple):
+    """What a program does besides moving.
+
+    Attributes
+    ----------
+    at : float
+        From the begin of its motion [s].
+    output : str
+        What is switched; of an event that is a comment only its name.
+    value : bool or None
+        To what; None for a comment.
+    """
+
+    at: float
+    output: str
+    value: bool | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class ControllerProgram:
     """What a program file says of a motion.
@@ -35,12 +54,15 @@ class ControllerProgram:
         From rest to rest, coordinates in the order of the axes.
     miss : Misses
         How far targets are off the motion, as the file states it.
+    switches : tuple of Switch
+        What is switched when, in order.
     """
 
     name: str
     axes: tuple[Axis, ...]
     stretches: tuple[Stretch, ...]
     miss: Misses
+    switches: tuple[Switch, ...] = ()
 
     @property
     def targets(self) -> int:

@@ -14,7 +14,7 @@ from selfmotion.formats.poses import from_normal
 # farther away than this [m].
 _BYTES, _POSES, _FAR = 200_000_000, 1_000_000, 1e3
 # What stops something: after a cut it belongs to that.
-_STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF")
+STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF")
 # Poses nearer than this [m, and of their axes] are the same.
 _SAME = 1e-9
 # Axes apart from their opposite by less than this have no shortest way.
@@ -176,7 +176,7 @@ class Machine:
 
         What stops something between two cuts happens at the end of the one before.
         """
-        if self._open is None and event in _STOPS and self.cuts and not self._next:
+        if self._open is None and event in STOPS and self.cuts and not self._next:
             self.cuts[-1].ends(event)
         elif self._open is None:
             self._next.append(event)

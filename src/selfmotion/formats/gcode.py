@@ -10,7 +10,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.formats.cuts import Machine, unit_axis
+from selfmotion.formats.cuts import STOPS, Machine, unit_axis
 from selfmotion.formats.path_rows import PoseRows
 
 _WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*")
@@ -93,11 +93,21 @@ class _Reader:
         moving = [code for code in codes if code in _MOTIONS]
         if len(moving) > 1:
             raise machine.fault(f"{moving[0]} and {moving[1]} are in one line")
+        switched = [code for code in codes if code.startswith("M")]
         for code in codes:
-            self._mode(code)
+            if code not in switched:
+                self._mode(code)
         if "R" in values and self._motion < 2:
             raise machine.fault("R is read of arcs only (G2, G3)")
+        # What starts does so before the motion of its line, what stops after it. A rapid leaves the
+        # cut before: all that its line switches belongs to the next one.
+        late = [code for code in switched if self._motion == 0 or code in STOPS]
+        for code in switched:
+            if code not in late:
+                self._mode(code)
         self._move(values)
+        for code in late:
+            self._mode(code)
         return any(code in _ENDS for code in codes)
 
     def _mode(self, code: str) -> None:

@@ -10,11 +10,11 @@ import numpy as np
 from selfmotion.basics import FileFormatError
 from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Constraint, JointAccelerationLimits, JointJerkLimits
-from selfmotion.formats.controller_program import ControllerProgram
+from selfmotion.formats.controller_program import ControllerProgram, Switch, plain
 from selfmotion.formats.program_files import read_program
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
-from selfmotion.result import Move
+from selfmotion.result import Move, Piece, elsewhere, gaps
 
 
 class JudgedStep(NamedTuple):
@@ -39,13 +39,32 @@ def stated_deviation(file: FilePath) -> Tolerance | None:
     return Tolerance(miss.position, max(miss.rotation, _LEAST)) if sound else None
 
 
-def judged_steps(
-    file: FilePath, job: Program, within: Tolerance | None = None
-) -> tuple[JudgedStep, ...]:
-    """Judge a controller's program by the job that it is of: each seam and each move.
+class JudgedProgram(NamedTuple):
+    """What is known of a controller's program, by the job that it is of.
+
+    Attributes
+    ----------
+    steps : tuple of JudgedStep
+    failures : tuple of str
+        What speaks against the whole: its ends, its order, its outputs, the job itself.
+    """
+
+    steps: tuple[JudgedStep, ...]
+    failures: tuple[str, ...]
+
+    @property
+    def verified(self) -> bool:
+        """Whether each step is, and nothing speaks against the whole."""
+        return all(step.verified for step in self.steps) and not self.failures
+
+
+def judged_program(file: FilePath, job: Program, within: Tolerance | None = None) -> JudgedProgram:
+    """Judge a controller's program by the job that it is of: each step, and the whole.
 
     Seams by all that their plans had to keep, at the deviation that the file states; moves by all
-    of theirs. Accelerations are the controller's, and not judged.
+    of theirs. Accelerations are the controller's, and not judged. The whole has to begin and end
+    where the job does, and to switch what its events say, when they say it: an output or a comment
+    for each, the same for each event of one name, and nothing else.
 
     Raises
     ------
@@ -54,17 +73,55 @@ def judged_steps(
     """
     program = read_program(file)
     within = within or stated_deviation(file)
-    found = []
+    found, pieces = list[JudgedStep](), list[Piece]()
     for step, motion in zip(job.steps, _pieces(file, program, job), strict=True):
         made = step.made
         if isinstance(made, Move):
-            verdict = Move(made.robot, what_targets_keep(made.constraints), motion)
-            found.append(JudgedStep(step.name, verdict.verified, verdict.verdict))
+            move = Move(made.robot, what_targets_keep(made.constraints), motion)
+            found.append(JudgedStep(step.name, move.verified, move.verdict))
         else:
             problem = replace(made.problem, constraints=what_targets_keep(made.problem.constraints))
             certificate = problem.certify(motion, within or made.tolerance)
             found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
-    return tuple(found)
+        pieces.append(Piece(f"'{step.name}'", motion))
+    failures = (
+        *(f"the job itself: {text}" for text in job.failures),
+        *gaps(job.robot, pieces),
+        *_elsewhere(job, pieces),
+        *_otherwise_switched(job, program.switches),
+    )
+    return JudgedProgram(tuple(found), failures)
+
+
+def _elsewhere(job: Program, pieces: Sequence[Piece]) -> Iterator[str]:
+    """Yield where a program does not begin or end as its job does."""
+    for end in (0, -1) if pieces else ():
+        asked = job.steps[end].motion.q[end]
+        yield from elsewhere(job.robot, pieces[end], end, asked, _DIGITS)
+
+
+def _otherwise_switched(job: Program, switches: Sequence[Switch]) -> Iterator[str]:
+    """Yield what of a job's events a program does not switch, or switches otherwise."""
+    asked = sorted(job.events, key=lambda event: event[0])
+    made = sorted(switches, key=lambda switch: switch.at)
+    if len(asked) != len(made):
+        yield f"it switches {len(made)} times, the job {len(asked)} times"
+        return
+    known: dict[str, Switch] = {}
+    for (at, seam, event), switch in zip(asked, made, strict=True):
+        if abs(at - switch.at) > _PROMPT:
+            yield (
+                f"event '{event}' of '{seam}' is at {at:.4f} s, but '{switch.output}' is switched "
+                f"at {switch.at:.4f} s"
+            )
+        if switch.value is None and switch.output != plain(event):
+            yield f"event '{event}' of '{seam}' is called '{switch.output}'"
+        before = known.setdefault(event, switch)
+        if before[1:] != switch[1:]:
+            yield (
+                f"event '{event}' switches '{before.output}' to {before.value} once, and "
+                f"'{switch.output}' to {switch.value} at {switch.at:.4f} s"
+            )
 
 
 def what_targets_keep(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
@@ -97,3 +154,6 @@ def _pieces(file: FilePath, program: ControllerProgram, job: Program) -> Iterato
 
 # Files have so many digits of time [s], and of angles [rad].
 _MOMENT, _LEAST = 1e-4, 1e-6
+# Where a program begins and ends is written to so many digits [rad or m]; what it switches is
+# switched at a target, as near to its time [s].
+_DIGITS, _PROMPT = 1e-6, 1e-3

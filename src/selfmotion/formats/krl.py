@@ -20,7 +20,7 @@ from selfmotion.formats.controller_program import (
     plain,
 )
 from selfmotion.formats.program_axes import written
-from selfmotion.formats.program_lines import ProgramReader, Row
+from selfmotion.formats.program_lines import ProgramReader, Row, switched
 from selfmotion.formats.program_settings import AXES
 from selfmotion.formats.stretches import Stretch
 from selfmotion.formats.thinning import TIME_DIGITS
@@ -150,6 +150,8 @@ class KrlReader(ProgramReader):
         super().__init__(file)
         self._parts: list[float] = []
         self._targets: list[list[float]] = []
+        # At which target what is switched.
+        self._triggers: list[tuple[int, Sequence[str]]] = []
 
     def begin(self, given: Sequence[str]) -> None:
         """Begin the module."""
@@ -161,7 +163,7 @@ class KrlReader(ProgramReader):
 
     def block(self, _: Sequence[str]) -> None:
         """Begin a spline block."""
-        self.state, self._parts, self._targets = "block", [], [self.at]
+        self.state, self._parts, self._targets, self._triggers = "block", [], [self.at], []
 
     def start(self, _: Sequence[str]) -> None:
         """Begin its time block."""
@@ -179,6 +181,10 @@ class KrlReader(ProgramReader):
             raise self.lines.fault("there is no target before this part")
         self._parts.append(self.lines.duration(given[0]))
 
+    def trigger(self, given: Sequence[str]) -> None:
+        """Take what is switched at the target that follows."""
+        self._triggers.append((len(self._targets), given))
+
     def whole(self, given: Sequence[str]) -> None:
         """Take the time of all of them."""
         seconds, parts = self.lines.duration(given[0]), self._parts
@@ -188,6 +194,10 @@ class KrlReader(ProgramReader):
         # Parts are shares: those that are seconds stay what they are.
         scale = 1.0 if abs(share - 1.0) * sum(parts) < _ABOVE else share
         row = Row(self.lines.step(), self._targets, [scale * part for part in parts])
+        for number, what in self._triggers:
+            if number > len(parts):
+                raise self.lines.fault("a trigger has no target after it")
+            self.switches.append(switched(self.clock + sum(row.seconds[:number]), what))
         self.rows.append(row)
         self.at, self.state = self._targets[-1], "ended"
 
@@ -218,16 +228,18 @@ KrlReader.grammar = (
     (("head",), rf"\$LOAD ?= ?\{{{_ANY}\{{{_ANY}\}}{_ANY}\{{{_ANY}\}}{_ANY}\}}", KrlReader.skip),
     (("head",), rf"PTP {_TARGET}", KrlReader.go),
     (_IN_BODY[1:], r"WAIT SEC (\S+)", KrlReader.wait),
-    (_IN_BODY, r"\$OUT ?\[ ?\d+ ?\] ?= ?(?:TRUE|FALSE)", KrlReader.skip),
+    (_IN_BODY, r"\$OUT ?\[ ?(\d+) ?\] ?= ?(TRUE|FALSE)", KrlReader.switch),
+    (_IN_BODY, r"; event: (.*)", KrlReader.switch),
     (_IN_BODY[1:], r"PTP_SPLINE", KrlReader.block),
     (("block",), r"TIME_BLOCK START", KrlReader.start),
     (("time",), rf"SPTP {_TARGET}", KrlReader.target),
     (("time",), r"TIME_BLOCK PART ?= ?(\S+)", KrlReader.part),
     (
         ("time",),
-        r"TRIGGER WHEN PATH ?= ?0 DELAY ?= ?0 DO \$OUT ?\[ ?\d+ ?\] ?= ?(?:TRUE|FALSE)",
-        KrlReader.skip,
+        r"TRIGGER WHEN PATH ?= ?0 DELAY ?= ?0 DO \$OUT ?\[ ?(\d+) ?\] ?= ?(TRUE|FALSE)",
+        KrlReader.trigger,
     ),
+    (("time",), r"; event: (.*)", KrlReader.trigger),
     (("time",), r"TIME_BLOCK END ?= ?(\S+)", KrlReader.whole),
     (("ended",), r"ENDSPLINE", KrlReader.close),
     (_IN_BODY, r"END", KrlReader.end),

@@ -4,7 +4,18 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.formats.path_rows import PoseRows
-from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints
+from selfmotion.path import (
+    Feed,
+    Joined,
+    Path,
+    Placed,
+    Polyline,
+    Retimed,
+    Reversed,
+    Section,
+    Waypoints,
+    Weave,
+)
 
 # Lengths below this [m] are none.
 _NOTHING = 1e-9
@@ -46,12 +57,17 @@ def _poses_passed(path: Path) -> Array | None:
             return path.pose_times
         case Waypoints():
             return np.asarray(path.waypoint_times - path.waypoint_times[0])
-        case Feed():
+        case Feed() | Retimed():
             times = _poses_passed(path.original)
             if times is None:
                 return None
+            passed = np.where(times <= 0.0, 0.0, path.when(times))
             # Both ends exactly.
-            return np.concatenate([[0.0], path.when(times[1:-1]), [path.duration]])
+            return np.where(times >= path.original.duration, path.duration, passed)
+        case Section() | Reversed() | Placed() | Weave():
+            times = _poses_passed(path.original)
+            # What happened before a section has happened when it begins.
+            return None if times is None else np.clip(path.when(times), 0.0, path.duration)
         case Joined():
             found, start = [np.zeros(1)], 0.0
             for piece in path.pieces:

@@ -71,6 +71,7 @@ def _usual(robot: RobotModel) -> dict[str, str]:
     for name in turning:
         parts.setdefault(name.rpartition("/")[0], []).append(name)
     own = max(parts.values(), key=len, default=[])
+    _check_one_arm(robot, own)
     others = [name for name in robot.joint_names if name not in own]
     if len(own) == _ROBOT + 1:
         # The arm's own seventh is the first of the others.
@@ -84,6 +85,22 @@ def _usual(robot: RobotModel) -> dict[str, str]:
     return {name: f"A{k}" for k, name in enumerate(own, 1)} | {
         name: f"E{k}" for k, name in enumerate(others, 1)
     }
+
+
+def _check_one_arm(robot: RobotModel, own: Sequence[str]) -> None:
+    """Refuse joints of one URDF of which only some carry the tool: a table is no wrist."""
+    carriers = robot.chain_to(robot.tool, None).joints
+    carrying = {robot.joint_names[k] for k in carriers.tolist()}
+    beside = [name for name in own if name not in carrying]
+    if beside and len(beside) < len(own):
+        arm = [name for name in own if name in carrying]
+        axes = {name: f"A{k}" for k, name in enumerate(arm, 1)}
+        axes |= {name: f"E{k}" for k, name in enumerate(beside, 1)}
+        raise ProblemError(
+            f"{robot.name}: joint '{beside[0]}' does not carry the tool '{robot.tool}', as "
+            f"{', '.join(arm)} do: say by axes= which joint is which axis of the controller, for "
+            f"example {axes}"
+        )
 
 
 def in_order(axes: Sequence[Axis]) -> list[int]:

@@ -9,13 +9,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from selfmotion.basics import FileFormatError
-from selfmotion.formats.controller_program import ControllerProgram
+from selfmotion.formats.controller_program import ControllerProgram, Switch
 from selfmotion.formats.program_axes import Axis
 from selfmotion.formats.stretches import Miss, Misses, Stretch
 
 # A file of a controller has less than so many bytes, lines less than so many characters, numbers
 # less than that.
 _BYTES, _LINE, _LARGEST = 50_000_000, 2000, 1e7
+# What comments of events begin with.
+_EVENT = "event: "
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)(E[+-]?[0-9]{1,3})?", re.IGNORECASE)
 
 
@@ -54,7 +56,7 @@ class Lines:
         self.notes: list[str] = []
 
     def __iter__(self) -> Iterator[str]:
-        """Yield what is no comment, without spaces around it."""
+        """Yield what is no comment but that of an event, without spaces around it."""
         for number, line in enumerate(self._lines, 1):
             self.number = number
             text = line.strip()
@@ -62,7 +64,9 @@ class Lines:
                 raise self.fault(f"has {len(text)} characters, expected {_LINE} at most")
             if text.startswith(self._mark):
                 note = text[len(self._mark) :].strip()
-                if note.startswith(".. ") and self.notes:
+                if note.startswith(_EVENT):
+                    yield f"{self._mark} {note}"
+                elif note.startswith(".. ") and self.notes:
                     self.notes[-1] += note[2:]
                 else:
                     self.notes.append(note)
@@ -128,9 +132,13 @@ class Lines:
         return None
 
     def program(
-        self, name: str, present: Sequence[str], rows: Sequence["Row"]
+        self,
+        name: str,
+        present: Sequence[str],
+        rows: Sequence["Row"],
+        switches: Sequence[Switch] = (),
     ) -> ControllerProgram:
-        """Return the program of rows of targets.
+        """Return the program of rows of targets, and of what is switched.
 
         Raises
         ------
@@ -153,7 +161,15 @@ class Lines:
             stretches.append(Stretch(row.name, t, q * scale))
         if not stretches:
             raise FileFormatError(f"{self._file}: has no targets with times")
-        return ControllerProgram(name, axes, tuple(stretches), self.miss())
+        return ControllerProgram(name, axes, tuple(stretches), self.miss(), tuple(switches))
+
+
+def switched(at: float, given: Sequence[str]) -> Switch:
+    """Return what an output and its value, or the name of an event, are at a time [s]."""
+    if len(given) == 1:
+        return Switch(at, given[0].strip())
+    output, value = given
+    return Switch(at, output, value.upper() in ("TRUE", "1"))
 
 
 class ProgramReader:
@@ -177,6 +193,7 @@ class ProgramReader:
         self.present: list[str] = []
         self.rows: list[Row] = []
         self.at: list[float] = []
+        self.switches: list[Switch] = []
 
     def program(self) -> ControllerProgram:
         """Read all of it.
@@ -200,7 +217,16 @@ class ProgramReader:
                 )
         if self.state != "after":
             raise self.lines.fault(f"is the last one, expected {self.last}")
-        return self.lines.program(self.name, self.present, self.rows)
+        return self.lines.program(self.name, self.present, self.rows, self.switches)
+
+    @property
+    def clock(self) -> float:
+        """How long the motion takes up to here [s]."""
+        return sum(sum(row.seconds) for row in self.rows)
+
+    def switch(self, given: Sequence[str]) -> None:
+        """Take what is switched now: an output and its value, or the name of an event."""
+        self.switches.append(switched(self.clock, given))
 
     def skip(self, _: Sequence[str]) -> None:
         """Take a line that says nothing of the motion."""

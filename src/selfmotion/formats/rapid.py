@@ -171,6 +171,11 @@ class RapidReader(ProgramReader):
             self.rows.append(Row(self.lines.step(), [self.at, *self._targets], self._times))
             self.at, self._targets, self._times = self._targets[-1], [], []
 
+    @property
+    def clock(self) -> float:
+        """See `ProgramReader.clock`: with the targets since the last stop."""
+        return super().clock + sum(self._times)
+
     def leave(self, _: Sequence[str]) -> None:
         """End the procedure."""
         if self._targets:
@@ -210,7 +215,8 @@ RapidReader.grammar = (
         RapidReader.move,
     ),
     (("body",), r"WaitTime ([^;\s]+) ?;", RapidReader.wait),
-    (("body",), rf"SetDO {_WORD} ?, ?[01] ?;", RapidReader.skip),
+    (("body",), rf"SetDO ({_WORD}) ?, ?([01]) ?;", RapidReader.switch),
+    (("body",), r"! event: (.*)", RapidReader.switch),
     (("body",), r"ENDPROC", RapidReader.leave),
     (("left",), r"ENDMODULE", RapidReader.end),
 )

@@ -36,7 +36,7 @@ def placed_table(table: Mapping[str, Any]) -> dict[str, Any]:
         )
     found["path"] = placed_path(found["path"], frame)
     if "also" in found:
-        found["also"] = [_placed_follow(item, frame) for item in found["also"]]
+        found["also"] = [_placed_follow(item, frame, carrier) for item in found["also"]]
     bodies = [placed_body(item, frame, carrier) for item in piece.get("obstacles", [])]
     if "mesh" in piece:
         scale = {"scale": piece["scale"]} if "scale" in piece else {}
@@ -73,13 +73,14 @@ def placed_body(values: Mapping[str, Any], frame: SE3, carrier: str | None) -> d
     return {**found, "position": pose.translation.tolist(), "rotation": rotation}
 
 
-def _placed_follow(values: Mapping[str, Any], frame: SE3) -> dict[str, Any]:
+def _placed_follow(values: Mapping[str, Any], frame: SE3, carrier: str | None) -> dict[str, Any]:
     # What follows in the frame of another link is not where the workpiece is.
-    if "reference" in values:
+    if values.get("reference", carrier) != carrier:
         return dict(values)
+    rides = {} if carrier is None else {"reference": carrier}
     if "path" in values:
-        return {**values, "path": placed_path(values["path"], frame)}
-    return {**values, "pose": frame * values["pose"]}
+        return {**values, **rides, "path": placed_path(values["path"], frame)}
+    return {**values, **rides, "pose": frame * values["pose"]}
 
 
 def _with_bodies(table: dict[str, Any], bodies: list[dict[str, Any]]) -> dict[str, Any]:

@@ -1,21 +1,39 @@
 """Programs as files, and what a job has finished so far."""
 
-import hashlib
 import json
 import math
 import re
 from collections.abc import Callable, Mapping, MutableMapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import FileFormatError, SelfmotionError, as_path, write_text
+import numpy as np
+
+from selfmotion.basics import Array, FileFormatError, SelfmotionError, as_path, write_text
+from selfmotion.certificate import Tolerance
 from selfmotion.collision import obstacle_from_dict
+from selfmotion.constraints import Constraint
 from selfmotion.job.program import Program
 from selfmotion.job.specification import Specification
 from selfmotion.job.step import Step
-from selfmotion.result import Move, Plan, load_move, read_bundle, read_plan, write_bundle
+from selfmotion.problem import Problem
+from selfmotion.result import (
+    Move,
+    Plan,
+    another_tool,
+    files_of,
+    key_of,
+    load_move,
+    load_plan,
+    not_judged_by,
+    read_bundle,
+    write_bundle,
+)
+from selfmotion.robot import RobotModel
 
+# A move leads to where it should up to rounding [rad or m].
+_JOINED = 1e-9
 # Raised with every change that older versions cannot read.
 _FORMAT = 2
 
@@ -87,41 +105,71 @@ def _step(values: Mapping[str, Any], made: Plan | Move) -> Step:
 class Shelf:
     """A folder with what a job has finished: plans and moves by what was asked for.
 
+    What is kept is read in one way: measured again with today's tolerance, whole, unchanged and
+    verified, or it is planned again.
+
     Parameters
     ----------
     folder : Path or None
         None keeps nothing.
+    tolerance : Tolerance
+        What a seam may miss its path by.
     known : mapping
         Arms and constraints that are made already; see `load_plan`.
     """
 
-    def __init__(self, folder: Path | None, known: MutableMapping[str, Any]) -> None:
-        self._folder, self._known = folder, known
+    def __init__(
+        self, folder: Path | None, tolerance: Tolerance, known: MutableMapping[str, Any]
+    ) -> None:
+        self._folder, self._tolerance, self._known = folder, tolerance, known
         if folder is not None:
             try:
                 folder.mkdir(parents=True, exist_ok=True)
             except OSError as error:
                 raise FileFormatError(f"{folder}: cannot be made: {error.strerror}") from error
 
-    def file(self, name: str, asked: Callable[[], Any]) -> Path | None:
-        """Return the file for what was asked (JSON-safe) under a name; None without a folder."""
+    def file(
+        self,
+        name: str,
+        asked: Callable[[], Any],
+        robot: RobotModel,
+        constraints: Sequence[Constraint],
+    ) -> Path | None:
+        """Return the file for what was asked (JSON-safe) under a name; None without a folder.
+
+        Of an arm, with what bodies are made of.
+        """
         if self._folder is None:
             return None
-        text = json.dumps(asked(), sort_keys=True)
-        key = hashlib.sha256(text.encode()).hexdigest()[:16]
+        files = files_of(robot, constraints, self._known)
+        key = key_of((asked(), asdict(self._tolerance)), files)[:16]
         plain = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:40]
         return self._folder / f"{plain}.{key}.json"
 
-    def plans(self, file: Path | None) -> tuple[list[Plan], str] | None:
-        """Return the plans that were kept, and why there are none; None for nothing kept."""
+    def plans(self, file: Path | None, problem: Problem) -> tuple[list[Plan], str] | None:
+        """Return the plans of a problem that were kept, and why there are none.
+
+        None for nothing kept.
+        """
         kept = self._read(file)
         if file is None or kept is None:
             return None
         try:
-            names = [file.with_suffix(f".{k}.npz") for k in range(int(kept["plans"]))]
-            return [read_plan(name, self._known) for name in names], str(kept["reason"])
+            count, reason = int(kept["plans"]), str(kept["reason"])
+            files = [file.with_suffix(f".{k}.npz") for k in range(count)]
+            found = [self._plan(name) for name in files]
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None
+        sound = all(
+            plan.certificate.verified and plan.problem.digest == problem.digest for plan in found
+        )
+        return (found, reason) if sound else None
+
+    def _plan(self, file: Path) -> Plan:
+        plan = load_plan(file, known=self._known)
+        if plan.tolerance == self._tolerance:
+            return plan
+        return replace(plan, certificate=plan.check(self._tolerance))
 
     def keep_plans(self, file: Path | None, made: tuple[Sequence[Plan], str]) -> None:
         """Keep plans, or why there are none."""
@@ -130,19 +178,28 @@ class Shelf:
         plans, reason = made
         for number, plan in enumerate(plans):
             plan.save(file.with_suffix(f".{number}.npz"))
-        _write(file, {"plans": len(plans), "reason": reason})
+        _write(file, {"kept": file.stem, "plans": len(plans), "reason": reason})
 
-    def move(self, file: Path | None, missing: Move) -> Move | None:
-        """Return the move that was kept, `missing` with the reason, or None for nothing kept."""
+    def move(self, file: Path | None, missing: Move, ends: Array) -> Move | None:
+        """Return the move between ends (2, n) that was kept, or `missing` with the reason.
+
+        None for nothing kept.
+        """
         kept = self._read(file)
         if file is None or kept is None:
             return None
         try:
             if kept["trouble"]:
                 return replace(missing, reason=str(kept["trouble"]))
-            return load_move(file.with_suffix(".npz"), known=self._known)
+            found = load_move(file.with_suffix(".npz"), known=self._known)
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None
+        if not found.verified or any(another_tool(found.robot, missing.robot)):
+            return None
+        if any(not_judged_by(found.constraints, missing.constraints, None)):
+            return None
+        apart = float(np.abs(found.motion.q[[0, -1]] - ends).max())
+        return found if apart <= _JOINED else None
 
     def keep_move(self, file: Path | None, move: Move) -> None:
         """Keep a move, or why there is none."""
@@ -150,7 +207,8 @@ class Shelf:
             return
         if move.trajectory is not None:
             move.save(file.with_suffix(".npz"))
-        _write(file, {"trouble": "" if move.trajectory is not None else move.trouble})
+        trouble = "" if move.trajectory is not None else move.trouble
+        _write(file, {"kept": file.stem, "trouble": trouble})
 
     def _read(self, file: Path | None) -> dict[str, Any] | None:
         if file is None or not file.exists():
@@ -159,7 +217,9 @@ class Shelf:
             found = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
-        return found if isinstance(found, dict) else None
+        # One that was kept under another name is of other work.
+        own = isinstance(found, dict) and found.get("kept") == file.stem
+        return found if own else None
 
 
 def _write(file: Path, values: Mapping[str, Any]) -> None:

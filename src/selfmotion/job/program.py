@@ -3,22 +3,18 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import accumulate, pairwise
+from itertools import accumulate
 from pathlib import Path as FilePath
 
-import numpy as np
-
 from selfmotion.basics import PlanError, as_path, write_text
+from selfmotion.certificate import Tolerance
 from selfmotion.collision import Obstacle
 from selfmotion.job.specification import Specification
 from selfmotion.job.step import Step
 from selfmotion.motion import Trajectory, joined_motions
-from selfmotion.result import Move, Plan
+from selfmotion.result import Move, Piece, Plan, another_tool, gaps, moving_end, reached_text
 from selfmotion.robot import RobotModel
 
-# From one step to the next configurations may differ by rounding [rad or m], velocities and
-# accelerations by what rest may be off.
-_JOINT, _REST, _PUSH = 1e-9, 1e-6, 1e-4
 # Events may be outside their step by rounding [s].
 _ROUNDING = 1e-9
 
@@ -70,6 +66,11 @@ class Program:
     def order(self) -> tuple[str, ...]:
         """The names of the seams, as they are made."""
         return tuple(step.name for step in self.steps if step.is_seam)
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """What each of the seams may miss its path by."""
+        return Tolerance() if self.specification is None else self.specification.tolerance
 
     @property
     def plans(self) -> dict[str, Plan]:
@@ -129,9 +130,10 @@ class Program:
         """One line: verified, or what is wrong with which seam or move."""
         if self.verified:
             alone = "" if self.specification else "; nothing says what was asked for"
+            reached = reached_text(list(self.plans.values()), self.tolerance)
             return (
                 f"verified at all times: {self.extent}, and all moves in between, from rest to "
-                f"rest{alone}"
+                f"rest; {reached}{alone}"
             )
         return f"not verified: {'; '.join(self.failures)}"
 
@@ -139,10 +141,9 @@ class Program:
     def failures(self) -> tuple[str, ...]:
         """What speaks against it; empty for a verified one."""
         strangers = [
-            f"'{step.name}' is of another arm than {self.robot.name}, of {step.made.robot.name}"
+            f"'{step.name}': {text}"
             for step in self.steps
-            if step.made.robot.urdf.sha256 != self.robot.urdf.sha256
-            or step.made.robot.joint_names != self.robot.joint_names
+            for text in another_tool(step.made.robot, self.robot)
         ]
         if strangers:
             return tuple(strangers)
@@ -160,25 +161,11 @@ class Program:
 
     def _gaps(self) -> Iterator[str]:
         """Yield where the arm would jump, or does not rest."""
-        whole = [step for step in self.steps if not step.is_missing]
-        for step, end, where in [(each, 0, "begin") for each in whole[:1]] + [
-            (each, -1, "end") for each in whole[-1:]
-        ]:
-            for order, most in ((1, _REST), (2, _PUSH)):
-                rate = float(np.abs(step.motion(step.motion.t[end], order)).max())
-                if not rate <= most:
-                    yield f"'{step.name}' does not {where} at rest: {rate:.2e}"
-        for one, other in pairwise(whole):
-            ends = one.motion, other.motion
-            for order, most in enumerate((_JOINT, _REST, _PUSH)):
-                last = ends[0](ends[0].t[-1], order)
-                first = ends[1](ends[1].t[0], order)
-                still = np.zeros_like(last) if order else last
-                gap = max(float(np.abs(each - still).max()) for each in (last, first))
-                # Written so that NaN is a gap.
-                if not gap <= most:
-                    what = ("configurations differ", "the arm does not rest", "it accelerates")
-                    yield f"from '{one.name}' to '{other.name}' {what[order]}: {gap:.2e}"
+        named = ((step, Piece.of(f"'{step.name}'", step.made)) for step in self.steps)
+        pieces = [piece for _, piece in named if piece is not None]
+        for piece, end in [(each, 0) for each in pieces[:1]] + [(each, -1) for each in pieces[-1:]]:
+            yield from moving_end(self.robot, piece, end)
+        yield from gaps(self.robot, pieces)
 
     def _left_out(self) -> Iterator[str]:
         """Yield what stands there and was not looked at."""

@@ -19,6 +19,7 @@ from selfmotion.basics import (
     shown,
     silent,
 )
+from selfmotion.certificate import Tolerance
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.job.building import Builder
 from selfmotion.job.files import Shelf
@@ -126,7 +127,7 @@ def plan_job(
             check_can_be_sent(seam.costs or ())
     ends = tuple(None if q is None else robot.configuration(q) for q in (start, end))
     price = as_number(seconds_per_cost, "seconds_per_cost", least=0.0)
-    shelf = Shelf(None if folder is None else as_path(folder), {})
+    shelf = Shelf(None if folder is None else as_path(folder), Tolerance(), {})
     work = Work(asked, shelf, executor, progress)
     ordering = Ordering(listed, work, ends, price, is_free)
     if not ordering.states:

@@ -5,11 +5,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from selfmotion.basics import ProblemError, as_flag, as_number, as_several, shown
+from selfmotion.basics import (
+    Array,
+    ProblemError,
+    as_flag,
+    as_number,
+    as_several,
+    read_only,
+    shown,
+)
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Constraint
 from selfmotion.costs import Cost
-from selfmotion.motion import reversed_motion
+from selfmotion.motion import NodeNullMotion, NullMotion, reversed_motion
 from selfmotion.path import STILL, Path, Reversed
 from selfmotion.problem import Problem
 from selfmotion.result import Plan
@@ -152,26 +160,54 @@ def one_way(constraint: Constraint) -> bool:
     return constraint.on_part() is not constraint or constraint.on_last_part() is not constraint
 
 
-def backwards(problem: Problem) -> Problem:
-    """Return the problem of a path the other way round."""
-    duration = problem.path.duration
-    turned = [
+def mirrored(relaxations: Sequence[Relaxation], duration: float) -> list[Relaxation]:
+    """Return what is relaxed along a path of a duration [s] the other way round."""
+    return [
         item
         if item.during is None
         else replace(item, during=(duration - item.during[1], duration - item.during[0]))
-        for item in problem.relaxations
+        for item in relaxations
     ]
+
+
+def backwards(problem: Problem) -> Problem:
+    """Return the problem of a path the other way round."""
+    turned = mirrored(problem.relaxations, problem.path.duration)
     path = Reversed(problem.path)
     return replace(problem, path=path, start=None, relaxations=turned)
 
 
 def backwards_plan(plan: Plan) -> Plan:
-    """Return a plan the other way round, judged anew."""
+    """Return a plan the other way round, judged anew, with its report by the new times."""
     problem = backwards(plan.problem)
-    motion = reversed_motion(plan.trajectory)
-    still = reversed_motion(plan.initial_trajectory)
-    turned = replace(plan, problem=problem, trajectory=motion, initial_trajectory=still)
+    duration = plan.trajectory.duration
+    null_motion, coefficients = _turned_null_motion(plan)
+    active = [
+        replace(item, spans=tuple((duration - b, duration - a) for a, b in item.spans[::-1]))
+        for item in plan.report.active
+    ]
+    turned = replace(
+        plan,
+        problem=problem,
+        trajectory=reversed_motion(plan.trajectory),
+        initial_trajectory=reversed_motion(plan.initial_trajectory),
+        coefficients=coefficients,
+        report=replace(plan.report, active=tuple(active), null_motion=null_motion),
+    )
     return replace(turned, certificate=turned.check())
+
+
+def _turned_null_motion(plan: Plan) -> tuple[NullMotion | None, Array]:
+    """Return the null motion of a plan the other way round, -ε(T - t), and its coefficients.
+
+    None and no coefficients for one whose functions are along the motion x = 0 of the first way.
+    """
+    given = plan.report.null_motion
+    if not isinstance(given, NodeNullMotion):
+        return None, read_only([])
+    values = plan.coefficients.reshape(-1, len(given.times))
+    times = tuple(1.0 - time for time in given.times[::-1])
+    return NodeNullMotion(times), read_only(-values[:, ::-1].ravel())
 
 
 def _names(given: object, what: str) -> tuple[str, ...]:

@@ -1,29 +1,25 @@
 """What a job asks for, which its program is held against."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, Saved, SelfmotionError, restore
+from selfmotion.basics import Array, restore
+from selfmotion.certificate import Tolerance
 from selfmotion.collision import Obstacle, obstacle_from_dict
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import cost_from_dict
-from selfmotion.job.seam import JOB_END, JOB_START, Seam, one_way
+from selfmotion.job.seam import JOB_END, JOB_START, Seam, mirrored, one_way
 from selfmotion.job.step import Step
-from selfmotion.path import Path
-from selfmotion.result import Plan
+from selfmotion.path import Path, Reversed
+from selfmotion.result import Asked, Piece, Plan, elsewhere, not_judged_by
 from selfmotion.robot import RobotModel
 from selfmotion.task import Relaxation, Task
 
-# Two paths are one where they are as near at these shares of their time, which no rhythm of a path
-# has [m, and as a rotation matrix]; times are the same up to rounding [s].
-_SHARES = np.modf(0.5 * (np.sqrt(5.0) - 1.0) * np.arange(1, 14))[0]
-_SAME, _ROUNDING = 1e-9, 1e-9
-# The program begins and ends so near to where it was asked to [rad or m].
-_JOINT = 1e-9
+# Times are the same up to rounding [s].
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +36,8 @@ class Specification:
     constraints : tuple of Constraint
         What all seams and moves have to keep.
     clearance : Clearance or None
+    tolerance : Tolerance
+        What each seam may miss its path by.
     """
 
     seams: tuple[Seam, ...]
@@ -48,6 +46,7 @@ class Specification:
     end: Array | None = None
     constraints: tuple[Constraint, ...] = ()
     clearance: Clearance | None = None
+    tolerance: Tolerance = field(default_factory=Tolerance)
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -71,11 +70,11 @@ class Specification:
             if name not in made and name not in missing:
                 yield f"seam '{name}' was asked for, and is neither made nor said to be missing"
         yield from self._order(made, seams)
-        yield from self._ends(steps)
+        yield from self._ends(robot, steps)
         yield from _moves(steps, seams)
         for number, step in enumerate(steps):
             if isinstance(step.made, Plan):
-                yield from _seam(step, step.made, seams[step.name])
+                yield from self._seam(robot, step, step.made)
                 following = steps[number + 1] if number + 1 < len(steps) else None
                 yield from _wait(step, following, seams[step.name].wait)
         yield from self._kept(robot, steps)
@@ -91,28 +90,43 @@ class Specification:
             if seam.after_any and before.isdisjoint(seam.after_any):
                 yield f"seam '{name}' is made before any of those on which it stands"
 
-    def _ends(self, steps: Sequence[Step]) -> Iterator[str]:
+    def _ends(self, robot: RobotModel, steps: Sequence[Step]) -> Iterator[str]:
         """Yield where it begins or ends elsewhere; moves that were not found are told elsewhere."""
-        for q, at, where in ((self.start, 0, "begin"), (self.end, -1, "end")):
-            if q is None or not steps or steps[at].is_missing:
-                continue
-            gap = float(np.abs(steps[at].motion.q[at] - q).max())
-            if not gap <= _JOINT:
-                yield f"it does not {where} where it was asked to: {gap:.2e}"
+        for q, at in ((self.start, 0), (self.end, -1)):
+            piece = Piece.of("it", steps[at].made) if steps and q is not None else None
+            if piece is not None and q is not None:
+                yield from elsewhere(robot, piece, at, q)
+
+    def _seam(self, robot: RobotModel, step: Step, plan: Plan) -> Iterator[str]:
+        """Yield where a seam's step is not what was asked for."""
+        seam = next(item for item in self.seams if item.name == step.name)
+        if step.turned and not seam.either_way:
+            yield f"seam '{seam.name}' is made from its end to its start"
+        kept = [item for item in seam.constraints if item.applies(robot)]
+        duration = seam.path.duration
+        asked = Asked(
+            robot,
+            Reversed(seam.path) if step.turned else seam.path,
+            Task.of(seam.task),
+            mirrored(seam.relaxations, duration) if step.turned else seam.relaxations,
+            kept,
+            tolerance=self.tolerance,
+        )
+        others = [
+            (tuple(step.events) == tuple(seam.events), "its events are others"),
+            (_bodies(step.leaves) == _bodies(seam.leaves), "it leaves something else"),
+            (set(step.may_meet) <= set(seam.may_meet), "it may meet more"),
+        ]
+        for text in (*asked.failures(plan), *(text for same, text in others if not same)):
+            yield f"seam '{seam.name}' is not what was asked for: {text}"
 
     def _kept(self, robot: RobotModel, steps: Sequence[Step]) -> Iterator[str]:
         """Yield steps that are judged by less than what all of them have to keep."""
-        known: dict[int, str] = {}
         wanted = [item for item in self.constraints if item.applies(robot) and not one_way(item)]
         apart = self.clearance if robot.urdf.has_collisions or self.obstacles else None
         for step in steps:
-            kept = step.constraints
-            described = {_described(item, known) for item in kept}
-            for item in wanted:
-                if _described(item, known) not in described:
-                    yield f"'{step.name}' is not judged by {type(item).__name__}, which was asked"
-            if apart is not None and not any(_as_far(item, apart) for item in kept):
-                yield f"'{step.name}' is not judged by the clearance that was asked for"
+            for text in not_judged_by(step.constraints, wanted, apart):
+                yield f"'{step.name}': {text}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as JSON-safe values; FileFormatError for what no file can carry."""
@@ -123,6 +137,7 @@ class Specification:
             "end": None if self.end is None else self.end.tolist(),
             "constraints": [item.to_dict() for item in self.constraints],
             "clearance": None if self.clearance is None else self.clearance.to_dict(),
+            "tolerance": asdict(self.tolerance),
         }
 
     @classmethod
@@ -138,32 +153,13 @@ class Specification:
             end,
             tuple(restore(Constraint, item) for item in values["constraints"]),
             None if apart is None else restore(Constraint, apart),
+            # Files of before say none: then it is the usual one.
+            Tolerance(**values.get("tolerance", {})),
         )
 
 
-def _seam(step: Step, plan: Plan, seam: Seam) -> Iterator[str]:
-    """Yield where a seam's step is not what was asked for."""
-    if step.turned and not seam.either_way:
-        yield f"seam '{seam.name}' is made from its end to its start"
-    problem, what = plan.problem, ""
-    known: dict[int, str] = {}
-    described = {_described(item, known) for item in problem.constraints}
-    if problem.task is not Task.of(seam.task):
-        what = f"its task is '{problem.task.value}', not '{Task.of(seam.task).value}'"
-    elif not _same_path(problem.path, seam.path, step.turned):
-        what = "it is along another path"
-    elif not _same_bands(problem.relaxations, seam, step.turned):
-        what = "other rows are relaxed"
-    elif any(_described(item, known) not in described for item in seam.constraints):
-        what = "it is not judged by all constraints of the seam"
-    elif tuple(step.events) != tuple(seam.events):
-        what = "its events are others"
-    elif [item.to_dict() for item in step.leaves] != [item.to_dict() for item in seam.leaves]:
-        what = "it leaves something else"
-    elif not set(step.may_meet) <= set(seam.may_meet):
-        what = "it may meet more"
-    if what:
-        yield f"seam '{seam.name}' is not what was asked for: {what}"
+def _bodies(several: Sequence[Obstacle]) -> list[dict[str, Any]]:
+    return [item.to_dict() for item in several]
 
 
 def _moves(steps: Sequence[Step], seams: Mapping[str, Seam]) -> Iterator[str]:
@@ -192,55 +188,6 @@ def _wait(step: Step, following: Step | None, seconds: float) -> Iterator[str]:
         rests = motion.duration if is_still and not np.any(motion.extremes(1)[1]) else 0.0
     if rests < seconds - _ROUNDING:
         yield f"after seam '{step.name}' the arm rests {rests:.6g} s, not {seconds:.6g} s"
-
-
-def _same_path(made: Path, asked: Path, turned: bool) -> bool:
-    """Whether a path is another one, the other way round where it is turned."""
-    if not abs(made.duration - asked.duration) <= _ROUNDING:
-        return False
-    t = _SHARES * asked.duration
-    for time in t.tolist():
-        one = made.pose(time).homogeneous
-        other = asked.pose(asked.duration - time if turned else time).homogeneous
-        if not np.abs(one - other).max() <= _SAME:
-            return False
-    return True
-
-
-def _same_bands(made: Sequence[Relaxation], seam: Seam, turned: bool) -> bool:
-    """Whether the rows of a seam are relaxed as asked, the other way round where it is turned."""
-    if len(made) != len(seam.relaxations):
-        return False
-    for one, other in zip(made, seam.relaxations, strict=True):
-        values, wanted = one.to_dict(), other.to_dict()
-        during, asked = values.pop("during"), wanted.pop("during")
-        if values != wanted or (during is None) != (asked is None):
-            return False
-        if asked is not None:
-            last = seam.path.duration
-            asked = [last - asked[1], last - asked[0]] if turned else asked
-            if not np.allclose(during, asked, rtol=0.0, atol=_ROUNDING):
-                return False
-    return True
-
-
-def _as_far(item: Constraint, apart: Clearance) -> bool:
-    """Whether a constraint keeps all that another clearance does, of the same obstacles."""
-    return (
-        isinstance(item, Clearance)
-        and item.distance >= apart.distance
-        and set(item.disabled) <= set(apart.disabled)
-    )
-
-
-def _described(item: Saved, known: dict[int, str]) -> str:
-    """Return what tells constraints apart: their description, or which one it is without any."""
-    if id(item) not in known:
-        try:
-            known[id(item)] = json.dumps(item.to_dict(), sort_keys=True)
-        except (SelfmotionError, TypeError):
-            known[id(item)] = f"{id(item)}"
-    return known[id(item)]
 
 
 def _seam_to_dict(seam: Seam) -> dict[str, Any]:

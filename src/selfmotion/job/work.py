@@ -161,17 +161,29 @@ class Work:
                 }
             )
         shelf = self._shelf
-        files = [shelf.file("move", partial(_move_asked, task)) for task in tasks]
+        files = [shelf.file("move", partial(_move_asked, task), *task["arm"]) for task in tasks]
         both = zip(files, tasks, strict=True)
-        kept = [shelf.move(file, _missing(task, "")) for file, task in both]
+        kept = [shelf.move(file, _missing(task, ""), task["ends"]) for file, task in both]
         return self._finished("move", "move", tasks, files, kept, shelf.keep_move)
 
     def _plans(self, tasks: Sequence[_Task], stage: str) -> list[tuple[list[Plan], str]]:
         shelf = self._shelf
         files = [
-            shelf.file(f"{stage} {task['name']}", partial(_plans_asked, task)) for task in tasks
+            shelf.file(
+                f"{stage} {task['name']}",
+                partial(_plans_asked, task),
+                self.asked.robot,
+                [
+                    item
+                    for problem in (task["problem"], task.get("allowed"))
+                    if problem is not None
+                    for item in problem.all_constraints
+                ],
+            )
+            for task in tasks
         ]
-        kept = [shelf.plans(file) for file in files]
+        both = zip(files, tasks, strict=True)
+        kept = [shelf.plans(file, task["problem"]) for file, task in both]
         return self._finished("plans", stage, tasks, files, kept, shelf.keep_plans)
 
     def _finished(

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -17,6 +17,7 @@ from selfmotion.basics import (
     as_whole,
     shown,
 )
+from selfmotion.motion.windows import resting_window
 
 # Intervals of a spline that is worth its while.
 _FEWEST = 8
@@ -39,13 +40,10 @@ class NullMotion(Saved, ABC, family="null motion"):
         ``"null"``: E is (r, K) in a null-space basis; ``"joint"``: E is (n, K), R = I.
     gain : float
         Share of the cost that `finer` functions have to save to be worth their while.
-    comes_to_rest : bool
-        Whether it rests by itself where the arm has to; others are multiplied by what does.
     """
 
     space: str = "null"
     gain: ClassVar[float] = np.inf
-    comes_to_rest: ClassVar[bool] = False
 
     def finer(self, intervals: int, rows: int, rests: bool = False) -> "NullMotion":
         """Return what to go on with where so many `intervals` pay: by default the same.
@@ -75,6 +73,14 @@ class NullMotion(Saved, ABC, family="null motion"):
     @abstractmethod
     def functions(self, t: Array, duration: float) -> Array:
         """Return φ at times `t` (S,) of a motion of length `duration` [s], (S, K)."""
+
+    def resting(self, t: Array, duration: float, orders: tuple[int, int]) -> Array:
+        """Return φ of a motion that comes to rest at its ends, (S, K).
+
+        At the start with its first a - 1 derivatives, at the end with its first b - 1; `orders` are
+        a and b, 0 to 2. By default φ times a function that does; see `resting_window`.
+        """
+        return self.functions(t, duration) * resting_window(t, duration, orders)[:, None]
 
 
 @dataclass(frozen=True)
@@ -237,7 +243,6 @@ class NodeNullMotion(NullMotion):
 
     times: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
     space: str = "joint"
-    comes_to_rest: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         times = as_numbers(self.times, "null motion: times", "shares of the duration")
@@ -257,9 +262,18 @@ class NodeNullMotion(NullMotion):
 
     def functions(self, t: Array, duration: float) -> Array:
         """See `NullMotion.functions`: each is 1 at one node and 0 at the others."""
+        return self.resting(t, duration, (0, 0))
+
+    def resting(self, t: Array, duration: float, orders: tuple[int, int]) -> Array:
+        """See `NullMotion.resting`: the end's own function is 0, the others begin without slope."""
         from scipy.interpolate import CubicSpline
 
-        return np.asarray(CubicSpline(self.times, np.eye(len(self.times)))(t / duration))
+        values = np.eye(len(self.times))
+        for end, order in zip((0, -1), orders, strict=True):
+            values[end, end] = 0.0 if order else 1.0
+        level = (1, np.zeros(len(self.times)))
+        ends: Any = tuple(level if order > 1 else "not-a-knot" for order in orders)
+        return np.asarray(CubicSpline(self.times, values, bc_type=ends)(t / duration))
 
 
 def _check_degree(degree: int) -> None:

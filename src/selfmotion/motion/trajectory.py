@@ -12,6 +12,7 @@ from selfmotion.basics import (
     Array,
     FileFormatError,
     as_number,
+    digest_of,
     plain_numbers,
     read_only,
     series,
@@ -126,6 +127,11 @@ class Trajectory:
         from scipy.interpolate import CubicSpline
 
         return cls(given.t, given.q, CubicSpline(given.t, given.q)(given.t, 1), given.joint_names)
+
+    @cached_property
+    def digest(self) -> str:
+        """What tells it from any other motion: a digest of all its numbers and names."""
+        return digest_of(self.joint_names, self.t, self.q, self.qd, self.qdd)
 
     def of_joints(self, names: Sequence[str]) -> "Trajectory":
         """Return the same motion with its joints in another order.

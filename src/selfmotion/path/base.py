@@ -173,6 +173,15 @@ class _Derived(Path):
     _path: Path
 
     @property
+    def original(self) -> Path:
+        """The path that it is made of."""
+        return self._path
+
+    @abstractmethod
+    def when(self, wanted: Array) -> Array:
+        """Return when times of the original (K,) are passed, (K,) [s]."""
+
+    @property
     def oriented(self) -> bool:
         """See `Path.oriented`: as the original."""
         return self._path.oriented
@@ -198,6 +207,10 @@ class _Derived(Path):
 
 class _InStep(_Derived):
     """One that is elsewhere than the original, but at the same times."""
+
+    def when(self, wanted: Array) -> Array:
+        """See `_Derived.when`: at the same times."""
+        return wanted
 
     @property
     def knots(self) -> Array:

@@ -154,11 +154,6 @@ class Feed(_Derived, kind="feed"):
         ends = np.zeros(len(wanted)), np.full(len(wanted), self.duration)
         return times_when(lambda t: self.pace(t)[0], wanted, *ends)
 
-    @property
-    def original(self) -> Path:
-        """The path at its own pace."""
-        return self._path
-
     def pace(self, t: Array) -> tuple[Array, Array]:
         """Return the original's time σ and dσ/dt at times `t` (K,)."""
         reached, rate = np.empty(len(t)), np.empty(len(t))
@@ -221,6 +216,9 @@ class Feed(_Derived, kind="feed"):
                     *(feed, self._within, read_only(during[self._asked[:, 1] == feed])),
                     *(read_only(t[here]), read_only(speeds[here]), read_only(lasts[here])),
                     *(counts[here], tuple(np.array(causes)[here].tolist())),
+                    path=self,
+                    own=read_only(t[here]),
+                    rows=np.flatnonzero(here),
                 )
             )
         return tuple(found)

@@ -3,10 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints
+
+if TYPE_CHECKING:
+    from selfmotion.path.base import Path
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +36,12 @@ class FeedKept:
         When the feed counts.
     causes : (K,)
         What holds the tool at each time, in words.
+    path : Path
+        The one at this feed, whatever was made of it since: its own speed between these times.
+    own : (K,)
+        The times on that path [s].
+    rows : (K,)
+        Their numbers there: between two that follow each other is no other.
     """
 
     asked: float
@@ -42,6 +52,9 @@ class FeedKept:
     lasts: Array = field(repr=False)
     counts: Flags = field(repr=False)
     causes: tuple[str, ...] = field(repr=False)
+    path: "Path" = field(repr=False)
+    own: Array = field(repr=False)
+    rows: Ints = field(repr=False)
 
     @property
     def reached(self) -> float:
@@ -103,6 +116,18 @@ class FeedKept:
         during = np.sort(when(self.during.ravel()).reshape(-1, 2), axis=1)
         return replace(self, during=during[np.argsort(during[:, 0])], t=when(self.t))
 
+    @property
+    def pieces(self) -> tuple[Array, Flags]:
+        """The intervals of the path at this feed that are left of it.
+
+        Beginnings and ends [s], (I, 2), and whether the feed counts there, (I,): at both ends.
+        """
+        order = np.argsort(self.rows)
+        rows, own, counts = self.rows[order], self.own[order], self.counts[order]
+        next_to = (np.diff(rows) == 1) & (np.diff(own) > 0.0)
+        ends = np.stack([own[:-1], own[1:]], axis=1)
+        return ends[next_to], (counts[:-1] & counts[1:])[next_to]
+
     def later(self, seconds: float) -> "FeedKept":
         """Return the same, begun later."""
         return self.timed(lambda t: t + seconds)
@@ -123,6 +148,7 @@ class FeedKept:
         if not len(counted):
             return None
         rows = rows & np.isin(self._stretch, counted)
-        chosen = {name: getattr(self, name)[rows] for name in ("t", "speeds", "lasts", "counts")}
+        names = ("t", "speeds", "lasts", "counts", "own", "rows")
+        chosen = {name: getattr(self, name)[rows] for name in names}
         causes = tuple(np.array(self.causes)[rows].tolist())
         return replace(self, during=self.during[counted], **chosen, causes=causes)

@@ -95,11 +95,6 @@ class Retimed(_Derived, kind="retimed"):
         return times_when(pace, sigma, pace.t[k], pace.t[k + 1])
 
     @property
-    def original(self) -> Path:
-        """The path at its own pace."""
-        return self._path
-
-    @property
     def pace(self) -> Pace:
         """How fast the original is run through: σ(t)."""
         return self._pace

@@ -57,6 +57,10 @@ class Reversed(_Derived, kind="reversed"):
         """See `Path.at_constant_speed`: as the original."""
         return Reversed(self._path.at_constant_speed())
 
+    def when(self, wanted: Array) -> Array:
+        """Return when times of the original (K,) are passed, (K,) [s]."""
+        return self.duration - wanted
+
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
         sigma = np.clip(self.duration - t, 0.0, self.duration)

@@ -84,6 +84,10 @@ class Section(_Derived, kind="section"):
         found = (item.between(self._first, self._last) for item in self._path.feeds)
         return tuple(item.later(-self._first) for item in found if item)
 
+    def when(self, wanted: Array) -> Array:
+        """Return when times of the original (K,) are passed, (K,) [s]; outside, they never are."""
+        return wanted - self._first
+
     def evaluate(self, t: Array) -> PathSamples:
         """See `Path.evaluate`."""
         found = self._path.samples(np.clip(self._first + t, self._first, self._last))

@@ -24,6 +24,8 @@ _ABOUT = 400
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 # How far from a node, by the distance of nodes, changes of the speed are measured.
 _BESIDE = 1e-4
+# More swings than this take longer than anybody plans for: an hour of a fast weld has some 6,000.
+_MOST_SWINGS = 20_000
 # A swing as wide as this [m] is a slip of units.
 _WIDEST = 0.5
 # From 0 to 1 with slopes and curvatures 0 at both ends: 10x³ - 15x⁴ + 6x⁵.
@@ -90,6 +92,11 @@ class Weave(_InStep, kind="weave"):
             raise PathError(
                 f"weave: the path is {length:.6g} m long, expected two swings of {self._pitch:g} m "
                 f"at least; lengths are in metres"
+            )
+        if length > _MOST_SWINGS * self._pitch:
+            raise PathError(
+                f"weave: a pitch of {self._pitch:g} m makes {length / self._pitch:.3g} swings, "
+                f"expected {_MOST_SWINGS:,} at most; lengths are in metres"
             )
 
     def at_constant_speed(self) -> "Weave":

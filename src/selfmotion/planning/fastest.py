@@ -36,7 +36,7 @@ from selfmotion.planning.settings import (
     ROUNDS,
 )
 from selfmotion.problem import Problem, check_problem
-from selfmotion.result import Plan, rate_limits, retime
+from selfmotion.result import Plan, check_no_feed, rate_limits, retime
 
 # What brings a path to another pace.
 Pace = Callable[[Path], Path]
@@ -119,7 +119,8 @@ def fastest(
     Raises
     ------
     ProblemError
-        No limits of acceleration are given or known; the problem has no such cost to keep.
+        No limits of acceleration are given or known; the problem has no such cost to keep, or its
+        path has a feed.
     PlanError
         No motion that was found keeps all limits at any pace, or none was found in time; says the
         last verdict.
@@ -127,6 +128,7 @@ def fastest(
         The interruption came before there was a motion.
     """
     check_problem(problem)
+    check_no_feed(problem)
     kept = KeptCosts.of(problem, {} if keep is None else keep)
     rounds = _Rounds(problem, *rate_limits(problem, acceleration, velocity), kept)
     clock = Deadline(np.inf)

@@ -43,7 +43,7 @@ from selfmotion.planning.settings import (
     WIDER,
 )
 from selfmotion.planning.ways import Room, find_way, shortened, straight_way
-from selfmotion.problem import envelope_of
+from selfmotion.problem import at_all_times, envelope_of
 from selfmotion.result import Ends, Move, PaceLimits, along, fastest_pace, quantities_of_pace
 from selfmotion.robot import RobotModel
 from selfmotion.search import start_candidates
@@ -286,13 +286,6 @@ class FreeMotions:
         longest = max(needed, BRIEFEST_MOVE)
         faster = qdd / longest**2
         return Trajectory(longest * tau, q, unit.qd / longest, unit.joint_names, faster)
-
-
-def at_all_times(constraints: Sequence[Constraint]) -> list[Constraint]:
-    """Return what constraints ask of all times, and nothing that they ask of an end."""
-    parts = (item.on_part() for item in constraints)
-    inner = (part.on_last_part() for part in parts if part is not None)
-    return [item for item in inner if item is not None]
 
 
 def _ulps(limit: Array) -> Array:

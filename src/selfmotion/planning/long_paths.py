@@ -19,7 +19,6 @@ from selfmotion.path import Section
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.for_nodes import most_nodes, takes
 from selfmotion.planning.nodes import NodeDescent
-from selfmotion.planning.part_problem import asked_of_part
 from selfmotion.planning.settings import (
     FIRST_NODES,
     LONG_AGREEMENT,
@@ -28,7 +27,7 @@ from selfmotion.planning.settings import (
     STRETCH_WAY,
 )
 from selfmotion.planning.starts import optimise_starts
-from selfmotion.problem import Problem
+from selfmotion.problem import Problem, asked_of_part
 
 
 def is_long(draft: Draft) -> bool:

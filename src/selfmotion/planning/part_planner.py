@@ -17,10 +17,9 @@ from selfmotion.basics import (
 from selfmotion.certificate import Tolerance
 from selfmotion.path import Retimed, Section, section_at_rest
 from selfmotion.planning.moves import Mover, Retreat, between_parts
-from selfmotion.planning.part_problem import asked_of_part, relaxed_along
 from selfmotion.planning.run import plan_along
 from selfmotion.planning.settings import ELSEWHERE, GUIDE_SAMPLES
-from selfmotion.problem import Problem, rest_orders
+from selfmotion.problem import Problem, asked_of_part, relaxed_along, rest_orders
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.search import Sequence, SequenceGuide, Stretch, Stretches, turned_towards
 
@@ -76,7 +75,8 @@ class PartPlanner:
         cuts = tuple(float(stretch.t[-1]) for stretch in chains[:-1])
         endings = tuple(stretch.ending for stretch in chains[:-1])
         moves = self._moves(plans)
-        return Parts(self._problem, tuple(plans), moves, cuts, endings), failed
+        parts = Parts(self._problem, tuple(plans), moves, cuts, endings, tolerance=self._tolerance)
+        return parts, failed
 
     def _moves(self, plans: list[Plan]) -> tuple[Move, ...]:
         pairs = list(itertools.pairwise(plans))

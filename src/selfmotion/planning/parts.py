@@ -114,7 +114,7 @@ def _parts(
     if len(chains) <= 1 + missed:
         whole = _whole(problem, rng, tolerance, progress)
         if whole is not None:
-            return Parts(problem, (whole,))
+            return Parts(problem, (whole,), tolerance=tolerance)
     if refused is not None:
         raise refused
     planner = PartPlanner(problem, stretches, retreats, ramp, rng, tolerance, progress)

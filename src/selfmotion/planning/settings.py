@@ -126,8 +126,6 @@ ATTEMPTS = 4
 ELSEWHERE = 0.03
 # A guide has at least so many samples.
 GUIDE_SAMPLES = 13
-# A window shorter than this share of a part is none.
-SHORTEST_WINDOW = 1e-2
 # A retreat goes at this speed on average [m/s], and takes no less than this [s].
 RETREAT_SPEED = 0.1
 BRIEFEST_RETREAT = 0.5

@@ -3,6 +3,11 @@
 from selfmotion.problem.defaults import KEPT as KEPT, NO_OVERLAP as NO_OVERLAP
 from selfmotion.problem.envelopes import envelope_of as envelope_of
 from selfmotion.problem.paper_problem import sample_problem as sample_problem
+from selfmotion.problem.parts import (
+    asked_of_part as asked_of_part,
+    at_all_times as at_all_times,
+    relaxed_along as relaxed_along,
+)
 from selfmotion.problem.problem import Problem as Problem, check_problem as check_problem
 from selfmotion.problem.rest import rest_orders as rest_orders
 from selfmotion.problem.saved_problem import (

@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from selfmotion.basics import ProblemError, RedundancyError
+from selfmotion.basics import Array, Ints, ProblemError, RedundancyError
 from selfmotion.follow import Follows
 from selfmotion.path import Path, check_oriented
 from selfmotion.robot import Chain, RobotModel
@@ -20,6 +20,12 @@ _FAR = 20.0
 _FAST, _HOPELESS = 100.0, 100.0
 # Reach that counts for the speed of an arm on an endless slide [m].
 _LONG = 1e3
+# What a path is looked at for: between so many of its marks about, and evenly, at so many times;
+# changes of its speed at this share of the way to the next mark, as a share of its duration at
+# least.
+_MIDDLES, _EVENLY, _BESIDE, _SHORTEST = 400, 9, 0.1, 1e-9
+# No tool accelerates like this [m/s²]: the fastest arms there are reach a tenth of it.
+_WILD, _GRAVITY = 2000.0, 9.81
 
 
 def check_fit(follows: Follows, relaxations: Sequence[Relaxation]) -> None:
@@ -174,7 +180,7 @@ def _check_pace(robot: RobotModel, path: Path, reach: float) -> None:
     fastest = np.minimum(robot.velocity_limit, _FAST)
     slides = np.array([robot.is_prismatic(name) for name in robot.joint_names])
     bound = float(np.sum(np.where(slides, fastest, fastest * min(reach, _LONG))))
-    times = np.linspace(0.0, path.duration, 9)
+    times = _inside(path)
     speeds = np.linalg.norm(path.samples(times).twist[:, :3], axis=1)
     k = int(np.argmax(speeds))
     # Written so that NaN is refused too.
@@ -183,3 +189,31 @@ def _check_pace(robot: RobotModel, path: Path, reach: float) -> None:
             f"{robot.name}: the path is too fast: {speeds[k]:.3g} m/s at t = {times[k]:.3g} s, "
             f"while its joints move the tool at {bound:.3g} m/s at most; durations are in seconds"
         )
+    # In a kink nothing is said of accelerations: so not across a mark.
+    away = np.abs(times[:, None] - np.asarray(path.marks)[_nearest(path, times)]).min(axis=1)
+    step = np.maximum(_BESIDE * away, _SHORTEST * path.duration)
+    early, late = (path.samples(times + side * step).twist[:, :3] for side in (-1.0, 1.0))
+    pushes = np.where(step < away, np.linalg.norm(late - early, axis=1) / (2.0 * step), 0.0)
+    k = int(np.argmax(pushes))
+    if pushes[k] > _WILD:
+        raise ProblemError(
+            f"{robot.name}: the path is too fast: it accelerates at {pushes[k]:.3g} m/s² at t = "
+            f"{times[k]:.3g} s, which is {pushes[k] / _GRAVITY:.0f} times gravity; durations are "
+            f"in seconds, lengths in metres"
+        )
+
+
+def _inside(path: Path) -> Array:
+    """Return times in the middle between marks of a path, of many some, and evenly spread ones."""
+    marks = np.asarray(path.marks)
+    middles = 0.5 * (marks[:-1] + marks[1:])
+    some = middles[:: 1 + len(middles) // _MIDDLES]
+    evenly = (np.arange(_EVENLY) + 0.5) / _EVENLY * path.duration
+    return np.union1d(some, evenly)
+
+
+def _nearest(path: Path, times: Array) -> Ints:
+    """Return the numbers of the marks before and after times (K,), (K, 2)."""
+    marks = np.asarray(path.marks)
+    after = np.clip(np.searchsorted(marks, times), 1, len(marks) - 1)
+    return np.stack([after - 1, after], axis=1)

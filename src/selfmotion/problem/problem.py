@@ -1,7 +1,7 @@
 """What to plan: an arm, a tool motion, the rows that count, and what to minimise."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +14,8 @@ from selfmotion.basics import (
     Progress,
     as_flag,
     as_several,
+    description_of,
+    digest_of,
     read_only,
     shown,
     silent,
@@ -29,7 +31,7 @@ from selfmotion.certificate import (
 from selfmotion.constraints import BoundConstraint, Clearance, Constraint, Envelope
 from selfmotion.costs import Cost, JointVelocity, OffPath
 from selfmotion.follow import Follow, Follows
-from selfmotion.motion import NullMotion, Trajectory, fading_window, resting_window
+from selfmotion.motion import NullMotion, Trajectory, fading_window
 from selfmotion.path import Path
 from selfmotion.problem.defaults import ANY_NULL_MOTION, KEPT, NO_OVERLAP, USUAL_COSTS
 from selfmotion.problem.envelopes import asked_envelope, with_own_limits
@@ -89,8 +91,9 @@ class Problem:
         are both ends of a closed path and the end of one with conditions there. Of several paths
         the first is relaxed.
     collision : Clearance, optional
-        How the arm keeps apart from itself where no constraint says it, and its URDF has bodies: by
-        default its links must not overlap. None to leave that out; the verdict then says so.
+        How the arm keeps apart from itself and from obstacles, besides what constraints say: by
+        default its links must not overlap, where its URDF has bodies and no constraint is a
+        `Clearance`. None to leave that out; the verdict then says so.
     rest : bool
         Whether the arm is at rest where the path begins or ends at rest, which a controller asks
         for, unless a constraint says how fast it is there: the null motion then vanishes, and its
@@ -197,8 +200,14 @@ class Problem:
 
     @cached_property
     def own_collision(self) -> Clearance | None:
-        """What keeps the arm apart from itself, besides the constraints; None for nothing."""
-        if self.collision is None or not self.robot.urdf.has_collisions:
+        """What keeps the arm apart, besides the constraints; None for nothing.
+
+        The default is left out where a constraint keeps the arm apart, or it has no bodies; what
+        was given never is.
+        """
+        if self.collision is not NO_OVERLAP:
+            return self.collision
+        if not self.robot.urdf.has_collisions:
             return None
         if any(item.envelope(self.robot).bodies for item in self.constraints):
             return None
@@ -249,10 +258,7 @@ class Problem:
 
     def null_functions(self, t: Array, motion: NullMotion) -> Array:
         """Return φ of a null motion at times `t` (S,), at rest where the arm has to be, (S, K)."""
-        if motion.comes_to_rest:
-            return motion.functions(t, self.path.duration)
-        window = resting_window(t, self.path.duration, self.rest_orders)
-        return motion.functions(t, self.path.duration) * window[:, None]
+        return motion.resting(t, self.path.duration, self.rest_orders)
 
     def brought_to_rest(self, t: Array, epsilon: Array) -> Array:
         """Return a null motion (S, n) that fades to nothing where the arm has to be at rest."""
@@ -269,15 +275,18 @@ class Problem:
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:
         """What the certificate has to judge besides the path: rest, and one of each constraint."""
-        return (*self._rest(*self.rests), *self._asked)
+        return (*self._rest(*self.rest_orders), *self._asked)
 
     @cached_property
     def _asked(self) -> tuple[Requirement, ...]:
         return tuple(item.requirement(self.robot) for item in self.all_constraints)
 
-    def _rest(self, start: bool, end: bool) -> tuple[Requirement, ...]:
+    def _rest(self, start: int, end: int) -> tuple[Requirement, ...]:
+        """Return what judges rest of so high orders; see `rest_orders`."""
         # A damped motion is under way to the path wherever it is off it.
-        return (AtRest(start, end),) if (start or end) and self.damping is None else ()
+        if self.damping is not None or not (start or end):
+            return ()
+        return (AtRest(start > 0, end > 0, (start > 1, end > 1)),)
 
     @cached_property
     def asked_envelope(self) -> Envelope:
@@ -310,8 +319,9 @@ class Problem:
         And by requirements `besides`. A motion with an `ending` stops before it can rest at the end
         of the path.
         """
-        rests = self._rest(self.rests[0], self.rests[1] and not ending)
-        return certify(
+        start, end = self.rest_orders
+        rests = self._rest(start, 0 if ending else end)
+        certificate = certify(
             self.robot,
             self.path,
             self.task,
@@ -323,6 +333,36 @@ class Problem:
             damping=self.damping_law,
             ending=ending,
             progress=progress,
+        )
+        return replace(certificate, problem=self.digest)
+
+    @cached_property
+    def digest(self) -> str:
+        """What tells it from problems whose motions are judged by something else.
+
+        A digest of the arm, of what is followed and how nearly, and of what has to be kept; not of
+        costs, the start and the null motion, which no certificate judges.
+        """
+        robot = self.robot
+        arm = (robot.urdf.sha256, robot.joint_names, robot.tools, robot.reference)
+        own = sorted(robot.urdf.continuous()), robot.locked, robot.touching
+        damping = None if self.damping is None else asdict(self.damping)
+        followed = [
+            (item.path.duration, item.task.value, item.chain.tip_name, item.chain.base)
+            for item in self.follows.items
+        ]
+        asked = (*(item.path for item in self.follows.items), *self.all_constraints)
+        return digest_of(
+            arm,
+            own,
+            robot.lower,
+            robot.upper,
+            robot.velocity_limit,
+            damping,
+            followed,
+            [item.to_dict() for item in self.relaxations],
+            [description_of(item) for item in asked],
+            self.rest,
         )
 
     def errors_between(self, trajectory: Trajectory) -> Array:

@@ -200,7 +200,18 @@ def _stand_in(robot: RobotModel, motion: Trajectory, asked: tuple[Constraint, ..
     path = _Performed(robot, motion)
     problem = Problem(robot, path, free[0], constraints=apart, rest=False)
     nothing = Extreme(0.0, 0.0, "")
-    certificate = Certificate(nothing, nothing, nothing, 0.0, 0, Tolerance(), (), ())
+    certificate = Certificate(
+        nothing,
+        nothing,
+        nothing,
+        0.0,
+        0,
+        Tolerance(),
+        (),
+        (),
+        motion=motion.digest,
+        problem=problem.digest,
+    )
     report = Report(0.0, 0.0, {}, {}, 0, 0, 0, 0, 0, (), Status.CONVERGED, "", 0.0)
     return Plan(problem, motion, motion, np.zeros(0), report, certificate)
 

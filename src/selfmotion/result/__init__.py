@@ -1,6 +1,19 @@
 """What came of a problem: plans, how they were found, their files, and other paces."""
 
+from selfmotion.result.asked import (
+    Asked as Asked,
+    another_tool as another_tool,
+    described as described,
+    not_judged_by as not_judged_by,
+)
 from selfmotion.result.bundle import read_bundle as read_bundle, write_bundle as write_bundle
+from selfmotion.result.joints import (
+    Piece as Piece,
+    elsewhere as elsewhere,
+    gaps as gaps,
+    moving_end as moving_end,
+)
+from selfmotion.result.kept import files_of as files_of, key_of as key_of
 from selfmotion.result.limits_used import (
     LimitsUsed as LimitsUsed,
     quantities_of_pace as quantities_of_pace,
@@ -13,10 +26,11 @@ from selfmotion.result.plan import (
     Plan as Plan,
     Views as Views,
     load_plan as load_plan,
-    read_plan as read_plan,
+    reached_text as reached_text,
 )
 from selfmotion.result.report import Attempt as Attempt, Gap as Gap, Report as Report
 from selfmotion.result.retiming import (
+    check_no_feed as check_no_feed,
     rate_limits as rate_limits,
     retime as retime,
     slowdown as slowdown,

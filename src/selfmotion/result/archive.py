@@ -25,8 +25,8 @@ from selfmotion.motion import NullMotion, Trajectory
 from selfmotion.optimise import Iteration, Status
 from selfmotion.problem.problem import Problem
 from selfmotion.problem.saved_problem import problem_from_dict, problem_to_dict
+from selfmotion.result.kept import files_of
 from selfmotion.result.report import Attempt, Gap, Report
-from selfmotion.robot import mesh_digests
 
 # Raised with every change that older versions cannot read.
 FORMAT = 3
@@ -63,7 +63,7 @@ class Archive(NamedTuple):
             "history_x": np.concatenate([np.zeros(0), *(item.x for item in history)]),
             "history_sizes": np.array([len(item.x) for item in history], dtype=np.float64),
         }
-        description["digest"] = digest_of(description, arrays)
+        description["digest"] = file_digest(description, arrays)
         write_archive(file, description, arrays)
 
     @classmethod
@@ -81,7 +81,7 @@ class Archive(NamedTuple):
         check_version(file, "plan", description.get("format"), FORMAT)
         written = description.pop("digest", None)
         altered = ""
-        if written != digest_of(description, arrays):
+        if written != file_digest(description, arrays):
             altered = f"{file.name} was changed after the plan was written: its digest differs"
         try:
             found = _restore(description, arrays, known)
@@ -99,19 +99,11 @@ class Archive(NamedTuple):
 
 
 def _meshes(problem: Problem, known: MutableMapping[str, Any]) -> dict[str, str]:
-    """Return the digests of all mesh files that bodies are made of, of an arm once."""
-    urdf = problem.robot.urdf
-    own = f"meshes of {urdf.sha256}"
-    if own not in known:
-        known[own] = mesh_digests(urdf, "collision")
-    found = dict(known[own])
-    bodies = (body for item in problem.requirements for body in item.obstacles)
-    for file in (file for body in bodies for file in body.files):
-        found[str(file)] = hashlib.sha256(file.read_bytes()).hexdigest()
-    return found
+    """Return the digests of all mesh files that bodies are made of."""
+    return files_of(problem.robot, problem.all_constraints, known)
 
 
-def digest_of(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
+def file_digest(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
     """Return a digest of robot, path, requirements, motion and all else that a file holds."""
     digest = hashlib.sha256(json.dumps(description, sort_keys=True).encode())
     for name in sorted(arrays):

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import FileFormatError, write_atomically
-from selfmotion.result.archive import OtherVersionError, check_version, digest_of
+from selfmotion.result.archive import OtherVersionError, check_version, file_digest
 from selfmotion.result.move import Move, load_move
 from selfmotion.result.plan import Plan, load_plan
 
@@ -47,7 +47,7 @@ def write_bundle(
                 members.append({"plan": isinstance(item, Plan), "digest": digest})
                 archive.write(member, member.name)
             whole = {"kind": kind, "version": version, "members": members, **description}
-            archive.writestr(_NAME, json.dumps({**whole, "digest": digest_of(whole, {})}))
+            archive.writestr(_NAME, json.dumps({**whole, "digest": file_digest(whole, {})}))
 
     write_atomically(file, write)
 
@@ -70,7 +70,7 @@ def read_bundle(
             if description["kind"] != kind:
                 raise ValueError(f"it is a {description['kind']}, expected a {kind}")
             check_version(file, kind, description["version"], version)
-            changed = description.pop("digest", None) != digest_of(description, {})
+            changed = description.pop("digest", None) != file_digest(description, {})
             made, known = list[Plan | Move](), dict[str, Any]()
             for number, item in enumerate(description["members"]):
                 data = archive.read(_member(number))

@@ -20,7 +20,7 @@ from selfmotion.collision import Obstacle
 from selfmotion.constraints import Constraint
 from selfmotion.motion import Trajectory
 from selfmotion.problem import arm_and_constraints, describe_arm
-from selfmotion.result.archive import arrays_of, check_version, digest_of, trajectory_of
+from selfmotion.result.archive import arrays_of, check_version, file_digest, trajectory_of
 from selfmotion.robot import RobotModel
 
 # Raised with every change that older versions cannot read.
@@ -84,7 +84,7 @@ class Move:
     def requirements(self) -> tuple[Requirement, ...]:
         """What it is judged by."""
         own = tuple(item.requirement(self.robot) for item in self.constraints)
-        return (AtRest(True, True), *arm_limits(self.robot, own), *own)
+        return (AtRest(True, True, (True, True)), *arm_limits(self.robot, own), *own)
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -126,7 +126,7 @@ class Move:
             "findings": [dataclasses.asdict(item) for item in self.findings],
         }
         arrays = arrays_of(motion)
-        description["digest"] = digest_of(description, arrays)
+        description["digest"] = file_digest(description, arrays)
         write_archive(as_path(file), description, arrays)
 
 
@@ -157,7 +157,7 @@ def load_move(file: str | FilePath, *, known: MutableMapping[str, Any] | None = 
         raise FileFormatError(f"{path}: is a plan, not a move: load_plan reads it")
     check_version(path, "move", description.get("move"), _FORMAT)
     written = description.pop("digest", None)
-    altered = written != digest_of(description, arrays)
+    altered = written != file_digest(description, arrays)
     try:
         robot, constraints = arm_and_constraints(description, {} if known is None else known)
         motion = trajectory_of(arrays, tuple(description["joint_names"]))

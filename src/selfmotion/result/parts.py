@@ -1,15 +1,18 @@
 """A plan in several parts, with changes of configuration in between."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from itertools import accumulate
 from pathlib import Path as FilePath
 
 from selfmotion.basics import FileFormatError, PlanError, SelfmotionError, as_path
+from selfmotion.certificate import Tolerance
 from selfmotion.motion import Trajectory, joined_motions
 from selfmotion.problem import Problem, problem_from_dict, problem_to_dict
 from selfmotion.result.bundle import read_bundle, write_bundle
 from selfmotion.result.move import Move
-from selfmotion.result.plan import Plan
+from selfmotion.result.parts_asked import PartsAsked
+from selfmotion.result.plan import Plan, reached_text
 from selfmotion.robot import RobotModel
 
 # Raised with every change that older versions cannot read.
@@ -35,6 +38,8 @@ class Parts:
         Why each part but the last goes no further.
     altered : str
         Why the file that they were read from is not the one that was written; "" where it is.
+    tolerance : Tolerance
+        What each of the plans may miss the path by.
     """
 
     problem: Problem
@@ -43,6 +48,7 @@ class Parts:
     cuts: tuple[float, ...] = ()
     endings: tuple[str, ...] = ()
     altered: str = ""
+    tolerance: Tolerance = field(default_factory=Tolerance)
 
     def __repr__(self) -> str:
         """Return a few lines: the parts, where they are cut and why, and the verdict."""
@@ -60,18 +66,22 @@ class Parts:
 
     @property
     def verified(self) -> bool:
-        """Whether all parts are verified plans, and all moves were found and keep everything."""
-        return not self._failures
+        """Whether the parts are what was asked for, and everything is kept at all times."""
+        return not self.failures
 
     @property
     def verdict(self) -> str:
-        """One line: verified, or what is wrong with which part or move."""
+        """One line: verified, and how near to the path; or what is wrong with which of them."""
         if self.verified:
-            return "verified: all parts, and all moves in between"
-        return f"not verified: {'; '.join(self._failures)}"
+            return (
+                f"verified at all times: {len(self.plans)} part{'s' * (len(self.plans) != 1)}, and "
+                f"all moves in between; {reached_text(self.plans, self.tolerance)}"
+            )
+        return f"not verified: {'; '.join(self.failures)}"
 
-    @property
-    def _failures(self) -> list[str]:
+    @cached_property
+    def failures(self) -> tuple[str, ...]:
+        """What speaks against them; empty for verified ones."""
         parts = [
             f"part {number}: {plan.certificate.verdict}"
             for number, plan in enumerate(self.plans, 1)
@@ -82,7 +92,8 @@ class Parts:
             for number, move in enumerate(self.moves, 1)
             if not move.verified
         ]
-        return [*([self.altered] if self.altered else []), *parts, *moves]
+        altered = [self.altered] if self.altered else []
+        return (*altered, *parts, *moves, *PartsAsked(self).failures())
 
     @property
     def trajectory(self) -> Trajectory:
@@ -142,6 +153,7 @@ class Parts:
         """
         description = {
             "problem": problem_to_dict(self.problem),
+            "tolerance": asdict(self.tolerance),
             "cuts": list(self.cuts),
             "endings": list(self.endings),
         }
@@ -167,9 +179,11 @@ def load_parts(file: str | FilePath) -> Parts:
         problem = problem_from_dict(description["problem"])
         cuts = tuple(map(float, description["cuts"]))
         endings = tuple(map(str, description["endings"]))
+        # Files of before say none: then it is the usual one.
+        tolerance = Tolerance(**description.get("tolerance", {}))
     except (KeyError, TypeError, ValueError, SelfmotionError) as error:
         raise FileFormatError(f"{path}: are damaged parts: {error!r}") from error
     plans = tuple(item for item in made if isinstance(item, Plan))
     moves = tuple(item for item in made if isinstance(item, Move))
     altered = f"{path.name} was changed after the parts were written" if changed else ""
-    return Parts(problem, plans, moves, cuts, endings, altered)
+    return Parts(problem, plans, moves, cuts, endings, altered, tolerance)

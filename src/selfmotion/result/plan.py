@@ -26,6 +26,7 @@ from selfmotion.certificate import (
     FinishedMotion,
     Requirement,
     Tolerance,
+    allowed_text,
     approaches,
 )
 from selfmotion.collision import Obstacle
@@ -69,6 +70,8 @@ class Plan:
         x, the null motion's coefficients.
     report : Report
     certificate : Certificate
+        Of this motion and this problem: one of any other is not kept, and the plan is then not
+        verified (``replace(plan, trajectory=…)``); `check` makes a new one.
     altered : str
         Why the file that it was read from is not the one that was written; "" where it is.
     """
@@ -82,6 +85,12 @@ class Plan:
     report: Report
     certificate: Certificate
     altered: str = ""
+
+    def __post_init__(self) -> None:
+        check = self.certificate
+        motion = self.trajectory.of_joints(self.robot.joint_names)
+        if (check.motion, check.problem) != (motion.digest, self.problem.digest):
+            object.__setattr__(self, "certificate", check.of_another())
 
     def __repr__(self) -> str:
         """Return a few lines: what moves, at what cost, and the verdict."""
@@ -183,7 +192,14 @@ class Plan:
         The file carries the URDF's text, so that it can be checked where the URDF is not, and the
         problem but for code: costs that are functions are missing when it is loaded.
         The write is atomic.
+
+        Raises
+        ------
+        PlanError
+            The certificate is of another motion.
         """
+        if not self.certificate.motion:
+            raise PlanError(f"{self.robot.name}: {self.certificate.verdict}")
         Archive(
             self.problem,
             self.trajectory,
@@ -216,6 +232,23 @@ class Plan:
         return None if self.views is None else self.views.notebook_html(self)
 
 
+def reached_text(plans: Sequence[Plan], tolerance: Tolerance) -> str:
+    """Return in words how near to their paths plans keep, for the verdict of all of them."""
+    found = [
+        pair
+        for plan in plans
+        for check in (plan.certificate,)
+        for pair in ((check.position_error, check.rotation_error), *check.others)
+    ]
+    position = max(one.value for one, _ in found)
+    rotation = max(other.value for _, other in found)
+    beyond = any(plan.certificate.deviations for plan in plans)
+    return (
+        f"at most {position:.1e} m and {rotation:.1e} rad off the path"
+        f"{', beyond what is relaxed' if beyond else ''}{allowed_text(tolerance)}"
+    )
+
+
 def load_plan(
     file: str | FilePath,
     *,
@@ -235,12 +268,19 @@ def load_plan(
         The file is missing, is no plan, lacks something, or was written by a newer version.
     """
     archive = Archive.read(as_path(file), known)
+    # What the file says of itself is not believed.
     plan = Plan(*archive[:-1])
     try:
         certificate = plan.check(progress=progress)
     except (CollisionError, RobotError) as error:
         unknown = f"it could not be measured anew: {error}"
-        certificate = replace(plan.certificate, failures=(unknown, *plan.certificate.failures))
+        written = archive.certificate
+        certificate = replace(
+            written,
+            failures=(unknown, *written.failures),
+            motion=plan.trajectory.digest,
+            problem=plan.problem.digest,
+        )
     except (SelfmotionError, ArithmeticError, ValueError) as error:
         raise FileFormatError(f"{file}: is a damaged plan: {error}") from error
     source = (plan.robot.urdf.source,) if plan.robot.urdf.has_changed() else ()
@@ -248,17 +288,3 @@ def load_plan(
         note = f"{name} has changed since the plan was made"
         certificate = replace(certificate, notes=(*certificate.notes, note))
     return replace(plan, certificate=certificate)
-
-
-def read_plan(file: FilePath, known: MutableMapping[str, Any]) -> Plan:
-    """Read a plan as it was written, with the certificate of then; see `load_plan`.
-
-    Raises
-    ------
-    FileFormatError
-        See `load_plan`; also where the file, or a mesh, was changed since.
-    """
-    archive = Archive.read(file, known)
-    if archive.altered or archive.changed:
-        raise FileFormatError(f"{file}: it, or what it depends on, was changed since")
-    return Plan(*archive[:-1])

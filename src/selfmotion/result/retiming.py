@@ -90,12 +90,14 @@ def retime(
     Raises
     ------
     ProblemError
-        A limit is not positive, or no limits of acceleration are given or known.
+        A limit is not positive, no limits of acceleration are given or known, or the path has a
+        feed.
     PlanError
         No pace keeps the limits, or the arm does not move at all.
     """
     _check_plan(plan)
     _check_moves(plan)
+    check_no_feed(plan.problem)
     v, a = rate_limits(plan.problem, acceleration, velocity)
     wanted = [JointVelocityLimits(v), JointAccelerationLimits(a)]
     # The problem's own limits stay: the tighter of both is kept.
@@ -160,6 +162,17 @@ def _ends(plan: Plan) -> Ends:
 def _check_plan(plan: Plan) -> None:
     if not isinstance(plan, Plan):
         raise ProblemError(f"plan is {shown(plan)}, expected a Plan")
+
+
+def check_no_feed(problem: Problem) -> None:
+    """Raise ProblemError where a feed is asked for along the path: no other pace keeps that."""
+    feeds = [feed for item in problem.follows.items for feed in item.path.feeds]
+    if feeds:
+        raise ProblemError(
+            f"{problem.robot.name}: the path asks for a feed of {feeds[0].asked:g} m/s, which a "
+            f"faster pace does not keep; plan along the path without it (Feed.original), or ask "
+            f"for a faster feed"
+        )
 
 
 def _check_moves(plan: Plan) -> None:

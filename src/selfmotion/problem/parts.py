@@ -1,15 +1,17 @@
-"""What of a problem is asked along a part of its path."""
+"""What of a problem is asked along a part of its path, and of moves between parts."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from selfmotion.constraints import Constraint
 from selfmotion.path import Retimed
-from selfmotion.planning.settings import SHORTEST_WINDOW
-from selfmotion.problem import Problem
+from selfmotion.problem.problem import Problem
 from selfmotion.task import Relaxation
+
+# A window shorter than this share of a part is none.
+_SHORTEST_WINDOW = 1e-2
 
 
 def asked_of_part(problem: Problem, is_first: bool, is_last: bool) -> Iterator[Constraint]:
@@ -24,6 +26,13 @@ def asked_of_part(problem: Problem, is_first: bool, is_last: bool) -> Iterator[C
             yield kept
 
 
+def at_all_times(constraints: Sequence[Constraint]) -> list[Constraint]:
+    """Return what constraints ask of all times, and nothing that they ask of an end."""
+    parts = (item.on_part() for item in constraints)
+    inner = (part.on_last_part() for part in parts if part is not None)
+    return [item for item in inner if item is not None]
+
+
 def relaxed_along(
     problem: Problem, path: Retimed, ends: tuple[float, float]
 ) -> Iterator[Relaxation]:
@@ -36,5 +45,5 @@ def relaxed_along(
         # A ramp hardly moves at its end: when it gets there is known to some digits only.
         first = 0.0 if item.during[0] <= ends[0] else first
         last = path.duration if item.during[1] >= ends[1] else last
-        if last - first > SHORTEST_WINDOW * path.duration:
+        if last - first > _SHORTEST_WINDOW * path.duration:
             yield replace(item, during=(first, last))

@@ -1,0 +1,42 @@
+"""What finished work is kept under: a digest of all that decides what comes of it."""
+
+import hashlib
+from collections.abc import Iterator, MutableMapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from selfmotion.basics import digest_of, version
+from selfmotion.collision import Obstacle
+from selfmotion.constraints import Clearance, Constraint
+from selfmotion.robot import RobotModel, mesh_digests
+
+
+def key_of(asked: Any, files: Any) -> str:
+    """Return the digest of what was asked for, as JSON-safe values, and of the files it reads.
+
+    And of the package's version: what another one made is made again.
+    """
+    return digest_of(version(), asked, files)
+
+
+def files_of(
+    robot: RobotModel, constraints: Sequence[Constraint], known: MutableMapping[str, Any]
+) -> dict[str, str]:
+    """Return the SHA-256 of each mesh file that bodies are made of; "" for one that is missing.
+
+    Those of an arm are read once, and put into what is `known`.
+    """
+    own = f"meshes of {robot.urdf.sha256}"
+    if own not in known:
+        known[own] = mesh_digests(robot.urdf, "collision")
+    bodies = (body for item in constraints for body in _bodies(item, robot))
+    return {**known[own], **{str(file): _digest(file) for body in bodies for file in body.files}}
+
+
+def _bodies(item: Constraint, robot: RobotModel) -> Iterator[Obstacle]:
+    # Its requirement makes bodies, which takes a good part of a second.
+    yield from item.obstacles if isinstance(item, Clearance) else item.requirement(robot).obstacles
+
+
+def _digest(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
