@@ -10,11 +10,15 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.certificate import Stretch
-from selfmotion.certificate.feed import _Along, _rounded_down
+from selfmotion.certificate.feed import FeedReached, _Along, _OwnPace, _Pace, _rounded_down
+from selfmotion.follow import Follows
 from selfmotion.path import section_at_rest
 from selfmotion.testing.majorants import check_majorants
-from support.arms import PANDA_HOME
+from support.arms import PANDA_HOME, robot_named
 from support.gantries import gantry
+
+# What a path at 20 mm/s leaves over [m/s].
+LEFT = _OwnPace(4e-4, None, 0.0199)
 
 
 def saddle(feed: float, **options) -> sm.Feed:
@@ -215,7 +219,7 @@ def test_a_feed_is_proved_where_its_path_has_bounds(tmp_path: FilePath) -> None:
         motion = sm.Trajectory([0.0, path.duration], still, still, robot.joint_names)
         stretch = Stretch(robot, motion, np.array([[0.4, 0.6]]) * path.duration)
         follow = sm.Follows.of(robot, path, "position").only
-        known = _Along(follow, path.feeds[0]).series(stretch)
+        known = _Along(follow, LEFT).series(stretch)
         assert (known is None) is bool(told)
 
 
@@ -227,7 +231,13 @@ def test_majorants_of_the_speed_along_a_path_are_above_all_derivatives(tmp_path:
     follow = sm.Follows.of(robot, path, "position").only
     stretch = Stretch(robot, motion, np.stack([t[:-1], t[1:]], axis=1))
     alone = np.isin(t[1:], path.marks[1:][np.diff(path.marks) > 1e-3])
-    check_majorants(_Along(follow, path.feeds[0]), stretch.some(np.flatnonzero(alone)))
+    check_majorants(_Along(follow, LEFT), stretch.some(np.flatnonzero(alone)))
+    # The path's own speed, of one that varies: a constant one is rounding alone.
+    places = np.array([[0.4, 0.0, 0.4], [0.5, 0.1, 0.4], [0.5, 0.2, 0.5], [0.4, 0.3, 0.5]])
+    free = sm.Waypoints([0.0, 1.0, 1.5, 3.0], places)
+    own = Stretch(robot, motion, np.stack([free.marks[:-1], free.marks[1:]], axis=1))
+    for low in (-0.2, 0.1):
+        check_majorants(_Pace(free, low, 0.2), own)
 
 
 def test_an_arm_at_rest_keeps_no_feed(tmp_path: FilePath) -> None:
@@ -306,3 +316,100 @@ def test_a_feed_that_is_asked_for_an_instant_ends_in_a_verdict(brief: float) -> 
     line = sm.Line(pose, end, 2.0, time_law="constant")
     path = sm.Feed(line, 0.05, stretches=[[1.0, 0.02], [1.0 + brief, 0.05]])
     assert sm.plan(sm.Problem(panda, path, "position", PANDA_HOME)).certificate.verified
+
+
+# A path whose own pace changes fast between its rows [s, m]: its feed is held by nothing that its
+# limits say, but the steps between its rows do.
+HASTY = (
+    [0.0, 1.0158335869593629, 1.1273602389174961, 19.684792992314637, 24.836557175401545],
+    [
+        [0.41183804471935753, 0.0017455991695705143, 0.4],
+        [0.4282843962271138, 0.015441242881589162, 0.4],
+        [0.4704684581066368, 0.06660961977353601, 0.4],
+        [0.5046118547624597, 0.11146610137665532, 0.4],
+        [0.5644143748773229, 0.23928026755704418, 0.4],
+    ],
+)
+
+
+def test_a_feed_is_proved_between_the_nodes_of_its_path(tmp_path: FilePath) -> None:
+    """At its nodes the path keeps it; the tool is five times slower in between, by differences."""
+    limits = {"acceleration": 500.0, "turn_acceleration": 5000.0, "smoothing": 0.005}
+    path = sm.Feed(sm.Waypoints(HASTY[0], np.array(HASTY[1])), 0.02, **limits)
+    assert path.feeds[0].kept
+    t = np.linspace(0.5, path.duration - 0.5, 200_001)
+    places = path.samples(t).translation
+    speed = np.linalg.norm(np.diff(places, axis=0), axis=1) / np.diff(t)
+    assert speed.min() < 0.5 * 0.02
+    robot = gantry(tmp_path)
+    times = np.union1d(path.marks, np.linspace(0.0, path.duration, 20_001))
+    times = times[np.append(True, np.diff(times) > 1e-7)]
+    found, still = path.samples(times), np.zeros((len(times), 1))
+    motion = sm.Trajectory(
+        times,
+        np.hstack([found.translation, still]),
+        np.hstack([found.twist[:, :3], still]),
+        robot.joint_names,
+    )
+    verdict = sm.certify(robot, path, "position", motion).verdict
+    assert "is kept by the path where it was laid out, but not in between" in verdict
+    # What it is made of keeps it, at a third of the pace.
+    calm = path.slower(3.0)
+    assert calm.feeds[0].asked == pytest.approx(0.02 / 3.0)
+
+
+def test_random_paths_keep_what_is_proved_of_their_feeds(tmp_path: FilePath) -> None:
+    """By speeds at many times: no verdict says 'feed' of a path that does not keep it."""
+    robot, rng, kept = gantry(tmp_path), np.random.default_rng(3), 0
+    for _ in range(12):
+        count = int(rng.integers(3, 7))
+        t = np.append(0.0, np.cumsum(rng.exponential(1.0, count) + 0.02))
+        steps = rng.normal(0.0, 1.0, (count, 3)) * rng.uniform(0.01, 0.1, (count, 1))
+        points = np.array([0.5, 0.0, 0.5]) + np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+        path = sm.Feed(
+            sm.Waypoints(t, points),
+            float(rng.uniform(0.01, 0.05)),
+            acceleration=float(rng.uniform(0.5, 50.0)),
+            smoothing=float(rng.uniform(0.005, 0.05)),
+            within=0.05,
+        )
+        found = FeedReached(path.feeds[0], Follows.of(robot, path, "position").items[0])
+        intervals, counts = path.feeds[0].pieces
+        motion = sm.FinishedMotion(robot, followed_motion(robot, path))
+        if not found.judge(motion).kept:
+            continue
+        kept += 1
+        inside = intervals[counts]
+        looks = (inside[:, :1] + np.diff(inside) * np.linspace(0.0, 1.0, 21)).ravel()
+        speeds = np.linalg.norm(path.samples(looks).twist[:, :3], axis=1)
+        assert speeds.min() >= 0.95 * path.feed
+        assert speeds.max() <= 1.05 * path.feed
+    assert kept
+
+
+def followed_motion(robot: sm.RobotModel, path: sm.Path) -> sm.Trajectory:
+    """Return the motion of three slides along a path, at its marks and between them."""
+    t = np.union1d(path.marks, np.linspace(0.0, path.duration, 2000))
+    t = t[np.append(True, np.diff(t) > 1e-7)]
+    found, still = path.samples(t), np.zeros((len(t), 1))
+    q, qd = (np.hstack([x, still]) for x in (found.translation, found.twist[:, :3]))
+    return sm.Trajectory(t, q, qd, robot.joint_names)
+
+
+def test_what_a_weave_moves_along_its_seam_is_told_as_it_is() -> None:
+    """A tool that weaves fast has |v_d| many times its feed: little of that is along the path."""
+    panda = robot_named("panda")
+    start = panda.dexterous_configuration()
+    here = panda.pose(start)
+    seam = sm.Feed(sm.Line(here, here * pin.SE3(np.eye(3), np.array([0.05, 0.05, 0.0])), 4.0), 0.02)
+    path = sm.Weave(seam, 2e-3, 1e-3)
+    plan = sm.plan(sm.Problem(panda, path, task="position", start=start, constraints=[]))
+    t = np.linspace(0.0, path.duration, 20_001)
+    tool = np.einsum(
+        "kcn,kn->kc", panda.chain.along(plan.trajectory(t))[0][:, :3], plan.trajectory(t, 1)
+    )
+    wanted = path.samples(t).twist[:, :3]
+    size = np.maximum(np.linalg.norm(wanted, axis=1), 1e-9)
+    along = np.abs(np.einsum("kc,kc->k", tool - wanted, wanted)) / size
+    assert along.max() < 4e-4
+    assert all(item.kept for item in plan.certificate.findings if item.requirement == "feed")

@@ -369,3 +369,49 @@ def test_a_list_of_seams_loses_no_events(tmp_path: Path) -> None:
         within = text.replace("EVENTS", "").replace(path, f"[seams.path]\n{outer}")
         with pytest.raises(sm.FileFormatError, match="event 'M3' would be lost"):
             sm.read_seam_job(written(tmp_path, "job.toml", within))
+
+
+@pytest.mark.parametrize(
+    ("text", "events"),
+    [
+        # On the line of a rapid: of the cut that follows, but what stops ends the one before.
+        ("G0 X0 Y0 Z0\nM3\nG1 X50 F900\nM5\nG0 X50 Y30 M3\nG1 X0\nM5", [(0, 1), (0, 1)]),
+        ("G0 X0 Y0 Z0\nM3\nG1 X50 F900\nG0 X50 Y30 M5\nM3\nG1 X0\nM5", [(0, 1), (0, 1)]),
+        # On the line of a cut: what starts does so before it, what stops after it.
+        ("G0 X0 Y0 Z0\nG1 X50 F900 M3\nX60 M5\nG0 X50 Y30\nG1 X0 M3\nX-9 M5", [(0, 1), (0, 1)]),
+    ],
+    ids=["start-on-rapid", "stop-on-rapid", "on-cuts"],
+)
+def test_effects_of_a_block_have_their_order(
+    tmp_path: Path, text: str, events: list[tuple[int, int]]
+) -> None:
+    file = written(tmp_path, "order.nc", f"G21 G90\n{text}\nM30\n")
+    cuts = list(read_gcode(file).values())
+    assert len(cuts) == len(events)
+    for cut, (on, off) in zip(cuts, events, strict=True):
+        last = len(cut.positions) - 1
+        assert cut.events == ((on * last, "M3"), (off * last, "M5"))
+
+
+def test_events_of_rows_with_times_are_at_these_times_after_a_ramp(tmp_path: Path) -> None:
+    rows = [(0, 0), (60, 0), (0, 8), (60, 16), (0, 24), (60, 32)]
+    table = [(float(k), *xy) for k, xy in enumerate(rows)]
+    table += [(6.0 + 0.15 * k, 60, 35 + 3 * k) for k in range(24)]
+    for number in range(1, len(table) - 1, 4):
+        lines = [
+            f"s,{t},{x},{y},300,{'arc on' if k == number else ''}"
+            for k, (t, x, y) in enumerate(table)
+        ]
+        written(tmp_path, "rows.csv", "\n".join(["seam,t,x_mm,y_mm,z_mm,event", *lines]) + "\n")
+        job = written(
+            tmp_path,
+            "rows.toml",
+            'task="position"\ncollision=false\n[robot]\nname="panda"\n[seams]\n'
+            'file="rows.csv"\nramp=0.3\n',
+        )
+        (seam,) = sm.read_seam_job(job).seams
+        ((_, at),) = seam.events
+        row = np.array([table[number][1], table[number][2], 300.0])
+        assert np.linalg.norm(1e3 * seam.path.pose(at).translation - row) < 1e-3
+        # Half a ramp is lost at the start.
+        assert at == pytest.approx(table[number][0] + 0.15, abs=1e-6)

@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.certificate import KeepsApart
-from selfmotion.formats import judged_steps, program_miss
-from selfmotion.formats.program_axes import tool_from_flange
+from selfmotion.formats import judged_program, program_miss
+from selfmotion.formats.program_axes import axes_of, tool_from_flange
 from selfmotion.formats.program_files import read_program
 from selfmotion.formats.stretches import NO_MISS, ways
 from selfmotion.job import Step
@@ -303,21 +303,21 @@ def test_a_program_of_a_job_is_verified_by_its_job(
     assert [line.split(":")[0] for line in text.splitlines()[:-1]] == [
         step.name for step in program.steps
     ]
-    assert "verified, step by step" in text
+    assert "verified: each step, and the whole" in text
     text = file.read_text()
     middle = text.index("SPTP" if name.endswith("src") else "MoveAbsJ", len(text) // 3)
     moved = re.sub(
         r"(\d)\.(\d)", lambda m: f"{m[1]}.{(int(m[2]) + 5) % 10}", text[middle:], count=1
     )
     file.write_text(text[:middle] + moved)
-    found = judged_steps(file, program)
+    found = judged_program(file, program).steps
     assert sum(not step.verified for step in found) == 1
     code, text = invoke("check", file, "--robot", job)
     assert code == 1
     assert f"not verified: 1 of {len(found)} steps" in text
     other = replace(program, steps=program.steps[:-1])
     with pytest.raises(sm.FileFormatError, match="goes on with '"):
-        judged_steps(file, other)
+        judged_program(file, other)
 
 
 @pytest.mark.parametrize(("name", "deviation"), [("weld.src", 1e-3), ("weld.mod", 1e-4)])
@@ -528,3 +528,75 @@ def test_the_tool_of_an_arm_in_a_cell_is_that_of_the_arm_alone() -> None:
     for robot in (alone, cell):
         at = tool_from_flange(robot, sm.ProgramSettings())
         np.testing.assert_allclose(at.homogeneous, np.eye(4), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_is_judged_as_a_whole_by_its_job(
+    program: sm.Program, tmp_path: Path, name: str
+) -> None:
+    """Its ends and its outputs, though each of its steps is verified."""
+    file = tmp_path / name
+    sm.write_motion(program, file, settings=settings(name, 1e-3))
+    assert judged_program(file, program).verified
+    text = file.read_text()
+    lines = text.splitlines(keepends=True)
+    switching = [k for k, line in enumerate(lines) if "$OUT[" in line or "SetDO" in line]
+    assert len(switching) == len(program.events) == 4
+    first, second = switching[:2]
+    on, off = ("TRUE", "FALSE") if name.endswith("src") else (", 1;", ", 0;")
+    without = lines[:first] + lines[first + 1 :]
+    later = list(lines)
+    effects = [re.search(r"\$OUT.*|SetDO.*", lines[k])[0] for k in (first, second)]
+    later[first] = ""
+    later[second] = lines[second].replace(effects[1], effects[0]) + lines[second]
+    other = list(lines)
+    other[first] = lines[first].replace(on, off)
+    for spoilt, said in (
+        (without, "it switches 3 times, the job 4 times"),
+        (later, "event 'arc on' of 'seam 0' is at"),
+        (other, "event 'arc on' switches"),
+    ):
+        file.write_text("".join(spoilt))
+        found = judged_program(file, program)
+        assert not found.verified
+        assert said in "; ".join(found.failures), found.failures
+        assert all(step.verified for step in found.steps)
+    file.write_text(text)
+    loose = replace(program, specification=replace(program.specification, start=None))
+    assert judged_program(file, loose).verified
+    wrong = replace(program, missing={"seam 9": "nobody knows"})
+    assert "the job itself: seam 'seam 9'" in "; ".join(judged_program(file, wrong).failures)
+    elsewhere = turned_smoothly(lines, program, 20.0)
+    file.write_text("".join(elsewhere))
+    assert "does not begin where it was asked to" in "; ".join(
+        judged_program(file, program).failures
+    )
+
+
+def turned_smoothly(lines: list[str], program: sm.Program, by: float) -> list[str]:
+    """Return a file whose first axis is turned in the first move, smoothly less towards its end."""
+    found = list(lines)
+    steps = [k for k, line in enumerate(lines) if "step:" in line]
+    targets = [
+        k for k, line in enumerate(lines[: steps[1]]) if re.search(r"PTP \{A1|MoveAbsJ \[\[", line)
+    ]
+    for share, k in zip(np.linspace(0.0, 1.0, len(targets)), targets, strict=True):
+        more = by * (1.0 - share**3 * (10.0 - 15.0 * share + 6.0 * share**2))
+        found[k] = re.sub(
+            r"(\{A1 |MoveAbsJ \[\[)(-?[\d.]+)",
+            lambda m, more=more: f"{m[1]}{float(m[2]) + more:.5f}",
+            lines[k],
+        )
+    return found
+
+
+def test_a_table_in_the_urdf_of_an_arm_is_no_wrist(tmp_path: Path) -> None:
+    cell = sm.load_robot(
+        {"arm": "ur5", "table": "positioner"}, tool="arm/tool0", reference="table/plate"
+    )
+    file = tmp_path / "cell.urdf"
+    file.write_text(cell.urdf.text.replace("arm/", "arm_").replace("table/", "table_"))
+    one = sm.load_robot(file, tool="arm_tool0", reference="table_plate", lock={"table_tilt": 0.0})
+    with pytest.raises(sm.ProblemError, match=r"'table_turn' does not carry the tool.*'A6'.*'E1'"):
+        axes_of(one, sm.ProgramSettings())
+    assert [axis.name for axis in axes_of(cell, sm.ProgramSettings())][-2:] == ["E1", "E2"]

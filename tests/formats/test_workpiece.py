@@ -195,3 +195,47 @@ def test_seams_of_a_job_move_with_it_and_so_does_what_they_leave(
             )
         assert len(one.leaves) == listed
     assert [body.name for body in here.settings["clearance"].obstacles] == ["clamp", "pin"]
+
+
+def test_what_else_follows_rides_on_what_the_workpiece_stands_on(tmp_path: Path) -> None:
+    """Both paths are in the frame of the plate, and move along with it."""
+    (tmp_path / "cell.toml").write_text(TWO_TOOLS)
+    problem = sm.read_problem(tmp_path / "cell.toml")
+    first, second = problem.follows.items
+    assert first.chain.base == second.chain.base != 0
+    np.testing.assert_allclose(second.path.pose(0.0).translation, [0.0, 0.1, 0.07], atol=1e-12)
+    # One with a reference of its own stays where that is.
+    own = TWO_TOOLS.replace('task = "position"\npose', 'reference = "arm/panda_link0"\npose')
+    (tmp_path / "own.toml").write_text(own)
+    other = sm.read_problem(tmp_path / "own.toml").follows.items[1]
+    np.testing.assert_allclose(other.path.pose(0.0).translation, [0.0, 0.1, 0.02], atol=1e-12)
+
+
+TWO_TOOLS = """
+task = "pointing"
+collision = false
+[robot]
+tool = ["arm/panda_hand_tcp", "other/panda_hand_tcp"]
+reference = "table/plate"
+[robot.parts.arm]
+name = "panda"
+[robot.parts.other]
+name = "panda"
+base = { position = [1.0, 0, 0], rpy_deg = [0, 0, 180] }
+[robot.parts.table]
+name = "positioner"
+base = { position = [0.5, 0, 0] }
+[workpiece]
+on = "table/plate"
+frame = { position = [0.0, 0.0, 0.05] }
+[path]
+kind = "circle"
+start = { position = [0.1, 0, 0.0], rpy_deg = [180, 0, 0] }
+radius = 0.1
+normal = [0, 0, 1]
+duration = 8
+[[also]]
+tool = "other/panda_hand_tcp"
+task = "position"
+pose = { position = [0.0, 0.1, 0.02], rpy_deg = [180, 0, 0] }
+"""

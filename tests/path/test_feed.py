@@ -313,3 +313,19 @@ def test_a_path_made_of_another_one_keeps_a_feed_as_that_does() -> None:
     for path in (sm.Placed(line, frame), Reversed(line)):
         assert sm.Feed(path, 0.05).duration == pytest.approx(sm.Feed(line, 0.05).duration, rel=1e-9)
     assert sm.Feed(sm.Weave(line, 0.002, 0.02), 0.05).duration > sm.Feed(line, 0.05).duration
+
+
+@pytest.mark.parametrize("aside", [1e-3, 1e-5, 1e-6])
+def test_time_never_runs_backwards_where_a_path_nearly_turns_back(aside: float) -> None:
+    """Nor is it faster than its feed, or harder than its acceleration: by differences."""
+    points = [[0, 0, 0], [0.05, 0, 0], [0.1, aside, 0], [0.05, 2 * aside, 0], [0, 2 * aside, 0]]
+    places = np.array(points) + np.array([0.4, 0.0, 0.4])
+    path = sm.Feed(sm.Waypoints([0, 1, 2, 3, 4], places), 0.05)
+    t = np.linspace(0.0, path.duration, 100_001)
+    sigma, rate = path.pace(t)
+    assert np.diff(sigma).min() >= 0.0
+    assert rate.min() >= 0.0
+    found = path.samples(t)
+    assert np.linalg.norm(found.twist[:, :3], axis=1).max() < 1.01 * 0.05
+    push = np.linalg.norm(np.diff(found.twist[:, :3], axis=0), axis=1).max() / t[1]
+    assert push < 1.0

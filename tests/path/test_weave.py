@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 import selfmotion as sm
 from selfmotion.basics import Array
 from selfmotion.task import SE3
+from support.arms import robot_named
 
 AMPLITUDE, PITCH = 4e-3, 0.02
 LENGTH = 0.3
@@ -151,3 +152,25 @@ def test_a_woven_seam_is_planned_and_verified() -> None:
 def test_what_is_no_swing_is_refused(given: dict, named: str) -> None:
     with pytest.raises(sm.PathError, match=named):
         sm.Weave(seam(), **{"amplitude": AMPLITUDE, "pitch": PITCH, **given})
+
+
+def test_a_weave_that_never_ends_is_refused_at_once() -> None:
+    """A pitch a hundred times too small: by its swings, or by how it accelerates."""
+    with pytest.raises(sm.PathError, match=r"makes 1e\+05 swings, expected 20,000 at most"):
+        sm.Weave(seam(), 2e-3, float(length_of(seam())) / 1e5)
+    panda = robot_named("panda")
+    start = panda.dexterous_configuration()
+    here = panda.pose(start)
+    there = here.copy()
+    there.translation = here.translation + np.array([0.0, 0.07, 0.0])
+    line = sm.Feed(sm.Line(here, there, 4.0), 0.02)
+    woven = sm.Weave(line, 2e-3, 5e-5)
+    with pytest.raises(sm.ProblemError, match=r"accelerates at 1\.\d*e\+04 m/s².*times gravity"):
+        sm.Problem(panda, woven, task="position", start=start)
+    # As it was meant it is planned.
+    sm.Problem(panda, sm.Weave(line, 2e-3, 5e-3), task="position", start=start)
+
+
+def length_of(path: sm.Path) -> float:
+    places = path.samples(np.linspace(0.0, path.duration, 2001)).translation
+    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())

@@ -110,6 +110,21 @@ def test_a_path_that_needs_two_changes_is_found_with_two() -> None:
     assert "a part is not at its end of the path at t = " in "".join(faults(broken))
     swapped = sm.Parts(parts.problem, parts.plans, parts.moves[::-1], parts.cuts)
     assert "a move does not lead from part to part" in faults(swapped)
+    # The verdict says so as well, each by its name.
+    loose = dataclasses.replace(parts, tolerance=sm.Tolerance(1e-12, 1e-12), endings=parts.endings)
+    for wrong, said in (
+        (broken, "part 2: it is not the path from"),
+        (swapped, "would jump by"),
+        (dataclasses.replace(parts, moves=parts.moves[:1]), "3 parts have 1 moves in between"),
+        (dataclasses.replace(parts, moves=()), "3 parts have 0 moves in between"),
+        (dataclasses.replace(parts, plans=parts.plans[::-1]), "it is not the path from 0 to"),
+        (dataclasses.replace(parts, cuts=(parts.cuts[0], parts.cuts[1] + 1e-3)), "the path from"),
+        (dataclasses.replace(parts, problem=wound(2.9 * TURN, sm.ToolLimits(speed=9.0))), "Tool"),
+        (loose, "it is judged within 1e-06 m"),
+    ):
+        assert not wrong.verified
+        assert said in wrong.verdict
+    assert "rad off the path" in parts.verdict
 
 
 def test_a_path_that_needs_no_change_is_one_plan() -> None:

@@ -212,8 +212,9 @@ class _Pace(Bounded):
         if path is None:
             return None
         speed = series.derivative(path.translation, stretch.half)
-        # A constant changes the size of the function, but none of its derivatives.
-        return np.asarray(series.product(speed, speed)[None] / self._half)
+        squared = series.product(speed, speed)
+        squared[0] += self._mean
+        return np.asarray(squared[None] / self._half)
 
     def values(self, stretch: Stretch, u: Array) -> Array:
         """See `Bounded.values`."""

@@ -95,6 +95,9 @@ class FeedNodes:
         for _ in range(_FINER):
             lengths, slopes = self._along(sigma)
             h, rise = np.diff(lengths), np.diff(sigma)
+            if h.min() <= 0.0:
+                # It rests there, which is refused.
+                break
             # The cubic and its slope half way between two nodes.
             middle = sigma[:-1] + 0.5 * rise + 0.125 * h * (slopes[:-1] - slopes[1:])
             slope = 1.5 * rise / h - 0.25 * (slopes[:-1] + slopes[1:])

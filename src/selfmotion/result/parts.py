@@ -55,7 +55,7 @@ class Parts:
         lines = [f"Parts({self.problem!r}, {len(self.plans)} with {len(self.moves)} moves)"]
         lines += [
             f"  cut at t = {cut:.6g} s: {ending}"
-            for cut, ending in zip(self.cuts, self.endings, strict=True)
+            for cut, ending in zip(self.cuts, self.endings, strict=False)
         ]
         return "\n".join([*lines, f"  {self.verdict}"])
 

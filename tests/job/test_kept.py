@@ -1,0 +1,193 @@
+"""What a job keeps is measured again, whole and ours, or planned again."""
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.job.seam import backwards_plan
+from selfmotion.task import SE3
+from support.arms import robot_named
+
+DOWN = np.diag([1.0, -1.0, -1.0])
+HOME = np.array(sm.NAMED_ARMS["panda"].home)
+
+
+def line(first, last, seconds: float = 1.0) -> sm.Path:
+    return sm.Line(SE3(DOWN, np.array(first)), SE3(DOWN, np.array(last)), seconds)
+
+
+SEAMS = [
+    sm.Seam("one", line([0.4, -0.1, 0.3], [0.5, -0.1, 0.3]), "pointing", either_way=False),
+    sm.Seam("two", line([0.4, 0.1, 0.3], [0.5, 0.1, 0.3]), "pointing", either_way=False),
+]
+ASKED = {"branches": 1, "start": HOME, "end": HOME}
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory) -> tuple[Path, sm.Program]:
+    """A folder of a job that is finished, and its program."""
+    folder = tmp_path_factory.mktemp("kept")
+    return folder, sm.plan_job(robot_named("panda"), SEAMS, folder=folder, **ASKED).require()
+
+
+def again(folder: Path) -> sm.Program:
+    return sm.plan_job(robot_named("panda"), SEAMS, folder=folder, **ASKED)
+
+
+def bent(plan: sm.Plan) -> sm.Plan:
+    """Return a plan with a smooth bump of one joint, and a certificate that says otherwise."""
+    motion = plan.trajectory
+    t = motion.t
+    x, w = np.pi * t / t[-1], np.pi / t[-1]
+    q, qd, qdd = (np.array(motion(t, order)) for order in range(3))
+    q[:, 3] += 0.05 * np.sin(x) ** 6
+    qd[:, 3] += 0.3 * w * np.sin(x) ** 5 * np.cos(x)
+    qdd[:, 3] += 0.05 * w**2 * (30 * np.sin(x) ** 4 * np.cos(x) ** 2 - 6 * np.sin(x) ** 6)
+    other = sm.Trajectory(t, q, qd, motion.joint_names, qdd)
+    # Who writes files knows digests as well.
+    said = replace(plan.certificate, motion=other.digest)
+    return replace(plan, trajectory=other, certificate=said)
+
+
+def swapped(folder: Path, kind: str) -> None:
+    one, other = sorted(folder.glob(f"{kind}*.npz"))[:2]
+    data = one.read_bytes()
+    one.write_bytes(other.read_bytes())
+    other.write_bytes(data)
+
+
+def truncated(folder: Path) -> None:
+    for file in folder.glob("*.npz"):
+        file.write_bytes(file.read_bytes()[:-100])
+
+
+def turned_about(folder: Path) -> None:
+    """Put what is known of one seam under the name of another."""
+    one, other = sorted(folder.glob("seam*.json"))[:2]
+    shutil.copy(one, other)
+
+
+def touched(folder: Path) -> None:
+    for file in folder.glob("*.npz"):
+        arrays = dict(np.load(file))
+        np.savez(file, **{**arrays, "q": arrays["q"] + 1e-12})
+
+
+def loosened(folder: Path) -> None:
+    """Say of each plan that it may be anywhere, with a digest that fits."""
+    for file in folder.glob("seam*.npz"):
+        plan = sm.load_plan(file)
+        certificate = plan.check(sm.Tolerance(1.0, 1.0))
+        bent(replace(plan, certificate=certificate)).save(file)
+
+
+def given_up(folder: Path) -> None:
+    """Say of each move that there is none, as another job did."""
+    for file in folder.glob("move*.json"):
+        file.write_text(json.dumps({"kept": "another", "trouble": "not found"}))
+
+
+def lied(folder: Path) -> None:
+    for file in folder.glob("seam*.npz"):
+        bent(sm.load_plan(file)).save(file)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda folder: swapped(folder, "seam"),
+        lambda folder: swapped(folder, "move"),
+        truncated,
+        turned_about,
+        touched,
+        loosened,
+        given_up,
+        lied,
+    ],
+    ids=["plans", "moves", "truncated", "names", "touched", "loosened", "given-up", "lied"],
+)
+def test_what_was_spoilt_is_planned_again(kept, tmp_path: Path, spoil) -> None:
+    folder, program = kept
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    spoil(tmp_path)
+    found = again(tmp_path).require()
+    np.testing.assert_array_equal(found.trajectory.q, program.trajectory.q)
+    # And kept, so that the next one takes what it finds.
+    times = {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("*.npz")}
+    assert again(tmp_path).verified
+    assert times == {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("*.npz")}
+
+
+def test_another_version_plans_again(kept, tmp_path: Path, monkeypatch) -> None:
+    folder, _ = kept
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    count = len(list(tmp_path.glob("*.json")))
+    monkeypatch.setattr("selfmotion.result.kept.version", lambda: "another")
+    assert again(tmp_path).verified
+    assert len(list(tmp_path.glob("*.json"))) > count
+
+
+def test_a_program_is_of_the_tool_the_reference_and_the_tolerance_that_were_asked(kept) -> None:
+    _, program = kept
+    flange = sm.load_robot("panda", tool="panda_link8")
+    other = sm.plan_job(flange, SEAMS, **ASKED)
+    mixed = replace(program, steps=other.steps)
+    assert "its tool is 'panda_link8', not 'panda_hand_tcp'" in mixed.verdict
+    asked = program.specification
+    finer = replace(program, specification=replace(asked, tolerance=sm.Tolerance(1e-9, 1e-9)))
+    assert "it is judged within 1e-06 m" in finer.verdict
+    looser = replace(program, specification=replace(asked, tolerance=sm.Tolerance(1e-3, 1e-3)))
+    assert "(0.001 m and 0.001 rad are allowed)" in looser.verdict
+    assert "rad off the path" in program.verdict
+
+
+def test_a_seams_own_clearance_is_kept_besides_that_of_the_job() -> None:
+    far = sm.Clearance([sm.Box("far", [0.0, 0.8, 0.6], [0.1, 0.1, 1.2])], 0.01)
+    post = sm.Clearance([sm.Box("post", [0.0, -0.6, 0.6], [0.1, 0.1, 1.2])], 0.01)
+    own = replace(SEAMS[0], constraints=[far])
+    made = sm.plan_job(robot_named("panda"), [own], clearance=post, **ASKED).require()
+    bodies = {item.name for item in made.plans["one"].obstacles}
+    assert bodies == {"far", "post"}
+
+
+@pytest.mark.parametrize("limit", [1.2, 1.262, 1.28])
+def test_a_seam_whose_limits_bind_rests_at_its_ends(limit: float) -> None:
+    """Its first polynomial begins without acceleration, and so the program is verified."""
+    path = line([0.3, -0.3, 0.3], [0.6, 0.1, 0.3], 1.3)
+    asked = [sm.JointVelocityLimits(np.full(7, limit))]
+    seam = sm.Seam("a", path, task="pointing", constraints=asked, either_way=False)
+    program = sm.plan_job(robot_named("panda"), [seam], **ASKED).require()
+    motion = program.plans["a"].trajectory
+    s = np.linspace(0.0, motion.t[1], 41)
+    pieces = (np.polynomial.Polynomial.fit(s, q, 5).convert() for q in motion(s).T)
+    assert 2.0 * max(abs(piece.coef[2]) for piece in pieces) < 1e-6
+
+
+def test_a_turned_plan_tells_the_times_of_its_own_direction() -> None:
+    limit = 1.2
+    path = line([0.3, -0.3, 0.3], [0.6, 0.1, 0.3], 1.3) + sm.Dwell(
+        SE3(DOWN, np.array([0.6, 0.1, 0.3])), 1.0
+    )
+    asked = [sm.JointVelocityLimits(np.full(7, limit))]
+    plan = sm.plan(
+        sm.Problem(robot_named("panda"), path, "pointing", constraints=asked, collision=None)
+    )
+    turned = backwards_plan(plan).require()
+    spans = [span for item in turned.report.active for span in item.spans]
+    assert spans
+    for first, last in spans:
+        t = np.linspace(first, last, 5)
+        assert np.abs(turned.trajectory(t, 1)).max() > 0.95 * limit
+    assert all(last > 1.0 for _, last in spans)
+    # -ε(T - t) at the nodes of the other direction.
+    times = np.array(turned.report.null_motion.times)
+    np.testing.assert_allclose(times, 1.0 - np.array(plan.report.null_motion.times)[::-1])
+    shape = (7, -1)
+    np.testing.assert_array_equal(
+        turned.coefficients.reshape(shape), -plan.coefficients.reshape(shape)[:, ::-1]
+    )
