@@ -28,7 +28,7 @@ from selfmotion.job.program import Program
 from selfmotion.job.seam import Seam
 from selfmotion.job.specification import Specification
 from selfmotion.job.work import Asked, Work, check_can_be_sent
-from selfmotion.problem import KEPT, NO_OVERLAP
+from selfmotion.problem import KEPT, NO_OVERLAP, check_all_times
 from selfmotion.robot import RobotModel
 
 
@@ -142,6 +142,7 @@ def plan_job(
 
 def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
     listed = as_several(constraints, "constraints", Constraint)
+    check_all_times(listed, "a job: give it to a seam that is made one way (either_way=False)")
     for item in listed:
         if isinstance(item, Clearance):
             raise ProblemError(

@@ -79,8 +79,7 @@ class FreeMotions:
 
     def configurations(self, end: npt.ArrayLike | SE3, task: Task) -> Array:
         """Return the configurations (k, n) that an end stands for; see `move`."""
-        is_pose = hasattr(end, "homogeneous") or np.shape(end) == (4, 4)
-        if not is_pose:
+        if not is_pose(end):
             return self.robot.configuration(end)[None]
         arm = self.asked.arm(self.robot)
         follows = Follows.of(arm, Dwell(end, 1.0), task)
@@ -286,6 +285,11 @@ class FreeMotions:
         longest = max(needed, BRIEFEST_MOVE)
         faster = qdd / longest**2
         return Trajectory(longest * tau, q, unit.qd / longest, unit.joint_names, faster)
+
+
+def is_pose(end: npt.ArrayLike | SE3) -> bool:
+    """Whether an end of a move is a pose of the tool, not a configuration."""
+    return hasattr(end, "homogeneous") or np.shape(end) == (4, 4)
 
 
 def _ulps(limit: Array) -> Array:

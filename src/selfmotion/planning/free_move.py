@@ -18,9 +18,9 @@ from selfmotion.basics import (
     silent,
 )
 from selfmotion.constraints import Clearance, Constraint
-from selfmotion.planning.free_motion import FreeMotions
+from selfmotion.planning.free_motion import FreeMotions, is_pose
 from selfmotion.planning.settings import MOVE_DEADLINE
-from selfmotion.problem import KEPT, NO_OVERLAP
+from selfmotion.problem import KEPT, NO_OVERLAP, check_all_times
 from selfmotion.result import Move
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3, Task
@@ -88,6 +88,7 @@ def move(
     if not isinstance(robot, RobotModel):
         raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
     asked = list(as_several(constraints, "constraints", Constraint))
+    check_all_times(asked, "a move, whose ends are given")
     if clearance is not None and not isinstance(clearance, Clearance):
         raise ProblemError(f"clearance is {shown(clearance)}, expected a Clearance, or None")
     apart = any(item.envelope(robot).bodies for item in asked)
@@ -96,8 +97,14 @@ def move(
         asked.append(clearance)
     if not isinstance(via, list | tuple | np.ndarray):
         raise ProblemError(f"via is {shown(via)}, expected a list of configurations")
+    given = (first, *via, last)
+    if Task.of(task) is not Task.POSE and not any(is_pose(end) for end in given):
+        raise ProblemError(
+            f"task is '{Task.of(task).value}', which counts where an end is a pose: all ends are "
+            f"configurations"
+        )
     seconds, generator = as_number(deadline, "deadline", above=0.0), random_numbers(rng)
     motions = FreeMotions(robot, asked, generator, obeying(progress))
     with one_blas_thread(), held_interruption():
-        ends = [motions.configurations(end, Task.of(task)) for end in (first, *via, last)]
+        ends = [motions.configurations(end, Task.of(task)) for end in given]
         return motions.through(ends, seconds)

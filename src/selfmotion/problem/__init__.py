@@ -6,6 +6,7 @@ from selfmotion.problem.paper_problem import sample_problem as sample_problem
 from selfmotion.problem.parts import (
     asked_of_part as asked_of_part,
     at_all_times as at_all_times,
+    check_all_times as check_all_times,
     relaxed_along as relaxed_along,
 )
 from selfmotion.problem.problem import Problem as Problem, check_problem as check_problem

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from selfmotion.basics import ProblemError
 from selfmotion.constraints import Constraint
 from selfmotion.path import Retimed
 from selfmotion.problem.problem import Problem
@@ -31,6 +32,16 @@ def at_all_times(constraints: Sequence[Constraint]) -> list[Constraint]:
     parts = (item.on_part() for item in constraints)
     inner = (part.on_last_part() for part in parts if part is not None)
     return [item for item in inner if item is not None]
+
+
+def check_all_times(constraints: Sequence[Constraint], what: str) -> None:
+    """Raise ProblemError where a constraint asks something of an end, which `what` cannot keep."""
+    for item in constraints:
+        if item.on_part() is None or item.on_last_part() is None:
+            raise ProblemError(
+                f"constraints: {type(item).__name__} asks something of an end, which is none of "
+                f"{what}; leave it out"
+            )
 
 
 def relaxed_along(
