@@ -3,6 +3,7 @@
 import copy
 import inspect
 import json
+import sys
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -211,7 +212,7 @@ def test_each_parameter_of_other_paces_matters() -> None:
 
 def test_each_parameter_of_fastest_matters(monkeypatch: pytest.MonkeyPatch) -> None:
     # One round shows it as well as many.
-    monkeypatch.setattr("selfmotion.planning.fastest.ROUNDS", 1)
+    monkeypatch.setattr(sys.modules["selfmotion.planning.fastest"], "ROUNDS", 1)
     robot, (heard, tell) = robot_named("planar_3r"), told()
     start = np.array([0.1, 0.9, 0.9])
     path = sm.Line(robot.pose(start), robot.pose(start + 0.2), 2.0)
