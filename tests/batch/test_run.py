@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 import selfmotion as sm
 from selfmotion.batch import BatchProgress, Item, grid_items, plan_items, run
@@ -396,3 +397,33 @@ def test_of_each_file_some_combination_has_to_be_verified() -> None:
     assert is_answered([one, other], {"a-2", "b-0"})
     assert not is_answered([one, other], {"a-0", "a-1", "a-2"})
     assert not is_answered([one], set())
+
+
+def test_a_mesh_that_changed_is_planned_anew_in_any_process(tmp_path: Path) -> None:
+    """In one that has its bodies made before as well; a row that lies is measured again."""
+    panda = robot_named("panda")
+    line = sm.Line(panda.pose(PANDA_HOME), panda.pose(PANDA_HOME + 0.05), 2.0)
+    part, out = tmp_path / "part.stl", tmp_path / "out"
+
+    def row() -> tuple[sm.batch.Row, int]:
+        bodies = [sm.Mesh("part", np.zeros(3), str(part))]
+        problem = sm.Problem(
+            panda, line, "position", PANDA_HOME, constraints=[sm.Clearance(bodies, 0.01)]
+        )
+        found = sm.batch.plan_many([problem], InPlace(), out=out)
+        return found.rows[0], found.resumed
+
+    for at, verified in (([2.0, 2.0, 0.0], True), (line.pose(1.0).translation, False)):
+        box = trimesh.creation.box((0.1, 0.1, 0.1))
+        box.apply_translation(at)
+        box.export(part)
+        assert (row()[0].verified, row()[1]) == (verified, 1)
+    said = out / "rows" / "plan-0.json"
+    values = json.loads(said.read_text())
+    said.write_text(json.dumps(values | {"verified": True, "verdict": "verified"}))
+    found, resumed = row()
+    assert (found.verified, resumed) == (False, 1)
+    # Another file in the place of its plan is not its plan.
+    other = sm.plan(sm.Problem(panda, line, "position", PANDA_HOME, collision=None))
+    other.save(out / "plans" / "plan-0.npz")
+    assert (row()[0].verified, row()[1]) == (False, 1)

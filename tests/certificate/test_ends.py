@@ -34,7 +34,8 @@ def test_ends_are_judged_to_a_micrometre(miss: float) -> None:
         assert any(words in found.text for words in where)
     given = motion_of([q[0], q[0] + 1e-3], [q[0], q[0]])
     told = ClosedMotion(True).judge(given).text
-    assert told == f"joint '{given.robot.joint_names[0]}' ends 1.00e-03 away from the start"
+    joint = given.robot.joint_names[0]
+    assert told == f"joint '{joint}' ends 0.001 rad away from the start (1e-06 allowed)"
 
 
 @pytest.mark.parametrize(

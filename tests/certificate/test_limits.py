@@ -27,7 +27,8 @@ def test_margins_are_those_of_the_nearest_side() -> None:
         # No pace helps a joint that is where it may not be.
         assert not found.of_pace
         assert found.time == pytest.approx(time)
-        told = f"as near as {amount:.3g} to its" if amount >= 0 else f"is {-amount:.3g} beyond its"
+        near = f"as near as {amount:.3g} rad to its"
+        told = near if amount >= 0 else f"is {-amount:.3g} rad beyond its"
         assert f"{told} limit at t = {time:.3f} s" in found.text
     kept = JointLimits(0, np.array([0.0, 0.0, -1.0]), np.array([1.0, 1.0, 0.0])).judge(motion)
     assert (kept.kept, kept.amount) == (True, pytest.approx(0.0, abs=ROUNDING))

@@ -12,6 +12,7 @@ import selfmotion as sm
 from selfmotion import testing
 from selfmotion.basics import restore
 from selfmotion.path import Retimed, Reversed, Section
+from selfmotion.task import SE3
 from support.arms import PANDA_HOME
 from support.paths import polygon
 from support.shell import complaint
@@ -327,5 +328,33 @@ def test_time_never_runs_backwards_where_a_path_nearly_turns_back(aside: float) 
     assert rate.min() >= 0.0
     found = path.samples(t)
     assert np.linalg.norm(found.twist[:, :3], axis=1).max() < 1.01 * 0.05
+    assert all(pace.falls_at() is None for _, _, pace in path._paces)
     push = np.linalg.norm(np.diff(found.twist[:, :3], axis=0), axis=1).max() / t[1]
     assert push < 1.0
+
+
+def test_a_pace_that_runs_backwards_between_its_samples_is_none() -> None:
+    line = sm.Line(SE3.Identity(), SE3(np.eye(3), np.array([0.1, 0, 0])), 2.0)
+    t, sigma = [0.0, 1.0, 2.0], [0.0, 0.2, 2.0]
+    with pytest.raises(sm.PathError, match=r"falls between its samples near t = 0\.[23]"):
+        Retimed(line, t, sigma, [0.0, 3.0, 0.0])
+    rates = Retimed(line, t, sigma, [0.0, 0.6, 0.0]).pace(np.linspace(0.0, 2.0, 1001), 1)
+    assert rates.min() >= 0.0
+    with pytest.raises(sm.PathError, match="falls between its samples"):
+        Retimed(line, t, [0.0, 1.0, 2.0], [1.0, 1.0, 1.0], [0.0, 60.0, 0.0])
+
+
+def test_a_feed_counts_where_a_pace_is_its_own_all_the_way() -> None:
+    """One that is its own at each sample, and three times as fast in between, keeps no feed."""
+    line = sm.Line(SE3.Identity(), SE3(np.eye(3), np.array([0.1, 0, 0])), 2.0)
+    path = sm.Feed(line, 0.02)
+    same = Retimed(path, [0.0, path.duration], [0.0, path.duration], [1.0, 1.0])
+    assert same.feeds[0].kept
+    times = np.linspace(0.0, path.duration, 9)
+    wavy = Retimed(path, times, times, np.ones(9), np.zeros(9))
+    assert wavy.feeds[0].kept
+    bent = np.zeros(9)
+    bent[4] = 8.0
+    assert len(Retimed(path, times, times, np.ones(9), bent).feeds[0].pieces[0]) < len(
+        wavy.feeds[0].pieces[0]
+    )

@@ -14,10 +14,10 @@ from selfmotion.basics import InverseKinematicsError, NoSequenceError, Selfmotio
 from selfmotion.batch.row import measured
 from selfmotion.formats import Job
 from selfmotion.problem import problem_from_dict
+from selfmotion.result import Made
 
-# Arms and bodies of problems planned before; forgotten when there are many.
-_known: dict[str, Any] = {}
-_MANY = 64
+# Arms and bodies of problems planned before.
+_made = Made()
 # What errors come to in a few words.
 _REASONS = ((InverseKinematicsError, "out of reach"), (NoSequenceError, "no way through"))
 
@@ -36,9 +36,8 @@ def plan_task(task: Mapping[str, Any]) -> tuple[dict[str, Any], bytes]:
     try:
         for name in task["modules"]:
             importlib.import_module(name)
-        if len(_known) > _MANY:
-            _known.clear()
-        found = Job(problem_from_dict(task["problem"], _known), **task["options"]).plan()
+        problem = problem_from_dict(task["problem"], _made.of(task["files"]))
+        found = Job(problem, **task["options"]).plan()
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder, "plan.npz")
             found.save(file)

@@ -123,7 +123,11 @@ def _miss(
     worst = int(np.argmax(size))
     joint, amount = motion.robot.joint_names[worst], float(size[worst])
     what = f" with {'an' if order == 2 else 'a'} {QUANTITIES[order]}" if order else ""
-    text = f"joint '{joint}' {'ends' if row else 'starts'}{what} {amount:.2e} {words}"
-    time = float(motion.trajectory.t[row])
+    unit = motion.robot.unit_of(joint) + ("", "/s", "/s²")[order]
     allowed = _ACCELERATED if order == 2 else ARRIVED
+    text = (
+        f"joint '{joint}' {'ends' if row else 'starts'}{what} {amount:.2g} {unit} {words} "
+        f"({allowed:g} allowed)"
+    )
+    time = float(motion.trajectory.t[row])
     return Finding(name, joint, time, amount, allowed, bool(amount <= allowed), text)

@@ -93,7 +93,10 @@ class JointLimits(Requirement):
                 return jump
         time = float(times[side, joint])
         name = motion.robot.joint_names[int(joint)]
-        text = _TEXTS[self.order](name, amount, time)
+        if self.order:
+            text = _TEXTS[self.order - 1](name, amount, time)
+        else:
+            text = _position(name, amount, time, motion.robot.unit_of(name))
         factor = 1.0 if kept or not self.order else max(amount, 0.0) ** (1.0 / self.order)
         return Finding(self.name, name, time, amount, allowed, kept, text, self.order > 0, factor)
 
@@ -125,10 +128,12 @@ def arm_limits(robot: RobotModel, requirements: Sequence[Requirement]) -> tuple[
     return tuple(item for item in own if item.order not in taken)
 
 
-def _position(name: str, amount: float, time: float) -> str:
+def _position(name: str, amount: float, time: float, unit: str) -> str:
     if amount >= 0.0:
-        return f"joint '{name}' comes as near as {amount:.3g} to its limit at t = {time:.3f} s"
-    return f"joint '{name}' is {-amount:.3g} beyond its limit at t = {time:.3f} s"
+        return (
+            f"joint '{name}' comes as near as {amount:.3g} {unit} to its limit at t = {time:.3f} s"
+        )
+    return f"joint '{name}' is {-amount:.3g} {unit} beyond its limit at t = {time:.3f} s"
 
 
 def _velocity(name: str, amount: float, time: float) -> str:
@@ -152,4 +157,4 @@ def _jerk(name: str, amount: float, time: float) -> str:
     )
 
 
-_TEXTS = (_position, _velocity, _acceleration, _jerk)
+_TEXTS = (_velocity, _acceleration, _jerk)

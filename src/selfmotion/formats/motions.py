@@ -105,6 +105,8 @@ def write_motion(
     if name == "urscript":
         _write_stream(path, plan, STREAM if rate is None else rate, settings or ProgramSettings())
         return
+    if settings is not None:
+        raise ProblemError(f"{path}: settings have no effect: they are of controllers' programs")
     motion = plan.motion if isinstance(plan, Move) else plan.trajectory
     WRITERS[name](path, MotionSamples.of(motion, rate), plan.robot, rate)
 

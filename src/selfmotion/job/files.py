@@ -141,10 +141,13 @@ class Shelf:
         """
         if self._folder is None:
             return None
-        files = files_of(robot, constraints, self._known)
-        key = key_of((asked(), asdict(self._tolerance)), files)[:16]
+        key = key_of((asked(), asdict(self._tolerance)), self.files(robot, constraints))[:16]
         plain = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:40]
         return self._folder / f"{plain}.{key}.json"
+
+    def files(self, robot: RobotModel, constraints: Sequence[Constraint]) -> dict[str, str]:
+        """Return the digests of what an arm's bodies and those it keeps apart from are made of."""
+        return files_of(robot, constraints, self._known)
 
     def plans(self, file: Path | None, problem: Problem) -> tuple[list[Plan], str] | None:
         """Return the plans of a problem that were kept, and why there are none.

@@ -29,7 +29,7 @@ from selfmotion.problem import (
     problem_from_dict,
     problem_to_dict,
 )
-from selfmotion.result import Move, Plan, load_move, load_plan
+from selfmotion.result import Made, Move, Plan, load_move, load_plan
 from selfmotion.robot import RobotModel
 
 # Clearances that are remembered: of a seam, and of the moves around it.
@@ -173,12 +173,7 @@ class Work:
                 f"{stage} {task['name']}",
                 partial(_plans_asked, task),
                 self.asked.robot,
-                [
-                    item
-                    for problem in (task["problem"], task.get("allowed"))
-                    if problem is not None
-                    for item in problem.all_constraints
-                ],
+                _constraints_of(task),
             )
             for task in tasks
         ]
@@ -233,8 +228,10 @@ class Work:
         if self._executor is None:
             raise RuntimeError("there is no other process to send to")
         if kind == "move":
-            return self._executor.submit(_move_there, _move_asked(task))
-        return self._executor.submit(_plans_there, _plans_asked(task))
+            files = self._shelf.files(*task["arm"])
+            return self._executor.submit(_move_there, {**_move_asked(task), "files": files})
+        files = self._shelf.files(self.asked.robot, _constraints_of(task))
+        return self._executor.submit(_plans_there, {**_plans_asked(task), "files": files})
 
 
 def check_can_be_sent(costs: Sequence[Any]) -> None:
@@ -245,6 +242,12 @@ def check_can_be_sent(costs: Sequence[Any]) -> None:
                 f"cost '{cost.name}' is a function, which can neither be kept in a folder nor sent "
                 f"to another process; derive a class from selfmotion.Cost"
             )
+
+
+def _constraints_of(task: _Task) -> list[Constraint]:
+    """Return what the plans of a task have to keep, and their starts."""
+    problems = (task["problem"], task.get("allowed"))
+    return [item for problem in problems if problem for item in problem.all_constraints]
 
 
 def _number(data: bytes) -> int:
@@ -287,30 +290,24 @@ def _move_asked(task: _Task) -> dict[str, Any]:
     return {**task, "arm": describe_arm(*task["arm"]), "ends": task["ends"].tolist()}
 
 
-# Arms and bodies of tasks done before in this process; forgotten when there are many.
-_known: dict[str, Any] = {}
-_MANY = 64
+# Arms and bodies of tasks done before in this process.
+_made = Made()
 
 
 def _plans_there(task: _Task) -> tuple[list[bytes], str]:
     """Do a task in another process: plans as the bytes of their files."""
-    _forget()
+    known = _made.of(task["files"])
     problems = [name for name in ("problem", "allowed") if name in task]
-    made = {name: problem_from_dict(task[name], _known) for name in problems}
+    made = {name: problem_from_dict(task[name], known) for name in problems}
     found, reason = _plans_here({**task, **made})
     return [_packed(plan) for plan in found], reason
 
 
 def _move_there(task: _Task) -> tuple[bytes, str]:
-    _forget()
-    arm, ends = arm_and_constraints(task["arm"], _known), np.array(task["ends"])
+    known = _made.of(task["files"])
+    arm, ends = arm_and_constraints(task["arm"], known), np.array(task["ends"])
     move = _move_here({**task, "arm": arm, "ends": ends})
     return (b"" if move.trajectory is None else _packed(move)), move.trouble
-
-
-def _forget() -> None:
-    if len(_known) > _MANY:
-        _known.clear()
 
 
 def _packed(made: Plan | Move) -> bytes:

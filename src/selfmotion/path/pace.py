@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from selfmotion.basics import Array, Ints, series
 # Of samples within this share of a window the first is kept: the jerk of more would be rounding.
 _CLOSE = 0.1
 _SAME = 1e-4
+# A pace falls where its rate is below minus this share of the largest; it is looked at so often.
+_FALL, _PLACES = 1e-6, 33
 # Intervals of time are halved so often to find when something is reached.
 _HALVINGS = 52
 
@@ -48,8 +51,14 @@ class Pace:
         """Return the mean over a window in time [s]: its second derivative jumps no more.
 
         It rests before its start and after its end, and takes a window longer. From one bend to
-        another the third derivative is at most their difference by the window.
+        another the third derivative is at most their difference by the window. The mean of what
+        does not fall does not fall: where one through fewer samples would, it has them all.
         """
+        thinned = self._mean(window, _CLOSE)
+        return thinned if thinned.falls_at() is None else self._mean(window, _SAME)
+
+    def _mean(self, window: float, close: float) -> "Pace":
+        """Return the mean over a window, by samples no closer than this share of it."""
         from scipy.interpolate import CubicHermiteSpline
 
         t = np.concatenate([[-window], self.t, [self.t[-1] + window]])
@@ -58,7 +67,7 @@ class Pace:
         spline = CubicHermiteSpline(t, sigma, rate)
         way = spline.antiderivative()
         new = np.union1d(self.t, self.t + window)
-        new = new[np.unique(np.floor(new / (_CLOSE * window)), return_index=True)[1]]
+        new = new[np.unique(np.floor(new / (close * window)), return_index=True)[1]]
         # Two that rounding puts on both sides of such a share are one as well.
         new = new[np.append(True, np.diff(new) > _SAME * window)]
         new[-1] = self.t[-1] + window
@@ -76,6 +85,28 @@ class Pace:
             # Where a motion ends at rest it does so exactly.
             found = np.where(np.asarray(t) == self.t[-1], known[-1], found)
         return np.clip(found, self.sigma[0], self.sigma[-1]) if order == 0 else found
+
+    def falls_at(self) -> float | None:
+        """Return about when σ falls most, by more than rounding; None where it never does."""
+        h = np.diff(self.t)
+        # dσ/dt in Bernstein form: what its control points keep, all of it keeps.
+        coefficients = self._spline.c[::-1][1:]
+        degree = len(coefficients) - 1
+        powers = np.arange(degree + 1.0)
+        local = coefficients * (powers + 1.0)[:, None] * h ** powers[:, None]
+        points = _bernstein(degree) @ local
+        allowed = _FALL * max(float(np.max(self.rate)), self.sigma[-1] / self.t[-1])
+        late = np.flatnonzero(points.min(axis=0) < -allowed)
+        if not len(late):
+            return None
+        # Control points are below the curve: where they are, it is looked at.
+        u = np.linspace(0.0, 1.0, _PLACES)
+        rates = np.vander(u, degree + 1, increasing=True) @ local[:, late]
+        place, piece = np.unravel_index(int(np.argmin(rates)), rates.shape)
+        if rates[place, piece] >= -allowed:
+            return None
+        k = int(late[piece])
+        return float(self.t[k] + u[place] * h[k])
 
     def series(self, middle: Array, half: Array) -> Array:
         """Return the majorants of σ on intervals between samples, (K + 1, I)."""
@@ -100,6 +131,13 @@ class Pace:
             10.0 * rise - 4.0 * gain + surge,
         )
         return PPoly(np.stack([*higher, start, self.rate[:-1], self.sigma[:-1]]), self.t)
+
+
+@cache
+def _bernstein(degree: int) -> Array:
+    """Return what control points are of coefficients of 1, u, u² … on 0 ≤ u ≤ 1."""
+    size = degree + 1
+    return np.array([[comb(j, k) / comb(degree, k) for k in range(size)] for j in range(size)])
 
 
 def _times_along(places: Array, rates: Array) -> Array:

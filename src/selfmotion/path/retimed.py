@@ -1,5 +1,6 @@
 """A tool motion run through at another pace."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ _OWN = 1e-9
 class Retimed(_Derived, kind="retimed"):
     """The same geometric path at another pace: pose(t) is that of the original at σ(t).
 
-    σ is a Hermite spline, non-decreasing at its samples: cubic, or quintic with `bend`.
+    σ is a Hermite spline that does not fall, cubic, or quintic with `bend`.
 
     Parameters
     ----------
@@ -56,6 +57,12 @@ class Retimed(_Derived, kind="retimed"):
         if not (np.all(np.diff(numbers["t"]) > 0) and np.all(np.diff(numbers["sigma"]) >= 0)):
             raise PathError("retimed path: times must increase and σ must not fall")
         self._pace = Pace(**numbers)
+        back = self._pace.falls_at()
+        if back is not None:
+            raise PathError(
+                f"retimed path: σ falls between its samples near t = {back:.6g} s: rates there are "
+                f"too large for how far it goes; give more samples, or smaller rates"
+            )
         self.duration = float(self._pace.t[-1])
 
     @property
@@ -77,10 +84,23 @@ class Retimed(_Derived, kind="retimed"):
     @property
     def feeds(self) -> tuple[FeedKept, ...]:
         """See `Path.feeds`: those of the original, where it is run through at its own pace."""
+        # At its own pace, all the way from one sample of the pace to the next.
+        pace = self._pace
+        straight = np.abs(np.diff(pace.sigma) - np.diff(pace.t)) <= _OWN * np.diff(pace.t)
+        level = np.abs(pace.rate - 1.0) <= _OWN
+        if pace.bend is not None:
+            level &= np.abs(pace.bend) * np.gradient(pace.t) <= _OWN
+        others = ~(straight & level[:-1] & level[1:])
+        before = np.append(0, np.cumsum(others))
         found = []
         for item in self._path.feeds:
             t = self.when(item.t)
-            own = item.where(np.abs(self._pace(t, 1) - 1.0) <= _OWN)
+            k = np.clip(np.searchsorted(pace.t, t, side="right") - 1, 0, len(others) - 1)
+            # A time between two pieces is one of each.
+            at = np.isclose(t, pace.t[k], rtol=0.0, atol=_OWN * self.duration)
+            # Between two rows with another piece in between nothing is known.
+            apart = replace(item, rows=item.rows + before[k])
+            own = apart.where(~others[k] | (at & ~others[np.maximum(k - 1, 0)]))
             found += [own.timed(self.when)] if own else []
         return tuple(found)
 

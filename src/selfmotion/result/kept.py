@@ -1,7 +1,7 @@
 """What finished work is kept under: a digest of all that decides what comes of it."""
 
 import hashlib
-from collections.abc import Iterator, MutableMapping, Sequence
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,3 +40,24 @@ def _bodies(item: Constraint, robot: RobotModel) -> Iterator[Obstacle]:
 
 def _digest(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
+
+
+class Made(dict[str, Any]):
+    """Arms and bodies that this process made before, by their description; see `load_plan`.
+
+    Forgotten when there are many, or a file that they were made of is another.
+    """
+
+    _MANY = 64
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._files: dict[str, str] = {}
+
+    def of(self, files: Mapping[str, str]) -> "Made":
+        """Return itself, for work whose bodies are made of files with these digests."""
+        changed = any(self._files.get(name, digest) != digest for name, digest in files.items())
+        if changed or len(self) > self._MANY:
+            self.clear()
+        self._files.update(files)
+        return self
