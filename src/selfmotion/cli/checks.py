@@ -94,8 +94,5 @@ def of_program(file: Path, job: Path, within: sm.Tolerance | None, as_json: bool
             style = None if step.verified else "bold red"
             text = f"{step.name}: {step.verdict}"
             terminal.print(text, style=style, markup=False, soft_wrap=True)
-        count = sum(not step.verified for step in steps)
-        told = [*([f"{count} of {len(steps)} steps"] if count else []), *found.failures]
-        text = f"not verified: {'; '.join(told)}" if told else "verified: each step, and the whole"
-        terminal.print(text, markup=False, soft_wrap=True)
+        terminal.print(found.verdict, markup=False, soft_wrap=True)
     raise typer.Exit(VERIFIED if verified else NOT_VERIFIED)

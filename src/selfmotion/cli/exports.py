@@ -1,8 +1,10 @@
 """The command that writes motions for controllers and simulators."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
+import numpy as np
 import typer
 
 import selfmotion as sm
@@ -57,6 +59,10 @@ def export(
             "--parts has no effect on programs of controllers, which move all joints of a cell; "
             "leave it out, or give a file of another kind as well"
         )
+    if settings is not None and not any(_is_of_controller(target, form) for target in out):
+        raise sm.ProblemError(
+            "--settings has no effect: it is of controllers' programs (.script, .src, .mod)"
+        )
     asked = None if settings is None else sm.read_program_settings(settings)
     made: _Made
     if file.suffix == jobs.PROGRAM:
@@ -81,7 +87,8 @@ def export(
         if parts and isinstance(made, sm.Plan) and not _is_program(target, form):
             together = sm.write_parts(made, target, **given)
         with StageDisplay(stages) as display:
-            sm.write_motion(made, target, settings=asked, progress=display.stage, **given)
+            own = asked if _is_of_controller(target, form) else None
+            sm.write_motion(made, target, settings=own, progress=display.stage, **given)
         kept, verdicts[str(target)] = _read_back(made, target, form)
         sound &= kept
         if together:
@@ -110,6 +117,11 @@ def _is_program(target: Path, form: str | None) -> bool:
     return (form or formats.SUFFIXES.get(target.suffix.lower())) in formats.PROGRAMS.values()
 
 
+def _is_of_controller(target: Path, form: str | None) -> bool:
+    name = form or formats.SUFFIXES.get(target.suffix.lower())
+    return name == "urscript" or _is_program(target, form)
+
+
 def _is_readable(target: Path, form: str | None) -> bool:
     return form in formats.READABLE or (
         form is None and target.suffix.lower() not in (".xml", ".script")
@@ -120,11 +132,36 @@ def _read_back(made: _Made, target: Path, form: str | None) -> tuple[bool, str]:
     """Return whether what was written is still the motion, and what there is to say."""
     if _is_program(target, form) and target.suffix.lower() in formats.PROGRAMS:
         return _confirmed(made, target)
-    if not isinstance(made, sm.Plan):
-        return made.verified, made.verdict
     if not _is_readable(target, form):
-        return made.certificate.verified, ""
-    return _judged(made, sm.read_motion(target))
+        return _verified(made), ""
+    motion = sm.read_motion(target)
+    match made:
+        case sm.Plan():
+            return _judged(made, motion)
+        case sm.Move():
+            read = sm.Move(made.robot, made.constraints, motion.of_joints(made.robot.joint_names))
+            return read.verified and made.verified, f"read back: {read.verdict}"
+        case sm.Program():
+            found = formats.judged_motion(motion, made)
+            return found.verified, f"read back: {found.verdict}"
+    return _judged_parts(made, motion)
+
+
+def _judged_parts(made: sm.Parts, motion: sm.Trajectory) -> tuple[bool, str]:
+    """Return whether a motion is still that of parts, part by part and move by move."""
+    whole = motion.of_joints(made.robot.joint_names)
+    stops = np.append(made.begins, made.trajectory.duration)
+    plans, moves = [], []
+    for k, (plan, begin) in enumerate(zip(made.plans, made.begins, strict=True)):
+        end = begin + plan.trajectory.duration
+        read = replace(plan, trajectory=formats.part_of(whole, begin, end))
+        plans.append(replace(read, certificate=read.check()))
+        if k < len(made.moves):
+            after = stops[k + 1]
+            part = formats.part_of(whole, end, float(after))
+            moves.append(sm.Move(made.robot, made.moves[k].constraints, part))
+    found = replace(made, plans=tuple(plans), moves=tuple(moves))
+    return found.verified, f"read back: {found.verdict}"
 
 
 def _confirmed(made: _Made, target: Path) -> tuple[bool, str]:

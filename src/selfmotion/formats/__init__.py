@@ -13,7 +13,9 @@ from selfmotion.formats.example import example_text as example_text
 from selfmotion.formats.job import Job as Job
 from selfmotion.formats.joint_limits import read_joint_limits as read_joint_limits
 from selfmotion.formats.judged_programs import (
+    judged_motion as judged_motion,
     judged_program as judged_program,
+    part_of as part_of,
     stated_deviation as stated_deviation,
     what_targets_keep as what_targets_keep,
 )

@@ -1,7 +1,8 @@
 """Programs of controllers, judged by what they were made from."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path as FilePath
 from typing import NamedTuple
 
@@ -57,6 +58,15 @@ class JudgedProgram(NamedTuple):
         """Whether each step is, and nothing speaks against the whole."""
         return all(step.verified for step in self.steps) and not self.failures
 
+    @property
+    def verdict(self) -> str:
+        """One line: verified, or how many steps are not, and what speaks against the whole."""
+        if self.verified:
+            return "verified: each step, and the whole"
+        count = sum(not step.verified for step in self.steps)
+        told = [*([f"{count} of {len(self.steps)} steps"] if count else []), *self.failures]
+        return f"not verified: {'; '.join(told)}"
+
 
 def judged_program(file: FilePath, job: Program, within: Tolerance | None = None) -> JudgedProgram:
     """Judge a controller's program by the job that it is of: each step, and the whole.
@@ -73,24 +83,70 @@ def judged_program(file: FilePath, job: Program, within: Tolerance | None = None
     """
     program = read_program(file)
     within = within or stated_deviation(file)
-    found, pieces = list[JudgedStep](), list[Piece]()
-    for step, motion in zip(job.steps, _pieces(file, program, job), strict=True):
-        made = step.made
-        if isinstance(made, Move):
-            move = Move(made.robot, what_targets_keep(made.constraints), motion)
-            found.append(JudgedStep(step.name, move.verified, move.verdict))
-        else:
-            problem = replace(made.problem, constraints=what_targets_keep(made.problem.constraints))
-            certificate = problem.certify(motion, within or made.tolerance)
-            found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
-        pieces.append(Piece(f"'{step.name}'", motion))
+    motions = list(_pieces(file, program, job))
+    steps, pieces = _judged_steps(job, motions, within, what_targets_keep)
     failures = (
         *(f"the job itself: {text}" for text in job.failures),
         *gaps(job.robot, pieces),
         *_elsewhere(job, pieces),
         *_otherwise_switched(job, program.switches),
     )
-    return JudgedProgram(tuple(found), failures)
+    return JudgedProgram(steps, failures)
+
+
+def judged_motion(motion: Trajectory, job: Program) -> JudgedProgram:
+    """Judge a motion that was read by the job that it is of: each step, and the whole.
+
+    By all that the job asks for; its outputs are none of a motion's.
+
+    Raises
+    ------
+    FileFormatError
+        It is of other joints.
+    """
+    whole = motion.of_joints(job.robot.joint_names)
+    if abs(whole.duration - job.duration) > _MOMENT:
+        told = f"it lasts {whole.duration:.6g} s, the job {job.duration:.6g} s"
+        return JudgedProgram((), (told,))
+    ends = [*job.begins, job.duration]
+    motions = [part_of(whole, first, last) for first, last in pairwise(ends)]
+    steps, pieces = _judged_steps(job, motions, None, tuple)
+    failures = (
+        *(f"the job itself: {text}" for text in job.failures),
+        *gaps(job.robot, pieces),
+        *_elsewhere(job, pieces),
+    )
+    return JudgedProgram(steps, failures)
+
+
+def part_of(motion: Trajectory, first: float, last: float) -> Trajectory:
+    """Return what a motion is from one of its times to another [s], from t = 0 on."""
+    first, last = motion.t[0] + first, min(motion.t[0] + last, motion.t[-1])
+    inside = motion.t[(motion.t > first + _INSTANT) & (motion.t < last - _INSTANT)]
+    t = np.concatenate([[first], inside, [last]])
+    faster = None if motion.qdd is None else motion(t, 2)
+    return Trajectory(t - first, motion(t), motion(t, 1), motion.joint_names, faster)
+
+
+def _judged_steps(
+    job: Program,
+    motions: Sequence[Trajectory],
+    within: Tolerance | None,
+    kept: Callable[[Sequence[Constraint]], tuple[Constraint, ...]],
+) -> tuple[tuple[JudgedStep, ...], list[Piece]]:
+    """Return what certificates say of the motions of a job's steps, by what of it is `kept`."""
+    found, pieces = list[JudgedStep](), list[Piece]()
+    for step, motion in zip(job.steps, motions, strict=True):
+        made = step.made
+        if isinstance(made, Move):
+            move = Move(made.robot, kept(made.constraints), motion)
+            found.append(JudgedStep(step.name, move.verified, move.verdict))
+        else:
+            problem = replace(made.problem, constraints=kept(made.problem.constraints))
+            certificate = problem.certify(motion, within or made.tolerance)
+            found.append(JudgedStep(step.name, certificate.verified, certificate.verdict))
+        pieces.append(Piece(f"'{step.name}'", motion))
+    return tuple(found), pieces
 
 
 def _elsewhere(job: Program, pieces: Sequence[Piece]) -> Iterator[str]:
@@ -157,3 +213,5 @@ _MOMENT, _LEAST = 1e-4, 1e-6
 # Where a program begins and ends is written to so many digits [rad or m]; what it switches is
 # switched at a target, as near to its time [s].
 _DIGITS, _PROMPT = 1e-6, 1e-3
+# Times as near as this are one [s].
+_INSTANT = 1e-9
