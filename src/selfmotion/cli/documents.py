@@ -1,5 +1,7 @@
 """What the options of ``selfmotion plan`` say, as the table of a problem file."""
 
+import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -8,7 +10,8 @@ import typer
 
 import selfmotion as sm
 from selfmotion.cli import options
-from selfmotion.cli.app import stages
+from selfmotion.cli.app import plan_with_progress, stages
+from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.formats import (
     events_of,
     grid_documents,
@@ -23,6 +26,9 @@ from selfmotion.formats import (
 SUFFIXES = (".toml", ".json")
 # Costs and their first number, the weight that --cost may give.
 _WEIGHTS = ("weight", "mu")
+
+
+_LISTS = ("lock", "argument", "packages", "cost", "relax")
 
 
 @dataclass
@@ -46,6 +52,8 @@ class Shell:
     tool: str | None
     reference: str | None
     lock: list[str]
+    argument: list[str]
+    packages: list[Path]
     degree: int
     mu: float
     cost: list[str]
@@ -64,15 +72,22 @@ class Shell:
     def of(cls, context: typer.Context) -> "Shell":
         """Return what was typed, of a command that has all these options."""
         given = {field.name: context.params[field.name] for field in fields(cls)}
-        lists = {name: list(given[name] or []) for name in ("lock", "cost", "relax")}
+        lists = {name: list(given[name] or []) for name in _LISTS}
         return cls(**{**given, **lists})
 
     def document(self, robot: str, warm_start: sm.Plan | None) -> dict[str, Any]:
         """Return the table."""
-        held = options.locks(self.lock)
+        held, arguments = options.locks(self.lock), options.arguments(self.argument)
         # Loaded only where it decides what is meant.
         planar = self.task is None and _is_planar(
-            sm.load_robot(robot, self.tool, held, reference=self.reference)
+            sm.load_robot(
+                robot,
+                self.tool,
+                held,
+                reference=self.reference,
+                arguments=arguments,
+                packages=self.packages,
+            )
         )
         task = self.task or ("planar" if planar else "pose")
         normal = self.normal or ("z" if task.startswith("planar") else "x")
@@ -93,6 +108,10 @@ class Shell:
         }
         if self.joint_limits is not None:
             table["joint_limits"] = str(self.joint_limits)
+        if arguments:
+            table["robot"]["arguments"] = arguments
+        if self.packages:
+            table["robot"]["packages"] = [str(folder) for folder in self.packages]
         for name in ("tool", "reference"):
             if getattr(self, name) is not None:
                 table["robot"][name] = getattr(self, name)
@@ -191,6 +210,32 @@ def of_file(file: Path, settings: list[str], allow_code: bool) -> sm.Job:
         count = len(grid_documents(document))
         raise sm.ProblemError(f"{file}: grid has {count} problems: use `selfmotion batch`")
     return _with_settings(document, file, settings, allow_code)
+
+
+def first_that_runs(texts: Iterable[str], file: Path, job: bool) -> str:
+    """Return the first of several problem files whose motion is verified.
+
+    Raises
+    ------
+    ProblemError
+        None is; the last one's reason is told.
+    """
+    reason = ""
+    for text in texts:
+        document = tomllib.loads(text)
+        try:
+            if job:
+                with StageDisplay(stages) as display:
+                    program = seam_job_of(document, file).plan(progress=display.stage)
+                verified, reason = program.verified, program.verdict
+            else:
+                certificate = plan_with_progress(job_of(document, file).problem).certificate
+                verified, reason = certificate.verified, certificate.verdict
+        except sm.PlanError as error:
+            verified, reason = False, str(error)
+        if verified:
+            return text
+    raise sm.ProblemError(f"{file}: no example was found that this arm follows: {reason}")
 
 
 def seams_of_file(file: Path, settings: list[str], allow_code: bool) -> sm.SeamJob:

@@ -184,6 +184,18 @@ LockOption = Annotated[
     list[str] | None,
     typer.Option(help="Joint to hold: NAME=VALUE (rad or m). Repeatable."),
 ]
+ArgumentOption = Annotated[
+    list[str] | None,
+    typer.Option(help="Argument of a .xacro file: NAME=VALUE. Repeatable."),
+]
+PackagesOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        help="Folder with packages that a robot's file names (package://, $(find …)); by default "
+        "they are looked for around the file, and by AMENT_PREFIX_PATH and ROS_PACKAGE_PATH. "
+        "Repeatable."
+    ),
+]
 DegreesOption = Annotated[
     bool, typer.Option("--degrees", help="Angles of the motion are in degrees.")
 ]
@@ -264,6 +276,17 @@ def locks(texts: list[str]) -> dict[str, float]:
                 f"--lock is '{text}', expected NAME=VALUE like joint_7=0.5"
             ) from None
     return held
+
+
+def arguments(texts: list[str] | None) -> dict[str, str]:
+    """Return what --argument describes."""
+    found = {}
+    for text in texts or []:
+        name, mark, value = text.partition("=")
+        if not (name and mark):
+            raise sm.RobotError(f"--argument is '{text}', expected NAME=VALUE like prefix=left_")
+        found[name] = value
+    return found
 
 
 def refuse(given: dict[str, Any], file: Path | str, whose: str) -> None:

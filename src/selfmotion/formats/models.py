@@ -93,6 +93,7 @@ _ROBOT: _Fields = {
     **dict.fromkeys(("name", "file", "reference"), (Text, None)),
     **dict.fromkeys(("base", "tool_offset"), (Pose, None)),
     "tool": (Names, None),
+    "packages": (Names, None),
     "arguments": (Table, None),
     "lock": (Coordinates, None),
 }

@@ -97,6 +97,8 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
     if mounting.tool_offset is not None:
         position, rpy = mounting.tool_offset
         table["tool_offset"] = {"position": position, "rpy": rpy}
+    if robot.urdf.packages:
+        table["packages"] = list(robot.urdf.packages)
     if mounting.bodies:
         table["bodies"] = mounting.bodies
     _check_frames(robot)
@@ -130,6 +132,7 @@ def _check_unchanged(robot: RobotModel, tool: str) -> None:
         base={part.name: part.base for part in given if part.base is not None},
         on={part.name: part.on for part in given if part.on is not None},
         arguments={part.name: part.arguments for part in given},
+        packages=robot.urdf.packages,
     )
     if now.urdf.bare_text() != robot.urdf.bare_text():
         raise ProblemError(

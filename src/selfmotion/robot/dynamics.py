@@ -42,6 +42,7 @@ class Dynamics:
                 f"{robot.name}: joint torques are asked for, but its URDF gives no masses; add "
                 f"<inertial> to its links"
             )
+        _check_weighed(robot)
         if not (np.isfinite(payload) and payload >= 0.0):
             raise ProblemError(f"payload is {payload} kg, expected a number ≥ 0")
         where = np.asarray(center, dtype=np.float64)
@@ -116,6 +117,7 @@ class Energy:
     """
 
     def __init__(self, robot: RobotModel) -> None:
+        _check_weighed(robot)
         self._model, self._still = robot.model, robot.model.copy()
         self._still.gravity.setZero()
 
@@ -153,6 +155,13 @@ class Energy:
         return np.array(
             [pin.computeGeneralizedGravityDerivatives(self._model, data, x).copy() for x in q]
         )
+
+
+def _check_weighed(robot: RobotModel) -> None:
+    """Raise ProblemError where a link that moves has an ``<inertial>`` that lacks something."""
+    for said, link in robot.urdf.lacking_inertials.items():
+        if robot.carrier_of(link)[0] > 0:
+            raise ProblemError(f"{robot.name}: {said}; torques and energies need it: add it")
 
 
 def has_masses(robot: RobotModel) -> bool:
