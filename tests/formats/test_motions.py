@@ -139,7 +139,7 @@ def test_a_broken_file_is_no_longer_verified(plan: sm.Plan, tmp_path: Path) -> N
     file.write_text(yaml.dump(message))
     assert not plan.problem.certify(sm.read_motion(file), plan.tolerance).verified
     for change, said in (
-        (lambda m: m["points"][3].pop("velocities"), r"points\[3\]: 'velocities'"),
+        (lambda m: m["points"][3].pop("velocities"), r"points\[3\]: velocities are given for some"),
         (lambda m: m["points"][3]["positions"].pop(), r"points\[3\]: 6 positions"),
         (lambda m: m.pop("joint_names"), "has no joint_names and points"),
     ):

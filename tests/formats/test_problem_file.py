@@ -331,14 +331,24 @@ def test_a_path_from_a_file_is_run_up_to_its_speed(tmp_path: Path) -> None:
     file = tmp_path / "cell.toml"
     text = 'task = "position"\nrobot.name = "panda"\n[path]\nkind = "file"\nfile = "seam.csv"\n'
     file.write_text(text + "duration = 4\n")
-    seam = sm.read_problem(file).path
-    file.write_text(text + "duration = 4\nramp = 0.5\n")
+    usual = sm.read_problem(file).path
+    file.write_text(text + "duration = 4\nramp = 1\n")
     path = sm.read_problem(file).path
-    assert path.duration == pytest.approx(seam.duration + 0.5)
-    assert np.linalg.norm(seam.twist(0.0)[:3]) == pytest.approx(0.05)
+    # The ramps are part of the duration: 0.2 m in what is left but for half of each.
+    for each, speed in ((usual, 0.2 / 3.5), (path, 0.2 / 3.0)):
+        assert each.duration == pytest.approx(4.0)
+        assert not each.twist(0.0).any()
+        assert not each.twist(each.duration).any()
+        assert np.linalg.norm(each.twist(2.0)[:3]) == pytest.approx(speed)
+    (tmp_path / "seam.csv").write_text("t,x,y,z\n0,0.5,-0.1,0.4\n2,0.5,0.0,0.4\n4,0.5,0.1,0.4\n")
+    file.write_text(text)
+    timed = sm.read_problem(file).path
+    file.write_text(text + "ramp = 0.5\n")
+    path = sm.read_problem(file).path
+    assert path.duration == pytest.approx(timed.duration + 0.5)
+    assert np.linalg.norm(timed.twist(0.0)[:3]) == pytest.approx(0.05)
     assert not path.twist(0.0).any()
-    assert not path.twist(path.duration).any()
-    np.testing.assert_allclose(path.twist(1.0), seam.twist(0.75), atol=1e-12)
+    np.testing.assert_allclose(path.twist(1.0), timed.twist(0.75), atol=1e-12)
 
 
 def test_a_seam_is_woven_as_a_file_says(tmp_path: Path) -> None:

@@ -29,8 +29,6 @@ from selfmotion.basics.files import (
     as_path as as_path,
     read_archive as read_archive,
     read_arrays as read_arrays,
-    read_rows as read_rows,
-    read_table as read_table,
     write_archive as write_archive,
     write_atomically as write_atomically,
     write_bytes as write_bytes,
@@ -58,4 +56,9 @@ from selfmotion.basics.jit import called as called, inlined as inlined, kernel a
 from selfmotion.basics.names import nearest as nearest
 from selfmotion.basics.progress import Progress as Progress, silent as silent
 from selfmotion.basics.saved import Saved as Saved, is_known as is_known, restore as restore
+from selfmotion.basics.tables import (
+    LEFT_OUT as LEFT_OUT,
+    read_rows as read_rows,
+    read_table as read_table,
+)
 from selfmotion.basics.threads import one_blas_thread as one_blas_thread

@@ -43,6 +43,12 @@ class Shell:
     feed: float | None
     jump: float | None
     seam: str | None
+    columns: str | None
+    flip_normals: bool
+    standoff: float | None
+    rotary: str | None
+    rotary_axes: str | None
+    rotary_center: str | None
     frame: str | None
     ramp: float | None
     corners: str
@@ -130,16 +136,25 @@ class Shell:
             raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
         if self.path is not None:
             given = {
-                name: getattr(self, name) for name in ("seam", "feed", "duration", "jump", "ramp")
+                name: getattr(self, name)
+                for name in ("seam", "feed", "duration", "jump", "ramp", "standoff")
             }
+            given["columns"] = None if self.columns is None else self.columns.split(",")
+            given["flip_normals"] = self.flip_normals or None
+            given |= {"rotary": self.rotary, "rotary_axes": self.rotary_axes}
+            if self.rotary_center is not None:
+                center = options.numbers(self.rotary_center, "--rotary-center", 3)
+                given["rotary_center"] = center.tolist()
             given["tolerance"] = self.corner_tolerance
             frame = {} if self.frame is None else {"frame": options.pose(self.frame, "--frame")}
             return {"kind": "file", "file": str(self.path), "corners": self.corners, **frame} | {
                 key: value for key, value in given.items() if value is not None
             }
-        if any(option is not None for option in (self.frame, self.ramp, self.seam)):
+        of_files = (self.frame, self.ramp, self.seam, self.columns, self.standoff, self.rotary)
+        if self.flip_normals or any(option is not None for option in of_files):
             raise sm.ProblemError(
-                "--frame, --ramp and --seam are for --path; a shape is one, and rests at its ends"
+                "--frame, --ramp, --seam, --columns, --standoff, --rotary and --flip-normals are "
+                "for --path; a shape is one, and rests at its ends"
             )
         if self.feed is not None and self.duration is not None:
             raise sm.ProblemError("give the pace by one of --feed and --duration")
@@ -264,7 +279,7 @@ def _tell_left_out(document: dict[str, Any], file: Path | None) -> None:
     path = document.get("path")
     if not (isinstance(path, dict) and path.get("kind") == "file"):
         return
-    events = events_of((file.parent if file else Path()) / str(path.get("file")), path.get("seam"))
+    events = events_of((file.parent if file else Path()) / str(path.get("file")), path)
     if events:
         verb = "are" if len(events) > 1 else "is"
         text = f"note: {', '.join(events)} {verb} left out: `selfmotion job` keeps what happens"

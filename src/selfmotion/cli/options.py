@@ -12,6 +12,7 @@ from selfmotion.basics import TURN, Array
 
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
 Corners = Literal["blend", "stop", "round"]
+Rotary = Literal["head", "table"]
 Axis = Literal["x", "y", "z"]
 SearchMode = Literal["auto", "local", "global"]
 
@@ -55,6 +56,35 @@ JumpOption = Annotated[
 ]
 SeamOption = Annotated[
     str | None, typer.Option(help="Which seam or cut of --path, where it has several.")
+]
+ColumnsOption = Annotated[
+    str | None,
+    typer.Option(help="Names of the columns of --path, where it has no header: x,y,z,nx,ny,nz."),
+]
+FlipOption = Annotated[
+    bool,
+    typer.Option("--flip-normals", help="Normals of --path point out of the part, as CAD's do."),
+]
+StandoffOption = Annotated[
+    float | None,
+    typer.Option(help="Distance from the poses of --path, back along the tool's z axis (m)."),
+]
+RotaryOption = Annotated[
+    Rotary | None,
+    typer.Option(
+        help="What A, B, C of G-code without G43.4 turn: the head (positions are the tip's), or a "
+        "table, with its axes and centre."
+    ),
+]
+RotaryAxesOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Axes of a rotary table from the machine to the part: BC, AC, or B,-C where C turns "
+        "the table right-handed."
+    ),
+]
+RotaryCenterOption = Annotated[
+    str | None, typer.Option(help="A point x,y,z (m) on the axes of a rotary table.")
 ]
 FrameOption = Annotated[
     str | None,

@@ -65,7 +65,9 @@ duration = 4.0
 # kind = "file"        # CSV, ROS Path or PoseArray, NumPy
 # file = "seam.csv"
 # feed = 0.05          # m/s, where the file has no times
-# ramp = 0.5           # s, in which it is run up to that from rest, and down again
+# flip_normals = true  # where nx,ny,nz point out of the part
+# standoff_mm = 5      # held back along the tool's axis
+# ramp = 0.5           # s, in which it is run up from rest, and down again, where it has times
 # frame = {{ position = [0.5, 0, 0.2], rpy_deg = [0, 0, 0] }}  # of the workpiece
 
 """

@@ -124,6 +124,12 @@ _PATH_FILE: _Fields = {
     **dict.fromkeys(("tolerance", "corner_angle"), (Number, None)),
     "corners": (Text, None),
     "seam": (Text, None),
+    "columns": (Names, None),
+    "flip_normals": (Flag, False),
+    "standoff": (Number, None),
+    "rotary": (Text, None),
+    "rotary_axes": (Names, None),
+    "rotary_center": (Numbers, None),
     **_BOUNDS,
     **_WOVEN,
 }
