@@ -25,6 +25,7 @@ from selfmotion.formats.motions import (
     read_motion as read_motion,
     write_motion as write_motion,
 )
+from selfmotion.formats.moving_ends import moving_ends as moving_ends
 from selfmotion.formats.overrides import (
     grid_documents as grid_documents,
     parse_setting as parse_setting,

@@ -15,6 +15,8 @@ from selfmotion.formats.samples import MotionSamples
 from selfmotion.motion import Trajectory
 
 _NANO = 1_000_000_000
+# At its ends a motion that is slower than this rests [rad/s or m/s].
+_REST = 1e-6
 # Where positions are joined by straight lines, a corner takes this share of the time to the next.
 _CORNER = 1e-3
 
@@ -22,7 +24,12 @@ _CORNER = 1e-3
 def joint_trajectory(motion: MotionSamples) -> dict[str, Any]:
     """Return a JointTrajectory; its stamp is 0, which means: at once."""
     points = []
-    for t, q, qd, qdd in zip(motion.t, motion.q, motion.qd, motion.qdd, strict=True):
+    rates = motion.qd.copy()
+    for row in (0, -1):
+        # Controllers want a 0 there, and refuse 1e-7.
+        if np.abs(rates[row]).max() <= _REST:
+            rates[row] = 0.0
+    for t, q, qd, qdd in zip(motion.t, motion.q, rates, motion.qdd, strict=True):
         sec, nanosec = divmod(round(float(t) * _NANO), _NANO)
         points.append(
             {
