@@ -172,7 +172,8 @@ def test_a_motion_that_begins_or_ends_moving_is_written_nowhere_unforced(tmp_pat
         assert text.startswith("nothing is written: joint '")
     sm.write_motion(plan, tmp_path / "a.yaml", force=True)
     # Not where the problem asks for it, nor at rest.
-    for asked in ({"rest": False}, {"constraints": [sm.ClosedPath()]}):
+    ends = [sm.StartVelocity(plan.trajectory.qd[0]), sm.EndVelocity(plan.trajectory.qd[-1])]
+    for asked in ({"rest": False}, {"constraints": ends}):
         sm.write_motion(replace(plan, problem=replace(problem, **asked)), tmp_path / "b.yaml")
     resting = sm.plan(replace(problem, path=sm.section_at_rest(moving)), max_evaluations=2)
     sm.write_motion(resting, tmp_path / "c.yaml")
