@@ -18,6 +18,7 @@ from selfmotion.robot import (
     TOOL_JOINT,
     RobotModel,
     UrdfPart,
+    follower_of,
     load_robot,
     mounting_of,
     moving_joints,
@@ -145,7 +146,7 @@ def _check_frames(robot: RobotModel) -> None:
     """Refuse an arm that was loaded for other frames than those it follows paths with."""
     offset = robot.urdf.joints.get(TOOL_JOINT)
     moving = moving_joints(robot.urdf, robot.tools, robot.reference)
-    free = {joint.name for joint in moving} - set(robot.locked)
+    free = {follower_of(robot.urdf, joint.name).joint for joint in moving} - set(robot.locked)
     if free != set(robot.joint_names) or (offset is not None and offset.child != robot.tool):
         raise ProblemError(
             f"{robot.name}: was loaded for other frames, so that its joints or its tool_offset "

@@ -65,7 +65,7 @@ def look(
     failed = -1
     (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
     tips = layout.shape[0]
-    turns, places = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    turns, places = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
     rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
     jacobians = np.zeros((tips, 6, n))
     system, factor, b = np.empty((n, n)), np.empty((n, n)), np.empty(n)
@@ -221,7 +221,7 @@ def follow(
     the first one that is not to be had, or -1.
     """
     (count, n), m, tips = q.shape, rows_of(layout), layout.shape[0]
-    turns, places = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    turns, places = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
     rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
     jacobians = np.zeros((tips, 6, n))
     rows, factor, b = np.empty((m, n)), np.empty((m, m)), np.empty(m)
