@@ -80,3 +80,65 @@ def reaching_arm() -> str:
         '<origin xyz="0 0 -0.0615" rpy="3.1416 0 0"/></joint></robot>'
     )
     return "\n".join(found)
+
+
+_MASS = '<inertial><origin xyz="{x} 0.01 0.02"/><mass value="{mass}"/><inertia ixx="0.01" ixy="0" \
+ixz="0.001" iyy="0.02" iyz="0" izz="0.015"/></inertial>'
+_BODY = '<collision><geometry><sphere radius="0.03"/></geometry></collision>'
+
+
+def finger(
+    limits: str = 'velocity="2" effort="5"',
+    mimic: str = 'multiplier="-1"',
+    telescope: bool = False,
+) -> str:
+    """Return an arm whose fourth joint mimics the third; or one that slides, by 0.4 q3 + 0.05."""
+    kind = "revolute" if "lower" in limits else "continuous"
+    axis = "0 1 0"
+    if telescope:
+        kind, axis = "prismatic", "1 0 0"
+        limits, mimic = f'lower="-1" upper="1" {limits}', 'multiplier="0.4" offset="0.05"'
+    joints = [
+        ("j1", "revolute", "0 0 0.3", "0 0 1", ""),
+        ("j2", "revolute", "0 0 0.1", "0 1 0", ""),
+        ("j3", "revolute", "0.3 0 0", "0 1 0", ""),
+        ("j4", kind, "0.3 0 0", axis, f'<mimic joint="j3" {mimic}/>'),
+        ("j5", "revolute", "0.1 0 0", "1 0 0", ""),
+    ]
+    found = ['<robot name="finger"><link name="l0"/>']
+    for k, (name, own, xyz, along, more) in enumerate(joints, 1):
+        bound = limits if name == "j4" else 'lower="-2" upper="2" velocity="2" effort="5"'
+        weight = _MASS.format(x=0.05 * k, mass=0.5 + 0.1 * k)
+        found.append(
+            f'<link name="l{k}">{weight}{_BODY if k in (2, 5) else ""}</link>'
+            f'<joint name="{name}" type="{own}"><parent link="l{k - 1}"/><child link="l{k}"/>'
+            f'<origin xyz="{xyz}"/><axis xyz="{along}"/><limit {bound}/>{more}</joint>'
+        )
+    found.append(
+        '<link name="tip"/><joint name="f" type="fixed"><parent link="l5"/><child link="tip"/>'
+        '<origin xyz="0.1 0 0"/></joint></robot>'
+    )
+    return "\n".join(found)
+
+
+def torso() -> str:
+    """Return two arms of seven joints on two joints that turn alike."""
+    limit = '<limit lower="-2.9" upper="2.9" velocity="2" effort="100"/>'
+    found = ['<robot name="torso"><link name="l0"/>']
+    for name, link, more in (("t1", "b1", ""), ("t2", "b2", '<mimic joint="t1"/>')):
+        found.append(
+            f'<link name="{link}"/><joint name="{name}" type="revolute"><parent link="l0"/>'
+            f'<child link="{link}"/><origin xyz="0 0 0.8"/><axis xyz="0 0 1"/>{limit}{more}</joint>'
+        )
+    for side, base, y in (("left", "b1", 0.25), ("right", "b2", -0.25)):
+        for k in range(1, 8):
+            parent, xyz = (base, f"0.1 {y} 0") if k == 1 else (f"{side}{k - 1}", "0.15 0 0")
+            weight = _MASS.format(x=0.07, mass=1.0)
+            found.append(
+                f'<link name="{side}{k}">{weight}{_BODY if k in (3, 7) else ""}</link>'
+                f'<joint name="{side}_j{k}" type="revolute"><parent link="{parent}"/>'
+                f'<child link="{side}{k}"/><origin xyz="{xyz}"/>'
+                f'<axis xyz="{"0 1 0" if k % 2 else "0 0 1"}"/>'
+                f'<limit lower="-2.8" upper="2.8" velocity="2" effort="50"/></joint>'
+            )
+    return "\n".join([*found, "</robot>"])

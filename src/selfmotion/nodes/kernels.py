@@ -14,6 +14,7 @@ import numpy as np
 from selfmotion.basics import Array, inlined, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels import (
+    Every,
     Tip,
     approach,
     cholesky,
@@ -186,6 +187,7 @@ def pull(
     no_error: Array,
     bases: Array,
     tangents: Array,
+    every: Every | None,
     out: Array,
 ) -> None:
     """Set `out` (K, 2 r) to the derivatives by (z, ν) of what has these by q and q̇ (K, n) each."""
@@ -195,7 +197,17 @@ def pull(
         for j in range(n):
             space.w[j], space.by_q[j] = by_qd[k, j], by_q[k, j]
         pull_stage(
-            table[k], n, layout, 0.0, None, space, no_error, space.by_epsilon, space.by_target
+            table[k],
+            n,
+            layout,
+            0.0,
+            None,
+            every,
+            k,
+            space,
+            no_error,
+            space.by_epsilon,
+            space.by_target,
         )
         for x in range(r):
             along, free = 0.0, 0.0

@@ -100,10 +100,9 @@ def _free_joints(
                 f"{urdf.source}: joint '{joint.name}' is {joint.kind}; an arm's joints are "
                 f"revolute, continuous or prismatic"
             )
-    moved = [followers[joint.name] for joint in chain if joint.name not in lock]
-    free = list(
-        dict.fromkeys(item.joint for item in moved if item.scale and item.joint not in lock)
-    )
+    by_them = [followers[joint.name] for joint in chain if joint.name not in lock]
+    moving = dict.fromkeys(item.joint for item in by_them if item.scale != 0.0)
+    free = [name for name in moving if name not in lock]
     for name in lock:
         by = followers[name].joint
         if by != name and by in free and followers[name].scale:

@@ -278,6 +278,22 @@ class Chain:
         return np.array([joint - 1 for joint, _ in self._passed], dtype=np.int64)
 
     @cached_property
+    def is_coupled(self) -> bool:
+        """Whether joints of the chain share a coordinate."""
+        return len(self.joints) < len(self.model_joints)
+
+    def every_along(self, q: Array) -> Array:
+        """Return the columns of the tip's Jacobian by the model's joints at q (K, n), (K, 6, N).
+
+        Each times its scale, so that those of a coordinate add up to its column.
+        """
+        return self._uncoupled.along(self.coupling.spread(q))[0] * self.coupling.scales
+
+    @cached_property
+    def _uncoupled(self) -> "Chain":
+        return Chain(self.model, self.tip, self.base)
+
+    @cached_property
     def signs(self) -> Array:
         """1 for joints that move the tip, -1 for those that move the base, 0 for both or none.
 
