@@ -85,6 +85,7 @@ def test_no_option_is_left_without_an_effect(plan: Path) -> None:
     (command,) = (item for item in app.registered_commands if item.callback is commands.check)
     names = set(inspect.signature(command.callback).parameters) - {"file", "as_json"}
     refused = {"robot", "path", "feed", "corners", "task", "tool", "reference", "lock", "degrees"}
+    refused |= {"argument", "packages"}
     judged = {"velocity", "acceleration", "joint_limits", "obstacles", "clearance", "srdf"}
     assert names == refused | judged | {"tolerance"}
 

@@ -5,6 +5,7 @@ import csv
 import json
 import re
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +140,7 @@ def test_a_broken_file_is_no_longer_verified(plan: sm.Plan, tmp_path: Path) -> N
     file.write_text(yaml.dump(message))
     assert not plan.problem.certify(sm.read_motion(file), plan.tolerance).verified
     for change, said in (
-        (lambda m: m["points"][3].pop("velocities"), r"points\[3\]: 'velocities'"),
+        (lambda m: m["points"][3].pop("velocities"), r"points\[3\]: velocities are given for some"),
         (lambda m: m["points"][3]["positions"].pop(), r"points\[3\]: 6 positions"),
         (lambda m: m.pop("joint_names"), "has no joint_names and points"),
     ):
@@ -148,6 +149,36 @@ def test_a_broken_file_is_no_longer_verified(plan: sm.Plan, tmp_path: Path) -> N
         file.write_text(yaml.dump(broken))
         with pytest.raises(sm.FileFormatError, match=said):
             sm.read_motion(file)
+
+
+def test_a_motion_that_begins_or_ends_moving_is_written_nowhere_unforced(tmp_path: Path) -> None:
+    robot = robot_named("panda")
+    q = robot.dexterous_configuration()
+    first = robot.pose(q)
+    goal = pin.SE3(first.rotation, first.translation + np.array([0.0, 0.05, 0.0]))
+    moving = sm.Line(first, goal, 2.0, time_law="constant")
+    problem = sm.Problem(robot, moving, "position", q)
+    plan = sm.plan(problem, max_evaluations=2)
+    assert plan.certificate.verified, plan.certificate.verdict
+    plan.save(tmp_path / "plan.npz")
+    for name in ("a.yaml", "a.csv", "a.json", "a.npz", "a.xml", "a.src", "a.script"):
+        with pytest.raises(
+            sm.PlanError, match=r"joint '\w+' begins at .* rad/s at t = 0 s.*--ramp"
+        ):
+            sm.write_motion(plan, tmp_path / name)
+        assert not (tmp_path / name).exists()
+        code, text = invoke("export", tmp_path / "plan.npz", "--out", tmp_path / name)
+        assert code == 1
+        assert text.startswith("nothing is written: joint '")
+    sm.write_motion(plan, tmp_path / "a.yaml", force=True)
+    # Not where the problem asks for it, nor at rest.
+    ends = [sm.StartVelocity(plan.trajectory.qd[0]), sm.EndVelocity(plan.trajectory.qd[-1])]
+    for asked in ({"rest": False}, {"constraints": ends}):
+        sm.write_motion(replace(plan, problem=replace(problem, **asked)), tmp_path / "b.yaml")
+    resting = sm.plan(replace(problem, path=sm.section_at_rest(moving)), max_evaluations=2)
+    sm.write_motion(resting, tmp_path / "c.yaml")
+    for point in (load((tmp_path / "c.yaml").read_text())["points"][k] for k in (0, -1)):
+        assert set(point["velocities"]) == {0.0}
 
 
 def simulated(robot: sm.RobotModel, keys: Path) -> mujoco.MjModel:

@@ -104,7 +104,9 @@ def test_arrays(poses: list[pin.SE3], tmp_path: Path) -> None:
     for array in (values, np.array([pose.homogeneous for pose in poses])):
         np.save(file, array)
         path = sm.read_path(file, duration=2.0)
-        for t, pose in zip(path.waypoint_times, poses, strict=True):
+        assert path.duration == pytest.approx(2.0)
+        assert not path.samples([0.0, 2.0]).twist.any()
+        for t, pose in ((0.0, poses[0]), (2.0, poses[-1])):
             np.testing.assert_allclose(path.pose(t).homogeneous, pose.homogeneous, atol=ROUNDING)
 
 
@@ -229,11 +231,22 @@ MALFORMED: list[tuple[str, str, str, str]] = [
     ("a.csv", csv(FIRST, FIRST, header=RPY), "--feed 1", "line 4: the tool does not move from the"),
     ("a.csv", csv(*GOOD), "--feed 0.1", "has times, so that --feed has no effect"),
     ("a.csv", csv(*GOOD), "--frame 1,2", "--frame has 2 numbers, expected 6"),
-    ("a.csv", "t x y z\n0 0 0 0\n", "", "unknown column 't x y z'"),
+    ("a.csv", "t x y q\n0 0 0 0\n", "", "unknown column 'q'"),
+    ("a.csv", "0,0.4,0,0.4\n1,0.4,0.1,0.4\n", "", "line 1: has no header, only numbers; add t,x"),
+    ("a.csv", csv("0,4,0,0,0,3", header="x,y,z"), "--feed 0.1", "are these decimal commas?"),
+    ("a.csv", csv("0.4,0,0,0,0,1", header="x,y,z,i,j,k"), "--feed 0.1", "and say --flip-normals"),
+    ("a.csv", csv("0.4,0,0", header="x,y,z"), "--feed 0.1 --columns x,y", "line 3 has 3 values"),
+    ("a.csv", csv("0.4,0,0", "0.4,0,1e-1", header="x,y,z"), "--feed 0.1 --flip-normals",
+     "--flip-normals has no effect"),
+    ("a.csv", csv("0.4,0,0", "0.4,0,1e-1", header="x,y,z"), "--feed 0.1 --standoff 0.01",
+     "--standoff is along the tool's z axis"),
+    ("a.yaml", "{}", "--columns x,y,z", "--columns has no effect"),
+    ("a.csv", csv("0.4,0,0", header="x,y,z"), "--rotary head", "--rotary has no effect"),
     ("a.step", "", "", "has suffix '.step', expected one of .csv"),
     ("a.npy", "no array", "", "cannot be read as a NumPy array"),
     ("a.json", "{", "", "is not JSON"),
-    ("a.json", "[]", "", "holds a list, expected a table"),
+    ("a.json", "[]", "", "holds no message with poses"),
+    ("a.json", "[{}]", "", "has no list of poses"),
     ("a.json", "{}", "", "has no list of poses, expected a nav_msgs/Path"),
     ("a.yaml", "poses: [", "", "is not YAML"),
     ("a.yaml", "poses: []", "", "has no list of poses"),

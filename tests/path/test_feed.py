@@ -170,7 +170,7 @@ def test_a_seam_at_a_feed_is_planned_and_verified(panda: sm.RobotModel) -> None:
     ("make", "message"),
     [
         (lambda: sm.Polyline([[0, 0, 0]]), "shape (1, 3), expected (N, 3) with N ≥ 2"),
-        (lambda: sm.Polyline([[0, 0, 0]] * 2), "poses[0] and poses[1] are the same"),
+        (lambda: sm.Polyline([[0, 0, 0]] * 2), "all 2 poses are the same"),
         (lambda: sm.Polyline([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0]]), "quaternions have shape"),
         (
             lambda: sm.Polyline([[0, 0, 0], [1, 0, 0], [0, 0, 0]]),

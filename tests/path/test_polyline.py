@@ -63,8 +63,8 @@ def test_orientation_kinks_and_both_ends_come_to_rest() -> None:
 
 def test_corners_that_meet_share_a_knot() -> None:
     """Steps of microseconds between them would turn rounding into accelerations."""
-    places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1e-3, 0.0], [3.0, 3e-3, 0.0]])
-    places = np.vstack([places, [4.0000113, 6e-3, 0.0], [5.0, 1e-2, 0.0]])
+    places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1e-2, 0.0], [3.0, 3e-2, 0.0]])
+    places = np.vstack([places, [4.0000113, 6e-2, 0.0], [5.0, 1e-1, 0.0]])
     path = sm.Polyline(places, tolerance=0.5)
     gaps = np.diff(path.knots)
     assert gaps.min() > 0.1

@@ -30,8 +30,6 @@ from selfmotion.basics.files import (
     as_path as as_path,
     read_archive as read_archive,
     read_arrays as read_arrays,
-    read_rows as read_rows,
-    read_table as read_table,
     write_archive as write_archive,
     write_atomically as write_atomically,
     write_bytes as write_bytes,
@@ -63,5 +61,10 @@ from selfmotion.basics.saved import (
     description_of as description_of,
     is_known as is_known,
     restore as restore,
+)
+from selfmotion.basics.tables import (
+    LEFT_OUT as LEFT_OUT,
+    read_rows as read_rows,
+    read_table as read_table,
 )
 from selfmotion.basics.threads import one_blas_thread as one_blas_thread

@@ -50,12 +50,14 @@ def jacobians(chain: Chain, q: Array) -> tuple[Array, Array]:
     placed = [data.oMf[frame] for frame in frames]
     # Views of what each placement sets.
     seen = [(pose.rotation, pose.translation) for pose in placed]
-    for k, configuration in enumerate(q):
+    coupling = chain.coupling
+    for k, configuration in enumerate(q @ coupling.matrix.T + coupling.offsets):
         pin.computeJointJacobians(model, data, configuration)
         for f, frame in enumerate(frames):
             pin.updateFramePlacement(model, data, frame)
             world[f, k] = pin.getFrameJacobian(model, data, frame, _AXES).reshape(6, -1)
             turns[f, k], places[f, k] = seen[f]
+    world = world @ coupling.matrix
     if chain.base == WORLD:
         return world[0], turns[0]
     own, other = world
@@ -76,7 +78,7 @@ def poses(chain: Chain, q: Array) -> tuple[Array, Array]:
     rotation, translation = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
     pose = data.oMf[tip]
     seen_rotation, seen_translation = pose.rotation, pose.translation
-    for k, configuration in enumerate(q):
+    for k, configuration in enumerate(q @ chain.coupling.matrix.T + chain.coupling.offsets):
         pin.forwardKinematics(model, data, configuration)
         pin.updateFramePlacement(model, data, tip)
         rotation[k], translation[k] = seen_rotation, seen_translation

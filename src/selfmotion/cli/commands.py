@@ -37,6 +37,12 @@ def plan(
     feed: options.FeedOption = None,
     jump: options.JumpOption = None,
     seam: options.SeamOption = None,
+    columns: options.ColumnsOption = None,
+    flip_normals: options.FlipOption = False,
+    standoff: options.StandoffOption = None,
+    rotary: options.RotaryOption = None,
+    rotary_axes: options.RotaryAxesOption = None,
+    rotary_center: options.RotaryCenterOption = None,
     frame: options.FrameOption = None,
     ramp: options.RampOption = None,
     corners: options.CornersOption = "blend",
@@ -48,6 +54,8 @@ def plan(
     tool: options.ToolOption = None,
     reference: options.ReferenceOption = None,
     lock: options.LockOption = None,
+    argument: options.ArgumentOption = None,
+    packages: options.PackagesOption = None,
     degree: options.DegreeOption = 3,
     mu: options.MuOption = 0.0,
     cost: options.CostOption = None,
@@ -102,17 +110,32 @@ def init(
     ],
     out: Annotated[Path | None, typer.Option(help="File; by default ROBOT.toml.")] = None,
     tool: options.ToolOption = None,
+    lock: options.LockOption = None,
+    argument: options.ArgumentOption = None,
+    packages: options.PackagesOption = None,
     job: Annotated[bool, typer.Option("--job", help="Of many seams: selfmotion job FILE.")] = False,
     positioner: Annotated[
         bool, typer.Option("--positioner", help="Of a cell: a table that tilts and turns as well.")
     ] = False,
+    no_collision: options.NoCollisionOption = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file.")] = False,
 ) -> None:
-    """Write a commented problem file to begin with."""
+    """Write a commented problem file to begin with; of an arm from a file, one that was planned."""
     file = Path(f"{Path(robot).stem}.toml") if out is None else out
-    text = formats.example_text(robot, file, tool=tool, job=job, positioner=positioner)
     if file.exists() and not force:
         raise sm.FileFormatError(f"{file}: is there already; give --out or --force")
+    texts = formats.example_texts(
+        robot,
+        file,
+        tool=tool,
+        job=job,
+        positioner=positioner,
+        lock=options.locks(lock or []),
+        arguments=options.arguments(argument),
+        packages=packages or (),
+        collision=not no_collision,
+    )
+    text = next(texts) if robot in sm.NAMED_ARMS else documents.first_that_runs(texts, file, job)
     write_text(file, text)
     terminal.print(f"wrote {file}", markup=False, soft_wrap=True)
 
@@ -143,6 +166,8 @@ def check(
     tool: options.ToolOption = None,
     reference: options.ReferenceOption = None,
     lock: options.LockOption = None,
+    argument: options.ArgumentOption = None,
+    packages: options.PackagesOption = None,
     degrees: options.DegreesOption = False,
     velocity: options.VelocityOption = None,
     acceleration: options.AccelerationOption = None,
@@ -158,6 +183,7 @@ def check(
     within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
     own: dict[str, Any] = {"path": path, "feed": feed, "corners": corners, "task": task}
     own |= {"tool": tool, "reference": reference, "lock": lock or None}
+    own |= {"argument": argument or None, "packages": packages or None}
     if file.suffix == jobs.PROGRAM:
         given = own | {"robot": robot, "degrees": degrees or None, "tolerance": tolerance}
         options.refuse(given | {"limits": any(judged) or None}, file, "the program's")
@@ -188,7 +214,14 @@ def check(
                     f"--path, or a problem file as --robot (a job's .program for its program)"
                 )
             held = options.locks(lock or [])
-            arm = sm.load_robot(robot, tool=tool, lock=held, reference=reference)
+            arm = sm.load_robot(
+                robot,
+                tool=tool,
+                lock=held,
+                reference=reference,
+                arguments=options.arguments(argument),
+                packages=packages or (),
+            )
             motion, stated = checks.read(file, degrees, within)
             asked = options.requirements(arm, *judged)
             followed = formats.read_path(path, feed=feed, corners=corners or "blend")

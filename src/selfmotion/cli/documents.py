@@ -1,5 +1,7 @@
 """What the options of ``selfmotion plan`` say, as the table of a problem file."""
 
+import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -8,7 +10,8 @@ import typer
 
 import selfmotion as sm
 from selfmotion.cli import options
-from selfmotion.cli.app import stages
+from selfmotion.cli.app import plan_with_progress, stages
+from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.formats import (
     events_of,
     grid_documents,
@@ -25,6 +28,9 @@ SUFFIXES = (".toml", ".json")
 _WEIGHTS = ("weight", "mu")
 
 
+_LISTS = ("lock", "argument", "packages", "cost", "relax")
+
+
 @dataclass
 class Shell:
     """The options, as typed."""
@@ -37,6 +43,12 @@ class Shell:
     feed: float | None
     jump: float | None
     seam: str | None
+    columns: str | None
+    flip_normals: bool
+    standoff: float | None
+    rotary: str | None
+    rotary_axes: str | None
+    rotary_center: str | None
     frame: str | None
     ramp: float | None
     corners: str
@@ -46,6 +58,8 @@ class Shell:
     tool: str | None
     reference: str | None
     lock: list[str]
+    argument: list[str]
+    packages: list[Path]
     degree: int
     mu: float
     cost: list[str]
@@ -64,15 +78,22 @@ class Shell:
     def of(cls, context: typer.Context) -> "Shell":
         """Return what was typed, of a command that has all these options."""
         given = {field.name: context.params[field.name] for field in fields(cls)}
-        lists = {name: list(given[name] or []) for name in ("lock", "cost", "relax")}
+        lists = {name: list(given[name] or []) for name in _LISTS}
         return cls(**{**given, **lists})
 
     def document(self, robot: str, warm_start: sm.Plan | None) -> dict[str, Any]:
         """Return the table."""
-        held = options.locks(self.lock)
+        held, arguments = options.locks(self.lock), options.arguments(self.argument)
         # Loaded only where it decides what is meant.
         planar = self.task is None and _is_planar(
-            sm.load_robot(robot, self.tool, held, reference=self.reference)
+            sm.load_robot(
+                robot,
+                self.tool,
+                held,
+                reference=self.reference,
+                arguments=arguments,
+                packages=self.packages,
+            )
         )
         task = self.task or ("planar" if planar else "pose")
         normal = self.normal or ("z" if task.startswith("planar") else "x")
@@ -93,6 +114,10 @@ class Shell:
         }
         if self.joint_limits is not None:
             table["joint_limits"] = str(self.joint_limits)
+        if arguments:
+            table["robot"]["arguments"] = arguments
+        if self.packages:
+            table["robot"]["packages"] = [str(folder) for folder in self.packages]
         for name in ("tool", "reference"):
             if getattr(self, name) is not None:
                 table["robot"][name] = getattr(self, name)
@@ -111,16 +136,25 @@ class Shell:
             raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
         if self.path is not None:
             given = {
-                name: getattr(self, name) for name in ("seam", "feed", "duration", "jump", "ramp")
+                name: getattr(self, name)
+                for name in ("seam", "feed", "duration", "jump", "ramp", "standoff")
             }
+            given["columns"] = None if self.columns is None else self.columns.split(",")
+            given["flip_normals"] = self.flip_normals or None
+            given |= {"rotary": self.rotary, "rotary_axes": self.rotary_axes}
+            if self.rotary_center is not None:
+                center = options.numbers(self.rotary_center, "--rotary-center", 3)
+                given["rotary_center"] = center.tolist()
             given["tolerance"] = self.corner_tolerance
             frame = {} if self.frame is None else {"frame": options.pose(self.frame, "--frame")}
             return {"kind": "file", "file": str(self.path), "corners": self.corners, **frame} | {
                 key: value for key, value in given.items() if value is not None
             }
-        if any(option is not None for option in (self.frame, self.ramp, self.seam)):
+        of_files = (self.frame, self.ramp, self.seam, self.columns, self.standoff, self.rotary)
+        if self.flip_normals or any(option is not None for option in of_files):
             raise sm.ProblemError(
-                "--frame, --ramp and --seam are for --path; a shape is one, and rests at its ends"
+                "--frame, --ramp, --seam, --columns, --standoff, --rotary and --flip-normals are "
+                "for --path; a shape is one, and rests at its ends"
             )
         if self.feed is not None and self.duration is not None:
             raise sm.ProblemError("give the pace by one of --feed and --duration")
@@ -193,6 +227,32 @@ def of_file(file: Path, settings: list[str], allow_code: bool) -> sm.Job:
     return _with_settings(document, file, settings, allow_code)
 
 
+def first_that_runs(texts: Iterable[str], file: Path, job: bool) -> str:
+    """Return the first of several problem files whose motion is verified.
+
+    Raises
+    ------
+    ProblemError
+        None is; the last one's reason is told.
+    """
+    reason = ""
+    for text in texts:
+        document = tomllib.loads(text)
+        try:
+            if job:
+                with StageDisplay(stages) as display:
+                    program = seam_job_of(document, file).plan(progress=display.stage)
+                verified, reason = program.verified, program.verdict
+            else:
+                certificate = plan_with_progress(job_of(document, file).problem).certificate
+                verified, reason = certificate.verified, certificate.verdict
+        except sm.PlanError as error:
+            verified, reason = False, str(error)
+        if verified:
+            return text
+    raise sm.ProblemError(f"{file}: no example was found that this arm follows: {reason}")
+
+
 def seams_of_file(file: Path, settings: list[str], allow_code: bool) -> sm.SeamJob:
     """Return the job of a file with seams."""
     document = read_document(file)
@@ -219,7 +279,7 @@ def _tell_left_out(document: dict[str, Any], file: Path | None) -> None:
     path = document.get("path")
     if not (isinstance(path, dict) and path.get("kind") == "file"):
         return
-    events = events_of((file.parent if file else Path()) / str(path.get("file")), path.get("seam"))
+    events = events_of((file.parent if file else Path()) / str(path.get("file")), path)
     if events:
         verb = "are" if len(events) > 1 else "is"
         text = f"note: {', '.join(events)} {verb} left out: `selfmotion job` keeps what happens"

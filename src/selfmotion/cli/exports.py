@@ -47,7 +47,8 @@ def export(
     ] = False,
     settings: options.SettingsOption = None,
     force: Annotated[
-        bool, typer.Option("--force", help="Write a motion that is not verified, too.")
+        bool,
+        typer.Option("--force", help="Write one that is not verified, or moves at an end, too."),
     ] = False,
     as_json: options.JsonOption = False,
 ) -> None:
@@ -101,10 +102,15 @@ def export(
 
 
 def _check_verified(made: _Made, force: bool, as_json: bool) -> None:
-    """End with one line where a motion is not verified, and not forced."""
-    if _verified(made) or force:
+    """End with one line where a motion is not verified, or moves at an end, and is not forced."""
+    if force:
         return
-    verdict = made.certificate.verdict if isinstance(made, sm.Plan) else made.verdict
+    if _verified(made):
+        verdict = formats.moving_ends(made)
+        if not verdict:
+            return
+    else:
+        verdict = made.certificate.verdict if isinstance(made, sm.Plan) else made.verdict
     if as_json:
         terminal.print_json(data={"verified": False, "written": {}, "verdict": verdict})
     else:

@@ -65,8 +65,9 @@ def job(
         raise typer.Exit(NOT_VERIFIED) from None
     _show(program, as_json)
     for target in wanted:
-        if not program.verified and outputs.is_motion(target) and not _is_timetable(target):
-            outputs.tell_left_out(target, terminal, quiet=as_json)
+        unsound = outputs.left_out(program)
+        if unsound and outputs.is_motion(target) and not _is_timetable(target):
+            outputs.tell_left_out(target, terminal, unsound, quiet=as_json)
             continue
         write_program(program, target, asked)
         if not as_json:
@@ -126,8 +127,9 @@ def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:
     else:
         terminal.print(repr(found), markup=False, soft_wrap=True)
     for file in wanted:
-        if not found.verified and outputs.is_motion(file):
-            outputs.tell_left_out(file, terminal, quiet=as_json)
+        unsound = outputs.left_out(found)
+        if unsound and outputs.is_motion(file):
+            outputs.tell_left_out(file, terminal, unsound, quiet=as_json)
             continue
         if file.suffix == PARTS:
             found.save(file)

@@ -12,6 +12,7 @@ from selfmotion.basics import TURN, Array
 
 TaskName = Literal["pose", "position", "pointing", "planar", "planar_pose"]
 Corners = Literal["blend", "stop", "round"]
+Rotary = Literal["head", "table"]
 Axis = Literal["x", "y", "z"]
 SearchMode = Literal["auto", "local", "global"]
 
@@ -55,6 +56,35 @@ JumpOption = Annotated[
 ]
 SeamOption = Annotated[
     str | None, typer.Option(help="Which seam or cut of --path, where it has several.")
+]
+ColumnsOption = Annotated[
+    str | None,
+    typer.Option(help="Names of the columns of --path, where it has no header: x,y,z,nx,ny,nz."),
+]
+FlipOption = Annotated[
+    bool,
+    typer.Option("--flip-normals", help="Normals of --path point out of the part, as CAD's do."),
+]
+StandoffOption = Annotated[
+    float | None,
+    typer.Option(help="Distance from the poses of --path, back along the tool's z axis (m)."),
+]
+RotaryOption = Annotated[
+    Rotary | None,
+    typer.Option(
+        help="What A, B, C of G-code without G43.4 turn: the head (positions are the tip's), or a "
+        "table, with its axes and centre."
+    ),
+]
+RotaryAxesOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Axes of a rotary table from the machine to the part: BC, AC, or B,-C where C turns "
+        "the table right-handed."
+    ),
+]
+RotaryCenterOption = Annotated[
+    str | None, typer.Option(help="A point x,y,z (m) on the axes of a rotary table.")
 ]
 FrameOption = Annotated[
     str | None,
@@ -184,6 +214,18 @@ LockOption = Annotated[
     list[str] | None,
     typer.Option(help="Joint to hold: NAME=VALUE (rad or m). Repeatable."),
 ]
+ArgumentOption = Annotated[
+    list[str] | None,
+    typer.Option(help="Argument of a .xacro file: NAME=VALUE. Repeatable."),
+]
+PackagesOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        help="Folder with packages that a robot's file names (package://, $(find …)); by default "
+        "they are looked for around the file, and by AMENT_PREFIX_PATH and ROS_PACKAGE_PATH. "
+        "Repeatable."
+    ),
+]
 DegreesOption = Annotated[
     bool, typer.Option("--degrees", help="Angles of the motion are in degrees.")
 ]
@@ -264,6 +306,17 @@ def locks(texts: list[str]) -> dict[str, float]:
                 f"--lock is '{text}', expected NAME=VALUE like joint_7=0.5"
             ) from None
     return held
+
+
+def arguments(texts: list[str] | None) -> dict[str, str]:
+    """Return what --argument describes."""
+    found = {}
+    for text in texts or []:
+        name, mark, value = text.partition("=")
+        if not (name and mark):
+            raise sm.RobotError(f"--argument is '{text}', expected NAME=VALUE like prefix=left_")
+        found[name] = value
+    return found
 
 
 def refuse(given: dict[str, Any], file: Path | str, whose: str) -> None:

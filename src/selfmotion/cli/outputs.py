@@ -24,10 +24,10 @@ def write(
         A file could not be written; says where the plan is.
     """
     written, faults = list[Path](), list[str]()
-    verified = result.certificate.verified
+    unsound = left_out(result)
     for file in [*out, *([] if html is None else [html])]:
-        if not verified and is_motion(file):
-            tell_left_out(file, console, quiet=quiet)
+        if unsound and is_motion(file):
+            tell_left_out(file, console, unsound, quiet=quiet)
             continue
         try:
             _write_one(result, file, page=file is html)
@@ -53,7 +53,8 @@ def finish(result: sm.Plan, out: list[Path], html: Path | None, as_json: bool) -
     else:
         tables.show(result, terminal)
     write(result, out, html, terminal, quiet=as_json)
-    raise typer.Exit(VERIFIED if result.certificate.verified else NOT_VERIFIED)
+    whole = not (left_out(result) and any(map(is_motion, out)))
+    raise typer.Exit(VERIFIED if result.certificate.verified and whole else NOT_VERIFIED)
 
 
 def is_motion(file: Path) -> bool:
@@ -61,11 +62,17 @@ def is_motion(file: Path) -> bool:
     return file.suffix in formats.SUFFIXES and file.suffix != ".npz"
 
 
-def tell_left_out(file: Path, console: Console, *, quiet: bool) -> None:
-    """Say that a motion that is not verified was not written."""
+def left_out(made: sm.Plan | sm.Parts | sm.Program) -> str:
+    """Return why a motion is given to no controller, "" where nothing speaks against it."""
+    verified = made.certificate.verified if isinstance(made, sm.Plan) else made.verified
+    return formats.moving_ends(made) if verified else "it is not verified"
+
+
+def tell_left_out(file: Path, console: Console, reason: str, *, quiet: bool) -> None:
+    """Say that a motion was not written, and why."""
     if not quiet:
         console.print(
-            f"{file} is not written, as it is not verified; `selfmotion export --force` writes it",
+            f"{file} is not written: {reason}; `selfmotion export --force` writes it",
             markup=False,
             soft_wrap=True,
         )

@@ -120,7 +120,8 @@ class HullDistances:
     def place(self, q: Array) -> Any:
         """Place the hulls at q (n,), and return their placements in world axes, by body."""
         data, places = self._own()
-        pin.updateGeometryPlacements(self._robot.model, data, self._model, places, q)
+        at = self._robot.coupling.spread(q)
+        pin.updateGeometryPlacements(self._robot.model, data, self._model, places, at)
         return places.oMg
 
     def _own(self) -> tuple[Any, Any]:
@@ -210,7 +211,7 @@ class HullDistances:
         CollisionError
             See `distance`.
         """
-        jacobians = np.empty((len(q), 6, self._robot.dof))
+        jacobians, coupling = np.empty((len(q), 6, self._robot.dof)), self._robot.coupling
         values, placed = np.empty(len(rows)), -1
         normals, points = np.empty((len(rows), 3)), np.empty((len(rows), 3))
         chain, model = self._robot.model, self._model
@@ -219,8 +220,8 @@ class HullDistances:
         for k, (row, pair, bound) in enumerate(wanted):
             if row != placed:
                 # Of one joint Pinocchio returns a vector.
-                columns = pin.computeJointJacobians(chain, data, q[row])
-                jacobians[row], placed = columns.reshape(6, -1), row
+                columns = pin.computeJointJacobians(chain, data, coupling.spread(q[row]))
+                jacobians[row], placed = coupling.gathered(columns.reshape(6, -1)), row
                 pin.updateGeometryPlacements(chain, data, model, places)
             answer = pin.computeDistance(model, places, pair)
             value = answer.min_distance

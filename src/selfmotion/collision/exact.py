@@ -194,7 +194,15 @@ class CollisionModel:
 
     @cached_property
     def moved(self) -> npt.NDArray[np.bool_]:
-        """Which bodies each joint moves, (B, n): those on its link and on all beyond."""
+        """Which bodies each joint moves, (B, n): those on its link and on all beyond.
+
+        And those that joints carry which mimic it.
+        """
+        found = self.robot.coupling.bounds(self._moved.astype(np.float64))
+        return np.asarray(found > 0.0)
+
+    @cached_property
+    def _moved(self) -> npt.NDArray[np.bool_]:
         return levers.moved_by(self._bodies, self.robot)
 
     @cached_property
@@ -205,7 +213,8 @@ class CollisionModel:
         [m/m] for prismatic ones, at every configuration within the joint limits. So no point moves
         farther than Σ_j lever_bj |Δq_j|.
         """
-        return np.where(self.moved, self._axis_distances, 0.0)
+        arms = np.where(self._moved, self._axis_distances, 0.0)
+        return self.robot.coupling.bounds(arms)
 
     @cached_property
     def pair_levers(self) -> Array:
@@ -215,7 +224,12 @@ class CollisionModel:
         configuration to another the distance of bodies that are apart changes by
         Σ_j lever_pj |Δq_j| at most. Joints that move both bodies as one block count nothing.
         """
-        return levers.pair_levers(self._axis_distances, self.moved, self.hulls.pairs)
+        return self.robot.coupling.bounds(self._levers)
+
+    @cached_property
+    def _levers(self) -> Array:
+        """Those of all joints of the model, (P, N)."""
+        return levers.pair_levers(self._axis_distances, self._moved, self.hulls.pairs)
 
     def pair_levers_up_to(self, farthest: Array) -> Array:
         """Return `pair_levers` where joints go as far as `farthest` (n,) from 0, (P, n).
@@ -223,8 +237,8 @@ class CollisionModel:
         A prismatic joint beyond its limits lengthens the levers of all revolute ones.
         """
         extra = levers.travel_beyond(self.robot, farthest)
-        counted = levers.is_turned(self.robot) & (self.pair_levers > 0.0)
-        return np.asarray(self.pair_levers + np.where(counted, extra, 0.0))
+        counted = levers.is_turned(self.robot) & (self._levers > 0.0)
+        return self.robot.coupling.bounds(self._levers + np.where(counted, extra, 0.0))
 
     @cached_property
     def _axis_distances(self) -> Array:

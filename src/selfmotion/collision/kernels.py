@@ -71,6 +71,7 @@ def lower_bounds(
     positions: Array,
     axes: Array,
     is_revolute: Flags,
+    scales: Array,
     joints: Ints,
     turns: Array,
     middles: Array,
@@ -80,14 +81,17 @@ def lower_bounds(
 ) -> Array:
     """Return `BoundingBoxes.lower_bounds`; the tree as in `placements`."""
     bounds = np.empty((len(q), len(pairs)))
-    r, p = np.empty((q.shape[1] + 1, 3, 3)), np.empty((q.shape[1] + 1, 3))
+    count = len(coordinates) + 1
+    r, p = np.empty((count, 3, 3)), np.empty((count, 3))
     turned, place = np.empty((len(joints), 3, 3)), np.empty((len(joints), 3))
     radii, t, work = np.empty(len(joints)), np.empty(3), np.empty((5, 3))
     for i in range(len(joints)):
         h = halves[i]
         radii[i] = math.sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2])
     for k in range(len(q)):
-        placements(q[k], coordinates, parents, rotations, positions, axes, is_revolute, r, p)
+        placements(
+            q[k], coordinates, parents, rotations, positions, axes, is_revolute, scales, r, p
+        )
         for i in range(len(joints)):
             j = joints[i]
             compose(r[j], p[j], turns[i], middles[i], turned[i], place[i])

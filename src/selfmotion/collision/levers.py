@@ -13,7 +13,9 @@ Ints = npt.NDArray[np.int64]
 
 
 def axis_distances(robot: RobotModel, bodies: Sequence[Body]) -> Array:
-    """Return bounds on the distance of every point of a body from every joint's axis, (B, n) [m].
+    """Return bounds on the distance of every point of a body from every joint's axis, (B, N) [m].
+
+    Of all joints of the model, those that mimic others, too.
 
     They hold at all configurations within the joint limits. Of a body and an axis that one joint
     parts, it is the largest distance of the body's outline from the axis. Beyond, the distances
@@ -24,27 +26,27 @@ def axis_distances(robot: RobotModel, bodies: Sequence[Body]) -> Array:
     For a prismatic joint it is 1 [m/m]: there every point moves as far as the joint.
     """
     tree = _Tree(robot)
-    distances = np.ones((len(bodies), robot.dof))
+    distances = np.ones((len(bodies), robot.model.nv))
     for b, body in enumerate(bodies):
         points, radius = body.solid.outline
         points = points @ body.place.rotation.T + body.place.translation
-        for joint in range(1, robot.dof + 1):
+        for joint in range(1, robot.model.nv + 1):
             if tree.is_revolute[joint]:
                 distances[b, joint - 1] = tree.distance(points, body.joint, joint) + radius
     return distances
 
 
 def moved_by(bodies: Sequence[Body], robot: RobotModel) -> npt.NDArray[np.bool_]:
-    """Return which bodies each joint moves, (B, n): all that it carries, however far off."""
+    """Return which bodies each joint of the model moves, (B, N): all that it carries."""
     tree = _Tree(robot)
-    found = np.zeros((len(bodies), robot.dof), dtype=bool)
+    found = np.zeros((len(bodies), robot.model.nv), dtype=bool)
     for b, body in enumerate(bodies):
         found[b, [joint - 1 for joint in tree.supports(body.joint)]] = True
     return found
 
 
 def pair_levers(distances: Array, moved: npt.NDArray[np.bool_], pairs: Ints) -> Array:
-    """Return bounds on the change of each pair's distance per unit of each joint, (P, n).
+    """Return bounds on the change of each pair's distance per unit of each joint, (P, N).
 
     Joints that move both bodies or none do not count. For one that moves one of them, the rate is
     n · (ω × x), with n the direction between the closest points, and the same for both of these:
@@ -56,19 +58,29 @@ def pair_levers(distances: Array, moved: npt.NDArray[np.bool_], pairs: Ints) -> 
 
 
 def is_turned(robot: RobotModel) -> npt.NDArray[np.bool_]:
-    """Return which joints are revolute, (n,)."""
-    return robot.is_revolute
+    """Return which joints of the model are revolute, (N,)."""
+    return robot.tree.is_revolute
 
 
 def travel_beyond(robot: RobotModel, farthest: Array) -> float:
     """Return how much longer levers get where joints go as far as `farthest` (n,) from 0 [m]."""
-    return float(np.maximum(farthest - _travel(robot), 0.0)[~is_turned(robot)].sum())
+    far = _of_joints(robot, farthest)
+    return float(np.maximum(far - _travel(robot), 0.0)[~is_turned(robot)].sum())
 
 
 def _travel(robot: RobotModel) -> Array:
-    """Return how far prismatic joints go from 0 within their limits, 0 for the others, (n,)."""
+    """Return how far prismatic joints go from 0 within their limits, 0 for the others, (N,)."""
     lower, upper = robot.finite_limits()
-    return np.where(is_turned(robot), 0.0, np.maximum(np.abs(lower), np.abs(upper)))
+    far = _of_joints(robot, np.maximum(np.abs(lower), np.abs(upper)))
+    return np.where(is_turned(robot), 0.0, far)
+
+
+def _of_joints(robot: RobotModel, farthest: Array) -> Array:
+    """Return how far the model's joints (N,) are from 0 at most where coordinates (n,) are."""
+    coupling = robot.coupling
+    return np.asarray(coupling.bounds(np.eye(len(coupling.scales))) @ farthest) + np.abs(
+        coupling.offsets
+    )
 
 
 class _Tree:

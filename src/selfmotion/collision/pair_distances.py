@@ -101,4 +101,5 @@ class PairDistances:
     def _moving(self) -> Flags:
         """Which joints move one body of each pair and not the other, (P, n)."""
         first, second = levers.moved_by(self._bodies, self._robot)[self._pairs.T]
-        return np.asarray(first != second)
+        parted = (first != second).astype(np.float64)
+        return np.asarray(self._robot.coupling.bounds(parted) > 0.0)

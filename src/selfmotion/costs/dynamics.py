@@ -92,6 +92,8 @@ class GravityTorque(Cost):
 
     def __post_init__(self) -> None:
         _check_arm(self.robot, self.name)
+        # Refuses arms whose masses are not known.
+        Energy(self.robot)
         object.__setattr__(self, "weight", as_weight(self.weight, self.name))
 
     def value(self, samples: Samples) -> Array:

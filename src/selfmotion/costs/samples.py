@@ -155,8 +155,9 @@ class Samples:
     def contract(self, weights: Array) -> Array:
         """Return ⟨M, ∂J/∂q_k⟩ for `weights` M (S, m, n) on the task Jacobian, (S, n)."""
         weights, layout = np.ascontiguousarray(weights), self.follows.layout
+        every = self.follows.every_column(self.q)
         parts = [
-            kernels.contract_task(tip.jacobian, tip.rotation, weights, layout, f)
+            kernels.contract_task(tip.jacobian, tip.rotation, weights, layout, f, every)
             for f, tip in enumerate(self.tips)
         ]
         return parts[0] if len(parts) == 1 else np.sum(parts, axis=0)

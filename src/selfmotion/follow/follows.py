@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array, Ints, ProblemError
 from selfmotion.basics.layout import Layout, layout_of
 from selfmotion.follow.follow import BoundFollow, Follow
 from selfmotion.follow.kinematics import TipKinematics
@@ -112,6 +112,23 @@ class Follows:
         for own, table in zip(found, tables, strict=True):
             own[: len(table)] = table
         return found
+
+    def every_column(self, q: Array) -> tuple[Array, Ints] | None:
+        """Return the columns of all joints at q (S, n), (S, F, 6, W), and their order (F + 1, W).
+
+        None where no joint on a chain mimics another one: then those of coordinates will do.
+        Derivatives of Jacobians need them, see `selfmotion.kernels.contraction`.
+        """
+        if not any(item.chain.is_coupled for item in self.items):
+            return None
+        coupling = self.robot.coupling
+        columns = np.stack([item.chain.every_along(q) for item in self.items], axis=1)
+        everyone = np.arange(len(coupling.coordinates))
+        orders = [
+            np.append(own, np.setdiff1d(everyone, own))
+            for own in (item.chain.model_joints for item in self.items)
+        ]
+        return np.ascontiguousarray(columns), np.array([*orders, coupling.coordinates])
 
     @property
     def row_names(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from selfmotion.formats.documents import (
     read_values as read_values,
     write_document as write_document,
 )
-from selfmotion.formats.example import example_text as example_text
+from selfmotion.formats.example import example_text as example_text, example_texts as example_texts
 from selfmotion.formats.job import Job as Job
 from selfmotion.formats.joint_limits import read_joint_limits as read_joint_limits
 from selfmotion.formats.judged_programs import (
@@ -27,6 +27,7 @@ from selfmotion.formats.motions import (
     read_motion as read_motion,
     write_motion as write_motion,
 )
+from selfmotion.formats.moving_ends import moving_ends as moving_ends
 from selfmotion.formats.overrides import (
     grid_documents as grid_documents,
     parse_setting as parse_setting,

@@ -14,7 +14,8 @@ from selfmotion.formats.poses import from_normal
 # farther away than this [m].
 _BYTES, _POSES, _FAR = 200_000_000, 1_000_000, 1e3
 # What stops something: after a cut it belongs to that.
-STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF")
+RETRACT, PRIME = "retract", "prime"
+STOPS = ("M5", "M9", "SPINDL/OFF", "COOLNT/OFF", "ARCOFF", RETRACT)
 # Poses nearer than this [m, and of their axes] are the same.
 _SAME = 1e-9
 # Axes apart from their opposite by less than this have no shortest way.
@@ -114,6 +115,7 @@ class Machine:
         self.axis: Array = np.array([0.0, 0.0, 1.0])
         self.feed = 0.0
         self.cuts: list[Cut] = []
+        self.notes: list[str] = []
         self._open: Cut | None = None
         self._next: list[str] = []
 
@@ -124,6 +126,11 @@ class Machine:
     def unread(self, what: str) -> FileFormatError:
         """Return an error about something that is not read."""
         return self.fault(f"{what} is not read: page 'Files' of the docs lists what is (read_path)")
+
+    def note(self, what: str) -> None:
+        """Note what is to be known of the line that is read, once for what is said alike."""
+        if not any(what in note for note in self.notes):
+            self.notes.append(f"line {self.number}: {what}")
 
     def text(self) -> str:
         """Return the file's text."""
@@ -196,7 +203,8 @@ class Machine:
         self._next = []
         if not moved:
             raise FileFormatError(f"{self.file}: has no cut: no motion at a feed")
-        rows = (replace(cut.rows(), one_way=True) for cut in moved)
+        notes = tuple(self.notes)
+        rows = (replace(cut.rows(), one_way=True, notes=notes) for cut in moved)
         return {f"cut {number}": each for number, each in enumerate(rows, 1)}
 
 

@@ -17,7 +17,7 @@ _BANDS = ("acceleration", "band", "center", "half", "speed", "target", "velocity
 _WITHIN_A_TURN = ("corner_angle", "rotation", "rotation_vector", "rpy", "turn_tolerance")
 _TURNS = (*_WITHIN_A_TURN, "margin", "turn_acceleration", "turn_rate", "within")
 ANGLES = frozenset((*_BANDS, *_TURNS, *PER_JOINT))
-_SIZES = ("length", "radius", "rise", "size", "tolerance")
+_SIZES = ("length", "radius", "rise", "rotary_center", "size", "standoff", "tolerance")
 _WAYS = ("amplitude", "by", "distance", "feed", "jump", "pitch", "position", "positions", "retreat")
 LENGTHS = frozenset((*_BANDS, *_WAYS, *_SIZES))
 # Tables or lists in each other; files of the trade have less than ten.

@@ -1,17 +1,18 @@
-"""G-code of machines with up to five axes: the subset of ISO 6983 that says where a tool goes.
+"""G-code of machines with up to five axes, and of printers: what says where a tool goes (ISO 6983).
 
-The names are Fanuc's. The tool's tip is meant, as under tool centre point control.
+The names are Fanuc's, and Marlin's where material is extruded (E). The tool's tip is meant.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
 
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.formats.cuts import STOPS, Machine, unit_axis
-from selfmotion.formats.path_rows import PoseRows
+from selfmotion.formats.cuts import PRIME, RETRACT, STOPS, Machine, unit_axis
+from selfmotion.formats.path_rows import PoseRows, Reading
+from selfmotion.formats.rotary import HEAD, Rotary
 
 _WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*")
 _INCH, _MM = 25.4e-3, 1e-3
@@ -22,17 +23,27 @@ _ROUND = 2e-4
 _LINE = 1000
 # Nearer than this [m] is the same place.
 _SAME = 1e-9
-# What changes nothing here: cutter compensation off, tool length, the first workpiece, no cycle,
-# feeds by the minute, centres of arcs from their starts, tool centre point control.
-_NOTHING = {"G40", "G43.4", "G43.5", "G49", "G54", "G69", "G80", "G94", "G91.1", "G64", "G61"}
+# What changes nothing here: cutter compensation off, tool length (programs say where the tip is),
+# no cycle and where one would end, centres of arcs from their starts, how corners are smoothed.
+_NOTHING = {"G40", "G43", "G69", "G80", "G98", "G99", "G91.1", "G64", "G61", "G61.1", "G5.1", "G8"}
+# Zeros of workpieces; a program has one.
+_ZEROS = {"G54", "G55", "G56", "G57", "G58", "G59"}
+_TIP = {"G43.4", "G43.5"}
+# The axes of arcs' planes and their normal, right-handed; what goes to a place of the machine.
+_PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
+_HOME = {"G28", "G30", "G53"}
+# A program of a printer moves and extrudes in one line.
+_EXTRUDES = re.compile(r"G0*[0-3](?![0-9.]).*E[+-]?[0-9.]")
+# What of a printer's lines is read; all others are commands of its own.
+_MOVES = re.compile(r"[GTNXYZEF][0-9+.-]")
 _MOTIONS = {"G0": 0, "G1": 1, "G2": 2, "G3": 3}
 _ENDS = {"M2", "M30"}
-_UNSEEN = "NSTHDO"
+_UNSEEN = "NSTHDOPQL"
 _AXES = "XYZABC"
-_EVERY = _AXES + "IJKRF" + _UNSEEN
+_EVERY = _AXES + "IJKRFE" + _UNSEEN
 
 
-def read_gcode(file: FilePath) -> Mapping[str, PoseRows]:
+def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, PoseRows]:
     """Read the cuts of a program; see `read_path`.
 
     Raises
@@ -40,22 +51,37 @@ def read_gcode(file: FilePath) -> Mapping[str, PoseRows]:
     FileFormatError
         The file cannot be read, or has a word that is not read; its line is named.
     """
-    reader = _Reader(file)
-    for number, line in enumerate(reader.machine.text().splitlines(), 1):
+    machine = Machine(file)
+    text = machine.text()
+    rotary = None if reading is None else reading.rotary
+    reader = _Reader(machine, rotary, prints=_extrudes(text))
+    for number, line in enumerate(text.splitlines(), 1):
         reader.machine.number = number
         if reader.take(line):
             break
     return reader.machine.seams()
 
 
+def _extrudes(text: str) -> bool:
+    """Return whether a program is a printer's."""
+    lines = (re.sub(r"[;(].*", "", line.upper()) for line in text.splitlines() if len(line) < _LINE)
+    return any("E" in line and _EXTRUDES.search(line) for line in lines)
+
+
 class _Reader:
     """The modes of a machine, and the lines that change them."""
 
-    def __init__(self, file: FilePath) -> None:
-        self.machine = Machine(file)
+    def __init__(self, machine: Machine, rotary: Rotary | None, prints: bool) -> None:
+        self.machine, self._rotary, self._prints = machine, rotary, prints
         self._unit, self._absolute, self._motion = _MM, True, 0
         self._begun = False
         self._turns: dict[str, float] = {}
+        # Where the machine is, the part's place if no table has turned it.
+        self._at: Array = np.full(3, np.nan)
+        self._plane, self._zero, self._tip = _PLANES["G17"], "", False
+        self._inverse_time = False
+        # How far material is fed, and whether words say so from the start.
+        self._fed, self._fed_from_start = 0.0, True
 
     def take(self, line: str) -> bool:
         """Take a line; return whether the program ends with it."""
@@ -65,6 +91,9 @@ class _Reader:
         text = (
             re.sub(r"\([^()]*\)", " ", line.upper()).partition(";")[0].strip().lstrip("/").strip()
         )
+        if self._prints and text and not _MOVES.match(text):
+            self._command(text)
+            return False
         if text == "%":
             # The second one ends the tape.
             self._begun, ended = True, self._begun
@@ -79,6 +108,10 @@ class _Reader:
             words.append((found[1], found[2]))
             at = found.end()
         codes = [f"{letter}{float(value):g}" for letter, value in words if letter in "GM"]
+        if any(code in ("G4", "G10", "G11", "G29") for code in codes):
+            # Nothing moves; a wait, a retraction of its own, or a look at a bed.
+            machine.happens(text)
+            return False
         values: dict[str, float] = {}
         for letter, value in words:
             if letter in "GM":
@@ -93,7 +126,8 @@ class _Reader:
         moving = [code for code in codes if code in _MOTIONS]
         if len(moving) > 1:
             raise machine.fault(f"{moving[0]} and {moving[1]} are in one line")
-        switched = [code for code in codes if code.startswith("M")]
+        modes = ("M82", "M83")
+        switched = [code for code in codes if code.startswith("M") and code not in modes]
         for code in codes:
             if code not in switched:
                 self._mode(code)
@@ -105,7 +139,13 @@ class _Reader:
         for code in switched:
             if code not in late:
                 self._mode(code)
-        self._move(values)
+        home = next((code for code in codes if code in _HOME), None)
+        if home is not None:
+            self._goes_home(home, values)
+        elif "G92" in codes:
+            self._set(values)
+        else:
+            self._move(values)
         for code in late:
             self._mode(code)
         return any(code in _ENDS for code in codes)
@@ -116,19 +156,27 @@ class _Reader:
                 self._unit = _INCH if code == "G20" else _MM
             case "G90" | "G91":
                 self._absolute = code == "G90"
-            case "G17":
-                pass
+            case "G93" | "G94":
+                self._inverse_time = code == "G93"
+            case "G49":
+                self._tip = False
+            case _ if code in _PLANES:
+                self._plane = _PLANES[code]
             case _ if code in _MOTIONS:
                 self._motion = _MOTIONS[code]
-            case _ if code in _NOTHING or code in _ENDS:
+            case _ if code in _TIP:
+                self._tip = True
+            case _ if code in _ZEROS:
+                self._zero = self._zero or code
+                if code != self._zero:
+                    raise self.machine.fault(
+                        f"{code} after {self._zero}: where their zeros are to each other is not "
+                        f"known; write one program for each"
+                    )
+            case _ if code in _NOTHING or code in _ENDS or code in _HOME or code == "G92":
                 pass
-            case "G43":
-                raise self.machine.fault(
-                    "G43 is not read: heights of its tools' table are not known; write G43.4 where "
-                    "the program's positions are those of the tip, or leave it out"
-                )
-            case "G4":
-                raise self.machine.fault("G4 is not read: nothing waits along a cut; leave it out")
+            case "M82" | "M83" if self._prints:
+                self._fed_from_start = code == "M82"
             case "M98" | "M99":
                 raise self.machine.fault(f"{code}: subprograms are not read; write them out")
             case _ if code.startswith("M"):
@@ -136,30 +184,109 @@ class _Reader:
             case _:
                 raise self.machine.unread(f"{code}")
 
+    def _command(self, text: str) -> None:
+        """Take a line of a printer that moves nothing: it happens where the tool is."""
+        code = text.split()[0]
+        if code in ("M82", "M83"):
+            self._fed_from_start = code == "M82"
+        elif text != "%":
+            self.machine.happens(code)
+
+    def _goes_home(self, code: str, values: Mapping[str, float]) -> None:
+        """Go to a place that is the machine's own: where that is in the part is not known."""
+        axes = [k for k, name in enumerate("XYZ") if name in values]
+        for k in axes or range(3):
+            self._at[k] = np.nan
+        self.machine.rapid(self._part(self._at), self.machine.axis)
+        self.machine.note(
+            f"{code} goes to a place of the machine's own: it is passed over, and "
+            f"where the tool is, is not known until X, Y and Z are given"
+        )
+
+    def _set(self, values: Mapping[str, float]) -> None:
+        """Say how far material is fed by now."""
+        moved = [name for name in _AXES if name in values]
+        if moved or "E" not in values:
+            raise self.machine.fault(
+                f"G92 {' '.join(moved)}: zeros that move are not read, but of E"
+            )
+        self._fed = values["E"]
+
+    def _extruded(self, values: Mapping[str, float]) -> float:
+        """Return how much material a line feeds."""
+        if "E" not in values:
+            return 0.0
+        fed = values["E"] - (self._fed if self._fed_from_start else 0.0)
+        self._fed = values["E"] if self._fed_from_start else self._fed + fed
+        return fed
+
     def _move(self, values: Mapping[str, float]) -> None:
         machine = self.machine
+        if "E" in values and not self._prints:
+            raise machine.unread(f"word 'E{values['E']:g}'")
         if "F" in values:
             if not 0.0 < values["F"] < 1e7:
                 raise machine.fault(f"F is {values['F']:g}, expected a feed above 0")
-            machine.feed = values["F"] * self._unit / 60.0
-        arc = self._motion > 1
+            machine.feed = values["F"] * (1.0 if self._inverse_time else self._unit) / 60.0
+        arc, fed = self._motion > 1, self._extruded(values)
+        if fed < 0.0:
+            machine.happens(RETRACT)
         moved = set(values) & set(_AXES + "IJK" + ("R" if arc else ""))
         if not moved:
+            if fed > 0.0:
+                machine.happens(PRIME)
             return
-        goal = machine.position.copy()
+        before, start = dict(self._turns), self._at.copy()
+        goal = self._at.copy()
         for k, name in enumerate("XYZ"):
             if name in values:
                 goal[k] = self._unit * values[name] + (0.0 if self._absolute else goal[k])
         axis = self._axis(values, arc)
-        if self._motion == 0:
-            machine.rapid(goal, axis)
+        travels = fed <= 0.0 if self._prints else self._motion == 0
+        if travels:
+            machine.rapid(self._part(goal), axis)
         elif not arc:
-            machine.cut(goal, axis)
+            self._cut(self._line(start, goal, before, axis))
         else:
             if np.abs(axis - machine.axis).max() > 0.0:
                 raise machine.fault("the tool turns along an arc, which is not read; write lines")
-            for point in self._arc(goal, values):
-                machine.cut(point, axis)
+            self._cut([(self._part(point), axis) for point in self._arc(goal, values)])
+        self._at = goal
+
+    def _cut(self, poses: Sequence[tuple[Array, Array]]) -> None:
+        """Go to poses at the feed; where F says how often a minute, over all of them."""
+        machine, feed = self.machine, self.machine.feed
+        if self._inverse_time:
+            places = np.array([machine.position, *(place for place, _ in poses)])
+            machine.feed = feed * float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+        for place, axis in poses:
+            machine.cut(place, axis)
+        machine.feed = feed
+
+    def _line(
+        self, start: Array, goal: Array, before: Mapping[str, float], axis: Array
+    ) -> list[tuple[Array, Array]]:
+        """Return where a line of the machine takes the tool in the part."""
+        rotary = self._rotary
+        if rotary is None or self._tip or np.isnan(start).any():
+            return [(self._part(goal), axis)]
+        count = rotary.count(start, goal, before, self._turns)
+        found = []
+        for k in range(1, count):
+            share = k / count
+            turns = {
+                name: before.get(name, 0.0) + share * (angle - before.get(name, 0.0))
+                for name, angle in self._turns.items()
+            }
+            place = rotary.in_part(start + share * (goal - start), turns)
+            found.append((place, rotary.rotation(turns)[:, 2]))
+        return [*found, (self._part(goal), axis)]
+
+    def _part(self, position: Array) -> Array:
+        """Return where a place of the machine is in the part."""
+        if self._rotary is None or self._tip:
+            return position.copy()
+        return self._rotary.in_part(position, self._turns)
 
     def _axis(self, values: Mapping[str, float], arc: bool) -> Array:
         """Return the direction from the tip to the holder."""
@@ -174,28 +301,38 @@ class _Reader:
             return unit_axis([values[name] for name in "IJK"], self.machine)
         if not any(name in values for name in "ABC"):
             return self.machine.axis
-        a, b, c = (self._turns.get(name, 0.0) for name in "ABC")
-        # Rz(C) Ry(B) Rx(A) z
-        tilted = np.array([np.sin(b) * np.cos(a), -np.sin(a), np.cos(b) * np.cos(a)])
-        x, y, z = tilted.tolist()
-        return np.array([x * np.cos(c) - y * np.sin(c), x * np.sin(c) + y * np.cos(c), z])
+        turned = [name for name in "ABC" if self._turns.get(name)]
+        if turned and self._rotary is None and not self._tip:
+            raise self.machine.fault(
+                f"{turned[0]} turns a table or the head, and positions may be the machine's: say "
+                f"rotary = 'table' with rotary_axes (BC, AC) and rotary_center, or 'head' where "
+                f"they are those of the tip in the part (as after G43.4)"
+            )
+        return (self._rotary or Rotary(HEAD)).rotation(self._turns)[:, 2]
 
     def _arc(self, goal: Array, values: Mapping[str, float]) -> Array:
-        """Return points (K, 3) of an arc in the plane of X and Y, its end the last."""
-        machine, start = self.machine, self.machine.position
+        """Return points (K, 3) of an arc in its plane, its end the last."""
+        machine, start = self.machine, self._at
         if np.isnan(start).any() or np.isnan(goal).any():
             raise machine.fault("an arc begins where X, Y or Z is not known yet")
         sense = -1.0 if self._motion == 2 else 1.0
-        if "K" in values:
-            raise machine.fault("arcs are in the plane of X and Y (G17): K is not read")
-        if not set(values) & set("IJR"):
-            raise machine.fault("an arc has neither I and J nor R; after an arc, lines say G1")
+        first, second, normal = self._plane
+        plane, offsets = [first, second], ["IJK"[first], "IJK"[second]]
+        if "IJK"[normal] in values:
+            raise machine.fault(
+                f"arcs are in the plane of {'XYZ'[first]} and {'XYZ'[second]}: {'IJK'[normal]} is "
+                f"not read"
+            )
+        if not set(values) & {*offsets, "R"}:
+            raise machine.fault(
+                f"an arc has neither {' and '.join(sorted(offsets))} nor R; after an arc, lines "
+                f"say G1"
+            )
         if "R" in values:
-            center = self._center(start[:2], goal[:2], self._unit * values["R"], sense)
+            center = self._center(start[plane], goal[plane], self._unit * values["R"], sense)
         else:
-            offset = [self._unit * values.get(name, 0.0) for name in "IJ"]
-            center = start[:2] + np.array(offset)
-        arms = start[:2] - center, goal[:2] - center
+            center = start[plane] + [self._unit * values.get(name, 0.0) for name in offsets]
+        arms = start[plane] - center, goal[plane] - center
         radius, other = (float(np.linalg.norm(arm)) for arm in arms)
         if radius < _SAME or abs(radius - other) > _ROUND:
             raise machine.fault(
@@ -212,9 +349,9 @@ class _Reader:
         share = np.arange(1, count + 1) / count
         angle = angles[0] + sense * turn * share
         radii = radius + (other - radius) * share
-        points = np.stack([np.cos(angle), np.sin(angle)], axis=1) * radii[:, None] + center
-        heights = start[2] + (goal[2] - start[2]) * share
-        found = np.column_stack([points, heights])
+        found = np.empty((count, 3))
+        found[:, plane] = np.stack([np.cos(angle), np.sin(angle)], axis=1) * radii[:, None] + center
+        found[:, normal] = start[normal] + (goal[normal] - start[normal]) * share
         found[-1] = goal
         return found
 

@@ -93,6 +93,7 @@ _ROBOT: _Fields = {
     **dict.fromkeys(("name", "file", "reference"), (Text, None)),
     **dict.fromkeys(("base", "tool_offset"), (Pose, None)),
     "tool": (Names, None),
+    "packages": (Names, None),
     "arguments": (Table, None),
     "lock": (Coordinates, None),
 }
@@ -123,6 +124,12 @@ _PATH_FILE: _Fields = {
     **dict.fromkeys(("tolerance", "corner_angle"), (Number, None)),
     "corners": (Text, None),
     "seam": (Text, None),
+    "columns": (Names, None),
+    "flip_normals": (Flag, False),
+    "standoff": (Number, None),
+    "rotary": (Text, None),
+    "rotary_axes": (Names, None),
+    "rotary_center": (Numbers, None),
     **_BOUNDS,
     **_WOVEN,
 }

@@ -7,6 +7,7 @@ import numpy as np
 
 from selfmotion.basics import FileFormatError, ProblemError, as_flag, as_path, shown
 from selfmotion.formats.motions import STREAM, WRITERS, check_verified, form_of, read_motion
+from selfmotion.formats.moving_ends import check_ends
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.motion import Trajectory
 from selfmotion.result import Plan
@@ -47,6 +48,7 @@ def write_parts(
     if name not in WRITERS:
         raise FileFormatError(f"{path}: a program moves all joints of a cell; it has no parts")
     check_verified(plan, path, as_flag(force, "force"))
+    check_ends(plan, path, force)
     write = WRITERS[name]
     rate = STREAM if name == "urscript" and rate is None else rate
     samples, written = MotionSamples.of(plan.trajectory, rate), {}

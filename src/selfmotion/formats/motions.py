@@ -29,6 +29,7 @@ from selfmotion.formats.motion_tables import (
     write_columns,
     write_lists,
 )
+from selfmotion.formats.moving_ends import check_ends
 from selfmotion.formats.mujoco import keyframes
 from selfmotion.formats.program_files import PROGRAMS, read_program, write_program
 from selfmotion.formats.program_settings import ProgramSettings
@@ -77,7 +78,7 @@ def write_motion(
         approach. Of ``krl`` and ``rapid`` it also bounds how far the controller, which passes
         targets, may be off the motion; there are as many as that takes, and a `rate` has no effect.
     force : bool
-        Whether a motion that is not verified is written all the same.
+        Whether a motion that is not verified, or begins or ends moving, is written all the same.
     progress : callable, optional
         Told how far a controller's program is: ``("targets", 2, 7)``.
 
@@ -88,7 +89,8 @@ def write_motion(
     ProblemError
         The rate gives no samples, or the arm has what the format cannot say.
     PlanError
-        It is not verified, or a move was not found.
+        It is not verified, a move was not found, or a joint moves at its start or its end, and
+        the problem does not ask for that.
     """
     if not isinstance(plan, Plan | Parts | Move | Program):
         raise ProblemError(f"plan is {shown(plan)}, expected a Plan, Parts, a Move or a Program")
@@ -97,6 +99,7 @@ def write_motion(
     path = as_path(file)
     name = form_of(path, form)
     check_verified(plan, path, as_flag(force, "force"))
+    check_ends(plan, path, force)
     if name in PROGRAMS.values():
         if rate is not None:
             raise ProblemError(f"{path}: rate has no effect: targets are as many as it takes")

@@ -29,12 +29,13 @@ def keyframes(robot: RobotModel, t: Array, q: Array, qd: Array) -> str:
         The URDF has a joint with more than one coordinate.
     """
     joints = list(_depth_first(robot.urdf))
-    column = {name: k for k, name in enumerate(robot.joint_names)}
+    # Joints that mimic others are joints of their own here.
+    places, speeds = robot.all_joints(q), robot.all_joints_rates(qd)
     root = ElementTree.Element("mujoco")
     frame = ElementTree.SubElement(root, "keyframe")
     for k, time in enumerate(t.tolist()):
-        position = [q[k, column[j]] if j in column else robot.locked[j] for j in joints]
-        speed = [qd[k, column[j]] if j in column else 0.0 for j in joints]
+        position = [places[j][k] if j in places else robot.locked[j] for j in joints]
+        speed = [speeds[j][k] if j in speeds else 0.0 for j in joints]
         ElementTree.SubElement(
             frame, "key", name=f"t{k}", time=repr(time), qpos=_text(position), qvel=_text(speed)
         )

@@ -1,16 +1,16 @@
 """From rows of poses to a tool motion."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path as FilePath
 
 import numpy as np
 
 from selfmotion.basics import TURN, Array, FileFormatError, PathError, as_choice
-from selfmotion.formats.path_rows import PoseRows
+from selfmotion.formats.path_rows import PoseRows, some_rows
 from selfmotion.formats.poses import ORIENTATIONS
-from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints
+from selfmotion.path import Feed, Joined, Path, Polyline, Waypoints, merged, section_at_rest
 
 # A coordinate beyond this [m] can only be meant in millimetres.
 _FAR = 50.0
@@ -23,6 +23,13 @@ _FLIP = 2.6
 _MOMENT = 1e-9
 # Legs that bend by more than this [rad] make a corner, unless another angle is given.
 _BEND = np.pi / 6
+# Poses nearer than this [m] are repeated ones; a stub is shorter than this share of the steps
+# beside it, and turns the tool by no more than this [rad].
+_REPEATED, _STUB, _TURN_TOLERANCE = 1e-9, 0.05, 1e-2
+# A path of a duration is run up in so long [s] at most.
+_RAMP = 0.5
+# A curve is looked at in so many places between two poses.
+_LOOKS = 9
 # Legs that go back by less than this of the way they came turn round.
 _BACK = 1e-3
 
@@ -42,6 +49,9 @@ class Pacing:
     turn_acceleration: float | None = None
     smoothing: float | None = None
     within: float | None = None
+    ramp: float | None = None
+    flip_normals: bool = False
+    standoff: float = 0.0
 
     @property
     def bounds(self) -> dict[str, float]:
@@ -62,27 +72,41 @@ def path_of_rows(path: FilePath, rows: PoseRows, asked: Pacing) -> Path:
     if len(rows.positions) < 2:
         raise FileFormatError(f"{path}: has {len(rows.positions)} poses, expected at least two")
     _check_rows(path, rows)
+    if asked.flip_normals:
+        rows = _flipped(path, rows)
     rotations = _rotations(path, rows)
     _check_jumps(path, rows, rotations, asked.jump)
+    rows, rotations = _without_stubs(rows, rotations, asked)
+    if asked.standoff:
+        rows = _stood_off(path, rows, rotations, asked.standoff)
     turns = _quaternions(rotations) if rows.orientation else None
-    feed, duration, bounds = asked.feed, asked.duration, asked.bounds
     try:
         as_choice(asked.corners, "corners", ("blend", "stop", "round"), PathError)
-        if rows.straight:
-            return _of_cut(path, rows, turns, asked)
-        t = _times(path, rows, feed, duration)
-        feeds = rows.feed if feed is None else np.full(len(rows.positions), feed)
-        if bounds and feeds is None:
-            raise PathError(f"{next(iter(bounds))} has no effect without a feed")
-        if asked.corners == "round":
-            if feeds is None:
-                raise PathError("corners are 'round', which needs a feed [m/s]; give it")
-            legs = Polyline(rows.positions, turns, tolerance=asked.tolerance)
-            return _at_feed(legs, legs.pose_times, feeds, bounds)
-        return _through(t, rows, turns, feeds, asked)
+        made = _of_cut(rows, turns, asked) if rows.straight else _of_table(path, rows, turns, asked)
+        is_ramped = asked.ramp is not None and asked.duration is None
+        found = section_at_rest(made, ramp=asked.ramp or 0.0) if is_ramped else made
     # Splines refuse times that differ, but by less than they can divide by.
     except (PathError, ValueError) as error:
         raise FileFormatError(f"{path}: {error}") from error
+    return found.noted((*rows.notes, *made.notes))
+
+
+def _of_table(file: FilePath, rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
+    """Return the tool motion of a table."""
+    feed, duration, bounds = asked.feed, asked.duration, asked.bounds
+    # The ramps are part of the duration, and go half as far as they last.
+    moving = None if duration is None else _moving(file, duration, asked)
+    t = _times(file, rows, feed, moving)
+    feeds = rows.feed if feed is None else np.full(len(rows.positions), feed)
+    if bounds and feeds is None:
+        raise PathError(f"{next(iter(bounds))} has no effect without a feed")
+    if asked.corners == "round":
+        if feeds is None:
+            raise PathError("corners are 'round', which needs a feed [m/s]; give it")
+        legs = Polyline(rows.positions, turns, tolerance=asked.tolerance)
+        steady = _steady(rows.positions, feeds, asked.tolerance)
+        return _at_feed(legs, legs.pose_times, steady, bounds)
+    return _noted(_through(t, rows, turns, feeds, asked), t, rows, asked)
 
 
 def _through(
@@ -93,7 +117,7 @@ def _through(
     through = Waypoints(t, rows.positions, turns, corners=asked.corners, corner_angle=bend)
     through.samples([0.0])
     if feeds is None:
-        return through
+        return through if asked.duration is None else _at_rest(through, asked)
     pieces: list[Path] = []
     passed = t - t[0]
     for piece in through.between_corners():
@@ -104,28 +128,150 @@ def _through(
     return pieces[0] if len(pieces) == 1 else Joined(pieces)
 
 
-def _of_cut(file: FilePath, rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
+def _moving(file: FilePath, duration: float, asked: Pacing) -> float:
+    """Return how long a path that is run up and down takes at its own speed [s]."""
+    ramp = 0.0 if asked.corners == "stop" else _ramp(asked)
+    if not 0.0 <= 2.0 * ramp <= duration:
+        raise FileFormatError(
+            f"{file}: ramp is {ramp:g} s, expected at most half of the duration, {duration:g} s"
+        )
+    return duration - ramp
+
+
+def _at_rest(path: Path, asked: Pacing) -> Path:
+    """Return a path of a duration run up from rest, and down again, unless it rests anyway."""
+    return path if asked.corners == "stop" else section_at_rest(path, ramp=_ramp(asked))
+
+
+def _ramp(asked: Pacing) -> float:
+    """Return how long a path of a duration takes to run up [s]."""
+    return min(_RAMP, 0.25 * (asked.duration or 0.0)) if asked.ramp is None else asked.ramp
+
+
+def _noted(path: Path, t: Array, rows: PoseRows, asked: Pacing) -> Path:
+    """Give a path a note where it leaves the straight lines between its poses."""
+    if asked.corners != "blend" or rows.t is not None:
+        return path
+    legs = np.diff(rows.positions, axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    sound = (lengths[:-1] > 0.0) & (lengths[1:] > 0.0)
+    products = np.where(sound, lengths[:-1] * lengths[1:], 1.0)
+    cosines = np.where(sound, (legs[:-1] * legs[1:]).sum(axis=1) / products, 1.0)
+    if not (cosines < np.cos(_BEND)).any():
+        return path
+    curve = Waypoints(t, rows.positions, corners="blend")
+    shares = np.linspace(0.0, 1.0, _LOOKS + 2)[1:-1]
+    times = (t[:-1, None] + np.diff(t)[:, None] * shares - t[0]).ravel()
+    places = curve.samples(times).translation.reshape(len(legs), _LOOKS, 3)
+    places = places - rows.positions[:-1, None]
+    squares = np.where(lengths > 0.0, lengths**2, 1.0)
+    along = np.clip(np.einsum("klc,kc->kl", places, legs) / squares[:, None], 0.0, 1.0)
+    away = np.linalg.norm(places - along[:, :, None] * legs[:, None], axis=2).max(axis=1)
+    worst = int(away.argmax())
+    if away[worst] > asked.tolerance:
+        has_feed = rows.feed is not None or asked.feed is not None
+        remedy = (
+            f"corners round (--corners round) keeps {1e3 * asked.tolerance:g} mm"
+            if has_feed
+            else "give more poses, or corners stop (--corners stop)"
+        )
+        # Of the ends of that leg, the one where it bends more.
+        bends = np.concatenate([[1.0], cosines, [1.0]])[worst : worst + 2]
+        kink = worst + int(bends.argmin())
+        note = (
+            f"the path leaves the straight lines between poses by up to {1e3 * away[worst]:.1f} mm "
+            f"at {rows.places[kink]}: {remedy}"
+        )
+        return path.noted([note])
+    return path
+
+
+def _flipped(file: FilePath, rows: PoseRows) -> PoseRows:
+    """Return rows whose normals point the other way."""
+    if rows.orientation != "normal":
+        raise FileFormatError(
+            f"{file}: flip_normals has no effect: it has no columns nx,ny,nz; drop it"
+        )
+    return replace(rows, values=-rows.values)
+
+
+def _stood_off(file: FilePath, rows: PoseRows, rotations: Array, standoff: float) -> PoseRows:
+    """Return rows whose tip is held back along the tool's z axis."""
+    if not rows.orientation:
+        raise FileFormatError(
+            f"{file}: standoff is along the tool's z axis, which it does not say; add nx,ny,nz"
+        )
+    return replace(rows, positions=rows.positions - standoff * rotations[:, :, 2])
+
+
+def _of_cut(rows: PoseRows, turns: Array | None, asked: Pacing) -> Path:
     """Return the straight legs of a cut or stroke, which rests where it goes back on itself."""
     if asked.duration is not None:
         raise PathError("straight legs go at a feed, so that duration has no effect; drop it")
     feeds = rows.feed if asked.feed is None else np.full(len(rows.positions), asked.feed)
     if feeds is None:
         raise PathError("it says no feed (programs: F, FEDRAT); give a feed [m/s]")
-    legs = np.diff(rows.positions, axis=0)
+    feeds = _steady(rows.positions, feeds, asked.tolerance)
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (len(rows.positions), 1)) if turns is None else turns
+    kept = merged(rows.positions, still, asked.tolerance, _TURN_TOLERANCE).kept
+    legs = np.diff(rows.positions[kept], axis=0)
     lengths = np.linalg.norm(legs, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         cosines = (legs[:-1] * legs[1:]).sum(axis=1) / (lengths[:-1] * lengths[1:])
-    back = 1 + np.flatnonzero(cosines < _BACK - 1.0)
+    back = kept[1 + np.flatnonzero(cosines < _BACK - 1.0)]
     if asked.corners == "stop":
         bend = _BEND if asked.corner_angle is None else asked.corner_angle
-        back = 1 + np.flatnonzero(cosines < np.cos(bend))
+        back = kept[1 + np.flatnonzero(cosines < np.cos(bend))]
     pieces: list[Path] = []
-    for first, last in pairwise([0, *back.tolist(), len(legs)]):
+    for first, last in pairwise([0, *back.tolist(), len(rows.positions) - 1]):
         part = slice(first, last + 1)
         own = None if turns is None else turns[part]
         piece = Polyline(rows.positions[part], own, tolerance=asked.tolerance)
         pieces.append(_at_feed(piece, piece.pose_times, feeds[part], asked.bounds))
     return pieces[0] if len(pieces) == 1 else Joined(pieces)
+
+
+def _steady(positions: Array, feeds: Array, tolerance: float) -> Array:
+    """Return feeds (N,) without those that hold for less way than the tolerance."""
+    found = feeds.copy()
+    steps = np.append(np.linalg.norm(np.diff(positions, axis=0), axis=1), 0.0)
+    edges = [0, *(1 + np.flatnonzero(np.diff(feeds[:-1]))).tolist(), len(feeds)]
+    before: float | None = None
+    for first, last in reversed(list(pairwise(edges))):
+        # A start that is as short goes at what follows it.
+        if before is not None and steps[first:last].sum() < tolerance:
+            found[first:last] = before
+        before = float(found[first])
+    return found
+
+
+def _without_stubs(rows: PoseRows, rotations: Array, asked: Pacing) -> tuple[PoseRows, Array]:
+    """Return rows without repeated ones and those of stubs, where the file says no times.
+
+    A stub is a step shorter than the tolerance, and than a twentieth of those beside it: a curve
+    through its ends would swing for it.
+    """
+    count = len(rows.positions)
+    if rows.t is not None or rows.straight or count < 3:
+        return rows, rotations
+    chosen = [0]
+    for k in range(1, count):
+        step = float(np.linalg.norm(rows.positions[k] - rows.positions[chosen[-1]]))
+        others = [
+            float(np.linalg.norm(rows.positions[b] - rows.positions[a]))
+            for a, b in ((k, k + 1), (chosen[-1] - 1, chosen[-1]))
+            if a >= 0 and b < count
+        ]
+        short = step <= _REPEATED or (step < asked.tolerance and step < _STUB * min(others))
+        cosine = 0.5 * (np.sum(rotations[k] * rotations[chosen[-1]]) - 1.0)
+        if not (short and np.arccos(np.clip(cosine, -1.0, 1.0)) <= _TURN_TOLERANCE):
+            chosen.append(k)
+        elif k == count - 1 and len(chosen) > 1:
+            # The end stays where it is.
+            chosen[-1] = k
+    if len(chosen) in (1, count):
+        return rows, rotations
+    return some_rows(rows, chosen), rotations[chosen]
 
 
 def _at_feed(path: Path, t: Array, feeds: Array, bounds: Mapping[str, float]) -> Feed:

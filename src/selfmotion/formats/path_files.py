@@ -1,21 +1,23 @@
 """Tool motions from files: tables, arrays, what ROS writes, programs of machine tools, drawings."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
-from selfmotion.basics import FileFormatError, as_number, as_path
+import numpy.typing as npt
+
+from selfmotion.basics import FileFormatError, as_flag, as_number, as_path
 from selfmotion.formats.cldata import read_cldata
 from selfmotion.formats.drawing import read_drawing
 from selfmotion.formats.gcode import read_gcode
 from selfmotion.formats.path_building import JUMP, Pacing, path_of_rows
-from selfmotion.formats.path_rows import READERS, PoseRows, no_such_seam
+from selfmotion.formats.path_rows import PROGRAMS, READERS, READING, PoseRows, Reading, no_such_seam
 from selfmotion.path import Path
 
-_READERS: Mapping[str, Callable[[FilePath], Mapping[str, PoseRows]]] = {
+_READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
     **READERS,
-    **dict.fromkeys((".nc", ".ngc", ".gcode", ".tap"), read_gcode),
-    **dict.fromkeys((".apt", ".cls", ".cl"), read_cldata),
+    **dict.fromkeys(PROGRAMS, read_gcode),
+    **dict.fromkeys((".apt", ".cls", ".cl"), lambda file, _: read_cldata(file)),
 }
 _DRAWING = ".dxf"
 
@@ -35,6 +37,13 @@ def read_path(
     smoothing: float | None = None,
     within: float | None = None,
     seam: str | None = None,
+    ramp: float | None = None,
+    flip_normals: bool = False,
+    standoff: float = 0.0,
+    columns: Sequence[str] | str | None = None,
+    rotary: str | None = None,
+    rotary_axes: Sequence[str] | str | None = None,
+    rotary_center: npt.ArrayLike | None = None,
 ) -> Path:
     """Read a tool motion through poses.
 
@@ -82,7 +91,7 @@ def read_path(
     feed : float, optional
         Speed of the tool [m/s], from rest to rest, where the file has no times; see `Feed`.
     duration : float, optional
-        Or the time of the whole motion [s], at about constant speed.
+        Or the time of the whole motion [s], from rest to rest, at about constant speed in between.
     jump : float
         Distance from one pose to the next [m] that is refused.
     corners : {"blend", "stop", "round"}
@@ -96,6 +105,24 @@ def read_path(
         Bounds of a feed, as in `Feed`.
     seam : str, optional
         Which of several seams, cuts or strokes of the file.
+    ramp : float, optional
+        In so long [s] it is run up from rest, and down again; see `section_at_rest`. Of a duration
+        it is a part: by default a quarter, at most 0.5 s.
+    flip_normals : bool
+        Whether ``nx,ny,nz`` point out of the part, as surface normals of CAD do.
+    standoff : float
+        How far the tool's tip is held back from the poses, along its z axis [m].
+    columns : sequence of str, optional
+        Names of a table's columns, in place of its header or where it has none; "-" leaves one out.
+    rotary : {"head", "table"}, optional
+        What ``A B C`` of G-code turn, where it does not say ``G43.4``: the head, positions being
+        those of the tip in the part, or a table with the part on it, positions being the machine's.
+    rotary_axes : str or sequence of str
+        A table's axes, from the machine to the part: ``"BC"`` for a C axis on a B axis, ``"AC"``,
+        or one. Positive words move the tool right-handed about the axis relative to the part (ISO
+        841); ``["B", "-C"]`` where a positive C turns the table right-handed.
+    rotary_center : (3,)
+        A point on all of a table's axes, in the program's coordinates [m].
 
     Raises
     ------
@@ -120,9 +147,21 @@ def read_path(
             "turn_acceleration": turn_acceleration,
             "smoothing": smoothing,
             "within": within,
+            "ramp": ramp,
+            "flip_normals": flip_normals,
+            "standoff": standoff,
         },
     )
-    return path_of_rows(path, one_seam(path, seam), asked)
+    reading = Reading.of(
+        path,
+        {
+            "columns": columns,
+            "rotary": rotary,
+            "rotary_axes": rotary_axes,
+            "rotary_center": rotary_center,
+        },
+    )
+    return path_of_rows(path, one_seam(path, seam, reading), asked)
 
 
 def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Path, PoseRows]]:
@@ -135,7 +174,9 @@ def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Pa
     FileFormatError
         As by `read_path`, or the file names no seams.
     """
-    seams = _read(file)
+    own = {key: options[key] for key in READING if key in options}
+    options = {key: value for key, value in options.items() if key not in own}
+    seams = _read(file, None, Reading.of(file, own))
     if "" in seams:
         raise FileFormatError(
             f"{file}: has no column 'seam', expected one that names the seam of each row"
@@ -147,13 +188,15 @@ def read_seams(file: FilePath, options: Mapping[str, Any]) -> dict[str, tuple[Pa
 def _pacing(path: FilePath, options: Mapping[str, Any]) -> Pacing:
     asked = Pacing(**options)
     as_number(asked.jump, f"{path}: jump", above=0.0, error=FileFormatError)
+    as_number(asked.standoff, f"{path}: standoff", error=FileFormatError)
+    as_flag(asked.flip_normals, f"{path}: flip_normals", FileFormatError)
     for name, value in (("feed", asked.feed), ("duration", asked.duration)):
         if value is not None:
             as_number(value, f"{path}: {name}", above=0.0, error=FileFormatError)
     return asked
 
 
-def _read(path: FilePath, seam: str | None = None) -> Mapping[str, PoseRows]:
+def _read(path: FilePath, seam: str | None, reading: Reading) -> Mapping[str, PoseRows]:
     """Return the rows of a file by the names of its seams, of a drawing those of one layer."""
     suffix = path.suffix.lower()
     if suffix == _DRAWING:
@@ -162,20 +205,21 @@ def _read(path: FilePath, seam: str | None = None) -> Mapping[str, PoseRows]:
     if reader is None:
         known = ", ".join((*_READERS, _DRAWING))
         raise FileFormatError(f"{path}: has suffix '{path.suffix}', expected one of {known}")
-    return reader(path)
+    return reader(path, reading)
 
 
-def events_of(file: FilePath, seam: str | None) -> tuple[str, ...]:
+def events_of(file: FilePath, options: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what happens along a path of a file, each once; nothing of one that is refused."""
     try:
-        return tuple(dict.fromkeys(event for _, event in one_seam(file, seam).events))
+        rows = one_seam(file, options.get("seam"), Reading.of(file, options))
+        return tuple(dict.fromkeys(event for _, event in rows.events))
     except FileFormatError:
         return ()
 
 
-def one_seam(path: FilePath, seam: str | None) -> PoseRows:
+def one_seam(path: FilePath, seam: str | None, reading: Reading) -> PoseRows:
     """Return the rows of one seam of a file."""
-    seams = _read(path, seam)
+    seams = _read(path, seam, reading)
     if seam is None and len(seams) == 1:
         return next(iter(seams.values()))
     if seam is not None and seam in seams:

@@ -1,6 +1,7 @@
 """Rows of poses, as files of several kinds hold them."""
 
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
@@ -10,13 +11,20 @@ import numpy as np
 from selfmotion.basics import (
     Array,
     FileFormatError,
+    ProblemError,
     nearest,
     read_arrays,
     read_rows,
+    shown,
 )
-from selfmotion.formats.documents import read_document
+from selfmotion.formats.documents import read_values
+from selfmotion.formats.ros import nanoseconds
+from selfmotion.formats.rotary import Rotary
 
 _POSITION = ("x", "y", "z")
+# Suffixes of tables, and of G-code.
+TABLES = (".csv", ".txt", ".tsv")
+PROGRAMS = (".nc", ".ngc", ".gcode", ".tap")
 
 
 # Columns of an orientation → its key in `ORIENTATIONS`.
@@ -28,6 +36,19 @@ _COLUMNS: Mapping[tuple[str, ...], str] = {
 }
 
 
+# What a table without a header may be, by the number of its columns.
+_HEADERS = {
+    3: "x,y,z",
+    4: "t,x,y,z",
+    6: "x,y,z,nx,ny,nz",
+    7: "x,y,z,qw,qx,qy,qz",
+    8: "t,x,y,z,qw,qx,qy,qz",
+}
+# Units in brackets behind a title → what its name ends in; other names of columns.
+_BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg"}
+_BRACKETS |= dict.fromkeys(("m", "rad", "s", "m/s", "sec", "-", "1"), "")
+_ALSO = {"time": "t"}
+_TITLE = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
 # Columns of texts: which seam a row is of, and what happens at it.
 SEAM, EVENT = "seam", "event"
 _KNOWN = {"t", "feed", *_POSITION, *(name for names in _COLUMNS for name in names)}
@@ -65,6 +86,8 @@ class PoseRows:
         Whether the tool goes straight from pose to pose.
     one_way : bool
         Whether it is meant in its own direction only, as cuts of a machine are.
+    notes : tuple of str
+        What to know of how the file was read.
     """
 
     places: Sequence[str]
@@ -76,6 +99,53 @@ class PoseRows:
     events: tuple[tuple[int, str], ...] = ()
     straight: bool = False
     one_way: bool = False
+    notes: tuple[str, ...] = ()
+
+
+# Options of `read_path` that say what a file means.
+READING = ("columns", "rotary", "rotary_axes", "rotary_center")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a file does not say itself; see `read_path`.
+
+    Attributes
+    ----------
+    columns : tuple of str or None
+        Of a table.
+    rotary : Rotary or None
+        Of a program of a machine: what its rotary words turn.
+    """
+
+    columns: tuple[str, ...] | None = None
+    rotary: Rotary | None = None
+
+    @classmethod
+    def of(cls, file: FilePath, options: Mapping[str, Any]) -> "Reading":
+        """Return what options say; others are passed over.
+
+        Raises
+        ------
+        FileFormatError
+            One is of the wrong kind, or of another kind of file.
+        """
+        try:
+            rotary = Rotary.of(options)
+        except (ValueError, ProblemError) as error:
+            raise FileFormatError(f"{file}: {error}") from error
+        if rotary is not None and file.suffix.lower() not in PROGRAMS:
+            raise FileFormatError(f"{file}: rotary has no effect: it is no G-code; drop it")
+        columns = options.get("columns")
+        if columns is None:
+            return cls(None, rotary)
+        if isinstance(columns, str):
+            columns = columns.split(",")
+        if not isinstance(columns, list | tuple) or not all(isinstance(x, str) for x in columns):
+            raise FileFormatError(f"{file}: columns is {shown(columns)}, expected names")
+        if file.suffix.lower() not in TABLES:
+            raise FileFormatError(f"{file}: columns has no effect: it is no table; drop it")
+        return cls(tuple(name.strip() for name in columns))
 
 
 # So many names of seams are listed.
@@ -91,10 +161,15 @@ def no_such_seam(file: FilePath, seam: str, names: Sequence[str]) -> FileFormatE
     )
 
 
-def read_tables(file: FilePath) -> dict[str, PoseRows]:
+def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, PoseRows]:
     """Return the rows of a table by the names in its column ``seam``, "" where it has none."""
     header, table, lines, texts = read_rows(
-        file, (SEAM, EVENT), check=lambda names: [_meant(file, name) for name in names]
+        file,
+        (SEAM, EVENT),
+        check=lambda names: [_meant(file, name) for name in names],
+        columns=None if reading is None else reading.columns,
+        named=_named,
+        usual=_HEADERS,
     )
     whole = _of_table(file, header, table, lines, texts.get(EVENT, [""] * len(lines)))
     if SEAM not in texts:
@@ -103,11 +178,11 @@ def read_tables(file: FilePath) -> dict[str, PoseRows]:
     blank = next((line for line, name in zip(lines, names, strict=True) if not name), None)
     if blank is not None:
         raise FileFormatError(f"{file}: line {blank}: names no seam")
-    return {name: _some(whole, [k for k, other in enumerate(names) if other == name])
+    return {name: some_rows(whole, [k for k, other in enumerate(names) if other == name])
             for name in dict.fromkeys(names)}  # fmt: skip
 
 
-def _some(rows: PoseRows, chosen: Sequence[int]) -> PoseRows:
+def some_rows(rows: PoseRows, chosen: Sequence[int]) -> PoseRows:
     """Return some of the rows."""
     new = {old: k for k, old in enumerate(chosen)}
     return PoseRows(
@@ -120,6 +195,7 @@ def _some(rows: PoseRows, chosen: Sequence[int]) -> PoseRows:
         tuple((new[k], event) for k, event in rows.events if k in new),
         rows.straight,
         rows.one_way,
+        rows.notes,
     )
 
 
@@ -162,6 +238,15 @@ def _of_table(
     )
 
 
+def _named(title: str) -> str:
+    """Return a title as its column is called here: x_mm of "X [mm]"."""
+    name = title.strip().lower()
+    found = _TITLE.fullmatch(name)
+    if found and found[2].strip() in _BRACKETS:
+        name = found[1] + _BRACKETS[found[2].strip()]
+    return _ALSO.get(name, name)
+
+
 def _several(text: str) -> list[str]:
     """Return the events of a row, with semicolons between them."""
     return [event.strip() for event in text.split(";") if event.strip()]
@@ -180,10 +265,17 @@ def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, A
 
 def _meant(file: FilePath, title: str) -> tuple[str, float]:
     """Return the name of a column without its unit, and that in SI units."""
+    title = _named(title)
     name, scale = title, 1.0
     for suffix, (names, factor) in _UNITS.items():
         if title.endswith(suffix) and title.removesuffix(suffix) in names:
             name, scale = title.removesuffix(suffix), factor or np.pi / 180.0
+    if name in ("i", "j", "k"):
+        raise FileFormatError(
+            f"{file}: column '{name}': of machines i,j,k points out of the part; nx,ny,nz is the "
+            f"tool's z axis here, into the part: call them nx,ny,nz, and say flip_normals where "
+            f"they point out"
+        )
     if name not in _KNOWN:
         raise FileFormatError(
             f"{file}: unknown column '{title}'{nearest(title, (*_LONG, SEAM, EVENT))}, expected t, "
@@ -209,13 +301,52 @@ def _read_array(file: FilePath) -> PoseRows:
     return PoseRows(places, rest[:, :3], "quaternion" if rest.shape[1] == 7 else "", rest[:, 3:], t)
 
 
-def _read_ros(file: FilePath) -> PoseRows:
-    poses = read_document(file).get("poses")
+# What a list of messages may be called.
+_LISTS = ("paths", "rasters", "pose_arrays")
+
+
+def _read_ros(file: FilePath) -> dict[str, PoseRows]:
+    """Return the poses of a message, or of each of several ones (rasters) as a seam."""
+    document = read_values(file)
+    if isinstance(document, list):
+        # Rasters of rasters are one list of strokes.
+        messages = list(_messages(document))
+    else:
+        keys = _LISTS if isinstance(document, Mapping) else ()
+        listed = next((document[key] for key in keys if key in document), None)
+        messages = list(_messages(listed)) if isinstance(listed, list) else [document]
+    if not messages:
+        raise FileFormatError(
+            f"{file}: holds no message with poses, expected a nav_msgs/Path or "
+            f"geometry_msgs/PoseArray, or a list of these"
+        )
+    found = {
+        f"seam {number}": _of_message(file, message, f"[{number - 1}].")
+        for number, message in enumerate(messages, 1)
+    }
+    return found if len(found) > 1 else {"": _of_message(file, messages[0], "")}
+
+
+def _messages(items: Sequence[Any]) -> Iterator[Any]:
+    for item in items:
+        if isinstance(item, list) and item and not _is_pose(item[0]):
+            yield from _messages(item)
+        else:
+            yield {"poses": item} if isinstance(item, list) else item
+
+
+def _is_pose(item: Any) -> bool:
+    return isinstance(item, Mapping) and ("position" in item or "pose" in item)
+
+
+def _of_message(file: FilePath, message: Any, where: str) -> PoseRows:
+    poses = message.get("poses") if isinstance(message, Mapping) else None
     if not isinstance(poses, list) or not poses:
         raise FileFormatError(
-            f"{file}: has no list of poses, expected a nav_msgs/Path or geometry_msgs/PoseArray"
+            f"{file}: {where and f'{where[:-1]} '}has no list of poses, expected a nav_msgs/Path "
+            f"or geometry_msgs/PoseArray"
         )
-    places = [f"poses[{k}]" for k in range(len(poses))]
+    places = [f"{where}poses[{k}]" for k in range(len(poses))]
     rows = [_ros_pose(file, place, pose) for place, pose in zip(places, poses, strict=True)]
     stamps = [_stamp(file, place, pose) for place, pose in zip(places, poses, strict=True)]
     # Publishers that know no times leave all stamps at the same one.
@@ -243,20 +374,18 @@ def _stamp(file: FilePath, place: str, given: Mapping[str, Any]) -> float | None
     if header is None:
         return None
     try:
-        stamp = header["stamp"]
-        return int(stamp["sec"]) + 1e-9 * int(stamp["nanosec"])
+        return 1e-9 * nanoseconds(header["stamp"])
     except (KeyError, OverflowError, TypeError, ValueError):
         raise FileFormatError(
-            f"{file}: {place}: header.stamp is incomplete, expected sec and nanosec"
+            f"{file}: {place}: header.stamp is incomplete, expected sec and nanosec (ROS 1: secs "
+            f"and nsecs)"
         ) from None
 
 
-READERS: Mapping[str, Callable[[FilePath], Mapping[str, PoseRows]]] = {
-    ".csv": read_tables,
-    ".txt": read_tables,
-    ".tsv": read_tables,
-    ".npy": lambda file: {"": _read_array(file)},
-    ".yaml": lambda file: {"": _read_ros(file)},
-    ".yml": lambda file: {"": _read_ros(file)},
-    ".json": lambda file: {"": _read_ros(file)},
+READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
+    **dict.fromkeys(TABLES, read_tables),
+    ".npy": lambda file, _: {"": _read_array(file)},
+    ".yaml": lambda file, _: _read_ros(file),
+    ".yml": lambda file, _: _read_ros(file),
+    ".json": lambda file, _: _read_ros(file),
 }

@@ -190,6 +190,8 @@ class _Reader:
         values = dict(given)
         parts = values.pop("parts", None)
         values["bodies"] = [self._obstacle(item) for item in values.pop("bodies", [])]
+        if "packages" in values:
+            values["packages"] = [self._beside(name) for name in values["packages"]]
         if parts is None:
             return load_robot(self._source(values), **values)
         for key in ("name", "file", "base", "arguments"):

@@ -25,7 +25,6 @@ from selfmotion.path import (
     Placed,
     Spiral,
     Weave,
-    section_at_rest,
     with_leads,
 )
 from selfmotion.robot import NAMED_ARMS, RobotModel
@@ -72,9 +71,7 @@ def path_of(
     match kind:
         case "file":
             del values["kind"]
-            ramp = values.pop("ramp", None)
             path: Path = read_path(beside(values.pop("file")), **values)
-            path = path if ramp is None else section_at_rest(path, ramp=ramp)
         case "circle":
             path = _circle(values)
         case "line":
@@ -85,9 +82,10 @@ def path_of(
             inner = partial(path_of, robot=robot, start=start, beside=beside)
             path = _restored(_with_inner(values, inner))
     path = path if feed is None else Feed(path, feed, **bounds)
+    notes = path.notes
     path = path if weave is None else woven(path, weave)
     path = path if leads is None else led(path, leads)
-    return path if frame is None else Placed(path, frame)
+    return (path if frame is None else Placed(path, frame)).noted(notes)
 
 
 def led(path: Path, values: Mapping[str, Any]) -> Path:

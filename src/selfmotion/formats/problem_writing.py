@@ -18,6 +18,7 @@ from selfmotion.robot import (
     TOOL_JOINT,
     RobotModel,
     UrdfPart,
+    follower_of,
     load_robot,
     mounting_of,
     moving_joints,
@@ -97,6 +98,8 @@ def _robot(robot: RobotModel) -> dict[str, Any]:
     if mounting.tool_offset is not None:
         position, rpy = mounting.tool_offset
         table["tool_offset"] = {"position": position, "rpy": rpy}
+    if robot.urdf.packages:
+        table["packages"] = list(robot.urdf.packages)
     if mounting.bodies:
         table["bodies"] = mounting.bodies
     _check_frames(robot)
@@ -130,6 +133,7 @@ def _check_unchanged(robot: RobotModel, tool: str) -> None:
         base={part.name: part.base for part in given if part.base is not None},
         on={part.name: part.on for part in given if part.on is not None},
         arguments={part.name: part.arguments for part in given},
+        packages=robot.urdf.packages,
     )
     if now.urdf.bare_text() != robot.urdf.bare_text():
         raise ProblemError(
@@ -142,7 +146,7 @@ def _check_frames(robot: RobotModel) -> None:
     """Refuse an arm that was loaded for other frames than those it follows paths with."""
     offset = robot.urdf.joints.get(TOOL_JOINT)
     moving = moving_joints(robot.urdf, robot.tools, robot.reference)
-    free = {joint.name for joint in moving} - set(robot.locked)
+    free = {follower_of(robot.urdf, joint.name).joint for joint in moving} - set(robot.locked)
     if free != set(robot.joint_names) or (offset is not None and offset.child != robot.tool):
         raise ProblemError(
             f"{robot.name}: was loaded for other frames, so that its joints or its tool_offset "

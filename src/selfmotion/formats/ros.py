@@ -10,17 +10,26 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError
+from selfmotion.basics import Array, FileFormatError
 from selfmotion.formats.samples import MotionSamples
 from selfmotion.motion import Trajectory
 
 _NANO = 1_000_000_000
+# At its ends a motion that is slower than this rests [rad/s or m/s].
+_REST = 1e-6
+# Where positions are joined by straight lines, a corner takes this share of the time to the next.
+_CORNER = 1e-3
 
 
 def joint_trajectory(motion: MotionSamples) -> dict[str, Any]:
     """Return a JointTrajectory; its stamp is 0, which means: at once."""
     points = []
-    for t, q, qd, qdd in zip(motion.t, motion.q, motion.qd, motion.qdd, strict=True):
+    rates = motion.qd.copy()
+    for row in (0, -1):
+        # Controllers want a 0 there, and refuse 1e-7.
+        if np.abs(rates[row]).max() <= _REST:
+            rates[row] = 0.0
+    for t, q, qd, qdd in zip(motion.t, motion.q, rates, motion.qdd, strict=True):
         sec, nanosec = divmod(round(float(t) * _NANO), _NANO)
         points.append(
             {
@@ -46,6 +55,12 @@ def _header() -> dict[str, Any]:
     return {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
 
 
+def nanoseconds(stamp: Mapping[str, Any]) -> int:
+    """Return a time of ROS 2, or of ROS 1, whose names differ [ns]; KeyError for what is none."""
+    seconds, rest = ("secs", "nsecs") if "secs" in stamp else ("sec", "nanosec")
+    return int(stamp[seconds]) * _NANO + int(stamp[rest])
+
+
 def trajectory(file: Path, document: Mapping[str, Any]) -> Trajectory:
     """Return the motion of either message.
 
@@ -54,6 +69,10 @@ def trajectory(file: Path, document: Mapping[str, Any]) -> Trajectory:
     FileFormatError
         A key is missing, or points do not fit the joints; the point is named.
     """
+    several = document.get("trajectory")
+    if isinstance(several, list) and len(several) == 1 and isinstance(several[0], Mapping):
+        # A DisplayTrajectory.
+        document = several[0]
     message = document.get("joint_trajectory", document)
     try:
         names, points = tuple(map(str, message["joint_names"])), list(message["points"])
@@ -64,23 +83,53 @@ def trajectory(file: Path, document: Mapping[str, Any]) -> Trajectory:
     t, q, qd, qdd = [], [], [], []
     for k, point in enumerate(points):
         try:
-            since = point["time_from_start"]
-            t.append((int(since["sec"]) * _NANO + int(since["nanosec"])) / _NANO)
-            q.append([float(value) for value in point["positions"]])
-            qd.append([float(value) for value in point["velocities"]])
-            qdd.append([float(value) for value in point.get("accelerations", [])])
+            t.append(nanoseconds(point["time_from_start"]) / _NANO)
+            q.append(_values(point, "positions"))
+            qd.append(_values(point, "velocities"))
+            qdd.append(_values(point, "accelerations"))
         except (KeyError, OverflowError, TypeError, ValueError) as error:
             raise FileFormatError(
-                f"{file}: points[{k}]: {error}; expected positions, velocities and "
-                f"time_from_start with sec and nanosec"
+                f"{file}: points[{k}]: {error}; expected positions, and time_from_start with sec "
+                f"and nanosec (ROS 1: secs and nsecs)"
             ) from error
-        if not len(q[-1]) == len(qd[-1]) == len(names):
+        if len(q[-1]) != len(names) or len(qd[-1]) not in (0, len(names)):
             raise FileFormatError(
                 f"{file}: points[{k}]: {len(q[-1])} positions and {len(qd[-1])} velocities for "
                 f"{len(names)} joints"
             )
+        if bool(qd[-1]) != bool(qd[0]):
+            raise FileFormatError(
+                f"{file}: points[{k}]: velocities are given for some points only; give all, or none"
+            )
+    faster = np.array(qdd) if all(len(row) == len(names) for row in qdd) else None
     try:
-        faster = np.array(qdd) if all(len(row) == len(names) for row in qdd) else None
+        if qd and not qd[0]:
+            return Trajectory(*_straight(Trajectory(np.array(t), np.array(q), np.array(q), names)))
         return Trajectory(np.array(t), np.array(q), np.array(qd), names, faster)
     except FileFormatError as error:
         raise FileFormatError(f"{file}: {error}") from error
+
+
+def _straight(points: Trajectory) -> tuple[Array, Array, Array, tuple[str, ...]]:
+    """Return the motion of a controller that is given positions only: straight from one to another.
+
+    At each point its velocity goes over from one to the next within a thousandth of the time to
+    either, in which it is off the lines by next to nothing.
+    """
+    t, q = points.t, points.q
+    lasts = np.diff(t)
+    rates = np.diff(q, axis=0) / lasts[:, None]
+    near = _CORNER * np.minimum(lasts[:-1], lasts[1:])
+    before, after = t[1:-1] - near, t[1:-1] + near
+    times = np.concatenate([t[:1], np.stack([before, after], axis=1).ravel(), t[-1:]])
+    ends = [q[1:-1] - near[:, None] * rates[:-1], q[1:-1] + near[:, None] * rates[1:]]
+    shape = (-1, q.shape[1])
+    places = np.concatenate([q[:1], np.stack(ends, axis=1).reshape(shape), q[-1:]])
+    speeds = np.repeat(rates, 2, axis=0)
+    return times, places, speeds, points.joint_names
+
+
+def _values(point: Mapping[str, Any], key: str) -> list[float]:
+    """Return numbers of a point; empty lists are absent ones, but for positions."""
+    given = point[key] if key == "positions" else point.get(key)
+    return [float(value) for value in given or []]

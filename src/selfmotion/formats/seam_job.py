@@ -11,12 +11,13 @@ from selfmotion.formats.documents import in_si, read_document
 from selfmotion.formats.job import Job
 from selfmotion.formats.path_events import times_of_events
 from selfmotion.formats.path_files import one_seam, read_path, read_seams
+from selfmotion.formats.path_rows import READING, Reading
 from selfmotion.formats.poses import pose_of
 from selfmotion.formats.problem_file import job_of
 from selfmotion.formats.problem_parts import FEED_BOUNDS, led, obstacle, start_of, woven
 from selfmotion.formats.workpiece import NAME, placed_body, standing
 from selfmotion.job import Program, Seam, plan_job
-from selfmotion.path import Path, Placed, section_at_rest
+from selfmotion.path import Path, Placed
 from selfmotion.problem import NO_OVERLAP, Problem
 from selfmotion.robot import RobotModel
 
@@ -24,8 +25,11 @@ from selfmotion.robot import RobotModel
 JOB = ("start", "end", "order", "branches", "seconds_per_cost", "deadline", "rng")
 SEAM = ("name", "either_way", "after", "after_any", "wait", "events", "leaves", "may_meet")
 OF_PROBLEM = ("path", "task", "costs", "constraints", "relaxations")
-_PLACED = ("file", "frame", "ramp", "weave", "leads")
-_PACED = ("feed", "duration", "jump", "corners", "tolerance", "corner_angle", *FEED_BOUNDS)
+_PLACED = ("file", "frame", "weave", "leads")
+_PACED = (
+    *("feed", "duration", "jump", "corners", "tolerance", "corner_angle", "ramp"),
+    *("flip_normals", "standoff", *READING, *FEED_BOUNDS),
+)
 OF_TABLE = (*_PLACED, *_PACED)
 
 
@@ -181,12 +185,11 @@ class _Reader:
         if not file.is_file():
             return [], False
         try:
-            rows = one_seam(file, path.get("seam"))
+            rows = one_seam(file, path.get("seam"), Reading.of(file, path))
             if not rows.events:
                 return [], rows.one_way
             options = {key: path[key] for key in ("seam", *_PACED) if key in path}
-            timed = _ramped(read_path(file, **options), path)
-            events = times_of_events(timed, rows)
+            events = times_of_events(read_path(file, **options), rows)
             return _after_lead(events, path.get("leads")), rows.one_way
         except (SelfmotionError, TypeError) as error:
             raise FileFormatError(f"{self._file}: {where}: path: {error}") from error
@@ -208,7 +211,6 @@ class _Reader:
         # What a machine switches stays switched in the cuts that follow: they keep their order.
         switched = any(rows.one_way and rows.events for _, rows in seams.values())
         for name, (path, rows) in seams.items():
-            path = _ramped(path, values)
             own = {**rest, "name": name}
             events = _after_lead(times_of_events(path, rows), values.get("leads"))
             if "weave" in values:
@@ -296,11 +298,6 @@ class _Reader:
                 )
         if not all(isinstance(item, Mapping) for item in given.get("leaves", ())):
             raise FileFormatError(f"{self._file}: {where}: leaves: expected tables of bodies")
-
-
-def _ramped(path: Path, values: Mapping[str, Any]) -> Path:
-    """Return a path that is run up to its speed, where that is asked for."""
-    return section_at_rest(path, ramp=values["ramp"]) if "ramp" in values else path
 
 
 def _after_lead(

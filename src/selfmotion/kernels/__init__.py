@@ -27,7 +27,7 @@ from selfmotion.kernels.backward import (
     space_of as space_of,
     space_size as space_size,
 )
-from selfmotion.kernels.contraction import contract_task as contract_task
+from selfmotion.kernels.contraction import Every as Every, contract_task as contract_task
 from selfmotion.kernels.damping import Law as Law
 from selfmotion.kernels.forward import (
     advance as advance,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from selfmotion.basics import Array, called, inlined, kernel
 from selfmotion.basics.layout import KIND, NO_ANGLE, POINTING, Layout
 from selfmotion.kernels.algebra import add_angular, angular, angular_part, cross, plus, respond
-from selfmotion.kernels.contraction import contract
+from selfmotion.kernels.contraction import Every, contract, contract_every
 from selfmotion.kernels.damping import Law, damping_slope, pull_damping
 from selfmotion.kernels.table import Stage, Tip, stage_of, tip_of, view
 from selfmotion.kernels.tool import pull_error, rows_of, unselect
@@ -77,6 +77,8 @@ def pull_stage(
     layout: Layout,
     gain: float,
     law: Law | None,
+    every: Every | None,
+    s: int,
     space: Space,
     error_bar: Array,
     epsilon_bar: Array,
@@ -87,7 +89,8 @@ def pull_stage(
     To ε (set), q (added to `space.by_q`) and the paths (set). z = -A⁻¹Jw and ε̄ = w + Jᵀz are eq. 4
     itself, for ε = w and u = 0; q̄ = ⟨y ε̄ᵀ + z q̇ᵀ, ∂J/∂q⟩ + (ēᵀ - zᵀS K) ∂e/∂q, and where the
     angular rows are in tool axes, -zᵀ ∂S u. Damping adds (λ0² zᵀy + K zᵀS e) ∂f, see
-    `pull_damping`; K is (1 - f) times the `gain`. A path's cotangent (12,) is that of its pose
+    `pull_damping`; K is (1 - f) times the `gain`. Stage s of `every` has the columns of all joints
+    where some mimic others. A path's cotangent (12,) is that of its pose
     [m, rad], then -Sᵀz of its twist.
     """
     m = rows_of(layout)
@@ -126,7 +129,11 @@ def pull_stage(
             pull_axes(at, tip, epsilon_bar, space)
         if law is not None and fade > 0.0:
             pull_damping(at, tip, layout, f, slope, space.weights, space.twist)
-        contract(layout, f, tip.jacobian, space.weights, space.twist, space.by_q)
+        if every is None:
+            contract(layout, f, tip.jacobian, space.weights, space.twist, space.by_q)
+        else:
+            own = every[0][s, f]
+            contract_every(every[1], f, own, space.weights, space.twist, space.by_q)
 
 
 @inlined
@@ -151,6 +158,7 @@ def pullback(
     layout: Layout,
     gain: float,
     law: Law | None,
+    every: Every | None,
     work: Array,
     epsilon_bar: Array,
     start_bar: Array,
@@ -177,7 +185,7 @@ def pullback(
             space.w[k] = w
             space.by_q[k] = q_cotangent[s, k]
         cotangents = error_cotangent[s], epsilon_bar[s], target_bar[s]
-        pull_stage(table[s], n, layout, gain, law, space, *cotangents)
+        pull_stage(table[s], n, layout, gain, law, every, s, space, *cotangents)
         for k in range(n):
             by_slope[i, k] = space.by_q[k]
             if last:
@@ -192,6 +200,7 @@ def sensitivities(
     layout: Layout,
     gain: float,
     law: Law | None,
+    every: Every | None,
     work: Array,
     no_error: Array,
     epsilon_matrix: Array,
@@ -225,6 +234,8 @@ def sensitivities(
                 layout,
                 gain,
                 law,
+                every,
+                s,
                 space,
                 no_error,
                 space.by_epsilon,

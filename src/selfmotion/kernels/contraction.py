@@ -7,7 +7,7 @@ Column k of J6 is [v_k; ω_k]. On a chain, with ω = 0 for prismatic joints,
 
 import numpy as np
 
-from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics import Array, Ints, inlined, kernel
 from selfmotion.basics.layout import KIND, ORDER, POINTING, Layout
 from selfmotion.kernels.algebra import (
     add_angular,
@@ -19,6 +19,11 @@ from selfmotion.kernels.algebra import (
     plus,
 )
 from selfmotion.kernels.tool import unselect
+
+# Where joints mimic others on a chain, the columns of all its joints have to be known: those of
+# samples and tips, (S, F, 6, W), each times its scale, and (F + 1, W): their order along the chain
+# of each tip, and last the coordinate of each.
+Every = tuple[Array, Ints]
 
 
 @inlined
@@ -47,9 +52,36 @@ def contract(
         inner = plus(inner, 1.0, cross(linear(weights, k), angular(jacobian, k)))
 
 
+@inlined
+def contract_every(
+    members: Ints, f: int, own: Array, weights: Array, twist: Array, out: Array
+) -> None:
+    """Do the same for the columns `own` (6, W) of all joints, of which some share a coordinate."""
+    count, last = own.shape[1], members.shape[0] - 1
+    outer = angular_part(twist)
+    for i in range(count - 1, -1, -1):
+        j = members[f, i]
+        k = members[last, j]
+        v, w = linear(own, j), angular(own, j)
+        outer = plus(outer, 1.0, cross(v, linear(weights, k)))
+        outer = plus(outer, 1.0, cross(w, angular(weights, k)))
+        out[k] += dot(w, outer)
+    inner = (twist[0], twist[1], twist[2])
+    for i in range(count):
+        j = members[f, i]
+        k = members[last, j]
+        out[k] += dot(linear(own, j), inner)
+        inner = plus(inner, 1.0, cross(linear(weights, k), angular(own, j)))
+
+
 @kernel
 def contract_task(
-    jacobian: Array, rotation: Array, weights: Array, layout: Layout, f: int
+    jacobian: Array,
+    rotation: Array,
+    weights: Array,
+    layout: Layout,
+    f: int,
+    every: Every | None,
 ) -> Array:
     """Return ⟨M, ∂J/∂q_k⟩ of tip f's task Jacobian for S samples: M = `weights` (S, m, n) → (S, n).
 
@@ -74,5 +106,8 @@ def contract_task(
             if layout[f, KIND] == POINTING:
                 turning = cross(angular_part(moment), angular(here, k))
                 add_angular(twist, 1.0, turning)
-        contract(layout, f, here, full, twist, out[s])
+        if every is None:
+            contract(layout, f, here, full, twist, out[s])
+        else:
+            contract_every(every[1], f, every[0][s, f], full, twist, out[s])
     return out

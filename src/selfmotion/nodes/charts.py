@@ -130,6 +130,7 @@ class Charts:
             own.no_error,
             self.bases,
             place.tangents,
+            own.follows.every_column(place.q),
             out,
         )
         return out

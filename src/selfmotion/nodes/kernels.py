@@ -14,6 +14,7 @@ import numpy as np
 from selfmotion.basics import Array, inlined, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels import (
+    Every,
     Tip,
     approach,
     cholesky,
@@ -65,7 +66,7 @@ def look(
     failed = -1
     (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
     tips = layout.shape[0]
-    turns, places = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    turns, places = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
     rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
     jacobians = np.zeros((tips, 6, n))
     system, factor, b = np.empty((n, n)), np.empty((n, n)), np.empty(n)
@@ -186,6 +187,7 @@ def pull(
     no_error: Array,
     bases: Array,
     tangents: Array,
+    every: Every | None,
     out: Array,
 ) -> None:
     """Set `out` (K, 2 r) to the derivatives by (z, ν) of what has these by q and q̇ (K, n) each."""
@@ -195,7 +197,17 @@ def pull(
         for j in range(n):
             space.w[j], space.by_q[j] = by_qd[k, j], by_q[k, j]
         pull_stage(
-            table[k], n, layout, 0.0, None, space, no_error, space.by_epsilon, space.by_target
+            table[k],
+            n,
+            layout,
+            0.0,
+            None,
+            every,
+            k,
+            space,
+            no_error,
+            space.by_epsilon,
+            space.by_target,
         )
         for x in range(r):
             along, free = 0.0, 0.0
@@ -221,7 +233,7 @@ def follow(
     the first one that is not to be had, or -1.
     """
     (count, n), m, tips = q.shape, rows_of(layout), layout.shape[0]
-    turns, places = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    turns, places = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
     rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
     jacobians = np.zeros((tips, 6, n))
     rows, factor, b = np.empty((m, n)), np.empty((m, m)), np.empty(m)

@@ -12,6 +12,7 @@ from selfmotion.path.base import (
 from selfmotion.path.feed import Feed as Feed
 from selfmotion.path.feed_kept import FeedKept as FeedKept
 from selfmotion.path.joined import Dwell as Dwell, Joined as Joined, with_leads as with_leads
+from selfmotion.path.merging import merged as merged
 from selfmotion.path.pace import Pace as Pace, times_when as times_when
 from selfmotion.path.placed import Placed as Placed
 from selfmotion.path.polyline import Polyline as Polyline

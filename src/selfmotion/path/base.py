@@ -1,7 +1,7 @@
 """What every tool motion offers."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
@@ -80,6 +80,8 @@ class Path(Saved, ABC, family="path"):
     """
 
     duration: float
+    # What to know before it is followed, in words.
+    notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.duration:.6g} s)"
@@ -145,6 +147,14 @@ class Path(Saved, ABC, family="path"):
                 f"{_said(times)} s is outside the path, which lasts from 0 to {self.duration:.6g} s"
             )
         return self.evaluate(np.clip(times, 0.0, self.duration))
+
+    def noted(self, notes: Iterable[str]) -> "Path":
+        """Give the path notes, unless there are none; return it."""
+        found = tuple(notes)
+        if found:
+            # Paths may be frozen; what is noted is no part of their value.
+            object.__setattr__(self, "notes", found)
+        return self
 
     def at_constant_speed(self) -> "Path":
         """Return the same path at a pace at which it rests nowhere, where it knows one."""

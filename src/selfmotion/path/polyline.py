@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from selfmotion.basics import Array, PathError, as_number, as_numbers, read_only, series, shown
 from selfmotion.path.base import Path, PathSamples, PathSeries, path_pose, rotvecs, unit
+from selfmotion.path.merging import merged
 from selfmotion.task import SE3, Quaternion
 
 # The pace of a polyline itself, to be replaced by `Feed` [m/s].
@@ -32,6 +33,9 @@ class Polyline(Path, kind="polyline"):
     of a corner its velocity goes over from that of one leg to that of the next by v₁ + Δv m'(x)
     with m''(x) ∝ (1 - x²/d²)²: the path is C³, and its miss of the corner is 5/32 d |Δv|.
 
+    Poses that legs pass anyway make no corners, nor do legs shorter than the tolerance that stand
+    between far longer ones: what is below the tolerance hardly counts.
+
     Its own pace is 1 m/s, or 10 rad/s where it mostly turns: `Feed` gives it one that fits.
 
     Parameters
@@ -49,8 +53,8 @@ class Polyline(Path, kind="polyline"):
     Raises
     ------
     PathError
-        Shapes do not agree, fewer than two poses, two equal ones in a row, a zero quaternion, a
-        leg that turns back on the one before.
+        Shapes do not agree, fewer than two poses, all the same, a zero quaternion, a leg that turns
+        back on the one before.
     """
 
     def __init__(
@@ -81,13 +85,14 @@ class Polyline(Path, kind="polyline"):
         self._tolerance = as_number(tolerance, what, above=0.0, error=PathError)
         what = "polyline: turn_tolerance"
         self._turn_tolerance = as_number(turn_tolerance, what, above=0.0, error=PathError)
-        self._points, self._turns = read_only(points), read_only(unit(turns))
+        self._given = read_only(points), read_only(unit(turns))
+        self._merged = merged(*self._given, self._tolerance, self._turn_tolerance)
+        self._points, self._turns = (read_only(given[self._merged.kept]) for given in self._given)
         lasts = self._lasts
-        still = np.flatnonzero(lasts <= _SAME)
-        if still.size:
+        if np.any(lasts <= _SAME):
             raise PathError(
-                f"polyline: poses[{still[0]}] and poses[{still[0] + 1}] are the same; leave one "
-                f"out, or join two polylines with a Dwell"
+                f"polyline: all {len(points)} poses are the same within its tolerances; a Dwell "
+                f"stays where it is"
             )
         self._times = read_only(np.append(0.0, np.cumsum(lasts)))
         self.duration = float(self._times[-1])
@@ -133,13 +138,14 @@ class Polyline(Path, kind="polyline"):
 
     @property
     def corner_times(self) -> Array:
-        """When the corners are passed, without both ends [s], (N - 2,)."""
+        """When the corners between legs are passed [s]."""
         return self._times[1:-1]
 
     @property
     def pose_times(self) -> Array:
-        """When each pose is passed, corners within their tolerance [s], (N,)."""
-        return self._times
+        """When each pose is passed, within the tolerance [s], (N,)."""
+        shares = self._merged.shares
+        return np.interp(shares, np.arange(len(self._times)), self._times)
 
     @cached_property
     def _edges(self) -> Array:
@@ -177,9 +183,11 @@ class Polyline(Path, kind="polyline"):
         jumps = np.linalg.norm(speeds[after] - speeds[before], axis=1)
         turns = np.linalg.norm(rates[after] - rates[before], axis=1)
         tiny = np.finfo(float).tiny
+        # What legs miss poses by is no longer left to the corners at their ends.
+        missed, turned = (np.maximum(off[before], off[after]) for off in self._merged[2:])
         half = np.minimum(
-            self._tolerance / (_MISS * np.maximum(jumps, tiny)),
-            self._turn_tolerance / (_MISS * np.maximum(turns, tiny)),
+            (self._tolerance - missed) / (_MISS * np.maximum(jumps, tiny)),
+            (self._turn_tolerance - turned) / (_MISS * np.maximum(turns, tiny)),
         )
         half = np.minimum(half, 0.5 * np.minimum(lasts[before], lasts[after]))
         return _Corners(speeds[before], speeds[after], rates[before], rates[after], half)
@@ -191,8 +199,8 @@ class Polyline(Path, kind="polyline"):
         back = np.flatnonzero(middle < 1e-6)
         if back.size:
             raise PathError(
-                f"polyline: at poses[{back[0]}] the tool turns straight back; end one polyline "
-                f"there and begin another: Feed(first, …) + Feed(second, …)"
+                f"polyline: at poses[{self._merged.kept[back[0]]}] the tool turns straight back; "
+                f"end one polyline there and begin another: Feed(first, …) + Feed(second, …)"
             )
 
     def evaluate(self, t: Array) -> PathSamples:
@@ -237,8 +245,8 @@ class Polyline(Path, kind="polyline"):
         """See `Saved.to_dict`."""
         return {
             "kind": self.kind,
-            "positions": self._points.tolist(),
-            "quaternions": self._turns.tolist() if self._oriented else None,
+            "positions": self._given[0].tolist(),
+            "quaternions": self._given[1].tolist() if self._oriented else None,
             "tolerance": self._tolerance,
             "turn_tolerance": self._turn_tolerance,
         }

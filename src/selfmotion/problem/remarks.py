@@ -35,8 +35,11 @@ def remarks_on(
 ) -> Iterator[str]:
     """Yield what is to be known: links that overlap, limits in other units or of nothing known.
 
-    And places inside what the tool works on.
+    And what of its file is left out, and places inside what the tool works on.
     """
+    yield from robot.urdf.notes
+    for followed in follows.items:
+        yield from followed.path.notes
     for model, _ in envelope.bodies:
         for pair in model.overlapping:
             if pair.is_checked:

@@ -99,7 +99,7 @@ def _axes(direction: Array) -> tuple[Array, Array]:
 def _skeleton(robot: RobotModel, q: Array) -> Array:
     """Return the lines from each joint to those that it carries, and to the tool, (B, 2, 3)."""
     model, data = robot.model, robot.model.createData()
-    pin.forwardKinematics(model, data, q)
+    pin.forwardKinematics(model, data, robot.coupling.spread(q))
     places = [np.array(place.translation) for place in data.oMi]
     bones = [[places[model.parents[joint]], places[joint]] for joint in range(1, model.njoints)]
     carrier, _ = robot.carrier_of(robot.tool)

@@ -19,6 +19,7 @@ from selfmotion.robot.coordinates import (
     JointCoordinate as JointCoordinate,
     SwivelAngle as SwivelAngle,
 )
+from selfmotion.robot.coupling import Coupling as Coupling, follower_of as follower_of
 from selfmotion.robot.dynamics import (
     Dynamics as Dynamics,
     Energy as Energy,

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import RobotError, as_number, nearest, read_only
+from selfmotion.robot.coupling import Follower, coupling_of, follower_of, tighter_limits
 from selfmotion.robot.full_model import full_model, name_links
 from selfmotion.robot.held import locked_configuration
 from selfmotion.robot.model import RobotModel
@@ -34,35 +35,50 @@ def build_robot(
     full = full_model(urdf)
     _check_lock(urdf, full, lock)
     chain = moving_joints(urdf, tools, reference) if chain is None else chain
-    free = _free_joints(urdf, chain, tools[0], lock, reference)
-    locked = _locked_joints(urdf, full, free, lock)
+    followers = {name: follower_of(urdf, name) for name in urdf.joints}
+    free = _free_joints(urdf, chain, tools[0], lock, reference, followers)
+    locked = _locked_joints(urdf, full, free, lock, followers)
     configuration, locked_ids = locked_configuration(full, locked)
     model = pin.buildReducedModel(full, locked_ids, configuration)
     name_links(urdf, model)
-    names = tuple(model.names[1:])
-    if model.nq != len(free) or set(names) != set(free):
+    every = tuple(model.names[1:])
+    moved = [name for name in followers if name not in locked and followers[name].joint in free]
+    if model.nq != len(every) or not set(free) <= set(every) or not set(every) <= set(moved):
         raise RobotError(
             f"{urdf.source}: the chain to '{tools[0]}' has joints {free}, but Pinocchio built "
-            f"{list(names)}"
+            f"{list(every)}"
         )
-    continuous = np.array([name in urdf.continuous() for name in names])
-    velocity = np.array(model.velocityLimit, dtype=np.float64)
-    effort = np.array(model.upperEffortLimit, dtype=np.float64)
+    coupling = coupling_of(every, followers)
+    names = tuple(every[k] for k in coupling.masters)
+    continuous = np.array([name in urdf.continuous() for name in every])
+    lower, upper = tighter_limits(
+        coupling,
+        np.where(continuous, -np.inf, model.lowerPositionLimit),
+        np.where(continuous, np.inf, model.upperPositionLimit),
+        every,
+        urdf.source,
+    )
+    limit = np.array(model.velocityLimit, dtype=np.float64)
+    velocity = np.full(len(names), np.inf)
+    slowest = np.where(limit > 0.0, limit, np.inf) / np.abs(coupling.scales)
+    np.minimum.at(velocity, coupling.coordinates, slowest)
+    effort = np.array(model.upperEffortLimit, dtype=np.float64)[coupling.masters]
     return RobotModel(
         # Its URDF may call an arm anything, as UF_ROBOT.
         name=next(iter(names_of(urdf.source)), model.name),
         tools=tuple(tools),
         reference=reference,
         joint_names=names,
-        lower=read_only(np.where(continuous, -np.inf, model.lowerPositionLimit)),
-        upper=read_only(np.where(continuous, np.inf, model.upperPositionLimit)),
-        velocity_limit=read_only(np.where(velocity > 0, velocity, np.inf)),
+        lower=read_only(lower),
+        upper=read_only(upper),
+        velocity_limit=read_only(velocity),
         locked=locked,
         model=model,
         urdf=urdf,
         effort_limit=read_only(np.where(effort > 0.0, effort, np.inf)),
         acceleration_limit=read_only(np.full(len(names), np.inf)),
         jerk_limit=read_only(np.full(len(names), np.inf)),
+        coupling=coupling,
     )
 
 
@@ -72,20 +88,28 @@ def _free_joints(
     tool: str,
     lock: Mapping[str, float],
     reference: str | None,
+    followers: Mapping[str, Follower],
 ) -> list[str]:
-    """Return the joints of a chain that are not held; RobotError where it is none of an arm."""
+    """Return the joints of a chain that are not held; RobotError where it is none of an arm.
+
+    Joints that mimic another one are moved by it, wherever it is.
+    """
     for joint in chain:
         if joint.kind in ("floating", "planar"):
             raise RobotError(
                 f"{urdf.source}: joint '{joint.name}' is {joint.kind}; an arm's joints are "
                 f"revolute, continuous or prismatic"
             )
-        if joint.mimics is not None and joint.name not in lock:
+    by_them = [followers[joint.name] for joint in chain if joint.name not in lock]
+    moving = dict.fromkeys(item.joint for item in by_them if item.scale != 0.0)
+    free = [name for name in moving if name not in lock]
+    for name in lock:
+        by = followers[name].joint
+        if by != name and by in free and followers[name].scale:
             raise RobotError(
-                f"{urdf.source}: joint '{joint.name}' on the way to '{tool}' mimics "
-                f"'{joint.mimics}'; choose a tool or a reference before it, or hold it with lock="
+                f"{urdf.source}: lock holds joint '{name}', which mimics '{by}', and that moves; "
+                f"hold '{by}'"
             )
-    free = [joint.name for joint in chain if joint.name not in lock]
     where = "the root" if reference is None else f"'{reference}'"
     if not chain:
         moved = [link for link in urdf.links if any(j.kind != "fixed" for j in urdf.chain(link))]
@@ -172,9 +196,13 @@ def _check_lock(urdf: Urdf, model: Any, lock: Mapping[str, float]) -> None:
 
 
 def _locked_joints(
-    urdf: Urdf, model: Any, free: list[str], lock: Mapping[str, float]
+    urdf: Urdf,
+    model: Any,
+    free: list[str],
+    lock: Mapping[str, float],
+    followers: Mapping[str, Follower],
 ) -> dict[str, float]:
-    """Return where the joints off the chain are held; those that mimic one follow it."""
+    """Return where the joints off the chain are held, but for those that mimic one on it."""
     locked: dict[str, float] = {}
 
     def hold(name: str) -> float:
@@ -184,13 +212,9 @@ def _locked_joints(
         lower = model.lowerPositionLimit[joint.idx_q]
         upper = model.upperPositionLimit[joint.idx_q]
         value = lock.get(name, np.clip(0.0, lower, upper))
-        if source.mimics in free and name not in lock:
-            raise RobotError(
-                f"{urdf.source}: joint '{name}' mimics '{source.mimics}', which moves on the way "
-                f"to the tool; a joint beside the chain cannot follow it: hold it with lock= if "
-                f"its links do not matter"
-            )
-        if source.mimics is not None and source.mimics not in free:
+        if followers[name].scale == 0.0:
+            value = followers[name].offset
+        elif source.mimics is not None:
             followed = source.multiplier * hold(source.mimics) + source.offset
             if name in lock and abs(followed - lock[name]) > _BESIDE:
                 raise RobotError(
@@ -203,6 +227,7 @@ def _locked_joints(
 
     for index in range(1, model.njoints):
         name = model.names[index]
-        if name not in free and model.joints[index].nq == 1:
+        moves = followers[name].joint in free and followers[name].scale != 0.0
+        if not moves and model.joints[index].nq == 1:
             hold(name)
     return locked

@@ -18,6 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from selfmotion.basics import Array, Ints
+from selfmotion.robot.coupling import Coupling
 from selfmotion.robot.placements import rebase
 from selfmotion.robot.tip_places import place_along
 from selfmotion.robot.tree_arrays import ChainArrays, serial_arrays
@@ -48,7 +49,10 @@ class Kinematics:
         of `at` refreshes.
     """
 
-    __slots__ = ("_base", "_tip", "_world", "chain", "data", "jacobian", "rotation", "translation")
+    __slots__ = (
+        *("_base", "_every", "_tip", "_world"),
+        *("chain", "data", "jacobian", "rotation", "translation"),
+    )
 
     def __init__(self, chain: "Chain", data: Any = None) -> None:
         self.chain, self.data = chain, data or chain.model.createData()
@@ -62,10 +66,13 @@ class Kinematics:
         else:
             self.jacobian = np.zeros((6, chain.dof), order="F")
             self.rotation, self.translation = np.zeros((3, 3), order="F"), np.zeros(3)
+        # The columns of all joints of the model, of which some may mimic others.
+        is_plain = chain.coupling.is_plain
+        self._every = self.jacobian if is_plain else np.zeros((6, chain.model.nv), order="F")
 
     def refresh(self, q: Array) -> None:
         """Set the tip's pose at q (n,), and `jacobian` (6, n), [v, ω] at the base's origin."""
-        pin.computeJointJacobians(self.chain.model, self.data, q)
+        pin.computeJointJacobians(self.chain.model, self.data, self.chain.coupling.spread(q))
         self.place_frames()
 
     def place_frames(self) -> None:
@@ -79,10 +86,12 @@ class Kinematics:
                 *self._base,
                 *self._tip,
                 chain.signs,
-                self.jacobian,
+                self._every,
                 self.rotation,
                 self.translation,
             )
+            if not chain.coupling.is_plain:
+                self.jacobian[:] = chain.coupling.gathered(self._every)
 
     def march(
         self,
@@ -101,8 +110,10 @@ class Kinematics:
         # Written out: in this loop the engine spends its time.
         model, tip, is_rooted = chain.model, chain.tip, chain.is_rooted
         jacobians, place = pin.computeJointJacobians, pin.updateFramePlacement
+        coupling = None if chain.coupling.is_plain else chain.coupling
         for s, configuration in enumerate(q):
-            jacobians(model, data, configuration)
+            at = configuration if coupling is None else coupling.spread(configuration)
+            jacobians(model, data, at)
             if is_rooted:
                 place(model, data, tip)
             else:
@@ -117,7 +128,7 @@ class Kinematics:
 
     def at(self, q: Array) -> Array:
         """Return the Jacobian at q (n,), (6, n): rows [v, ω] of the tip in the base's axes."""
-        pin.computeJointJacobians(self.chain.model, self.data, q)
+        pin.computeJointJacobians(self.chain.model, self.data, self.chain.coupling.spread(q))
         return self.beside()
 
     def beside(self) -> Array:
@@ -135,7 +146,7 @@ class Kinematics:
     def place(self, q: Array) -> pin.SE3:
         """Return the tip's pose at q (n,), a copy; cheaper than with its Jacobian."""
         chain = self.chain
-        pin.forwardKinematics(chain.model, self.data, q)
+        pin.forwardKinematics(chain.model, self.data, chain.coupling.spread(q))
         tip = pin.updateFramePlacement(chain.model, self.data, chain.tip)
         if chain.is_rooted:
             return pin.SE3(tip)
@@ -155,36 +166,41 @@ class Chain:
         The tree, one coordinate for each joint.
     tip, base : int
         Frames of the model.
+    coupling : Coupling, optional
+        Which joints mimic others; by default none.
     """
 
-    def __init__(self, model: Any, tip: int, base: int = WORLD) -> None:
+    def __init__(
+        self, model: Any, tip: int, base: int = WORLD, coupling: Coupling | None = None
+    ) -> None:
         self.model, self.tip, self.base = model, tip, base
+        self.coupling = Coupling.plain(model.nv if model else 0) if coupling is None else coupling
         self._per_thread = threading.local()
 
-    def __getstate__(self) -> tuple[Any, int, int]:
-        return self.model, self.tip, self.base
+    def __getstate__(self) -> tuple[Any, int, int, Coupling]:
+        return self.model, self.tip, self.base, self.coupling
 
-    def __setstate__(self, state: tuple[Any, int, int]) -> None:
+    def __setstate__(self, state: tuple[Any, int, int, Coupling]) -> None:
         # What belongs to a thread does not travel to another process.
         self.__init__(*state)  # type: ignore[misc]
 
     @property
     def dof(self) -> int:
-        """Number n of the tree's joints: the length of configurations."""
-        return int(self.model.nv)
+        """Number n of the tree's coordinates: the length of configurations."""
+        return self.coupling.dof
 
     @property
     def is_rooted(self) -> bool:
-        """Whether the base is the world, and all joints are on the way to the tip."""
-        return self.base == WORLD and len(self.joints) == self.dof
+        """Whether the base is the world, all joints are on the way to the tip, none mimics one."""
+        return self.base == WORLD and self.coupling.is_plain and len(self.joints) == self.dof
 
     def to_base(self) -> "Chain":
         """Return the chain from the world to the base frame."""
-        return Chain(self.model, self.base)
+        return Chain(self.model, self.base, WORLD, self.coupling)
 
     @property
     def carrier(self) -> int:
-        """The joint that carries the base frame, by its coordinate; -1 for the world."""
+        """The joint of the model that carries the base frame, from 0 on; -1 for the world."""
         return int(self.model.frames[self.base].parentJoint) - 1
 
     @property
@@ -197,9 +213,12 @@ class Chain:
         """Name of the tip's frame."""
         return str(self.model.frames[self.tip].name)
 
-    def kinematics(self) -> Kinematics:
-        """Return the chain's kinematics with data of their own, for whoever asks often."""
-        return Kinematics(self)
+    def kinematics(self, data: Any = None) -> Kinematics:
+        """Return the chain's kinematics for whoever asks often.
+
+        With data of their own, or those of another chain of the tree.
+        """
+        return Kinematics(self, data)
 
     @property
     def own(self) -> Kinematics:
@@ -223,17 +242,18 @@ class Chain:
         jacobians = np.zeros((len(q), 1, 6, self.dof))
         rotations, translations = np.empty((len(q), 1, 3, 3)), np.empty((len(q), 1, 3))
         # A copy: kernels are compiled anew for what may not be written to.
-        place_along(np.array(q), self.arrays.table[None], jacobians, rotations, translations)
+        place_along(np.array(q), self.table[None], jacobians, rotations, translations)
         return jacobians[:, 0], rotations[:, 0], translations[:, 0]
 
     def rooted(self) -> tuple[Any, int]:
         """Return a model in which the base is the world, and the tip's frame there.
 
-        Its joints are those of `joints`, in this order.
+        Its joints are those of `model_joints`, in this order.
         """
-        if self.base == WORLD and len(self.joints) == self.dof:
+        if self.base == WORLD and len(self.model_joints) == self.model.nv:
             return self.model, self.tip
-        model, (tree, rotation, position) = pin.Model(), self.arrays
+        # Offsets of joints that mimic are in their positions, not in their places.
+        model, (tree, rotation, position) = pin.Model(), self._arrays(plain=True)
         parent = 0
         for j in range(len(tree.joints)):
             kind = (
@@ -248,13 +268,38 @@ class Chain:
 
     @cached_property
     def joints(self) -> Ints:
-        """Coordinates of the chain's joints, from base to tip, (c,)."""
+        """Coordinates of the chain's joints, from base to tip, each once."""
+        passed = self.coupling.coordinates[self.model_joints].tolist()
+        return np.array(list(dict.fromkeys(passed)), dtype=np.int64)
+
+    @cached_property
+    def model_joints(self) -> Ints:
+        """The chain's joints among those of the model, from base to tip, (c,)."""
         return np.array([joint - 1 for joint, _ in self._passed], dtype=np.int64)
 
     @cached_property
+    def is_coupled(self) -> bool:
+        """Whether joints of the chain share a coordinate."""
+        return len(self.joints) < len(self.model_joints)
+
+    def every_along(self, q: Array) -> Array:
+        """Return the columns of the tip's Jacobian by the model's joints at q (K, n), (K, 6, N).
+
+        Each times its scale, so that those of a coordinate add up to its column.
+        """
+        return self._uncoupled.along(self.coupling.spread(q))[0] * self.coupling.scales
+
+    @cached_property
+    def _uncoupled(self) -> "Chain":
+        return Chain(self.model, self.tip, self.base)
+
+    @cached_property
     def signs(self) -> Array:
-        """1 for joints that move the tip, -1 for those that move the base, 0 for both or none."""
-        signs = np.zeros(self.dof)
+        """1 for joints that move the tip, -1 for those that move the base, 0 for both or none.
+
+        Of all joints of the model, (N,).
+        """
+        signs = np.zeros(self.model.nv)
         for joint, sign in self._passed:
             signs[joint - 1] = sign
         return signs
@@ -267,9 +312,19 @@ class Chain:
         both = sum(1 for a, b in zip(up, down, strict=False) if a == b) - 1
         return [(joint, -1) for joint in up[:both:-1]] + [(joint, 1) for joint in down[both + 1 :]]
 
+    @property
+    def table(self) -> Array:
+        """What compiled kinematics need of its joints, then of its tip, (c + 1, 6, 3)."""
+        return self.arrays.table
+
     @cached_property
     def arrays(self) -> ChainArrays:
         """Its joints and its tip as arrays."""
+        return self._arrays()
+
+    def _arrays(self, plain: bool = False) -> ChainArrays:
+        """Return them, or those of the model's joints where `plain`."""
+        coupling = Coupling.plain(self.model.nv) if plain else self.coupling
         model, frames = self.model, self.model.frames
         place = frames[self.base].placement.inverse()
         places = []
@@ -280,7 +335,14 @@ class Chain:
             place = pin.SE3.Identity() if sign > 0 else model.jointPlacements[joint].inverse()
         place = place * frames[self.tip].placement
         return ChainArrays(
-            serial_arrays(model, self.joints, np.arange(len(self.joints)), places, self.signs),
+            serial_arrays(
+                model,
+                coupling,
+                self.model_joints,
+                np.arange(len(self.model_joints)),
+                places,
+                self.signs,
+            ),
             np.array(place.rotation),
             np.array(place.translation),
         )

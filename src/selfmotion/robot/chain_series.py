@@ -27,14 +27,20 @@ class ChainSeries:
 
     def __init__(self, robot: RobotModel, joints: Array, half: Array) -> None:
         self.robot, self.joints, self.half = robot, joints, half
-        self._is_revolute = [not robot.is_prismatic(name) for name in robot.joint_names]
+        coupling, tree = robot.coupling, robot.tree
+        self._is_revolute = tree.is_revolute.tolist()
+        # Those of the model's joints.
+        self._every = joints
+        if not coupling.is_plain:
+            self._every = np.abs(coupling.scales)[:, None, None] * joints[coupling.coordinates]
+            self._every[:, 0] += np.where(tree.is_revolute, 0.0, np.abs(coupling.offsets))[:, None]
 
     @cached_property
     def turned(self) -> list[Array]:
         """The orientation of the world and of each joint's frame, (K + 1, I) each."""
         sums = [np.zeros_like(self.joints[0])]
         for joint, parent, _ in self._links():
-            sums.append(sums[parent] + self.joints[joint] * self._is_revolute[joint])
+            sums.append(sums[parent] + self._every[joint] * self._is_revolute[joint])
         return [series.exponential(total) for total in sums]
 
     @cached_property
@@ -44,7 +50,7 @@ class ChainSeries:
         for joint, parent, length in self._links():
             step = length * self.turned[parent]
             if not self._is_revolute[joint]:
-                step = step + series.product(self.joints[joint], self.turned[parent])
+                step = step + series.product(self._every[joint], self.turned[parent])
             found.append(step)
         return found
 
@@ -69,15 +75,15 @@ class ChainSeries:
 
     def is_revolute(self, joint: int) -> bool:
         """Return whether a joint turns."""
-        return self._is_revolute[joint]
+        return bool(self._is_revolute[joint])
 
     def parent(self, joint: int) -> int:
         """Return the parent of a joint, 0 for the world, else 1 + its number."""
         return int(self.robot.model.parents[joint + 1])
 
     def rate(self, joint: int) -> Array:
-        """Return a joint's velocity."""
-        return series.derivative(self.joints[joint], self.half)
+        """Return the velocity of a joint of the model."""
+        return series.derivative(self._every[joint], self.half)
 
     def place(self, frame: int) -> Array:
         """Return where a frame is [m], by its number."""
@@ -101,13 +107,13 @@ class ChainSeries:
         tree, _, last = chain.arrays
         total = np.zeros_like(self.joints[0])
         place = np.zeros_like(total)
-        for joint, position in zip(tree.joints.tolist(), tree.positions, strict=True):
+        for joint, position in zip(chain.model_joints.tolist(), tree.positions, strict=True):
             turned = series.exponential(total)
             place += float(np.linalg.norm(position)) * turned
             if self._is_revolute[joint]:
-                total = total + self.joints[joint]
+                total = total + self._every[joint]
             else:
-                place += series.product(self.joints[joint], turned)
+                place += series.product(self._every[joint], turned)
         turned = series.exponential(total)
         return place + float(np.linalg.norm(last)) * turned, turned
 
@@ -116,10 +122,10 @@ class ChainSeries:
         if chain.base == WORLD:
             return self.spin(chain.tip)
         total, spin = np.zeros_like(self.joints[0]), np.zeros_like(self.joints[0][1:])
-        for joint in chain.joints.tolist():
+        for joint in chain.model_joints.tolist():
             if self._is_revolute[joint]:
                 spin = spin + series.product(self.rate(joint), series.exponential(total))
-                total = total + self.joints[joint]
+                total = total + self._every[joint]
         return np.asarray(spin)
 
     def _links(self) -> Iterator[tuple[int, int, float]]:

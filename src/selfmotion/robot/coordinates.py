@@ -260,10 +260,12 @@ def _points(robot: RobotModel, q: Array, names: tuple[str, ...]) -> list[tuple[A
     ids = [_frame(robot, name) for name in names]
     found = [(np.empty((len(q), 3)), np.empty((len(q), 3, robot.dof))) for _ in ids]
     for k, configuration in enumerate(q):
-        pin.computeJointJacobians(model, data, np.ascontiguousarray(configuration))
+        at = robot.coupling.spread(np.ascontiguousarray(configuration))
+        pin.computeJointJacobians(model, data, at)
         for (places, jacobians), index in zip(found, ids, strict=True):
             places[k] = pin.updateFramePlacement(model, data, index).translation
-            jacobians[k] = pin.getFrameJacobian(model, data, index, _AXES)[:3]
+            columns = pin.getFrameJacobian(model, data, index, _AXES).reshape(6, -1)[:3]
+            jacobians[k] = robot.coupling.gathered(columns)
     return found
 
 

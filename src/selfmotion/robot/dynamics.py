@@ -6,6 +6,7 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, ProblemError, series
 from selfmotion.robot.chain_series import ChainSeries
+from selfmotion.robot.coupling import Coupling
 from selfmotion.robot.model import RobotModel
 
 
@@ -42,6 +43,7 @@ class Dynamics:
                 f"{robot.name}: joint torques are asked for, but its URDF gives no masses; add "
                 f"<inertial> to its links"
             )
+        _check_weighed(robot)
         if not (np.isfinite(payload) and payload >= 0.0):
             raise ProblemError(f"payload is {payload} kg, expected a number ≥ 0")
         where = np.asarray(center, dtype=np.float64)
@@ -58,20 +60,26 @@ class Dynamics:
         tool = model.frames[robot.chain.tip]
         held = pin.Inertia(float(payload), where, turning)
         model.appendBodyToJoint(tool.parentJoint, held, tool.placement)
-        self._model, self._data = model, model.createData()
+        self._model, self._data, self._coupling = model, model.createData(), robot.coupling
 
     def torques(self, q: Array, qd: Array, qdd: Array) -> Array:
         """Return τ for a motion (K, n) each, (K, n) [Nm, or N of prismatic joints]."""
-        rows = zip(q, qd, qdd, strict=True)
+        rows = zip(*self._of_joints(q, qd, qdd), strict=True)
         found = [pin.rnea(self._model, self._data, *row).copy() for row in rows]
-        return np.array(found).reshape(q.shape)
+        # A coordinate moves all of its joints: virtual work.
+        return self._coupling.gathered(np.array(found).reshape(len(q), -1))
+
+    def _of_joints(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+        """Return a motion (K, n) as that of the model's joints, (K, N)."""
+        coupling = self._coupling
+        return coupling.spread(q), coupling.rates(qd), coupling.rates(qdd)
 
     def series(self, chain: ChainSeries) -> Array:
         """Return the torques' majorants, (n, K + 1, I): Newton's and Euler's equations of them.
 
         In world axes: f = m (c̈ - g) and n = d/dt (R I Rᵀ ω) of each body, summed from the tip.
         """
-        model, half, count = self._model, chain.half, len(chain.joints)
+        model, half, count = self._model, chain.half, self._model.nv
         gravity = float(np.linalg.norm(model.gravity.linear))
         forces, moments = [], []
         for body in range(count + 1):
@@ -95,15 +103,17 @@ class Dynamics:
             forces[parent] = forces[parent] + forces[body]
             arm = series.product(chain.steps[body], forces[body])
             moments[parent] = moments[parent] + moments[body] + arm
-        return found
+        return np.moveaxis(self._coupling.bounds(np.moveaxis(found, 0, -1)), -1, 0)
 
     def derivatives(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
         """Return ∂τ/∂q, ∂τ/∂q̇ and ∂τ/∂q̈ = M, (K, n, n) each."""
+        q, qd, qdd = self._of_joints(q, qd, qdd)
         count, n = q.shape
         by_q, by_qd, by_qdd = (np.empty((count, n, n)) for _ in range(3))
         for k in range(count):
             found = pin.computeRNEADerivatives(self._model, self._data, q[k], qd[k], qdd[k])
             by_q[k], by_qd[k], by_qdd[k] = found
+        by_q, by_qd, by_qdd = (_reduced(self._coupling, each) for each in (by_q, by_qd, by_qdd))
         return by_q, by_qd, by_qdd
 
 
@@ -116,12 +126,15 @@ class Energy:
     """
 
     def __init__(self, robot: RobotModel) -> None:
+        _check_weighed(robot)
         self._model, self._still = robot.model, robot.model.copy()
         self._still.gravity.setZero()
+        self._coupling = robot.coupling
 
     def kinetic(self, q: Array, qd: Array) -> Array:
         """Return the energies of a motion (K, n) each, (K,) [J]."""
-        data, rows = self._still.createData(), zip(q, qd, strict=True)
+        data, coupling = self._still.createData(), self._coupling
+        rows = zip(coupling.spread(q), coupling.rates(qd), strict=True)
         return np.array([pin.computeKineticEnergy(self._still, data, *row) for row in rows])
 
     def kinetic_slopes(self, q: Array, qd: Array) -> tuple[Array, Array]:
@@ -130,29 +143,46 @@ class Energy:
         At rest and without gravity the inverse dynamics are τ = Mq̈, so that both come from its
         derivatives with q̇ in place of q̈.
         """
-        data, rest = self._still.createData(), np.zeros(q.shape[1])
+        data, rest = self._still.createData(), np.zeros(self._still.nv)
+        q, qd = self._coupling.spread(q), self._coupling.rates(qd)
         by_q, by_qd = np.empty_like(q), np.empty_like(qd)
         for k in range(len(q)):
             found = pin.computeRNEADerivatives(self._still, data, q[k], rest, qd[k])
             by_q[k], by_qd[k] = 0.5 * (qd[k] @ found[0]), found[2] @ qd[k]
-        return by_q, by_qd
+        return self._coupling.gathered(by_q), self._coupling.gathered(by_qd)
 
     def mass(self, q: Array) -> Array:
         """Return M at q (n,), (n, n)."""
-        upper = np.triu(pin.crba(self._still, self._still.createData(), q))
-        return np.asarray(upper + np.triu(upper, 1).T)
+        at = self._coupling.spread(q)
+        upper = np.triu(pin.crba(self._still, self._still.createData(), at))
+        return _reduced(self._coupling, np.asarray(upper + np.triu(upper, 1).T))
 
     def gravity(self, q: Array) -> Array:
         """Return g at configurations (K, n), (K, n) [Nm, or N]."""
-        data = self._model.createData()
-        return np.array([pin.computeGeneralizedGravity(self._model, data, x).copy() for x in q])
+        data, at = self._model.createData(), self._coupling.spread(q)
+        found = [pin.computeGeneralizedGravity(self._model, data, x).copy() for x in at]
+        return self._coupling.gathered(np.array(found))
 
     def gravity_slopes(self, q: Array) -> Array:
         """Return ∂g/∂q at configurations (K, n), (K, n, n)."""
-        data = self._model.createData()
-        return np.array(
-            [pin.computeGeneralizedGravityDerivatives(self._model, data, x).copy() for x in q]
-        )
+        data, at = self._model.createData(), self._coupling.spread(q)
+        slopes = pin.computeGeneralizedGravityDerivatives
+        found = np.array([slopes(self._model, data, x).copy() for x in at])
+        return _reduced(self._coupling, found)
+
+
+def _reduced(coupling: Coupling, matrices: Array) -> Array:
+    """Return CᵀMC of matrices (…, N, N), (…, n, n)."""
+    if coupling.is_plain:
+        return matrices
+    return np.asarray(coupling.matrix.T @ matrices @ coupling.matrix)
+
+
+def _check_weighed(robot: RobotModel) -> None:
+    """Raise ProblemError where a link that moves has an ``<inertial>`` that lacks something."""
+    for said, link in robot.urdf.lacking_inertials.items():
+        if robot.carrier_of(link)[0] > 0:
+            raise ProblemError(f"{robot.name}: {said}; torques and energies need it: add it")
 
 
 def has_masses(robot: RobotModel) -> bool:

@@ -101,8 +101,8 @@ def name_links(urdf: Urdf, model: Any) -> None:
 def _inner_text(urdf: Urdf) -> str:
     names = inner_names(urdf)
     if not names:
-        return urdf.text
-    root = ElementTree.fromstring(urdf.text)
+        return urdf.readable_text
+    root = ElementTree.fromstring(urdf.readable_text)
     for link in root.findall("link"):
         link.set("name", names.get(link.get("name", ""), link.get("name", "")))
     for joint in root.findall("joint"):

@@ -8,6 +8,7 @@ cannot be hit, so such files must not pass.
 import xml.etree.ElementTree as ElementTree
 
 from selfmotion.basics import RobotError
+from selfmotion.robot.cosmetic_elements import MOMENTS
 from selfmotion.robot.xml_values import check_origin, name_of, number, numbers, only
 
 # Shape → its numbers, and how many of each.
@@ -17,13 +18,12 @@ _SIZES = {
     "sphere": {"radius": 1},
     "mesh": {},
 }
-_MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 # How far below 0 CAD programs round the inertia of a small part [kg m²].
 _ROUNDING = 1e-9
 
 
 def check_link_elements(root: ElementTree.Element, source: str) -> None:
-    """Check every ``<link>`` of the ``<robot>``: name, inertia, bodies and visuals.
+    """Check every ``<link>`` of the ``<robot>``: name, inertia and bodies.
 
     Parameters
     ----------
@@ -35,10 +35,9 @@ def check_link_elements(root: ElementTree.Element, source: str) -> None:
     Raises
     ------
     RobotError
-        A name is missing or there twice, a mass or inertia is missing, negative or no number; a
-        collision or visual element has no shape, one that URDF does not know, or numbers that are
-        none, not finite, too few or too many, or sizes that are not above 0. Link, element and
-        value are named.
+        A name is missing or there twice, a mass or inertia is negative or no number; a collision
+        element has no shape, one that URDF does not know, or numbers that are none, not finite, too
+        few or too many, or sizes that are not above 0. Link, element and value are named.
     """
     for element in root.iter("collision"):
         if not any(element in list(link) for link in root.findall("link")):
@@ -50,10 +49,9 @@ def check_link_elements(root: ElementTree.Element, source: str) -> None:
             raise RobotError(f"{source}: link name '{name}' is used more than once; rename one")
         taken.add(name)
         _check_inertial(link, f"{source}: link '{name}'")
-        for tag in ("collision", "visual"):
-            for order, element in enumerate(link.findall(tag), start=1):
-                which = element.get("name") or f"number {order}"
-                _check_shape(element, f"{source}: link '{name}': <{tag}> {which}")
+        for order, element in enumerate(link.findall("collision"), start=1):
+            which = element.get("name") or f"number {order}"
+            check_shape(element, f"{source}: link '{name}': <collision> {which}")
 
 
 def _check_inertial(link: ElementTree.Element, where: str) -> None:
@@ -63,19 +61,19 @@ def _check_inertial(link: ElementTree.Element, where: str) -> None:
     check_origin(inertial, f"{where}: <inertial>")
     parts = {tag: only(inertial, tag, where) for tag in ("mass", "inertia")}
     for tag, part in parts.items():
-        if part is None:
-            raise RobotError(
-                f"{where}: its <inertial> has no <{tag}>; add it, or leave the <inertial> out"
-            )
-        for key in ("value",) if tag == "mass" else _MOMENTS:
+        for key in ("value",) if tag == "mass" else MOMENTS:
+            if part is None or part.get(key) is None:
+                # Missed only where torques are asked for.
+                continue
             value = number(part, key, f"{where}: <{tag}>")
             if tag == "mass" and value < 0.0:
                 raise RobotError(f"{where} has a negative mass {value} kg")
-            if key in _MOMENTS[:3] and value < -_ROUNDING:
+            if key in MOMENTS[:3] and value < -_ROUNDING:
                 raise RobotError(f"{where} has a negative inertia {key} {value} kg m²")
 
 
-def _check_shape(element: ElementTree.Element, where: str) -> None:
+def check_shape(element: ElementTree.Element, where: str) -> None:
+    """Raise RobotError where a ``<collision>`` or ``<visual>`` has no shape that URDF knows."""
     check_origin(element, where)
     shapes = [shape for geometry in element.findall("geometry") for shape in geometry]
     if len(shapes) != 1 or shapes[0].tag not in _SIZES:

@@ -17,13 +17,8 @@ from selfmotion.robot.expansion import expand
 from selfmotion.robot.model import RobotModel
 from selfmotion.robot.mounting import CarriedBody, with_base, with_bodies, with_tool_offset
 from selfmotion.robot.named import NAMED_ARMS, NAMED_PARTS, published, read_named
-from selfmotion.robot.urdf import (
-    Urdf,
-    UrdfPart,
-    package_folders,
-    parse_urdf,
-    read_urdf,
-)
+from selfmotion.robot.packages import Packages
+from selfmotion.robot.urdf import Urdf, UrdfPart, read_urdf, urdf_of_file
 from selfmotion.task import as_pose
 
 
@@ -38,6 +33,7 @@ def load_robot(
     tool_offset: pin.SE3 | npt.ArrayLike | None = None,
     bodies: Sequence[CarriedBody] = (),
     arguments: Mapping[str, Any] | None = None,
+    packages: str | Path | Sequence[str | Path] = (),
 ) -> RobotModel:
     """Load an arm, or a cell of several robots.
 
@@ -70,6 +66,10 @@ def load_robot(
         arm, without masses; shapes of one's own cannot.
     arguments : dict, optional
         Of a xacro file; of several robots a dict of these, by part.
+    packages : path or sequence of path, optional
+        Folders in which packages that files name are looked up first (``package://``,
+        ``$(find …)``). Without, they are found in folders above the file and three levels below
+        these, and by ``AMENT_PREFIX_PATH`` and ``ROS_PACKAGE_PATH``.
 
     Returns
     -------
@@ -90,10 +90,11 @@ def load_robot(
     for name, given in (("lock", lock), ("arguments", arguments), ("on", on)):
         if not isinstance(given, Mapping | None):
             raise RobotError(f"{name} is {shown(given)}, expected a dict")
+    folders = _folders(packages)
     source = (
-        _parts(robot, base, on, arguments or {})
+        _parts(robot, base, on, arguments or {}, folders)
         if isinstance(robot, Mapping)
-        else _single(robot, base, on, arguments or {})
+        else _single(robot, base, on, arguments or {}, folders)
     )
     urdf = source.urdf
     if tool is None:
@@ -111,6 +112,16 @@ def load_robot(
     return dataclasses.replace(
         built, touching=source.touching, acceleration_limit=acceleration, jerk_limit=jerk
     )
+
+
+def _folders(given: Any) -> tuple[str, ...]:
+    listed = [given] if isinstance(given, str | Path) else given
+    if not isinstance(listed, list | tuple):
+        raise RobotError(f"packages is {shown(given)}, expected a folder or several")
+    for folder in listed:
+        if not isinstance(folder, str | Path) or not Path(folder).is_dir():
+            raise RobotError(f"packages: {shown(folder)} is no folder")
+    return tuple(str(Path(folder).resolve()) for folder in listed)
 
 
 def _tool_frames(tool: Any, urdf: Urdf) -> list[str]:
@@ -143,23 +154,27 @@ class _Source:
     limits: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
-def _read(robot: str | Path, arguments: Mapping[str, str]) -> _Source:
+def _read(robot: str | Path, arguments: Mapping[str, str], packages: tuple[str, ...]) -> _Source:
     known = {**NAMED_ARMS, **NAMED_PARTS}
     if isinstance(robot, str) and robot in known:
         _check_no_arguments(robot, arguments)
         arm = known[robot]
         return _Source(read_named(arm), arm.tool, arm.touching, published(robot))
-    urdf = _read_file(Path(robot), arguments, str(robot))
+    urdf = _read_file(Path(robot), arguments, str(robot), packages)
     return _Source(urdf, None)
 
 
 def _single(
-    robot: str | Path, base: Any, on: Mapping[str, str] | None, arguments: Mapping[str, str]
+    robot: str | Path,
+    base: Any,
+    on: Mapping[str, str] | None,
+    arguments: Mapping[str, str],
+    packages: tuple[str, ...],
 ) -> _Source:
     if isinstance(base, Mapping) or on is not None:
         what = "on" if on is not None else "base"
         raise RobotError(f"{what} is a dict of parts, but there is one robot, '{robot}'")
-    source = _read(robot, arguments)
+    source = _read(robot, arguments, packages)
     urdf = source.urdf
     if base is not None:
         urdf = with_base(urdf, as_pose(base, f"{urdf.source}: base", RobotError))
@@ -171,6 +186,7 @@ def _parts(
     base: Any,
     on: Mapping[str, str] | None,
     arguments: Mapping[str, Any],
+    packages: tuple[str, ...],
 ) -> _Source:
     """Return several robots as one."""
     for name in robots:
@@ -194,7 +210,7 @@ def _parts(
                 f".xacro file{nearest(name, robots)}; parts: {', '.join(robots)}"
             )
     own_arguments = {name: dict(arguments.get(name, {})) for name in robots}
-    sources = {name: _read(robot, own_arguments[name]) for name, robot in robots.items()}
+    sources = {name: _read(robot, own_arguments[name], packages) for name, robot in robots.items()}
     poses = {
         name: as_pose(at, f"base of '{name}'", RobotError) for name, at in (base or {}).items()
     }
@@ -204,7 +220,10 @@ def _parts(
         UrdfPart(name, str(robot), poses.get(name), on.get(name), own_arguments[name])
         for name, robot in robots.items()
     )
-    urdf = dataclasses.replace(urdf, parts=parts)
+    notes = tuple(
+        f"{name}: {note}" for name, source in sources.items() for note in source.urdf.notes
+    )
+    urdf = dataclasses.replace(urdf, parts=parts, notes=notes, packages=packages)
     first, source = next(iter(sources.items()))
     own = source.tool
     limits: dict[str, dict[str, float]] = {}
@@ -218,23 +237,21 @@ def _parts(
     return _Source(urdf, None if own is None else f"{first}/{own}", touching, limits)
 
 
-def _read_file(path: Path, arguments: Mapping[str, str], given: str) -> Urdf:
+def _read_file(
+    path: Path, arguments: Mapping[str, str], given: str, packages: tuple[str, ...]
+) -> Urdf:
     if "://" in given:
         raise RobotError(f"{given}: is an address, expected a file: download it first")
     if path.suffix == ".xacro":
-        return parse_urdf(
-            expand(path, arguments),
-            source=str(path),
-            package_dirs=package_folders(path),
-            mesh_folder=path.resolve().parent,
-        )
+        near = Packages(path, packages)
+        return urdf_of_file(expand(path, arguments, near), near)
     _check_no_arguments(given, arguments)
     if path.suffix != ".urdf":
         raise RobotError(
             f"unknown robot '{given}', expected a .urdf or .xacro file or one of: "
             f"{', '.join(NAMED_ARMS)}{nearest(str(path), NAMED_ARMS)}"
         )
-    return read_urdf(path)
+    return read_urdf(path, packages)
 
 
 def _check_no_arguments(given: str, arguments: Mapping[str, Any]) -> None:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import coal
 import numpy as np
 
+from selfmotion.robot.packages import Packages
 from selfmotion.robot.urdf import Urdf
 
 
@@ -81,7 +82,14 @@ def _fault(urdf: Urdf, file: str) -> str:
         return "the mesh is not on this machine, download it"
     found = _place(urdf, file)
     if found is None:
-        return "no such mesh file"
+        scheme, _, rest = file.rpartition("://")
+        if scheme not in ("package", "model"):
+            return "no such mesh file"
+        near, name = Packages(Path(urdf.source), urdf.packages), rest.partition("/")[0]
+        folder = near.folder(name)
+        if folder is not None:
+            return f"no such mesh file in package '{name}', {folder}"
+        return f"no such mesh file, {near.searched(name)}"
     try:
         coal.MeshLoader().load(str(found), np.ones(3))
     except (RuntimeError, ValueError) as error:

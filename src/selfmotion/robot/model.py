@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, Flags, RobotError, plain_numbers, random_numbers, shown
 from selfmotion.robot.chain import WORLD, Chain
+from selfmotion.robot.coupling import Coupling
 from selfmotion.robot.freedom import can_follow, most_dexterous, redundancy
 from selfmotion.robot.geometry import readable_visuals, reduced_geometry
 from selfmotion.robot.inverse import solved
@@ -36,7 +37,7 @@ class RobotModel:
     reference : str or None
         The link in whose frame poses and paths are given; None for the world.
     joint_names : tuple of str
-        The n joints, base to tool.
+        The n joints, base to tool; those that mimic one of them (`coupling`) are not among them.
     lower, upper : (n,)
         Position limits [rad or m]; ±inf for continuous joints.
     velocity_limit : (n,)
@@ -44,7 +45,7 @@ class RobotModel:
     locked : dict
         Joint name → coordinate at which it is held.
     model : pinocchio.Model
-        The tree of its joints, nq = nv = n. Not to be modified.
+        The tree of its joints and of those that mimic them, nq = nv = N. Not to be modified.
     urdf : Urdf
         What it was made from.
     touching : tuple of (str, str)
@@ -54,6 +55,8 @@ class RobotModel:
     acceleration_limit, jerk_limit : (n,)
         Limits that the maker of a named arm publishes [rad/s² or m/s², rad/s³ or m/s³]; inf where
         none are known.
+    coupling : Coupling
+        The positions of the model's joints at q.
     """
 
     name: str
@@ -70,6 +73,7 @@ class RobotModel:
     jerk_limit: Array
     touching: tuple[tuple[str, str], ...] = ()
     reference: str | None = None
+    coupling: Coupling = field(repr=False, kw_only=True)
 
     def __repr__(self) -> str:
         """Return one line: name, tool and joints."""
@@ -93,8 +97,8 @@ class RobotModel:
         RobotError
             There is no such link.
         """
-        frames = [WORLD if link is None else self._frame(link) for link in (tool, reference)]
-        return Chain(self.model, *frames)
+        tip, base = (WORLD if link is None else self._frame(link) for link in (tool, reference))
+        return Chain(self.model, tip, base, self.coupling)
 
     def _frame(self, link: str) -> int:
         self.urdf.check_tool(link)
@@ -108,12 +112,12 @@ class RobotModel:
     @cached_property
     def tree(self) -> TreeArrays:
         """What compiled kinematics need of all joints, placed in the world."""
-        return tree_arrays(self.model)
+        return tree_arrays(self.model, self.coupling)
 
     @property
     def is_revolute(self) -> Flags:
         """Which joints' coordinates are angles, (n,)."""
-        return self.tree.is_revolute
+        return np.asarray(self.tree.is_revolute[self.coupling.masters])
 
     def is_prismatic(self, joint: str) -> bool:
         """Whether a joint's coordinate is a length [m]."""
@@ -131,8 +135,9 @@ class RobotModel:
 
     def reach_of(self, chain: Chain) -> float:
         """Return how far from its base the tip of a chain can be at most [m]."""
-        slides = ~self.is_revolute
-        farthest = np.maximum(np.abs(self.lower), np.abs(self.upper))
+        slides = ~self.tree.is_revolute
+        farthest = np.maximum(np.abs(self.lower), np.abs(self.upper))[self.coupling.coordinates]
+        farthest = np.abs(self.coupling.scales) * farthest + np.abs(self.coupling.offsets)
         return float(chain.arrays.link_lengths.sum() + farthest[slides].sum())
 
     @property
@@ -285,15 +290,27 @@ class RobotModel:
         return str(self.model.frames[frame].name)
 
     def joint_poses(self, q: Array) -> Array:
-        """Return the joints' frames in the world at configurations (K, n): (K, n, 7).
+        """Return the frames of the model's joints in the world at q (K, n): (K, N, 7).
 
         Positions [m] and quaternions (x, y, z, w).
         """
-        data, found = self.model.createData(), np.empty((len(q), self.dof, 7))
-        for k, configuration in enumerate(q):
+        count = self.model.nv
+        data, found = self.model.createData(), np.empty((len(q), count, 7))
+        for k, configuration in enumerate(self.coupling.spread(q)):
             pin.forwardKinematics(self.model, data, configuration)
-            found[k] = [pin.SE3ToXYZQUAT(data.oMi[joint + 1]) for joint in range(self.dof)]
+            found[k] = [pin.SE3ToXYZQUAT(data.oMi[joint + 1]) for joint in range(count)]
         return found
+
+    def all_joints(self, q: Array) -> dict[str, Array]:
+        """Return the positions of all joints that move at q (K, n), by name, (K,) each.
+
+        Those of the joints that mimic others, too.
+        """
+        return dict(zip(list(self.model.names)[1:], self.coupling.spread(q).T, strict=True))
+
+    def all_joints_rates(self, qd: Array) -> dict[str, Array]:
+        """Return the velocities, or accelerations, of all joints that move; see `all_joints`."""
+        return dict(zip(list(self.model.names)[1:], self.coupling.rates(qd).T, strict=True))
 
     def geometry(self, kind: pin.GeometryType) -> Any:
         """Return the visual or collision geometry, all links, locked joints where they are held.

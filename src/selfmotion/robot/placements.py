@@ -46,13 +46,15 @@ def placements(
     positions: Array,
     axes: Array,
     is_revolute: Flags,
+    scales: Array,
     r: Array,
     p: Array,
 ) -> None:
     """Write where q (n,) places the joints of a tree: (c + 1, 3, 3) and (c + 1, 3).
 
-    Row 0 is the base. Each joint has a coordinate, `joints` (c,), a place in the frame of another
-    row, `parents` (c,), which is (c, 3, 3) and (c, 3), and an axis in its own, (c, 3).
+    Row 0 is the base. Each joint has a coordinate, `joints` (c,), times its scale, a place in the
+    frame of another row, `parents` (c,), which is (c, 3, 3) and (c, 3), and an axis in its own,
+    (c, 3).
     """
     # Loops, here and in all kernels: for an array assigned to a slice of another, numba compiles
     # for seconds what NumPy says of shapes that differ.
@@ -63,7 +65,7 @@ def placements(
     for j in range(len(joints)):
         before = parents[j]
         compose(r[before], p[before], rotations[j], positions[j], r[j + 1], p[j + 1])
-        moved(axes[j], q[joints[j]], is_revolute[j], r[j + 1], p[j + 1])
+        moved(axes[j], q[joints[j]] * scales[j], is_revolute[j], r[j + 1], p[j + 1])
 
 
 @kernel

@@ -24,11 +24,13 @@ class ToolRates:
     def __init__(self, chain: Chain) -> None:
         self._chain, (self._model, self._frame) = chain, chain.rooted()
         self._data = self._model.createData()
+        # Of the chain's joints by coordinates, (c, n).
+        self._matrix = chain.coupling.matrix[chain.model_joints]
 
     def __call__(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
         """Return velocities and accelerations of motions (K, n) each, (K, 6) [m, rad, s]."""
         velocity, acceleration = np.empty((len(q), 6)), np.empty((len(q), 6))
-        q, qd, qdd = (x[:, self._chain.joints] for x in (q, qd, qdd))
+        q, qd, qdd = self._of_joints(q, qd, qdd)
         model, data, frame = self._model, self._data, self._frame
         for k in range(len(q)):
             pin.forwardKinematics(model, data, q[k], qd[k], qdd[k])
@@ -49,11 +51,9 @@ class ToolRates:
         self, q: Array, qd: Array, qdd: Array
     ) -> tuple[tuple[Array, Array], tuple[Array, Array, Array]]:
         """Return ∂/∂q and ∂/∂q̇ of velocities, ∂/∂q, ∂/∂q̇ and ∂/∂q̈ of accelerations, (K, 6, n)."""
-        joints = self._chain.joints
-        shape = (*q.shape[:1], 6, len(joints))
+        shape = (*q.shape[:1], 6, len(self._matrix))
         v_by_q, a_by_q, a_by_qd, jacobians = (np.empty(shape) for _ in range(4))
-        dof = q.shape[1]
-        q, qd, qdd = (x[:, joints] for x in (q, qd, qdd))
+        q, qd, qdd = self._of_joints(q, qd, qdd)
         model, data, frame = self._model, self._data, self._frame
         for k in range(len(q)):
             pin.computeForwardKinematicsDerivatives(model, data, q[k], qd[k], qdd[k])
@@ -67,12 +67,12 @@ class ToolRates:
             for by, of in ((a_by_q, v_by_q), (a_by_qd, jacobians)):
                 by[k, :3] += turning @ of[k, :3] - moving @ of[k, 3:]
         v_by_q, a_by_q, a_by_qd, jacobians = (
-            self._spread(part, dof) for part in (v_by_q, a_by_q, a_by_qd, jacobians)
+            part @ self._matrix for part in (v_by_q, a_by_q, a_by_qd, jacobians)
         )
         return (v_by_q, jacobians), (a_by_q, a_by_qd, jacobians)
 
-    def _spread(self, columns: Array, dof: int) -> Array:
-        """Return columns (K, 6, c) of the chain's joints as those of all joints, (K, 6, n)."""
-        found = np.zeros((*columns.shape[:2], dof))
-        found[:, :, self._chain.joints] = columns
-        return found
+    def _of_joints(self, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array, Array]:
+        """Return a motion (K, n) as that of the chain's joints, (K, c)."""
+        coupling, joints = self._chain.coupling, self._chain.model_joints
+        qd, qdd = (np.ascontiguousarray(coupling.rates(x)[:, joints]) for x in (qd, qdd))
+        return np.ascontiguousarray(coupling.spread(q)[:, joints]), qd, qdd

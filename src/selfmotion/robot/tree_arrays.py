@@ -8,9 +8,11 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from selfmotion.basics import Array, Flags, Ints
+from selfmotion.robot.coupling import Coupling
 
-# What a chain's table tells of a joint, (6, 3): its coordinate, or -1 for the tip, and whether it
-# turns; its axis; where it is in the frame of the joint before, and how it is turned there.
+# What a chain's table tells of a joint, (6, 3): its coordinate, or -1 for the tip, whether it
+# turns, and by how much [rad or m] where the coordinate is 1; its axis; where it is in the frame of
+# the joint before, and how it is turned there.
 JOINT, AXIS, POSITION, ROTATION = 0, 1, 2, 3
 
 
@@ -28,6 +30,8 @@ class TreeArrays(NamedTuple):
     axes : (c, 3)
         In the joints' own frames; turned round where a joint is passed from its far side.
     is_revolute : (c,)
+    scales : (c,)
+        By how much each turns or goes where its coordinate is 1 [rad or m].
     """
 
     joints: Ints
@@ -36,6 +40,7 @@ class TreeArrays(NamedTuple):
     positions: Array
     axes: Array
     is_revolute: Flags
+    scales: Array
 
 
 class ChainArrays(NamedTuple):
@@ -60,6 +65,7 @@ class ChainArrays(NamedTuple):
         found = np.zeros((count + 1, 6, 3))
         found[:, JOINT, 0] = [*tree.joints, -1.0]
         found[:count, JOINT, 1] = tree.is_revolute
+        found[:count, JOINT, 2] = tree.scales
         found[:count, AXIS] = tree.axes
         found[:, POSITION] = [*tree.positions, self.tip_position]
         found[:, ROTATION:] = [*tree.rotations, self.tip_rotation]
@@ -71,17 +77,25 @@ class ChainArrays(NamedTuple):
         return np.asarray(np.linalg.norm([*self.tree.positions, self.tip_position], axis=1))
 
 
-def tree_arrays(model: Any) -> TreeArrays:
+def tree_arrays(model: Any, coupling: Coupling) -> TreeArrays:
     """Return what compiled kinematics need of all joints of a model, placed in the world."""
-    joints = np.arange(model.nv, dtype=np.int64)
-    places = list(model.jointPlacements)[1:]
-    return serial_arrays(model, joints, list(model.parents)[1:], places, np.ones(model.nv))
+    joints, places = np.arange(model.nv, dtype=np.int64), list(model.jointPlacements)[1:]
+    parents = list(model.parents)[1:]
+    return serial_arrays(model, coupling, joints, parents, places, np.ones(model.nv))
 
 
 def serial_arrays(
-    model: Any, joints: Ints, parents: npt.ArrayLike, places: Sequence[pin.SE3], signs: Array
+    model: Any,
+    coupling: Coupling,
+    joints: Ints,
+    parents: npt.ArrayLike,
+    places: Sequence[pin.SE3],
+    signs: Array,
 ) -> TreeArrays:
-    """Return the arrays of some joints with their parents and places; -1 turns an axis round."""
+    """Return the arrays of some joints with their parents and places; -1 turns an axis round.
+
+    Where a joint is when its coordinate is 0 is part of its place.
+    """
     data = model.createData()
     # Columns [v, ω] at the world's origin; of one joint Pinocchio returns a vector.
     columns = pin.computeJointJacobians(model, data, pin.neutral(model)).reshape(6, -1).T
@@ -91,11 +105,25 @@ def serial_arrays(
         signs[j] * np.array(twist.angular if turns else twist.linear)
         for j, twist, turns in zip(joints, twists, is_revolute, strict=True)
     ]
+    places = [
+        place if offset == 0.0 else place * _moved(axis, turns, offset)
+        for place, axis, turns, offset in zip(
+            places, axes, is_revolute, coupling.offsets[joints], strict=True
+        )
+    ]
     return TreeArrays(
-        np.array(joints, dtype=np.int64),
+        np.array(coupling.coordinates[joints], dtype=np.int64),
         np.array(parents, dtype=np.int64),
         np.array([place.rotation for place in places]).reshape(-1, 3, 3),
         np.array([place.translation for place in places]).reshape(-1, 3),
         np.array(axes).reshape(-1, 3),
         np.array(is_revolute, dtype=np.bool_),
+        np.array(coupling.scales[joints], dtype=np.float64),
     )
+
+
+def _moved(axis: Array, turns: bool, by: float) -> pin.SE3:
+    """Return how a joint places what it carries."""
+    if turns:
+        return pin.SE3(pin.exp3(by * axis), np.zeros(3))
+    return pin.SE3(np.eye(3), by * axis)

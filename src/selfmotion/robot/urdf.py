@@ -5,16 +5,24 @@ Here such files are refused with a message that names the joint or link, and con
 become single-angle joints without limits; mesh addresses become absolute.
 """
 
+import copy
 import hashlib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import RobotError, nearest
+from selfmotion.robot.cosmetic_elements import (
+    lacking_inertials,
+    mend_cosmetics,
+    without_lacking,
+)
 from selfmotion.robot.joint_elements import check_joint_elements
-from selfmotion.robot.link_elements import check_link_elements
+from selfmotion.robot.link_elements import check_link_elements, check_shape
+from selfmotion.robot.packages import Packages
 from selfmotion.robot.urdf_text import (
     check_expanded,
     make_meshes_absolute,
@@ -94,6 +102,10 @@ class Urdf:
         Names of all links, in file order.
     parts : tuple of UrdfPart
         What it was composed of; none of a robot of its own, or read from a saved plan.
+    notes : tuple of str
+        What of it is not drawn or not weighed, and why.
+    packages : tuple of str
+        Folders of packages that the user named.
     """
 
     source: str
@@ -102,6 +114,21 @@ class Urdf:
     joints: dict[str, UrdfJoint]
     links: tuple[str, ...]
     parts: tuple[UrdfPart, ...] = ()
+    notes: tuple[str, ...] = ()
+    packages: tuple[str, ...] = ()
+
+    @property
+    def readable_text(self) -> str:
+        """The text without what parsers refuse and no motion needs."""
+        if not self.lacking_inertials:
+            return self.text
+        root = without_lacking(ElementTree.fromstring(self.text))
+        return ElementTree.tostring(root, encoding="unicode")
+
+    @cached_property
+    def lacking_inertials(self) -> Mapping[str, str]:
+        """What incomplete ``<inertial>`` elements lack, in words → the link's name."""
+        return lacking_inertials(ElementTree.fromstring(self.text))
 
     @property
     def sha256(self) -> str:
@@ -119,7 +146,7 @@ class Urdf:
         if not file.is_file() or file.suffix == ".xacro":  # whose arguments are not known here
             return False
         try:
-            return read_urdf(file).text != self.bare_text()
+            return read_urdf(file, self.packages).text != self.bare_text()
         except RobotError:
             return True
 
@@ -175,13 +202,15 @@ class Urdf:
         return chain[::-1]
 
 
-def read_urdf(path: Path) -> Urdf:
+def read_urdf(path: Path, packages: Iterable[str] = ()) -> Urdf:
     """Read and validate a URDF file.
 
     Parameters
     ----------
     path : Path
-        The file. Mesh addresses ``package://NAME/…`` are looked up in the folders above it.
+        The file.
+    packages : sequence of str
+        Folders in which packages are looked up besides; see `Packages`.
 
     Returns
     -------
@@ -199,10 +228,14 @@ def read_urdf(path: Path) -> Urdf:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise RobotError(f"{path}: cannot be read as UTF-8 text: {error}") from error
-    folder = path.resolve().parent
-    return parse_urdf(
-        text, source=str(path), package_dirs=package_folders(path), mesh_folder=folder
-    )
+    return urdf_of_file(text, Packages(path, tuple(packages)))
+
+
+def urdf_of_file(text: str, packages: Packages) -> Urdf:
+    """Validate URDF text that a file has or expands to; see `read_urdf`."""
+    folders = package_folders(packages.file)
+    found = parse_urdf(text, source=str(packages.file), package_dirs=folders, packages=packages)
+    return replace(found, packages=packages.given)
 
 
 def package_folders(path: Path) -> tuple[str, ...]:
@@ -211,25 +244,27 @@ def package_folders(path: Path) -> tuple[str, ...]:
 
 
 def parse_urdf(
-    text: str, *, source: str, package_dirs: tuple[str, ...], mesh_folder: Path | None = None
+    text: str, *, source: str, package_dirs: tuple[str, ...], packages: Packages | None = None
 ) -> Urdf:
-    """Validate URDF text; see `read_urdf`. Relative mesh names are taken from `mesh_folder`."""
+    """Validate URDF text; see `read_urdf`. Addresses of meshes are looked up by `packages`."""
     root = root_of(text, source)
     check_expanded(root, source)
+    notes = mend_cosmetics(root, check_shape)
     check_link_elements(root, source)
     check_joint_elements(root, source)
-    parsed = parsed_by_yourdfpy(ElementTree.tostring(root, encoding="unicode"), source)
+    bare = without_lacking(copy.deepcopy(root))
+    parsed = parsed_by_yourdfpy(ElementTree.tostring(bare, encoding="unicode"), source)
     if [joint.name for joint in parsed.joints] != [j.get("name") for j in root.findall("joint")]:
         raise RobotError(f"{source}: is XML that parsers read differently; write it plainly")
     joints = {joint.name: joint for joint in map(_joint, parsed.joints)}
     _check_tree(parsed, source)
     _check_mimics(joints, source)
     make_single_angles(root)
-    if mesh_folder is not None:
-        make_meshes_absolute(root, mesh_folder)
+    if packages is not None:
+        make_meshes_absolute(root, packages, package_dirs)
     links = tuple(link.name for link in parsed.links)
     prepared = ElementTree.tostring(root, encoding="unicode")
-    return Urdf(source, prepared, package_dirs, joints, links)
+    return Urdf(source, prepared, package_dirs, joints, links, notes=tuple(notes))
 
 
 def _joint(joint: Any) -> UrdfJoint:

@@ -4,10 +4,12 @@ import contextlib
 import io
 import logging
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from selfmotion.basics import RobotError
+from selfmotion.robot.packages import Packages
 
 # A limit that no motion reaches; Pinocchio wants finite numbers for a revolute joint.
 _UNLIMITED = 1e6
@@ -39,7 +41,7 @@ def root_of(text: str, source: str) -> ElementTree.Element:
     if root.tag != "robot":
         raise RobotError(f"{source}: the root element is <{root.tag}>, expected <robot>")
     if not root.get("name"):
-        raise RobotError(f'{source}: the <robot> has no name; add name="…"')
+        root.set("name", Path(source).stem or "robot")
     if root.find("link") is None:
         raise RobotError(f"{source}: has no <link>, expected those of an arm")
     return root
@@ -85,9 +87,22 @@ def make_single_angles(root: ElementTree.Element) -> None:
             limit.set("upper", str(_UNLIMITED))
 
 
-def make_meshes_absolute(root: ElementTree.Element, folder: Path) -> None:
-    """Turn names of meshes into paths, relative ones as seen from a folder."""
+def make_meshes_absolute(
+    root: ElementTree.Element, packages: Packages, folders: Sequence[str]
+) -> None:
+    """Turn addresses of meshes into paths on this machine, as far as they are there.
+
+    What is found as ``package://`` in the `folders` stays as it is; a relative name that is nowhere
+    is taken to be beside the file.
+    """
     for mesh in root.iter("mesh"):
         name = mesh.get("filename", "")
-        if "://" not in name and not Path(name).is_absolute():
-            mesh.set("filename", str(folder / name))
+        scheme, mark, rest = name.partition("://")
+        is_there = any(Path(folder, rest).is_file() for folder in folders)
+        if mark and scheme in ("package", "model") and is_there:
+            continue
+        place = packages.place(name)
+        if place is not None:
+            mesh.set("filename", str(place))
+        elif not mark and not Path(name).is_absolute():
+            mesh.set("filename", str(packages.file.resolve().parent / name))

@@ -29,7 +29,7 @@ def walk(
     Sets `samples` (K, n); returns how many there are, and whether they lead back to the start.
     """
     n, tips = len(start), layout.shape[0]
-    r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    r, p = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
     rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
     jacobians = np.zeros((tips, 6, n))
     tangents, q = np.empty((3, n)), np.empty(n)

@@ -90,7 +90,7 @@ def project_all(
     (K,) says of which that was possible within so many steps.
     """
     n, tips = q.shape[1], layout.shape[0]
-    r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    r, p = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
     rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
     jacobians, unused = np.zeros((tips, 6, n)), np.empty(n)
     held = np.zeros(n, dtype=np.bool_)

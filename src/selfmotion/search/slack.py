@@ -44,7 +44,7 @@ def project_relaxed(
     says of which it was possible within so many steps.
     """
     n, tips = q.shape[1], layout.shape[0]
-    r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    r, p = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
     rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
     jacobians, wide = np.zeros((tips, 6, n)), np.zeros((tips, 6, n + 6))
     held, bound = np.zeros(n, dtype=np.bool_), np.zeros(6, dtype=np.bool_)
@@ -97,7 +97,7 @@ def approach_all(
     are what is left in the rows [m, rad]; infinite where that is no number from the beginning.
     """
     n, tips, m = q.shape[1], layout.shape[0], rows_of(layout)
-    r, p = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+    r, p = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
     rotations, positions = np.empty((tips, 3, 3)), np.empty((tips, 3))
     jacobians, wide = np.zeros((tips, 6, n)), np.zeros((tips, 6, n + 6))
     error, step, moved = np.empty(m), np.empty(m), target.copy()

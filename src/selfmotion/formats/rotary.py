@@ -1,0 +1,115 @@
+"""What the words A, B and C of a machine turn: its head, or the table that the part is on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from selfmotion.basics import Array, as_numbers, shown
+
+_AXES = ("A", "B", "C")
+HEAD, TABLE = "head", "table"
+# Chords of lines that a table turns are off by this at most [m], and so many at most.
+_CHORD, _CHORDS = 1e-5, 100_000
+
+
+@dataclass(frozen=True)
+class Rotary:
+    """Which axes turn what.
+
+    Parameters
+    ----------
+    kind : {"head", "table"}
+        With ``"head"`` positions are those of the tip in the part, and A, B, C turn the tool.
+        With ``"table"`` they are those of the machine, in which the table has turned the part.
+    axes : tuple of (str, float)
+        Of a table, from the machine to the part, with their signs: ``("B", 1.0), ("C", 1.0)`` for a
+        C axis on a B axis. By ISO 841 a positive word moves the tool right-handed about the axis,
+        relative to the part: the table itself turns the other way. -1 for a table that turns
+        right-handed.
+    center : (3,)
+        A point on all axes, in the program's coordinates at A = B = C = 0 [m].
+    """
+
+    kind: str
+    axes: tuple[tuple[str, float], ...] = ()
+    center: Array = field(default_factory=lambda: np.zeros(3))
+
+    @classmethod
+    def of(cls, options: Mapping[str, Any]) -> "Rotary | None":
+        """Return what options say; ValueError for what makes no sense."""
+        kind, axes = options.get("rotary"), options.get("rotary_axes")
+        center = options.get("rotary_center")
+        if kind is None:
+            if axes is not None or center is not None:
+                raise ValueError("rotary_axes and rotary_center are of rotary = 'table'; say that")
+            return None
+        if kind not in (HEAD, TABLE):
+            raise ValueError(f"rotary is {shown(kind)}, expected 'head' or 'table'")
+        if kind == HEAD:
+            if axes is not None or center is not None:
+                raise ValueError("rotary_axes and rotary_center are of a table; drop them")
+            return cls(HEAD)
+        if center is None:
+            raise ValueError("rotary_center is missing: a point on the table's axes [x, y, z] (m)")
+        where = as_numbers(center, "rotary_center", "three numbers", (3,))
+        return cls(TABLE, _axes_of(axes), where)
+
+    def rotation(self, turns: Mapping[str, float]) -> Array:
+        """Return what turns the machine's directions into the part's (3, 3), at angles [rad]."""
+        if self.kind == HEAD:
+            return _about("C", turns) @ _about("B", turns) @ _about("A", turns)
+        found = np.eye(3)
+        for axis, sign in self.axes:
+            found = _about(axis, {axis: sign * turns.get(axis, 0.0)}) @ found
+        return found
+
+    def in_part(self, position: Array, turns: Mapping[str, float]) -> Array:
+        """Return where a position of the machine (3,) is in the part; NaN where it is not known."""
+        if self.kind == HEAD:
+            return position
+        if np.isnan(position).any():
+            return np.full(3, np.nan)
+        return np.asarray(self.center + self.rotation(turns) @ (position - self.center))
+
+    def count(
+        self, start: Array, goal: Array, turns: Mapping[str, float], then: Mapping[str, float]
+    ) -> int:
+        """Return how many chords a line of the machine takes in the part.
+
+        A point R(s) p(s), with R turning by θ and p going d from it at distance r, has a second
+        derivative of at most r θ² + 2 d θ, an eighth of which is what a chord misses.
+        """
+        if self.kind == HEAD:
+            return 1
+        angle = sum(abs(then.get(axis, 0.0) - turns.get(axis, 0.0)) for axis, _ in self.axes)
+        far = max(float(np.linalg.norm(point - self.center)) for point in (start, goal))
+        bend = angle * (far * angle + 2.0 * float(np.linalg.norm(goal - start)))
+        return int(np.clip(np.ceil(np.sqrt(bend / (8.0 * _CHORD))), 1, _CHORDS))
+
+
+def _axes_of(given: Any) -> tuple[tuple[str, float], ...]:
+    text = given.replace(" ", "") if isinstance(given, str) else given
+    if isinstance(text, str):
+        text = text.split(",") if "," in text else list(text) if "-" not in text else [text]
+    listed = list(text) if isinstance(text, list | tuple) else [given]
+    names = [str(item).lstrip("+-").upper() for item in listed]
+    if not set(names) <= set(_AXES) or len(set(names)) != len(names) or len(names) > 2:
+        raise ValueError(
+            f"rotary_axes is {shown(given)}, expected the table's axes from the machine to the "
+            f"part: BC or AC, or one; B,-C where C turns the table right-handed"
+        )
+    signs = [-1.0 if str(item).startswith("-") else 1.0 for item in listed]
+    return tuple(zip(names, signs, strict=True))
+
+
+def _about(axis: str, turns: Mapping[str, float]) -> Array:
+    """Return the rotation about an axis by its angle [rad]."""
+    angle, k = turns.get(axis, 0.0), _AXES.index(axis)
+    i, j = (k + 1) % 3, (k + 2) % 3
+    found = np.eye(3)
+    found[i, i] = found[j, j] = np.cos(angle)
+    found[j, i] = np.sin(angle)
+    found[i, j] = -found[j, i]
+    return found

@@ -1,0 +1,173 @@
+"""Packages and files that robot descriptions name, found on this machine without ROS.
+
+``$(find NAME)`` of xacro, ``package://NAME/…``, ``model://NAME/…``, ``file://`` and absolute paths
+of the machine that wrote a file, and relative paths: all are looked up here, in this order, the
+nearest first:
+
+1. folders that are given (``packages=``, ``--packages``), and three levels below them
+2. the folders above the file: one of that name, or whose ``package.xml`` says so, or one beside it
+3. ``AMENT_PREFIX_PATH`` (``share/NAME``), and ``ROS_PACKAGE_PATH`` with three levels below
+4. three levels below the folders above the file, up to six of them, or to the root of a repository
+"""
+
+import os
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+# How many levels below a folder are looked at, below how many folders above a file, and at how many
+# folders in all: a home is larger than any workspace.
+_BELOW, _ABOVE, _MOST = 3, 6, 5000
+_SKIPPED = {"node_modules", "__pycache__", "build", "log"}
+
+
+@dataclass(frozen=True)
+class Packages:
+    """Where a file's packages are looked for.
+
+    Attributes
+    ----------
+    file : Path
+        The description that names them.
+    given : tuple of str
+        Folders that the user names.
+    """
+
+    file: Path
+    given: tuple[str, ...] = ()
+
+    def folder(self, name: str) -> Path | None:
+        """Return the folder of a package, None where there is none."""
+        return next(self._places(name), None)
+
+    def place(self, address: str) -> Path | None:
+        """Return the file that an address means, None where it is not on this machine."""
+        scheme, mark, rest = address.partition("://")
+        if not mark:
+            scheme, rest = "", address
+        if scheme in ("package", "model"):
+            name, _, inside = rest.partition("/")
+            places = (folder / inside for folder in self._places(name))
+            return next((place for place in places if place.is_file()), None)
+        if scheme not in ("", "file"):
+            return None
+        path = Path(rest)
+        if not path.is_absolute():
+            places = (folder / path for folder in self._above)
+            return next((place for place in places if place.is_file()), None)
+        return path if path.is_file() else self._moved(path)
+
+    def searched(self, name: str) -> str:
+        """Return in words where a package was looked for, and what helps."""
+        given = "".join(f"{folder}, " for folder in self.given)
+        variables = ("AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH")
+        known = " and ".join(
+            key if os.environ.get(key) else f"{key} (not set)" for key in variables
+        )
+        return (
+            f"package '{name}' is in none of {given}{self.file.resolve().parent} and the folders "
+            f"above it, {_BELOW} levels below the nearest of these, {known}; name the folder that "
+            f"has it: --packages DIR (packages=)"
+        )
+
+    @cached_property
+    def _above(self) -> tuple[Path, ...]:
+        """All folders above the file but the root, nearest first."""
+        return tuple(folder for folder in self.file.resolve().parents if folder.parts[1:])
+
+    @cached_property
+    def _up(self) -> tuple[Path, ...]:
+        """The folders above the file that are searched downwards, nearest first."""
+        found: list[Path] = []
+        shared = {Path.home(), Path(tempfile.gettempdir()).resolve()}
+        for folder in self._above[:_ABOVE]:
+            if len(folder.parts) < 3 or folder in shared:
+                break
+            found.append(folder)
+            if (folder / ".git").exists():
+                break
+        return tuple(found)
+
+    def _places(self, name: str) -> Iterator[Path]:
+        """Yield the folders that have a package's name, in the order of the module's text."""
+        for given in self.given:
+            yield from _named(name, [Path(given)])
+        for folder in self._above:
+            yield from (place for place in (folder, folder / name) if _is(place, name))
+        for prefix in _folders_of("AMENT_PREFIX_PATH"):
+            if (prefix / "share" / name).is_dir():
+                yield prefix / "share" / name
+        yield from _named(name, _folders_of("ROS_PACKAGE_PATH"))
+        yield from _named(name, self._up)
+
+    def _moved(self, path: Path) -> Path | None:
+        """Return a file of another machine: each folder of its path may be a package's."""
+        for k, name in enumerate(path.parts[1:-1], 1):
+            inside = Path(*path.parts[k + 1 :])
+            for folder in self._near(name):
+                if (folder / inside).is_file():
+                    return folder / inside
+        return None
+
+    def _near(self, name: str) -> Iterator[Path]:
+        # Any word of a path would be looked for: below folders only where it is a package's.
+        if "_" in name or name.endswith("description"):
+            yield from self._places(name)
+            return
+        for folder in self._above:
+            yield from (place for place in (folder, folder / name) if _is(place, name))
+
+
+def _folders_of(variable: str) -> list[Path]:
+    return [Path(item) for item in os.environ.get(variable, "").split(os.pathsep) if item]
+
+
+def _is(folder: Path, name: str) -> bool:
+    """Return whether a folder is the package of that name."""
+    if not folder.is_dir():
+        return False
+    said = _package_name(folder)
+    return said == name or folder.name == name
+
+
+def _package_name(folder: Path) -> str | None:
+    """Return what a folder's ``package.xml`` calls it; None where it has none."""
+    try:
+        found = ElementTree.parse(folder / "package.xml").findtext("name")
+    except (OSError, ElementTree.ParseError):
+        return None
+    return None if found is None else found.strip()
+
+
+def _named(name: str, tops: Sequence[Path]) -> Iterator[Path]:
+    """Yield packages of a name at folders and below them, level by level."""
+    seen: set[Path] = set()
+    for top in tops:
+        level = [top]
+        for depth in range(_BELOW + 1):
+            below: list[Path] = []
+            for folder in level:
+                if folder in seen or len(seen) > _MOST:
+                    continue
+                seen.add(folder)
+                if _is(folder, name):
+                    yield folder
+                if depth < _BELOW:
+                    below += _inside(folder)
+            level = below
+
+
+def _inside(folder: Path) -> list[Path]:
+    try:
+        with os.scandir(folder) as entries:
+            found = [
+                entry.path
+                for entry in entries
+                if entry.is_dir() and not entry.name.startswith(".") and entry.name not in _SKIPPED
+            ]
+    except OSError:
+        return []
+    return [Path(path) for path in sorted(found)]

@@ -1,0 +1,340 @@
+"""Files of paths and motions as people have them: what they say is what is read."""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.spatial.transform import Rotation
+
+import selfmotion as sm
+from selfmotion.formats.gcode import read_gcode
+from selfmotion.formats.path_rows import Reading
+from support.arms import robot_named
+from support.shell import complaint, invoke
+
+# Durations of what differs by less than its tolerance [share], and rounding of a file [m].
+ALIKE, ROUNDING = 0.02, 1e-9
+GOOD = np.array([[0.4, -0.05, 0.3], [0.42, 0.0, 0.3], [0.4, 0.05, 0.3]])
+DOWN = [0.0, 0.0, -1.0]
+
+
+def written(folder: Path, name: str, text: str) -> Path:
+    (folder / name).write_text(text)
+    return folder / name
+
+
+_ROWS = ["0.4 -0.05 0.3 0 0 -1", "0.42 0 0.3 0 0 -1", "0.4 0.05 0.3 0 0 -1"]
+_NORMALS = "x,y,z,nx,ny,nz"
+TABLES: list[tuple[str, str, str | None]] = [
+    ("commas", "\n".join([_NORMALS, *(row.replace(" ", ",") for row in _ROWS)]), None),
+    ("spaces", "\n".join([_NORMALS.replace(",", " "), *_ROWS]), None),
+    ("wide spaces", "\n".join(["x   y  z", *(f"  {row[:-7]}" for row in _ROWS)]), None),
+    ("tabs", "\n".join(["x\ty\tz", *(row[:-7].replace(" ", "\t") for row in _ROWS)]), None),
+    ("upper case", "X,Y,Z\n0.4,-0.05,0.3\n0.42,0,0.3\n0.4,0.05,0.3\n", None),
+    ("units in brackets", "x [mm],Y (mm),z[mm]\n400,-50,300\n420,0,300\n400,50,300\n", None),
+    ("decimal commas", "x;y;z\n0,4;-0,05;0,3\n0,42;0;0,3\n0,4;0,05;0,3\n", None),
+    ("no header", "\n".join(_ROWS), _NORMALS),
+    ("no header, commas", "\n".join(row.replace(" ", ",") for row in _ROWS), _NORMALS),
+    ("a header in a comment", "\n".join([f"# {_NORMALS}", *_ROWS]), None),
+    ("columns left out", "\n".join(f"7 {row}" for row in _ROWS), "-,x,y,z,-,-,-"),
+    ("commas at the ends", "x,y,z,\n0.4,-0.05,0.3,\n0.42,0,0.3,\n0.4,0.05,0.3,\n", None),
+]
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table[0])
+def test_tables_of_all_forms_give_one_motion(
+    table: tuple[str, str, str | None], tmp_path: Path
+) -> None:
+    _, text, columns = table
+    path = sm.read_path(written(tmp_path, "a.txt", text), feed=0.05, columns=columns)
+    plain = sm.read_path(written(tmp_path, "b.csv", TABLES[0][1]), feed=0.05)
+    assert path.duration == pytest.approx(plain.duration)
+    t = np.linspace(0.0, plain.duration, 31)
+    found, wanted = path.samples(t), plain.samples(t)
+    np.testing.assert_allclose(found.translation, wanted.translation, atol=ROUNDING)
+    if path.oriented:
+        np.testing.assert_allclose(found.rotation, wanted.rotation, atol=ROUNDING)
+
+
+def test_a_table_without_header_is_planned_with_columns(tmp_path: Path) -> None:
+    file = written(tmp_path, "a.csv", "\n".join(row.replace(" ", ",") for row in _ROWS))
+    asked = ("plan", "panda", "--path", file, "--task", "position", "--feed", "0.05")
+    assert f"add {_NORMALS} (or say --columns {_NORMALS})" in complaint(*asked)
+    code, text = invoke(*asked, "--columns", _NORMALS)
+    assert code == 0, text
+
+
+def test_normals_that_point_out_are_flipped_and_tips_held_back(tmp_path: Path) -> None:
+    text = TABLES[0][1].replace(",-1", ",1")
+    file = written(tmp_path, "a.csv", text)
+    path = sm.read_path(file, feed=0.05, flip_normals=True, standoff=0.01)
+    plain = sm.read_path(written(tmp_path, "b.csv", TABLES[0][1]), feed=0.05)
+    found, wanted = path.pose(0.0), plain.pose(0.0)
+    np.testing.assert_allclose(found.rotation[:, 2], DOWN, atol=ROUNDING)
+    np.testing.assert_allclose(found.translation - wanted.translation, [0, 0, 0.01], atol=1e-12)
+    job = tmp_path / "a.toml"
+    job.write_text(
+        'task = "pointing"\nrobot.name = "panda"\n[path]\nkind = "file"\nfile = "a.csv"\n'
+        "feed_mm = 50\nflip_normals = true\nstandoff_mm = 10\n"
+    )
+    again = sm.read_problem(job).path.pose(0.0)
+    np.testing.assert_allclose(again.homogeneous, found.homogeneous, atol=1e-12)
+
+
+def test_a_path_that_leaves_its_straight_lines_says_by_how_much(tmp_path: Path) -> None:
+    text = "x,y,z\n0.40,-0.10,0.4\n0.45,-0.10,0.4\n0.45,0.10,0.4\n"
+    file = written(tmp_path, "three.csv", text)
+    (note,) = sm.read_path(file, feed=0.05).notes
+    assert "by up to 40.0 mm at line 3: corners round (--corners round) keeps 1 mm" in note
+    assert sm.read_path(file, feed=0.05, corners="round").notes == ()
+    assert sm.read_path(file, feed=0.05, corners="stop").notes == ()
+    # Not of what is smooth.
+    angle = np.linspace(0.0, np.pi, 60)
+    arc = np.column_stack([0.4 + 0.1 * np.sin(angle), 0.1 * np.cos(angle), np.full(60, 0.4)])
+    rows = "\n".join(",".join(map(repr, row)) for row in arc.tolist())
+    assert sm.read_path(written(tmp_path, "arc.csv", f"x,y,z\n{rows}\n"), feed=0.05).notes == ()
+    placed = tmp_path / "a.toml"
+    placed.write_text(
+        'task = "position"\nrobot.name = "panda"\n[path]\nkind = "file"\nfile = "three.csv"\n'
+        "feed = 0.05\nframe = { position = [0.0, 0.01, 0.0] }\n"
+    )
+    assert note in sm.read_problem(placed).remarks
+
+
+_HEAD = "G21 G90 G94\nG0 X0 Y0 Z10\nG1 Z0 F1800\n"
+_SAME_LINE = {
+    "stub of 1 nm": "G1 X30\nG1 X30.000001\nG1 Y30\n",
+    "stub of 1 um": "G1 X30\nG1 X30.001\nG1 Y30\n",
+    "stub of 0.1 mm": "G1 X30\nG1 X30.1\nG1 Y30\n",
+    "stub aside": "G1 X30\nG1 X30.1 Y-0.1\nG1 X30 Y30\n",
+    "stub back": "G1 X30\nG1 X29.99\nG1 Y30\n",
+    "a feed for no way": "G1 X30\nG1 X30.001 F10\nG1 Y30 F1800\n",
+    "chords": "".join(f"G1 X{k / 20:.2f}\n" for k in range(1, 601))
+    + "".join(f"G1 Y{k / 20:.2f}\n" for k in range(1, 601)),
+}
+
+
+@pytest.mark.parametrize("kind", _SAME_LINE)
+def test_legs_shorter_than_the_tolerance_hardly_count(kind: str, tmp_path: Path) -> None:
+    def cut(text: str, corners: str) -> sm.Path:
+        file = written(tmp_path, "a.nc", _HEAD + text + "G0 Z10\nM30\n")
+        return sm.read_path(file, seam="cut 1", corners=corners)
+
+    plain, path = cut("G1 X30\nG1 Y30\n", "round"), cut(_SAME_LINE[kind], "round")
+    assert path.duration == pytest.approx(plain.duration, rel=ALIKE)
+    assert path.duration <= cut(_SAME_LINE[kind], "stop").duration
+    places = path.samples(np.linspace(0.0, path.duration, 2001)).translation
+    ends = 1e-3 * np.array([[0, 0, 10], [0, 0, 0], [30, 0, 0], [30, 30, 0]])
+    legs = list(pairwise(ends))
+    away = np.min([_away(places, *leg) for leg in legs], axis=0)
+    assert away.max() <= 1.15e-3 if kind == "stub aside" else away.max() <= 1e-3 + 1e-9
+
+
+def _away(places: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    leg = end - begin
+    share = np.clip((places - begin) @ leg / (leg @ leg), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(begin + share[:, None] * leg - places, axis=1))
+
+
+@pytest.mark.parametrize("corners", ["blend", "round"])
+def test_rows_that_are_repeated_or_all_but_repeated_hardly_count(
+    corners: str, tmp_path: Path
+) -> None:
+    rows = ["0.4,-0.1,0.4", "0.45,-0.1,0.4", "0.45,0.1,0.4"]
+    plain = sm.read_path(
+        written(tmp_path, "a.csv", "\n".join(["x,y,z", *rows])), feed=0.05, corners=corners
+    )
+    for extra in (rows[1], "0.4500001,-0.1,0.4", "0.45,-0.10001,0.4"):
+        text = "\n".join(["x,y,z", *rows[:2], extra, rows[2]])
+        path = sm.read_path(written(tmp_path, "b.csv", text), feed=0.05, corners=corners)
+        assert path.duration == pytest.approx(plain.duration, rel=ALIKE)
+        t = np.linspace(0.0, 1.0, 101)
+        one, other = (each.samples(t * each.duration).translation for each in (plain, path))
+        assert np.linalg.norm(one - other, axis=1).max() < 1e-3
+
+
+# A slicer's file: a loop, a retraction, a travel, and a line.
+PRINTED = """; made for a test
+M104 S205
+M82 ;absolute extrusion
+M117 Printing...
+G28 ;home
+G92 E0
+G1 F200 E3
+G92 E0
+M204 X500 Y500
+G0 F3600 X10 Y10 Z0.3
+;TYPE:WALL-OUTER
+G1 F1500 X40 Y10 E1.2
+G1 X40 Y30 E2.0
+G1 X10 Y30 E3.2
+G1 X10 Y10 E4.0
+G1 F1800 E-2.5
+G0 F3600 X14 Y14
+G1 F1800 E4.0
+;TYPE:FILL
+G1 F1500 X36 Y26 E5.0
+M84
+"""
+
+
+@pytest.mark.parametrize("relative", [False, True])
+def test_what_extrudes_is_a_cut(relative: bool, tmp_path: Path) -> None:
+    text = PRINTED
+    if relative:
+        text = text.replace("M82 ;absolute extrusion", "M83").replace("E5.0", "E1.0")
+        for now, fed in (("E2.0", "E0.8"), ("E3.2", "E1.3"), ("E4.0\nG1 F18", "E.8\nG1 F18")):
+            text = text.replace(now, fed)
+        text = text.replace("G1 F1800 E4.0", "G1 F1800 E6.5")
+    cuts = read_gcode(written(tmp_path, "part.gcode", text))
+    assert list(cuts) == ["cut 1", "cut 2"]
+    loop, line = cuts.values()
+    np.testing.assert_allclose(
+        1e3 * loop.positions, [[10, 10, 0.3], [40, 10, 0.3], [40, 30, 0.3], [10, 30, 0.3],
+                               [10, 10, 0.3]])  # fmt: skip
+    np.testing.assert_allclose(1e3 * line.positions, [[14, 14, 0.3], [36, 26, 0.3]])
+    assert loop.feed is not None
+    np.testing.assert_allclose(loop.feed, 0.025)
+    assert (4, "retract") in loop.events
+    assert (0, "prime") in line.events
+    assert [event for _, event in loop.events][:2] == ["M104", "M117"]
+    (note,) = loop.notes
+    assert "line 5: G28 goes to a place of the machine's own" in note
+    assert "not known until X, Y and Z are given" in note
+    path = sm.read_path(tmp_path / "part.gcode", seam="cut 1")
+    # 100 mm at 25 mm/s, less what three rounded corners save.
+    assert path.duration == pytest.approx(4.0, rel=0.02)
+    with pytest.raises(sm.FileFormatError, match="line 6: G92 X: zeros that move"):
+        read_gcode(written(tmp_path, "b.gcode", text.replace("G92 E0", "G92 X0 E0", 1)))
+
+
+ROTARY = "G21 G90 G94\nG0 X-25 Y-6 Z45 {0}0 C0\nG1 Z38 F300\nG1 X-20 {0}-26.5 C-5\nG0 Z60\nM30\n"
+
+
+@pytest.mark.parametrize("first", ["A", "B"])
+@pytest.mark.parametrize("signs", [(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])
+def test_a_rotary_table_turns_the_part(
+    first: str, signs: tuple[float, float], tmp_path: Path
+) -> None:
+    """Held against a part that is carried by hand: placed, turned by C, then by the first axis."""
+    file, centre = written(tmp_path, "a.nc", ROTARY.format(first)), np.array([5.0, -3.0, 2.0])
+    axes = [
+        ("" if sign > 0 else "-") + name for name, sign in zip([first, "C"], signs, strict=True)
+    ]
+    options = {"rotary": "table", "rotary_axes": axes, "rotary_center": (1e-3 * centre).tolist()}
+    rows = read_gcode(file, Reading.of(file, options))["cut 1"]
+    start, goal = np.array([-25.0, -6.0, 38.0]), np.array([-20.0, -6.0, 38.0])
+    for k, (point, rotation) in enumerate(zip(rows.positions[1:], rows.values[1:], strict=True)):
+        share = k / (len(rows.positions) - 2)
+        # The table itself turns against the words, but for those with a minus.
+        table = [-sign * share * angle for sign, angle in zip(signs, (-26.5, -5.0), strict=True)]
+        carried = Rotation.from_euler("X" if first == "A" else "Y", table[0], degrees=True)
+        carried = carried * Rotation.from_euler("Z", table[1], degrees=True)
+        in_machine = centre + carried.apply(1e3 * point - centre)
+        np.testing.assert_allclose(in_machine, start + share * (goal - start), atol=1e-9)
+        # The machine's axis stays upright, the tool points down along it.
+        np.testing.assert_allclose(carried.apply(rotation[:, 2]), DOWN, atol=1e-12)
+    middles = 0.5 * (rows.positions[2:] + rows.positions[1:-1])
+    assert np.linalg.norm(np.diff(middles, axis=0), axis=1).max() < 2e-3
+
+
+def test_rotary_words_without_what_they_turn_are_refused(tmp_path: Path) -> None:
+    file = written(tmp_path, "a.nc", ROTARY.format("B"))
+    with pytest.raises(sm.FileFormatError, match=r"line 4: B turns a table or the head.*_axes"):
+        sm.read_path(file)
+    asked = ("plan", "panda", "--path", file, "--task", "pointing")
+    assert "say --rotary table with --rotary-axes (BC, AC)" in complaint(*asked)
+    known = {name: sm.read_path(file, rotary="head").pose(0.5).homogeneous for name in ("head",)}
+    tip = written(tmp_path, "b.nc", ROTARY.format("B").replace("G94", "G94 G43.4 H1"))
+    np.testing.assert_array_equal(sm.read_path(tip).pose(0.5).homogeneous, known["head"])
+    # Words of 0 turn nothing.
+    assert sm.read_path(written(tmp_path, "c.nc", "G0 X0 Y0 Z0 A0\nG1 X10 F600 A0\n")).duration > 0
+    for options, said in (
+        ({"rotary": "bed"}, "expected 'head' or 'table'"),
+        ({"rotary": "table"}, "rotary_center is missing"),
+        ({"rotary": "table", "rotary_center": [0, 0, 0]}, "rotary_axes is None"),
+        ({"rotary": "table", "rotary_center": [0, 0, 0], "rotary_axes": "BD"}, "'BD', expected"),
+        ({"rotary_axes": "BC"}, "are of rotary = 'table'"),
+        ({"rotary": "head", "rotary_axes": "BC"}, "are of a table; drop them"),
+    ):
+        with pytest.raises(sm.FileFormatError, match=said):
+            sm.read_path(file, **options)
+
+
+def test_arcs_in_all_planes_are_turned_ones_of_the_first(tmp_path: Path) -> None:
+    start = "G0 X0 Y0 Z0\nF600\n"
+    flat = read_gcode(written(tmp_path, "a.nc", start + "G17 G2 X10 Y10 I10 J0 Z3"))["cut 1"]
+    for plane, words, order in (
+        ("G18", "Z10 X10 K10 I0 Y3", [1, 2, 0]),
+        ("G19", "Y10 Z10 J10 K0 X3", [2, 0, 1]),
+    ):
+        other = read_gcode(written(tmp_path, "b.nc", f"{start}{plane} G2 {words}"))["cut 1"]
+        np.testing.assert_allclose(other.positions, flat.positions[:, order], atol=1e-12)
+
+
+def test_inverse_time_says_how_long_a_line_takes(tmp_path: Path) -> None:
+    text = "G0 X0 Y0 Z0\nG93\nG1 X100 F30\nG1 X150 F60\n"
+    rows = read_gcode(written(tmp_path, "a.nc", text))["cut 1"]
+    assert rows.feed is not None
+    # 100 mm in 2 s, and 50 mm in 1 s.
+    np.testing.assert_allclose(rows.feed, 0.05)
+
+
+def test_lists_of_pose_arrays_are_seams(tmp_path: Path) -> None:
+    def raster(y: float) -> list[dict[str, object]]:
+        turned = {"x": 1.0, "y": 0.0, "z": 0.0, "w": 0.0}
+        places = [{"x": 0.4 + x, "y": y, "z": 0.3} for x in (0.0, 0.1)]
+        return [{"position": place, "orientation": dict(turned)} for place in places]
+
+    arrays = [{"poses": raster(0.0)}, {"poses": raster(0.1)}]
+    for k, document in enumerate((arrays, {"paths": arrays}, [[raster(0.0)], [raster(0.1)]])):
+        file = written(tmp_path, f"{k}.json", json.dumps(document))
+        second = sm.read_path(file, seam="seam 2", feed=0.05)
+        np.testing.assert_allclose(second.pose(0.0).translation, [0.4, 0.1, 0.3], atol=ROUNDING)
+        with pytest.raises(sm.FileFormatError, match="has 2 seams or cuts, seam 1 to seam 2"):
+            sm.read_path(file, feed=0.05)
+    one = sm.read_path(written(tmp_path, "one.json", json.dumps(arrays[:1])), feed=0.05)
+    assert one.duration > 0.0
+
+
+def test_trajectories_of_other_tools_are_judged_alike(tmp_path: Path) -> None:
+    robot = robot_named("panda")
+    q = robot.dexterous_configuration()
+    goal = robot.pose(q)
+    goal.translation += [0.0, 0.1, 0.0]
+    line = sm.Line(robot.pose(q), goal, 2.0)
+    plan = sm.plan(sm.Problem(robot, line, "pose", q), max_evaluations=3)
+    sm.write_motion(plan, tmp_path / "good.yaml", rate=50.0)
+    good = yaml.safe_load((tmp_path / "good.yaml").read_text())
+    miss = robot_miss(robot, plan)
+
+    def judged(document: object) -> sm.Certificate:
+        file = written(tmp_path, "other.yaml", yaml.dump(document))
+        return sm.certify(robot, line, "pose", sm.read_motion(file))
+
+    wanted = judged(good)
+    assert wanted.verified, wanted.verdict
+    for k, point in enumerate(good["points"]):
+        point["time_from_start"] = {"secs": k // 50, "nsecs": k % 50 * 20_000_000}
+    assert judged({"trajectory": [{"joint_trajectory": good}]}).verdict == wanted.verdict
+    for point in good["points"]:
+        point |= {"velocities": [], "accelerations": []}
+    empty = judged(good)
+    for point in good["points"]:
+        del point["velocities"], point["accelerations"], point["effort"]
+    assert judged(good).verdict == empty.verdict
+    # Straight lines between points are off the path by what they miss, and not by more.
+    assert not empty.verified
+    assert empty.position_error.value == pytest.approx(miss, rel=0.05)
+
+
+def robot_miss(robot: sm.RobotModel, plan: sm.Plan) -> float:
+    """Return how far straight lines between samples at 50 Hz are off a plan's path [m]."""
+    t = np.arange(0.0, 2.0 + 1e-9, 0.02)
+    q = plan.trajectory(t)
+    middles = np.array([robot.pose(each).translation for each in 0.5 * (q[1:] + q[:-1])])
+    wanted = plan.path.samples(0.5 * (t[1:] + t[:-1])).translation
+    return float(np.linalg.norm(middles - wanted, axis=1).max())
