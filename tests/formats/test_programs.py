@@ -408,12 +408,15 @@ def test_what_is_not_verified_is_written_only_when_forced(
     for made in (broken, unmade):
         for name in (*FILES, "weld.csv"):
             file = tmp_path / name
+            asked = settings(name) if name in FILES else None
             with pytest.raises(sm.PlanError, match=r"is not written: .*force=True"):
-                sm.write_motion(made, file, settings=settings(name))
+                sm.write_motion(made, file, settings=asked)
             assert not file.exists()
-            sm.write_motion(made, file, settings=settings(name), force=True)
+            sm.write_motion(made, file, settings=asked, force=True)
             assert file.exists()
             file.unlink()
+    with pytest.raises(sm.ProblemError, match="settings have no effect"):
+        sm.write_motion(program, tmp_path / "weld.csv", settings=settings("weld.src"))
     unmade.save(tmp_path / "a.program")
     asked = ("export", tmp_path / "a.program", "--out", tmp_path / "a.csv")
     code, text = invoke(*asked)

@@ -12,6 +12,7 @@ from selfmotion.certificate.ends import (
     EndState as EndState,
 )
 from selfmotion.certificate.findings import (
+    USUAL as USUAL,
     DampedStretch as DampedStretch,
     Extreme as Extreme,
     Finding as Finding,

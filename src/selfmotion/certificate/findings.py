@@ -42,6 +42,10 @@ class Tolerance:
         return cls(value, value)
 
 
+# What a motion may miss its path by where nobody says otherwise.
+USUAL = Tolerance()
+
+
 @dataclass(frozen=True)
 class Extreme:
     """The worst value of a quantity along a motion.

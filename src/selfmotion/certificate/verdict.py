@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from selfmotion.certificate.findings import DampedStretch, Extreme, Finding, Tolerance
+from selfmotion.certificate.findings import USUAL, DampedStretch, Extreme, Finding, Tolerance
 from selfmotion.certificate.limits import LIMIT_NAMES
 
 # What a reader of a verdict would take to have been checked, unless told otherwise.
@@ -18,8 +18,7 @@ _EXPECTED = ("path", "joint limits", "speeds", "accelerations", "self-collision"
 
 def allowed_text(tolerance: Tolerance) -> str:
     """Return what a verdict adds where more is allowed than usual, "" where it is not."""
-    usual = Tolerance()
-    if tolerance.position <= usual.position and tolerance.rotation <= usual.rotation:
+    if tolerance.position <= USUAL.position and tolerance.rotation <= USUAL.rotation:
         return ""
     return f" ({tolerance.position:.2g} m and {tolerance.rotation:.2g} rad are allowed)"
 
@@ -167,6 +166,9 @@ class Certificate:
 
     def _required(self, name: str, choose: Callable[..., Finding]) -> Extreme:
         worst = self._worst(name, choose)
+        if worst is None and not self.motion:
+            # Nothing was judged: see `of_another`.
+            return Extreme(np.nan, np.nan, "")
         if worst is None:
             raise RuntimeError(f"a certificate always judges {name}")
         return worst

@@ -1,13 +1,13 @@
 """What a job asks for, which its program is held against."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from selfmotion.basics import Array, restore
-from selfmotion.certificate import Tolerance
+from selfmotion.certificate import USUAL, Tolerance
 from selfmotion.collision import Obstacle, obstacle_from_dict
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import cost_from_dict
@@ -46,7 +46,7 @@ class Specification:
     end: Array | None = None
     constraints: tuple[Constraint, ...] = ()
     clearance: Clearance | None = None
-    tolerance: Tolerance = field(default_factory=Tolerance)
+    tolerance: Tolerance = USUAL
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:

@@ -2,12 +2,12 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from selfmotion.basics import Array, Saved, description_of
-from selfmotion.certificate import Tolerance
+from selfmotion.certificate import USUAL, Tolerance
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.follow import Follow
 from selfmotion.path import Path
@@ -49,7 +49,7 @@ class Asked:
     relaxations: Sequence[Relaxation] = ()
     constraints: Sequence[Constraint] = ()
     clearance: Clearance | None = None
-    tolerance: Tolerance = field(default_factory=Tolerance)
+    tolerance: Tolerance = USUAL
     also: Sequence[Follow] = ()
 
     def failures(self, plan: Plan) -> Iterator[str]:

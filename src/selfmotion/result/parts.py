@@ -1,12 +1,12 @@
 """A plan in several parts, with changes of configuration in between."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import accumulate
 from pathlib import Path as FilePath
 
 from selfmotion.basics import FileFormatError, PlanError, SelfmotionError, as_path
-from selfmotion.certificate import Tolerance
+from selfmotion.certificate import USUAL, Tolerance
 from selfmotion.motion import Trajectory, joined_motions
 from selfmotion.problem import Problem, problem_from_dict, problem_to_dict
 from selfmotion.result.bundle import read_bundle, write_bundle
@@ -48,7 +48,7 @@ class Parts:
     cuts: tuple[float, ...] = ()
     endings: tuple[str, ...] = ()
     altered: str = ""
-    tolerance: Tolerance = field(default_factory=Tolerance)
+    tolerance: Tolerance = USUAL
 
     def __repr__(self) -> str:
         """Return a few lines: the parts, where they are cut and why, and the verdict."""
