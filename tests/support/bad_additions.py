@@ -41,6 +41,7 @@ def addition_rows() -> list[Row]:
         *_coordinate_rows(),
         *_constraint_rows(),
         *_planning_rows(),
+        *_dropped_rows(),
         *_limit_file_rows(),
         *_replanner_rows(),
     ]
@@ -121,6 +122,21 @@ def _path_rows() -> list[Row]:
             bend,
             bend={"[0]": [0], "[0, nan]": [0, NAN], "1.0": 1.0, "'none'": "none"},
         ),
+        Row(
+            area,
+            "Retimed() with rates that make it run backwards",
+            lambda _: sm.Retimed(line(), [0, 1, 2], [0, 0.2, 2], [0, 3, 0]),
+        ),
+        Row(
+            area,
+            "Weave() with a pitch a hundred thousand times too small",
+            lambda _: sm.Weave(line(), 1e-3, 1e-7),
+        ),
+        Row(
+            "Problems",
+            "a weave that no arm swings",
+            lambda _: _panda(sm.Weave(line(), 1e-2, 3e-5), task="position"),
+        ),
         *(
             Row("Problems", f"{kind.__name__}, without orientations, for a full pose", call)
             for kind, call in (
@@ -130,6 +146,35 @@ def _path_rows() -> list[Row]:
             )
         ),
     ]
+
+
+def _dropped_rows() -> list[Row]:
+    """Return what would make no difference where it is given."""
+    panda = robot_named("panda")
+    fed = sm.Feed(line(), 0.05)
+    move = {"robot": panda, "first": PANDA_HOME, "last": PANDA_HOME + 0.1}
+    end = sm.EndConfiguration(PANDA_HOME)
+    seam = sm.Seam("one", line(), "pointing")
+    return [
+        Row("Planning", "move(constraints=[EndConfiguration(…)])", lambda _: _ended(move, end)),
+        Row("Planning", "move(task='position') between configurations", lambda _: _tasked(move)),
+        Row(
+            "Planning",
+            "plan_job(constraints=[EndConfiguration(…)])",
+            lambda _: sm.plan_job(panda, [seam], constraints=[end]),
+        ),
+        Row(
+            "Planning", "fastest() along a Feed", lambda _: sm.fastest(_panda(fed, task="position"))
+        ),
+    ]
+
+
+def _ended(move: dict[str, Any], end: sm.Constraint) -> object:
+    return sm.move(**move, constraints=[end])
+
+
+def _tasked(move: dict[str, Any]) -> object:
+    return sm.move(**move, task="position")
 
 
 def _moved() -> Any:

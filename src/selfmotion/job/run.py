@@ -142,7 +142,7 @@ def plan_job(
 
 def _checked_constraints(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
     listed = as_several(constraints, "constraints", Constraint)
-    check_all_times(listed, "a job: give it to a seam that is made one way (either_way=False)")
+    check_all_times(listed, "give it to a seam that is made one way (either_way=False)")
     for item in listed:
         if isinstance(item, Clearance):
             raise ProblemError(

@@ -88,7 +88,7 @@ def move(
     if not isinstance(robot, RobotModel):
         raise ProblemError(f"robot is {shown(robot)}, expected a RobotModel")
     asked = list(as_several(constraints, "constraints", Constraint))
-    check_all_times(asked, "a move, whose ends are given")
+    check_all_times(asked, "the ends of a move are first and last; leave it out")
     if clearance is not None and not isinstance(clearance, Clearance):
         raise ProblemError(f"clearance is {shown(clearance)}, expected a Clearance, or None")
     apart = any(item.envelope(robot).bodies for item in asked)

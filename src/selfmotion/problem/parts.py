@@ -34,13 +34,12 @@ def at_all_times(constraints: Sequence[Constraint]) -> list[Constraint]:
     return [item for item in inner if item is not None]
 
 
-def check_all_times(constraints: Sequence[Constraint], what: str) -> None:
-    """Raise ProblemError where a constraint asks something of an end, which `what` cannot keep."""
+def check_all_times(constraints: Sequence[Constraint], remedy: str) -> None:
+    """Raise ProblemError, with a remedy, where a constraint asks something of an end alone."""
     for item in constraints:
         if item.on_part() is None or item.on_last_part() is None:
             raise ProblemError(
-                f"constraints: {type(item).__name__} asks something of an end, which is none of "
-                f"{what}; leave it out"
+                f"constraints: {type(item).__name__} asks something of an end alone: {remedy}"
             )
 
 
