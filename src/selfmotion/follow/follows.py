@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from selfmotion.basics import Array, ProblemError
+from selfmotion.basics import Array, Flags, ProblemError
 from selfmotion.basics.layout import Layout, layout_of
 from selfmotion.follow.follow import BoundFollow, Follow
 from selfmotion.follow.kinematics import TipKinematics
@@ -107,7 +107,7 @@ class Follows:
     @cached_property
     def chains(self) -> Array:
         """What compiled kernels need of the chains, (F, c + 1, 6, 3): their tables, filled up."""
-        tables = [item.chain.arrays.table for item in self.items]
+        tables = [item.chain.table for item in self.items]
         found = np.zeros((len(tables), max(map(len, tables)), *tables[0].shape[1:]))
         for own, table in zip(found, tables, strict=True):
             own[: len(table)] = table
@@ -141,6 +141,25 @@ class Follows:
     def along(self, path: Path) -> "Follows":
         """Return that the one tip follows another path."""
         return replace(self, items=(replace(self.only, path=path),))
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is the arm's own tool alone, of which the arm has inverse kinematics."""
+        return len(self.items) == 1
+
+    @property
+    def names(self) -> str:
+        """The tips that are followed, for messages."""
+        return " and ".join(f"'{item.chain.tip_name}'" for item in self.items)
+
+    def held(self, t: Array) -> Flags:
+        """Return which coordinates have to stand still at 0 at times t (K,), (K, n)."""
+        return np.zeros((len(t), self.robot.dof), dtype=np.bool_)
+
+    @property
+    def holds(self) -> bool:
+        """Whether there are such at any time."""
+        return False
 
     def for_robot(self, robot: RobotModel) -> "Follows":
         """Return the same for an arm of the same joints with other limits."""

@@ -155,14 +155,8 @@ def one_way(constraint: Constraint) -> bool:
 def backwards(problem: Problem) -> Problem:
     """Return the problem of a path the other way round."""
     duration = problem.path.duration
-    turned = [
-        item
-        if item.during is None
-        else replace(item, during=(duration - item.during[1], duration - item.during[0]))
-        for item in problem.relaxations
-    ]
-    path = Reversed(problem.path)
-    return replace(problem, path=path, start=None, relaxations=turned)
+    turned = problem.along(Reversed, lambda times: (duration - times)[::-1])
+    return replace(problem, **turned, start=None)
 
 
 def backwards_plan(plan: Plan) -> Plan:

@@ -9,6 +9,7 @@ from selfmotion import kernels
 from selfmotion.basics import Array
 from selfmotion.follow import Follows
 from selfmotion.nodes.kernels import look, pull
+from selfmotion.robot import null_space
 
 # Rates along a motion are differences over this share of its duration.
 _STEP = 1e-5
@@ -53,7 +54,8 @@ class Charts:
     """Charts of the self-motion manifolds of all nodes, around a motion on the path.
 
     The coordinates of a node are z (r,), where it is on its manifold, and ν (r,), its null motion
-    in eq. 4, q̇ = J⁺ẋ + (I - J⁺J) N0 ν.
+    in eq. 4, q̇ = J⁺ẋ + (I - J⁺J) N0 ν. Where joints are held at 0, they move no tip, and the last
+    coordinates are theirs.
 
     Attributes
     ----------
@@ -81,9 +83,11 @@ class Charts:
         place = self._looked(z, epsilon, centred=True, carried=carried)
         if place is None:
             return None
-        around = Charts(self.manifolds, place.q, place.tangents)
+        tangents = self.manifolds.with_held_last(place.tangents)
+        place = Place(place.q, place.qd, tangents, place.table)
+        around = Charts(self.manifolds, place.q, tangents)
         own = self.manifolds.rates(place.table)[1]
-        nu = (np.swapaxes(place.tangents, 1, 2) @ own[:, :, None])[:, :, 0]
+        nu = (np.swapaxes(tangents, 1, 2) @ own[:, :, None])[:, :, 0]
         return Centred(around, nu, place)
 
     def moving(self, place: Place, qd: Array) -> Centred:
@@ -112,7 +116,7 @@ class Charts:
         z = np.ascontiguousarray(z)
         given = own.targets, own.chains, own.layout
         along = len(q) // own.copies if carried else 0
-        failed = look(q, z, bases, self.q, *given, table, tangents, centred, along)
+        failed = look(q, z, bases, self.q, *given, table, tangents, own.held, centred, along)
         if failed >= 0 and own.is_whole:
             return None
         return Place(q, np.array(qd), tangents, table)
@@ -172,6 +176,7 @@ class Manifolds:
             parts = own.translation, own.rotation.reshape(-1, 9), own.twist
             path = np.hstack([part[: len(t)] for part in parts])
             self._paths.append(np.tile(path, (copies, 1)))
+        self.held = np.tile(follows.held(t), (copies, 1))
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
 
     def table(self) -> Array:
@@ -186,6 +191,24 @@ class Manifolds:
         """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
         return kernels.rates_of(table, self.follows.robot.dof)
 
+    def with_held_last(self, bases: Array) -> Array:
+        """Return orthonormal bases (N + 1, n, r) turned so that the last vectors are held joints'.
+
+        These are in the null spaces, since they move no tip.
+        """
+        found = bases
+        for k in np.flatnonzero(self.held.any(axis=1)):
+            joints = np.flatnonzero(self.held[k])
+            count = len(joints)
+            unit = np.eye(bases.shape[1])[:, joints]
+            if np.array_equal(bases[k, :, -count:], unit):
+                continue
+            found = found.copy() if found is bases else found
+            rest = bases[k] @ null_space(bases[k, joints])
+            rest[joints] = 0.0
+            found[k] = np.hstack([rest, unit])
+        return found
+
     def near(self, q: Array, epsilon: Array) -> Centred | None:
         """Return charts around the nodes nearest to q, with what of ε acts there, (N + 1, n) each.
 
@@ -193,9 +216,11 @@ class Manifolds:
         not come onto its manifold.
         """
         n, m, _ = self._sizes
+        q, epsilon = (np.where(self.held, 0.0, x) for x in (q, epsilon))
         bases = np.zeros((len(q), n, n - m))
         for first in range(0, len(q), len(q) // self.copies):
-            bases[first] = self.follows.null_basis(q[first])
+            rows = np.where(self.held[first], 0.0, self.follows.jacobian(q[first]))
+            bases[first] = null_space(rows)
         return Charts(self, q, bases).centred(np.zeros((len(q), n - m)), epsilon, carried=True)
 
     def accelerations(self, place: Place) -> Array:

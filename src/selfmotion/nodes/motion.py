@@ -1,7 +1,7 @@
 """A motion on its path, given by its nodes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -91,7 +91,10 @@ class NodeGrid:
         ends = np.array([0, len(t) - 1])[np.array(problem.rests)]
         self._resting = (ends + len(t) * np.arange(copies)[:, None]).ravel()
         held += [2 * r * node + r + np.arange(r) for node in self._resting]
-        self.held = np.concatenate([np.zeros(0, dtype=np.int64), *held])
+        for node, count in enumerate(self.manifolds.held.sum(axis=1)):
+            last = 2 * r * node + np.arange(r - count, r)
+            held += [last, last + r] if count else []
+        self.held = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *held]))
 
     @property
     def t(self) -> Array:
@@ -136,6 +139,8 @@ class NodeGrid:
 
     def around(self, charts: Charts, qd: Array) -> "NodeMotion | None":
         """Return the motion at z = 0 of charts whose velocities are nearest to q̇, or None."""
+        own = self.manifolds.held
+        charts = replace(charts, q=np.where(own, 0.0, charts.q)) if own.any() else charts
         found = charts.centred(np.zeros((len(qd), charts.bases.shape[2])), self._free(qd))
         return None if found is None else self.at(*found)
 
@@ -145,7 +150,7 @@ class NodeGrid:
 
     def _free(self, qd: Array) -> Array:
         """Return what velocities are where the arm does not rest."""
-        found = qd.copy()
+        found = np.where(self.manifolds.held, 0.0, qd)
         found[self._resting] = 0.0
         return found
 
@@ -158,7 +163,7 @@ class NodeGrid:
         own = self.manifolds
         q = np.empty((len(self.t), len(start)))
         share = np.minimum(np.append(0.0, np.diff(self.t)) / time, 1.0)
-        if follow(start, wanted, share, own.targets, own.chains, own.layout, q) >= 0:
+        if follow(start, wanted, share, own.targets, own.chains, own.layout, own.held, q) >= 0:
             return None
         return self.near(q, np.asarray(np.gradient(q, self.t, axis=0)))
 
@@ -318,6 +323,7 @@ class NodeMotion:
         bases = self.charts.bases
         qdd += (bases @ (np.swapaxes(bases, 1, 2) @ near[:, :, None]))[:, :, 0]
         self._calm(qdd, near)
+        qdd[self.grid.manifolds.held] = 0.0
         for order, node in zip(problem.rest_orders, (0, -1), strict=True):
             if order > 1:
                 qdd[node] = 0.0

@@ -1,6 +1,6 @@
 """The largest part of a path that the arm can follow, where it cannot follow all of it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -193,14 +193,10 @@ def _until(problem: Problem, time: float) -> Problem:
         return problem
     asked = (item.on_part() for item in problem.constraints)
     kept = [item for item in asked if item is not None]
-    relaxations = [
-        item if item.during is None else replace(item, during=(first, min(last, time)))
-        for item in problem.relaxations
-        for first, last in [item.window(problem.path.duration)]
-        if first < time
-    ]
-    shorter = problem.along(lambda path: Section(path, 0.0, time, crowding=True))
-    return replace(problem, **shorter, constraints=kept, relaxations=relaxations)
+    shorter = problem.along(
+        lambda path: Section(path, 0.0, time, crowding=True), lambda t: np.minimum(t, time)
+    )
+    return problem.changed(**shorter, constraints=kept)
 
 
 def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attempt:
@@ -224,11 +220,7 @@ def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attemp
 
 def _apart(problem: Problem, starts: list[Array]) -> list[Array]:
     """Return the starts at which the arm does not meet itself; all where it always does."""
-    own = problem.own_collision
-    if own is None:
-        return starts
-    model = own.model(problem.robot)
-    return [q for q in starts if not model.collides(q, own.distance)] or starts
+    return [q for q in starts if problem.keeps_off_itself(q[None])] or starts
 
 
 def _candidates(problem: Problem, starts: list[Array]) -> list[_Candidate]:

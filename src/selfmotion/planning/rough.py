@@ -34,14 +34,11 @@ class RoughMotion:
     Attributes
     ----------
     trajectory : Trajectory
-    deviation : (size,) or None
-        Of the tool from its path, as `Deviation` has it, where some is allowed.
     cost : float or None
         F, where it is about what is best near by; None where it is farther from there.
     """
 
     trajectory: Trajectory
-    deviation: Array | None = None
     cost: float | None = None
 
 
@@ -193,4 +190,4 @@ def _same(a: float, b: float | None) -> bool:
 
 
 def _rough(motion: NodeMotion) -> RoughMotion:
-    return RoughMotion(motion.trajectory, None, motion.cost)
+    return RoughMotion(motion.trajectory, motion.cost)

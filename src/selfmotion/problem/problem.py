@@ -1,7 +1,7 @@
 """What to plan: an arm, a tool motion, the rows that count, and what to minimise."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -171,15 +171,51 @@ class Problem:
         """What the arm follows: the one thing that planners are told."""
         return Follows.of(self.robot, self.path, self.task, self.also)
 
-    def along(self, other: Callable[[Path], Path]) -> dict[str, Any]:
-        """Return, for `dataclasses.replace`, other paths in place of all that are followed."""
-        return {
-            "path": other(self.path),
-            "also": tuple(
-                item.along(other(bound.path))
-                for item, bound in zip(self.also, self.follows.items[1:], strict=True)
-            ),
-        }
+    @cached_property
+    def augmented(self) -> "Problem":
+        """The problem as planners see it: its tolerances are virtual joints."""
+        from selfmotion.problem.augmented import AugmentedProblem
+
+        return AugmentedProblem(self) if self.relaxations else self
+
+    @property
+    def asked(self) -> "Problem":
+        """The problem as it was asked, where this is `augmented`."""
+        return self
+
+    def own(self, trajectory: Trajectory) -> Trajectory:
+        """Return what the arm's own joints do in a motion of all."""
+        return trajectory
+
+    def at(self, t: Array, q: Array) -> Array:
+        """Return all coordinates for the arm's own, (K, n), at times t (K,) [s] of the path."""
+        return q
+
+    def with_own(self, trajectory: Trajectory, path: Path) -> Trajectory:
+        """Return the motion of all joints for one of the arm's own along a path like this one's."""
+        return trajectory
+
+    def changed(self, **changes: Any) -> "Problem":
+        """Return the same with other parameters."""
+        return replace(self, **changes)
+
+    def along(
+        self, other: Callable[[Path], Path], when: Callable[[Array], Array] | None = None
+    ) -> dict[str, Any]:
+        """Return, for `dataclasses.replace`, other paths in place of all that are followed.
+
+        With `when`, also the windows of tolerances at other times; those that become empty are
+        left out.
+        """
+        others = tuple(
+            item.along(other(bound.path))
+            for item, bound in zip(self.also, self.follows.items[1:], strict=True)
+        )
+        found: dict[str, Any] = {"path": other(self.path), "also": others}
+        if when is not None:
+            moved = (item.moved(when) for item in self.relaxations)
+            found["relaxations"] = tuple(item for item in moved if item is not None)
+        return found
 
     @property
     def given_start(self) -> Array | None:

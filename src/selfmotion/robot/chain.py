@@ -197,9 +197,12 @@ class Chain:
         """Name of the tip's frame."""
         return str(self.model.frames[self.tip].name)
 
-    def kinematics(self) -> Kinematics:
-        """Return the chain's kinematics with data of their own, for whoever asks often."""
-        return Kinematics(self)
+    def kinematics(self, data: Any = None) -> Kinematics:
+        """Return the chain's kinematics for whoever asks often.
+
+        With data of their own, or those of another chain of the tree.
+        """
+        return Kinematics(self, data)
 
     @property
     def own(self) -> Kinematics:
@@ -223,7 +226,7 @@ class Chain:
         jacobians = np.zeros((len(q), 1, 6, self.dof))
         rotations, translations = np.empty((len(q), 1, 3, 3)), np.empty((len(q), 1, 3))
         # A copy: kernels are compiled anew for what may not be written to.
-        place_along(np.array(q), self.arrays.table[None], jacobians, rotations, translations)
+        place_along(np.array(q), self.table[None], jacobians, rotations, translations)
         return jacobians[:, 0], rotations[:, 0], translations[:, 0]
 
     def rooted(self) -> tuple[Any, int]:
@@ -266,6 +269,11 @@ class Chain:
         up, down = (list(supports[frames[frame].parentJoint]) for frame in (self.base, self.tip))
         both = sum(1 for a, b in zip(up, down, strict=False) if a == b) - 1
         return [(joint, -1) for joint in up[:both:-1]] + [(joint, 1) for joint in down[both + 1 :]]
+
+    @property
+    def table(self) -> Array:
+        """What compiled kinematics need of its joints, then of its tip, (c + 1, 6, 3)."""
+        return self.arrays.table
 
     @cached_property
     def arrays(self) -> ChainArrays:

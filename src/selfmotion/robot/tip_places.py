@@ -44,7 +44,7 @@ def place_tips(
             own = chains[f, last]
             compose(r[last], p[last], own[ROTATION:], own[POSITION], r[last + 1], p[last + 1])
             last += 1
-            x, turns = q[int(own[JOINT, 0])], own[JOINT, 1] > 0.0
+            x, turns = q[int(own[JOINT, 0])] * own[JOINT, 2], own[JOINT, 1] > 0.0
             moved(own[AXIS], x, turns, r[last], p[last])
         own = chains[f, last]
         compose(r[last], p[last], own[ROTATION:], own[POSITION], rotations[f], positions[f])
@@ -56,7 +56,8 @@ def _jacobian(r: Array, p: Array, chain: Array, joints: int, tip: Array, jacobia
     """Write the columns of a tip's Jacobian [v, ω] (6, n) at its origin, in the base's axes."""
     for j in range(joints):
         column, axis = int(chain[j, JOINT, 0]), chain[j, AXIS]
-        u, v, w = axis[0], axis[1], axis[2]
+        size = chain[j, JOINT, 2]
+        u, v, w = size * axis[0], size * axis[1], size * axis[2]
         x = r[j + 1, 0, 0] * u + r[j + 1, 0, 1] * v + r[j + 1, 0, 2] * w
         y = r[j + 1, 1, 0] * u + r[j + 1, 1, 1] * v + r[j + 1, 1, 2] * w
         z = r[j + 1, 2, 0] * u + r[j + 1, 2, 1] * v + r[j + 1, 2, 2] * w

@@ -9,8 +9,9 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, Flags, Ints
 
-# What a chain's table tells of a joint, (6, 3): its coordinate, or -1 for the tip, and whether it
-# turns; its axis; where it is in the frame of the joint before, and how it is turned there.
+# What a chain's table tells of a joint, (6, 3): its coordinate, or -1 for the tip, whether it turns,
+# and by how much [rad or m] where the coordinate is 1; its axis; where it is in the frame of the
+# joint before, and how it is turned there.
 JOINT, AXIS, POSITION, ROTATION = 0, 1, 2, 3
 
 
@@ -60,6 +61,7 @@ class ChainArrays(NamedTuple):
         found = np.zeros((count + 1, 6, 3))
         found[:, JOINT, 0] = [*tree.joints, -1.0]
         found[:count, JOINT, 1] = tree.is_revolute
+        found[:count, JOINT, 2] = 1.0
         found[:count, AXIS] = tree.axes
         found[:, POSITION] = [*tree.positions, self.tip_position]
         found[:, ROTATION:] = [*tree.rotations, self.tip_rotation]

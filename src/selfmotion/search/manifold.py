@@ -5,7 +5,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, RobotError
 from selfmotion.follow import Follows
 from selfmotion.search import projection
-from selfmotion.search.settings import FAR_STEPS, LONGEST_CORRECTION, NEAR_STEPS
+from selfmotion.search.settings import FAR_STEPS, ITERATIONS, LONGEST_CORRECTION, NEAR_STEPS
 
 # Compiled kinematics and Pinocchio's differ by rounding alone [m, or rows of a rotation].
 _AGREE = 1e-9
@@ -43,7 +43,9 @@ class Manifold:
         self.layout = follows.layout
         self._check()
 
-    def project(self, q: Array, target: Array, *, far: bool = False) -> tuple[Array, Flags]:
+    def project(
+        self, q: Array, target: Array, *, far: bool = False, held: Flags | None = None
+    ) -> tuple[Array, Flags]:
         """Return the configurations (K, n) that Newton's method reaches, and where it does, (K,).
 
         From where it reaches none of its target, it is given more steps.
@@ -55,16 +57,43 @@ class Manifold:
             See `Follows.targets`.
         far : bool
             Whether q is any configuration instead of one near the solution.
+        held : (n,) or (K, n), optional
+            Joints that have to stand at 0; by default none.
         """
         wanted = np.array(np.broadcast_to(target, (len(q), np.shape(target)[-1])), order="C")
-        found, arrived = self._within(q, wanted, FAR_STEPS if far else NEAR_STEPS)
+        still = np.array(np.broadcast_to(False if held is None else held, q.shape))
+        found, arrived = self._within(q, wanted, still, FAR_STEPS if far else NEAR_STEPS)
         # Near singular poses Newton's method takes many steps, from near as well.
         alone = ~arrived if np.ndim(target) == 2 else np.full(len(q), not arrived.any())
         if not far and alone.any():
-            found[alone], arrived[alone] = self._within(q[alone], wanted[alone], FAR_STEPS)
+            found[alone], arrived[alone] = self._within(
+                q[alone], wanted[alone], still[alone], FAR_STEPS
+            )
         return found, arrived
 
-    def _within(self, q: Array, targets: Array, steps: int) -> tuple[Array, Flags]:
+    def approach(self, q: Array, target: Array, held: Flags) -> tuple[Array, Array]:
+        """Return configurations (K, n) brought as near to a target (12 F,) as limits let them.
+
+        Slower than `project`, it arrives at stretched poses and with joints at their limits, too;
+        joints that are `held` (n,) stand at 0.
+
+        Returns
+        -------
+        q : (K, n)
+        misses : (K, 2)
+            What is left [m], [rad].
+        """
+        found, left = np.array(q), np.zeros((len(q), self.follows.dimension))
+        limits = *self._limits, np.array(held)
+        projection.approach_all(
+            found, target, self.chains, self.layout, *limits, ITERATIONS, left
+        )
+        linear = self.follows.linear > 0.0
+        parts = np.where(linear, left, 0.0), np.where(linear, 0.0, left)
+        misses = [np.sqrt(np.einsum("km,km->k", part, part)) for part in parts]
+        return found, np.stack(misses, axis=1)
+
+    def _within(self, q: Array, targets: Array, still: Flags, steps: int) -> tuple[Array, Flags]:
         found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
         projection.project_all(
             found,
@@ -72,6 +101,7 @@ class Manifold:
             self.chains,
             self.layout,
             *self._limits,
+            still,
             LONGEST_CORRECTION,
             steps,
             arrived,

@@ -184,8 +184,7 @@ def _layers(
         before = layers[-1]
         cost = np.zeros(len(before)) if i == 1 else cost
         parents = _spread_out(before[np.isfinite(cost)], cost[np.isfinite(cost)], PARENTS)
-        each = max(STRAYS, -(-waypoints.fewest_strays // max(len(parents), 1)))
-        strays = np.repeat(parents, each, axis=0)
+        strays = np.repeat(parents, STRAYS, axis=0)
         away = rng.normal(scale=STRAYED, size=strays.shape) / weights
         step = 0.5 * largest_step[i - 1]
         guesses = np.concatenate([parents, strays + np.clip(away, -step, step)])

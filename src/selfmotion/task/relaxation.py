@@ -1,13 +1,13 @@
 """Rows of the tool's motion that need not follow the path exactly, for all of it or a while."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import TURN, ProblemError, shown
+from selfmotion.basics import TURN, Array, ProblemError, shown
 
 POSITION_ROWS, _ROTATION = ("x", "y", "z"), ("rx", "ry", "rz")
 ROW_NAMES = (*POSITION_ROWS, *_ROTATION)
@@ -120,6 +120,13 @@ class Relaxation:
     def window(self, duration: float) -> tuple[float, float]:
         """Return first and last time of the window in a motion of length `duration` [s]."""
         return (0.0, duration) if self.during is None else self.during
+
+    def moved(self, when: Callable[[Array], Array]) -> "Relaxation | None":
+        """Return the same with its window at other times [s]; None where nothing is left of it."""
+        if self.during is None:
+            return self
+        first, last = when(np.array(self.during)).tolist()
+        return replace(self, during=(first, last)) if first < last else None
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe description: ``Relaxation(**description)`` restores it."""
