@@ -147,6 +147,12 @@ class AugmentedFollows(Follows):
         """See `Follows.holds`."""
         return bool(self.virtual.windowed.any())
 
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """See `Follows.edges`."""
+        ends = {x for item in self.virtual.relaxations for x in item.window(self.duration)}
+        return tuple(sorted(ends - {0.0, self.duration}))
+
 
 class _Alike:
     """The one row in which two hinges of a tilt turn alike; see `Task`."""

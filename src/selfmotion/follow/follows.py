@@ -161,6 +161,11 @@ class Follows:
         """Whether there are such at any time."""
         return False
 
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """When coordinates begin and end to stand still [s]."""
+        return ()
+
     def for_robot(self, robot: RobotModel) -> "Follows":
         """Return the same for an arm of the same joints with other limits."""
         return replace(self, robot=robot)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints
+from selfmotion.basics import Array, Flags, Ints, kernel
 from selfmotion.robot import Chain, Kinematics, place_tips
 from selfmotion.robot.tree_arrays import JOINT
 from selfmotion.task import SE3
@@ -74,15 +74,15 @@ class TableChain(Chain):
 class TableKinematics(Kinematics):
     """What `Kinematics` are to other chains; its data are the configuration."""
 
-    __slots__ = ("_places", "_tip_jacobian", "_turns")
+    __slots__ = ("_at_tip", "_table")
 
     def __init__(self, chain: TableChain, data: Any = None) -> None:
         n = chain.dof
         self.chain, self.data = chain, np.zeros(n) if data is None else data
         self.jacobian = np.zeros((6, n), order="F")
         self.rotation, self.translation = np.zeros((3, 3), order="F"), np.zeros(3)
-        self._tip_jacobian = np.zeros((1, 6, n))
-        self._turns, self._places = np.empty((n + 1, 3, 3)), np.empty((n + 1, 3))
+        self._table = np.array(chain.table)[None]
+        self._at_tip = np.zeros((1, 6, n)), np.empty((1, 3, 3)), np.empty((1, 3))
 
     def refresh(self, q: Array) -> None:
         """See `Kinematics.refresh`."""
@@ -91,14 +91,8 @@ class TableKinematics(Kinematics):
 
     def place_frames(self) -> None:
         """See `Kinematics.place_frames`."""
-        rotation, translation = np.empty((1, 3, 3)), np.empty((1, 3))
-        table = self.chain.table[None]
-        given = self._turns, self._places, rotation, translation, self._tip_jacobian
-        place_tips(self.data, table, *given)
-        self.rotation[:], self.translation[:] = rotation[0], translation[0]
-        own = self._tip_jacobian[0]
-        self.jacobian[:3] = own[:3] - np.cross(own[3:].T, translation[0]).T
-        self.jacobian[3:] = own[3:]
+        _place(self.data, self._table, *self._at_tip)
+        _at_base(*self._at_tip, self.jacobian, self.rotation, self.translation)
 
     def march(
         self,
@@ -125,4 +119,26 @@ class TableKinematics(Kinematics):
     def beside(self) -> Array:
         """See `Kinematics.beside`."""
         self.place_frames()
-        return self._tip_jacobian[0].copy()
+        return self._at_tip[0][0].copy()
+
+
+@kernel
+def _place(q: Array, table: Array, jacobian: Array, rotation: Array, translation: Array) -> None:
+    """Set where a tip is, (1, 3, 3) and (1, 3), and its Jacobian (1, 6, n), at q (n,)."""
+    r, p = np.empty((len(q) + 1, 3, 3)), np.empty((len(q) + 1, 3))
+    place_tips(q, table, r, p, rotation, translation, jacobian)
+
+
+@kernel
+def _at_base(
+    at_tip: Array, turn: Array, place: Array, jacobian: Array, rotation: Array, translation: Array
+) -> None:
+    """Set the Jacobian (6, n) at the base's origin for that at the tip's, and where that is."""
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        translation[a] = place[0, a]
+        for i in range(3):
+            rotation[a, i] = turn[0, a, i]
+        for k in range(at_tip.shape[2]):
+            moved = at_tip[0, 3 + b, k] * place[0, c] - at_tip[0, 3 + c, k] * place[0, b]
+            jacobian[a, k], jacobian[3 + a, k] = at_tip[0, a, k] - moved, at_tip[0, 3 + a, k]

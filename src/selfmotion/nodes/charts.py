@@ -83,11 +83,9 @@ class Charts:
         place = self._looked(z, epsilon, centred=True, carried=carried)
         if place is None:
             return None
-        tangents = self.manifolds.with_held_last(place.tangents)
-        place = Place(place.q, place.qd, tangents, place.table)
-        around = Charts(self.manifolds, place.q, tangents)
+        around = Charts(self.manifolds, place.q, place.tangents)
         own = self.manifolds.rates(place.table)[1]
-        nu = (np.swapaxes(tangents, 1, 2) @ own[:, :, None])[:, :, 0]
+        nu = (np.swapaxes(place.tangents, 1, 2) @ own[:, :, None])[:, :, 0]
         return Centred(around, nu, place)
 
     def moving(self, place: Place, qd: Array) -> Centred:
@@ -191,23 +189,41 @@ class Manifolds:
         """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
         return kernels.rates_of(table, self.follows.robot.dof)
 
-    def with_held_last(self, bases: Array) -> Array:
-        """Return orthonormal bases (N + 1, n, r) turned so that the last vectors are held joints'.
+    def with_held_last(self, q: Array, bases: Array) -> Array:
+        """Return bases (N + 1, n, r) at q (N + 1, n) whose last vectors are those of held joints.
 
-        These are in the null spaces, since they move no tip.
+        These move no tip, so that they are in the null spaces. Where they are last already, bases
+        stay as they are.
         """
-        found = bases
+        found = bases.copy()
         for k in np.flatnonzero(self.held.any(axis=1)):
-            joints = np.flatnonzero(self.held[k])
-            count = len(joints)
-            unit = np.eye(bases.shape[1])[:, joints]
-            if np.array_equal(bases[k, :, -count:], unit):
-                continue
-            found = found.copy() if found is bases else found
-            rest = bases[k] @ null_space(bases[k, joints])
-            rest[joints] = 0.0
-            found[k] = np.hstack([rest, unit])
+            self._put_held_last(k, q[k], found)
         return found
+
+    def _put_held_last(self, k: int, q: Array, bases: Array) -> None:
+        joints = np.flatnonzero(self.held[k])
+        unit = np.eye(bases.shape[1])[:, joints]
+        if not len(joints) or np.array_equal(bases[k, :, -len(joints) :], unit):
+            return
+        moving = np.delete(np.arange(len(unit)), joints)
+        free = null_space(self.follows.jacobian(q)[:, moving])
+        own = np.zeros((len(unit), free.shape[1]))
+        # As near as may be to what they were.
+        left, _, right = np.linalg.svd(free.T @ bases[k, moving, : free.shape[1]])
+        own[moving] = free @ (left @ right)
+        bases[k] = np.hstack([own, unit])
+
+    def _bases(self, q: Array) -> Array:
+        """Return bases of the null spaces at q (N + 1, n), each turned to the one before."""
+        rows = np.where(self.held[:, None], 0.0, self.follows.jacobians(q))
+        spaces = np.ascontiguousarray(null_space(rows))
+        for k in range(len(q)):
+            first = k % (len(q) // self.copies) == 0
+            if not first:
+                left, _, right = np.linalg.svd(spaces[k].T @ spaces[k - 1])
+                spaces[k] = spaces[k] @ (left @ right)
+            self._put_held_last(k, q[k], spaces)
+        return spaces
 
     def near(self, q: Array, epsilon: Array) -> Centred | None:
         """Return charts around the nodes nearest to q, with what of ε acts there, (N + 1, n) each.
@@ -216,12 +232,14 @@ class Manifolds:
         not come onto its manifold.
         """
         n, m, _ = self._sizes
-        q, epsilon = (np.where(self.held, 0.0, x) for x in (q, epsilon))
+        none = np.zeros((len(q), n - m))
+        if self.held.any():
+            q, epsilon = (np.where(self.held, 0.0, x) for x in (q, epsilon))
+            return Charts(self, q, self._bases(q)).centred(none, epsilon)
         bases = np.zeros((len(q), n, n - m))
         for first in range(0, len(q), len(q) // self.copies):
-            rows = np.where(self.held[first], 0.0, self.follows.jacobian(q[first]))
-            bases[first] = null_space(rows)
-        return Charts(self, q, bases).centred(np.zeros((len(q), n - m)), epsilon, carried=True)
+            bases[first] = self.follows.null_basis(q[first])
+        return Charts(self, q, bases).centred(none, epsilon, carried=True)
 
     def accelerations(self, place: Place) -> Array:
         """Return the least q̈ by which nodes follow the path, (N + 1, n): J⁺(ẍ - J̇q̇).

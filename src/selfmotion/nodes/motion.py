@@ -140,7 +140,9 @@ class NodeGrid:
     def around(self, charts: Charts, qd: Array) -> "NodeMotion | None":
         """Return the motion at z = 0 of charts whose velocities are nearest to q̇, or None."""
         own = self.manifolds.held
-        charts = replace(charts, q=np.where(own, 0.0, charts.q)) if own.any() else charts
+        if own.any():
+            q = np.where(own, 0.0, charts.q)
+            charts = replace(charts, q=q, bases=self.manifolds.with_held_last(q, charts.bases))
         found = charts.centred(np.zeros((len(qd), charts.bases.shape[2])), self._free(qd))
         return None if found is None else self.at(*found)
 

@@ -36,9 +36,13 @@ class Smoothing:
 
 
 def smoothing_at_rest(problem: Problem, spline: Hermite) -> Smoothing | None:
-    """Return what makes the self-motion start and stop as the arm does where it rests."""
+    """Return what makes the self-motion start and stop as the arm does where it rests.
+
+    And what makes joints do so that are held for a while.
+    """
     orders = [order for cost in problem.all_costs for order in cost.curvature(problem.robot.dof)]
-    if not any(problem.rests) or max(orders, default=0) > 1:
+    edges = problem.follows.edges
+    if not (any(problem.rests) or len(edges)) or max(orders, default=0) > 1:
         return None
     duration, t = problem.path.duration, spline.sampling.t[:-1].reshape(-1, 4)
     starting = _STARTING * duration
@@ -47,7 +51,12 @@ def smoothing_at_rest(problem: Problem, spline: Hermite) -> Smoothing | None:
         near |= rest & (np.abs(t - end) <= _NEAR_REST * starting)
     usual = JointVelocity.usual(problem.robot)
     weight = weight_matrix(np.asarray(usual.weight), problem.robot.dof)
-    return Smoothing(np.where(near, starting**2, 0.0), weight)
+    shares = np.where(near, 1.0, 0.0)
+    for edge in edges:
+        # Fading out: what is held costs nothing by itself, and would jump where this does.
+        far = np.abs(t - edge) / (_NEAR_REST * starting)
+        shares = np.maximum(shares, np.maximum(1.0 - far**2, 0.0) ** 3)
+    return Smoothing(starting**2 * shares, weight)
 
 
 class Continuity:
