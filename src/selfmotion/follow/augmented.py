@@ -48,8 +48,10 @@ class AugmentedArm(RobotModel):
     @property
     def is_revolute(self) -> Flags:
         """See `RobotModel`: of virtual joints, those that are back after a turn of 2π."""
-        turns = [joint.turns and joint.scale == 1.0 and not joint.name.startswith("tilt")
-                 for joint in self.virtual.each]
+        turns = [
+            joint.turns and joint.scale == 1.0 and not joint.name.startswith("tilt")
+            for joint in self.virtual.each
+        ]
         return np.concatenate([self.arm.is_revolute, turns])
 
     def is_prismatic(self, joint: str) -> bool:
@@ -116,7 +118,7 @@ class AugmentedFollows(Follows):
         return self.virtual.rows_of(item, q[:, self.robot.dof - len(self.virtual.each) :])[0]
 
     def limits_within(self, item: Relaxation, band: float) -> Array:
-        """Return limits of |q| (n,) outside of which a relaxation's rows are off by more than that."""
+        """Return limits of |q| (n,) beyond which rows are off their path by more than a band."""
         found = np.full(self.robot.dof, np.inf)
         first = self.robot.dof - len(self.virtual.each)
         for k, joint in enumerate(self.virtual.each):
@@ -135,7 +137,9 @@ class AugmentedFollows(Follows):
     @property
     def names(self) -> str:
         """See `Follows.names`."""
-        return " and ".join(f"'{item.chain.tip_name}'" for item in self.items if item.chain.tip_name)
+        return " and ".join(
+            f"'{item.chain.tip_name}'" for item in self.items if item.chain.tip_name
+        )
 
     def held(self, t: Array) -> Flags:
         """See `Follows.held`."""

@@ -50,7 +50,7 @@ class TableChain(Chain):
         return self._table
 
     @property
-    def joints(self) -> Ints:  # type: ignore[override]  # what is cached there is cheap here
+    def joints(self) -> Ints:
         """See `Chain.joints`."""
         return self._table[:-1, JOINT, 0].astype(np.int64)
 
@@ -119,7 +119,7 @@ class TableKinematics(Kinematics):
     def beside(self) -> Array:
         """See `Kinematics.beside`."""
         self.place_frames()
-        return self._at_tip[0][0].copy()
+        return np.array(self._at_tip[0][0])
 
 
 @kernel

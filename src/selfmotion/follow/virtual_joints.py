@@ -21,6 +21,7 @@ ones, weigh alike where motions are as short as they can be.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -175,7 +176,7 @@ class VirtualJoints:
             There is none.
         """
         ends = sorted({x for item in self.relaxations for x in item.window(self._duration)})
-        middles = np.array([0.5 * (a + b) for a, b in zip(ends, ends[1:], strict=False)])
+        middles = np.array([0.5 * (a + b) for a, b in pairwise(ends)])
         pairs = set()
         for relaxed in self._relaxed(middles)[:, 3:]:
             if relaxed.sum() == 2:
@@ -195,7 +196,7 @@ class VirtualJoints:
             first, last = item.window(self._duration)
             begun = (t > first + near) | (first <= near)
             lasts = (t < last - near) | (last >= self._duration - near)
-            found[np.ix_(begun & lasts, item.indices)] = True
+            found[:, item.indices] |= (begun & lasts)[:, None]
         return found
 
     def held(self, t: Array) -> Flags:
@@ -203,13 +204,14 @@ class VirtualJoints:
         relaxed = self._relaxed(t)
         rows = [joint.row for joint in self.each]
         free = [np.ones(len(t), bool) if row is None else relaxed[:, row] for row in rows]
-        return ~np.stack(free, axis=1)
+        return np.asarray(~np.stack(free, axis=1))
 
     @cached_property
     def windowed(self) -> Flags:
         """Which joints stand still at some time, (v,)."""
         ends = {x for item in self.relaxations for x in item.window(self._duration)}
-        return self.held(np.array(sorted(ends | {0.0, self._duration}))).any(axis=0)
+        times = np.array(sorted(ends | {0.0, self._duration}))
+        return np.asarray(self.held(times).any(axis=0))
 
     @cached_property
     def at_zero(self) -> Flags:
@@ -270,9 +272,7 @@ class VirtualJoints:
         which = [row - 3 for row in item.indices]
         return vector[:, which], by[:, which]
 
-    def _tilted(
-        self, s: Array, turning: list[int], own: dict[int, int]
-    ) -> tuple[Array, Array]:
+    def _tilted(self, s: Array, turning: list[int], own: dict[int, int]) -> tuple[Array, Array]:
         """Return δ of a tilt, and of a twist before it where its row is relaxed, (K, 3)."""
         first, second = self.each[turning[0]], self.each[turning[1]]
         i, j = first.axis, second.axis

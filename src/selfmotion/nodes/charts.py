@@ -197,7 +197,7 @@ class Manifolds:
         """
         found = bases.copy()
         for k in np.flatnonzero(self.held.any(axis=1)):
-            self._put_held_last(k, q[k], found)
+            self._put_held_last(int(k), q[k], found)
         return found
 
     def _put_held_last(self, k: int, q: Array, bases: Array) -> None:

@@ -170,7 +170,7 @@ class NodeConditions:
         return found
 
     def at_once(self) -> Ints:
-        """Return which conditions count from the beginning: what is best without them is far off."""
+        """Return which conditions count at once: what is best without them is far off."""
         each = [getattr(item, "counts_at_once", False) for item in self.constraints]
         return np.flatnonzero(np.tile(np.repeat(np.array(each, dtype=np.bool_), self._counts), 2))
 

@@ -6,9 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, read_only
-from selfmotion.costs import PlacedLater, Samples
+from selfmotion.costs import PlacedLater
 from selfmotion.follow import Follows
-from selfmotion.motion import Sampling, Trajectory
+from selfmotion.motion import Trajectory
 from selfmotion.nodes.spline import SHARES, Hermite
 
 _SAMPLES = len(SHARES)

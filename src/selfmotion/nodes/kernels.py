@@ -60,9 +60,9 @@ def look(
     `tangents` (K, n, r). Or, `centred`, an orthonormal basis of the null space instead of T, and of
     ε what is in it: the same motion in charts around it. Where bases are to be `carried`, along
     motions of so many nodes, the first is that of a motion's first node, and each other one becomes
-    what is found at the node before; 0 for none. Joints that are `held` (K, n) at 0 move no tip; see
-    `Charts`. Returns the first node for which that is
-    impossible, or -1; of all such nodes, q̇ is no number.
+    what is found at the node before; 0 for none. Joints that are `held` (K, n) at 0 move no tip;
+    see `Charts`. Returns the first node for which that is impossible, or -1; of all such nodes, q̇
+    is no number.
     """
     failed = -1
     (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]

@@ -6,7 +6,6 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.costs import JointVelocity
-from selfmotion.costs.base import weight_matrix
 from selfmotion.nodes.hermite import HermiteSamples
 from selfmotion.nodes.spline import Hermite, weighted
 from selfmotion.problem import Problem
@@ -46,17 +45,20 @@ def smoothing_at_rest(problem: Problem, spline: Hermite) -> Smoothing | None:
         return None
     duration, t = problem.path.duration, spline.sampling.t[:-1].reshape(-1, 4)
     starting = _STARTING * duration
-    near = np.zeros_like(t, dtype=bool)
-    for rest, end in zip(problem.rests, (0.0, duration), strict=True):
-        near |= rest & (np.abs(t - end) <= _NEAR_REST * starting)
-    usual = JointVelocity.usual(problem.robot)
-    weight = weight_matrix(np.asarray(usual.weight), problem.robot.dof)
-    shares = np.where(near, 1.0, 0.0)
-    for edge in edges:
-        # Fading out: what is held costs nothing by itself, and would jump where this does.
-        far = np.abs(t - edge) / (_NEAR_REST * starting)
+    ends = [end for rest, end in zip(problem.rests, (0.0, duration), strict=True) if rest]
+    shares = np.zeros_like(t)
+    for end in (*ends, *edges):
+        # Fading out: where it ended at once, velocities would jump.
+        far = np.abs(t - end) / (_NEAR_REST * starting)
         shares = np.maximum(shares, np.maximum(1.0 - far**2, 0.0) ** 3)
-    return Smoothing(starting**2 * shares, weight)
+    return Smoothing(starting**2 * shares, np.diag(_weights(problem)))
+
+
+def _weights(problem: Problem) -> Array:
+    """Return what the squares of rates weigh, (n,): of virtual joints nothing, as in costs."""
+    arm, found = problem.asked.robot, np.zeros(problem.robot.dof)
+    found[: arm.dof] = np.asarray(JointVelocity.usual(arm).weight)
+    return found
 
 
 class Continuity:
@@ -82,9 +84,8 @@ class Continuity:
         for node, order in zip((0, -1), problem.rest_orders, strict=True):
             if order > 1:
                 weights[node] = _STRENGTH * spline.steps[node] ** 3
-        usual = JointVelocity.usual(problem.robot)
-        root = np.linalg.cholesky(weight_matrix(np.asarray(usual.weight), problem.robot.dof))
-        self._scales = np.sqrt(weights)[:, None, None] * root.T
+        root = np.diag(np.sqrt(_weights(problem)))
+        self._scales = np.sqrt(weights)[:, None, None] * root
 
     def jumps(self, samples: HermiteSamples) -> Array:
         """Return the weighed jumps, (N + 1, n)."""

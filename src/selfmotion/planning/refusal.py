@@ -36,11 +36,12 @@ def looked_at(problem: Problem, search: Search) -> Obstruction | None:
 def no_way(problem: Problem, blocked: Obstruction) -> SelfmotionError:
     """Return the error that says what is in the way, and what would help."""
     robot, pose = problem.robot, problem.path.pose(blocked.time)
+    task = problem.asked.task.value
     if not blocked.is_met and blocked.time == 0.0:
         position, rotation = blocked.misses
         return InverseKinematicsError(
             f"{robot.name}: no configuration within the limits puts '{robot.tool}' at "
-            f"{np.round(pose.translation, 4).tolist()} m for task '{problem.asked.task.value}', where "
+            f"{np.round(pose.translation, 4).tolist()} m for task '{task}', where "
             f"the path begins: {blocked.reason}; move the pose into the workspace{blocked.help}",
             position_miss=position,
             rotation_miss=rotation,

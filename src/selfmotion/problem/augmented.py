@@ -49,7 +49,11 @@ class AugmentedProblem(Problem):
         follows = AugmentedFollows.with_tolerances(asked.follows, asked.relaxations)
         given = {one.name: getattr(asked, one.name) for one in fields(Problem)}
         dof = follows.robot.dof
-        given["robot"], given["task"], given["relaxations"] = follows.robot, follows.virtual.task, ()
+        given["robot"], given["task"], given["relaxations"] = (
+            follows.robot,
+            follows.virtual.task,
+            (),
+        )
         given["costs"] = tuple(cost_of_arm(cost, asked.follows, dof) for cost in asked.costs)
         for name, value in {**given, "_original": asked, "follows": follows}.items():
             object.__setattr__(self, name, value)
@@ -200,13 +204,15 @@ class AugmentedProblem(Problem):
             for item in self.asked.relaxations
             if len(item.rows) > 1 and np.isfinite(item.band)
         ]
+        speed, acceleration, jerk = (
+            read_only(np.append(rate, free)) for rate in (own.speed, own.acceleration, own.jerk)
+        )
         return Envelope(
             read_only(np.append(own.lower, robot.lower[n:])),
             read_only(np.append(own.upper, robot.upper[n:])),
-            *(
-                read_only(np.append(rate, free))
-                for rate in (own.speed, own.acceleration, own.jerk)
-            ),
+            speed,
+            acceleration,
+            jerk,
             tuple(bodies),
             (*(quantity_of_arm(item, n) for item in own.quantities), *several),
         )

@@ -9,9 +9,9 @@ import pinocchio as pin
 
 from selfmotion.basics import Array, Flags, Ints
 
-# What a chain's table tells of a joint, (6, 3): its coordinate, or -1 for the tip, whether it turns,
-# and by how much [rad or m] where the coordinate is 1; its axis; where it is in the frame of the
-# joint before, and how it is turned there.
+# What a chain's table tells of a joint, (6, 3): its coordinate, or -1 for the tip, whether it
+# turns, and by how much [rad or m] where the coordinate is 1; its axis; where it is in the frame of
+# the joint before, and how it is turned there.
 JOINT, AXIS, POSITION, ROTATION = 0, 1, 2, 3
 
 

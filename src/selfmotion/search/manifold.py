@@ -85,9 +85,7 @@ class Manifold:
         """
         found, left = np.array(q), np.zeros((len(q), self.follows.dimension))
         limits = *self._limits, np.array(held)
-        projection.approach_all(
-            found, target, self.chains, self.layout, *limits, ITERATIONS, left
-        )
+        projection.approach_all(found, target, self.chains, self.layout, *limits, ITERATIONS, left)
         linear = self.follows.linear > 0.0
         parts = np.where(linear, left, 0.0), np.where(linear, 0.0, left)
         misses = [np.sqrt(np.einsum("km,km->k", part, part)) for part in parts]

@@ -87,8 +87,8 @@ def obstruction(problem: Problem, rng: np.random.Generator) -> Obstruction | Non
 
     Poses all along the path, the first, then those that are farthest from the others. A
     pose is given up when thousands of tries lead nowhere: Newton's method from all over the
-    limits, and of the bands of tolerances; where self-motions are curves, these as a whole; and what
-    met bodies least, moved aside.
+    limits, and of the bands of tolerances; where self-motions are curves, these as a whole; and
+    what met bodies least, moved aside.
     """
     poses = SinglePoses(problem, rng)
     times = np.linspace(0.0, problem.path.duration, COARSE_POSES)

@@ -1,10 +1,12 @@
 """What would help where the arm cannot be at a pose: another place, a tilt, a wider limit."""
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.follow import AugmentedFollows
 from selfmotion.search.settings import (
     FARTHEST,
     MOVE_TRIES,
@@ -80,8 +82,8 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
         for item in asked.relaxations
         if not set(item.rows) <= set(rows)
     )
-    wider = poses.of(replace(asked, relaxations=(*others, more)))
-    follows, n = wider.problem.augmented.follows, asked.robot.dof
+    wider, n = poses.of(replace(asked, relaxations=(*others, more))), asked.robot.dof
+    follows = cast(AugmentedFollows, wider.problem.follows)
     q = poses.some(t, REMEDY_SEEDS)[:, :n]
     q = np.hstack([q, np.zeros((len(q), follows.robot.dof - n))])
     best: Array | None = None

@@ -107,7 +107,7 @@ class SinglePoses:
         return target
 
     def _held(self, t: float) -> Flags:
-        return self.follows.held(np.array([t]))[0]
+        return np.asarray(self.follows.held(np.array([t]))[0])
 
     def project(self, q: Array, t: float, *, far: bool = False) -> tuple[Array, Flags]:
         """Return what Newton's method makes of q (K, n) at a time [s], and where it arrives, (K,).

@@ -64,7 +64,8 @@ def start_candidates(
     if not found and not follows.is_plain:
         raise InverseKinematicsError(
             f"{follows.robot.name}: no configuration within the limits was found that puts "
-            f"{follows.names} on the start of the path; move that into the workspace, or give one (start=)",
+            f"{follows.names} on the start of the path; move that into the workspace, or give one "
+            f"(start=)",
             position_miss=np.inf,
             rotation_miss=np.inf,
         )

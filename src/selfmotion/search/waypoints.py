@@ -2,8 +2,6 @@
 
 from typing import Protocol
 
-import numpy as np
-
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.engine import carried_bases
 from selfmotion.follow import Follows
