@@ -17,7 +17,7 @@ from selfmotion.follow import AugmentedFollows, Follows
 from selfmotion.task import Relaxation
 
 # Share of a band that is aimed to be left unused; at least half of it is.
-BAND_MARGIN = 2e-4
+BAND_MARGIN = 2e-3
 
 
 class _OfArm(Cost):
