@@ -175,7 +175,6 @@ def setting_rows() -> list[Row]:
             band={"nan": NAN, "0": 0, "-1": -1, "'wide'": "wide", "None": None},
             during=times,
             axes=TEXTS,
-            intervals={**WHOLE, "3": 3},
         ),
         *bad_values_of(
             "Damping",

@@ -6,3 +6,4 @@ from selfmotion.follow.augmented import (
 )
 from selfmotion.follow.follow import BoundFollow as BoundFollow, Follow as Follow
 from selfmotion.follow.follows import Follows as Follows
+from selfmotion.follow.virtual_joints import VirtualJoints as VirtualJoints

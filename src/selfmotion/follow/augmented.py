@@ -54,6 +54,11 @@ class AugmentedArm(RobotModel):
         ]
         return np.concatenate([self.arm.is_revolute, turns])
 
+    @property
+    def coordinate_sizes(self) -> Array:
+        """See `RobotModel.coordinate_sizes`."""
+        return np.append(self.arm.coordinate_sizes, [one.scale for one in self.virtual.each])
+
     def is_prismatic(self, joint: str) -> bool:
         """See `RobotModel.is_prismatic`."""
         own = {one.name: not one.turns for one in self.virtual.each}

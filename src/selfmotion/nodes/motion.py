@@ -57,6 +57,8 @@ class NodeGrid:
     cost : NodeCost
     conditions : NodeConditions
     ends : NodeEnds
+    is_continuous : bool
+        Whether they are kept so at all nodes.
     continuity : Continuity or None
     held : (k,)
         Numbers of the coordinates w (N + 1, 2r), in one row, that stay as they are.
@@ -78,7 +80,10 @@ class NodeGrid:
         self.manifolds = Manifolds(follows, t, copies)
         copies = self.manifolds.copies
         self.spline = Hermite(t, copies)
-        self.continuity = Continuity(problem, self.spline) if continuous else None
+        self.is_continuous = continuous
+        self.continuity = None
+        if continuous or (follows.edges and copies == 1):
+            self.continuity = Continuity(problem, self.spline, everywhere=continuous)
         smoothing = smoothing_at_rest(problem, self.spline)
         self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
         ends = [item for item in constraints if isinstance(item, BoundEnd)]
@@ -103,7 +108,7 @@ class NodeGrid:
 
     def on(self, t: Array) -> "NodeGrid":
         """Return the same on other nodes."""
-        return self._other(t, continuous=self.continuity is not None)
+        return self._other(t, continuous=self.is_continuous)
 
     @property
     def continuous(self) -> "NodeGrid":
@@ -226,7 +231,7 @@ class NodeMotion:
     def ends_of_limits(self) -> Flags:
         """Near which intervals a limit of accelerations begins or ends to bind, (N,)."""
         changes = np.zeros(len(self.along) + 3, dtype=np.bool_)
-        if self.grid.continuity is not None:
+        if self.grid.is_continuous:
             changes[2:-2] = self.along[1:] != self.along[:-1]
         # Two intervals before, and two after.
         return changes[:-3] | changes[1:-2] | changes[2:-1] | changes[3:]

@@ -66,24 +66,30 @@ class Continuity:
 
     A cubic Hermite spline's q̈ may jump at its nodes. Where limits of acceleration bind, the best
     motion makes use of that, and an arm's, whose q̈ cannot jump, goes beyond the limits there:
-    ½ Σ w_k jump_kᵀ W jump_k keeps it from that.
+    ½ Σ w_k jump_kᵀ W jump_k keeps it from that. So it does where joints begin and end to be held.
 
     Parameters
     ----------
     problem : Problem
         At its knots accelerations may jump; where its arm rests, they begin and end at 0.
     spline : Hermite
+    everywhere : bool
+        Whether at all nodes, or only where joints begin and end to be held.
     """
 
-    def __init__(self, problem: Problem, spline: Hermite) -> None:
+    def __init__(self, problem: Problem, spline: Hermite, *, everywhere: bool) -> None:
         self._spline = spline
-        shorter = np.minimum(spline.steps[1:], spline.steps[:-1])
         weights = np.zeros(len(spline.t))
-        weights[1:-1] = _STRENGTH * shorter**3
-        weights[np.isin(spline.t, problem.knots)] = 0.0
-        for node, order in zip((0, -1), problem.rest_orders, strict=True):
-            if order > 1:
-                weights[node] = _STRENGTH * spline.steps[node] ** 3
+        if everywhere:
+            shorter = np.minimum(spline.steps[1:], spline.steps[:-1])
+            weights[1:-1] = _STRENGTH * shorter**3
+            weights[np.isin(spline.t, problem.knots)] = 0.0
+            for node, order in zip((0, -1), problem.rest_orders, strict=True):
+                if order > 1:
+                    weights[node] = _STRENGTH * spline.steps[node] ** 3
+        for edge in problem.follows.edges:
+            node = int(np.argmin(np.abs(spline.t - edge)))
+            weights[node] = _STRENGTH * (_STARTING * problem.path.duration) ** 3
         root = np.diag(np.sqrt(_weights(problem)))
         self._scales = np.sqrt(weights)[:, None, None] * root
 

@@ -1,6 +1,7 @@
 """A problem as planners see it: its tolerances are virtual joints, and no row is relaxed."""
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any, cast
@@ -28,6 +29,7 @@ from selfmotion.problem.of_arm import (
     WithinBand,
     cost_of_arm,
     quantity_of_arm,
+    springs,
 )
 from selfmotion.problem.problem import Problem
 from selfmotion.task import DampingLaw
@@ -70,6 +72,17 @@ class AugmentedProblem(Problem):
     def augmented(self) -> "AugmentedProblem":
         """See `Problem.augmented`."""
         return self
+
+    def softened(self, cost: float) -> "Problem":
+        """See `Problem.softened`."""
+        virtual = self.robot.upper[self._dof :]
+        if not np.isfinite(virtual).any() or not 0.0 < cost < np.inf:
+            return self
+        weights = np.append(np.zeros(self._dof), 2.0 * cost / self.path.duration / virtual**2)
+        found = copy(self)
+        object.__setattr__(found, "costs", (*self.costs, springs(weights)))
+        found.__dict__.pop("all_costs", None)
+        return found
 
     def changed(self, **changes: Any) -> "AugmentedProblem":
         """See `Problem.changed`."""

@@ -16,8 +16,9 @@ from selfmotion.costs import Cost, Partials, Samples
 from selfmotion.follow import AugmentedFollows, Follows
 from selfmotion.task import Relaxation
 
-# Share of a band that is aimed to be left unused; at least half of it is.
-BAND_MARGIN = 2e-3
+# Share of a band that is aimed to be left unused, but at least so much [m or rad], about what a
+# certificate tells apart, and at most so large a share; half of it is left.
+_MARGIN, _LEAST, _MOST = 2e-3, 6e-7, 0.5
 
 
 class _OfArm(Cost):
@@ -67,6 +68,37 @@ class _OfArm(Cost):
 def cost_of_arm(cost: Cost, follows: Follows, dof: int) -> Cost:
     """Return a cost of the joints of an arm, for one with virtual joints besides, dof in all."""
     return _OfArm(cost, follows, dof)
+
+
+class _Springs(Cost):
+    """G = ½ Σ w q²: what virtual joints cost where they are not kept within limits.
+
+    Parameters
+    ----------
+    weights : (n,)
+    """
+
+    name, is_quadratic, is_pointwise = "tolerances", True, True
+
+    def __init__(self, weights: Array) -> None:
+        self._weights = weights
+
+    def value(self, samples: Samples) -> Array:
+        """See `Cost.value`."""
+        return np.asarray(0.5 * samples.q**2 @ self._weights)
+
+    def gradient(self, samples: Samples) -> Partials:
+        """See `Cost.gradient`."""
+        return Partials(q=samples.q * self._weights)
+
+    def curvature(self, dof: int) -> dict[int, Array]:
+        """See `Cost.curvature`."""
+        return {0: np.diag(self._weights)}
+
+
+def springs(weights: Array) -> Cost:
+    """Return the cost ½ Σ w q² of weights (n,)."""
+    return _Springs(weights)
 
 
 class _ArmTangents(NodeTangents):
@@ -197,7 +229,8 @@ class WithinBand(BoundQuantity):
     def of(cls, item: Relaxation, follows: AugmentedFollows) -> "WithinBand":
         """Return that of a relaxation with a band, for an arm with virtual joints."""
         first, last = item.window(follows.duration)
-        return cls(_band(item, follows), BAND_MARGIN, (first, last))
+        margin = min(max(_MARGIN, _LEAST / item.band), _MOST)
+        return cls(_band(item, follows), margin, (first, last))
 
     def _outside(self, samples: Samples) -> npt.NDArray[np.bool_]:
         t = samples.sampling.node_times

@@ -84,10 +84,11 @@ class Problem:
         joint position and velocity, and those of acceleration and jerk that the arm's maker
         publishes (`RobotModel.acceleration_limit`).
     relaxations : sequence of Relaxation
-        Rows in which the tool may leave its path, by how much and when; the deviation is optimised
-        along with the self-motion. By default none. A given start is on the path itself, and so
-        are both ends of a closed path and the end of one with conditions there. Of several paths
-        the first is relaxed.
+        Rows in which the tool may leave its path, by how much and when. Each is one more joint
+        between tool and path, which costs nothing, so that the deviation is part of the
+        self-motion. By default none. A given start is on the path itself, and so is the end of a
+        path with conditions there; where a path is closed, the deviation is so, too. Of several
+        paths the first is relaxed.
     collision : Clearance, optional
         How the arm keeps apart from itself where no constraint says it, and its URDF has bodies: by
         default its links must not overlap. None to leave that out; the verdict then says so.
@@ -194,6 +195,13 @@ class Problem:
     def with_own(self, trajectory: Trajectory, path: Path) -> Trajectory:
         """Return the motion of all joints for one of the arm's own along a path like this one's."""
         return trajectory
+
+    def softened(self, cost: float) -> "Problem":
+        """Return the same where using tolerances costs, for who does not ask bands to be kept.
+
+        Where `cost` is what a motion costs, being at a band all the time costs as much.
+        """
+        return self
 
     def changed(self, **changes: Any) -> "Problem":
         """Return the same with other parameters."""

@@ -40,8 +40,6 @@ class Relaxation:
         First and last time of the window [s]; by default the whole motion.
     axes : {"world", "tool"}
         Of x, y and z; rotations are in tool axes always.
-    intervals : int
-        Pieces of the cubic spline that describes the deviation over the window, ≥ 4.
 
     Raises
     ------
@@ -54,7 +52,6 @@ class Relaxation:
     band: float = np.inf
     during: tuple[float, float] | None = None
     axes: str = "world"
-    intervals: int = 8
 
     def __post_init__(self) -> None:
         _check_types(self.rows, self.band, self.during)
@@ -80,13 +77,6 @@ class Relaxation:
         if self.axes not in ("world", "tool"):
             raise ProblemError(
                 f"relaxation {self.name}: axes are '{self.axes}', expected 'world' or 'tool'"
-            )
-        if isinstance(self.intervals, bool) or not (
-            isinstance(self.intervals, int | np.integer) and self.intervals >= 4
-        ):
-            raise ProblemError(
-                f"relaxation {self.name}: intervals is {self.intervals}, expected a whole number "
-                f"≥ 4"
             )
         if self.during is not None:
             times = tuple(float(time) for time in self.during)
