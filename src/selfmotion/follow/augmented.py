@@ -16,6 +16,10 @@ from selfmotion.robot import RobotModel
 from selfmotion.task import SE3, Relaxation, Task
 
 
+# What is put back within a band is so by this share of it.
+_INSIDE = 0.999
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AugmentedArm(RobotModel):
     """An arm with virtual joints after its own, which move nothing of it.
@@ -132,6 +136,20 @@ class AugmentedFollows(Follows):
                 halved = self.virtual.swing is not None and k == self.virtual.swing[0]
                 share = 0.5 if halved else 1.0
                 found[first + k] = share * band / joint.scale
+        return found
+
+    def within_bands(self, q: Array) -> Array:
+        """See `Follows.within_bands`."""
+        found, first = np.full_like(q, np.inf), self.robot.dof - len(self.virtual.each)
+        for item in self.virtual.relaxations:
+            if len(item.rows) == 1 or not np.isfinite(item.band):
+                continue
+            size = np.linalg.norm(self.deviation(item, q), axis=1)
+            beyond = size > item.band
+            share = _INSIDE * item.band / np.where(beyond, size, 1.0)
+            for k, joint in enumerate(self.virtual.each, first):
+                if joint.row in item.indices:
+                    found[beyond, k] = share[beyond] * np.abs(q[beyond, k])
         return found
 
     @property

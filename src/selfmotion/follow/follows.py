@@ -156,6 +156,13 @@ class Follows:
         """Return which coordinates have to stand still at 0 at times t (K,), (K, n)."""
         return np.zeros((len(t), self.robot.dof), dtype=np.bool_)
 
+    def within_bands(self, q: Array) -> Array:
+        """Return limits of |q| like q (K, n), within which joints that share a band keep it.
+
+        Infinite where they do.
+        """
+        return np.full_like(q, np.inf)
+
     @property
     def holds(self) -> bool:
         """Whether there are such at any time."""

@@ -84,9 +84,9 @@ class AugmentedProblem(Problem):
         found.__dict__.pop("all_costs", None)
         return found
 
-    def changed(self, **changes: Any) -> "AugmentedProblem":
+    def changed(self, **changes: Any) -> Problem:
         """See `Problem.changed`."""
-        return AugmentedProblem(replace(self.asked, **changes))
+        return replace(self.asked, **changes).augmented
 
     def along(
         self, other: Callable[[Path], Path], when: Callable[[Array], Array] | None = None

@@ -38,6 +38,7 @@ class Manifold:
         self.follows, self.robot = follows, follows.robot
         # Copies: kernels are compiled anew for what may not be written to.
         self._limits = np.array(lower), np.array(upper)
+        self._limited = np.isfinite(upper)
         self.chains = follows.chains
         self.revolute: Flags = follows.robot.is_revolute
         self.layout = follows.layout
@@ -69,6 +70,12 @@ class Manifold:
             found[alone], arrived[alone] = self._within(
                 q[alone], wanted[alone], still[alone], FAR_STEPS
             )
+        # Joints that share a band may be within their limits, and beyond that together.
+        within = np.where(self._limited, self.follows.within_bands(found), np.inf)
+        beyond = arrived & (np.abs(found) > within).any(axis=1)
+        if beyond.any():
+            given = found[beyond], wanted[beyond], still[beyond], FAR_STEPS, within[beyond]
+            found[beyond], arrived[beyond] = self._within(*given)
         return found, arrived
 
     def approach(self, q: Array, target: Array, held: Flags) -> tuple[Array, Array]:
@@ -91,14 +98,19 @@ class Manifold:
         misses = [np.sqrt(np.einsum("km,km->k", part, part)) for part in parts]
         return found, np.stack(misses, axis=1)
 
-    def _within(self, q: Array, targets: Array, still: Flags, steps: int) -> tuple[Array, Flags]:
+    def _within(
+        self, q: Array, targets: Array, still: Flags, steps: int, most: Array | float = np.inf
+    ) -> tuple[Array, Flags]:
+        """Return what Newton's method makes of q (K, n), no |q| more than `most` besides limits."""
         found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
+        lower, upper = self._limits
         projection.project_all(
             found,
             targets,
             self.chains,
             self.layout,
-            *self._limits,
+            np.array(np.broadcast_to(np.maximum(lower, -most), q.shape)),
+            np.array(np.broadcast_to(np.minimum(upper, most), q.shape)),
             still,
             LONGEST_CORRECTION,
             steps,
@@ -116,7 +128,8 @@ class Manifold:
             target = np.concatenate(
                 [part for pose in poses for part in (pose.translation, pose.rotation.ravel())]
             )
-            found, arrived = self.project(q[None], target)
+            still = np.zeros((1, len(q)), dtype=np.bool_)
+            found, arrived = self._within(q[None], target[None], still, NEAR_STEPS)
             for item, pose in zip(items, poses, strict=True):
                 miss = max(item.miss(pose, found[0]))
                 if not (arrived[0] and miss < _AGREE):

@@ -100,8 +100,8 @@ def project_all(
 ) -> None:
     """Put each of q (K, n) onto its target (K, 12 F) by Newton's method, in place.
 
-    A joint that would leave its limits stays at the limit, and the others do the rest; joints that
-    are to stand `still` (K, n) are at 0. `arrived`
+    A joint that would leave its limits (K, n) stays at the limit, and the others do the rest;
+    joints that are to stand `still` (K, n) are at 0. `arrived`
     (K,) says of which that was possible within so many steps.
     """
     n, tips = q.shape[1], layout.shape[0]
@@ -117,7 +117,7 @@ def project_all(
                 q[k, j] = 0.0
         length = np.inf
         for _ in range(steps):
-            inside = stopped(q[k], lower, upper, held)
+            inside = stopped(q[k], lower[k], upper[k], held)
             if inside and length < CONVERGED:
                 arrived[k] = True
                 break

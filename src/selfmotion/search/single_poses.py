@@ -169,7 +169,10 @@ class SinglePoses:
     def _by_damped_steps(self, t: float, count: int) -> Array:
         """Return what the slower method finds, which comes to limits and edges, (K, n)."""
         q, misses = self.nearest(t, count)
-        return np.asarray(q[misses.sum(axis=1) < NEARLY])
+        near = q[misses.sum(axis=1) < NEARLY]
+        within = (np.abs(near) <= self.follows.within_bands(near)).all(axis=1)
+        pulled, arrived = self.project(near[~within], t)
+        return np.concatenate([near[within], pulled[arrived]])
 
     def nearest(self, t: float, count: int = APPROACHED) -> tuple[Array, Array]:
         """Return configurations as near to a pose as limits let them (K, n), misses [m, rad]."""
