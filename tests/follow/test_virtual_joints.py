@@ -13,6 +13,7 @@ from selfmotion.constraints import NodeTangents
 from selfmotion.costs import Samples
 from selfmotion.follow import AugmentedFollows, Follows
 from selfmotion.motion import Sampling
+from selfmotion.nodes.objective import scattered
 from selfmotion.problem.of_arm import WithinBand
 from support.arms import PANDA_HOME, robot_named
 from support.nodes import moved, nodes_of, random_step
@@ -175,10 +176,10 @@ def test_gradients_along_nodes_equal_central_differences(
     direction = random_step(motion, 4)
     size = 1e-5
     aims = [moved(motion, step + side * direction).aim for side in (size, -size)]
-    slopes = here.grid.cost.slopes(here.samples, here.partials)
-    by_node = np.zeros((len(slopes) + 1, 2, slopes.shape[2]))
-    by_node[:-1] += slopes[:, :2]
-    by_node[1:] += slopes[:, 2:]
+    slopes, continuity = here.grid.cost.slopes(here.samples, here.partials), here.grid.continuity
+    if continuity is not None:
+        slopes += continuity.slopes(here.samples)
+    by_node = scattered(slopes)
     gradient = here.charts.pulled(here.place, by_node[:, 0], by_node[:, 1])
     exact = (aims[0] - aims[1]) / (2.0 * size)
     assert abs(float((gradient * direction).sum()) - exact) < COST * np.abs(gradient).sum()

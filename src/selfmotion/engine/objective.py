@@ -148,11 +148,12 @@ class Objective:
     def _pulled_back(self, x: Array) -> Array:
         if not np.isfinite(self.value(x)):
             return np.full(self.size, np.nan)
-        by_epsilon, by_start, _ = self.rollout.pullback(
+        by_epsilon, by_start = self.rollout.pullback(
             *self._costs.cotangents(self.rollout.samples())
         )
-        by_z, _ = self.start.tangent()
-        return np.concatenate([by_start @ by_z, self.null_motion.pullback(by_epsilon)])
+        return np.concatenate(
+            [by_start @ self.start.tangent(), self.null_motion.pullback(by_epsilon)]
+        )
 
     def require_finite(self, x: Array) -> None:
         """Raise ProblemError where a cost or a condition has no finite value at x; says when."""
@@ -257,6 +258,6 @@ class Objective:
         first = self.start.size
         epsilon_matrix = self.null_motion.matrix(first)
         start_matrix = np.zeros((epsilon_matrix.shape[1], self.size))
-        start_matrix[:, :first], _ = self.start.tangent()
+        start_matrix[:, :first] = self.start.tangent()
         self._tangents = self.rollout.sensitivities(epsilon_matrix, start_matrix)
         return self._tangents

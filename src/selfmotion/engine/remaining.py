@@ -64,6 +64,9 @@ class Remaining:
         basis[:z, :z] = np.eye(z)
         basis[z:, z:] = inner
         values, vectors = np.linalg.eigh(basis.T @ self._metric @ basis)
+        if not values[-1] > 0.0:
+            # Nothing that the spline moves costs anything.
+            return 0.0
         scale = basis @ (vectors / np.sqrt(np.maximum(values, _FLAT * values[-1])))
         slope, bend = scale.T @ self._gradient, scale.T @ self._metric @ scale
         reach = _REACH * float(np.linalg.norm(slope))

@@ -15,7 +15,6 @@ from selfmotion.path import Dwell
 from selfmotion.robot import RobotModel
 from selfmotion.task import SE3, Relaxation, Task
 
-
 # What is put back within a band is so by this share of it.
 _INSIDE = 0.999
 

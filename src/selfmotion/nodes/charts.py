@@ -156,7 +156,7 @@ class Manifolds:
         self.follows, self.t, self.copies = follows, np.tile(t, copies), copies
         self.chains, self.layout = follows.chains, follows.layout
         self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
-        self.work = np.zeros(kernels.space_size(*self._sizes))
+        self.work = np.zeros(kernels.space_size(*self._sizes[:2]))
         self.no_error = np.zeros((len(follows.items), 6))
         # A moment before each node and after: one step back, one on; at the ends of the path both
         # inside.

@@ -203,13 +203,11 @@ def pull(
 ) -> None:
     """Set `out` (K, 2 r) to the derivatives by (z, ν) of what has these by q and q̇ (K, n) each."""
     (count, n), m, r = by_q.shape, rows_of(layout), bases.shape[2]
-    space = space_of(work, n, m, layout.shape[0])
+    space = space_of(work, n, m)
     for k in range(count):
         for j in range(n):
             space.w[j], space.by_q[j] = by_qd[k, j], by_q[k, j]
-        pull_stage(
-            table[k], n, layout, 0.0, None, space, no_error, space.by_epsilon, space.by_target
-        )
+        pull_stage(table[k], n, layout, 0.0, None, space, no_error, space.by_epsilon)
         for x in range(r):
             along, free = 0.0, 0.0
             for j in range(n):
