@@ -29,7 +29,7 @@ from selfmotion.search.settings import (
     TURN,
 )
 from selfmotion.search.shortest import Shortest
-from selfmotion.search.waypoints import OnPath, Waypoints
+from selfmotion.search.waypoints import OnPath
 from selfmotion.task import log3
 
 
@@ -122,7 +122,7 @@ def asks_length(problem: Problem) -> bool:
 
 
 def _sampled(
-    problem: Problem, waypoints: Waypoints, t: Array, options: dict[str, Any]
+    problem: Problem, waypoints: OnPath, t: Array, options: dict[str, Any]
 ) -> list[Sequence]:
     asked = problem.envelope
     return sampled_sequences(

@@ -1,40 +1,13 @@
 """A path's waypoints as the sampled search knows them: where configurations are, how they move."""
 
-from typing import Protocol
-
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.engine import carried_bases
 from selfmotion.follow import Follows
-from selfmotion.robot import RobotModel
 from selfmotion.search.manifold import Manifold
 
 
-class Waypoints(Protocol):
-    """Configurations that put the tool where it may be at each of W waypoints."""
-
-    @property
-    def robot(self) -> RobotModel:
-        """The arm."""
-
-    @property
-    def count(self) -> int:
-        """W."""
-
-    def project(self, q: Array, i: int, *, far: bool = False) -> tuple[Array, Flags]:
-        """Return what Newton's method makes of q (K, n) at waypoint i, and where it arrives."""
-
-    def project_each(self, q: Array, i: Ints) -> tuple[Array, Flags]:
-        """Return the same of q (K, n), each at its own waypoint (K,)."""
-
-    def bases(self, q: Array) -> Array:
-        """Return bases of the directions that a motion q (W, n) may move aside in, (W, n, d).
-
-        Each turned to the one before.
-        """
-
-
 class OnPath:
-    """Those whose tool is on its path.
+    """Configurations that put the tool on its path at each of W waypoints.
 
     Parameters
     ----------
@@ -51,13 +24,16 @@ class OnPath:
         self._held = follows.held(t)
 
     def project(self, q: Array, i: int, *, far: bool = False) -> tuple[Array, Flags]:
-        """See `Waypoints.project`."""
+        """Return what Newton's method makes of q (K, n) at waypoint i, and where it arrives."""
         return self._manifold.project(q, self._targets[i], far=far, held=self._held[i])
 
     def project_each(self, q: Array, i: Ints) -> tuple[Array, Flags]:
-        """See `Waypoints.project_each`."""
+        """Return the same of q (K, n), each at its own waypoint (K,)."""
         return self._manifold.project(q, self._targets[i], held=self._held[i])
 
     def bases(self, q: Array) -> Array:
-        """See `Waypoints.bases`."""
+        """Return bases of the directions that a motion q (W, n) may move aside in, (W, n, d).
+
+        Each turned to the one before.
+        """
         return carried_bases(self._follows, q)
