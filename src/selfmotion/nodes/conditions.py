@@ -169,10 +169,19 @@ class NodeConditions:
             first += own
         return found
 
+    @property
+    def any_at_once(self) -> bool:
+        """Whether some conditions count at once: what is best without them is far off."""
+        return any(self._at_once)
+
+    @property
+    def _at_once(self) -> list[bool]:
+        return [getattr(item, "counts_at_once", False) for item in self.constraints]
+
     def at_once(self) -> Ints:
-        """Return which conditions count at once: what is best without them is far off."""
-        each = [getattr(item, "counts_at_once", False) for item in self.constraints]
-        return np.flatnonzero(np.tile(np.repeat(np.array(each, dtype=np.bool_), self._counts), 2))
+        """Return which conditions do."""
+        each = np.array(self._at_once, dtype=np.bool_)
+        return np.flatnonzero(np.tile(np.repeat(each, self._counts), 2))
 
     def bending(
         self, samples: CheckedSamples, prices: Array, changes: Array

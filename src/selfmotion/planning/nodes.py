@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints
+from selfmotion.basics import Array, Flags, Ints
 from selfmotion.constraints import BoundConstraint
 from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, Status
@@ -23,6 +23,7 @@ from selfmotion.planning.settings import (
     COST_AGREEMENT,
     FAR_OFF,
     FEWEST_WITH_ACCELERATIONS,
+    MOST_FINER,
     NODE_AGREEMENT,
     NODE_ROUNDS,
     SAME_COST,
@@ -148,7 +149,7 @@ class NodeDescent:
                     smooth = finer.smoothed(motion.exact_cost + SAME_COST * size)
                     if smooth is not None:
                         return smooth
-                broken = finer.motion.broken()
+                broken = finer.motion.broken() & self._worth_refining(finer)
                 if is_last and not broken.any():
                     return finer.smoothed(finer.cost) or finer
                 dearest = motion.cost
@@ -166,6 +167,17 @@ class NodeDescent:
                 break
             standing = found
         return standing
+
+    @staticmethod
+    def _worth_refining(standing: MotionOnNodes) -> Flags:
+        """Return between which nodes more of them may keep the conditions better, (N,).
+
+        Where a tolerance begins and ends to be used fully, velocities have a kink: on very short
+        intervals, what Newton's method leaves of it are rates that no limit allows.
+        """
+        steps = np.diff(standing.motion.grid.t)
+        kinks = standing.motion.grid.conditions.any_at_once
+        return np.asarray((steps * MOST_FINER > steps.max()) | (not kinks))
 
     @staticmethod
     def _at_once(motion: NodeMotion) -> Ints:

@@ -233,9 +233,7 @@ def _sorted(q: Array) -> Array:
     return np.ascontiguousarray(q[np.argsort(q[:, 0], kind="stable")])
 
 
-def _starts(
-    waypoints: OnPath, bounds: Admissible, station: int, rng: np.random.Generator
-) -> Array:
+def _starts(waypoints: OnPath, bounds: Admissible, station: int, rng: np.random.Generator) -> Array:
     """Return configurations within the limits, free where there are such, (K, n)."""
     seeds = np.array(list(spread(waypoints.robot, BEGINNING_SEEDS, rng)))
     q, arrived = waypoints.project(seeds, station, far=True)
