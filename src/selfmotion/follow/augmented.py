@@ -12,7 +12,7 @@ from selfmotion.follow.follows import Follows
 from selfmotion.follow.table_chain import TableChain
 from selfmotion.follow.virtual_joints import VirtualJoints
 from selfmotion.path import Dwell
-from selfmotion.robot import RobotModel
+from selfmotion.robot import RobotModel, mean_lever
 from selfmotion.task import SE3, Relaxation, Task
 
 # What is put back within a band is so by this share of it.
@@ -78,13 +78,6 @@ class AugmentedArm(RobotModel):
         """See `RobotModel`: of the arm, with the virtual joints at 0."""
         none = np.zeros(len(self.virtual.each))
         return np.concatenate([self.arm.dexterous_configuration(task), none])
-
-
-def mean_lever(arm: RobotModel) -> float:
-    """Return how far [m] the tool goes where a joint of an arm turns by a radian."""
-    lengths = arm.chain.arrays.link_lengths
-    levers = np.cumsum(lengths[:0:-1])[::-1][arm.chain.arrays.tree.is_revolute]
-    return float(levers.mean()) if levers.size and levers.max() > 0.0 else 1.0
 
 
 @dataclass(frozen=True, eq=False)

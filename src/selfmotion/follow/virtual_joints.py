@@ -18,7 +18,7 @@ as a radian of the arm does, whichever is less: so do joints of both kinds, of w
 ones, weigh alike where motions are as short as they can be.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -383,8 +383,3 @@ def _angles(cosine: Array, sine: Array) -> tuple[Array, Array]:
         (angle * cosine - sine) / safe**3,
     )
     return size, slope
-
-
-def names_in(joints: Iterable[VirtualJoint]) -> tuple[str, ...]:
-    """Return the names of virtual joints."""
-    return tuple(joint.name for joint in joints)
