@@ -112,7 +112,6 @@ PARTS = (
         (
             "engine/test_conditions.py",
             "constraints/test_base.py -k 'equality or finite or rows'",
-            "engine/test_deviation.py -k 'metric or (equal_central and (several or window))'",
             "engine/test_objective.py -k 'metric or gradient_equals and (planar_3r or panda-pose)'",
         ),
     ),

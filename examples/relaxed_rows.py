@@ -10,7 +10,6 @@ variants = {
     "the whole pose": [],
     "± 5 mm along the tool axis": [sm.Relaxation("z", 5e-3, axes="tool")],
     "a cone of 0.2 rad": [sm.Relaxation(("rx", "ry"), 0.2)],
-    "the same, 16 intervals": [sm.Relaxation(("rx", "ry"), 0.2, intervals=16)],
     "any turn about the axis from 1 to 3 s": [sm.Relaxation("rz", during=(1.0, 3.0))],
     "rotation free": [sm.Relaxation(("rx", "ry", "rz"))],
 }

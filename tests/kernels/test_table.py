@@ -13,11 +13,11 @@ from support.compiled import compiled
 def test_parts_tile_what_they_are_parts_of(n: int, m: int, tips: int) -> None:
     """Each number belongs to one part: no overlap, none left, none beyond the end."""
     row = np.arange(float(kernels.columns(n, m, tips)))
-    space = np.arange(float(kernels.space_size(n, m, tips)))
+    space = np.arange(float(kernels.space_size(n, m)))
     of_tips = [part for f in range(tips) for part in table.tip_of(row, f, n, m)]
     for numbers, parts in (
         (row, [*table.stage_of(row, n, m), *of_tips]),
-        (space, backward.space_of(space, n, m, tips)),
+        (space, backward.space_of(space, n, m)),
     ):
         found = np.concatenate([part.ravel() for part in parts])
         np.testing.assert_array_equal(np.sort(found), numbers)

@@ -11,7 +11,7 @@ import selfmotion as sm
 import selfmotion.testing
 from selfmotion.basics import Array, NoSequenceError, ProblemError
 from selfmotion.path import section_at_rest
-from selfmotion.problem import relaxed_along
+from selfmotion.problem import times_along
 from support.arms import robot_named
 
 # The planar arm keeps about this shape, and its first joint turns by so much at most.
@@ -191,7 +191,7 @@ def test_what_is_relaxed_for_a_while_is_so_in_each_part() -> None:
     windows = []
     for ends, ramped in (((0.0, 12.0), (False, True)), ((12.0, 20.0), (True, False))):
         path = section_at_rest(problem.path, *ends, 0.5, ramped)
-        during, always = relaxed_along(problem, path, ends)
+        during, always = (item.moved(times_along(path, ends)) for item in relaxed)
         assert always == relaxed[1]
         windows.append(during.during)
         if ends[0] == 0.0:
@@ -199,7 +199,7 @@ def test_what_is_relaxed_for_a_while_is_so_in_each_part() -> None:
     # Half a ramp later than without one.
     assert windows[1] == (0.0, pytest.approx(3.0 + 0.25))
     late = section_at_rest(problem.path, 16.0, 20.0, 0.5, (True, False))
-    assert list(relaxed_along(problem, late, (16.0, 20.0))) == relaxed[1:]
+    assert relaxed[0].moved(times_along(late, (16.0, 20.0))) is None
 
 
 def test_what_parts_cannot_be_is_refused() -> None:

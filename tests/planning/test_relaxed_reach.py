@@ -3,17 +3,12 @@
 import dataclasses
 
 import numpy as np
-import pytest
 
 import selfmotion as sm
-from selfmotion.basics import Array
-from selfmotion.engine import Deviation
 from support.arms import robot_named
 
 # How far the path leaves the arm's reach of 5 m [m].
 BEYOND = 0.01
-# Deviations that are splines are found again to what a least-squares fit leaves.
-ROUNDING = 1e-9
 
 
 def outward() -> sm.Problem:
@@ -52,26 +47,3 @@ def test_a_band_that_is_too_narrow_is_refused_at_once() -> None:
     plan = sm.plan(dataclasses.replace(outward(), relaxations=narrow))
     assert not plan.certificate.verified
     assert "out of reach" in plan.certificate.verdict
-
-
-@pytest.mark.parametrize("band", [0.02, np.inf])
-def test_a_deviation_that_is_a_spline_is_found_again(band: float) -> None:
-    """c from the rows that it makes, and as what x = 0 stands for."""
-    path, t = outward().path, np.linspace(0.0, 5.0, 60)
-    relaxed = [sm.Relaxation(("x", "y"), band)]
-    free = (False, False)
-    deviation = Deviation(path, relaxed, t, free)
-    c = np.random.default_rng(0).uniform(-0.5, 0.5, deviation.size)
-
-    def rows(target: sm.PathSamples) -> Array:
-        away = np.zeros((len(t), 6))
-        away[:, :3] = target.translation - path.samples(t).translation
-        return away
-
-    target = deviation.target(c)
-    np.testing.assert_allclose(deviation.nearest(rows(target)), c, atol=ROUNDING)
-    around = Deviation(path, relaxed, t, free, around=c)
-    none = np.zeros(deviation.size)
-    np.testing.assert_allclose(around.target(none).translation, target.translation, atol=0.0)
-    np.testing.assert_allclose(around.matrix(none), deviation.matrix(c), atol=0.0)
-    np.testing.assert_allclose(around.nearest(rows(target)), none, atol=ROUNDING)

@@ -68,7 +68,6 @@ def test_what_nodes_do_not_take_is_ranked_by_heats() -> None:
     circle = sm.Circle.around(problem.path.pose(0.0), 0.05, 2.0)
     for other in (
         replace(problem, null_motion=sm.PolynomialNullMotion()),
-        replace(problem, relaxations=[sm.Relaxation("rz", 0.1)]),
         replace(problem, path=circle, constraints=[sm.ClosedPath()]),
     ):
         assert not OnNodes.takes(other, effort(), start)

@@ -12,6 +12,7 @@ from selfmotion import testing
 from selfmotion.basics import Array
 from selfmotion.certificate import deviation
 from selfmotion.robot import Dynamics, Energy, ToolRates
+from selfmotion.robot.tree_arrays import JOINT
 from support.files_of_people import finger, torso
 
 # Against other libraries' products of rotations, and differences [m, rad].
@@ -87,7 +88,8 @@ def test_all_kinematics_agree_with_differences(robot: sm.RobotModel) -> None:
         np.testing.assert_allclose(deviation.poses(robot.chain, q[None])[0], rotations, atol=EXACT)
         every = robot.chain.every_along(q[None])[0]
         whole = np.zeros_like(jacobian)
-        np.add.at(whole.T, robot.coupling.coordinates, every.T)
+        own = robot.chain.table[:-1, JOINT, 0].astype(int)
+        np.add.at(whole.T, own, every.T)
         np.testing.assert_allclose(whole, jacobian, atol=EXACT)
 
 

@@ -7,7 +7,7 @@ import pinocchio as pin
 
 import selfmotion as sm
 from selfmotion.basics import Array
-from selfmotion.engine import Counts, Deviation, Objective, Rollout
+from selfmotion.engine import Counts, Objective, Rollout
 from selfmotion.engine.conditions import Conditions
 from selfmotion.engine.start import Start
 from selfmotion.motion import NullMotionTable
@@ -64,18 +64,15 @@ def objective_of(
     costs: Sequence[sm.Cost],
     start: Start,
     *,
-    deviation: Deviation | None = None,
     constraints: Sequence[sm.BoundConstraint] = (),
 ) -> Objective:
     """Return an objective of parts, for laws that hold whatever problem they come from."""
-    grid, path = rollout.grid, rollout.follows.items[0].path
     return Objective(
         rollout,
         table,
         costs,
         start,
-        deviation or Deviation(path, (), grid.stage_times, (False, False)),
-        Conditions(constraints, grid),
+        Conditions(constraints, rollout.grid),
         Counts(),
     )
 

@@ -22,6 +22,14 @@ NAN = float("nan")
 POSITIVE_OR_NONE = {key: value for key, value in POSITIVE.items() if value is not None}
 
 
+# Of the rows rx, ry, rz first two are relaxed, then another two.
+_PAIRS = [
+    sm.Relaxation("rx", 0.1, during=(0.0, 0.4)),
+    sm.Relaxation("ry", 0.1),
+    sm.Relaxation("rz", 0.1, during=(0.6, 1.0)),
+]
+
+
 def _panda(**given: Any) -> sm.Problem:
     robot = robot_named("panda")
     path = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 4.0)
@@ -71,6 +79,7 @@ def problem_rows() -> list[Row]:
             collision={"0.01": 0.01, "True": True, "'none'": "none"},
             rest=FLAGS,
         ),
+        Row(area, "other pairs of rotations at other times", lambda _: _panda(relaxations=_PAIRS)),
         Row(area, "1 cm in 1 ns", lambda _: _panda(path=_line(1e-9))),
         Row(area, "1 m in 1 µs", lambda _: _panda(path=_line(1e-6, 1.0))),
         Row(area, "a path in millimetres", lambda _: _panda(path=sm.Dwell(far, 1.0), start=None)),
@@ -175,7 +184,6 @@ def setting_rows() -> list[Row]:
             band={"nan": NAN, "0": 0, "-1": -1, "'wide'": "wide", "None": None},
             during=times,
             axes=TEXTS,
-            intervals={**WHOLE, "3": 3},
         ),
         *bad_values_of(
             "Damping",

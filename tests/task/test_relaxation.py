@@ -23,7 +23,6 @@ import selfmotion as sm
         ({"rows": "x", "during": "ab"}, "expected two times"),
         ({"rows": "x", "band": "a"}, "expected a number"),
         ({"rows": 3}, "expected names of rows"),
-        ({"rows": "x", "intervals": 3}, "≥ 4"),
     ],
 )
 def test_bad_relaxations_are_refused(options: dict, message: str) -> None:

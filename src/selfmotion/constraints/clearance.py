@@ -188,7 +188,7 @@ class BoundClearance:
         Where the distances are not known yet, this takes much less time than these.
         """
         least = self.distance + self.margin - level * _METRE
-        q = motion_of_order(samples, 0)
+        q = self._of_arm(samples)
         if self._knows(q):
             return np.asarray((self._last[1].values < least).any(axis=1))
         return self.model.closer(q, least)
@@ -204,10 +204,16 @@ class BoundClearance:
 
     def _clearances(self, samples: Samples) -> Clearances:
         """Return the distances at the nodes; those of the last motion are kept."""
-        q = motion_of_order(samples, 0)
+        q = self._of_arm(samples)
         if not self._knows(q):
             self._last[:] = [q, self.model.clearances(q)]
         return cast(Clearances, self._last[1])
+
+    def _of_arm(self, samples: Samples) -> Array:
+        """Return q at the nodes of the joints that move bodies, which come first, (N + 1, n)."""
+        q = motion_of_order(samples, 0)
+        dof = self.model.robot.dof
+        return q if q.shape[1] == dof else np.ascontiguousarray(q[:, :dof])
 
     def _knows(self, q: Array) -> bool:
         return bool(self._last) and np.array_equal(self._last[0], q)
@@ -236,12 +242,15 @@ class _Pull:
 
     def tangents_of(self, motion: NodeTangents) -> Array:
         """See `Linear.tangents_of`."""
-        return self.clearances.along(-motion.q / _METRE)
+        return self.clearances.along(-self._moved(motion) / _METRE)
 
     def picked(self, motion: NodeTangents, rows: Ints, columns: Ints) -> Array:
         """See `Linear.picked`."""
         slopes = self.clearances.slopes_at(rows, columns)
-        return np.asarray(np.einsum("kn,knd->kd", slopes, motion.q[rows])) / -_METRE
+        return np.asarray(np.einsum("kn,knd->kd", slopes, self._moved(motion)[rows])) / -_METRE
+
+    def _moved(self, motion: NodeTangents) -> Array:
+        return motion.q[:, : self.clearances.slopes.shape[1]]
 
 
 # So far beyond the distance asked for, clearances begin to level off [m]: well outside of where

@@ -222,7 +222,6 @@ class ClosedPath(Constraint):
         Also q̇(T) = q̇(0), for repetition without a jump in speed.
     """
 
-    pins: ClassVar[tuple[bool, bool]] = (True, True)
     closes: ClassVar[bool] = True
 
     velocity: bool = True

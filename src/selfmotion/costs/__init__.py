@@ -33,6 +33,7 @@ from selfmotion.costs.off_path import OffPath as OffPath
 from selfmotion.costs.path_length import PathLength as PathLength
 from selfmotion.costs.reversals import JointReversals as JointReversals
 from selfmotion.costs.samples import (
+    PlacedLater as PlacedLater,
     Samples as Samples,
     TipSamples as TipSamples,
 )

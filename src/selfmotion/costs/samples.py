@@ -135,6 +135,18 @@ class Samples:
         """Joint jerks, (S, n)."""
         return np.asarray(self.sampling.differentiation(2) @ self.qd[self.nodes])
 
+    def of(self, follows: Follows) -> "Samples":
+        """Return the motion of the arm alone, without the virtual joints after its own.
+
+        What is asked for again is not made again.
+        """
+        if self.follows is follows:
+            return self
+        known = self.__dict__.get("_of_arm")
+        if known is None or known.follows is not follows:
+            known = self.__dict__["_of_arm"] = _OfArm(self, follows)
+        return known
+
     @cached_property
     def gram(self) -> Array:
         """JJᵀ of the task Jacobian, (S, m, m)."""
@@ -161,6 +173,57 @@ class Samples:
             for f, tip in enumerate(self.tips)
         ]
         return parts[0] if len(parts) == 1 else np.sum(parts, axis=0)
+
+
+class PlacedLater(Samples):
+    """A motion as costs and constraints see it; tips are placed when they are asked for.
+
+    Parameters
+    ----------
+    follows : Follows
+    sampling : Sampling
+    given : arrays
+        By name: q and q̇ (S, n), where they are not known otherwise.
+    """
+
+    def __init__(self, follows: Follows, sampling: Sampling, **given: Array) -> None:
+        for name, value in {"sampling": sampling, "follows": follows, **given}.items():
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def _placed(self) -> Samples:
+        return Samples.along(self.follows, self.sampling, self.q, self.qd)
+
+    @cached_property
+    def tips(self) -> tuple[TipSamples, ...]:
+        """See `Samples`."""
+        return self._placed.tips
+
+    @cached_property
+    def task_jacobian(self) -> Array:
+        """See `Samples`."""
+        return self._placed.task_jacobian
+
+
+class _OfArm(PlacedLater):
+    """A motion of an arm's own joints, which come before all others; see `Samples.of`."""
+
+    _whole: Samples
+
+    def __init__(self, whole: Samples, follows: Follows) -> None:
+        n = follows.robot.dof
+        object.__setattr__(self, "_whole", whole)
+        super().__init__(follows, whole.sampling, q=whole.q[:, :n], qd=whole.qd[:, :n])
+
+    @cached_property
+    def qdd(self) -> Array:
+        """See `Samples`."""
+        return self._whole.qdd[:, : self.follows.robot.dof]
+
+    @cached_property
+    def qddd(self) -> Array:
+        """See `Samples`."""
+        return self._whole.qddd[:, : self.follows.robot.dof]
 
 
 def _show(owner: Samples | TipSamples, names: Sequence[str]) -> None:

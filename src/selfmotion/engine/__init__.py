@@ -2,7 +2,6 @@
 
 from selfmotion.engine.conditions import Conditions as Conditions
 from selfmotion.engine.counts import Counts as Counts
-from selfmotion.engine.deviation import Deviation as Deviation
 from selfmotion.engine.evaluation import Evaluation as Evaluation
 from selfmotion.engine.frame import carried_bases as carried_bases, transport as transport
 from selfmotion.engine.objective import Objective as Objective
@@ -13,7 +12,6 @@ from selfmotion.engine.still import (
     MOST_HALVINGS as MOST_HALVINGS,
     Guide as Guide,
     StillMotion as StillMotion,
-    deviation_of as deviation_of,
     rough_still_motion as rough_still_motion,
     settled_still_motion as settled_still_motion,
 )

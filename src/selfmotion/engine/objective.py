@@ -10,11 +10,10 @@ from selfmotion.costs import Cost, Samples
 from selfmotion.engine.conditions import Conditions
 from selfmotion.engine.cost_integrals import CostIntegrals
 from selfmotion.engine.counts import Counts
-from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.evaluation import Evaluation
 from selfmotion.engine.rollout import Rollout
 from selfmotion.engine.start import FixedStart, FreeStart, Start
-from selfmotion.engine.still import StillMotion, deviation_of, null_motion_table
+from selfmotion.engine.still import StillMotion, null_motion_table
 from selfmotion.motion import Grid, NullMotion, NullMotionTable, Trajectory
 from selfmotion.optimise import Residuals, Rows
 from selfmotion.problem import Problem
@@ -23,8 +22,8 @@ from selfmotion.problem import Problem
 class Objective:
     """F = ∫ Σ G(q̇, q, t) dt along the motion of a decision vector, and the conditions on it.
 
-    The decision vector is [z | x | c]: where the start is on its self-motion manifold (nothing if
-    it is given), the null motion's coefficients, and the tool's deviation (if rows are relaxed).
+    The decision vector is [z | x]: where the start is on its self-motion manifold (nothing if it is
+    given), and the null motion's coefficients.
 
     Parameters
     ----------
@@ -35,8 +34,6 @@ class Objective:
     costs : sequence of Cost
     start : Start
         z → q(0).
-    deviation : Deviation
-        c → the poses and twists that the tool follows.
     constraints : Conditions
     counts : Counts
         Where work is added up.
@@ -48,13 +45,11 @@ class Objective:
         null_motion: NullMotionTable,
         costs: Sequence[Cost],
         start: Start,
-        deviation: Deviation,
         constraints: Conditions,
         counts: Counts,
     ) -> None:
         self.rollout, self.null_motion, self.start = rollout, null_motion, start
         self.constraints, self.counts = constraints, counts
-        self._deviation = deviation
         self._costs = CostIntegrals(costs, rollout.grid)
         self._at: Array | None = None
         # ∂q/∂x and ∂q̇/∂x there, gradient and evaluation, once they were asked for.
@@ -111,14 +106,13 @@ class Objective:
             null_motion_table(problem, t, still, null_motion or problem.null_motion, around),
             problem.all_costs,
             start,
-            deviation_of(problem, t, still.deviation),
             Conditions(constraints, grid),
             Counts() if counts is None else counts,
         )
         if problem.damping is None:
             orders = zip((0, -1), problem.rest_orders, strict=True)
             found._still_ends = [end for end, order in orders if order > 1]
-        found._is_rolled = rollout is not None and not (start.size or found._deviation.size)
+        found._is_rolled = rollout is not None and not start.size
         return found
 
     @property
@@ -129,22 +123,16 @@ class Objective:
     @property
     def size(self) -> int:
         """Number of decision variables."""
-        return self.start.size + self.null_motion.size + self._deviation.size
+        return self.start.size + self.null_motion.size
 
     @property
     def evaluations(self) -> int:
         """How often F was computed, by all that add to the same counts."""
         return self.counts.evaluations
 
-    def parts(self, x: Array) -> tuple[Array, Array, Array]:
-        """Return the parts z, x and c of the decision vector."""
-        first = self.start.size
-        last = first + self.null_motion.size
-        return x[:first], x[first:last], x[last:]
-
-    def deviation(self, x: Array) -> Array | None:
-        """Return the tool's deviation at x as `Deviation` has it; None where none is allowed."""
-        return self._deviation.whole(self.parts(x)[2]) if self._deviation.size else None
+    def parts(self, x: Array) -> tuple[Array, Array]:
+        """Return the parts z and x of the decision vector."""
+        return x[: self.start.size], x[self.start.size :]
 
     def value(self, x: Array) -> float:
         """Return the cost at x; infinite where the motion breaks down."""
@@ -165,16 +153,12 @@ class Objective:
     def _pulled_back(self, x: Array) -> Array:
         if not np.isfinite(self.value(x)):
             return np.full(self.size, np.nan)
-        by_epsilon, by_start, by_target = self.rollout.pullback(
+        by_epsilon, by_start = self.rollout.pullback(
             *self._costs.cotangents(self.rollout.samples())
         )
-        by_z, by_pose = self.start.tangent()
-        parts = [by_start @ by_z, self.null_motion.pullback(by_epsilon)]
-        if self._deviation.size:
-            own = by_target[:, :12]
-            own[0, :6] += by_start @ by_pose[:, :6]
-            parts.append(self._deviation.pullback(self.parts(x)[2], own))
-        return np.concatenate(parts)
+        return np.concatenate(
+            [by_start @ self.start.tangent(), self.null_motion.pullback(by_epsilon)]
+        )
 
     def require_finite(self, x: Array) -> None:
         """Raise ProblemError where a cost or a condition has no finite value at x; says when."""
@@ -229,16 +213,11 @@ class Objective:
         """Return the Gauss-Newton matrix of quadratic costs, (size, size).
 
         ∫ Σ_k (∂q^(k)/∂x)ᵀ W_k (∂q^(k)/∂x) dt over the derivatives q^(k) of q that the costs weigh
-        (that of ½ q̇ᵀq̇ where none does), and likewise over the pose error; and |∂F/∂c| for what
-        keeps a deviation within its band. Its inverse starts the quasi-Newton method.
+        (that of ½ q̇ᵀq̇ where none does), and likewise over the pose error. Its inverse starts the
+        quasi-Newton method.
         """
         by_q, by_qd = self._sensitivities(x)
-        metric = self._costs.curvature(by_q, by_qd, lambda: self._error_tangent(x, by_q))
-        if self._deviation.size:
-            # sin s bends as much as it rises: without it, steps would go round many times.
-            slope = np.abs(self.parts(self.gradient(x))[2]) * self._deviation.banded
-            metric[-len(slope) :, -len(slope) :] += np.diag(slope)
-        return metric
+        return self._costs.curvature(by_q, by_qd, lambda: self._error_tangent(by_q))
 
     def node_tangents(self, x: Array) -> NodeTangents:
         """Return how the motion at the nodes changes with the decision vector, at x."""
@@ -246,18 +225,12 @@ class Objective:
         sampling = self.grid.sampling
         return NodeTangents(by_q[sampling.nodes], by_qd[sampling.nodes], sampling)
 
-    def _error_tangent(self, x: Array, by_q: Array) -> Array:
-        """Return ∂(S e)/∂x = S ∂target/∂x - J ∂q/∂x, (S, m, size).
+    def _error_tangent(self, by_q: Array) -> Array:
+        """Return ∂(S e)/∂x = -J ∂q/∂x, (S, m, size).
 
         Nothing on the path, where the self-motion does not move the tool.
         """
-        samples = self.rollout.samples()
-        tangent = -(samples.task_jacobian @ by_q)
-        if self._deviation.size:
-            c = self.parts(x)[2]
-            own = samples.task.select_along(self._deviation.matrix(c)[:, :6], samples.rotation)
-            tangent[:, : own.shape[1], -len(c) :] += own
-        return np.asarray(tangent)
+        return np.asarray(-(self.rollout.samples().task_jacobian @ by_q))
 
     def _run(self, x: Array) -> None:
         """Make x the motion that the rollout holds."""
@@ -275,11 +248,8 @@ class Objective:
         self._at = x.copy()
 
     def _evaluate(self, x: Array) -> None:
-        z, coefficients, c = self.parts(x)
-        if self._deviation.size:
-            self.rollout.aim(self._deviation.target(c))
-        first = self.rollout.first_target if self._deviation.size else self._first
-        start = self.start.configuration(z, first)
+        z, coefficients = self.parts(x)
+        start = self.start.configuration(z, self._first)
         if start is None:
             return
         is_rolled, self._is_rolled = self._is_rolled and not x.any(), False
@@ -289,20 +259,13 @@ class Objective:
         self._terms = self._costs.values(self.rollout.samples())
 
     def _sensitivities(self, x: Array) -> tuple[Array, Array]:
-        """Return ∂q/∂[z | x | c] and ∂q̇/∂[z | x | c] at the stages, (S, n, size)."""
+        """Return ∂q/∂[z | x] and ∂q̇/∂[z | x] at the stages, (S, n, size)."""
         self._run(x)
         if self._tangents is not None:
             return self._tangents
         first = self.start.size
-        last = first + self.null_motion.size
-        epsilon_matrix, target_matrix = self.null_motion.matrix(first, self.size - last), None
-        stages, n, _ = epsilon_matrix.shape
-        start_matrix = np.zeros((n, self.size))
-        start_matrix[:, :first], by_pose = self.start.tangent()
-        if self._deviation.size:
-            # The first tip's path is the one that is relaxed.
-            target_matrix = np.zeros((stages, 12 * len(self.rollout.follows.items), self.size))
-            target_matrix[:, :12, last:] = self._deviation.matrix(x[last:])
-            start_matrix[:, last:] = by_pose[:, :6] @ target_matrix[0, :6, last:]
-        self._tangents = self.rollout.sensitivities(epsilon_matrix, start_matrix, target_matrix)
+        epsilon_matrix = self.null_motion.matrix(first)
+        start_matrix = np.zeros((epsilon_matrix.shape[1], self.size))
+        start_matrix[:, :first] = self.start.tangent()
+        self._tangents = self.rollout.sensitivities(epsilon_matrix, start_matrix)
         return self._tangents

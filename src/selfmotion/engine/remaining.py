@@ -58,13 +58,15 @@ class Remaining:
 
     def saving(self, intervals: int) -> float:
         """Return what a spline of so many intervals (8, 16, …) would save [cost]."""
-        z, spline, c = self._parts
+        z, _ = self._parts
         inner = np.kron(np.eye(self._fine.null_motion.rows), _within(intervals, self._finest))
-        basis = np.zeros((self._fine.size, z + inner.shape[1] + c))
+        basis = np.zeros((self._fine.size, z + inner.shape[1]))
         basis[:z, :z] = np.eye(z)
-        basis[z : z + spline, z : z + inner.shape[1]] = inner
-        basis[z + spline :, z + inner.shape[1] :] = np.eye(c)
+        basis[z:, z:] = inner
         values, vectors = np.linalg.eigh(basis.T @ self._metric @ basis)
+        if not values[-1] > 0.0:
+            # Nothing that the spline moves costs anything.
+            return 0.0
         scale = basis @ (vectors / np.sqrt(np.maximum(values, _FLAT * values[-1])))
         slope, bend = scale.T @ self._gradient, scale.T @ self._metric @ scale
         reach = _REACH * float(np.linalg.norm(slope))

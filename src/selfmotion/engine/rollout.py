@@ -41,7 +41,7 @@ class Rollout:
         self._law = None if damping is None else (damping.threshold, damping.strength)
         self._gain = feedback_rate(follows.duration)
         self._table, self._at, self._tips = self._new_table(len(grid.stage_times))
-        self._space = np.zeros(kernels.space_size(*self._sizes))
+        self._space = np.zeros(kernels.space_size(*self._sizes[:2]))
         # Of the last run, once they were asked for.
         self._samples: Samples | None = None
         # What `polished` works on: one stage, at a node.
@@ -138,9 +138,7 @@ class Rollout:
         self.jacobian_evaluations += len(here)
         return self.grid.nodes, q, qd
 
-    def sensitivities(
-        self, epsilon_matrix: Array, start_matrix: Array, target_matrix: Array | None = None
-    ) -> tuple[Array, Array]:
+    def sensitivities(self, epsilon_matrix: Array, start_matrix: Array) -> tuple[Array, Array]:
         """Return ∂q/∂x and ∂q̇/∂x at the stages of the last run, (S, n, d) each.
 
         Parameters
@@ -149,9 +147,6 @@ class Rollout:
             ∂ε/∂x at the stages.
         start_matrix : (n, d)
             ∂q(0)/∂x.
-        target_matrix : (S, 12 F, d), optional
-            That of the F paths' poses [m, rotation vector] and twists; without it the paths are
-            fixed.
         """
         epsilon_matrix = np.ascontiguousarray(epsilon_matrix)
         by_q, by_qd = np.empty_like(epsilon_matrix), np.empty_like(epsilon_matrix)
@@ -165,7 +160,6 @@ class Rollout:
             np.zeros((len(self._tips), 6)),
             epsilon_matrix,
             np.ascontiguousarray(start_matrix),
-            None if target_matrix is None else self._by_tip(target_matrix),
             by_q,
             by_qd,
         )
@@ -229,7 +223,7 @@ class Rollout:
 
     def pullback(
         self, q_cotangent: Array, qd_cotangent: Array, error_cotangent: Array | None = None
-    ) -> tuple[Array, Array, Array]:
+    ) -> tuple[Array, Array]:
         """Pull a gradient with respect to the last run's stages back to what drove it.
 
         The exact derivative of the discrete scheme: one backward sweep, no finite differences.
@@ -247,12 +241,9 @@ class Rollout:
             ∂F/∂ε at the stages.
         start_gradient : (n,)
             ∂F/∂q(0).
-        target_gradient : (S, 12 F)
-            With respect to the paths' poses [m, rotation vector] and twists.
         """
         count, (n, _, tips) = len(self._table), self._sizes
         epsilon_gradient, start_gradient = np.empty((count, n)), np.empty(n)
-        target_gradient = np.empty((count, tips, 12))
         if error_cotangent is None:
             error_cotangent = np.zeros((count, 6 * tips))
         kernels.pullback(
@@ -267,9 +258,8 @@ class Rollout:
             self._space,
             epsilon_gradient,
             start_gradient,
-            target_gradient,
         )
-        return epsilon_gradient, start_gradient, target_gradient.reshape(count, -1)
+        return epsilon_gradient, start_gradient
 
 
 def _correction(jacobians: Array, errors: Array) -> Array:

@@ -26,11 +26,8 @@ class Start(Protocol):
         These are as `Follows.targets` has them, (12 F,).
         """
 
-    def tangent(self) -> tuple[Array, Array]:
-        """Return ∂q(0)/∂z (n, size) and that with respect to the poses (n, 6 F), at the last q(0).
-
-        A pose's change is [m, rotation vector].
-        """
+    def tangent(self) -> Array:
+        """Return ∂q(0)/∂z at the last q(0), (n, size)."""
 
 
 class FixedStart:
@@ -45,9 +42,9 @@ class FixedStart:
         """See `Start.configuration`."""
         return self._q
 
-    def tangent(self) -> tuple[Array, Array]:
+    def tangent(self) -> Array:
         """See `Start.tangent`."""
-        return np.zeros((len(self._q), 0)), np.zeros((len(self._q), 6))
+        return np.zeros((len(self._q), 0))
 
 
 class FreeStart:
@@ -88,19 +85,13 @@ class FreeStart:
                 return q
         return None
 
-    def tangent(self) -> tuple[Array, Array]:
-        """See `Start.tangent`: [J; N0ᵀ]⁻¹ [0; I] and [J; N0ᵀ]⁻¹ [S; 0]."""
-        items, r = self._follows.items, self.size
-        m, count = self._follows.dimension, len(items)
+    def tangent(self) -> Array:
+        """See `Start.tangent`: [J; N0ᵀ]⁻¹ [0; I]."""
+        items, m = self._follows.items, self._follows.dimension
         jacobians, rotations, _ = self._tips.at(self._at)
-        right = np.zeros((m + r, r + 6 * count))
-        right[m:, :r] = np.eye(r)
-        rows, first = [], 0
-        for f, item in enumerate(items):
-            rows.append(item.task.select(jacobians[f], rotations[f]))
-            last = first + item.task.dimension
-            here = slice(r + 6 * f, r + 6 * f + 6)
-            right[first:last, here] = item.task.select(np.eye(6), rotations[f])
-            first = last
-        both = np.linalg.solve(np.vstack([*rows, self._null.T]), right)
-        return np.asarray(both[:, :r]), np.asarray(both[:, r:])
+        rows = [
+            item.task.select(jacobian, rotation)
+            for item, jacobian, rotation in zip(items, jacobians, rotations, strict=True)
+        ]
+        right = np.vstack([np.zeros((m, self.size)), np.eye(self.size)])
+        return np.asarray(np.linalg.solve(np.vstack([*rows, self._null.T]), right))

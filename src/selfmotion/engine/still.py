@@ -7,7 +7,6 @@ from functools import cached_property, partial
 import numpy as np
 
 from selfmotion.basics import Array, BreakdownError
-from selfmotion.engine.deviation import Deviation
 from selfmotion.engine.frame import TransportedFrame
 from selfmotion.engine.rollout import Rollout
 from selfmotion.motion import Grid, NullMotion, NullMotionTable
@@ -40,8 +39,6 @@ class StillMotion:
     grid : Grid
     guide : Guide or None
         The null motion that stands for x = 0; None for none.
-    deviation : Array or None
-        That of the tool from its path, as `Deviation` has it; None for none.
     q, qd : (N + 1, n)
         At the nodes.
     jacobians : (N + 1, m, n)
@@ -62,7 +59,6 @@ class StillMotion:
     problem: Problem
     grid: Grid
     guide: Guide | None
-    deviation: Array | None
     q: Array
     qd: Array
     jacobians: Array
@@ -79,13 +75,10 @@ class StillMotion:
         configuration: Array,
         grid: Grid,
         guide: Guide | None = None,
-        deviation: Array | None = None,
     ) -> "StillMotion":
         """Integrate from a start configuration (n,) on one grid."""
         rollout = Rollout(problem.follows, grid, damping=problem.damping_law)
         t = grid.stage_times
-        if deviation is not None:
-            rollout.aim(deviation_of(problem, t).target(deviation))
         idle = np.zeros((len(t), problem.robot.dof))
         own = idle if guide is None else problem.brought_to_rest(t, guide(t))
         broken = rollout.run(configuration, own)
@@ -100,7 +93,6 @@ class StillMotion:
             problem,
             grid,
             guide,
-            deviation,
             samples.q[nodes],
             samples.qd[nodes],
             samples.task_jacobian[nodes],
@@ -140,13 +132,6 @@ class StillMotion:
     @cached_property
     def _transported(self) -> TransportedFrame:
         return TransportedFrame(self.grid.nodes, self.jacobians)
-
-
-def deviation_of(problem: Problem, t: Array, around: Array | None = None) -> Deviation:
-    """Return the deviation that a problem allows at times t (S,), around that of x = 0."""
-    return Deviation(
-        problem.path, problem.relaxations, t, problem.pinned, problem.rests, around=around
-    )
 
 
 def null_motion_table(
@@ -197,7 +182,6 @@ def settled_still_motion(
     problem: Problem,
     configuration: Array,
     guide: Guide | None = None,
-    deviation: Array | None = None,
     grid: Grid | None = None,
 ) -> tuple[StillMotion, int]:
     """Return the motion at x = 0 on the coarsest grid on which it stays near the path.
@@ -222,7 +206,7 @@ def settled_still_motion(
     troubles: list[tuple[float, float]] = []
     evaluations = 0
     for _ in range(MOST_HALVINGS):
-        still = StillMotion.on(problem, configuration, grid, guide, deviation)
+        still = StillMotion.on(problem, configuration, grid, guide)
         evaluations += still.jacobian_evaluations
         settled = _settled(still, coarse)
         if still.broken is None and settled:

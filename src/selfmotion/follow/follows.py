@@ -7,12 +7,13 @@ from typing import Self
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints, ProblemError
+from selfmotion.basics import Array, Flags, Ints, ProblemError
 from selfmotion.basics.layout import Layout, layout_of
 from selfmotion.follow.follow import BoundFollow, Follow
 from selfmotion.follow.kinematics import TipKinematics
 from selfmotion.path import Path
 from selfmotion.robot import RobotModel, null_space
+from selfmotion.robot.tree_arrays import JOINT
 from selfmotion.task import Task
 
 
@@ -107,7 +108,7 @@ class Follows:
     @cached_property
     def chains(self) -> Array:
         """What compiled kernels need of the chains, (F, c + 1, 6, 3): their tables, filled up."""
-        tables = [item.chain.arrays.table for item in self.items]
+        tables = [item.chain.table for item in self.items]
         found = np.zeros((len(tables), max(map(len, tables)), *tables[0].shape[1:]))
         for own, table in zip(found, tables, strict=True):
             own[: len(table)] = table
@@ -119,16 +120,19 @@ class Follows:
         None where no joint on a chain mimics another one: then those of coordinates will do.
         Derivatives of Jacobians need them, see `selfmotion.kernels.contraction`.
         """
+        tables = [item.chain.table for item in self.items]
         if not any(item.chain.is_coupled for item in self.items):
             return None
-        coupling = self.robot.coupling
-        columns = np.stack([item.chain.every_along(q) for item in self.items], axis=1)
-        everyone = np.arange(len(coupling.coordinates))
-        orders = [
-            np.append(own, np.setdiff1d(everyone, own))
-            for own in (item.chain.model_joints for item in self.items)
-        ]
-        return np.ascontiguousarray(columns), np.array([*orders, coupling.coordinates])
+        coordinates = [table[:-1, JOINT, 0].astype(np.int64) for table in tables]
+        ends = np.cumsum([0, *map(len, coordinates)])
+        columns = np.zeros((len(q), len(tables), 6, int(ends[-1])))
+        orders = []
+        for f, item in enumerate(self.items):
+            own = slice(int(ends[f]), int(ends[f + 1]))
+            columns[:, f, :, own] = item.chain.every_along(q)
+            others = np.delete(np.arange(ends[-1]), own)
+            orders.append(np.append(np.arange(ends[-1])[own], others))
+        return columns, np.array([*orders, np.concatenate(coordinates)])
 
     @property
     def row_names(self) -> tuple[str, ...]:
@@ -158,6 +162,37 @@ class Follows:
     def along(self, path: Path) -> "Follows":
         """Return that the one tip follows another path."""
         return replace(self, items=(replace(self.only, path=path),))
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is the arm's own tool alone, of which the arm has inverse kinematics."""
+        return len(self.items) == 1
+
+    @property
+    def names(self) -> str:
+        """The tips that are followed, for messages."""
+        return " and ".join(f"'{item.chain.tip_name}'" for item in self.items)
+
+    def held(self, t: Array) -> Flags:
+        """Return which coordinates have to stand still at 0 at times t (K,), (K, n)."""
+        return np.zeros((len(t), self.robot.dof), dtype=np.bool_)
+
+    def within_bands(self, q: Array) -> Array:
+        """Return limits of |q| like q (K, n), within which joints that share a band keep it.
+
+        Infinite where they do.
+        """
+        return np.full_like(q, np.inf)
+
+    @property
+    def holds(self) -> bool:
+        """Whether there are such at any time."""
+        return False
+
+    @property
+    def edges(self) -> tuple[float, ...]:
+        """When coordinates begin and end to stand still [s]."""
+        return ()
 
     def for_robot(self, robot: RobotModel) -> "Follows":
         """Return the same for an arm of the same joints with other limits."""

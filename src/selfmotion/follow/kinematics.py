@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.robot import Chain, Kinematics
+from selfmotion.robot import Chain
 
 
 class TipKinematics:
@@ -24,7 +24,7 @@ class TipKinematics:
 
     def __init__(self, chains: Sequence[Chain]) -> None:
         first = chains[0].kinematics()
-        self.each = [first, *(Kinematics(chain, first.data) for chain in chains[1:])]
+        self.each = [first, *(chain.kinematics(first.data) for chain in chains[1:])]
         count, dof = len(chains), chains[0].dof
         self._jacobians = np.zeros((count, 6, dof))
         self._rotations, self._translations = np.zeros((count, 3, 3)), np.zeros((count, 3))

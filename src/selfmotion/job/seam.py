@@ -1,6 +1,6 @@
 """One of the seams of a job."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -160,21 +160,15 @@ def one_way(constraint: Constraint) -> bool:
     return constraint.on_part() is not constraint or constraint.on_last_part() is not constraint
 
 
-def mirrored(relaxations: Sequence[Relaxation], duration: float) -> list[Relaxation]:
-    """Return what is relaxed along a path of a duration [s] the other way round."""
-    return [
-        item
-        if item.during is None
-        else replace(item, during=(duration - item.during[1], duration - item.during[0]))
-        for item in relaxations
-    ]
+def reversing(duration: float) -> Callable[[Array], Array]:
+    """Return when windows (first, last) of a path of a duration [s] are open on its way back."""
+    return lambda times: (duration - times)[::-1]
 
 
 def backwards(problem: Problem) -> Problem:
     """Return the problem of a path the other way round."""
-    turned = mirrored(problem.relaxations, problem.path.duration)
-    path = Reversed(problem.path)
-    return replace(problem, path=path, start=None, relaxations=turned)
+    turned = problem.along(Reversed, reversing(problem.path.duration))
+    return replace(problem, **turned, start=None)
 
 
 def backwards_plan(plan: Plan) -> Plan:

@@ -11,7 +11,7 @@ from selfmotion.certificate import USUAL, Tolerance
 from selfmotion.collision import Obstacle, obstacle_from_dict
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.costs import cost_from_dict
-from selfmotion.job.seam import JOB_END, JOB_START, Seam, mirrored, one_way
+from selfmotion.job.seam import JOB_END, JOB_START, Seam, one_way, reversing
 from selfmotion.job.step import Step
 from selfmotion.path import Path, Reversed
 from selfmotion.result import Asked, Piece, Plan, elsewhere, not_judged_by
@@ -103,12 +103,12 @@ class Specification:
         if step.turned and not seam.either_way:
             yield f"seam '{seam.name}' is made from its end to its start"
         kept = [item for item in seam.constraints if item.applies(robot)]
-        duration = seam.path.duration
+        turned = (item.moved(reversing(seam.path.duration)) for item in seam.relaxations)
         asked = Asked(
             robot,
             Reversed(seam.path) if step.turned else seam.path,
             Task.of(seam.task),
-            mirrored(seam.relaxations, duration) if step.turned else seam.relaxations,
+            [item for item in turned if item] if step.turned else seam.relaxations,
             kept,
             tolerance=self.tolerance,
         )

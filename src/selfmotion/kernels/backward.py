@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from selfmotion.basics import Array, called, inlined, kernel
-from selfmotion.basics.layout import KIND, NO_ANGLE, POINTING, Layout
+from selfmotion.basics.layout import KIND, POINTING, Layout
 from selfmotion.kernels.algebra import add_angular, angular, angular_part, cross, plus, respond
 from selfmotion.kernels.contraction import Every, contract, contract_every
 from selfmotion.kernels.damping import Law, damping_slope, pull_damping
@@ -30,8 +30,6 @@ class Space(NamedTuple):
         What a stage's pullback gives.
     by_slope : (4, n)
         The last four of `by_q`.
-    by_target : (F, 12)
-        What a stage's pullback gives to the paths of F tips.
     """
 
     w: Array
@@ -44,12 +42,11 @@ class Space(NamedTuple):
     by_epsilon: Array
     by_q: Array
     by_slope: Array
-    by_target: Array
 
 
 @inlined
-def space_of(space: Array, n: int, m: int, tips: int) -> Space:
-    """Return the parts of the array to work in, for n joints and m rows of so many tips."""
+def space_of(space: Array, n: int, m: int) -> Space:
+    """Return the parts of the array to work in, for n joints and m rows."""
     return Space(
         w=view(space, 0, (n,)),
         z=view(space, n, (m,)),
@@ -61,13 +58,12 @@ def space_of(space: Array, n: int, m: int, tips: int) -> Space:
         by_epsilon=view(space, 7 * n + m + 24, (n,)),
         by_q=view(space, 8 * n + m + 24, (n,)),
         by_slope=view(space, 9 * n + m + 24, (4, n)),
-        by_target=view(space, 13 * n + m + 24, (tips, 12)),
     )
 
 
-def space_size(n: int, m: int, tips: int) -> int:
+def space_size(n: int, m: int) -> int:
     """Return how long the array to work in is."""
-    return 13 * n + m + 24 + 12 * tips
+    return 13 * n + m + 24
 
 
 @called
@@ -82,16 +78,13 @@ def pull_stage(
     space: Space,
     error_bar: Array,
     epsilon_bar: Array,
-    target_bar: Array,
 ) -> None:
     """Pull the cotangents `space.w` on q̇ and ē (F, 6) on the pose errors back.
 
-    To ε (set), q (added to `space.by_q`) and the paths (set). z = -A⁻¹Jw and ε̄ = w + Jᵀz are eq. 4
-    itself, for ε = w and u = 0; q̄ = ⟨y ε̄ᵀ + z q̇ᵀ, ∂J/∂q⟩ + (ēᵀ - zᵀS K) ∂e/∂q, and where the
-    angular rows are in tool axes, -zᵀ ∂S u. Damping adds (λ0² zᵀy + K zᵀS e) ∂f, see
-    `pull_damping`; K is (1 - f) times the `gain`. Stage s of `every` has the columns of all joints
-    where some mimic others. A path's cotangent (12,) is that of its pose
-    [m, rad], then -Sᵀz of its twist.
+    To ε (set) and q (added to `space.by_q`). z = -A⁻¹Jw and ε̄ = w + Jᵀz are eq. 4 itself, for
+    ε = w and u = 0; q̄ = ⟨y ε̄ᵀ + z q̇ᵀ, ∂J/∂q⟩ + (ēᵀ - zᵀS K) ∂e/∂q, and where the angular rows are
+    in tool axes, -zᵀ ∂S u. Damping adds (λ0² zᵀy + K zᵀS e) ∂f, see `pull_damping`; K is (1 - f)
+    times the `gain`. Stage s of `every` has the columns of all joints where some mimic others.
     """
     m = rows_of(layout)
     at = stage_of(row, n, m)
@@ -103,7 +96,7 @@ def pull_stage(
     if law is not None and fade > 0.0:
         slope = damping_slope(row, n, layout, gain, space.z)
     for f in range(layout.shape[0]):
-        tip, back = tip_of(row, f, n, m), target_bar[f]
+        tip = tip_of(row, f, n, m)
         unselect(layout, f, tip.rotation, at.y, space.full_y)
         unselect(layout, f, tip.rotation, space.z, space.full_z)
         for i in range(6):
@@ -119,12 +112,6 @@ def pull_stage(
             space.by_error,
             space.twist,
         )
-        # Moved together, target and tip turn the error with them: ∂e = ω × e.
-        for i in range(6):
-            back[i], back[6 + i] = -space.twist[i], -space.full_z[i]
-        if layout[f, KIND] != NO_ANGLE:
-            turned = cross(angular_part(tip.error), angular_part(space.by_error))
-            add_angular(back, 1.0, turned)
         if layout[f, KIND] == POINTING:
             pull_axes(at, tip, epsilon_bar, space)
         if law is not None and fade > 0.0:
@@ -162,16 +149,15 @@ def pullback(
     work: Array,
     epsilon_bar: Array,
     start_bar: Array,
-    target_bar: Array,
 ) -> None:
     """Reverse the Runge-Kutta recursion: cotangents on all stages → start (n,).
 
-    Sets those of ε (S, n), of the start (n,) and of the paths (S, F, 12), see `pull_stage`.
+    Sets those of ε (S, n) and of the start (n,), see `pull_stage`.
 
     A stage's slope acts on the later stages of its step and on the step's end.
     """
     (count, n), m = q_cotangent.shape, rows_of(layout)
-    space = space_of(work, n, m, layout.shape[0])
+    space = space_of(work, n, m)
     by_slope = space.by_slope
     for s in range(count - 1, -1, -1):
         at = stage_of(table[s], n, m)
@@ -184,7 +170,7 @@ def pullback(
                     w += by_slope[i + 1, k] * (h if i == 2 else 0.5 * h)
             space.w[k] = w
             space.by_q[k] = q_cotangent[s, k]
-        cotangents = error_cotangent[s], epsilon_bar[s], target_bar[s]
+        cotangents = error_cotangent[s], epsilon_bar[s]
         pull_stage(table[s], n, layout, gain, law, every, s, space, *cotangents)
         for k in range(n):
             by_slope[i, k] = space.by_q[k]
@@ -205,21 +191,19 @@ def sensitivities(
     no_error: Array,
     epsilon_matrix: Array,
     start_matrix: Array,
-    target_matrix: Array | None,
     q_matrix: Array,
     qd_matrix: Array,
 ) -> None:
     """Set ∂q/∂x and ∂q̇/∂x at all stages, (S, n, d).
 
-    For ∂ε/∂x = `epsilon_matrix` (S, n, d), ∂q(0)/∂x = `start_matrix` (n, d) and that of the path's
-    poses and twists, `target_matrix` (S, F, 12, d), or None where the paths are fixed.
+    For ∂ε/∂x = `epsilon_matrix` (S, n, d) and ∂q(0)/∂x = `start_matrix` (n, d).
 
-    The tangent of the Runge-Kutta recursion: ∂q̇ = (I - J⁺J) ∂ε + (∂q̇/∂q) ∂q + (∂q̇/∂path) ∂path
-    at every stage. The rows of the matrices are pullbacks of the unit vectors.
+    The tangent of the Runge-Kutta recursion: ∂q̇ = (I - J⁺J) ∂ε + (∂q̇/∂q) ∂q at every stage. The
+    rows of the matrices are pullbacks of the unit vectors.
     """
     count, n, d = epsilon_matrix.shape
     m = rows_of(layout)
-    space = space_of(work, n, m, layout.shape[0])
+    space = space_of(work, n, m)
     for j in range(n):
         for x in range(d):
             q_matrix[0, j, x] = start_matrix[j, x]
@@ -228,19 +212,8 @@ def sensitivities(
         for j in range(n):
             for k in range(n):
                 space.w[k], space.by_q[k] = (1.0 if k == j else 0.0), 0.0
-            pull_stage(
-                table[s],
-                n,
-                layout,
-                gain,
-                law,
-                every,
-                s,
-                space,
-                no_error,
-                space.by_epsilon,
-                space.by_target,
-            )
+            cotangents = no_error, space.by_epsilon
+            pull_stage(table[s], n, layout, gain, law, every, s, space, *cotangents)
             # Along x inside: neighbours in memory, several at once.
             slope = qd_matrix[s, j]
             slope[:] = 0.0
@@ -249,11 +222,6 @@ def sensitivities(
                     slope[x] += space.by_epsilon[k] * epsilon_matrix[s, k, x]
                 for x in range(d):
                     slope[x] += space.by_q[k] * q_matrix[s, k, x]
-            if target_matrix is not None:
-                for f in range(layout.shape[0]):
-                    for k in range(12):
-                        for x in range(d):
-                            slope[x] += space.by_target[f, k] * target_matrix[s, f, k, x]
         if s + 1 < count:
             step_matrix(q_matrix, qd_matrix, s, at.step[0])
 

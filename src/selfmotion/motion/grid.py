@@ -45,6 +45,14 @@ class Grid:
         cut = middles if where is None else middles[where]
         return Grid(read_only(np.sort(np.concatenate([self.nodes, cut]))))
 
+    def graded(self, most: float) -> "Grid":
+        """Return the grid with steps halved until none is so many times one beside it."""
+        steps = np.diff(self.nodes)
+        beside = np.minimum(np.append(steps[1:], np.inf), np.append(np.inf, steps[:-1]))
+        # Rounding makes no step longer.
+        long = steps > most * (1.0 + 1e-6) * beside
+        return self.halved(long).graded(most) if long.any() else self
+
     def with_steps(self, fewest: int) -> "Grid":
         """Return the grid halved until it has so many steps."""
         return self if self.steps >= fewest else self.halved().with_steps(fewest)

@@ -9,6 +9,7 @@ from selfmotion import kernels
 from selfmotion.basics import Array
 from selfmotion.follow import Follows
 from selfmotion.nodes.kernels import look, pull
+from selfmotion.robot import null_space
 
 # Rates along a motion are differences over this share of its duration.
 _STEP = 1e-5
@@ -53,7 +54,8 @@ class Charts:
     """Charts of the self-motion manifolds of all nodes, around a motion on the path.
 
     The coordinates of a node are z (r,), where it is on its manifold, and ν (r,), its null motion
-    in eq. 4, q̇ = J⁺ẋ + (I - J⁺J) N0 ν.
+    in eq. 4, q̇ = J⁺ẋ + (I - J⁺J) N0 ν. Where joints are held at 0, they move no tip, and the last
+    coordinates are theirs.
 
     Attributes
     ----------
@@ -112,7 +114,7 @@ class Charts:
         z = np.ascontiguousarray(z)
         given = own.targets, own.chains, own.layout
         along = len(q) // own.copies if carried else 0
-        failed = look(q, z, bases, self.q, *given, table, tangents, centred, along)
+        failed = look(q, z, bases, self.q, *given, table, tangents, own.held, centred, along)
         if failed >= 0 and own.is_whole:
             return None
         return Place(q, np.array(qd), tangents, table)
@@ -155,7 +157,7 @@ class Manifolds:
         self.follows, self.t, self.copies = follows, np.tile(t, copies), copies
         self.chains, self.layout = follows.chains, follows.layout
         self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
-        self.work = np.zeros(kernels.space_size(*self._sizes))
+        self.work = np.zeros(kernels.space_size(*self._sizes[:2]))
         self.no_error = np.zeros((len(follows.items), 6))
         # A moment before each node and after: one step back, one on; at the ends of the path both
         # inside.
@@ -173,6 +175,7 @@ class Manifolds:
             parts = own.translation, own.rotation.reshape(-1, 9), own.twist
             path = np.hstack([part[: len(t)] for part in parts])
             self._paths.append(np.tile(path, (copies, 1)))
+        self.held = np.tile(follows.held(t), (copies, 1))
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
 
     def table(self) -> Array:
@@ -187,6 +190,42 @@ class Manifolds:
         """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
         return kernels.rates_of(table, self.follows.robot.dof)
 
+    def with_held_last(self, q: Array, bases: Array) -> Array:
+        """Return bases (N + 1, n, r) at q (N + 1, n) whose last vectors are those of held joints.
+
+        These move no tip, so that they are in the null spaces. Where they are last already, bases
+        stay as they are.
+        """
+        found = bases.copy()
+        for k in np.flatnonzero(self.held.any(axis=1)):
+            self._put_held_last(int(k), q[k], found)
+        return found
+
+    def _put_held_last(self, k: int, q: Array, bases: Array) -> None:
+        joints = np.flatnonzero(self.held[k])
+        unit = np.eye(bases.shape[1])[:, joints]
+        if not len(joints) or np.array_equal(bases[k, :, -len(joints) :], unit):
+            return
+        moving = np.delete(np.arange(len(unit)), joints)
+        free = null_space(self.follows.jacobian(q)[:, moving])
+        own = np.zeros((len(unit), free.shape[1]))
+        # As near as may be to what they were.
+        left, _, right = np.linalg.svd(free.T @ bases[k, moving, : free.shape[1]])
+        own[moving] = free @ (left @ right)
+        bases[k] = np.hstack([own, unit])
+
+    def _bases(self, q: Array) -> Array:
+        """Return bases of the null spaces at q (N + 1, n), each turned to the one before."""
+        rows = np.where(self.held[:, None], 0.0, self.follows.jacobians(q))
+        spaces = np.ascontiguousarray(null_space(rows))
+        for k in range(len(q)):
+            first = k % (len(q) // self.copies) == 0
+            if not first:
+                left, _, right = np.linalg.svd(spaces[k].T @ spaces[k - 1])
+                spaces[k] = spaces[k] @ (left @ right)
+            self._put_held_last(k, q[k], spaces)
+        return spaces
+
     def near(self, q: Array, epsilon: Array) -> Centred | None:
         """Return charts around the nodes nearest to q, with what of ε acts there, (N + 1, n) each.
 
@@ -194,10 +233,14 @@ class Manifolds:
         not come onto its manifold.
         """
         n, m, _ = self._sizes
+        none = np.zeros((len(q), n - m))
+        if self.held.any():
+            q, epsilon = (np.where(self.held, 0.0, x) for x in (q, epsilon))
+            return Charts(self, q, self._bases(q)).centred(none, epsilon)
         bases = np.zeros((len(q), n, n - m))
         for first in range(0, len(q), len(q) // self.copies):
             bases[first] = self.follows.null_basis(q[first])
-        return Charts(self, q, bases).centred(np.zeros((len(q), n - m)), epsilon, carried=True)
+        return Charts(self, q, bases).centred(none, epsilon, carried=True)
 
     def accelerations(self, place: Place) -> Array:
         """Return the least q̈ by which nodes follow the path, (N + 1, n): J⁺(ẍ - J̇q̇).

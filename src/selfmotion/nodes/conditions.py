@@ -169,6 +169,47 @@ class NodeConditions:
             first += own
         return found
 
+    @property
+    def any_at_once(self) -> bool:
+        """Whether some conditions count at once: what is best without them is far off."""
+        return any(self._at_once)
+
+    @property
+    def _at_once(self) -> list[bool]:
+        return [getattr(item, "counts_at_once", False) for item in self.constraints]
+
+    def at_once(self) -> Ints:
+        """Return which conditions do."""
+        each = np.array(self._at_once, dtype=np.bool_)
+        return np.flatnonzero(np.tile(np.repeat(each, self._counts), 2))
+
+    def bending(
+        self, samples: CheckedSamples, prices: Array, changes: Array
+    ) -> tuple[Array, Array] | None:
+        """Return Σ prices · ∂²h/∂w² of conditions that are sums of squares: what they bend by.
+
+        By w of each node, (N + 1, 2r, 2r), and by w of both ends of each interval, (N, 4r, 4r);
+        None where there are none. `prices` are (N + 1, C).
+        """
+        count, _, _, size = changes.shape
+        nodes, intervals = np.zeros((count, size, size)), np.zeros((count - 1, 2 * size, 2 * size))
+        found, middle = False, self.spline.between[0]
+        for item, own in zip(self.constraints, self.by_constraint(prices), strict=True):
+            squares = getattr(item, "squares", None)
+            if squares is None or not own.any():
+                continue
+            found = True
+            # (2 N + 1, c, n), each with its price.
+            slopes = np.sqrt(np.abs(own))[:, :1, None] * squares(samples)
+            at_node = slopes[::2] @ changes[:, 0]
+            nodes += np.swapaxes(at_node, 1, 2) @ at_node
+            both = np.concatenate(
+                [weighted(middle[:, :2], changes[:-1]), weighted(middle[:, 2:], changes[1:])], 2
+            )
+            between = slopes[1::2] @ both
+            intervals += np.swapaxes(between, 1, 2) @ between
+        return (nodes, intervals) if found else None
+
     def of_bodies(self) -> Flags:
         """Return which conditions are distances of bodies, (C,)."""
         each = [isinstance(item, BoundClearance) for item in self.constraints]

@@ -6,42 +6,12 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array, read_only
-from selfmotion.costs import Samples, TipSamples
+from selfmotion.costs import PlacedLater
 from selfmotion.follow import Follows
-from selfmotion.motion import Sampling, Trajectory
+from selfmotion.motion import Trajectory
 from selfmotion.nodes.spline import SHARES, Hermite
 
 _SAMPLES = len(SHARES)
-
-
-class PlacedLater(Samples):
-    """A motion as costs and constraints see it; tips are placed when they are asked for.
-
-    Parameters
-    ----------
-    follows : Follows
-    sampling : Sampling
-    given : arrays
-        By name: q and q̇ (S, n), where they are not known otherwise.
-    """
-
-    def __init__(self, follows: Follows, sampling: Sampling, **given: Array) -> None:
-        for name, value in {"sampling": sampling, "follows": follows, **given}.items():
-            object.__setattr__(self, name, value)
-
-    @cached_property
-    def _placed(self) -> Samples:
-        return Samples.along(self.follows, self.sampling, self.q, self.qd)
-
-    @cached_property
-    def tips(self) -> tuple[TipSamples, ...]:
-        """See `Samples`."""
-        return self._placed.tips
-
-    @cached_property
-    def task_jacobian(self) -> Array:
-        """See `Samples`."""
-        return self._placed.task_jacobian
 
 
 class _WithRates(PlacedLater, ABC):
@@ -109,7 +79,7 @@ class HermiteSamples(_WithRates):
 
     def forget(self) -> None:
         """Let go of what can be computed anew."""
-        for name in ("checked", "q", "qd", "qdd", "qddd", "_placed"):
+        for name in ("checked", "q", "qd", "qdd", "qddd", "_placed", "_of_arm"):
             self.__dict__.pop(name, None)
 
     def _of_order(self, order: int) -> Array:

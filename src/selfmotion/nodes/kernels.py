@@ -11,7 +11,7 @@ from math import sqrt
 
 import numpy as np
 
-from selfmotion.basics import Array, inlined, kernel
+from selfmotion.basics import Array, Flags, inlined, kernel
 from selfmotion.basics.layout import Layout
 from selfmotion.kernels import (
     Every,
@@ -50,6 +50,7 @@ def look(
     layout: Layout,
     table: Array,
     tangents: Array,
+    held: Flags,
     centred: bool,
     carried: int,
 ) -> int:
@@ -60,8 +61,9 @@ def look(
     `tangents` (K, n, r). Or, `centred`, an orthonormal basis of the null space instead of T, and of
     ε what is in it: the same motion in charts around it. Where bases are to be `carried`, along
     motions of so many nodes, the first is that of a motion's first node, and each other one becomes
-    what is found at the node before; 0 for none. Returns the first node for which that is
-    impossible, or -1; of all such nodes, q̇ is no number.
+    what is found at the node before; 0 for none. Joints that are `held` (K, n) at 0 move no tip;
+    see `Charts`. Returns the first node for which that is impossible, or -1; of all such nodes, q̇
+    is no number.
     """
     failed = -1
     (count, n), m, r = q.shape, rows_of(layout), bases.shape[2]
@@ -83,6 +85,7 @@ def look(
                 here[j] += bases[k, j, x] * coordinates[k, x]
         for _ in range(_STEPS):
             place_tips(here, chains, turns, places, rotations, positions, jacobians)
+            _hold(held[k], jacobians)
             off = approach(
                 here,
                 jacobians,
@@ -140,6 +143,16 @@ def look(
 
 
 @inlined
+def _hold(held: Flags, jacobians: Array) -> None:
+    """Clear the columns of joints that are held, (n,), in Jacobians (F, 6, n)."""
+    for j in range(len(held)):
+        if held[j]:
+            for f in range(jacobians.shape[0]):
+                for i in range(6):
+                    jacobians[f, i, j] = 0.0
+
+
+@inlined
 def _centre(tangents: Array, epsilon: Array, rest: Array) -> None:
     """Make tangents (n, r) orthonormal by Gram-Schmidt, and ε what of it they span."""
     n, r = tangents.shape
@@ -192,23 +205,11 @@ def pull(
 ) -> None:
     """Set `out` (K, 2 r) to the derivatives by (z, ν) of what has these by q and q̇ (K, n) each."""
     (count, n), m, r = by_q.shape, rows_of(layout), bases.shape[2]
-    space = space_of(work, n, m, layout.shape[0])
+    space = space_of(work, n, m)
     for k in range(count):
         for j in range(n):
             space.w[j], space.by_q[j] = by_qd[k, j], by_q[k, j]
-        pull_stage(
-            table[k],
-            n,
-            layout,
-            0.0,
-            None,
-            every,
-            k,
-            space,
-            no_error,
-            space.by_epsilon,
-            space.by_target,
-        )
+        pull_stage(table[k], n, layout, 0.0, None, every, k, space, no_error, space.by_epsilon)
         for x in range(r):
             along, free = 0.0, 0.0
             for j in range(n):
@@ -225,12 +226,13 @@ def follow(
     targets: Array,
     chains: Array,
     layout: Layout,
+    held: Flags,
     q: Array,
 ) -> int:
     """Set q (K, n) to configurations on targets (K, 12 F), each near the one before it.
 
-    From one to the next, the self-motion goes a `share` (K,) of the way to `wanted` (n,). Returns
-    the first one that is not to be had, or -1.
+    From one to the next, the self-motion goes a `share` (K,) of the way to `wanted` (n,); joints
+    that are `held` (K, n) are at 0. Returns the first one that is not to be had, or -1.
     """
     (count, n), m, tips = q.shape, rows_of(layout), layout.shape[0]
     turns, places = np.empty((chains.shape[1], 3, 3)), np.empty((chains.shape[1], 3))
@@ -240,8 +242,12 @@ def follow(
     way, here = np.empty(n), start.copy()
     for k in range(count):
         off = np.inf
+        for j in range(n):
+            if held[k, j]:
+                here[j] = 0.0
         for i in range(_STEPS):
             place_tips(here, chains, turns, places, rotations, positions, jacobians)
+            _hold(held[k], jacobians)
             errors_and_rows(layout, targets[k], jacobians, rotations, positions, b, rows)
             off = 0.0
             for x in range(m):
@@ -249,7 +255,7 @@ def follow(
                     off = abs(b[x])
             # First Jᵀ(JJᵀ)⁻¹(e - J p) + p: towards what is wanted by p, then what is left of e.
             for j in range(n):
-                way[j] = share[k] * (wanted[j] - here[j]) if i == 0 else 0.0
+                way[j] = share[k] * (wanted[j] - here[j]) if i == 0 and not held[k, j] else 0.0
             for x in range(m):
                 for j in range(n):
                     b[x] -= rows[x, j] * way[j]

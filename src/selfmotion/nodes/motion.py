@@ -1,7 +1,7 @@
 """A motion on its path, given by its nodes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -57,6 +57,8 @@ class NodeGrid:
     cost : NodeCost
     conditions : NodeConditions
     ends : NodeEnds
+    is_continuous : bool
+        Whether they are kept so at all nodes.
     continuity : Continuity or None
     held : (k,)
         Numbers of the coordinates w (N + 1, 2r), in one row, that stay as they are.
@@ -78,7 +80,10 @@ class NodeGrid:
         self.manifolds = Manifolds(follows, t, copies)
         copies = self.manifolds.copies
         self.spline = Hermite(t, copies)
-        self.continuity = Continuity(problem, self.spline) if continuous else None
+        self.is_continuous = continuous
+        self.continuity = None
+        if continuous or (follows.edges and copies == 1):
+            self.continuity = Continuity(problem, self.spline, everywhere=continuous)
         smoothing = smoothing_at_rest(problem, self.spline)
         self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
         ends = [item for item in constraints if isinstance(item, BoundEnd)]
@@ -91,7 +96,10 @@ class NodeGrid:
         ends = np.array([0, len(t) - 1])[np.array(problem.rests)]
         self._resting = (ends + len(t) * np.arange(copies)[:, None]).ravel()
         held += [2 * r * node + r + np.arange(r) for node in self._resting]
-        self.held = np.concatenate([np.zeros(0, dtype=np.int64), *held])
+        for node, count in enumerate(self.manifolds.held.sum(axis=1)):
+            last = 2 * r * node + np.arange(r - count, r)
+            held += [last, last + r] if count else []
+        self.held = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *held]))
 
     @property
     def t(self) -> Array:
@@ -100,7 +108,7 @@ class NodeGrid:
 
     def on(self, t: Array) -> "NodeGrid":
         """Return the same on other nodes."""
-        return self._other(t, continuous=self.continuity is not None)
+        return self._other(t, continuous=self.is_continuous)
 
     @property
     def continuous(self) -> "NodeGrid":
@@ -136,6 +144,10 @@ class NodeGrid:
 
     def around(self, charts: Charts, qd: Array) -> "NodeMotion | None":
         """Return the motion at z = 0 of charts whose velocities are nearest to q̇, or None."""
+        own = self.manifolds.held
+        if own.any():
+            q = np.where(own, 0.0, charts.q)
+            charts = replace(charts, q=q, bases=self.manifolds.with_held_last(q, charts.bases))
         found = charts.centred(np.zeros((len(qd), charts.bases.shape[2])), self._free(qd))
         return None if found is None else self.at(*found)
 
@@ -145,7 +157,7 @@ class NodeGrid:
 
     def _free(self, qd: Array) -> Array:
         """Return what velocities are where the arm does not rest."""
-        found = qd.copy()
+        found = np.where(self.manifolds.held, 0.0, qd)
         found[self._resting] = 0.0
         return found
 
@@ -158,7 +170,7 @@ class NodeGrid:
         own = self.manifolds
         q = np.empty((len(self.t), len(start)))
         share = np.minimum(np.append(0.0, np.diff(self.t)) / time, 1.0)
-        if follow(start, wanted, share, own.targets, own.chains, own.layout, q) >= 0:
+        if follow(start, wanted, share, own.targets, own.chains, own.layout, own.held, q) >= 0:
             return None
         return self.near(q, np.asarray(np.gradient(q, self.t, axis=0)))
 
@@ -219,7 +231,7 @@ class NodeMotion:
     def ends_of_limits(self) -> Flags:
         """Near which intervals a limit of accelerations begins or ends to bind, (N,)."""
         changes = np.zeros(len(self.along) + 3, dtype=np.bool_)
-        if self.grid.continuity is not None:
+        if self.grid.is_continuous:
             changes[2:-2] = self.along[1:] != self.along[:-1]
         # Two intervals before, and two after.
         return changes[:-3] | changes[1:-2] | changes[2:-1] | changes[3:]
@@ -318,6 +330,7 @@ class NodeMotion:
         bases = self.charts.bases
         qdd += (bases @ (np.swapaxes(bases, 1, 2) @ near[:, :, None]))[:, :, 0]
         self._calm(qdd, near)
+        qdd[self.grid.manifolds.held] = 0.0
         for order, node in zip(problem.rest_orders, (0, -1), strict=True):
             if order > 1:
                 qdd[node] = 0.0

@@ -120,12 +120,18 @@ class _Solver:
         around = Around.of(motion.charts, motion.nu, by_prices)
         if around is None:
             return Status.GRADIENT
+        curved = around.curvature
         rows, by_jumps = self._rows(around), self._by_jumps(around)
         ends = motion.grid.ends.border(motion.c, around.changes, motion.grid.held)
         intervals = motion.grid.cost.curvature(motion.samples, motion.partials, around.changes)
+        if self._columns.size:
+            conditions = motion.grid.conditions
+            bending = conditions.bending(motion.samples.checked, prices, around.changes)
+            if bending is not None:
+                curved, intervals = curved + bending[0], intervals + bending[1]
         gap = motion.wanted[:, self._columns] + self._slacks
         while True:
-            step = self._step(gradient, around.curvature, intervals, by_jumps, rows, gap, ends)
+            step = self._step(gradient, curved, intervals, by_jumps, rows, gap, ends)
             if step is None:
                 return Status.GRADIENT
             by_slack, by_price = self._others(rows, gap, step)

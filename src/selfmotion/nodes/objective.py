@@ -19,10 +19,10 @@ from functools import cached_property
 import numpy as np
 
 from selfmotion.basics import Array
-from selfmotion.costs import Cost, Partials, Samples
+from selfmotion.costs import Cost, Partials, PlacedLater, Samples
 from selfmotion.follow import Follows
 from selfmotion.nodes.charts import Charts, orthonormal
-from selfmotion.nodes.hermite import HermiteSamples, PlacedLater
+from selfmotion.nodes.hermite import HermiteSamples
 from selfmotion.nodes.smoothness import Smoothing
 from selfmotion.nodes.spline import SHARES, Hermite
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from selfmotion.basics import Array
 from selfmotion.costs import JointVelocity
-from selfmotion.costs.base import weight_matrix
 from selfmotion.nodes.hermite import HermiteSamples
 from selfmotion.nodes.spline import Hermite, weighted
 from selfmotion.problem import Problem
@@ -36,18 +35,30 @@ class Smoothing:
 
 
 def smoothing_at_rest(problem: Problem, spline: Hermite) -> Smoothing | None:
-    """Return what makes the self-motion start and stop as the arm does where it rests."""
+    """Return what makes the self-motion start and stop as the arm does where it rests.
+
+    And what makes joints do so that are held for a while.
+    """
     orders = [order for cost in problem.all_costs for order in cost.curvature(problem.robot.dof)]
-    if not any(problem.rests) or max(orders, default=0) > 1:
+    edges = problem.follows.edges
+    if not (any(problem.rests) or len(edges)) or max(orders, default=0) > 1:
         return None
     duration, t = problem.path.duration, spline.sampling.t[:-1].reshape(-1, 4)
     starting = _STARTING * duration
-    near = np.zeros_like(t, dtype=bool)
-    for rest, end in zip(problem.rests, (0.0, duration), strict=True):
-        near |= rest & (np.abs(t - end) <= _NEAR_REST * starting)
-    usual = JointVelocity.usual(problem.robot)
-    weight = weight_matrix(np.asarray(usual.weight), problem.robot.dof)
-    return Smoothing(np.where(near, starting**2, 0.0), weight)
+    ends = [end for rest, end in zip(problem.rests, (0.0, duration), strict=True) if rest]
+    shares = np.zeros_like(t)
+    for end in (*ends, *edges):
+        # Fading out: where it ended at once, velocities would jump.
+        far = np.abs(t - end) / (_NEAR_REST * starting)
+        shares = np.maximum(shares, np.maximum(1.0 - far**2, 0.0) ** 3)
+    return Smoothing(starting**2 * shares, np.diag(_weights(problem)))
+
+
+def _weights(problem: Problem) -> Array:
+    """Return what the squares of rates weigh, (n,): of virtual joints nothing, as in costs."""
+    arm, found = problem.asked.robot, np.zeros(problem.robot.dof)
+    found[: arm.dof] = np.asarray(JointVelocity.usual(arm).weight)
+    return found
 
 
 class Continuity:
@@ -55,27 +66,32 @@ class Continuity:
 
     A cubic Hermite spline's q̈ may jump at its nodes. Where limits of acceleration bind, the best
     motion makes use of that, and an arm's, whose q̈ cannot jump, goes beyond the limits there:
-    ½ Σ w_k jump_kᵀ W jump_k keeps it from that.
+    ½ Σ w_k jump_kᵀ W jump_k keeps it from that. So it does where joints begin and end to be held.
 
     Parameters
     ----------
     problem : Problem
         At its knots accelerations may jump; where its arm rests, they begin and end at 0.
     spline : Hermite
+    everywhere : bool
+        Whether at all nodes, or only where joints begin and end to be held.
     """
 
-    def __init__(self, problem: Problem, spline: Hermite) -> None:
+    def __init__(self, problem: Problem, spline: Hermite, *, everywhere: bool) -> None:
         self._spline = spline
-        shorter = np.minimum(spline.steps[1:], spline.steps[:-1])
         weights = np.zeros(len(spline.t))
-        weights[1:-1] = _STRENGTH * shorter**3
-        weights[np.isin(spline.t, problem.knots)] = 0.0
-        for node, order in zip((0, -1), problem.rest_orders, strict=True):
-            if order > 1:
-                weights[node] = _STRENGTH * spline.steps[node] ** 3
-        usual = JointVelocity.usual(problem.robot)
-        root = np.linalg.cholesky(weight_matrix(np.asarray(usual.weight), problem.robot.dof))
-        self._scales = np.sqrt(weights)[:, None, None] * root.T
+        if everywhere:
+            shorter = np.minimum(spline.steps[1:], spline.steps[:-1])
+            weights[1:-1] = _STRENGTH * shorter**3
+            weights[np.isin(spline.t, problem.knots)] = 0.0
+            for node, order in zip((0, -1), problem.rest_orders, strict=True):
+                if order > 1:
+                    weights[node] = _STRENGTH * spline.steps[node] ** 3
+        for edge in problem.follows.edges:
+            node = int(np.argmin(np.abs(spline.t - edge)))
+            weights[node] = _STRENGTH * (_STARTING * problem.path.duration) ** 3
+        root = np.diag(np.sqrt(_weights(problem)))
+        self._scales = np.sqrt(weights)[:, None, None] * root
 
     def jumps(self, samples: HermiteSamples) -> Array:
         """Return the weighed jumps, (N + 1, n)."""

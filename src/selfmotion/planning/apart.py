@@ -13,12 +13,12 @@ Apart = Callable[[Array, Array], Array]
 
 def apart_of(robot: RobotModel) -> Apart:
     """Return how far motions of an arm are from each other, at most, up to whole turns."""
-    turning = robot.is_revolute
+    turning, sizes = robot.is_revolute, robot.coordinate_sizes
 
     def apart(motion: Array, others: Array) -> Array:
         difference = others - motion
         turns = np.round(difference / (2.0 * np.pi))
-        away = np.abs(difference - 2.0 * np.pi * turns * turning)
+        away = sizes * np.abs(difference - 2.0 * np.pi * turns * turning)
         return np.asarray(away.max(axis=(1, 2)))
 
     return apart

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from selfmotion.basics import BreakdownError, InverseKinematicsError, NoSequenceError
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.long_paths import is_long, keep_to_posture
-from selfmotion.planning.refusal import begins_off_path, looked_at, no_way
+from selfmotion.planning.refusal import looked_at, no_way
 from selfmotion.planning.sequences import optimise_sequences
 from selfmotion.planning.session import Session
 from selfmotion.planning.settings import SECOND_EFFORT, VERY_LONG_WAY
 from selfmotion.planning.starts import optimise_starts
-from selfmotion.planning.warm_start import start_of
+from selfmotion.planning.warm_start import on_start
 from selfmotion.result import Attempt
-from selfmotion.search import guides, guides_near
+from selfmotion.search import guides
 
 
 def go_through(draft: Draft) -> None:
@@ -74,10 +74,8 @@ def _plan_before_blocked_pose(draft: Draft) -> bool:
         return False
     told = blocked.help.removeprefix("; ")
     draft.notes += [told] if told else []
-    # A part would begin on the path itself, which relaxed rows only let the arm be near.
-    off = begins_off_path(draft.problem, draft.search)
     try:
-        found = not off and draft.prove_part(blocked.time)
+        found = draft.prove_part(blocked.time)
     except InverseKinematicsError:
         found = False
     if not found:
@@ -102,7 +100,7 @@ def _begin_at_plan(draft: Draft) -> bool:
     if plan is None or not draft.is_free:
         return False
     try:
-        start = start_of(plan, draft.problem)
+        start = on_start(draft.problem, plan.trajectory.q[0])
     except InverseKinematicsError as error:
         draft.failure = error
         return True
@@ -168,19 +166,10 @@ def _prove_on_meshes(draft: Draft) -> bool:
 def _search_globally(draft: Draft) -> bool:
     """Optimise from the best chains of configurations over all self-motions."""
     wanted = draft.search.compare or (draft.chooses_globally and draft.is_unmet)
-    can = draft.is_searchable and not draft.is_off_path and (draft.is_free or draft.best)
+    can = draft.is_searchable and (draft.is_free or draft.best)
     if not (draft.is_sought and wanted and can) or draft.is_out_of_reach():
         return False
     optimise_sequences(draft, guides, chosen=draft.chooses_globally)
-    return True
-
-
-def _search_off_path(draft: Draft) -> bool:
-    """Do so with the tool off its path, as far as rows are relaxed."""
-    can = bool(draft.problem.relaxations) and (draft.chooses_globally or draft.is_off_path)
-    if not (draft.is_sought and draft.is_unmet and can) or draft.is_out_of_reach():
-        return False
-    optimise_sequences(draft, guides_near, chosen=True)
     return True
 
 
@@ -284,7 +273,6 @@ ATTEMPTS: tuple[tuple[str, Callable[[Draft], bool]], ...] = (
     ("postures compared", _compare_postures),
     ("proof on meshes", _prove_on_meshes),
     ("global search", _search_globally),
-    ("search off the path", _search_off_path),
     ("more starts", _draw_more_starts),
     ("largest part", _plan_largest_part),
     ("other null motions", _take_other_null_motion),

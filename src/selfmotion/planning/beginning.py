@@ -49,7 +49,6 @@ class Beginning:
         *,
         free: bool,
         guide: Guide | None = None,
-        deviation: Array | None = None,
         grid: Grid | None = None,
         is_rough: bool = False,
     ) -> "Beginning":
@@ -65,8 +64,6 @@ class Beginning:
             Whether the start may move along its self-motion.
         guide : Guide, optional
             The null motion that stands for x = 0: where the search found one worth starting from.
-        deviation : (size,), optional
-            That of the tool from its path at x = 0, as `Deviation` has it, likewise.
         grid : Grid, optional
             To begin with; it is refined until the motion stays near the path.
         is_rough : bool
@@ -80,7 +77,7 @@ class Beginning:
         if is_rough and grid is not None:
             still, jacobians = rough_still_motion(problem, configuration, grid)
         else:
-            still, jacobians = settled_still_motion(problem, configuration, guide, deviation, grid)
+            still, jacobians = settled_still_motion(problem, configuration, guide, grid)
         effort.counts.jacobians += jacobians
         bound = problem.bind_constraints(configuration, still.end, apart=effort.apart)
         return cls(problem, effort, still, tuple(bound), free)

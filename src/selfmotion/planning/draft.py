@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from selfmotion.planning.finish import finish
 from selfmotion.planning.known import Known, Proved
 from selfmotion.planning.largest_part import LargestPart, largest_part, shorter_part
 from selfmotion.planning.refinement import settle_both
-from selfmotion.planning.refusal import leaves_path
 from selfmotion.planning.rough import Ranking, RoughMotion
 from selfmotion.planning.search import Search
 from selfmotion.planning.session import Session
@@ -35,6 +33,7 @@ class Draft:
     Attributes
     ----------
     problem : Problem
+        With its tolerances as virtual joints, see `Problem.augmented`.
     effort : Effort
         What all sessions share.
     search : Search
@@ -99,11 +98,6 @@ class Draft:
         """Whether there is anything to search: a self-motion."""
         return self.problem.follows.redundancy > 0
 
-    @cached_property
-    def is_off_path(self) -> bool:
-        """Whether the start is free, and relaxed rows have to be made use of."""
-        return self.is_free and leaves_path(self.problem, self.search)
-
     @property
     def chooses_globally(self) -> bool:
         """Whether what the global search finds may be chosen, and is not only compared with."""
@@ -113,7 +107,7 @@ class Draft:
     def takes_starts(self) -> bool:
         """Whether starts are drawn."""
         only_global = self.search.mode == "global" and self.is_searchable
-        return self.is_free and not only_global and not self.is_off_path
+        return self.is_free and not only_global
 
     @property
     def is_sought(self) -> bool:
@@ -136,7 +130,6 @@ class Draft:
         *,
         free: bool,
         guide: Guide | None = None,
-        deviation: Array | None = None,
         grid: Grid | None = None,
     ) -> Session | None:
         """Return the session of a start; None where it breaks down at once, which is noted."""
@@ -147,7 +140,6 @@ class Draft:
                 start,
                 free=free,
                 guide=guide,
-                deviation=deviation,
                 grid=grid,
             )
         except BreakdownError as error:
@@ -163,8 +155,7 @@ class Draft:
     def taken_up(self, motion: RoughMotion) -> Session | None:
         """Return the session that begins at a rough motion; None where it breaks down at once."""
         trajectory = motion.trajectory
-        # Where rows are relaxed it begins beside the path.
-        session = self.begin(trajectory.q[0], free=True, deviation=motion.deviation)
+        session = self.begin(trajectory.q[0], free=True)
         if session is not None:
             session.resume(trajectory, is_optimum=motion.cost is not None)
         return session

@@ -278,15 +278,10 @@ def _at_its_fastest(planned: Plan, problem: Problem, v: Array, a: Array) -> Plan
 
 
 def _at_pace(problem: Problem, pace: Pace) -> Problem:
-    """Return a problem along a path at another pace, with the windows of its relaxations there."""
+    """Return a problem along a path at another pace, with the windows of its tolerances there."""
     path = pace(problem.path)
-    moved = [
-        replace(item, during=tuple(path.when(np.array(item.during)).tolist()))
-        if item.during is not None and isinstance(path, Retimed)
-        else item
-        for item in problem.relaxations
-    ]
-    return replace(problem, **problem.along(pace), relaxations=moved)
+    when = path.when if isinstance(path, Retimed) else np.asarray
+    return replace(problem, **problem.along(pace, when))
 
 
 def _own(path: Path) -> Path:

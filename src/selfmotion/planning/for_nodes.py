@@ -24,7 +24,6 @@ def takes(problem: Problem, effort: Effort, constraints: Sequence[BoundConstrain
         isinstance(problem.null_motion, FreeNullMotion)
         and effort.optimizer == QuasiNewton()
         and problem.damping is None
-        and not problem.relaxations
         and problem.follows.redundancy == dof - problem.follows.dimension > 0
         and max(orders, default=0) < 3
         and all(NodeEnds.takes(item) for item in constraints if item.equality)

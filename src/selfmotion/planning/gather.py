@@ -55,9 +55,9 @@ def gathered(draft: Draft, deadline: Deadline) -> Plan:
         attempts=tuple(draft.attempts),
     )
     return Plan(
-        problem=draft.problem,
-        trajectory=motion.trajectory,
-        initial_trajectory=still.trajectory,
+        problem=draft.problem.asked,
+        trajectory=draft.problem.own(motion.trajectory),
+        initial_trajectory=draft.problem.own(still.trajectory),
         coefficients=read_only(standing.coefficients),
         report=report,
         certificate=check,

@@ -42,12 +42,12 @@ class Heats:
     def ranked(self) -> list[RoughMotion]:
         """See `Ranking`."""
         motions = (session.rolled for _, session in self._merits)
-        return [RoughMotion(one.evaluation().trajectory, one.deviation) for one in motions]
+        return [RoughMotion(one.evaluation().trajectory) for one in motions]
 
     def run(self, starts: Sequence[Array], finalists: int) -> bool:
         """See `Ranking`."""
         grid = rough_grid(self._problem)
-        problem = replace(self._problem, null_motion=self._problem.null_motion.rough)
+        problem = self._problem.changed(null_motion=self._problem.null_motion.rough)
         first_heat = max(HEATS[0][0], finalists)
         promising = most_promising(problem, starts, grid, self._apart)[:first_heat]
         for number, start in enumerate(promising, 1):

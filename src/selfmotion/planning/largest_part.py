@@ -1,6 +1,6 @@
 """The largest part of a path that the arm can follow, where it cannot follow all of it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -118,6 +118,7 @@ def largest_part(problem: Problem, reach: Reach, effort: Effort) -> LargestPart 
     attempts = []
     given = problem.given_start is not None
     few = reach.starts if given else reach.starts[:: -(-len(reach.starts) // PART_STARTS)]
+    few = [_start_of(first, problem, q) for q in few]
     starts = _apart(first, few) if effort.apart else few
     for candidate in _candidates(first, starts)[: PART_FINALISTS if given else 1]:
         attempts.append(_attempt(first, candidate, effort))
@@ -175,7 +176,8 @@ def shorter_part(problem: Problem, part: LargestPart, effort: Effort) -> Largest
     For one whose last bit is too rough: near a singular pose rates grow between its nodes.
     """
     first = _until(problem, part.problem.path.duration * (1.0 - PART_BACK))
-    attempt = _attempt(first, (part.session.motion().trajectory.q[0], None), effort)
+    start = _start_of(first, part.problem, part.session.motion().trajectory.q[0])
+    attempt = _attempt(first, (start, None), effort)
     if attempt.session is None or not attempt.arrived:
         return None
     return _ending_at(problem, first, attempt.session, part.why)
@@ -193,14 +195,16 @@ def _until(problem: Problem, time: float) -> Problem:
         return problem
     asked = (item.on_part() for item in problem.constraints)
     kept = [item for item in asked if item is not None]
-    relaxations = [
-        item if item.during is None else replace(item, during=(first, min(last, time)))
-        for item in problem.relaxations
-        for first, last in [item.window(problem.path.duration)]
-        if first < time
-    ]
-    shorter = problem.along(lambda path: Section(path, 0.0, time, crowding=True))
-    return replace(problem, **shorter, constraints=kept, relaxations=relaxations)
+    shorter = problem.along(
+        lambda path: Section(path, 0.0, time, crowding=True), lambda t: np.minimum(t, time)
+    )
+    return problem.changed(**shorter, constraints=kept)
+
+
+def _start_of(part: Problem, problem: Problem, q: Array) -> Array:
+    """Return a start (n,) of a problem as one of its part, which may have fewer joints."""
+    own = q[None, : problem.asked.robot.dof]
+    return np.asarray(part.at(np.zeros(1), own)[0])
 
 
 def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attempt:
@@ -224,11 +228,7 @@ def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attemp
 
 def _apart(problem: Problem, starts: list[Array]) -> list[Array]:
     """Return the starts at which the arm does not meet itself; all where it always does."""
-    own = problem.own_collision
-    if own is None:
-        return starts
-    model = own.model(problem.robot)
-    return [q for q in starts if not model.collides(q, own.distance)] or starts
+    return [q for q in starts if problem.keeps_off_itself(q[None])] or starts
 
 
 def _candidates(problem: Problem, starts: list[Array]) -> list[_Candidate]:

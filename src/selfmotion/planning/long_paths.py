@@ -27,6 +27,7 @@ from selfmotion.planning.settings import (
     STRETCH_WAY,
 )
 from selfmotion.planning.starts import optimise_starts
+from selfmotion.planning.warm_start import on_start
 from selfmotion.problem import Problem, asked_of_part
 
 
@@ -35,7 +36,7 @@ def is_long(draft: Draft) -> bool:
     problem = draft.problem
     if problem.way_in_reaches <= LONG_WAY:
         return False
-    middle = problem.robot.dexterous_configuration(problem.task)
+    middle = problem.robot.dexterous_configuration(problem.asked.task)
     return takes(problem, draft.effort, problem.bind_constraints(middle, middle))
 
 
@@ -56,9 +57,8 @@ def _optimise(draft: Draft, posture: Array, ended: Status | None) -> None:
     """Consider the best motion near one in a posture (n,), if it keeps the conditions."""
     problem, start = draft.problem, draft.problem.given_start
     if start is None:
-        pose = problem.path.pose(0.0)
         try:
-            start = problem.robot.inverse_kinematics(pose, problem.task, seed=posture)
+            start = on_start(problem, posture)
         except SelfmotionError:
             return
     constraints = problem.bind_constraints(start, start, apart=draft.effort.apart)
@@ -94,8 +94,7 @@ def _postures(draft: Draft) -> tuple[list[Array], Status | None]:
     problem = draft.problem
     middle, half = 0.5, 0.5 * STRETCH_WAY / problem.way_in_reaches
     first, last = (problem.path.duration * share for share in (middle - half, middle + half))
-    stretch = replace(
-        problem,
+    stretch = problem.changed(
         **problem.along(lambda path: Section(path, first, last)),
         start=None,
         constraints=list(asked_of_part(problem, is_first=False, is_last=False)),

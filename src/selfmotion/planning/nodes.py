@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints
+from selfmotion.basics import Array, Flags, Ints
 from selfmotion.constraints import BoundConstraint
 from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, Status
@@ -23,6 +23,7 @@ from selfmotion.planning.settings import (
     COST_AGREEMENT,
     FAR_OFF,
     FEWEST_WITH_ACCELERATIONS,
+    MOST_FINER,
     NODE_AGREEMENT,
     NODE_ROUNDS,
     SAME_COST,
@@ -103,8 +104,9 @@ class NodeDescent:
         # Of what is infinite, or depends on accelerations in other ways, there is no curvature.
         if not np.isfinite(motion.aim) or grid.cost.bends_by_rates(motion.partials):
             return None
-        freely = self._minimise(motion, _NO_COLUMNS)
-        best = self._kept(freely)
+        first = self._at_once(motion)
+        freely = self._minimise(motion, first)
+        best = self._kept(freely, first)
         if best is not None or self._ended is not None:
             return best
         if freely.motion.cost >= dearest:
@@ -147,7 +149,7 @@ class NodeDescent:
                     smooth = finer.smoothed(motion.exact_cost + SAME_COST * size)
                     if smooth is not None:
                         return smooth
-                broken = finer.motion.broken()
+                broken = finer.motion.broken() & self._worth_refining(finer)
                 if is_last and not broken.any():
                     return finer.smoothed(finer.cost) or finer
                 dearest = motion.cost
@@ -166,6 +168,23 @@ class NodeDescent:
             standing = found
         return standing
 
+    @staticmethod
+    def _worth_refining(standing: MotionOnNodes) -> Flags:
+        """Return between which nodes more of them may keep the conditions better, (N,).
+
+        Where a tolerance begins and ends to be used fully, velocities have a kink: on very short
+        intervals, what Newton's method leaves of it are rates that no limit allows.
+        """
+        steps = np.diff(standing.motion.grid.t)
+        kinks = standing.motion.grid.conditions.any_at_once
+        return np.asarray((steps * MOST_FINER > steps.max()) | (not kinks))
+
+    @staticmethod
+    def _at_once(motion: NodeMotion) -> Ints:
+        """Return the columns of conditions that count from the beginning."""
+        motion.h  # noqa: B018  # which columns there are is known then
+        return motion.grid.conditions.at_once()
+
     def _saves(self, motion: NodeMotion, before: float) -> bool:
         """Whether more nodes where limits begin and end to bind may lower the cost."""
         return before - motion.cost > COST_AGREEMENT * abs(motion.cost)
@@ -182,8 +201,9 @@ class NodeDescent:
         for share in TOWARDS_MIDDLE:
             motion = grid.motion_towards(start, middle, share * self._problem.path.duration)
             if motion is not None and self._ended is None:
-                optimum = self._minimise(motion, _NO_COLUMNS)
-                best = self._kept(optimum)
+                first = self._at_once(motion)
+                optimum = self._minimise(motion, first)
+                best = self._kept(optimum, first)
                 same = abs(optimum.motion.cost - known.cost) <= COST_AGREEMENT * abs(known.cost)
                 if best is not None or same:
                     return best
@@ -202,17 +222,18 @@ class NodeDescent:
         motion = freely.motion
         orders = motion.orders
         if (orders[broken_by(motion)] < 2).all():
-            return self._bound(freely, _NO_COLUMNS, dearest)
+            return self._bound(freely, self._at_once(motion), dearest)
         most = self._effort.max_evaluations
         if most is not None and most < FEWEST_WITH_ACCELERATIONS:
             return None
         smooth = motion.grid.continuous.near(motion.place.q, motion.place.qd)
         if smooth is None:
             return None
-        motion = self._minimise(smooth, _NO_COLUMNS, dearest).motion
+        motion = self._minimise(smooth, self._at_once(smooth), dearest).motion
         # One such limit leads to the next: all count at once.
         every = (orders == 2) & ~motion.grid.conditions.of_bodies()
         columns = np.flatnonzero(every | broken_by(motion) | nearly_broken(motion))
+        columns = np.union1d(columns, self._at_once(motion))
         return self._bound(self._minimise(motion, columns, dearest), columns, dearest)
 
     def _bound(

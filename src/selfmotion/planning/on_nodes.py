@@ -12,7 +12,7 @@ from selfmotion.engine import Conditions, Evaluation
 from selfmotion.motion import Grid, NodeNullMotion, NullMotion
 from selfmotion.nodes import NodeMotion, Optimum
 from selfmotion.optimise import Status
-from selfmotion.planning.settings import LEAST_SAVING
+from selfmotion.planning.settings import LEAST_SAVING, MOST_UNEVEN
 from selfmotion.search import BESIDE
 
 
@@ -113,7 +113,7 @@ class MotionOnNodes:
         """Return it with more nodes: all intervals halved so many times, or some (N,) once."""
         t = self.motion.grid.t
         self.motion.forget()
-        finer = Grid(t).halved(where).nodes
+        finer = Grid(t).halved(where).graded(MOST_UNEVEN).nodes
         for _ in range(1, times):
             finer = Grid(finer).halved().nodes
         motion = self.motion.on(self.motion.grid.on(finer))

@@ -19,7 +19,7 @@ from selfmotion.path import Retimed, Section, section_at_rest
 from selfmotion.planning.moves import Mover, Retreat, between_parts
 from selfmotion.planning.run import plan_along
 from selfmotion.planning.settings import ELSEWHERE, GUIDE_SAMPLES
-from selfmotion.problem import Problem, asked_of_part, relaxed_along, rest_orders
+from selfmotion.problem import Problem, asked_of_part, rest_orders, times_along
 from selfmotion.result import Move, Parts, Plan
 from selfmotion.search import Sequence, SequenceGuide, Stretch, Stretches, turned_towards
 
@@ -128,9 +128,8 @@ class PartPlanner:
         path = section_at_rest(whole.path, *ends, min(self._ramp, ends[1] - ends[0]), ramped)
         return replace(
             whole,
-            path=path,
+            **whole.along(lambda _: path, times_along(path, ends)),
             start=whole.start if stretch.first == 0 else None,
             constraints=list(asked_of_part(whole, stretch.first == 0, stretch.last == last)),
-            relaxations=list(relaxed_along(whole, path, ends)),
             rest=True,
         )

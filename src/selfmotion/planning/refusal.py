@@ -5,7 +5,7 @@ import numpy as np
 from selfmotion.basics import InverseKinematicsError, NoSequenceError, SelfmotionError
 from selfmotion.planning.search import Search
 from selfmotion.problem import Problem
-from selfmotion.search import Obstruction, SinglePoses, obstruction
+from selfmotion.search import Obstruction, obstruction
 
 
 def looked_at(problem: Problem, search: Search) -> Obstruction | None:
@@ -33,30 +33,15 @@ def looked_at(problem: Problem, search: Search) -> Obstruction | None:
     return blocked
 
 
-def leaves_path(problem: Problem, search: Search) -> bool:
-    """Whether rows are relaxed, and have to be: the arm cannot be on the path itself."""
-    if not problem.relaxations or problem.damping is not None:
-        return False
-    return obstruction(problem, np.random.default_rng(search.rng), relaxed=False) is not None
-
-
-def begins_off_path(problem: Problem, search: Search) -> bool:
-    """Whether rows are relaxed, and nothing was found that is on the path itself at its start."""
-    if not problem.relaxations:
-        return False
-    rng = np.random.default_rng(search.rng)
-    poses = SinglePoses(problem, rng, clear=False, relaxed=False)
-    return poses.first_blocked(np.zeros(1)) is not None
-
-
 def no_way(problem: Problem, blocked: Obstruction) -> SelfmotionError:
     """Return the error that says what is in the way, and what would help."""
     robot, pose = problem.robot, problem.path.pose(blocked.time)
+    task = problem.asked.task.value
     if not blocked.is_met and blocked.time == 0.0:
         position, rotation = blocked.misses
         return InverseKinematicsError(
             f"{robot.name}: no configuration within the limits puts '{robot.tool}' at "
-            f"{np.round(pose.translation, 4).tolist()} m for task '{problem.task.value}', where "
+            f"{np.round(pose.translation, 4).tolist()} m for task '{task}', where "
             f"the path begins: {blocked.reason}; move the pose into the workspace{blocked.help}",
             position_miss=position,
             rotation_miss=rotation,

@@ -34,14 +34,11 @@ class RoughMotion:
     Attributes
     ----------
     trajectory : Trajectory
-    deviation : (size,) or None
-        Of the tool from its path, as `Deviation` has it, where some is allowed.
     cost : float or None
         F, where it is about what is best near by; None where it is farther from there.
     """
 
     trajectory: Trajectory
-    deviation: Array | None = None
     cost: float | None = None
 
 
@@ -121,6 +118,10 @@ class OnNodes:
         total = 1 + ROUGH_ROUNDS
         self._progress("rough motions", 1, total)
         found = self._found = Together.near(nodes, motions[arrived])
+        soft = problem.softened(float(found.costs.min()))
+        if soft is not problem:
+            nodes = NodeGrid(soft, grid.nodes, (), free=True, counts=self._effort.counts)
+            found = self._found = Together.near(nodes, motions[arrived])
         alone, near = unlike(found.q, _cheapest(found), self._apart, ONE_VALLEY)
         which = [*alone, *near][: max(HEATS[0][0], finalists)]
         if not which or nodes.cost.bends_by_rates(found.motion.partials):
@@ -153,14 +154,18 @@ class OnNodes:
                 return []
             # What got stuck may become better as well.
             stuck = found.promised[k] > ABOUT_AS_GOOD * abs(motion.cost)
-            if stuck or broken_by(motion).any():
+            broken = broken_by(motion)
+            # What was softened is kept from now on.
+            broken[motion.grid.conditions.at_once()] = False
+            if stuck or broken.any():
                 others.append(_rough(motion))
             elif self._clear(motion):
                 kept.append(_rough(motion))
             else:
                 # An optimum that takes the arm into itself goes on doing that.
                 continue
-            dearest = min(dearest, motion.cost + ABOUT_AS_GOOD * abs(motion.cost))
+            cost = float(found.costs[k])
+            dearest = min(dearest, cost + ABOUT_AS_GOOD * abs(cost))
         return [*kept, *others] if kept and not _hopeful(found).any() else []
 
     def _motion(self, found: Together, k: int) -> NodeMotion | None:
@@ -193,4 +198,4 @@ def _same(a: float, b: float | None) -> bool:
 
 
 def _rough(motion: NodeMotion) -> RoughMotion:
-    return RoughMotion(motion.trajectory, None, motion.cost)
+    return RoughMotion(motion.trajectory, motion.cost)

@@ -113,8 +113,18 @@ def plan(
         max_evaluations = DAMPED_EVALUATIONS
     counts = TimedCounts(deadline=clock)
     effort = Effort(optimizer or QuasiNewton(), callback, max_evaluations, counts)
-    search, known = search or Search(), Known(plan=warm_start)
-    draft = Draft(problem, effort, search, Tolerance.of(tolerance), clock.telling(progress), known)
+    search, problem = search or Search(), problem.augmented
+    if warm_start is not None:
+        known = problem.with_own(warm_start.trajectory, warm_start.path)
+        warm_start = replace(warm_start, trajectory=known)
+    draft = Draft(
+        problem,
+        effort,
+        search,
+        Tolerance.of(tolerance),
+        clock.telling(progress),
+        Known(plan=warm_start),
+    )
     try:
         with one_blas_thread(), held_interruption():
             return _planned(draft, clock)
@@ -133,6 +143,8 @@ def plan_along(
     """Plan as `plan` does, but try a motion first that is known, near which there should be one."""
     clock = Deadline(inf)
     effort = Effort(QuasiNewton(), None, None, TimedCounts(deadline=clock))
+    problem, chain = problem.augmented, guide.sequence
+    guide = SequenceGuide(replace(chain, q=problem.at(chain.t, chain.q)))
     draft = Draft(problem, effort, Search(), tolerance, progress, Known(guide=guide))
     with one_blas_thread(), held_interruption():
         return _planned(draft, clock)

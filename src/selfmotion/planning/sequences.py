@@ -28,7 +28,7 @@ def optimise_sequences(draft: Draft, searched: _Searched, *, chosen: bool) -> No
     begun: list[Session] = []
     for number, guide in enumerate(draft.sequences, 1):
         draft.progress("refining sequence", number, len(draft.sequences))
-        session = draft.begin(guide.start, free=True, guide=guide, deviation=guide.deviation)
+        session = draft.begin(guide.start, free=True, guide=guide)
         if session is None or (begun and _is_hopeless(draft, guide, session, begun[0])):
             continue
         session.take_chain(guide)

@@ -13,6 +13,11 @@ NODE_AGREEMENT = 3e-5
 ROUGH_AGREEMENT = 1e-2
 # Farther off than so many times what nodes may be, intervals are halved twice at once.
 FAR_OFF = 8.0
+# Where tolerances are used fully, intervals are no more than so many times finer than the longest.
+MOST_FINER = 16.0
+# An interval so many times as long as one beside it is halved as well: beside short ones, long ones
+# make accelerations that no finer motion has.
+MOST_UNEVEN = 4.0
 # A grid on which the motion at x = 0 costs this much more or less will do for a rough null motion.
 ALIKE = 0.05
 # While a null motion is chosen, this share of the steps that it should have will do.

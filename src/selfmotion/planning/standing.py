@@ -127,11 +127,6 @@ class RolledMotion:
         return self.objective.parts(self.x)[1].copy()
 
     @property
-    def deviation(self) -> Array | None:
-        """The tool's deviation from its path, as `Deviation` has it; None where none is allowed."""
-        return self.objective.deviation(self.x)
-
-    @property
     def steps(self) -> int:
         """Of its grid."""
         return self.objective.grid.steps
@@ -191,7 +186,7 @@ class RolledMotion:
     def with_null_motion(self, motion: NullMotion) -> "RolledMotion":
         """Return it with another null motion that can be what the present one is."""
         before = self.objective
-        z, x, c = before.parts(self.x)
+        z, x = before.parts(self.x)
         grid = before.grid.with_steps(motion.fewest_steps // THINNER)
         t, duration = grid.stage_times, self.beginning.problem.path.duration
         own, new = (kind.functions(t, duration) for kind in (self.null_motion, motion))
@@ -199,7 +194,7 @@ class RolledMotion:
         rows = x.reshape(before.null_motion.rows, own.shape[1]) @ same.T
         return replace(
             self,
-            x=np.concatenate([z, rows.ravel(), c]),
+            x=np.concatenate([z, rows.ravel()]),
             objective=self.on(grid, motion),
             null_motion=motion,
             minimum=None,
@@ -211,7 +206,7 @@ class RolledMotion:
         None where that would be no coarser.
         """
         objective, rough = self.objective, self.null_motion.rough
-        z, _, c = objective.parts(self.x)
+        z, _ = objective.parts(self.x)
         cost = objective.value(self.x)
         coarse = self.on(Grid.aligned(self.beginning.problem.knots, rough.fewest_steps), rough)
         # Written so that NaN asks for more steps, too.
@@ -219,7 +214,7 @@ class RolledMotion:
             if coarse.grid.steps >= objective.grid.steps:
                 return None
             coarse = self.on(coarse.grid.halved(), rough)
-        x = np.concatenate([z, np.zeros(coarse.null_motion.size), c])
+        x = np.concatenate([z, np.zeros(coarse.null_motion.size)])
         return replace(self, x=x, objective=coarse, null_motion=rough)
 
     def resumed(self, trajectory: Trajectory) -> "RolledMotion":
@@ -240,8 +235,8 @@ class RolledMotion:
     ) -> "RolledMotion":
         still, t, problem = self.merit(), objective.grid.stage_times, self.beginning.problem
         x = coefficients_of(trajectory, pace, problem, t, objective.null_motion)
-        z, _, c = objective.parts(np.zeros(objective.size))
-        other = replace(self, x=np.concatenate([z, x, c]), objective=objective, null_motion=motion)
+        z, _ = objective.parts(np.zeros(objective.size))
+        other = replace(self, x=np.concatenate([z, x]), objective=objective, null_motion=motion)
         return other if other.merit() <= still else self
 
     def left(self, *, bound: bool) -> Remaining:
@@ -255,10 +250,10 @@ class RolledMotion:
             grid = Grid.aligned(problem.knots, MOST_ESTIMATED)
         same = grid is self.objective.grid
         objective = self.objective if same else self.on(grid)
-        z, x, c = objective.parts(self.x)
+        z, x = objective.parts(self.x)
         fine = self.on(grid, spline, objective.null_motion.epsilon(x))
         none = np.zeros(fine.null_motion.size)
-        return Remaining(fine, np.concatenate([z, none, c]), bound=bound)
+        return Remaining(fine, np.concatenate([z, none]), bound=bound)
 
 
 def relative_change(before: float, after: float) -> float:

@@ -4,12 +4,13 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, InverseKinematicsError
 from selfmotion.optimise import Status
 from selfmotion.planning.draft import Draft
 from selfmotion.planning.heats import Heats
 from selfmotion.planning.rough import OnNodes, Ranking, RoughMotion
 from selfmotion.planning.session import Session
+from selfmotion.problem import Problem
 from selfmotion.search import start_candidates
 
 
@@ -21,10 +22,7 @@ def optimise_starts(draft: Draft, starts: int, finalists: int) -> None:
     InverseKinematicsError
         None reaches the start of the path.
     """
-    problem = draft.problem
-    arm = problem.envelope.arm(problem.robot)
-    admits = problem.envelope.admits if problem.envelope.quantities else None
-    candidates = start_candidates(problem.follows.for_robot(arm), starts, draft.rng, admits)
+    candidates = _candidates(draft, starts)
     ranked = False
     for ranking in _rankings(draft, candidates) if len(candidates) > finalists else ():
         draft.rankings = [*draft.rankings, ranking]
@@ -37,6 +35,24 @@ def optimise_starts(draft: Draft, starts: int, finalists: int) -> None:
     if not ranked:
         sessions = _sessions(draft, candidates)
         _optimise_each(draft, sessions, len(sessions))
+
+
+def _candidates(draft: Draft, count: int) -> list[Array]:
+    """Return so many starts: on the path itself, or as near to it as tolerances allow."""
+    problem = draft.problem
+    try:
+        found = _on_start(problem.asked, draft, count)
+    except InverseKinematicsError:
+        if problem.asked is problem:
+            raise
+        return _on_start(problem, draft, count)
+    return list(problem.at(np.zeros(len(found)), np.array(found)))
+
+
+def _on_start(problem: Problem, draft: Draft, count: int) -> list[Array]:
+    arm, asked = problem.envelope.arm(problem.robot), problem.envelope
+    admits = asked.admits if asked.quantities else None
+    return start_candidates(problem.follows.for_robot(arm), count, draft.rng, admits)
 
 
 def _rankings(draft: Draft, candidates: Sequence[Array]) -> list[Ranking]:

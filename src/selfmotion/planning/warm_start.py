@@ -22,24 +22,25 @@ def check_warm_start(plan: object, problem: Problem) -> None:
         )
 
 
-def start_of(plan: Plan, problem: Problem) -> Array:
-    """Return the configuration (n,) near a plan's first one that is on the start of all paths.
+def on_start(problem: Problem, seed: Array) -> Array:
+    """Return the configuration (n,) near another one that is on the start of all paths.
 
     Raises
     ------
     InverseKinematicsError
         There is none.
     """
-    seed, follows, robot = plan.trajectory.q[0], problem.follows, problem.robot
-    if len(follows.items) > 1:
+    follows, robot = problem.follows, problem.robot
+    if not follows.is_plain:
         manifold = Manifold(follows, robot.lower, robot.upper)
-        q, arrived = manifold.project(seed[None], follows.targets(np.zeros(1)), far=True)
+        held = follows.held(np.zeros(1))
+        q, arrived = manifold.project(seed[None], follows.targets(np.zeros(1)), far=True, held=held)
         if not arrived[0]:
             misses = np.array([item.miss(item.path.pose(0.0), q[0]) for item in follows.items])
             position, rotation = misses.max(axis=0)
             raise InverseKinematicsError(
-                f"{robot.name}: from the start of warm_start no configuration was found in which "
-                f"all frames are where their paths begin",
+                f"{robot.name}: from the configuration that is known none was found in which all "
+                f"frames are where their paths begin",
                 position_miss=float(position),
                 rotation_miss=float(rotation),
             )
@@ -86,6 +87,5 @@ def coefficients_of(
     acting = null @ table.matrix()
     wanted = np.einsum("srn,sn->sr", null, qd)
     if not wanted.size:
-        # No self-motion is left, only what is relaxed.
         return np.zeros(table.size)
     return np.asarray(np.linalg.lstsq(acting.reshape(-1, table.size), wanted.ravel())[0])

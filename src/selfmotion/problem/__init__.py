@@ -7,7 +7,7 @@ from selfmotion.problem.parts import (
     asked_of_part as asked_of_part,
     at_all_times as at_all_times,
     check_all_times as check_all_times,
-    relaxed_along as relaxed_along,
+    times_along as times_along,
 )
 from selfmotion.problem.problem import Problem as Problem, check_problem as check_problem
 from selfmotion.problem.rest import rest_orders as rest_orders

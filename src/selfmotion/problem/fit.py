@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from selfmotion.basics import Array, Ints, ProblemError, RedundancyError
-from selfmotion.follow import Follows
+from selfmotion.follow import Follows, VirtualJoints
 from selfmotion.path import Path, check_oriented
 from selfmotion.robot import Chain, RobotModel
 from selfmotion.task import POSITION_ROWS, ROW_NAMES, Relaxation, Task
@@ -86,6 +86,8 @@ def check_relaxations(relaxations: Sequence[Relaxation], path: Path, task: Task)
             raise ProblemError(f"row {', '.join(sorted(twice))} is relaxed twice at the same time")
     if len({item.in_tool_axes for item in relaxations if not item.angular}) > 1:
         raise ProblemError("positions are relaxed in world axes and in tool axes; choose one")
+    # They are virtual joints, which not all of them can be together.
+    VirtualJoints(task, relaxations, path.duration, 1.0)
 
 
 def _prescribed(path: Path, task: Task) -> list[str]:

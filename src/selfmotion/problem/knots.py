@@ -10,14 +10,13 @@ from selfmotion.task import Relaxation
 
 
 def smooth_knots(follows: Follows, relaxations: Sequence[Relaxation]) -> Array:
-    """Return the knots of all paths, and those of the deviations in their windows, [s] (K,)."""
+    """Return the knots of all paths, and the ends of the windows of tolerances, [s] (K,)."""
     duration, first = follows.duration, follows.items[0]
     knots = list(first.path.knots)
     for other in follows.items[1:]:
         knots = _with_times(knots, other.path.knots, duration)
     for item in relaxations:
-        times = np.linspace(*item.window(duration), item.intervals + 1)
-        knots = _with_times(knots, times, duration)
+        knots = _with_times(knots, item.window(duration), duration)
     return read_only(sorted(knots))
 
 

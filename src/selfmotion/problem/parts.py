@@ -1,15 +1,13 @@
 """What of a problem is asked along a part of its path, and of moves between parts."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from selfmotion.basics import ProblemError
+from selfmotion.basics import Array, ProblemError
 from selfmotion.constraints import Constraint
 from selfmotion.path import Retimed
 from selfmotion.problem.problem import Problem
-from selfmotion.task import Relaxation
 
 # A window shorter than this share of a part is none.
 _SHORTEST_WINDOW = 1e-2
@@ -43,17 +41,18 @@ def check_all_times(constraints: Sequence[Constraint], remedy: str) -> None:
             )
 
 
-def relaxed_along(
-    problem: Problem, path: Retimed, ends: tuple[float, float]
-) -> Iterator[Relaxation]:
-    """Return what is relaxed along a stretch of the path, windows by its own time."""
-    for item in problem.relaxations:
-        if item.during is None:
-            yield item
-            continue
-        first, last = path.when(np.clip(item.during, *ends) - ends[0]).tolist()
+def times_along(path: Retimed, ends: tuple[float, float]) -> Callable[[Array], Array]:
+    """Return when windows of the whole path (first, last) are open on a stretch of it.
+
+    As (0, 0) where that is hardly at all.
+    """
+
+    def when(window: Array) -> Array:
+        first, last = path.when(np.clip(window, *ends) - ends[0]).tolist()
         # A ramp hardly moves at its end: when it gets there is known to some digits only.
-        first = 0.0 if item.during[0] <= ends[0] else first
-        last = path.duration if item.during[1] >= ends[1] else last
-        if last - first > _SHORTEST_WINDOW * path.duration:
-            yield replace(item, during=(first, last))
+        first = 0.0 if window[0] <= ends[0] else first
+        last = path.duration if window[1] >= ends[1] else last
+        is_open = last - first > _SHORTEST_WINDOW * path.duration
+        return np.array([first, last]) if is_open else np.zeros(2)
+
+    return when

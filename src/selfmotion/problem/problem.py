@@ -86,10 +86,11 @@ class Problem:
         joint position and velocity, and those of acceleration and jerk that the arm's maker
         publishes (`RobotModel.acceleration_limit`).
     relaxations : sequence of Relaxation
-        Rows in which the tool may leave its path, by how much and when; the deviation is optimised
-        along with the self-motion. By default none. A given start is on the path itself, and so
-        are both ends of a closed path and the end of one with conditions there. Of several paths
-        the first is relaxed.
+        Rows in which the tool may leave its path, by how much and when. Each is one more joint
+        between tool and path, which costs nothing, so that the deviation is part of the
+        self-motion. By default none. A given start is on the path itself, and so is the end of a
+        path with conditions there; where a path is closed, the deviation is so, too. Of several
+        paths the first is relaxed.
     collision : Clearance, optional
         How the arm keeps apart from itself and from obstacles, besides what constraints say: by
         default its links must not overlap, where its URDF has bodies and no constraint is a
@@ -174,15 +175,58 @@ class Problem:
         """What the arm follows: the one thing that planners are told."""
         return Follows.of(self.robot, self.path, self.task, self.also)
 
-    def along(self, other: Callable[[Path], Path]) -> dict[str, Any]:
-        """Return, for `dataclasses.replace`, other paths in place of all that are followed."""
-        return {
-            "path": other(self.path),
-            "also": tuple(
-                item.along(other(bound.path))
-                for item, bound in zip(self.also, self.follows.items[1:], strict=True)
-            ),
-        }
+    @cached_property
+    def augmented(self) -> "Problem":
+        """The problem as planners see it: its tolerances are virtual joints."""
+        from selfmotion.problem.augmented import AugmentedProblem
+
+        return AugmentedProblem(self) if self.relaxations else self
+
+    @property
+    def asked(self) -> "Problem":
+        """The problem as it was asked, where this is `augmented`."""
+        return self
+
+    def own(self, trajectory: Trajectory) -> Trajectory:
+        """Return what the arm's own joints do in a motion of all."""
+        return trajectory
+
+    def at(self, t: Array, q: Array) -> Array:
+        """Return all coordinates for the arm's own, (K, n), at times t (K,) [s] of the path."""
+        return q
+
+    def with_own(self, trajectory: Trajectory, path: Path) -> Trajectory:
+        """Return the motion of all joints for one of the arm's own along a path like this one's."""
+        return trajectory
+
+    def softened(self, cost: float) -> "Problem":
+        """Return the same where using tolerances costs, for who does not ask bands to be kept.
+
+        Where `cost` is what a motion costs, being at a band all the time costs as much.
+        """
+        return self
+
+    def changed(self, **changes: Any) -> "Problem":
+        """Return the same with other parameters."""
+        return replace(self, **changes)
+
+    def along(
+        self, other: Callable[[Path], Path], when: Callable[[Array], Array] | None = None
+    ) -> dict[str, Any]:
+        """Return, for `dataclasses.replace`, other paths in place of all that are followed.
+
+        With `when`, also the windows of tolerances at other times; those that become empty are
+        left out.
+        """
+        others = tuple(
+            item.along(other(bound.path))
+            for item, bound in zip(self.also, self.follows.items[1:], strict=True)
+        )
+        found: dict[str, Any] = {"path": other(self.path), "also": others}
+        if when is not None:
+            moved = (item.moved(when) for item in self.relaxations)
+            found["relaxations"] = tuple(item for item in moved if item is not None)
+        return found
 
     @property
     def given_start(self) -> Array | None:

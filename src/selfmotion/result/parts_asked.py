@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from selfmotion.path import Path, Retimed
-from selfmotion.problem import asked_of_part, at_all_times, relaxed_along
+from selfmotion.problem import asked_of_part, at_all_times, times_along
 from selfmotion.result.asked import Asked, another_tool, follows_at, looked_at, not_judged_by
 from selfmotion.result.joints import Piece, gaps
 from selfmotion.result.plan import Plan
@@ -57,7 +57,8 @@ class PartsAsked:
                 yield f"it is not the path from {ends[0]:.6g} to {ends[1]:.6g} s"
                 return
             if isinstance(path, Retimed):
-                relaxed = tuple(relaxed_along(problem, path, ends))
+                moved = problem.along(lambda _: path, times_along(path, ends))
+                relaxed = moved["relaxations"]
             else:
                 relaxed = tuple(problem.relaxations)
             constraints = tuple(asked_of_part(problem, is_first, is_last))

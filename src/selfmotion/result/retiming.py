@@ -31,7 +31,6 @@ from selfmotion.result.limits_used import quantities_of_pace
 from selfmotion.result.pace_rows import PaceLimits
 from selfmotion.result.pacing import Ends, along, fastest_pace
 from selfmotion.result.plan import Plan
-from selfmotion.task import Relaxation
 
 # Time between two samples of the new motion [s]: the first that keeps the plan's tolerance.
 _STEPS = (4e-3, 2e-3, 1e-3)
@@ -220,9 +219,11 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
     asked = (item.on_part() if plan.report.ending else item for item in old.constraints)
     problem = replace(
         old,
-        **old.along(lambda path: Retimed(path, pace.t, pace.sigma, pace.rate, pace.bend)),
+        **old.along(
+            lambda path: Retimed(path, pace.t, pace.sigma, pace.rate, pace.bend),
+            lambda times: np.interp(times, pace.sigma, pace.t),
+        ),
         constraints=(*(item for item in asked if item is not None), *wanted),
-        relaxations=[_moved(item, pace.t, pace.sigma) for item in old.relaxations],
     )
     retimed = replace(
         plan,
@@ -232,12 +233,3 @@ def _retimed(plan: Plan, wanted: Sequence[Constraint], pace: Pace) -> Plan:
         report=replace(plan.report, active=active),
     )
     return replace(retimed, certificate=retimed.check())
-
-
-def _moved(item: Relaxation, t: Array, sigma: Array) -> Relaxation:
-    """Return a relaxation with its window at the new times t of σ."""
-    if item.during is None:
-        return item
-    # Near enough: the deviation and two of its derivatives vanish at the ends of a window.
-    first, last = (float(np.interp(time, sigma, t)) for time in item.during)
-    return replace(item, during=(first, last))

@@ -52,3 +52,4 @@ from selfmotion.robot.urdf import (
     UrdfJoint as UrdfJoint,
     UrdfPart as UrdfPart,
 )
+from selfmotion.robot.weights import mean_lever as mean_lever

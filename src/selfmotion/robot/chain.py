@@ -21,7 +21,7 @@ from selfmotion.basics import Array, Ints
 from selfmotion.robot.coupling import Coupling
 from selfmotion.robot.placements import rebase
 from selfmotion.robot.tip_places import place_along
-from selfmotion.robot.tree_arrays import ChainArrays, serial_arrays
+from selfmotion.robot.tree_arrays import JOINT, ChainArrays, serial_arrays
 
 # The frame that does not move.
 WORLD = 0
@@ -280,18 +280,20 @@ class Chain:
     @cached_property
     def is_coupled(self) -> bool:
         """Whether joints of the chain share a coordinate."""
-        return len(self.joints) < len(self.model_joints)
+        return len(self.joints) < len(self.table) - 1
 
     def every_along(self, q: Array) -> Array:
-        """Return the columns of the tip's Jacobian by the model's joints at q (K, n), (K, 6, N).
+        """Return the columns of the tip's Jacobian by each joint on the way at q (K, n), (K, 6, c).
 
         Each times its scale, so that those of a coordinate add up to its column.
         """
-        return self._uncoupled.along(self.coupling.spread(q))[0] * self.coupling.scales
-
-    @cached_property
-    def _uncoupled(self) -> "Chain":
-        return Chain(self.model, self.tip, self.base)
+        table = self.table.copy()
+        own, count = table[:-1, JOINT, 0].astype(np.int64), len(table) - 1
+        table[:-1, JOINT, 0] = np.arange(count)
+        jacobians = np.zeros((len(q), 1, 6, count))
+        rotations, translations = np.empty((len(q), 1, 3, 3)), np.empty((len(q), 1, 3))
+        place_along(np.array(q[:, own]), table[None], jacobians, rotations, translations)
+        return jacobians[:, 0]
 
     @cached_property
     def signs(self) -> Array:

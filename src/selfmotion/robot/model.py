@@ -141,6 +141,11 @@ class RobotModel:
         return float(chain.arrays.link_lengths.sum() + farthest[slides].sum())
 
     @property
+    def coordinate_sizes(self) -> Array:
+        """How far each joint goes where its coordinate grows by 1, (n,) [rad or m]: 1."""
+        return np.ones(self.dof)
+
+    @property
     def joint_weights(self) -> Array:
         """What a unit of each joint counts where joints are added up, (n,).
 

@@ -13,11 +13,15 @@ if TYPE_CHECKING:
 
 def joint_weights(robot: "RobotModel") -> Array:
     """Return what a unit of each joint counts, (n,); see `RobotModel.joint_weights`."""
+    return np.where(robot.is_revolute, 1.0, 1.0 / mean_lever(robot))
+
+
+def mean_lever(robot: "RobotModel") -> float:
+    """Return how far [m] the tool goes where a revolute joint turns by a radian: their mean."""
     arrays = robot.chain.arrays
     beyond = np.cumsum(arrays.link_lengths[:0:-1])[::-1]
     levers = beyond[arrays.tree.is_revolute]
-    mean = float(levers.mean()) if levers.size and levers.max() > 0.0 else 1.0
-    return np.where(robot.is_revolute, 1.0, 1.0 / mean)
+    return float(levers.mean()) if levers.size and levers.max() > 0.0 else 1.0
 
 
 def part_weights(robot: "RobotModel", weights: Mapping[str, float]) -> Array:

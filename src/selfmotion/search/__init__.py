@@ -9,7 +9,6 @@ from selfmotion.search.guides import (
     SequenceGuide as SequenceGuide,
     asks_length as asks_length,
     guides as guides,
-    guides_near as guides_near,
     has_curves as has_curves,
     shortest_along as shortest_along,
 )

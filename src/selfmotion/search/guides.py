@@ -2,14 +2,12 @@
 
 import itertools
 from collections import abc
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, NoSequenceError, Progress
+from selfmotion.basics import Array, Progress
 from selfmotion.costs import PathLength
-from selfmotion.engine import deviation_of
 from selfmotion.path import Path
 from selfmotion.problem import Problem
 from selfmotion.search.measures import Length, measure_of
@@ -26,13 +24,12 @@ from selfmotion.search.settings import (
     MOST,
     PATH_LOOKS,
     REFINED,
-    SEARCHES,
     SMOOTHING,
     STRIDE,
     TURN,
 )
 from selfmotion.search.shortest import Shortest
-from selfmotion.search.waypoints import NearPath, OnPath, Waypoints
+from selfmotion.search.waypoints import OnPath
 from selfmotion.task import log3
 
 
@@ -44,11 +41,9 @@ class SequenceGuide:
     sequence : Sequence
     start : (n,)
         Its first configuration.
-    deviation : (size,) or None
-        How far its tool is from the path, as `Deviation` has it; None for not at all.
     """
 
-    def __init__(self, sequence: Sequence, deviation: Array | None = None) -> None:
+    def __init__(self, sequence: Sequence) -> None:
         from scipy.interpolate import make_lsq_spline
 
         t, q = sequence.t, sequence.q
@@ -56,7 +51,7 @@ class SequenceGuide:
         inner = np.append(t[:-SMOOTHING:SMOOTHING], t[-1])
         knots = np.concatenate([[t[0]] * 3, inner, [t[-1]] * 3])
         self._rate = make_lsq_spline(t, q, knots).derivative()
-        self.sequence, self.deviation = sequence, deviation
+        self.sequence = sequence
         self.start: Array = q[0]
 
     def __call__(self, t: Array) -> Array:
@@ -126,59 +121,8 @@ def asks_length(problem: Problem) -> bool:
     return isinstance(measure_of(problem.follows, problem.costs, t, weights), Length)
 
 
-def guides_near(
-    problem: Problem, rng: np.random.Generator | int | None, progress: Progress
-) -> list[SequenceGuide]:
-    """Return guides whose tool leaves the path where relaxed rows allow it.
-
-    For where nothing follows the path itself.
-
-    Raises
-    ------
-    NoSequenceError
-        No chain of configurations was found, or none whose deviation can be one of the relaxations'
-        splines.
-    """
-    t, asked = search_times(problem.path, FEWEST), problem.envelope
-    waypoints = NearPath(
-        problem.follows, problem.relaxations, problem.pinned, t, asked.lower, asked.upper
-    )
-    generator = np.random.default_rng(rng)
-    for number in range(1, SEARCHES + 1):
-        try:
-            found = _sampled(problem, waypoints, t, _options(problem, t, generator, progress))
-            break
-        except NoSequenceError:
-            if number == SEARCHES:
-                raise
-    near = [_near(problem, waypoints, sequence) for sequence in found]
-    kept = [guide for guide in near if guide is not None]
-    if not kept:
-        reason = "no spline of the relaxations' intervals (intervals=) deviates like them"
-        raise NoSequenceError(
-            f"{problem.robot.name}: {len(found)} chains are near the path, but {reason}",
-            time=0.0,
-            reason=reason,
-        )
-    return kept
-
-
-def _near(problem: Problem, waypoints: NearPath, sequence: Sequence) -> SequenceGuide | None:
-    """Return the guide whose deviation is a spline near that of a sequence; None for none."""
-    t, q = sequence.t, sequence.q
-    rows = [waypoints.allowed.deviation(x[None], float(s))[0] for s, x in zip(t, q, strict=True)]
-    deviation = deviation_of(problem, t)
-    c = deviation.nearest(np.array(rows))
-    tool, targets = deviation.target(c), problem.follows.targets(t)
-    targets[:, :3], targets[:, 3:12] = tool.translation, tool.rotation.reshape(len(t), 9)
-    there, arrived = waypoints.allowed.manifold.project(q, targets, far=True)
-    if not arrived.all():
-        return None
-    return SequenceGuide(replace(sequence, q=there), c)
-
-
 def _sampled(
-    problem: Problem, waypoints: Waypoints, t: Array, options: dict[str, Any]
+    problem: Problem, waypoints: OnPath, t: Array, options: dict[str, Any]
 ) -> list[Sequence]:
     asked = problem.envelope
     return sampled_sequences(
@@ -207,8 +151,8 @@ def _options(
 
 
 def has_curves(problem: Problem) -> bool:
-    """Whether the self-motions of a problem are curves."""
-    return problem.follows.redundancy == 1
+    """Whether the self-motions of a problem are curves, at all times."""
+    return problem.follows.redundancy == 1 and not problem.follows.holds
 
 
 def waypoint_times(problem: Problem) -> Array:

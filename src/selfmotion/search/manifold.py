@@ -5,7 +5,7 @@ import numpy as np
 from selfmotion.basics import Array, Flags, RobotError
 from selfmotion.follow import Follows
 from selfmotion.search import projection
-from selfmotion.search.settings import FAR_STEPS, LONGEST_CORRECTION, NEAR_STEPS
+from selfmotion.search.settings import FAR_STEPS, ITERATIONS, LONGEST_CORRECTION, NEAR_STEPS
 
 # Compiled kinematics and Pinocchio's differ by rounding alone [m, or rows of a rotation].
 _AGREE = 1e-9
@@ -38,12 +38,15 @@ class Manifold:
         self.follows, self.robot = follows, follows.robot
         # Copies: kernels are compiled anew for what may not be written to.
         self._limits = np.array(lower), np.array(upper)
+        self._limited = np.isfinite(upper)
         self.chains = follows.chains
         self.revolute: Flags = follows.robot.is_revolute
         self.layout = follows.layout
         self._check()
 
-    def project(self, q: Array, target: Array, *, far: bool = False) -> tuple[Array, Flags]:
+    def project(
+        self, q: Array, target: Array, *, far: bool = False, held: Flags | None = None
+    ) -> tuple[Array, Flags]:
         """Return the configurations (K, n) that Newton's method reaches, and where it does, (K,).
 
         From where it reaches none of its target, it is given more steps.
@@ -55,23 +58,60 @@ class Manifold:
             See `Follows.targets`.
         far : bool
             Whether q is any configuration instead of one near the solution.
+        held : (n,) or (K, n), optional
+            Joints that have to stand at 0; by default none.
         """
         wanted = np.array(np.broadcast_to(target, (len(q), np.shape(target)[-1])), order="C")
-        found, arrived = self._within(q, wanted, FAR_STEPS if far else NEAR_STEPS)
+        still = np.array(np.broadcast_to(False if held is None else held, q.shape))
+        found, arrived = self._within(q, wanted, still, FAR_STEPS if far else NEAR_STEPS)
         # Near singular poses Newton's method takes many steps, from near as well.
         alone = ~arrived if np.ndim(target) == 2 else np.full(len(q), not arrived.any())
         if not far and alone.any():
-            found[alone], arrived[alone] = self._within(q[alone], wanted[alone], FAR_STEPS)
+            found[alone], arrived[alone] = self._within(
+                q[alone], wanted[alone], still[alone], FAR_STEPS
+            )
+        # Joints that share a band may be within their limits, and beyond that together.
+        within = np.where(self._limited, self.follows.within_bands(found), np.inf)
+        beyond = arrived & (np.abs(found) > within).any(axis=1)
+        if beyond.any():
+            given = found[beyond], wanted[beyond], still[beyond], FAR_STEPS, within[beyond]
+            found[beyond], arrived[beyond] = self._within(*given)
         return found, arrived
 
-    def _within(self, q: Array, targets: Array, steps: int) -> tuple[Array, Flags]:
+    def approach(self, q: Array, target: Array, held: Flags) -> tuple[Array, Array]:
+        """Return configurations (K, n) brought as near to a target (12 F,) as limits let them.
+
+        Slower than `project`, it arrives at stretched poses and with joints at their limits, too;
+        joints that are `held` (n,) stand at 0.
+
+        Returns
+        -------
+        q : (K, n)
+        misses : (K, 2)
+            What is left [m], [rad].
+        """
+        found, left = np.array(q), np.zeros((len(q), self.follows.dimension))
+        limits = *self._limits, np.array(held)
+        projection.approach_all(found, target, self.chains, self.layout, *limits, ITERATIONS, left)
+        linear = self.follows.linear > 0.0
+        parts = np.where(linear, left, 0.0), np.where(linear, 0.0, left)
+        misses = [np.sqrt(np.einsum("km,km->k", part, part)) for part in parts]
+        return found, np.stack(misses, axis=1)
+
+    def _within(
+        self, q: Array, targets: Array, still: Flags, steps: int, most: Array | float = np.inf
+    ) -> tuple[Array, Flags]:
+        """Return what Newton's method makes of q (K, n), no |q| more than `most` besides limits."""
         found, arrived = np.array(q), np.zeros(len(q), dtype=bool)
+        lower, upper = self._limits
         projection.project_all(
             found,
             targets,
             self.chains,
             self.layout,
-            *self._limits,
+            np.array(np.broadcast_to(np.maximum(lower, -most), q.shape)),
+            np.array(np.broadcast_to(np.minimum(upper, most), q.shape)),
+            still,
             LONGEST_CORRECTION,
             steps,
             arrived,
@@ -88,7 +128,8 @@ class Manifold:
             target = np.concatenate(
                 [part for pose in poses for part in (pose.translation, pose.rotation.ravel())]
             )
-            found, arrived = self.project(q[None], target)
+            still = np.zeros((1, len(q)), dtype=np.bool_)
+            found, arrived = self._within(q[None], target[None], still, NEAR_STEPS)
             for item, pose in zip(items, poses, strict=True):
                 miss = max(item.miss(pose, found[0]))
                 if not (arrived[0] and miss < _AGREE):

@@ -59,7 +59,7 @@ class Obstruction:
             )
         q, _ = self._nearest
         position, rotation = self.misses
-        turned = f" and {rotation:.2g} rad" if np.any(poses.problem.task.rows >= 3) else ""
+        turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""
         return (
             f"none was found that puts '{name}' there, from {found.tries} tries"
             f"{cause(poses, q[0])}: the nearest misses it by {1e3 * position:.3g} mm{turned}"
@@ -82,30 +82,21 @@ def _roomiest(poses: SinglePoses, met: Array) -> str:
     )
 
 
-def obstruction(
-    problem: Problem, rng: np.random.Generator, *, relaxed: bool = True
-) -> Obstruction | None:
+def obstruction(problem: Problem, rng: np.random.Generator) -> Obstruction | None:
     """Return a pose of the path that no configuration was found for; None where there is none.
 
     Poses all along the path, the first, then those that are farthest from the others. A
     pose is given up when thousands of tries lead nowhere: Newton's method from all over the
-    limits, with deviations all over the bands of relaxed rows; where self-motions are curves,
-    these as a whole; and what met bodies least, moved aside.
-
-    Parameters
-    ----------
-    problem : Problem
-    rng : Generator
-    relaxed : bool
-        Whether relaxed rows need not be kept.
+    limits, and of the bands of tolerances; where self-motions are curves, these as a whole; and
+    what met bodies least, moved aside.
     """
-    poses = SinglePoses(problem, rng, relaxed=relaxed)
+    poses = SinglePoses(problem, rng)
     times = np.linspace(0.0, problem.path.duration, COARSE_POSES)
     known: dict[float, Array] = {}
     order = _worst_first(problem, times)
     for t in order:
         near = min(known, key=lambda other: abs(other - t), default=None)
-        found = poses.look(t, np.empty((0, problem.robot.dof)) if near is None else known[near])
+        found = poses.look(t, np.empty((0, poses.robot.dof)) if near is None else known[near])
         if not len(found.free):
             found = poses.look_closely(t, found)
         if not len(found.free):
@@ -130,11 +121,11 @@ def _worst_first(problem: Problem, times: Array) -> list[float]:
 def cause(poses: SinglePoses, q: Array) -> str:
     """Return what keeps the arm from reaching further at q (n,); "" where nothing shows."""
     robot, follows, causes = poses.robot, poses.follows, []
-    near = np.minimum(q - robot.lower, robot.upper - q) < AT_LIMIT
+    near = np.minimum(q - robot.lower, robot.upper - q)[: poses.problem.asked.robot.dof] < AT_LIMIT
     if np.any(near):
         names = ", ".join(f"'{robot.joint_names[k]}'" for k in np.flatnonzero(near))
         causes.append(f"at its limit: joint {names}")
-    best = robot.dexterous_configuration(poses.problem.task)
+    best = robot.dexterous_configuration(poses.problem.asked.task)
     here, there = (
         float(np.linalg.svd(follows.jacobian(x), compute_uv=False)[-1]) for x in (q, best)
     )

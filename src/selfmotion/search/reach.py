@@ -36,13 +36,13 @@ def reachable(
 ) -> Reach:
     """Return how far single poses of the path can be reached, within the joint limits.
 
-    With what relaxed rows allow. Inverse kinematics from the solutions of the pose before, and from
+    With what tolerances allow. Inverse kinematics from the solutions of the pose before, and from
     elsewhere where these do not go on: a pose that nothing leads to is out of reach, as far as can
     be told. Poses all along the path, and more about the time `suspect` [s], where a motion had
     trouble.
     """
-    path, given = problem.path, problem.given_start
     poses = SinglePoses(problem, rng, clear=False)
+    path, given = problem.path, poses.problem.given_start
     first = [given] if given is not None else start_candidates(poses.follows, starts, rng)
     about = np.clip(suspect / path.duration + np.array(ABOUT), 0.0, 1.0)
     times = path.duration * np.union1d(np.linspace(0.0, 1.0, POSES + 1), about)
@@ -80,14 +80,13 @@ def _out_of_reach(poses: SinglePoses, time: float, q: Array, beyond: Array) -> s
     q (n,) is its configuration at `time`, the last one; `beyond` are later times.
     """
     begin = f"from t = {time:.6g} s on the pose is out of reach{cause(poses, q)}"
-    items = poses.follows.items
-    if len(items) > 1:
-        names = " and ".join(f"'{item.chain.tip_name}'" for item in items)
+    if len(poses.problem.asked.follows.items) > 1:
+        names = poses.follows.names
         return f"{begin}: no configuration was found that puts {names} on their paths"
     looks = beyond[np.unique(np.linspace(0, len(beyond) - 1, LOOKS).round().astype(int))]
     misses = [(*poses.nearest(float(t))[1][0], float(t)) for t in looks]
     position, rotation, when = max(misses, key=lambda miss: miss[0] + miss[1])
-    turned = f" and {rotation:.2g} rad" if np.any(poses.problem.task.rows >= 3) else ""
+    turned = f" and {rotation:.2g} rad" if poses.problem.asked.task.angular else ""
     return (
         f"{begin}: the nearest configuration found misses it by up to "
         f"{1e3 * position:.3g} mm{turned}, at t = {when:.4g} s"

@@ -1,8 +1,12 @@
 """What would help where the arm cannot be at a pose: another place, a tilt, a wider limit."""
 
+from dataclasses import replace
+from typing import cast
+
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.follow import AugmentedFollows
 from selfmotion.search.settings import (
     FARTHEST,
     MOVE_TRIES,
@@ -67,30 +71,41 @@ def least_deviation(poses: SinglePoses, t: float, rows: tuple[str, ...]) -> Arra
     As far as tries tell: the least of many, and then less and less. None where nothing is found, or
     the task does not prescribe these rows.
     """
-    prescribed = [ROW_NAMES[k] for k in poses.problem.task.rows]
+    asked = poses.problem.asked
+    prescribed = [ROW_NAMES[k] for k in asked.task.rows]
     rows = tuple(row for row in rows if row in prescribed)
     if not rows:
         return None
-    band = FARTHEST if rows[0] in POSITION_ROWS else np.pi
-    here = [ROW_NAMES.index(row) for row in rows]
+    more = Relaxation(rows, FARTHEST if rows[0] in POSITION_ROWS else np.pi)
+    others = (
+        replace(item, rows=tuple(row for row in item.rows if row not in rows))
+        for item in asked.relaxations
+        if not set(item.rows) <= set(rows)
+    )
+    wider, n = poses.of(replace(asked, relaxations=(*others, more))), asked.robot.dof
+    follows = cast(AugmentedFollows, wider.problem.follows)
+    q = poses.some(t, REMEDY_SEEDS)[:, :n]
+    q = np.hstack([q, np.zeros((len(q), follows.robot.dof - n))])
     best: Array | None = None
-    q = poses.some(t, REMEDY_SEEDS)
-    away = np.zeros((len(q), 6))
     for _ in range(SHRINKS):
-        allowed = poses.allowed.relaxed_besides(Relaxation(rows, band))
-        q, away, arrived = allowed.project(q, t, far=True, deviation=away)
-        q, away = q[arrived], away[arrived]
-        free = poses.bounds.keep(q)
-        q, away = q[free], away[free]
+        q, arrived = wider.project(q, t, far=True)
+        q = q[arrived]
+        q = q[wider.bounds.keep(q)]
         if not len(q):
             break
-        sizes = np.linalg.norm(away[:, here], axis=1)
+        away = follows.deviation(more, q)
+        sizes = np.linalg.norm(away, axis=1)
         order = np.argsort(sizes)
-        q, away, band = q[order], away[order], SHRUNK * float(sizes[order[0]])
-        best = np.zeros(6)
-        best[here] = away[0, here]
-        if not band > 0.0:
+        q, size = q[order], float(sizes[order[0]])
+        if best is None or size < np.linalg.norm(best):
+            best = np.zeros(6)
+            best[more.indices] = away[order[0]]
+        limits = follows.limits_within(more, SHRUNK * size)
+        if not limits.max() > 0.0:
             break
+        wider = wider.with_limits(
+            np.maximum(wider.bounds.lower, -limits), np.minimum(wider.bounds.upper, limits)
+        )
     if best is None:
         return None
     return best[:3] if rows[0] in POSITION_ROWS else best[3:]
@@ -104,14 +119,14 @@ def least_excess(poses: SinglePoses, t: float) -> tuple[str, float] | None:
     lower, upper = poses.bounds.lower, poses.bounds.upper
     seeds = poses.some(t, REMEDY_SEEDS)
     found: list[tuple[float, str]] = []
-    for k, name in enumerate(poses.robot.joint_names):
+    for k, name in enumerate(poses.problem.asked.robot.joint_names):
         if not (np.isfinite(lower[k]) or np.isfinite(upper[k])):
             continue
         wide = poses.with_limits(
             np.where(np.arange(len(lower)) == k, -np.inf, lower),
             np.where(np.arange(len(upper)) == k, np.inf, upper),
         )
-        q, _, arrived = wide.allowed.project(seeds, t, far=True)
+        q, arrived = wide.project(seeds, t, far=True)
         q = q[arrived]
         q = q[wide.bounds.keep(q)]
         excess = np.maximum(q[:, k] - upper[k], lower[k] - q[:, k])

@@ -29,7 +29,7 @@ from selfmotion.search.settings import (
 )
 from selfmotion.search.shortest import Shortest
 from selfmotion.search.starts import spread
-from selfmotion.search.waypoints import Waypoints
+from selfmotion.search.waypoints import OnPath
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,20 +38,20 @@ class SampledLayers:
 
     Attributes
     ----------
-    waypoints : Waypoints
+    waypoints : OnPath
     bounds : Admissible
     layers : list of (K, n)
         Free samples, sorted by the first joint.
     """
 
-    waypoints: Waypoints
+    waypoints: OnPath
     bounds: Admissible
     layers: list[Array]
 
     @classmethod
     def of(
         cls,
-        waypoints: Waypoints,
+        waypoints: OnPath,
         limits: tuple[Array, Array],
         bodies: tuple[tuple[CollisionModel, float], ...],
         largest_step: Array,
@@ -76,7 +76,7 @@ class SampledLayers:
 
 
 def sampled_sequences(
-    waypoints: Waypoints,
+    waypoints: OnPath,
     t: Array,
     *,
     lower: Array,
@@ -99,7 +99,7 @@ def sampled_sequences(
 
     Parameters
     ----------
-    waypoints : Waypoints
+    waypoints : OnPath
     t : (W,)
         Their times [s].
     lower, upper : (n,)
@@ -164,7 +164,7 @@ def sampled_sequences(
 
 
 def _layers(
-    waypoints: Waypoints,
+    waypoints: OnPath,
     bounds: Admissible,
     largest_step: Array,
     weights: Array,
@@ -184,8 +184,7 @@ def _layers(
         before = layers[-1]
         cost = np.zeros(len(before)) if i == 1 else cost
         parents = _spread_out(before[np.isfinite(cost)], cost[np.isfinite(cost)], PARENTS)
-        each = max(STRAYS, -(-waypoints.fewest_strays // max(len(parents), 1)))
-        strays = np.repeat(parents, each, axis=0)
+        strays = np.repeat(parents, STRAYS, axis=0)
         away = rng.normal(scale=STRAYED, size=strays.shape) / weights
         step = 0.5 * largest_step[i - 1]
         guesses = np.concatenate([parents, strays + np.clip(away, -step, step)])
@@ -202,7 +201,7 @@ def _layers(
 
 
 def _smooth_motions(
-    waypoints: Waypoints, bounds: Admissible, rng: np.random.Generator, progress: Progress
+    waypoints: OnPath, bounds: Admissible, rng: np.random.Generator, progress: Progress
 ) -> list[Array]:
     """Return at all waypoints where motions with constant null motions are, each (K, n)."""
     dof, last = waypoints.robot.dof, waypoints.count - 1
@@ -234,9 +233,7 @@ def _sorted(q: Array) -> Array:
     return np.ascontiguousarray(q[np.argsort(q[:, 0], kind="stable")])
 
 
-def _starts(
-    waypoints: Waypoints, bounds: Admissible, station: int, rng: np.random.Generator
-) -> Array:
+def _starts(waypoints: OnPath, bounds: Admissible, station: int, rng: np.random.Generator) -> Array:
     """Return configurations within the limits, free where there are such, (K, n)."""
     seeds = np.array(list(spread(waypoints.robot, BEGINNING_SEEDS, rng)))
     q, arrived = waypoints.project(seeds, station, far=True)
@@ -246,7 +243,7 @@ def _starts(
 
 
 def _shortened(
-    waypoints: Waypoints,
+    waypoints: OnPath,
     bounds: Admissible,
     q: Array,
     largest_step: Array,
@@ -269,7 +266,7 @@ def _shortened(
     return q
 
 
-def _around(waypoints: Waypoints, bounds: Admissible, q: Array, ring: float) -> list[Array]:
+def _around(waypoints: OnPath, bounds: Admissible, q: Array, ring: float) -> list[Array]:
     """Return q (W, n) and the free samples around it at each waypoint, each (K, n).
 
     At one and two times `ring` to both sides along each axis of a basis of the null space that is

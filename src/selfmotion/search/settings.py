@@ -171,13 +171,6 @@ ABOUT = (-1e-3, 0.0, 1e-3, 4e-3)
 STRETCHED = 0.1
 AT_LIMIT = 1e-3
 
-# --- relaxed rows
-# The search uses this share of a band: the spline that follows its motion needs some of the rest.
-WITHIN_BAND = 0.9995
-# Tries around the samples that a chain reaches, at least, and searches from other seeds before
-# nothing counts as found.
-FEWEST_STRAYS, SEARCHES = 320, 3
-
 # --- single poses
 # The slower method brings so many seeds nearer, in so many iterations each; and so many where a
 # pose would be given up: near limits it arrives from a third of them, Newton's from one in 300.

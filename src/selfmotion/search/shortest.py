@@ -30,7 +30,7 @@ from selfmotion.search.settings import (
     STEP_KEPT,
     STEPS_STIFF,
 )
-from selfmotion.search.waypoints import Waypoints
+from selfmotion.search.waypoints import OnPath
 
 # Of directions along which nothing changes.
 _DAMPING = 1e-3
@@ -47,7 +47,7 @@ class Shortest:
 
     Parameters
     ----------
-    waypoints : Waypoints
+    waypoints : OnPath
     bounds : Admissible
         What each configuration has to keep.
     largest_step : (W - 1, n)
@@ -57,7 +57,7 @@ class Shortest:
     """
 
     def __init__(
-        self, waypoints: Waypoints, bounds: Admissible, largest_step: Array, weights: Array
+        self, waypoints: OnPath, bounds: Admissible, largest_step: Array, weights: Array
     ) -> None:
         self._waypoints, self._bounds, self._weights = waypoints, bounds, weights
         self._largest, self._kept = largest_step, STEP_KEPT * largest_step

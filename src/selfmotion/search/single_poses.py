@@ -1,16 +1,16 @@
-"""Whether the arm can be at single poses of a path at all: limits, bodies, relaxed rows."""
+"""Whether the arm can be at single poses of a path at all: limits, bodies."""
 
 from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Flags
 from selfmotion.collision import Closest
 from selfmotion.problem import Problem
 from selfmotion.robot import RobotModel
-from selfmotion.search.allowed import Allowed
 from selfmotion.search.curves import SelfMotion
+from selfmotion.search.manifold import Manifold
 from selfmotion.search.nodes import Admissible
 from selfmotion.search.settings import (
     APPROACHED,
@@ -53,7 +53,7 @@ class Found:
 
 
 class SinglePoses:
-    """Inverse kinematics of single poses, within limits, clear of bodies, rows relaxed.
+    """Inverse kinematics of single poses, within limits, clear of bodies, tolerances made use of.
 
     Parameters
     ----------
@@ -62,41 +62,59 @@ class SinglePoses:
         Shifts the seeds.
     clear : bool
         Whether bodies have to keep their distances.
-    relaxed : bool
-        Whether relaxed rows need not be kept.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        rng: np.random.Generator,
-        *,
-        clear: bool = True,
-        relaxed: bool = True,
-    ) -> None:
+    def __init__(self, problem: Problem, rng: np.random.Generator, *, clear: bool = True) -> None:
+        problem = problem.augmented
         asked = problem.asked_envelope
-        self.problem, self._rng = problem, rng
+        self.problem, self._rng, self._clear = problem, rng, clear
         self.robot: RobotModel = asked.arm(problem.robot)
         self.follows = problem.follows.for_robot(self.robot)
-        relaxations = problem.relaxations if relaxed else ()
-        self.allowed = Allowed(self.follows, relaxations, problem.pinned, asked.lower, asked.upper)
+        self._manifold = Manifold(self.follows, asked.lower, asked.upper)
         self.bounds = Admissible(
             asked.lower, asked.upper, self.robot.is_revolute, asked.bodies if clear else ()
         )
         self._seeds = np.array(list(spread(self.robot, SEEDS, rng)))
+        self._shift = np.zeros(3)
+        # A path takes a millisecond to say where it is, and is asked again and again.
+        self._targets: dict[float, Array] = {}
+
+    def of(self, problem: Problem) -> "SinglePoses":
+        """Return that of another problem, its path moved as far as this one's."""
+        other = SinglePoses(problem, self._rng, clear=self._clear)
+        other._shift = self._shift
+        return other
 
     def shifted(self, shift: Array) -> "SinglePoses":
         """Return that of the path moved by so much (3,) [m], among the same bodies."""
         other = copy(self)
-        other.allowed = self.allowed.shifted(shift)
+        other._shift = self._shift + shift
         return other
 
     def with_limits(self, lower: Array, upper: Array) -> "SinglePoses":
         """Return that of an arm with other limits (n,)."""
         other = copy(self)
-        other.allowed = self.allowed.with_limits(lower, upper)
+        other._manifold = Manifold(self.follows, lower, upper)
         other.bounds = replace(self.bounds, lower=lower, upper=upper)
         return other
+
+    def target(self, t: float) -> Array:
+        """Return where the tips are at a time [s], (12 F,)."""
+        if t not in self._targets:
+            self._targets[t] = self.follows.targets(np.array([t]))[0]
+        target = self._targets[t].copy()
+        target[:3] += self._shift
+        return target
+
+    def _held(self, t: float) -> Flags:
+        return np.asarray(self.follows.held(np.array([t]))[0])
+
+    def project(self, q: Array, t: float, *, far: bool = False) -> tuple[Array, Flags]:
+        """Return what Newton's method makes of q (K, n) at a time [s], and where it arrives, (K,).
+
+        `far` says that q is any configuration, instead of one near a solution.
+        """
+        return self._manifold.project(q, self.target(t), far=far, held=self._held(t))
 
     def first_blocked(self, times: Array) -> float | None:
         """Return the first of some times [s] at whose poses nothing is found by a quick look."""
@@ -145,20 +163,21 @@ class SinglePoses:
 
     def _reached(self, t: float, seeds: Array, *, far: bool = False) -> Array:
         """Return what Newton's method makes of seeds (K, n) for the pose at t, (K', n)."""
-        away = self.allowed.anywhere(len(seeds), t, self._rng) if far and len(seeds) else None
-        found, _, arrived = self.allowed.project(seeds, t, far=far, deviation=away)
+        found, arrived = self.project(seeds, t, far=far)
         return np.asarray(found[arrived])
 
     def _by_damped_steps(self, t: float, count: int) -> Array:
         """Return what the slower method finds, which comes to limits and edges, (K, n)."""
         q, misses = self.nearest(t, count)
-        return np.asarray(q[misses.sum(axis=1) < NEARLY])
+        near = q[misses.sum(axis=1) < NEARLY]
+        within = (np.abs(near) <= self.follows.within_bands(near)).all(axis=1)
+        pulled, arrived = self.project(near[~within], t)
+        return np.concatenate([near[within], pulled[arrived]])
 
     def nearest(self, t: float, count: int = APPROACHED) -> tuple[Array, Array]:
         """Return configurations as near to a pose as limits let them (K, n), misses [m, rad]."""
         seeds = np.array(list(spread(self.robot, count, self._rng)))
-        away = self.allowed.anywhere(len(seeds), t, self._rng)
-        q, _, misses = self.allowed.approach(seeds, t, away)
+        q, misses = self._manifold.approach(seeds, self.target(t), self._held(t))
         order = np.argsort(misses.sum(axis=1), kind="stable")
         return q[order], misses[order]
 
@@ -171,10 +190,10 @@ class SinglePoses:
 
     def _along_curves(self, t: float, met: Array) -> Array:
         """Return samples of all self-motions of a pose, where these are curves, (K, n)."""
-        if self.follows.redundancy != 1 or self.allowed.relaxed(t):
+        if self.follows.redundancy != 1 or self._held(t).any():
             return np.empty((0, self.robot.dof))
         motion = SelfMotion(self.follows, SPACING)
-        target = self.allowed.target(t)
+        target = self.target(t)
         seeds = spread(self.robot, TRACING_SEEDS, self._rng)
         samples = [curve.q for curve in motion.curves(target, seeds).curves]
         every = np.concatenate([np.empty((0, self.robot.dof)), *samples])
@@ -190,7 +209,7 @@ class SinglePoses:
             here = known[self._rng.integers(len(known), size=WALKERS)]
             size = self._rng.choice(WALK_STEPS, size=(WALKERS, 1))
             away = self._rng.normal(size=here.shape) * size / self.robot.joint_weights
-            found, _, arrived = self.allowed.project(here + away, t)
+            found, arrived = self.project(here + away, t)
             known = np.concatenate([known, found[arrived]])
             if self.bounds.keep(found[arrived]).any():
                 break
@@ -203,7 +222,7 @@ class SinglePoses:
         room = np.array([self.room(q)[0] for q in best])
         for size in CLIMBS:
             away = self._rng.normal(scale=size, size=best.shape) / self.robot.joint_weights
-            found, _, arrived = self.allowed.project(best + away, t)
+            found, arrived = self.project(best + away, t)
             for k in np.flatnonzero(arrived):
                 here = self.room(found[k])[0]
                 if here > room[k]:

@@ -55,17 +55,17 @@ def start_candidates(
         No seed led to the pose.
     """
     found: list[Array] = []
-    if follows.redundancy == 1:
+    if follows.redundancy == 1 and not follows.holds:
         found = _along_curves(follows, count, rng, admits or _all)
     if not found:
         found = _scattered(follows, count, rng, admits or _all)
     if not found and admits is not None:
         return start_candidates(follows, count, rng)
-    if not found and len(follows.items) > 1:
-        names = " and ".join(f"'{item.chain.tip_name}'" for item in follows.items)
+    if not found and not follows.is_plain:
         raise InverseKinematicsError(
-            f"{follows.robot.name}: no configuration within the limits was found that puts {names} "
-            f"on the start of their paths; move these into the workspace, or give one (start=)",
+            f"{follows.robot.name}: no configuration within the limits was found that puts "
+            f"{follows.names} on the start of the path; move that into the workspace, or give one "
+            f"(start=)",
             position_miss=np.inf,
             rotation_miss=np.inf,
         )
@@ -104,9 +104,10 @@ def _scattered(
     robot = follows.robot
     manifold = Manifold(follows, robot.lower, robot.upper)
     target, found = follows.targets(np.zeros(1))[0], list[Array]()
+    held = follows.held(np.zeros(1))[0]
     for _ in range(START_ROUNDS):
         seeds = np.array(list(spread(robot, TRIES * count, rng)))
-        q, arrived = manifold.project(seeds, target, far=True)
+        q, arrived = manifold.project(seeds, target, far=True, held=held)
         for one in q[arrived][admits(q[arrived])]:
             if len(found) < count and all(
                 np.linalg.norm(one - other) > SAME_START for other in found
@@ -127,8 +128,8 @@ def carried(follows: Follows, starts: Array, t: Array) -> tuple[Array, npt.NDArr
     free = np.full(follows.robot.dof, np.inf)
     manifold = Manifold(follows, -free, free)
     motions, going = [starts], np.ones(len(starts), dtype=bool)
-    for target in follows.targets(t)[1:]:
-        q, arrived = manifold.project(motions[-1], target)
+    for target, held in zip(follows.targets(t)[1:], follows.held(t)[1:], strict=True):
+        q, arrived = manifold.project(motions[-1], target, held=held)
         going &= arrived
         motions.append(q)
     return np.stack(motions, axis=1), going

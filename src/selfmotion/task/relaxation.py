@@ -1,13 +1,13 @@
 """Rows of the tool's motion that need not follow the path exactly, for all of it or a while."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import TURN, ProblemError, shown
+from selfmotion.basics import TURN, Array, ProblemError, shown
 
 POSITION_ROWS, _ROTATION = ("x", "y", "z"), ("rx", "ry", "rz")
 ROW_NAMES = (*POSITION_ROWS, *_ROTATION)
@@ -40,8 +40,6 @@ class Relaxation:
         First and last time of the window [s]; by default the whole motion.
     axes : {"world", "tool"}
         Of x, y and z; rotations are in tool axes always.
-    intervals : int
-        Pieces of the cubic spline that describes the deviation over the window, ≥ 4.
 
     Raises
     ------
@@ -54,7 +52,6 @@ class Relaxation:
     band: float = np.inf
     during: tuple[float, float] | None = None
     axes: str = "world"
-    intervals: int = 8
 
     def __post_init__(self) -> None:
         _check_types(self.rows, self.band, self.during)
@@ -80,13 +77,6 @@ class Relaxation:
         if self.axes not in ("world", "tool"):
             raise ProblemError(
                 f"relaxation {self.name}: axes are '{self.axes}', expected 'world' or 'tool'"
-            )
-        if isinstance(self.intervals, bool) or not (
-            isinstance(self.intervals, int | np.integer) and self.intervals >= 4
-        ):
-            raise ProblemError(
-                f"relaxation {self.name}: intervals is {self.intervals}, expected a whole number "
-                f"≥ 4"
             )
         if self.during is not None:
             times = tuple(float(time) for time in self.during)
@@ -120,6 +110,13 @@ class Relaxation:
     def window(self, duration: float) -> tuple[float, float]:
         """Return first and last time of the window in a motion of length `duration` [s]."""
         return (0.0, duration) if self.during is None else self.during
+
+    def moved(self, when: Callable[[Array], Array]) -> "Relaxation | None":
+        """Return the same with its window at other times [s]; None where nothing is left of it."""
+        if self.during is None:
+            return self
+        first, last = when(np.array(self.during)).tolist()
+        return replace(self, during=(first, last)) if first < last else None
 
     def to_dict(self) -> dict[str, Any]:
         """Return a JSON-safe description: ``Relaxation(**description)`` restores it."""

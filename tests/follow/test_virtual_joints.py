@@ -1,0 +1,185 @@
+"""Tolerances as virtual joints: where they put the tool is what the relaxations say, no more."""
+
+import dataclasses
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from selfmotion.certificate.deviation import deviation_from
+from selfmotion.constraints import NodeTangents
+from selfmotion.costs import Samples
+from selfmotion.follow import AugmentedFollows, Follows
+from selfmotion.motion import Sampling
+from selfmotion.nodes.objective import scattered
+from selfmotion.problem.of_arm import WithinBand
+from support.arms import PANDA_HOME, robot_named
+from support.nodes import moved, nodes_of, random_step
+
+# Rounding of poses that are composed twice.
+ROUNDING = 1e-12
+# Central differences over 1e-6: their truncation, and rounding over the step.
+GRADIENT = 1e-7
+# Central differences of a whole motion's cost, relative to the largest entry.
+COST = 1e-7
+
+R = sm.Relaxation
+TOLERANCES = [
+    ("panda", "pose", [R("rz", 0.5)]),
+    ("panda", "pose", [R(("rx", "ry"), 0.4), R("x", 0.01, axes="tool")]),
+    ("tiago", "pose", [R(("ry", "rz"), 0.4), R(("x", "y"), 0.01), R("z", 0.05)]),
+    ("panda", "pose", [R("rx", 0.3), R("ry", 0.2)]),
+    ("xarm7", "pose", [R(("rx", "ry", "rz"), 0.8), R("z")]),
+    ("ur5", "pose", [R("rz"), R(("rx", "ry"), 0.3)]),
+    ("ur5", "pointing", [R(("rx", "ry"), 0.3), R("z", 0.01, axes="tool")]),
+    ("ur5", "pointing", [R("rx", 0.3)]),
+    ("panda", "pointing", [R("rx", 0.3), R("ry", 0.1), R("x", 0.02, axes="tool")]),
+    ("panda", "position", [R("z", 0.02, axes="tool")]),
+    ("planar_3r", "planar_pose", [R("rz", 0.3), R(("x", "y"), 0.05)]),
+]
+
+
+def differences(function, x: Array, step: float = 1e-6) -> Array:
+    """Return the derivatives of what is (K, …) at x (K, n), (K, …, n)."""
+    sides = [(function(x + step * axis), function(x - step * axis)) for axis in np.eye(x.shape[1])]
+    return np.stack([(above - below) / (2.0 * step) for above, below in sides], axis=-1)
+
+
+@pytest.mark.parametrize(("name", "task", "relaxations"), TOLERANCES)
+def test_the_tool_deviates_in_what_is_relaxed_and_by_what_the_joints_say(
+    name: str, task: str, relaxations: list[sm.Relaxation]
+) -> None:
+    robot, rng = robot_named(name), np.random.default_rng(1)
+    real = Follows.of(robot, sm.Dwell(pin.SE3.Identity(), 1.0), task)
+    follows = AugmentedFollows.with_tolerances(real, relaxations)
+    virtual, n = follows.virtual, robot.dof
+    lower, upper = robot.finite_limits()
+    for _ in range(3):
+        s = rng.uniform(-0.6, 0.6, (1, len(virtual.each)))
+        if virtual.swing is not None:
+            s[:, virtual.swing[1]] = s[:, virtual.swing[0]]
+        q = np.hstack([rng.uniform(lower, upper)[None], s])
+        # Where all is followed is where the joints put it; what deviates is the arm's own tool.
+        pose, tool = follows.items[0].chain.place(q[0]), robot.pose(q[0, :n])
+        there = Follows.of(robot, sm.Dwell(pose, 1.0), task).items[0]
+        in_tool = any(item.in_tool_axes for item in relaxations)
+        away = deviation_from(there, np.zeros(1), q[:, :n], in_tool)
+        rest = away.copy()
+        for item in relaxations:
+            rest[:, item.indices] = 0.0
+            rows, by = virtual.rows_of(item, s)
+            sizes = [np.linalg.norm(x) for x in (rows, away[:, item.indices])]
+            assert abs(sizes[0] - sizes[1]) < ROUNDING
+            exact = differences(lambda x, item=item: virtual.rows_of(item, x)[0], s)
+            np.testing.assert_allclose(by, exact, atol=GRADIENT)
+        assert np.abs(rest).max() < ROUNDING
+        poses = [(x.rotation[None], x.translation[None]) for x in (tool, pose)]
+        np.testing.assert_allclose(virtual.coordinates(*poses), s, atol=1e-9)
+        # The last joint's Jacobian is that of its chain, with the arm's own in front.
+        jacobian = follows.items[0].chain.at(q[0])[0]
+        chain = follows.items[0].chain
+        places = differences(lambda x, chain=chain: chain.place(x[0]).translation[None], q)
+        np.testing.assert_allclose(jacobian[:3], places[0], atol=GRADIENT)
+
+
+def test_joints_stand_still_outside_of_windows() -> None:
+    robot = robot_named("panda")
+    path = sm.Dwell(robot.pose(PANDA_HOME), 4.0)
+    windows = [R("x", 0.1, during=(0.0, 2.0)), R(("rx", "ry"), 0.2, during=(1.0, 4.0)), R("z", 0.1)]
+    follows = AugmentedFollows.with_tolerances(Follows.of(robot, path, "pose"), windows)
+    names = follows.robot.joint_names[7:]
+    held = follows.held(np.array([0.0, 1.0, 1.5, 2.0, 4.0]))[:, 7:]
+    told = [{name for name, still in zip(names, row, strict=True) if still} for row in held]
+    tilt = {"tilt rx", "tilt ry"}
+    assert told == [tilt, tilt, set(), {"relaxed x"}, {"relaxed x"}]
+    assert follows.holds
+    assert follows.edges == (1.0, 2.0)
+
+
+def test_rotations_about_changing_pairs_of_axes_are_refused() -> None:
+    robot = robot_named("panda")
+    path = sm.Dwell(robot.pose(PANDA_HOME), 4.0)
+    pairs = [R("rx", 0.1, (0.0, 2.0)), R("ry", 0.1), R("rz", 0.1, (2.5, 4.0))]
+    with pytest.raises(sm.ProblemError, match="two and another two"):
+        sm.Problem(robot, path, start=PANDA_HOME, relaxations=pairs)
+
+
+def test_a_problem_with_tolerances_keeps_what_its_costs_and_limits_say_of_the_arm() -> None:
+    """Their values and derivatives are those of the arm's own joints; bands are besides."""
+    robot = robot_named("panda")
+    circle = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 3.0)
+    tilt = sm.Tilt("panda_link7", within=2.0, towards=(1.0, 0.0, 0.0))
+    costs = [sm.JointVelocity(), sm.InverseManipulability(0.1), sm.JointAcceleration(0.01)]
+    asked = sm.Problem(
+        robot,
+        circle,
+        start=PANDA_HOME,
+        costs=costs,
+        constraints=[sm.JointPositionLimits(), sm.JointVelocityLimits(), tilt],
+        relaxations=[R(("rx", "ry"), 0.2), R("z", 0.01, axes="tool")],
+    )
+    problem, rng = asked.augmented, np.random.default_rng(0)
+    t = np.linspace(0.0, 3.0, 9)
+    more = problem.robot.dof - robot.dof
+    q = np.hstack([PANDA_HOME + 0.1 * rng.normal(size=(9, 7)), 0.3 * rng.normal(size=(9, more))])
+    qd = rng.normal(size=q.shape)
+    sampling = Sampling.trapezoidal(t)
+    whole = Samples.along(problem.follows, sampling, q, qd)
+    own = Samples.along(asked.follows, sampling, q[:, :7], qd[:, :7])
+    for one, other in zip(problem.all_costs, asked.all_costs, strict=True):
+        np.testing.assert_allclose(one.value(whole), other.value(own), rtol=1e-12)
+        for name in ("q", "qd", "qdd"):
+            part, wanted = (getattr(x, name) for x in (one.gradient(whole), other.gradient(own)))
+            assert (part is None) == (wanted is None)
+            if part is not None:
+                np.testing.assert_allclose(part[:, :7], wanted, rtol=1e-12)
+                assert not part[:, 7:].any()
+    bound = problem.bind_constraints(q[0], q[-1], apart=False)
+    before = asked.bind_constraints(q[0, :7], q[-1, :7], apart=False)
+    bands = bound[len(before) :]
+    assert all(isinstance(item, WithinBand) for item in bands)
+    assert len(bands) == 2
+    for one, other in zip(bound, before, strict=False):
+        np.testing.assert_allclose(one.residual(whole), other.residual(own), atol=1e-12)
+    ones = np.eye(q.shape[1])
+    motion = NodeTangents(np.tile(ones, (9, 1, 1)), np.zeros((9, *ones.shape)), sampling)
+    for item in bound:
+        exact = differences(
+            lambda x, item=item: item.residual(Samples.along(problem.follows, sampling, x, qd)), q
+        )
+        if "velocity" in item.name:
+            continue
+        np.testing.assert_allclose(item.tangents(whole, motion), exact, atol=1e-6)
+
+
+@pytest.mark.parametrize("relaxations", [item[2] for item in TOLERANCES[:4]])
+@pytest.mark.parametrize("window", [None, (0.5, 1.3)])
+def test_gradients_along_nodes_equal_central_differences(
+    relaxations: list[sm.Relaxation], window: tuple[float, float] | None
+) -> None:
+    robot = robot_named("panda")
+    circle = sm.Circle.around(robot.pose(PANDA_HOME), 0.1, 2.0)
+    items = [dataclasses.replace(item, during=window) for item in relaxations]
+    asked = sm.Problem(
+        robot, circle, start=PANDA_HOME, relaxations=items, rest=False, collision=None
+    )
+    motion = nodes_of(asked.augmented)
+    held = motion.grid.manifolds.held
+    assert held.any() == (window is not None)
+    step = random_step(motion, 3, 0.02)
+    here = moved(motion, step)
+    # What stands still does so, and moves nothing.
+    assert not here.place.q[held].any()
+    assert not here.place.qd[held].any()
+    direction = random_step(motion, 4)
+    size = 1e-5
+    aims = [moved(motion, step + side * direction).aim for side in (size, -size)]
+    slopes, continuity = here.grid.cost.slopes(here.samples, here.partials), here.grid.continuity
+    if continuity is not None:
+        slopes += continuity.slopes(here.samples)
+    by_node = scattered(slopes)
+    gradient = here.charts.pulled(here.place, by_node[:, 0], by_node[:, 1])
+    exact = (aims[0] - aims[1]) / (2.0 * size)
+    assert abs(float((gradient * direction).sum()) - exact) < COST * np.abs(gradient).sum()

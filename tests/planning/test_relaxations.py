@@ -1,0 +1,180 @@
+"""Plans that make use of tolerances: within their bands, in their windows, for less."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import selfmotion as sm
+from selfmotion.basics import Array
+from support.arms import robot_named, short_line, start_of
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_a_cone_lowers_the_cost_and_is_kept(panda_circle: Callable, free: bool) -> None:
+    problem = panda_circle()
+    if free:
+        problem = dataclasses.replace(problem, start="free")
+    # A cone is kept by whatever optimises it; the global search has tests of its own.
+    search = sm.Search(mode="local") if free else None
+    exact = sm.plan(problem, search=search)
+    cone = sm.Relaxation(("rx", "ry"), 0.2)
+    plan = sm.plan(dataclasses.replace(problem, relaxations=[cone]), search=search)
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert plan.report.cost < 0.99 * exact.report.cost
+    # Judged without the package: the tool's axis against the path's.
+    t = np.linspace(0.0, 4.0, 401)
+    angles = []
+    for time, q in zip(t, plan.trajectory(t), strict=True):
+        target, actual = plan.path.pose(time), plan.robot.pose(q)
+        assert np.linalg.norm(actual.translation - target.translation) < 1e-6
+        angles.append(np.arccos(np.clip(actual.rotation[:, 2] @ target.rotation[:, 2], -1, 1)))
+    assert 0.05 < max(angles) <= 0.2 + 1e-6
+    # Without the relaxation the same motion is refused.
+    exact = dataclasses.replace(plan.problem, relaxations=())
+    assert not dataclasses.replace(plan, problem=exact).check().verified
+
+
+def test_a_band_is_used_and_a_smaller_one_is_refused(planar: sm.RobotModel) -> None:
+    problem = dataclasses.replace(
+        sm.sample_problem(), relaxations=[sm.Relaxation("y", 0.05)], constraints=()
+    )
+    plan = sm.plan(problem)
+    exact = sm.plan(dataclasses.replace(problem, relaxations=()))
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert plan.report.cost < exact.report.cost
+    t = np.linspace(0.0, 1.0, 501)
+    q = plan.trajectory(t)
+    x, y = planar_tool(q)
+    target = plan.path.samples(t).translation
+    np.testing.assert_allclose(x, target[:, 0], atol=1e-6)
+    assert 0.02 < np.abs(y - target[:, 1]).max() <= 0.05 + 1e-6
+    narrower = (sm.Relaxation("y", 0.02),)
+    asked = dataclasses.replace(plan.problem, relaxations=narrower)
+    check = dataclasses.replace(plan, problem=asked).check()
+    assert not check.verified
+    largest = np.abs(y - target[:, 1]).max()
+    assert check.position_error.value == pytest.approx(largest - 0.02, abs=1e-4)
+
+
+def planar_tool(q: Array) -> tuple[Array, Array]:
+    """Return x and y of the sample problem's tool: links 2, 2, 1 m."""
+    angles = np.cumsum(q, axis=1)
+    lengths = np.array([2.0, 2.0, 1.0])
+    return np.cos(angles) @ lengths, np.sin(angles) @ lengths
+
+
+def test_a_row_is_off_in_its_window_only(panda_circle: Callable) -> None:
+    window = sm.Relaxation("rz", during=(1.0, 2.5))
+    plan = sm.plan(panda_circle(relaxations=[window]))
+    assert plan.certificate.verified, plan.certificate.verdict
+    t = np.linspace(0.0, 4.0, 801)
+    misses = []
+    for time, q in zip(t, plan.trajectory(t), strict=True):
+        relative = plan.path.pose(time).rotation.T @ plan.robot.pose(q).rotation
+        misses.append(pin.log3(relative))
+    turned = np.abs(misses)
+    outside = (t < 1.0) | (t > 2.5)
+    assert turned[outside].max() < 1e-6
+    assert turned[:, :2].max() < 1e-6
+    assert turned[:, 2].max() > 1e-3
+    # Neither speed nor acceleration jumps at the window's ends.
+    for edge in (1.0, 2.5):
+        for order in (1, 2):
+            sides = plan.trajectory(np.array([edge - 1e-3, edge + 1e-3]), order=order)
+            scale = np.abs(plan.trajectory(t, order=order)).max()
+            assert np.abs(np.diff(sides, axis=0)).max() < 0.05 * scale
+
+
+def test_six_joints_and_a_full_pose_with_a_cone() -> None:
+    """No self-motion at all: the deviation is all there is to optimise."""
+    robot = robot_named("ur5")
+    start = start_of(robot, "pose")
+    path = short_line(robot, start)
+    with pytest.raises(sm.RedundancyError, match="relax"):
+        sm.Problem(robot, path, start=start)
+    cone = sm.Relaxation(("rx", "ry"), 0.3)
+    for given in (start, None):
+        search = sm.Search(starts=4) if given is None else None
+        plan = sm.plan(sm.Problem(robot, path, start=given, relaxations=[cone]), search=search)
+        assert plan.certificate.verified, plan.certificate.verdict
+        assert plan.report.cost < 0.99 * plan.report.initial_cost
+    circle = sm.Circle.around(robot.pose(start), 0.05, 2.0, normal=(1.0, 0.0, 0.0))
+    closed = sm.plan(
+        sm.Problem(robot, circle, start=start, relaxations=[cone], constraints=[sm.ClosedPath()])
+    )
+    assert closed.certificate.verified, closed.certificate.verdict
+
+
+@pytest.mark.parametrize("band", [1e-3, 1e-4, 1e-5])
+def test_a_narrow_band_costs_no_more_than_none(panda_circle: Callable, band: float) -> None:
+    """And no work or acceleration beyond what the plan without it takes, up to small factors."""
+    exact = sm.plan(panda_circle())
+    plan = sm.plan(panda_circle(relaxations=[sm.Relaxation("z", band)]))
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert plan.report.cost <= exact.report.cost * (1.0 + 1e-6)
+    assert plan.report.steps <= 4 * exact.report.steps
+    fastest = [np.abs(each.trajectory.extremes(2)[1]).max() for each in (plan, exact)]
+    assert fastest[0] < 2.0 * fastest[1]
+
+
+def test_other_methods_refuse_relaxations(panda_circle: Callable) -> None:
+    with pytest.raises(sm.ProblemError, match="leave the relaxations out"):
+        sm.plan_by(panda_circle(relaxations=[sm.Relaxation("z", 0.01)]), sm.PseudoInverse())
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_where_a_path_closes_the_deviation_does_so_too(panda_circle: Callable, given: bool) -> None:
+    """A given start is on the path itself, and so is the end then."""
+    band = sm.Relaxation("x", 0.01)
+    constraints = (sm.JointPositionLimits(), sm.JointVelocityLimits(), sm.ClosedPath())
+    problem = dataclasses.replace(panda_circle(), relaxations=[band], constraints=constraints)
+    problem = problem if given else dataclasses.replace(problem, start=None)
+    plan = sm.plan(problem)
+    assert plan.certificate.verified, plan.certificate.verdict
+    assert plan.certificate.closure < 1e-6
+    ends = ((0.0, plan.trajectory.q[0]), (4.0, plan.trajectory.q[-1]))
+    away = [plan.robot.pose(q).translation - plan.path.pose(t).translation for t, q in ends]
+    np.testing.assert_allclose(away[0], away[1], atol=1e-6)
+    assert (np.abs(away).max() < 1e-6) == given
+
+
+def test_ends_that_are_asked_for_are_on_the_path(panda_circle: Callable) -> None:
+    """However much of the band is used on the way."""
+    exact = sm.plan(panda_circle())
+    end = sm.EndConfiguration(exact.trajectory.q[-1])
+    band = sm.Relaxation(("x", "y"), 0.01)
+    limits = (sm.JointPositionLimits(), sm.JointVelocityLimits())
+    for asked in (end, sm.EndVelocity(0.0)):
+        plan = sm.plan(panda_circle(relaxations=[band], constraints=[*limits, asked]))
+        assert plan.certificate.verified, plan.certificate.verdict
+        assert plan.certificate.deviations[0].value > 1e-3
+        miss = sm.Task.POSE.miss(plan.path.pose(4.0), plan.robot.pose(plan.trajectory.q[-1]))
+        assert max(miss) < 1e-6
+
+
+def test_a_plan_is_begun_with_where_its_tool_deviates(panda_circle: Callable) -> None:
+    band = sm.Relaxation(("rx", "ry"), 0.2)
+    first = sm.plan(panda_circle(relaxations=[band]))
+    again = sm.plan(panda_circle(relaxations=[band]), warm_start=first)
+    assert again.certificate.verified
+    assert again.report.evaluations < first.report.evaluations
+    assert again.report.cost == pytest.approx(first.report.cost, rel=1e-4)
+
+
+def test_relaxations_survive_saving_and_retiming(panda_circle: Callable, tmp_path: Path) -> None:
+    relaxations = [
+        sm.Relaxation(("rx", "ry"), 0.1, during=(1.0, 3.0)),
+        sm.Relaxation("x", axes="tool", during=(0.5, 2.0)),
+    ]
+    plan = sm.plan(panda_circle(relaxations=relaxations))
+    plan.save(tmp_path / "plan.npz")
+    loaded = sm.load_plan(tmp_path / "plan.npz")
+    assert loaded.problem.relaxations == tuple(relaxations)
+    assert loaded.check().verified
+    slower = sm.retime(plan, acceleration=5.0)
+    assert slower.certificate.verified, slower.certificate.verdict
+    assert slower.problem.relaxations[0].during != (1.0, 3.0)
