@@ -116,7 +116,10 @@ def finger(
         )
     found.append(
         '<link name="tip"/><joint name="f" type="fixed"><parent link="l5"/><child link="tip"/>'
-        '<origin xyz="0.1 0 0"/></joint></robot>'
+        '<origin xyz="0.1 0 0"/></joint>'
+        # Beside the last axis, so that all joints move it.
+        '<link name="side"/><joint name="s" type="fixed"><parent link="l5"/><child link="side"/>'
+        '<origin xyz="0.1 0.06 0.03"/></joint></robot>'
     )
     return "\n".join(found)
 
