@@ -84,6 +84,21 @@ def test_normals_that_point_out_are_flipped_and_tips_held_back(tmp_path: Path) -
     np.testing.assert_allclose(again.homogeneous, found.homogeneous, atol=1e-12)
 
 
+def test_normals_that_seem_to_point_out_are_told(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Above the floor an arm reaches down, not up from below it."""
+    rows = "\n".join(f"0.5,{y},0.02,0,0,1" for y in (-0.1, 0.0, 0.1))
+    file = written(tmp_path, "a.csv", f"x,y,z,nx,ny,nz\n{rows}\n")
+    asked = ["panda", "--path", file, "--task", "pointing", "--feed", "0.05"]
+    limit = ["--max-evaluations", "1", "--no-self-collision"]
+    invoke("plan", *asked, *limit, "--start", "0,0,0,-2,0,2,0")
+    said = "out of reach as read, and in reach with --flip-normals"
+    assert said in capfd.readouterr().err
+    invoke("plan", *asked, *limit, "--flip-normals")
+    assert "out of reach" not in capfd.readouterr().err
+
+
 def test_a_path_that_leaves_its_straight_lines_says_by_how_much(tmp_path: Path) -> None:
     text = "x,y,z\n0.40,-0.10,0.4\n0.45,-0.10,0.4\n0.45,0.10,0.4\n"
     file = written(tmp_path, "three.csv", text)

@@ -217,6 +217,15 @@ def events_of(file: FilePath, options: Mapping[str, Any]) -> tuple[str, ...]:
         return ()
 
 
+def has_normals(file: FilePath, options: Mapping[str, Any]) -> bool:
+    """Return whether a path of a file says the tool's axis by normals; of one refused, no."""
+    try:
+        rows = one_seam(file, options.get("seam"), Reading.of(file, options))
+    except FileFormatError:
+        return False
+    return rows.orientation == "normal"
+
+
 def one_seam(path: FilePath, seam: str | None, reading: Reading) -> PoseRows:
     """Return the rows of one seam of a file."""
     seams = _read(path, seam, reading)
