@@ -64,7 +64,8 @@ def _is_colour(material: ElementTree.Element, where: str, notes: list[str]) -> b
         colour.set("rgba", text)
         try:
             values = numbers(colour, "rgba", 4, where)
-            colour.set("rgba", " ".join(repr(min(max(x, 0.0), 1.0)) for x in values))
+            if not all(0.0 <= x <= 1.0 for x in values):
+                colour.set("rgba", " ".join(repr(min(max(x, 0.0), 1.0)) for x in values))
         except RobotError as error:
             notes.append(f"{error}; it is drawn grey")
             material.remove(colour)
