@@ -42,14 +42,19 @@ def described_package(folder: Path, name: str = "arm_description") -> Path:
 def with_arguments(folder: Path) -> Path:
     """Write a xacro file whose name and height are arguments; return it."""
     file = folder / "arm.urdf.xacro"
-    file.write_text(
+    file.write_text(with_arguments_text())
+    return file
+
+
+def with_arguments_text() -> str:
+    """Return its text."""
+    return (
         ROBOT.replace('"arm"', '"$(arg name)"')
         + '<xacro:arg name="name" default="arm"/><xacro:arg name="reach" default=""/>'
         + """<xacro:property name="lift" value="${float('$(arg reach)')}"/>"""
         + chain_elements("${lift}")
         + "</robot>"
     )
-    return file
 
 
 # Origins (xyz, rpy) and limits of a Kinova Gen3's joints, rounded from its maker's description.

@@ -70,9 +70,9 @@ def read_path(
       axis by ``A B C``, Rz(C) Ry(B) Rx(A) z, after ``G43.4 G43.5`` or as `rotary` says, or by ``I J
       K`` in lines. Arcs lie in the plane that is chosen, by offsets of their centre from the start
       or ``R``, as chords within 0.01 mm. ``M2 M30`` end it, other ``M`` and ``G4`` are events;
-      ``G28 G30 G53`` go to places that are not known, and are passed over with a note; ``G40 G43 G49
-      G61 G64 G69 G80 G91.1 G98 G99``, one of ``G54`` to ``G59``, ``N O S T H D P Q L``, ``%`` and
-      comments are passed over
+      ``G28 G30 G53`` go to places that are not known, and are passed over with a note; ``G40 G43
+      G49 G61 G64 G69 G80 G91.1 G98 G99``, one of ``G54`` to ``G59``, ``N O S T H D P Q L``, ``%``
+      and comments are passed over
     - G-code of printers, where lines have ``E``: what extrudes is a cut, what does not a travel.
       ``M82 M83 G92 E`` set what E means; ``retract`` and ``prime`` are events, as are commands
     - APT: ``GOTO FROM GODLTA RAPID FEDRAT UNITS``, with ``i,j,k`` the tool's axis, feeds by the
