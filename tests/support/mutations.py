@@ -404,7 +404,7 @@ def _drawing() -> bytes:
 
 _GCODE = b"""%
 O1 (SLOT)
-N10 G21 G90 G94 G17 G54
+N10 G21 G90 G94 G43.4 G17 G54
 G0 X0 Y0 Z5 M3
 G1 Z-2 F600
 X40 F1200
