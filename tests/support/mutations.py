@@ -65,7 +65,7 @@ _OTHERS = (
     (".csv", "x;y;z\n0,4;-0,05;0,3\n0,42;0;0,3\n0,4;0,05;0,3\n"),
     (".csv", "# X,Y,Z,NX,NY,NZ\n0.4,0,0.3,0,0,-1\n0.4,0.1,0.3,0,0,-1\n"),
     (".gcode", "M82\nG28\nG92 E0\nG1 F200 E3\nG0 X1 Y1 Z0.3\nG1 F600 X9 Y1 E4\nG1 X9 Y9 E5\nM84\n"),
-    (".nc", "G0 X0 Y0 Z0\nG93\nG1 X9 F30\nG18 G2 X19 Z0 I5 K0\nG28\nG0 X1 Y1 Z1\nG1 X5\n"),
+    (".nc", "G28\nG0 X0 Y0 Z0\nG93\nG1 X9 F30\nG18 G2 X19 Z0 I5 K0\n"),
     (".json", '[{"poses": [{"position": {"x": 0.4, "y": 0, "z": 0.3}, "orientation": {"x": 1, '
      '"y": 0, "z": 0, "w": 0}}, {"position": {"x": 0.5, "y": 0, "z": 0.3}, "orientation": {"x": 1, '
      '"y": 0, "z": 0, "w": 0}}]}]'),
