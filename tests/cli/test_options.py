@@ -119,7 +119,7 @@ def test_a_plan_is_written_in_any_format(tmp_path: Path, name: str) -> None:
         (("--cost", "Speed"), "--cost is 'Speed', expected NAME or NAME=WEIGHT"),
         (("--cost", "PathLength=1"), "--cost: PathLength has no weight"),
         (("--cost", "JointVelocity=a"), "--cost is 'a', expected numbers"),
-        (("--frame", "0,0,0,0,0,0"), "--frame, --ramp and --seam are for --path"),
+        (("--frame", "0,0,0,0,0,0"), "--frame, --ramp, --seam, --columns, "),
         (("--feed", "0.1", "--duration", "2"), "give the pace by one of --feed and --duration"),
         (("--lock", "a"), "--lock is 'a', expected NAME=VALUE"),
         (("--lock", "a=1"), "lock names joint 'a'"),

@@ -179,18 +179,27 @@ def test_what_is_not_read_is_named_and_hidden_layers_are_not_read(tmp_path: Path
     document = ezdxf.new(units=4)
     space = document.modelspace()
     space.add_line((0, 0), (100, 0), dxfattribs={"layer": "Weld"})
-    text = space.add_text("weld here", dxfattribs={"layer": "notes"})
+    fill = space.add_solid([(0, 0), (1, 0), (0, 1)], dxfattribs={"layer": "notes"})
+    space.add_text("weld here", dxfattribs={"layer": "notes"})
+    space.add_point((3, 3), dxfattribs={"layer": "Weld"})
     document.layers.add("Weld")
     notes = document.layers.add("notes")
     file = tmp_path / "part.dxf"
     document.saveas(file)
-    with pytest.raises(sm.FileFormatError, match=f"'notes': TEXT {text.dxf.handle} is not read"):
+    with pytest.raises(sm.FileFormatError, match=f"'notes': SOLID {fill.dxf.handle} is not read"):
         sm.read_path(file, feed=0.1)
     for hide in (notes.off, notes.freeze):
         hide()
         document.saveas(file)
         assert sm.read_path(file, feed=0.1, seam="Weld").duration > 1.0
         notes.on()
+    # Texts and marks move nothing.
+    space.delete_entity(fill)
+    notes.thaw()
+    document.saveas(file)
+    path = sm.read_path(file, feed=0.1)
+    assert path.duration > 1.0
+    assert path.notes == ("passed over: 1 POINT, 1 TEXT",)
     document.layers.get("Weld").off()
     document.saveas(file)
     with pytest.raises(sm.FileFormatError, match="nothing drawn in model space"):
@@ -202,7 +211,7 @@ def test_beside_the_layer_of_a_seam_anything_may_be_drawn(tmp_path: Path) -> Non
         for y in (0, 10):
             space.add_line((0, y), (60, y), dxfattribs={"layer": "weld"})
         space.add_line((0, 50), (60, 50), dxfattribs={"layer": "glue"})
-        space.add_text("bracket", dxfattribs={"layer": "notes"})
+        space.add_solid([(0, 0), (1, 0), (0, 1)], dxfattribs={"layer": "notes"})
 
     file = drawn(tmp_path / "part.dxf", draw)
     assert list(read_drawing(file, "glue")) == ["glue"]
@@ -211,11 +220,11 @@ def test_beside_the_layer_of_a_seam_anything_may_be_drawn(tmp_path: Path) -> Non
         "weld": "has no seam 'weld'; nearest: 'weld 2', 'weld 1'",
         "welt": "has no seam 'welt'; nearest: 'weld'",
         "7": "has no seam '7'; it has 'weld', 'glue', 'notes'",
-        "notes": "layer 'notes': TEXT .* is not read",
+        "notes": "layer 'notes': SOLID .* is not read",
     }.items():
         with pytest.raises(sm.FileFormatError, match=told):
             sm.read_path(file, feed=0.05, seam=seam)
-    with pytest.raises(sm.FileFormatError, match=r"layer 'notes': TEXT .* is not read"):
+    with pytest.raises(sm.FileFormatError, match=r"layer 'notes': SOLID .* is not read"):
         read_drawing(file)
 
 

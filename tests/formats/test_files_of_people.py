@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 import yaml
 from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
 
 import selfmotion as sm
+from selfmotion.cli import app
 from selfmotion.formats.gcode import read_gcode
 from selfmotion.formats.path_rows import Reading
 from support.arms import robot_named
@@ -82,6 +84,24 @@ def test_normals_that_point_out_are_flipped_and_tips_held_back(tmp_path: Path) -
     )
     again = sm.read_problem(job).path.pose(0.0)
     np.testing.assert_allclose(again.homogeneous, found.homogeneous, atol=1e-12)
+
+
+def test_normals_that_seem_to_point_out_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Above the floor an arm reaches down, not up from below it."""
+    rows = "\n".join(f"0.5,{y},0.02,0,0,1" for y in (-0.1, 0.0, 0.1))
+    file = written(tmp_path, "a.csv", f"x,y,z,nx,ny,nz\n{rows}\n")
+
+    def refused(*_: object, **__: object) -> sm.Plan:
+        raise sm.PlanError("not planned here")
+
+    monkeypatch.setattr("selfmotion.cli.commands.plan_with_progress", refused)
+    asked = ["plan", "panda", "--path", file, "--task", "pointing", "--feed", "0.05"]
+    said = "out of reach as read, and in reach with --flip-normals"
+    for more, is_told in (([], True), (["--flip-normals"], False)):
+        printed = CliRunner().invoke(app, [*map(str, asked), *more]).output
+        assert (said in printed) == is_told
 
 
 def test_a_path_that_leaves_its_straight_lines_says_by_how_much(tmp_path: Path) -> None:

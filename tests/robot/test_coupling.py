@@ -8,16 +8,20 @@ import pytest
 import yourdfpy
 
 import selfmotion as sm
-from selfmotion import testing
 from selfmotion.basics import Array
 from selfmotion.certificate import deviation
+from selfmotion.engine.start import FixedStart
+from selfmotion.motion import NullMotionTable, PolynomialNullMotion
 from selfmotion.robot import Dynamics, Energy, ToolRates
 from selfmotion.robot.tree_arrays import JOINT
+from support.arms import Case, central_difference, objective_of, short_line
 from support.files_of_people import finger, torso
+from support.nodes import centred, moved, nodes_of, problem_of, random_step
+from support.rollouts import assert_sensitivities, rollout_of
 
 # Against other libraries' products of rotations, and differences [m, rad].
 EXACT, DIFFERENCE, STEP = 1e-12, 2e-7, 1e-6
-CASES = {"finger": ("tip", finger()), "telescope": ("tip", finger(telescope=True)),
+CASES = {"finger": ("side", finger()), "telescope": ("side", finger(telescope=True)),
          "torso": ("left7", torso())}  # fmt: skip
 
 
@@ -109,7 +113,9 @@ def test_velocities_and_accelerations_agree_with_differences(robot: sm.RobotMode
         np.testing.assert_allclose(turn @ acceleration[:3], second, atol=1e-5)
         (v_by_q, v_by_qd), (a_by_q, _, _) = rates.derivatives(q[None], qd[None], qdd[None])
         for order, found in ((0, v_by_q), (1, a_by_q)):
-            slopes = differences(lambda x, k=order: rates(x[None], qd[None], qdd[None])[k][0], q)
+            slopes = differences(
+                lambda x, k=order, v=qd, a=qdd: rates(x[None], v[None], a[None])[k][0], q
+            )
             np.testing.assert_allclose(found[0], slopes, atol=1e-6)
         np.testing.assert_allclose(v_by_qd[0] @ qd, velocity, atol=EXACT)
 
@@ -117,7 +123,6 @@ def test_velocities_and_accelerations_agree_with_differences(robot: sm.RobotMode
 def test_torques_are_those_of_the_energies(robot: sm.RobotModel) -> None:
     """Lagrange's equations, of energies summed over the links by their own places."""
     dynamics, energy, rng = Dynamics(robot), Energy(robot), np.random.default_rng(2)
-    model = robot.model
     centres = []
     for link in ElementTree.fromstring(robot.urdf.text).findall("link"):
         for inertial in link.findall("inertial"):
@@ -138,21 +143,52 @@ def test_torques_are_those_of_the_energies(robot: sm.RobotModel) -> None:
         np.testing.assert_allclose(still - slopes, energy.mass(q) @ qdd, atol=1e-6)
         whole = dynamics.torques(q[None], qd[None], qdd[None])[0]
         # d/dt ∂T/∂q̇ - ∂T/∂q + ∂V/∂q.
-        by_q = differences(lambda x: energy.kinetic(x[None], qd[None])[0], q)
+        by_q = differences(lambda x, v=qd: energy.kinetic(x[None], v[None])[0], q)
         along = sum(
-            differences(lambda x, k=k: energy.mass(x)[k] @ qd, q) @ qd * np.eye(robot.dof)[k]
+            differences(lambda x, k=k, v=qd: energy.mass(x)[k] @ v, q) @ qd * np.eye(robot.dof)[k]
             for k in range(robot.dof)
         )
         np.testing.assert_allclose(whole, energy.mass(q) @ qdd + along - by_q + slopes, atol=1e-5)
         found = dynamics.derivatives(q[None], qd[None], qdd[None])
-        by_place = differences(lambda x: dynamics.torques(x[None], qd[None], qdd[None])[0], q)
+        by_place = differences(
+            lambda x, v=qd, a=qdd: dynamics.torques(x[None], v[None], a[None])[0], q
+        )
         np.testing.assert_allclose(found[0][0], by_place, atol=1e-5)
 
 
-def test_gradients_of_costs_are_derivatives(robot: sm.RobotModel) -> None:
-    """Of motions along a path: through all pullbacks, with the columns of all joints."""
-    for cost in (sm.JointVelocity(), sm.InverseManipulability(1e-3)):
-        testing.check_cost(cost, robot, "position")
+def case_of(robot: sm.RobotModel) -> Case:
+    start = robot.dexterous_configuration("position")
+    return robot, sm.Task.POSITION, start, short_line(robot, start)
+
+
+def test_gradients_of_rollouts_are_differences(robot: sm.RobotModel) -> None:
+    """Through the Hessian of the chain, in which joints that share a coordinate are two."""
+    case = case_of(robot)
+    rollout = rollout_of(case, 8)
+    t = rollout.grid.stage_times
+    functions = PolynomialNullMotion(2, "joint").functions(t, case[3].duration)
+    table = NullMotionTable(functions, None, robot.dof)
+    costs = [sm.JointVelocity(), sm.InverseManipulability(1e-3), sm.KineticEnergy(robot)]
+    objective = objective_of(rollout, table, costs, FixedStart(case[2]))
+    x = 0.1 * np.random.default_rng(7).normal(size=objective.size)
+    exact = objective.gradient(x)
+    found = central_difference(objective.value, x, 1e-5)
+    assert np.abs(exact - found).max() <= 1e-6 * np.abs(found).max()
+    by_x = 0.05 * np.random.default_rng(8).normal(size=objective.size)
+    assert_sensitivities(rollout, table, case[2], by_x, 1e-6)
+
+
+def test_gradients_on_nodes_are_differences(robot: sm.RobotModel) -> None:
+    motion = nodes_of(problem_of(case_of(robot)))
+    motion = moved(motion, random_step(motion, 2, 0.02))
+    step, rng, near = random_step(motion, 3), np.random.default_rng(4), 1e-5
+    by_q, by_qd = rng.normal(size=(2, *motion.place.q.shape))
+    here = centred(motion)
+    above, below = (moved(here, sign * near * step).place for sign in (1.0, -1.0))
+    change_q, change_qd = (above.q - below.q) / (2 * near), (above.qd - below.qd) / (2 * near)
+    pulled = here.charts.pulled(here.place, by_q, by_qd)
+    expected = np.sum(by_q * change_q) + np.sum(by_qd * change_qd)
+    assert abs(np.sum(pulled * step) - expected) < 1e-6 * np.abs(pulled).max() * step.size
 
 
 def test_bodies_turn_with_what_they_mimic(robot: sm.RobotModel) -> None:

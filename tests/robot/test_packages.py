@@ -7,11 +7,14 @@ import pinocchio as pin
 import pytest
 
 import selfmotion as sm
+from selfmotion.replay.links import bake
+from selfmotion.replay.payload import Payload
 from selfmotion.robot.packages import Packages
 from support.files_of_people import arm, described_package, with_arguments
 from support.shell import complaint, invoke
 
 UP = [0.0, 0.0, 1.2]
+_SHAPE = '<geometry><box size=".05 .05 .05"/></geometry>'
 
 
 @pytest.fixture(autouse=True)
@@ -128,8 +131,34 @@ def test_arguments_of_a_xacro_are_given_in_the_shell(tmp_path: Path) -> None:
     assert "is 'reach', expected NAME=VALUE" in complaint("plan", file, "--argument", "reach")
 
 
+@pytest.mark.parametrize(
+    ("element", "said", "shapes"),
+    [
+        ("visual", None, {"Box"}),
+        ("collision", "its collision bodies stand for them", {"Box"}),
+        ("other", "its joints stand for it", {"Cylinder"}),
+    ],
+)
+def test_an_arm_without_visuals_is_drawn(
+    element: str, said: str | None, shapes: set[str], tmp_path: Path
+) -> None:
+    """By its bodies, or by its joints: where they are, and along their axes."""
+    file = tmp_path / "arm.urdf"
+    file.write_text(arm(f"<{element}>{_SHAPE}</{element}>"))
+    robot = sm.load_robot(file)
+    geometry, missing = robot.visuals()
+    assert {type(item.geometry).__name__ for item in geometry.geometryObjects} == shapes
+    assert [note for note in missing if said is None or said not in note] == []
+    assert bake(robot, Payload()).visuals
+    if element == "other":
+        axes = [item for item in geometry.geometryObjects if item.name.startswith("axis")]
+        assert [int(item.parentJoint) for item in axes] == list(range(1, 8))
+        for k, item in enumerate(axes, 1):
+            along = np.abs(item.placement.rotation[:, 2])
+            np.testing.assert_allclose(along, [0, 0, 1] if k % 2 else [0, 1, 0], atol=1e-12)
+
+
 _RED = '<material><color rgba="1 0 0 1"/></material>'
-_SHAPE = '<geometry><box size=".05 .05 .05"/></geometry>'
 
 
 @pytest.mark.parametrize(
@@ -161,8 +190,7 @@ def test_what_only_colours_an_arm_never_refuses_it(
     np.testing.assert_array_equal(
         robot.pose(q).homogeneous, sm.load_robot(bare).pose(q).homogeneous
     )
-    geometry, missing = robot.visuals()
-    assert missing == ()
+    geometry = robot.geometry(pin.GeometryType.VISUAL)
     found = [item.meshColor.tolist() for item in geometry.geometryObjects]
     assert len(found) == (1 if colours is None else len(colours))
     if colours is not None:

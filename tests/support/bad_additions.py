@@ -74,7 +74,7 @@ def _path_rows() -> list[Row]:
                 "of shape (2, 3)": _POINTS[:2],
                 "one pose": _POINTS[:1],
                 "with NaN": _POINTS * [[1], [NAN], [1]],
-                "two equal": _POINTS[[0, 1, 1]],
+                "all equal": _POINTS[[1, 1, 1]],
                 "there and straight back": _POINTS[[0, 1, 0]],
                 "None": None,
                 "1.0": 1.0,

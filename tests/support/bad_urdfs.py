@@ -141,7 +141,11 @@ EDITS: list[tuple[str, str, str]] = [
     ("a mimic of no joint", _SHOULDER, '<mimic joint="wrist"/>' + _SHOULDER),
     ("a mimic of itself", _SHOULDER, '<mimic joint="shoulder"/>' + _SHOULDER),
     ("a mimic without a joint", _SHOULDER, "<mimic/>" + _SHOULDER),
-    ("a mimic on the way to the tool", _SHOULDER, '<mimic joint="elbow"/>' + _SHOULDER),
+    (
+        "a mimic whose limits leave no position",
+        _SHOULDER,
+        '<mimic joint="elbow" offset="9"/>' + _SHOULDER,
+    ),
     (
         "a mimic with a multiplier of NaN",
         _SHOULDER,

@@ -42,14 +42,19 @@ def described_package(folder: Path, name: str = "arm_description") -> Path:
 def with_arguments(folder: Path) -> Path:
     """Write a xacro file whose name and height are arguments; return it."""
     file = folder / "arm.urdf.xacro"
-    file.write_text(
+    file.write_text(with_arguments_text())
+    return file
+
+
+def with_arguments_text() -> str:
+    """Return its text."""
+    return (
         ROBOT.replace('"arm"', '"$(arg name)"')
         + '<xacro:arg name="name" default="arm"/><xacro:arg name="reach" default=""/>'
         + """<xacro:property name="lift" value="${float('$(arg reach)')}"/>"""
         + chain_elements("${lift}")
         + "</robot>"
     )
-    return file
 
 
 # Origins (xyz, rpy) and limits of a Kinova Gen3's joints, rounded from its maker's description.
@@ -116,7 +121,10 @@ def finger(
         )
     found.append(
         '<link name="tip"/><joint name="f" type="fixed"><parent link="l5"/><child link="tip"/>'
-        '<origin xyz="0.1 0 0"/></joint></robot>'
+        '<origin xyz="0.1 0 0"/></joint>'
+        # Beside the last axis, so that all joints move it.
+        '<link name="side"/><joint name="s" type="fixed"><parent link="l5"/><child link="side"/>'
+        '<origin xyz="0.1 0.06 0.03"/></joint></robot>'
     )
     return "\n".join(found)
 

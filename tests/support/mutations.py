@@ -16,6 +16,7 @@ import numpy as np
 
 import selfmotion as sm
 from selfmotion.cli.options import read_obstacles
+from support.files_of_people import finger, with_arguments_text
 
 # Numbers that no file means, and tokens that stand where numbers should.
 _ODD = (
@@ -58,6 +59,33 @@ class Good(NamedTuple):
     read: Callable[[Path], object]
 
 
+# Tables without headers, in other units and forms, printers' programs and rotary tables.
+_OTHERS = (
+    (".txt", "x [mm] y [mm] z [mm]\n400 -50 300\n420 0 300\n400 50 300\n"),
+    (".csv", "x;y;z\n0,4;-0,05;0,3\n0,42;0;0,3\n0,4;0,05;0,3\n"),
+    (".csv", "# X,Y,Z,NX,NY,NZ\n0.4,0,0.3,0,0,-1\n0.4,0.1,0.3,0,0,-1\n"),
+    (".gcode", "M82\nG28\nG92 E0\nG1 F200 E3\nG0 X1 Y1 Z0.3\nG1 F600 X9 Y1 E4\nG1 X9 Y9 E5\nM84\n"),
+    (".nc", "G28\nG0 X0 Y0 Z0\nG93\nG1 X9 F30\nG18 G2 X19 Z0 I5 K0\n"),
+    (".json", '[{"poses": [{"position": {"x": 0.4, "y": 0, "z": 0.3}, "orientation": {"x": 1, '
+     '"y": 0, "z": 0, "w": 0}}, {"position": {"x": 0.5, "y": 0, "z": 0.3}, "orientation": {"x": 1, '
+     '"y": 0, "z": 0, "w": 0}}]}]'),
+)  # fmt: skip
+_POINTS = b"""joint_names: [a, b]
+points:
+- {positions: [0, 1], velocities: [], time_from_start: {secs: 0, nsecs: 0}}
+- {positions: [0.1, 1], velocities: [], time_from_start: {secs: 1, nsecs: 0}}
+- {positions: [0.2, 2], velocities: [], time_from_start: {secs: 2, nsecs: 5}}
+"""
+
+
+def _others(file: Path) -> object:
+    return sm.read_path(file, feed=0.05, corners="round")
+
+
+def _expanded(file: Path) -> object:
+    return sm.load_robot(file, tool="l7", arguments={"name": "arm", "reach": "0.3"})
+
+
 @cache
 def good_files() -> tuple[Good, ...]:
     """Return files of all kinds, the same whenever they are made."""
@@ -68,6 +96,10 @@ def good_files() -> tuple[Good, ...]:
         Good("URDF", ".urdf", arm.urdf.bare_text().encode(), sm.load_robot),
         Good("URDF", ".urdf", _URDF, sm.load_robot),
         *(Good(_kind(suffix), suffix, content, _path) for suffix, content in _paths()),
+        *(Good("others' files", suffix, text.encode(), _others) for suffix, text in _OTHERS),
+        Good("xacro", ".xacro", with_arguments_text().encode(), _expanded),
+        Good("URDF", ".urdf", finger().encode(), lambda file: sm.load_robot(file, tool="tip")),
+        Good("motion", ".yaml", _POINTS, sm.read_motion),
         Good("SRDF", ".srdf", _SRDF, lambda file: sm.Clearance(srdf=file)),
         Good("obstacles", ".json", json.dumps(_OBSTACLES, indent=1).encode(), read_obstacles),
         Good("obstacles", ".toml", _OBSTACLES_TOML, read_obstacles),
@@ -372,7 +404,7 @@ def _drawing() -> bytes:
 
 _GCODE = b"""%
 O1 (SLOT)
-N10 G21 G90 G94 G17 G54
+N10 G21 G90 G94 G43.4 G17 G54
 G0 X0 Y0 Z5 M3
 G1 Z-2 F600
 X40 F1200

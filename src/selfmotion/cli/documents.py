@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import typer
 
 import selfmotion as sm
@@ -15,6 +16,7 @@ from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.formats import (
     events_of,
     grid_documents,
+    has_normals,
     job_of,
     parse_setting,
     read_document,
@@ -24,6 +26,8 @@ from selfmotion.formats import (
 
 # Of problem files.
 SUFFIXES = (".toml", ".json")
+# So many poses of a path are looked at for whether normals are meant the other way.
+_LOOKS = 7
 # Costs and their first number, the weight that --cost may give.
 _WEIGHTS = ("weight", "mu")
 
@@ -271,7 +275,40 @@ def _with_settings(
     _set(document, settings)
     job = job_of(document, file, allow_code=allow_code)
     _tell_left_out(document, file)
+    _tell_flip(document, file, job)
     return job
+
+
+def _tell_flip(document: dict[str, Any], file: Path | None, job: sm.Job) -> None:
+    """Print that normals seem to point the other way, where only so the path is in reach."""
+    path = document.get("path")
+    if not (isinstance(path, dict) and path.get("kind") == "file"):
+        return
+    if not has_normals((file.parent if file else Path()) / str(path.get("file")), path):
+        return
+    if _is_in_reach(job.problem):
+        return
+    flips = not path.get("flip_normals", False)
+    other = {**document, "path": {**path, "flip_normals": flips}}
+    if _is_in_reach(job_of(other, file).problem):
+        said = "with --flip-normals (flip_normals)" if flips else "without flipping the normals"
+        stages.print(
+            f"note: poses of the path are out of reach as read, and in reach {said}: nx,ny,nz is "
+            f"the tool's z axis here, into the part; surface normals of CAD point out of it",
+            markup=False,
+            soft_wrap=True,
+        )
+
+
+def _is_in_reach(problem: sm.Problem) -> bool:
+    """Return whether some poses of a path are in reach, each on its own."""
+    q = None
+    for t in np.linspace(0.0, problem.path.duration, _LOOKS):
+        try:
+            q = problem.robot.inverse_kinematics(problem.path.pose(t), problem.task, q, attempts=8)
+        except sm.InverseKinematicsError:
+            return False
+    return True
 
 
 def _tell_left_out(document: dict[str, Any], file: Path | None) -> None:

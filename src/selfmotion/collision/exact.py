@@ -109,8 +109,8 @@ class CollisionModel:
 
     def _with(self, pairs: Sequence[tuple[int, int]]) -> "CollisionModel":
         other = copy(self)
-        for of_pairs in ("pair_levers", "_levers"):
-            other.__dict__.pop(of_pairs, None)
+        for known in ("pair_levers", "_levers"):
+            other.__dict__.pop(known, None)
         other._take(pairs)
         return other
 

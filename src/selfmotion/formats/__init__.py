@@ -34,7 +34,11 @@ from selfmotion.formats.overrides import (
     set_key as set_key,
     write_combination as write_combination,
 )
-from selfmotion.formats.path_files import events_of as events_of, read_path as read_path
+from selfmotion.formats.path_files import (
+    events_of as events_of,
+    has_normals as has_normals,
+    read_path as read_path,
+)
 from selfmotion.formats.poses import pose_of as pose_of
 from selfmotion.formats.problem_file import (
     job_of as job_of,

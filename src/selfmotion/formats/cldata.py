@@ -21,6 +21,8 @@ _NOTHING = (
     *("PARTNO", "PPRINT", "TPRINT", "REMARK", "MACHIN", "MODE", "CUTTER", "INTOL", "OUTTOL"),
     *("LOADTL", "TLDATA", "SELECTL", "TOOLNO", "MULTAX", "PAINT", "OPSKIP", "SEQNO", "RESET"),
 )
+# What NX writes around its paths.
+_OF_NX = ("TOOL PATH", "END-OF-PATH", "MSYS/", "SET/", "LOAD/", "CUTCOM/OFF")
 # What happens to other things than the arm: the events of a cut.
 _EVENTS = ("SPINDL", "COOLNT", "AUXFUN", "ARCON", "ARCOFF")
 _ENDS = ("FINI", "END")
@@ -62,8 +64,7 @@ class _Reader:
         machine = self.machine
         if len(text) > _LONGEST:
             raise machine.fault(f"has {len(text)} characters, expected {_LONGEST} at most")
-        words = _NOTHING[:4]
-        if text.startswith(words):
+        if text.startswith((*_NOTHING[:4], *_OF_NX)):
             return False
         found = _STATEMENT.fullmatch(text)
         if not found:

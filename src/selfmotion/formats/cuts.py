@@ -164,7 +164,9 @@ class Machine:
         self._check(position)
         missing = [name for name, value in zip("XYZ", position, strict=True) if np.isnan(value)]
         if missing:
-            raise self.fault(f"cuts, and {missing[0]} is not known yet")
+            raise self.fault(
+                f"cuts, and {missing[0]} is not known yet: give X, Y and Z in a rapid before"
+            )
         place = f"line {self.number}"
         if self._open is None:
             self._open = Cut()

@@ -4,7 +4,9 @@ What the codes of a drawing mean: https://ezdxf.mozman.at/docs/.
 """
 
 import logging
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
@@ -15,6 +17,10 @@ from selfmotion.formats.cuts import Cut
 from selfmotion.formats.drawn_entities import DRAWN
 from selfmotion.formats.path_rows import PoseRows, no_such_seam
 
+# What is written or marked in a drawing, and no stroke.
+_SAID = frozenset(
+    ("TEXT", "MTEXT", "DIMENSION", "LEADER", "MULTILEADER", "MLEADER", "TOLERANCE", "ATTDEF")
+) | frozenset(("ATTRIB", "ACAD_TABLE", "HATCH", "POINT", "VIEWPORT", "IMAGE", "WIPEOUT", "XLINE"))
 # What ezdxf remarks, such as handles that two entities share, is not told beside our own errors.
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 # A drawing has less than so many bytes; nothing is farther away than this [m].
@@ -90,10 +96,19 @@ def read_drawing(file: FilePath, seam: str | None = None) -> Mapping[str, PoseRo
     if seam is not None and present and not asked:
         raise no_such_seam(file, seam, present)
     layers: dict[str, list[_Piece]] = {layer: [] for layer in asked}
+    beside: Counter[str] = Counter()
     for layer, entity in drawn:
-        if layer in layers:
+        if layer not in layers:
+            continue
+        if entity.dxftype() in _SAID:
+            beside[entity.dxftype()] += 1
+        else:
             layers[layer].extend(_piece(file, layer, entity, unit))
-    return _named(file, {layer: _strokes(pieces) for layer, pieces in layers.items()})
+    found = _named(file, {layer: _strokes(pieces) for layer, pieces in layers.items()})
+    if not beside:
+        return found
+    note = f"passed over: {', '.join(f'{count} {kind}' for kind, count in sorted(beside.items()))}"
+    return {name: replace(rows, notes=(note,)) for name, rows in found.items()}
 
 
 def _may_have(layer: str, seam: str) -> bool:

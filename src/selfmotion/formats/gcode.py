@@ -15,6 +15,8 @@ from selfmotion.formats.path_rows import PoseRows, Reading
 from selfmotion.formats.rotary import HEAD, Rotary
 
 _WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*")
+# What only a control's own language says.
+_MACRO = re.compile(r"#|\[|^\s*N?[0-9]*\s*O\s*<|\b(SUB|CALL|REPEAT|WHILE|IF|ENDSUB|GOTO)\b")
 _INCH, _MM = 25.4e-3, 1e-3
 # Chords of arcs are off by this at most [m].
 _CHORD = 1e-5
@@ -31,6 +33,7 @@ _ZEROS = {"G54", "G55", "G56", "G57", "G58", "G59"}
 _TIP = {"G43.4", "G43.5"}
 # The axes of arcs' planes and their normal, right-handed; what goes to a place of the machine.
 _PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
+_CYCLES = {"G73", "G74", "G76", *(f"G{k}" for k in range(81, 90))}
 _HOME = {"G28", "G30", "G53"}
 # A program of a printer moves and extrudes in one line.
 _EXTRUDES = re.compile(r"G0*[0-3](?![0-9.]).*E[+-]?[0-9.]")
@@ -103,6 +106,11 @@ class _Reader:
         words, at = list[tuple[str, str]](), 0
         while at < len(text):
             found = _WORD.match(text, at)
+            if not found and _MACRO.search(text):
+                raise machine.fault(
+                    f"'{text[:40]}': variables, expressions and subroutines are not read; let CAM "
+                    f"write the program out, or run it in a simulator that does"
+                )
             if not found:
                 raise machine.unread(f"'{text[at : at + 40]}'")
             words.append((found[1], found[2]))
@@ -177,6 +185,10 @@ class _Reader:
                 pass
             case "M82" | "M83" if self._prints:
                 self._fed_from_start = code == "M82"
+            case _ if code in _CYCLES:
+                raise self.machine.fault(
+                    f"{code}: canned cycles are not read; let CAM write their moves (G0, G1)"
+                )
             case "M98" | "M99":
                 raise self.machine.fault(f"{code}: subprograms are not read; write them out")
             case _ if code.startswith("M"):
@@ -318,7 +330,7 @@ class _Reader:
         sense = -1.0 if self._motion == 2 else 1.0
         first, second, normal = self._plane
         plane, offsets = [first, second], ["IJK"[first], "IJK"[second]]
-        if "IJK"[normal] in values:
+        if values.get("IJK"[normal], 0.0) != 0.0:
             raise machine.fault(
                 f"arcs are in the plane of {'XYZ'[first]} and {'XYZ'[second]}: {'IJK'[normal]} is "
                 f"not read"

@@ -65,11 +65,16 @@ def read_path(
     part, against the axis of the machine: down where the file has none. About it the tool turns as
     little as may be.
 
-    - G-code: ``G0 G1 G2 G3 G17 G20 G21 G90 G91 G94``, ``X Y Z`` in mm unless ``G20``, ``F`` by
-      the minute; the tool's axis by ``A B C``, Rz(C) Ry(B) Rx(A) z as of heads that turn, or by
-      ``I J K`` in lines. Arcs lie in the plane of X and Y, by ``I J`` from the start or ``R``,
-      as chords within 0.01 mm. ``M2 M30`` end it, other ``M`` are events; ``G40 G43.4 G43.5 G49
-      G54 G61 G64 G69 G80 G91.1``, ``N O S T H D``, ``%`` and comments are passed over
+    - G-code: ``G0 G1 G2 G3 G17 G18 G19 G20 G21 G90 G91 G93 G94``, ``X Y Z`` in mm unless
+      ``G20``, ``F`` by the minute, of the tip along the part (``G93``: lines a minute); the tool's
+      axis by ``A B C``, Rz(C) Ry(B) Rx(A) z, after ``G43.4 G43.5`` or as `rotary` says, or by ``I J
+      K`` in lines. Arcs lie in the plane that is chosen, by offsets of their centre from the start
+      or ``R``, as chords within 0.01 mm. ``M2 M30`` end it, other ``M`` and ``G4`` are events;
+      ``G28 G30 G53`` go to places that are not known, and are passed over with a note; ``G40 G43
+      G49 G61 G64 G69 G80 G91.1 G98 G99``, one of ``G54`` to ``G59``, ``N O S T H D P Q L``, ``%``
+      and comments are passed over
+    - G-code of printers, where lines have ``E``: what extrudes is a cut, what does not a travel.
+      ``M82 M83 G92 E`` set what E means; ``retract`` and ``prime`` are events, as are commands
     - APT: ``GOTO FROM GODLTA RAPID FEDRAT UNITS``, with ``i,j,k`` the tool's axis, feeds by the
       minute (``MMPM``, ``IPM``); ``SPINDL COOLNT AUXFUN ARCON ARCOFF`` are events; names, the
       cutter's shape and number (``LOADTL``, …) are passed over; ``FINI`` ends it
@@ -80,7 +85,8 @@ def read_path(
     within 0.01 mm of each other and no third one is there. A stroke has the name of its layer,
     with a number where the layer has several, and the direction of what was drawn first of it.
     ``LINE ARC CIRCLE ELLIPSE SPLINE LWPOLYLINE POLYLINE`` are read, curves as chords within
-    0.01 mm, which are followed as legs of a cut; any other entity is refused by its handle, but
+    0.01 mm, which are followed as legs of a cut; texts, dimensions, hatches and points are passed
+    over with a note, and any other entity is refused by its handle, but
     not on layers that are off or frozen, nor beside the layer of `seam`. The unit is that of
     ``$INSUNITS``, and none is refused. The tool's z axis points down, against that of the drawing.
     A feed has to be given.
@@ -215,6 +221,15 @@ def events_of(file: FilePath, options: Mapping[str, Any]) -> tuple[str, ...]:
         return tuple(dict.fromkeys(event for _, event in rows.events))
     except FileFormatError:
         return ()
+
+
+def has_normals(file: FilePath, options: Mapping[str, Any]) -> bool:
+    """Return whether a path of a file says the tool's axis by normals; of one refused, no."""
+    try:
+        rows = one_seam(file, options.get("seam"), Reading.of(file, options))
+    except FileFormatError:
+        return False
+    return rows.orientation == "normal"
 
 
 def one_seam(path: FilePath, seam: str | None, reading: Reading) -> PoseRows:

@@ -47,7 +47,7 @@ _HEADERS = {
 # Units in brackets behind a title → what its name ends in; other names of columns.
 _BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg"}
 _BRACKETS |= dict.fromkeys(("m", "rad", "s", "m/s", "sec", "-", "1"), "")
-_ALSO = {"time": "t"}
+_ALSO = {"time": "t", "timestamp": "t"}
 _TITLE = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
 # Columns of texts: which seam a row is of, and what happens at it.
 SEAM, EVENT = "seam", "event"

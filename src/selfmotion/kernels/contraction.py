@@ -81,7 +81,7 @@ def contract_task(
     weights: Array,
     layout: Layout,
     f: int,
-    every: Every | None,
+    every: Every | None = None,
 ) -> Array:
     """Return ⟨M, ∂J/∂q_k⟩ of tip f's task Jacobian for S samples: M = `weights` (S, m, n) → (S, n).
 

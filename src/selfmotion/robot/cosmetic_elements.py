@@ -64,10 +64,8 @@ def _is_colour(material: ElementTree.Element, where: str, notes: list[str]) -> b
         colour.set("rgba", text)
         try:
             values = numbers(colour, "rgba", 4, where)
-            within = [min(max(x, 0.0), 1.0) for x in values]
-            # What is right stays as it is written: a text that is read again is the same.
-            if within != list(values):
-                colour.set("rgba", " ".join(map(repr, within)))
+            if not all(0.0 <= x <= 1.0 for x in values):
+                colour.set("rgba", " ".join(repr(min(max(x, 0.0), 1.0)) for x in values))
         except RobotError as error:
             notes.append(f"{error}; it is drawn grey")
             material.remove(colour)

@@ -13,7 +13,7 @@ from selfmotion.basics import Array, Flags, RobotError, plain_numbers, random_nu
 from selfmotion.robot.chain import WORLD, Chain
 from selfmotion.robot.coupling import Coupling
 from selfmotion.robot.freedom import can_follow, most_dexterous, redundancy
-from selfmotion.robot.geometry import readable_visuals, reduced_geometry
+from selfmotion.robot.geometry import readable_visuals, reduced_geometry, stand_in
 from selfmotion.robot.inverse import solved
 from selfmotion.robot.tree_arrays import TreeArrays, tree_arrays
 from selfmotion.robot.urdf import Urdf
@@ -340,11 +340,17 @@ class RobotModel:
     def visuals(self) -> tuple[Any, tuple[str, ...]]:
         """Return the visual geometry as far as its meshes can be read, and what is missing.
 
+        Where nothing is left, collision bodies stand for it, or joints and their axes.
+
         Returns
         -------
         geometry : pinocchio.GeometryModel
             See `geometry`.
         missing : tuple of str
-            Link, file and reason of each mesh that is left out.
+            Link, file and reason of each mesh that is left out, and what stands for the whole.
         """
-        return readable_visuals(self.urdf, self.locked)
+        geometry, missing = readable_visuals(self.urdf, self.locked)
+        if not geometry.ngeoms:
+            geometry, said = stand_in(self.urdf, self.locked, self.model, self.chain.tip)
+            missing = (*missing, said)
+        return geometry, missing
