@@ -73,6 +73,7 @@ def check_stage(follows: Follows, start: Array, damped: bool) -> None:
         layout,
         gain,
         law,
+        None,
         np.zeros(kernels.space_size(n, m)),
         to_epsilon,
         to_q,
