@@ -76,6 +76,7 @@ def check_stage(follows: Follows, start: Array, damped: bool) -> None:
         layout,
         gain,
         law,
+        None,
         np.zeros(kernels.space_size(n, m, count)),
         to_epsilon,
         to_q,
