@@ -89,8 +89,15 @@ class _Measure:
         kept, waiting = [0], [(0, len(self._points) - 1)]
         while waiting:
             first, last = waiting.pop()
-            missed = self.miss(self.leg(first, last))
-            if missed.max(initial=0.0) > most:
+            if last == first + 1:
+                kept.append(last)
+                continue
+            # Turns take ten times as long as places, which decide as a rule.
+            moved = _leg(self._points, self._turns, first, last, turns_count=False)
+            missed = self.miss(moved)
+            if missed.max() <= most:
+                missed = self.miss(self.leg(first, last))
+            if missed.max() > most:
                 middle = first + 1 + int(missed.argmax())
                 waiting += [(middle, last), (first, middle)]
             else:
@@ -119,7 +126,7 @@ class _Measure:
         return found
 
 
-def _leg(points: Array, turns: Array, first: int, last: int) -> _Leg:
+def _leg(points: Array, turns: Array, first: int, last: int, turns_count: bool = True) -> _Leg:
     inner = points[first + 1 : last] - points[first]
     chord = points[last] - points[first]
     length = float(np.linalg.norm(chord))
@@ -134,7 +141,8 @@ def _leg(points: Array, turns: Array, first: int, last: int) -> _Leg:
     shares = np.maximum.accumulate(np.append(0.0, shares))[1:]
     # Where the tool goes back, it has to turn round where it has come farthest.
     back = _gone_back(along, passed)
-    return _Leg(shares, away, _turned(turns, first, last, shares), back)
+    turned = _turned(turns, first, last, shares) if turns_count else np.zeros(len(shares))
+    return _Leg(shares, away, turned, back)
 
 
 def _gone_back(along: Array, passed: Array) -> Array:
