@@ -90,7 +90,7 @@ def export(
         with StageDisplay(stages) as display:
             own = asked if _is_of_controller(target, form) else None
             sm.write_motion(made, target, settings=own, progress=display.stage, **given)
-        kept, verdicts[str(target)] = _read_back(made, target, form)
+        kept, verdicts[str(target)] = _read_back(made, target, form, rate)
         sound &= kept
         if together:
             names = ", ".join(map(str, together.values()))
@@ -134,7 +134,7 @@ def _is_readable(target: Path, form: str | None) -> bool:
     )
 
 
-def _read_back(made: _Made, target: Path, form: str | None) -> tuple[bool, str]:
+def _read_back(made: _Made, target: Path, form: str | None, rate: float | None) -> tuple[bool, str]:
     """Return whether what was written is still the motion, and what there is to say."""
     if _is_program(target, form) and target.suffix.lower() in formats.PROGRAMS:
         return _confirmed(made, target)
@@ -147,10 +147,23 @@ def _read_back(made: _Made, target: Path, form: str | None) -> tuple[bool, str]:
         case sm.Move():
             read = sm.Move(made.robot, made.constraints, motion.of_joints(made.robot.joint_names))
             return read.verified and made.verified, f"read back: {read.verdict}"
+        case sm.Program() | sm.Parts() if rate is not None:
+            # Steps meet between its samples: there is no motion of each that rests at its ends.
+            return _verified(made), _told_of_samples(made.trajectory, motion, rate)
         case sm.Program():
             found = formats.judged_motion(motion, made)
             return found.verified, f"read back: {found.verdict}"
     return _judged_parts(made, motion)
+
+
+def _told_of_samples(motion: sm.Trajectory, read: sm.Trajectory, rate: float) -> str:
+    """Return how far a motion leaves the whole that it was sampled from, in words."""
+    t = np.append(motion.t, motion.t[:-1] + 0.5 * np.diff(motion.t))
+    off = read.of_joints(motion.joint_names)(np.clip(t, None, read.t[-1])) - motion(t)
+    return (
+        f"at {rate:g} Hz up to {np.abs(off).max():.3g} rad or m off the motion; "
+        "its steps are judged only without a rate"
+    )
 
 
 def _judged_parts(made: sm.Parts, motion: sm.Trajectory) -> tuple[bool, str]:

@@ -88,7 +88,9 @@ class Plan:
 
     def __post_init__(self) -> None:
         check = self.certificate
-        motion = self.trajectory.of_joints(self.robot.joint_names)
+        motion = self.trajectory
+        if set(motion.joint_names) == set(self.robot.joint_names):
+            motion = motion.of_joints(self.robot.joint_names)
         if (check.motion, check.problem) != (motion.digest, self.problem.digest):
             object.__setattr__(self, "certificate", check.of_another())
 
