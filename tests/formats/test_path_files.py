@@ -212,6 +212,7 @@ MALFORMED: list[tuple[str, str, str, str]] = [
     ("a.csv", csv(*GOOD, header="t,x,y,q,qw,qx,qy,qz"), "", "unknown column 'q', expected t"),
     ("a.csv", csv(*GOOD, header="t,x,y,yaw,qw,qx,qy,qz"), "", "column 'z' is missing"),
     ("a.csv", csv(*GOOD, header="t,x,y,z,qw,qx,qy,yaw"), "", "has columns qw,qx,qy,qz and roll"),
+    ("a.csv", csv("a", "b", header="seam"), "", "column 'x' is missing"),
     ("a.csv", csv("0,1,0,0,1", header="t,x,y,z,rx"), "", "column 'ry' is missing, expected rx"),
     ("a.csv", csv(*GOOD, header="t,x,y,z,z_mm,qx,qy,qz"), "", "column 'z' appears twice, in two"),
     ("a.csv", csv(*GOOD, header="t_mm,x,y,z,qw,qx,qy,qz"), "", "unknown column 't_mm'"),

@@ -97,7 +97,7 @@ def read_rows(
         numbers.append(number)
         for name, column in cells_of.items():
             column.append(cells[names.index(name)])
-    found = np.array(values, dtype=np.float64).reshape(-1, len(plain))
+    found = np.array(values, dtype=np.float64).reshape(len(values), len(plain))
     return [names[k] for k in plain], found, numbers, cells_of
 
 
