@@ -3,6 +3,8 @@
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -10,6 +12,7 @@ import pytest
 
 import selfmotion as sm
 from selfmotion.basics import Array
+from selfmotion.planning.largest_part import _candidate_of, _Push, _until
 from support.arms import robot_named, short_line, start_of
 
 
@@ -178,3 +181,27 @@ def test_relaxations_survive_saving_and_retiming(panda_circle: Callable, tmp_pat
     slower = sm.retime(plan, acceleration=5.0)
     assert slower.certificate.verified, slower.certificate.verdict
     assert slower.problem.relaxations[0].during != (1.0, 3.0)
+
+
+def test_a_part_before_a_window_has_none_of_its_joints(panda: sm.RobotModel) -> None:
+    """Out of reach before the window begins: what is planned ends where it does without it."""
+    start = panda.dexterous_configuration()
+    pose = panda.pose(start)
+    away = pin.SE3(pose.rotation, pose.translation + np.array([1.2, 0.0, 0.0]))
+    line = sm.Line(pose, away, 4.0)
+    problem = sm.Problem(panda, line, start=start, collision=None)
+    late = sm.Relaxation("z", 5e-3, during=(3.5, 3.9), axes="tool")
+    ends = [
+        sm.plan(dataclasses.replace(problem, relaxations=items), max_evaluations=20)
+        for items in ([], [late])
+    ]
+    assert all(plan.report.ending for plan in ends)
+    assert ends[1].trajectory.duration == pytest.approx(ends[0].trajectory.duration, rel=0.02)
+    # What was begun with on a longer part is cut to the joints that are left.
+    whole = dataclasses.replace(problem, relaxations=[late]).augmented
+    part, push = _until(whole, 2.0), _Push(np.ones(8))
+    failed: Any = SimpleNamespace(problem=whole, candidate=(whole.given_start, push))
+    first, guide = _candidate_of(part, failed)
+    np.testing.assert_array_equal(first, start)
+    assert guide is not None
+    np.testing.assert_array_equal(guide(np.zeros(2)), np.ones((2, 7)))

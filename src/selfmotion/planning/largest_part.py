@@ -148,7 +148,8 @@ def _bisect(problem: Problem, failed: _Attempt, reach: Reach, effort: Effort) ->
             probe = 0.5 * (low + high)
         if probe < LEAST_PART * problem.path.duration or high - low < agreement * high:
             break
-        attempt = _attempt(_until(problem, probe), failed.candidate, effort)
+        part = _until(problem, probe)
+        attempt = _attempt(part, _candidate_of(part, failed), effort)
         if attempt.arrived_with_room or attempt.cut_short:
             arrived, low = attempt, probe
         else:
@@ -207,6 +208,14 @@ def _start_of(part: Problem, problem: Problem, q: Array) -> Array:
     return np.asarray(part.at(np.zeros(1), own)[0])
 
 
+def _candidate_of(part: Problem, failed: _Attempt) -> _Candidate:
+    """Return the candidate of another part as one of a part, which may have fewer joints."""
+    start, guide = failed.candidate
+    if isinstance(guide, _Push):
+        guide = guide.of(part.asked.robot.dof, part.robot.dof)
+    return _start_of(part, failed.problem, start), guide
+
+
 def _attempt(problem: Problem, candidate: _Candidate, effort: Effort) -> _Attempt:
     try:
         start, guide = candidate
@@ -246,6 +255,12 @@ class _Push:
 
     def __init__(self, rate: Array) -> None:
         self._rate = rate
+
+    def of(self, own: int, dof: int) -> "_Push":
+        """Return that of the arm's own joints, with virtual ones at rest after them, dof in all."""
+        if len(self._rate) == dof:
+            return self
+        return _Push(np.append(self._rate[:own], np.zeros(dof - own)))
 
     def __call__(self, t: Array) -> Array:
         """Return the rate at times `t` (S,), (S, n)."""
