@@ -30,6 +30,7 @@ from selfmotion.basics.files import (
     as_path as as_path,
     read_archive as read_archive,
     read_arrays as read_arrays,
+    text_of as text_of,
     write_archive as write_archive,
     write_atomically as write_atomically,
     write_bytes as write_bytes,

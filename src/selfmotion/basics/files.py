@@ -1,5 +1,6 @@
 """Archives and tables on disk: written atomically, read with errors that name the place."""
 
+import codecs
 import json
 import math
 import os
@@ -17,6 +18,8 @@ from selfmotion.basics.errors import FileFormatError
 _DESCRIPTION = "description"
 # Files of arrays beyond this many bytes are not read: 250,000 samples of a plan are a tenth.
 _LARGEST = 250_000_000
+# What texts have besides letters: blanks, ends of lines and pages, of tapes and files.
+_BLANKS = "\t\n\v\f\r\x11\x13\x1a\x1c\x1d\x1e\x1f"
 
 
 def write_atomically(file: Path, write: Callable[[IO[bytes]], object]) -> None:
@@ -55,6 +58,30 @@ def write_bytes(file: Path, data: bytes) -> None:
 def write_text(file: Path, text: str) -> None:
     """Write a text file, atomically."""
     write_bytes(file, text.encode())
+
+
+def text_of(file: Path, content: bytes) -> str:
+    """Return the text of a file: in UTF-8, in UTF-16 with its mark, or in letters of one byte each.
+
+    What other machines write in their own letters (Latin-1, Windows) are comments and units, such
+    as °; nothing else of a table or a program is beyond ASCII.
+
+    Raises
+    ------
+    FileFormatError
+        It holds bytes that no text has.
+    """
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        text = content.decode("utf-16", errors="replace")
+    else:
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("latin-1")
+    odd = next((letter for letter in text if letter < " " and letter not in _BLANKS), None)
+    if odd is not None:
+        raise FileFormatError(f"{file}: is no text: it has a byte {ord(odd)}")
+    return text
 
 
 def write_archive(file: Path, description: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from selfmotion.basics.arrays import Array
 from selfmotion.basics.errors import FileFormatError
+from selfmotion.basics.files import text_of
 
 # What begins a line that says nothing.
 _COMMENTS = ("#", "%", "//")
@@ -154,7 +155,7 @@ def _mark(line: str) -> str:
 
 def _cells(line: str, mark: str) -> list[str]:
     cells = line.split(mark) if mark else line.split()
-    return [cell.strip().strip('"').strip() for cell in cells]
+    return [cell.strip().strip("\"'").strip() for cell in cells]
 
 
 def _hint(cells: Sequence[str], names: Sequence[str], mark: str) -> str:
@@ -166,11 +167,10 @@ def _hint(cells: Sequence[str], names: Sequence[str], mark: str) -> str:
 def _lines(file: Path) -> tuple[list[tuple[int, str]], list[tuple[int, str]]]:
     """Return the comments of a table and its other lines, and which they are, no empty ones."""
     try:
-        lines = file.read_text(encoding="utf-8-sig").splitlines()
+        content = file.read_bytes()
     except OSError as error:
         raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise FileFormatError(f"{file}: is no UTF-8 text: {error}") from error
+    lines = text_of(file, content).splitlines()
     all_lines = [(k, line.strip(" ")) for k, line in enumerate(lines, 1) if line.strip()]
     kept = [each for each in all_lines if not each[1].startswith(_COMMENTS)]
     if not kept:

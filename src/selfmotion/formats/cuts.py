@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError
+from selfmotion.basics import Array, FileFormatError, text_of
 from selfmotion.formats.path_rows import PoseRows
 from selfmotion.formats.poses import from_normal
 
@@ -144,10 +144,8 @@ class Machine:
             raise FileFormatError(
                 f"{self.file}: has {len(content)} bytes, expected {_BYTES} at most"
             )
-        try:
-            return content.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise FileFormatError(f"{self.file}: is no text: {error}") from error
+        # DOS marks the end of a file.
+        return text_of(self.file, content).rstrip("\x1a")
 
     def rapid(self, position: Array, axis: Array) -> None:
         """Go somewhere without cutting, which ends a cut."""

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from selfmotion.basics import FileFormatError
+from selfmotion.basics import FileFormatError, text_of
 from selfmotion.formats.controller_program import ControllerProgram, Switch
 from selfmotion.formats.program_axes import Axis
 from selfmotion.formats.stretches import Miss, Misses, Stretch
@@ -48,10 +48,7 @@ class Lines:
             raise FileFormatError(f"{file}: cannot be read: {error.strerror or error}") from error
         if len(content) > _BYTES:
             raise FileFormatError(f"{file}: has {len(content)} bytes, expected {_BYTES} at most")
-        try:
-            self._lines = content.decode("utf-8-sig").splitlines()
-        except UnicodeDecodeError as error:
-            raise FileFormatError(f"{file}: is no text: {error}") from error
+        self._lines = text_of(file, content).splitlines()
         self.number = 0
         self.notes: list[str] = []
 
