@@ -96,7 +96,8 @@ def _of_table(file: FilePath, rows: PoseRows, turns: Array | None, asked: Pacing
     feed, duration, bounds = asked.feed, asked.duration, asked.bounds
     # The ramps are part of the duration, and go half as far as they last.
     moving = None if duration is None else _moving(file, duration, asked)
-    t = _times(file, rows, feed, moving)
+    in_place = asked.corners == "round" and moving is None
+    t = _times(file, rows, feed, moving, turns_in_place=in_place)
     feeds = rows.feed if feed is None else np.full(len(rows.positions), feed)
     if bounds and feeds is None:
         raise PathError(f"{next(iter(bounds))} has no effect without a feed")
@@ -354,7 +355,14 @@ def _remedy(jump: float, is_cut: bool) -> str:
     )
 
 
-def _times(file: FilePath, rows: PoseRows, feed: float | None, duration: float | None) -> Array:
+def _times(
+    file: FilePath,
+    rows: PoseRows,
+    feed: float | None,
+    duration: float | None,
+    *,
+    turns_in_place: bool,
+) -> Array:
     given = {"feed": feed, "duration": duration}
     named = [name for name, value in given.items() if value is not None]
     columns = [name for name, own in (("t", rows.t), ("feed", rows.feed)) if own is not None]
@@ -380,10 +388,11 @@ def _times(file: FilePath, rows: PoseRows, feed: float | None, duration: float |
         )
     steps = np.linalg.norm(np.diff(rows.positions, axis=0), axis=1)
     still = np.flatnonzero(steps == 0.0)
-    if still.size:
+    if still.size and not turns_in_place:
         raise FileFormatError(
             f"{file}: {rows.places[int(still[0]) + 1]}: the tool does not move from the pose "
-            f"before, which takes no time by feed or duration; give a column t"
+            f"before, which takes no time by feed or duration; give a column t, or a feed with "
+            f"corners round (--corners round), where the tool turns in place"
         )
     if rows.feed is not None:
         return np.append(0.0, np.cumsum(steps / rows.feed[:-1]))
