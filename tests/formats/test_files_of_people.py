@@ -30,6 +30,7 @@ def written(folder: Path, name: str, text: str) -> Path:
 
 _ROWS = ["0.4 -0.05 0.3 0 0 -1", "0.42 0 0.3 0 0 -1", "0.4 0.05 0.3 0 0 -1"]
 _NORMALS = "x,y,z,nx,ny,nz"
+# fmt: off
 TABLES: list[tuple[str, str, str | None]] = [
     ("commas", "\n".join([_NORMALS, *(row.replace(" ", ",") for row in _ROWS)]), None),
     ("spaces", "\n".join([_NORMALS.replace(",", " "), *_ROWS]), None),
@@ -41,11 +42,21 @@ TABLES: list[tuple[str, str, str | None]] = [
     ("no header", "\n".join(_ROWS), _NORMALS),
     ("no header, commas", "\n".join(row.replace(" ", ",") for row in _ROWS), _NORMALS),
     ("a header in a comment", "\n".join([f"# {_NORMALS}", *_ROWS]), None),
+    ("inches", "x_in,Y [in],z (inch)\n15.748031496063,-1.968503937008,11.811023622047\n"
+     "16.535433070866,0,11.811023622047\n15.748031496063,1.968503937008,11.811023622047\n", None),
+    ("centimetres", "x_cm,y_cm,z [cm]\n40,-5,30\n42,0,30\n40,5,30\n", None),
+    ("quotes", "'x';\"y\";'z'\n'0.4';\"-0.05\";'0.3'\n0.42;0;0.3\n0.4;0.05;0.3\n", None),
+    ("titles of messages", "\n".join(["pose.position.x,pose.position.y,pose.position.z,"
+     "pose.orientation.x,pose.orientation.y,pose.orientation.z,pose.orientation.w",
+     *(row[:-7].replace(" ", ",") + ",1,0,0,0" for row in _ROWS)]), None),
+    ("titles with marks", "\n".join(["pos_x,position_y,pz,quat_x,quat_y,quat_z,q_w",
+     *(row[:-7].replace(" ", ",") + ",1,0,0,0" for row in _ROWS)]), None),
     ("columns left out", "\n".join(f"7 {row}" for row in _ROWS), "-,x,y,z,-,-,-"),
     ("commas at the ends", "x,y,z,\n0.4,-0.05,0.3,\n0.42,0,0.3,\n0.4,0.05,0.3,\n", None),
 ]
 
 
+# fmt: on
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table[0])
 def test_tables_of_all_forms_give_one_motion(
     table: tuple[str, str, str | None], tmp_path: Path
@@ -54,11 +65,59 @@ def test_tables_of_all_forms_give_one_motion(
     path = sm.read_path(written(tmp_path, "a.txt", text), feed=0.05, columns=columns)
     plain = sm.read_path(written(tmp_path, "b.csv", TABLES[0][1]), feed=0.05)
     assert path.duration == pytest.approx(plain.duration)
-    t = np.linspace(0.0, plain.duration, 31)
+    t = np.linspace(0.0, min(plain.duration, path.duration), 31)
     found, wanted = path.samples(t), plain.samples(t)
     np.testing.assert_allclose(found.translation, wanted.translation, atol=ROUNDING)
     if path.oriented:
         np.testing.assert_allclose(found.rotation, wanted.rotation, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("code", ["utf-8-sig", "utf-16", "latin-1", "cp1252"])
+def test_letters_of_other_machines_are_no_matter(code: str, tmp_path: Path) -> None:
+    rows = "0,4;-0,05;0,3;180;0;0\r\n0,42;0;0,3;180;0;0\r\n"
+    file = tmp_path / "a.csv"
+    file.write_bytes(
+        f"# Naht für Träger\r\nx;y;z;roll [°];pitch [°];yaw [°]\r\n{rows}".encode(code)
+    )
+    path = sm.read_path(file, feed=0.05)
+    np.testing.assert_allclose(path.pose(0.0).translation, GOOD[0], atol=ROUNDING)
+    np.testing.assert_allclose(path.pose(0.0).rotation[:, 2], DOWN, atol=ROUNDING)
+
+
+def test_a_trajectory_of_a_camera_is_read(tmp_path: Path) -> None:
+    text = "# timestamp tx ty tz qx qy qz qw\n5.0 0.4 0 0.3 1 0 0 0\n7.0 0.5 0 0.3 1 0 0 0\n"
+    assert sm.read_path(written(tmp_path, "a.txt", text)).duration == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("seam,event\na,b\n", "column 'x' is missing; the header is seam,event, expected x,y,z"),
+        ("X,Y,Z,A,B,C\n", "'a': A,B,C of KUKA are yaw_deg,pitch_deg,roll_deg here"),
+        ("x,y,z,q1,q2,q3,q4\n", "'q1': q1,q2,q3,q4 of ABB are qw,qx,qy,qz here"),
+        ("x,y,z,w,p,r\n", "'w': W,P,R of Fanuc are roll_deg,pitch_deg,yaw_deg here"),
+        ("id,x,y,z\n", "unknown column 'id', .*to leave a column out, call it - in columns"),
+        ("x\x00,y\n", "is no text: it has a byte 0"),
+    ],
+)
+def test_tables_that_lack_or_have_more_say_what_to_do(text: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(sm.FileFormatError, match=said):
+        sm.read_path(written(tmp_path, "a.csv", text), feed=0.05)
+
+
+def test_a_tool_that_turns_in_place_takes_time_for_it(tmp_path: Path) -> None:
+    rows = ["0.4,0,0.3,180,0,0", "0.4,0,0.3,180,0,30", "0.45,0,0.3,180,0,30"]
+    text = "\n".join(["x,y,z,roll_deg,pitch_deg,yaw_deg", *rows])
+    file = written(tmp_path, "a.csv", text)
+    with pytest.raises(sm.FileFormatError, match=r"line 3: .*a feed with corners round"):
+        sm.read_path(file, feed=0.05)
+    path = sm.read_path(file, feed=0.05, corners="round")
+    samples = path.samples(np.linspace(0.0, path.duration, 501))
+    turning = np.abs(samples.twist[:, 5]) > 0.5
+    assert turning.any()
+    np.testing.assert_allclose(samples.translation[turning, 0], 0.4, atol=1e-3)
+    angle = np.arccos(0.5 * (np.trace(samples.rotation[0].T @ samples.rotation[-1]) - 1.0))
+    assert angle == pytest.approx(np.pi / 6)
 
 
 def test_a_table_without_header_is_planned_with_columns(tmp_path: Path) -> None:

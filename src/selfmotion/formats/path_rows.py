@@ -24,7 +24,7 @@ from selfmotion.formats.rotary import Rotary
 _POSITION = ("x", "y", "z")
 # Suffixes of tables, and of G-code.
 TABLES = (".csv", ".txt", ".tsv")
-PROGRAMS = (".nc", ".ngc", ".gcode", ".tap")
+PROGRAMS = (".nc", ".ngc", ".gcode", ".tap", ".cnc", ".eia", ".mpf", ".g", ".gc", ".gco")
 
 
 # Columns of an orientation → its key in `ORIENTATIONS`.
@@ -45,13 +45,25 @@ _HEADERS = {
     8: "t,x,y,z,qw,qx,qy,qz",
 }
 # Units in brackets behind a title → what its name ends in; other names of columns.
-_BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg"}
+_BRACKETS = {"mm": "_mm", "mm/s": "_mm", "deg": "_deg", "°": "_deg", "degrees": "_deg"}
+_BRACKETS |= {"cm": "_cm", "cm/s": "_cm", "in": "_in", "inch": "_in", "in/s": "_in"}
 _BRACKETS |= dict.fromkeys(("m", "rad", "s", "m/s", "sec", "-", "1"), "")
 _ALSO = {"time": "t", "timestamp": "t"}
+# What other programs call x or qx: pose.position.x, pos_x, px, tx; orientation.x, quat_x.
+_PLACES = re.compile(r"(?:[a-z]+[._])*(?:position|pos|translation)[._]([xyz])|[pt]([xyz])")
+_TURNS = re.compile(r"(?:[a-z]+[._])*(?:orientation|quaternion|quat|q)[._]([wxyz])")
 _TITLE = re.compile(r"([^\[(]*?)[\s_]*[\[(]([^\])]*)[\])]")
 # Columns of texts: which seam a row is of, and what happens at it.
 SEAM, EVENT = "seam", "event"
 _KNOWN = {"t", "feed", *_POSITION, *(name for names in _COLUMNS for name in names)}
+
+
+# What makers of controllers call orientations → what they are here.
+_MAKERS = {
+    **dict.fromkeys("abc", "A,B,C of KUKA are yaw_deg,pitch_deg,roll_deg here"),
+    **dict.fromkeys(("w", "p", "r"), "W,P,R of Fanuc are roll_deg,pitch_deg,yaw_deg here"),
+    **dict.fromkeys(("q1", "q2", "q3", "q4"), "q1,q2,q3,q4 of ABB are qw,qx,qy,qz here"),
+}
 
 
 # Names that are long enough to be taken for one another.
@@ -60,6 +72,8 @@ _LONG = ("feed", "roll", "pitch", "yaw")
 
 _UNITS = {
     "_mm": ((*_POSITION, "feed"), 1e-3),
+    "_cm": ((*_POSITION, "feed"), 1e-2),
+    "_in": ((*_POSITION, "feed"), 25.4e-3),
     "_deg": (("rx", "ry", "rz", "roll", "pitch", "yaw"), None),
 }
 
@@ -171,7 +185,7 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
         named=_named,
         usual=_HEADERS,
     )
-    whole = _of_table(file, header, table, lines, texts.get(EVENT, [""] * len(lines)))
+    whole = _of_table(file, header, table, lines, texts)
     if SEAM not in texts:
         return {"": whole}
     names = texts[SEAM]
@@ -204,14 +218,16 @@ def _of_table(
     header: Sequence[str],
     table: Array,
     lines: Sequence[int],
-    events: Sequence[str],
+    texts: Mapping[str, Sequence[str]],
 ) -> PoseRows:
     columns = _columns(file, header, table)
+    events = texts.get(EVENT, [""] * len(lines))
     missing = [name for name in _POSITION if name not in columns]
     if missing:
         raise FileFormatError(
-            f"{file}: column '{missing[0]}' is missing; the header is {','.join(header)}, expected "
-            f"x,y,z [m] (or x_mm,…), t [s], and an orientation"
+            f"{file}: column '{missing[0]}' is missing; the header is "
+            f"{','.join((*header, *texts))}, expected x,y,z [m] (or x_mm,…), t [s], and an "
+            f"orientation"
         )
     given = [names for names in _COLUMNS if set(names) & set(columns)]
     if len(given) > 1:
@@ -244,7 +260,15 @@ def _named(title: str) -> str:
     found = _TITLE.fullmatch(name)
     if found and found[2].strip() in _BRACKETS:
         name = found[1] + _BRACKETS[found[2].strip()]
-    return _ALSO.get(name, name)
+    stem, unit = name, ""
+    for suffix in _UNITS:
+        if name.endswith(suffix):
+            stem, unit = name.removesuffix(suffix), suffix
+    if place := _PLACES.fullmatch(stem):
+        stem = place[1] or place[2]
+    elif turn := _TURNS.fullmatch(stem):
+        stem = f"q{turn[1]}"
+    return _ALSO.get(stem, stem) + unit
 
 
 def _several(text: str) -> list[str]:
@@ -276,10 +300,13 @@ def _meant(file: FilePath, title: str) -> tuple[str, float]:
             f"tool's z axis here, into the part: call them nx,ny,nz, and say flip_normals where "
             f"they point out"
         )
+    if name in _MAKERS:
+        raise FileFormatError(f"{file}: unknown column '{title}': {_MAKERS[name]}")
     if name not in _KNOWN:
         raise FileFormatError(
             f"{file}: unknown column '{title}'{nearest(title, (*_LONG, SEAM, EVENT))}, expected t, "
-            f"feed, seam, event, x,y,z and {' or '.join(','.join(names) for names in _COLUMNS)}"
+            f"feed, seam, event, x,y,z and {' or '.join(','.join(names) for names in _COLUMNS)}; "
+            f"to leave a column out, call it - in columns (--columns -,x,y,z)"
         )
     return name, scale
 
