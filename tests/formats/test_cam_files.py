@@ -8,6 +8,7 @@ import pytest
 import selfmotion as sm
 from selfmotion.formats.cldata import read_cldata
 from selfmotion.formats.gcode import read_gcode
+from selfmotion.formats.path_rows import PoseRows
 
 # A plunge, a slot with an arc of 20 mm and a tilted end, a retract; and another cut.
 GCODE = """%
@@ -148,6 +149,138 @@ def test_the_path_goes_along_the_legs_at_the_feeds(tmp_path: Path, name: str) ->
         assert np.abs(samples.twist[end]).max() < 1e-9
 
 
+# Round the centre (20, 0) from (10, 0) up to (20, 10) and on to (30, 0), as four systems write it.
+ROUND_BEGIN = "UNITS/MM\nFEDRAT/600,MMPM\nRAPID\nGOTO/10,0,5\nGOTO/10,0,0\n"
+ROUND = {
+    "ISO": "CIRCLE/20,0,0,0,0,-1,10\nGOTO/20,10,0\nCIRCLE/20,0,0,0,0,-1,10\nGOTO/30,0,0\n",
+    "one": "CIRCLE / 20, 0, 0, 0, 0, -1\nGOTO / 30, 0, 0\n",
+    "MOVARC": "MOVARC/20,0,0,0,0,-1,10,ANGLE,180\nGOTO/30,0,0\n",
+    # NX: left-handed about its axis, with tolerances and its cutter behind the radius.
+    "NX": "CIRCLE/20,0,0,0.0,0.0,1.0,10,0.06,0.5,25,0\nPAINT/COLOR,31\nGOTO/30,0,0\n",
+    "CATIA": "AUTOPS\nINDIRV/ 0.0, 1.0, 0.0\nTLON,GOFWD/ (CIRCLE/ 20, 0, 0,$\n 10),ON,(LINE/ 20, 0,"
+    " 0, 20, 10, 0)\nINDIRV/1,0,0\nTLON,GOFWD/ (CIRCLE/ 20,0,0,10),ON,2,INTOF,$\n"
+    "(LINE/20,0,0,30,0,0)\n",
+    "CATIA's cylinder": "INDIRV/0,1,0\nTLON,GOFWD/ (CYLNDR/20,0,0,0,0,1,10),ON,$\n(PLANE/PERPTO,$\n"
+    "(PLANE/(POINT/20,0,0),PERPTO,(VECTOR/0,0,1)),(POINT/20,0,0),(POINT/30,0,0))\n",
+}
+
+
+@pytest.mark.parametrize("system", ROUND)
+def test_arcs_of_all_systems_go_the_same_way(system: str, tmp_path: Path) -> None:
+    (cut,) = read_cldata(written(tmp_path, "a.apt", ROUND_BEGIN + ROUND[system])).values()
+    points = 1e3 * cut.positions[1:]
+    np.testing.assert_allclose(points[[0, -1]], [[10, 0, 0], [30, 0, 0]], atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(points - [20, 0, 0], axis=1), 10.0, atol=1e-9)
+    assert (np.diff(points[:, 0]) > 0.0).all()
+    assert points[:, 1].max() == pytest.approx(10.0, abs=1e-2)
+
+
+def test_helices_go_round_as_often_as_they_say(tmp_path: Path) -> None:
+    """NX counts the turn that it ends in, and so does P of G-code."""
+    helix = "CIRCLE/20,0,-6,0,0,1,10,0.06,0.5,25,0,TIMES,3\nGOTO/30,0,-6\n"
+    (cut,) = read_cldata(written(tmp_path, "a.cls", ROUND_BEGIN + helix)).values()
+    text = "G0 X10 Y0 Z5\nG1 Z0 F600\nG2 X30 Y0 Z-6 I10 J0 P3\n"
+    (other,) = read_gcode(written(tmp_path, "a.nc", text)).values()
+    np.testing.assert_allclose(cut.positions, other.positions, atol=1e-12)
+    points = cut.positions[1:] - [0.02, 0, 0]
+    turned = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
+    assert turned[-1] - turned[0] == pytest.approx(-5.0 * np.pi)
+    np.testing.assert_allclose(points[:, 2], -6e-3 * np.linspace(0, 1, len(points)), atol=1e-12)
+    absolute = text.replace("I10 J0 P3", "I20 J0 P3").replace("G0 X10", "G90.1 G0 X10")
+    (again,) = read_gcode(written(tmp_path, "b.nc", absolute)).values()
+    np.testing.assert_allclose(again.positions, other.positions, atol=1e-12)
+
+
+HOLES = {
+    "G-code": "G0 X0 Y0 Z20\nG99 G83 X10 Y0 Z-5 R2 Q3 F120\nG98 X20\nG80\nG1 X30 F60\n",
+    "by differences": "G0 X0 Y0 Z20\nG91\nG99 G83 X10 Z-7 R-18 Q3 F120\nG98 X10\nG80\nG1 X10 F60\n",
+    "NX": "RAPID\nGOTO/0,0,20\nCYCLE/DRILL,DEEP,STEP,3,RAPTO,2,FEDTO,-5,RTRCTO,20,MMPM,120\n"
+    "GOTO/10,0,0\nGOTO/20,0,0\nCYCLE/OFF\nRAPID\nGOTO/20,0,20\nFEDRAT/60\nGOTO/30,0,20\n",
+    "CAMWorks": "RAPID/\nGOTO/0,0,20\nCYCLE/INIT\nCYCLE/DEEP2,FEDTO,5,1STPECK,3,SUBPECK,3,MMPM,120,"
+    "RAPTO,2,RTRCTO,20\nGOTO/10,0,0\nGOTO/20,0,0\nCYCLE/OFF\nRAPID/\nGOTO/20,0,20\nFEDRAT/60\n"
+    "GOTO/30,0,20\n",
+    "ISO": "RAPID\nGOTO/0,0,20\nCYCLE/DEEP, 5.0, INCR, 3.0, MMPM, 120, 2.0\nGOTO/10,0,0\n"
+    "GOTO/20,0,0\nCYCLE/OFF\nRAPID\nGOTO/20,0,20\nFEDRAT/60\nGOTO/30,0,20\n",
+}
+
+
+@pytest.mark.parametrize("language", HOLES)
+def test_holes_are_cuts_that_come_straight_out(language: str, tmp_path: Path) -> None:
+    is_gcode = language in ("G-code", "by differences")
+    file = written(tmp_path, "a.nc" if is_gcode else "a.apt", HOLES[language])
+    first, second, line = (read_gcode if is_gcode else read_cldata)(file).values()
+    heights = [2, -1, 2, -0.5, -4, 2, -3.5, -5, 2]
+    for hole, x in ((first, 10), (second, 20)):
+        wanted = np.column_stack([np.full(9, x), np.zeros(9), heights])
+        np.testing.assert_allclose(1e3 * hole.positions, wanted, atol=1e-9)
+        assert hole.feed is not None
+        # At the feed where it cuts, faster where the hole is there already.
+        np.testing.assert_allclose(hole.feed[:-1], [0.002, *[0.05, 0.05, 0.002] * 2, 0.05])
+    np.testing.assert_allclose(1e3 * line.positions, [[20, 0, 20], [30, 0, 20]], atol=1e-9)
+
+
+def test_other_cycles_wait_break_chips_and_come_out_at_the_feed(tmp_path: Path) -> None:
+    start = "G0 X0 Y0 Z20\nG99 "
+
+    def hole(cycle: str) -> PoseRows:
+        (found,) = read_gcode(written(tmp_path, "a.nc", start + cycle)).values()
+        return found
+
+    waits, reams = hole("G82 X0 Z-5 R2 P500 F120"), hole("G85 X0 Z-5 R2 F120")
+    assert waits.events == ((1, "G4 P500"),)
+    assert reams.feed is not None
+    np.testing.assert_allclose(reams.feed, 0.002)
+    chips = hole("G73 X0 Z-5 R2 Q4 F120")
+    np.testing.assert_allclose(1e3 * chips.positions[:, 2], [2, -2, -1.5, -5, 2], atol=1e-9)
+
+
+def test_statements_of_systems_are_passed_over_or_told(tmp_path: Path) -> None:
+    head = (
+        "$$ CATIA APT VERSION 1.0\nPARTNO PART = 1\nUNIT / MM\nINSERT/STOP = 3\n"
+        "SELECT/TOOL,2\nCSI_SET_FLUTE_LENGTH/16.\nTRNTYP/WORLD,0,0,0\n"
+        "CSYS/-1,0,0,0,0,1,0,0,0,0,-1,0\nSETUP/START,1\nTLAXIS/ 0.0, 0.0, 1.0\n"
+        "CUTCOM/LEFT,XYPLAN\nOPSTOP\n"
+    )
+    text = head + ROUND_BEGIN + "GOTO/20,0,0\nGOHOME\nGOTO/30,0,0\nGOTO/40,0,0\nREWIND/0\nEND\n"
+    content = text.replace("PART = 1", "STÜCK = 1").replace("\n", "\r\n").encode("latin-1")
+    (tmp_path / "a.aptsource").write_bytes(content)
+    first, second = read_cldata(tmp_path / "a.aptsource").values()
+    np.testing.assert_allclose(1e3 * first.positions, [[10, 0, 5], [10, 0, 0], [20, 0, 0]])
+    assert first.events == ((0, "OPSTOP"),)
+    # Where home is, is not known: the cut begins where it is known again.
+    np.testing.assert_allclose(1e3 * second.positions, [[30, 0, 0], [40, 0, 0]])
+    offset, home = first.notes
+    assert "line 11: CUTCOM/LEFT,XYPLAN: places are taken as they are written" in offset
+    assert "GOHOME goes to a place of the machine's own" in home
+    file = written(tmp_path, "b.ncl", ROUND_BEGIN + "GOHOME/0,0,90\nGOTO/0,0,80\n")
+    _, last = read_cldata(file).values()
+    np.testing.assert_allclose(1e3 * last.positions, [[0, 0, 90], [0, 0, 80]])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "g21 g90\n(a (b) c)\ng0 x0 y0 z5 (open\ng1 z0 f600\nx10\n",
+        "N1 G21*5\nN2 G0 X0 Y0 Z5*21\nN3 G1 Z0 F600*9\nN4 X10\n",
+        "G92 X0 Y0 Z5\nG91 G1 Z-5 F600\nX10\n",
+        "G15 G50.1 G67 X=0 Y=0 Z=5\nG0 X0\nG9 G1 Z0 F600\nX10 ; (Fr\xe4sen)\n\x1a",
+    ],
+    ids=["comments", "checksums", "zero first", "Latin-1"],
+)
+def test_programs_of_all_forms_give_one_cut(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "a.gc"
+    file.write_bytes(text.encode("latin-1"))
+    (cut,) = read_gcode(file).values()
+    np.testing.assert_allclose(1e3 * cut.positions, [[0, 0, 5], [0, 0, 0], [10, 0, 0]], atol=1e-9)
+
+
+def test_a_program_without_z_is_in_its_plane(tmp_path: Path) -> None:
+    laser = "G21 G90 (Z is not said)\nM4 S0\nG0 X5 Y5\nG1 X10 F600 S255\nY10\nM5\n"
+    (cut,) = read_gcode(written(tmp_path, "a.nc", laser)).values()
+    np.testing.assert_allclose(1e3 * cut.positions, [[5, 5, 0], [10, 5, 0], [10, 10, 0]])
+    assert cut.notes == ("no line says Z: it is taken for 0",)
+
+
 def test_a_cut_that_goes_back_rests_there(tmp_path: Path) -> None:
     text = "G0 X0 Y0 Z5\nG1 Z-5 F600\nZ5\nX10\n"
     path = sm.read_path(written(tmp_path, "peck.nc", text))
@@ -241,14 +374,22 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("G41 D1", "G41 is not read: page 'Files' of the docs"),
-        ("G95", "G95 is not read"),
+        ("G41 D1", "G41: the cutter's radius is not added: let CAM do so"),
+        ("G12", "G12 is not read: page 'Files' of the docs"),
+        ("G95", "G95: feeds by turns of a spindle are not read: let CAM write them by the minute"),
+        ("G52 X3", "G52 is not read"),
         ("G55", "G55 after G54: where their zeros are"),
         ("G92 X0", "G92 X: zeros that move are not read"),
         ("G18 G2 X1 Y1 J1", "in the plane of Z and X: J is not read"),
         ("G1 U4", "word 'U4' is not read"),
         ("G1 X#101", "'G1 X#101': variables, expressions and subroutines are not read"),
-        ("G81 Z-5 R1", "G81: canned cycles are not read"),
+        ("G84 Z-5 R1", "G84: cycles that tap or bore are not read, those that drill are"),
+        ("G81 X3 R1", "G81 says no Z, expected Z and R of the hole"),
+        ("G0 B0\nG81 X3 Z3 R1", "the hole ends 2 mm above where it begins"),
+        ("G0 B0\nG83 X3 Z-3 R1", "drills by 0 mm at once, expected a step above 0"),
+        ("G81 X3 Z-3 R1", "G81 drills along Z, and the tool is tilted"),
+        ("G3 X60 Y20 I-20 J0 P1.5", "P of an arc is 1.5, expected how often it goes round"),
+        ("BEGIN PGM A MM", "is in Heidenhain's own language"),
         ("G1 X1 X2", "word X is there twice"),
         ("G1 X1 F0", "expected a feed above 0"),
         ("G2 X1 Y1 R0.1", "no arc of radius"),
@@ -262,15 +403,22 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
 )
 def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -> None:
     text = GCODE.replace("N90 Z5 ; out", line)
-    with pytest.raises(sm.FileFormatError, match=rf"slot\.nc: line 11: .*{said}"):
+    with pytest.raises(sm.FileFormatError, match=rf"slot\.nc: line 1[12]: .*{said}"):
         sm.read_path(written(tmp_path, "slot.nc", text), seam="cut 1")
 
 
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("CIRCLE/1,2,3,0,0,1,5", "statement 'CIRCLE' is not read"),
-        ("CYCLE/DRILL,5", "statement 'CYCLE' is not read"),
+        ("CIRCLE/1,2,3", "CIRCLE has 3 numbers, expected x,y,z of its centre"),
+        ("CIRCLE/1,2,3,0,0,1,5\nGOTO/50,50,5", "the arc begins .* mm from its centre and ends"),
+        ("CYCLE/TAP,FEDTO,5,RAPTO,2", "'TAP' of a cycle is not read, but DRILL, DEEP and BRKCHP"),
+        ("CYCLE/DRILL,5", "expected a depth .FEDTO. and a height .RAPTO or CLEAR"),
+        ("CYCLE/DEEP,FEDTO,5,RAPTO,2\nGOTO/9,9,0", "drills by 0 mm at once, expected a step"),
+        ("NURBS/", "NURBS: splines are not read; let CAM write lines or arcs"),
+        ("CSYS/1,0,0,5,0,1,0,0,0,0,1,0", "frames that are turned or moved are not read"),
+        ("P1=POINT/1,2,3", "names and geometry of part programs are not read"),
+        ("TLON,GOFWD/ (CIRCLE/1,2,3,4),ON,(LINE/1,2,3,4,5,6)", "is not read"),
         ("GOTO/1,2", "GOTO has 2 numbers"),
         ("GOTO/1,2,x", "'X' is no number"),
         ("MODE/INCR", "MODE/INCR: places by differences are not read"),
@@ -282,7 +430,7 @@ def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -
 )
 def test_other_statements_are_refused_by_line(tmp_path: Path, line: str, said: str) -> None:
     text = CLDATA.replace("GOTO/40,50,5", line)
-    with pytest.raises(sm.FileFormatError, match=rf"slot\.apt: line 15: .*{said}"):
+    with pytest.raises(sm.FileFormatError, match=rf"slot\.apt: line 1[56]: .*{said}"):
         sm.read_path(written(tmp_path, "slot.apt", text), seam="cut 1")
 
 

@@ -10,33 +10,50 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from selfmotion.basics import Array
+from selfmotion.formats.arcs import arc_points
 from selfmotion.formats.cuts import PRIME, RETRACT, STOPS, Machine, unit_axis
+from selfmotion.formats.holes import Pecks, drill
 from selfmotion.formats.path_rows import PoseRows, Reading
 from selfmotion.formats.rotary import HEAD, Rotary
 
-_WORD = re.compile(r"([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*")
+_WORD = re.compile(r"([A-Z])\s*=?\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))\s*")
 # What only a control's own language says.
 _MACRO = re.compile(r"#|\[|^\s*N?[0-9]*\s*O\s*<|\b(SUB|CALL|REPEAT|WHILE|IF|ENDSUB|GOTO)\b")
 _INCH, _MM = 25.4e-3, 1e-3
-# Chords of arcs are off by this at most [m].
-_CHORD = 1e-5
-# Both ends of an arc are as far from its centre, but for this [m].
+# A chord may be longer than its circle is wide by so much [m].
 _ROUND = 2e-4
 _LINE = 1000
 # Nearer than this [m] is the same place.
 _SAME = 1e-9
+# A helix goes round so many times at most.
+_TURNS = 1000
 # What changes nothing here: cutter compensation off, tool length (programs say where the tip is),
-# no cycle and where one would end, centres of arcs from their starts, how corners are smoothed.
-_NOTHING = {"G40", "G43", "G69", "G80", "G98", "G99", "G91.1", "G64", "G61", "G61.1", "G5.1", "G8"}
+# no polar words, mirror or turn, how corners are smoothed.
+_NOTHING = {"G40", "G43", "G69", "G64", "G61", "G61.1", "G5.1", "G8", "G9"}
+_NOTHING |= {"G15", "G50.1", "G67"}
+# What is not read for a reason that says what to do.
+_REASONS = {
+    **dict.fromkeys(("G41", "G42"), "the cutter's radius is not added: let CAM do so"),
+    "G95": "feeds by turns of a spindle are not read: let CAM write them by the minute (G94)",
+    "G96": "speeds of a lathe are not read",
+    "G16": "polar words are not read: let CAM write X, Y and Z",
+    "G68": "turned frames are not read: let CAM write places in one frame",
+    "G68.2": "turned frames are not read: let CAM write places in one frame, after G43.4",
+}
+_HEIDENHAIN = re.compile(r"[0-9]*\s*BEGIN PGM")
 # Zeros of workpieces; a program has one.
 _ZEROS = {"G54", "G55", "G56", "G57", "G58", "G59"}
 _TIP = {"G43.4", "G43.5"}
 # The axes of arcs' planes and their normal, right-handed; what goes to a place of the machine.
 _PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
-_CYCLES = {"G73", "G74", "G76", *(f"G{k}" for k in range(81, 90))}
+# Cycles: those that drill along Z, and those that need a spindle that is synchronous or stops.
+_DRILLS = {"G73", "G81", "G82", "G83", "G85", "G89"}
+_CYCLES = {"G74", "G76", "G84", "G86", "G87", "G88"}
 _HOME = {"G28", "G30", "G53"}
 # A program of a printer moves and extrudes in one line.
 _EXTRUDES = re.compile(r"G0*[0-3](?![0-9.]).*E[+-]?[0-9.]")
+# A word Z.
+_LIFTS = re.compile(r"Z\s*=?\s*[-+.0-9#\[]")
 # What of a printer's lines is read; all others are commands of its own.
 _MOVES = re.compile(r"[GTNXYZEF][0-9+.-]")
 _MOTIONS = {"G0": 0, "G1": 1, "G2": 2, "G3": 3}
@@ -58,6 +75,8 @@ def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, P
     text = machine.text()
     rotary = None if reading is None else reading.rotary
     reader = _Reader(machine, rotary, prints=_extrudes(text))
+    if not any(_LIFTS.search(_bare(line.upper())) for line in text.splitlines()):
+        reader.stay_flat()
     for number, line in enumerate(text.splitlines(), 1):
         reader.machine.number = number
         if reader.take(line):
@@ -71,6 +90,14 @@ def _extrudes(text: str) -> bool:
     return any("E" in line and _EXTRUDES.search(line) for line in lines)
 
 
+def _bare(line: str) -> str:
+    """Return a line without comments: (…), also in each other, ; to its end, and checksums."""
+    text, count = line, 1
+    while count:
+        text, count = re.subn(r"\([^()]*(?:\)|$)", " ", text)
+    return re.sub(r"\*[0-9]+\s*$", "", text.partition(";")[0]).strip()
+
+
 class _Reader:
     """The modes of a machine, and the lines that change them."""
 
@@ -82,18 +109,24 @@ class _Reader:
         # Where the machine is, the part's place if no table has turned it.
         self._at: Array = np.full(3, np.nan)
         self._plane, self._zero, self._tip = _PLANES["G17"], "", False
-        self._inverse_time = False
+        self._inverse_time = self._centers_absolute = False
+        # The cycle, its words so far, where Z was before it, and whether it returns there.
+        self._cycle, self._level, self._returns = "", np.nan, True
+        self._hole: dict[str, float] = {}
         # How far material is fed, and whether words say so from the start.
         self._fed, self._fed_from_start = 0.0, True
+
+    def stay_flat(self) -> None:
+        """Stay at Z 0, as lasers and plotters do, whose programs say no Z."""
+        self._at[2] = 0.0
+        self.machine.notes.append("no line says Z: it is taken for 0")
 
     def take(self, line: str) -> bool:
         """Take a line; return whether the program ends with it."""
         machine = self.machine
         if len(line) > _LINE:
             raise machine.fault(f"has {len(line)} characters, expected {_LINE} at most")
-        text = (
-            re.sub(r"\([^()]*\)", " ", line.upper()).partition(";")[0].strip().lstrip("/").strip()
-        )
+        text = _bare(line.upper()).lstrip("/").strip()
         if self._prints and text and not _MOVES.match(text):
             self._command(text)
             return False
@@ -110,6 +143,11 @@ class _Reader:
                 raise machine.fault(
                     f"'{text[:40]}': variables, expressions and subroutines are not read; let CAM "
                     f"write the program out, or run it in a simulator that does"
+                )
+            if not found and _HEIDENHAIN.match(text):
+                raise machine.fault(
+                    "is in Heidenhain's own language, which is not read: let CAM write ISO G-code, "
+                    "or APT"
                 )
             if not found:
                 raise machine.unread(f"'{text[at : at + 40]}'")
@@ -139,11 +177,11 @@ class _Reader:
         for code in codes:
             if code not in switched:
                 self._mode(code)
-        if "R" in values and self._motion < 2:
+        if "R" in values and self._motion < 2 and not self._cycle:
             raise machine.fault("R is read of arcs only (G2, G3)")
         # What starts does so before the motion of its line, what stops after it. A rapid leaves the
         # cut before: all that its line switches belongs to the next one.
-        late = [code for code in switched if self._motion == 0 or code in STOPS]
+        late = [code for code in switched if self._travels or code in STOPS]
         for code in switched:
             if code not in late:
                 self._mode(code)
@@ -152,6 +190,8 @@ class _Reader:
             self._goes_home(home, values)
         elif "G92" in codes:
             self._set(values)
+        elif self._cycle:
+            self._drill(values)
         else:
             self._move(values)
         for code in late:
@@ -168,10 +208,22 @@ class _Reader:
                 self._inverse_time = code == "G93"
             case "G49":
                 self._tip = False
+            case "G90.1" | "G91.1":
+                self._centers_absolute = code == "G90.1"
+            case _ if code in _REASONS:
+                raise self.machine.fault(f"{code}: {_REASONS[code]}")
             case _ if code in _PLANES:
                 self._plane = _PLANES[code]
             case _ if code in _MOTIONS:
-                self._motion = _MOTIONS[code]
+                self._motion, self._cycle = _MOTIONS[code], ""
+            case _ if code in _DRILLS:
+                if not self._cycle:
+                    self._hole, self._level = {}, float(self._at[2])
+                self._cycle = code
+            case "G98" | "G99":
+                self._returns = code == "G98"
+            case "G80":
+                self._cycle = ""
             case _ if code in _TIP:
                 self._tip = True
             case _ if code in _ZEROS:
@@ -187,7 +239,8 @@ class _Reader:
                 self._fed_from_start = code == "M82"
             case _ if code in _CYCLES:
                 raise self.machine.fault(
-                    f"{code}: canned cycles are not read; let CAM write their moves (G0, G1)"
+                    f"{code}: cycles that tap or bore are not read, those that drill are "
+                    f"({', '.join(sorted(_DRILLS))}); let CAM write their moves (G0, G1)"
                 )
             case "M98" | "M99":
                 raise self.machine.fault(f"{code}: subprograms are not read; write them out")
@@ -216,11 +269,17 @@ class _Reader:
         )
 
     def _set(self, values: Mapping[str, float]) -> None:
-        """Say how far material is fed by now."""
+        """Say how far material is fed by now, or, before anything has moved, where the tool is."""
         moved = [name for name in _AXES if name in values]
+        is_first = not self.machine.cuts and np.isnan(self._at).all() and "E" not in values
+        if is_first and set(moved) == set("XYZ"):
+            self._at = self._unit * np.array([values[name] for name in "XYZ"])
+            self.machine.rapid(self._at.copy(), self.machine.axis)
+            return
         if moved or "E" not in values:
             raise self.machine.fault(
-                f"G92 {' '.join(moved)}: zeros that move are not read, but of E"
+                f"G92 {' '.join(moved)}: zeros that move are not read, but of E, or of X, Y and Z "
+                f"before the first motion"
             )
         self._fed = values["E"]
 
@@ -232,14 +291,70 @@ class _Reader:
         self._fed = values["E"] if self._fed_from_start else self._fed + fed
         return fed
 
+    @property
+    def _travels(self) -> bool:
+        return self._motion == 0 and not self._cycle
+
+    def _drill(self, values: Mapping[str, float]) -> None:
+        """Drill a hole of the cycle, where X or Y is given."""
+        machine = self.machine
+        self._take_feed(values)
+        if self._plane != _PLANES["G17"]:
+            raise machine.fault(f"{self._cycle} drills along Z: say G17")
+        if any(values.get(name, 1.0) > 1.0 for name in "LK"):
+            raise machine.fault(f"{self._cycle} is repeated, which is not read: write its places")
+        goal, level = self._at.copy(), self._level
+        for k, name in enumerate("XY"):
+            if name in values:
+                goal[k] = self._unit * values[name] + (0.0 if self._absolute else goal[k])
+        # By differences R is from where it was before, and Z from R.
+        for name in "RZ":
+            if name in values:
+                before = level if name == "R" else self._hole.get("R", np.nan)
+                self._hole[name] = self._unit * values[name] + (0.0 if self._absolute else before)
+        self._hole |= {name: values[name] for name in "PQ" if name in values}
+        axis = self._axis({name: values[name] for name in "ABC" if name in values}, arc=False)
+        lacking = [name for name in "ZR" if not np.isfinite(self._hole.get(name, np.nan))]
+        if lacking:
+            raise machine.fault(f"{self._cycle} says no {lacking[0]}, expected Z and R of the hole")
+        if not set(values) & set("XYZ") or values.get("L") == 0.0:
+            self._at = goal
+            return
+        above, bottom = goal.copy(), goal.copy()
+        above[2], bottom[2] = self._hole["R"], self._hole["Z"]
+        is_turned = self._rotary is None or self._tip
+        if is_turned and np.abs(axis - [0.0, 0.0, 1.0]).max() > _SAME:
+            raise machine.fault(f"{self._cycle} drills along Z, and the tool is tilted")
+        pecks = None
+        if self._cycle in ("G73", "G83"):
+            step = self._unit * self._hole.get("Q", 0.0)
+            pecks = Pecks(step, step, is_out=self._cycle == "G83")
+        waits = self._cycle in ("G82", "G89") and self._hole.get("P", 0.0) > 0.0
+        drill(
+            machine,
+            self._part(above),
+            self._part(bottom),
+            axis,
+            pecks=pecks,
+            dwell=f"G4 P{self._hole['P']:g}" if waits else "",
+            feeds_out=self._cycle in ("G85", "G89"),
+        )
+        goal[2] = level if self._returns and np.isfinite(level) else self._hole["R"]
+        machine.rapid(self._part(goal), axis)
+        self._at = goal
+
+    def _take_feed(self, values: Mapping[str, float]) -> None:
+        if "F" in values:
+            if not 0.0 < values["F"] < 1e7:
+                raise self.machine.fault(f"F is {values['F']:g}, expected a feed above 0")
+            scale = 1.0 if self._inverse_time else self._unit
+            self.machine.feed = values["F"] * scale / 60.0
+
     def _move(self, values: Mapping[str, float]) -> None:
         machine = self.machine
         if "E" in values and not self._prints:
             raise machine.unread(f"word 'E{values['E']:g}'")
-        if "F" in values:
-            if not 0.0 < values["F"] < 1e7:
-                raise machine.fault(f"F is {values['F']:g}, expected a feed above 0")
-            machine.feed = values["F"] * (1.0 if self._inverse_time else self._unit) / 60.0
+        self._take_feed(values)
         arc, fed = self._motion > 1, self._extruded(values)
         if fed < 0.0:
             machine.happens(RETRACT)
@@ -343,29 +458,22 @@ class _Reader:
         if "R" in values:
             center = self._center(start[plane], goal[plane], self._unit * values["R"], sense)
         else:
-            center = start[plane] + [self._unit * values.get(name, 0.0) for name in offsets]
-        arms = start[plane] - center, goal[plane] - center
-        radius, other = (float(np.linalg.norm(arm)) for arm in arms)
-        if radius < _SAME or abs(radius - other) > _ROUND:
-            raise machine.fault(
-                f"the arc begins {1e3 * radius:.4g} mm from its centre and ends "
-                f"{1e3 * other:.4g} mm from it"
+            given = np.array([self._unit * values.get(name, 0.0) for name in offsets])
+            center = given if self._centers_absolute else start[plane] + given
+        about = np.array(start)
+        about[plane] = center
+        axis = np.zeros(3)
+        axis[normal] = sense
+        return arc_points(machine, start, goal, about, axis, self._more_turns(values))
+
+    def _more_turns(self, values: Mapping[str, float]) -> int:
+        """Return how many whole turns an arc makes besides: P counts the one that it ends in."""
+        turns = values.get("P", 1.0)
+        if turns != round(turns) or not 1.0 <= turns <= _TURNS:
+            raise self.machine.fault(
+                f"P of an arc is {turns:g}, expected how often it goes round: 1 to {_TURNS}"
             )
-        angles = [float(np.arctan2(arm[1], arm[0])) for arm in arms]
-        turn = (sense * (angles[1] - angles[0])) % (2.0 * np.pi)
-        if turn < 1e-9:
-            turn = 2.0 * np.pi
-        count = max(2, int(np.ceil(turn / (2.0 * np.arccos(max(0.0, 1.0 - _CHORD / radius))))))
-        if count > 100_000:
-            raise machine.fault(f"the arc has a radius of {radius:.4g} m")
-        share = np.arange(1, count + 1) / count
-        angle = angles[0] + sense * turn * share
-        radii = radius + (other - radius) * share
-        found = np.empty((count, 3))
-        found[:, plane] = np.stack([np.cos(angle), np.sin(angle)], axis=1) * radii[:, None] + center
-        found[:, normal] = start[normal] + (goal[normal] - start[normal]) * share
-        found[-1] = goal
-        return found
+        return int(turns) - 1
 
     def _center(self, start: Array, goal: Array, radius: float, sense: float) -> Array:
         chord = goal - start

@@ -7,7 +7,7 @@ from typing import Any
 import numpy.typing as npt
 
 from selfmotion.basics import FileFormatError, as_flag, as_number, as_path
-from selfmotion.formats.cldata import read_cldata
+from selfmotion.formats.cldata import CLDATA, read_cldata
 from selfmotion.formats.drawing import read_drawing
 from selfmotion.formats.gcode import read_gcode
 from selfmotion.formats.path_building import JUMP, Pacing, path_of_rows
@@ -17,7 +17,7 @@ from selfmotion.path import Path
 _READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
     **READERS,
     **dict.fromkeys(PROGRAMS, read_gcode),
-    **dict.fromkeys((".apt", ".cls", ".cl"), lambda file, _: read_cldata(file)),
+    **dict.fromkeys(CLDATA, lambda file, _: read_cldata(file)),
 }
 _DRAWING = ".dxf"
 
@@ -50,13 +50,15 @@ def read_path(
     - ``.csv .txt .tsv``: columns in any order: ``t`` [s], ``x,y,z`` [m], and one of
       ``qw,qx,qy,qz``, ``rx,ry,rz`` (rotation vector [rad]), ``roll,pitch,yaw`` [rad],
       ``nx,ny,nz`` (the tool's z axis) or none; ``feed`` [m/s] from a pose on, instead of ``t``;
-      ``x_mm``, ``feed_mm`` and ``roll_deg`` are in those units; ``seam`` names the seam that a
-      pose is of, ``event`` what happens there (``arc on; gas on``: both)
+      ``x_mm``, ``x_cm``, ``x_in``, ``feed_mm`` and ``roll_deg`` are in those units, as is ``X
+      [mm]``; ``pos_x``, ``pose.position.x``, ``px`` and ``tx`` are ``x``, and ``orientation.x`` and
+      ``quat_x`` are ``qx``; ``seam`` names the seam that a pose is of, ``event`` what happens there
+      (``arc on; gas on``: both)
     - ``.npy``: (N, 4, 4) poses, or a table (N, 3) x,y,z; (N, 4) t,x,y,z; (N, 7)
       x,y,z,qw,qx,qy,qz; (N, 8) with t first
     - ``.yaml .json``: ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``
-    - ``.nc .ngc .gcode .tap``: G-code of up to five axes, below
-    - ``.apt .cls .cl``: APT, cutter location data, below
+    - ``.nc .ngc .gcode .tap .cnc .eia .mpf .g .gc .gco``: G-code of up to five axes, below
+    - ``.apt .aptsource .cls .clsf .cl .ncl``: APT, cutter location data, below
     - ``.dxf``: a drawing, below; with ``pip install 'selfmotion[dxf]'``
 
     Of programs of machine tools, what goes at a feed is a cut; rapids part cuts, called ``cut 1``,
@@ -69,15 +71,25 @@ def read_path(
       ``G20``, ``F`` by the minute, of the tip along the part (``G93``: lines a minute); the tool's
       axis by ``A B C``, Rz(C) Ry(B) Rx(A) z, after ``G43.4 G43.5`` or as `rotary` says, or by ``I J
       K`` in lines. Arcs lie in the plane that is chosen, by offsets of their centre from the start
-      or ``R``, as chords within 0.01 mm. ``M2 M30`` end it, other ``M`` and ``G4`` are events;
-      ``G28 G30 G53`` go to places that are not known, and are passed over with a note; ``G40 G43
-      G49 G61 G64 G69 G80 G91.1 G98 G99``, one of ``G54`` to ``G59``, ``N O S T H D P Q L``, ``%``
+      or ``R``, of their centre itself after ``G90.1``, ``P`` times round, as chords within 0.01 mm.
+      ``G73 G81 G82 G83 G85 G89`` drill holes along Z (``X Y Z R Q P``, ``G98 G99``), until ``G80``.
+      Without any ``Z`` it is 0. ``M2 M30`` end it, other ``M`` and ``G4`` are events;
+      ``G28 G30 G53`` go to places that are not known, and are passed over with a note; ``G9 G15
+      G40 G43 G49 G50.1 G61 G64 G67 G69``, one of ``G54`` to ``G59``, ``N O S T H D P Q L``, ``%``
       and comments are passed over
     - G-code of printers, where lines have ``E``: what extrudes is a cut, what does not a travel.
       ``M82 M83 G92 E`` set what E means; ``retract`` and ``prime`` are events, as are commands
-    - APT: ``GOTO FROM GODLTA RAPID FEDRAT UNITS``, with ``i,j,k`` the tool's axis, feeds by the
-      minute (``MMPM``, ``IPM``); ``SPINDL COOLNT AUXFUN ARCON ARCOFF`` are events; names, the
-      cutter's shape and number (``LOADTL``, …) are passed over; ``FINI`` ends it
+    - APT: ``GOTO FROM GODLTA GOHOME RAPID FEDRAT UNITS TLAXIS``, with ``i,j,k`` the tool's axis,
+      feeds by the minute (``MMPM``, ``IPM``). Arcs are ``CIRCLE/x,y,z,i,j,k,r`` or ``MOVARC``
+      before a ``GOTO``, right-handed about their axis, those of NX, which have 11 numbers,
+      left-handed; and ``INDIRV`` with ``TLON,GOFWD``, as CATIA writes them. ``CYCLE/DRILL``,
+      ``DEEP`` and ``BRKCHP`` drill a hole at each ``GOTO`` (``FEDTO RAPTO STEP``, …), until
+      ``CYCLE/OFF``. ``SPINDL COOLNT AUXFUN ARCON ARCOFF STOP OPSTOP DELAY`` are events; names,
+      texts, the cutter's shape and number (``LOADTL``, …) are passed over, and ``CUTCOM`` with a
+      note; ``FINI`` or ``END`` ends it
+
+    A hole is a cut of its own, straight down at the feed and out again, out and where it is drilled
+    already at 50 mm/s.
 
     Any other word or statement is refused, by its line.
 
