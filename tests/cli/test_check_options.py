@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 import selfmotion as sm
-from selfmotion.cli import app, commands
-from selfmotion.formats import example_text
+from selfmotion.cli import app, commands, documents
+from selfmotion.formats import example_text, job_of
 from support.arms import robot_named
 from support.shell import complaint
 
@@ -36,6 +36,10 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ["--tool", "x"],
         ["--reference", "x"],
         ["--feed", "0"],
+        ["--seam", "a"],
+        ["--frame", "0,0,0,0,0,0"],
+        ["--columns", "x,y,z"],
+        ["--flip-normals"],
         ["--lock", "a=1"],
         ["--degrees"],
     ],
@@ -80,12 +84,31 @@ def test_what_is_asked_is_judged(plan: Path, options: list[str], words: str) -> 
     assert words in found.output.replace("\n", " ")
 
 
+def test_a_path_is_read_by_the_options_that_it_was_planned_with(tmp_path: Path) -> None:
+    rows = "0.05;0;0;0\n0.05;0.05;0;9\n0.05;0.1;0;9\n"
+    file = tmp_path / "a.csv"
+    file.write_text(rows)
+    typed = ["--path", file, "--columns", "x,y,z,-", "--frame", "0.4,-0.1,0.4,0,0,0"]
+    typed += ["--duration", "3", "--task", "position"]
+    table = {"kind": "file", "file": str(file), "columns": ["x", "y", "z", "-"], "duration": 3.0}
+    frame = {"frame": {"position": [0.4, -0.1, 0.4]}}
+    document = {"task": "position", "start": "free", "path": table | frame}
+    problem = job_of({"robot": {"name": "panda"}, **document}, None).problem
+    sm.plan(problem, max_evaluations=3).to_csv(tmp_path / "motion.csv")
+    run = ["check", str(tmp_path / "motion.csv"), "--robot", "panda", *map(str, typed)]
+    found = CliRunner().invoke(app, run)
+    assert found.exit_code == 0, found.output
+    moved = [text.replace("0.4,-0.1", "0.4,-0.11") for text in run]
+    assert CliRunner().invoke(app, moved).exit_code == 1
+    assert "names no seams, so that seam has no effect" in complaint(*run, "--seam", "a")
+
+
 def test_no_option_is_left_without_an_effect(plan: Path) -> None:
     """Each is refused, or judged; --json and help change what is printed."""
     (command,) = (item for item in app.registered_commands if item.callback is commands.check)
-    names = set(inspect.signature(command.callback).parameters) - {"file", "as_json"}
-    refused = {"robot", "path", "feed", "corners", "task", "tool", "reference", "lock", "degrees"}
-    refused |= {"argument", "packages"}
+    names = set(inspect.signature(command.callback).parameters) - {"context", "file", "as_json"}
+    refused = {"robot", "path", "task", "tool", "reference", "lock", "degrees"}
+    refused |= {"argument", "packages", *documents.OF_PATH}
     judged = {"velocity", "acceleration", "joint_limits", "obstacles", "clearance", "srdf"}
     assert names == refused | judged | {"tolerance"}
 

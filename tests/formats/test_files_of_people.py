@@ -42,8 +42,9 @@ TABLES: list[tuple[str, str, str | None]] = [
     ("no header", "\n".join(_ROWS), _NORMALS),
     ("no header, commas", "\n".join(row.replace(" ", ",") for row in _ROWS), _NORMALS),
     ("a header in a comment", "\n".join([f"# {_NORMALS}", *_ROWS]), None),
-    ("inches", "x_in,Y [in],z (inch)\n15.748031496063,-1.968503937008,11.811023622047\n"
-     "16.535433070866,0,11.811023622047\n15.748031496063,1.968503937008,11.811023622047\n", None),
+    ("inches", "x_in,Y [in],z (inch)\n15.748031496062994,-1.9685039370078743,11.811023622047244\n"
+     "16.53543307086614,0,11.811023622047244\n"
+     "15.748031496062994,1.9685039370078743,11.811023622047244\n", None),
     ("centimetres", "x_cm,y_cm,z [cm]\n40,-5,30\n42,0,30\n40,5,30\n", None),
     ("quotes", "'x';\"y\";'z'\n'0.4';\"-0.05\";'0.3'\n0.42;0;0.3\n0.4;0.05;0.3\n", None),
     ("titles of messages", "\n".join(["pose.position.x,pose.position.y,pose.position.z,"
@@ -156,6 +157,17 @@ def test_normals_that_seem_to_point_out_are_told(
         raise sm.PlanError("not planned here")
 
     monkeypatch.setattr("selfmotion.cli.commands.plan_with_progress", refused)
+    job = tmp_path / "a.toml"
+    job.write_text(
+        'task = "pointing"\nrobot.name = "panda"\n[seams]\nfile = "b.csv"\nfeed = 0.05\n'
+    )
+    seams = rows.replace("0.5,", "left,0.5,")
+    written(tmp_path, "b.csv", f"seam,x,y,z,nx,ny,nz\n{seams}\n")
+    monkeypatch.setattr("selfmotion.formats.SeamJob.plan", refused)
+    for setting, is_told in (("false", True), ("true", False)):
+        asked = ["job", str(job), "--set", f"seams.flip_normals={setting}"]
+        printed = CliRunner().invoke(app, asked).output
+        assert ("seam 'left' are out of reach as read, and in reach with" in printed) == is_told
     asked = ["plan", "panda", "--path", file, "--task", "pointing", "--feed", "0.05"]
     said = "out of reach as read, and in reach with --flip-normals"
     for more, is_told in (([], True), (["--flip-normals"], False)):
@@ -181,6 +193,10 @@ def test_a_path_that_leaves_its_straight_lines_says_by_how_much(tmp_path: Path) 
         "feed = 0.05\nframe = { position = [0.0, 0.01, 0.0] }\n"
     )
     assert note in sm.read_problem(placed).remarks
+    asked = ("plan", str(placed), "--json", "--max-evaluations", "1")
+    found = CliRunner().invoke(app, asked)
+    assert note in json.loads(found.stdout)["remarks"]
+    assert f"note: {note}" in found.stderr
 
 
 _HEAD = "G21 G90 G94\nG0 X0 Y0 Z10\nG1 Z0 F1800\n"

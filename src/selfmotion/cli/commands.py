@@ -84,8 +84,8 @@ def plan(
         outputs.check_suffixes([*job.outputs, *(out or [])])
     asked = {"max_evaluations": max_evaluations, "search": options.search_of(search, compare)}
     given = {key: value for key, value in asked.items() if value is not None}
-    for remark in job.problem.remarks:
-        stages.print(f"note: {remark}", markup=False, soft_wrap=True)
+    remarks = job.problem.remarks
+    outputs.tell(remarks)
     if job.goal == "parts":
         options.refuse({"from": warm, **given}, "a motion in parts", "its own")
         jobs.finish_parts(job, [*(out or []), *([] if html is None else [html])], as_json)
@@ -97,7 +97,7 @@ def plan(
         result = sm.retime(found)
     else:
         result = plan_with_progress(job.problem, warm_start=warm_start, **{**job.settings, **given})
-    outputs.finish(result, [*job.outputs, *(out or [])], html, as_json)
+    outputs.finish(result, [*job.outputs, *(out or [])], html, as_json, remarks=remarks)
 
 
 @app.command(
@@ -157,11 +157,24 @@ def schema(
     epilog="Example: selfmotion check motion.csv --robot panda --path seam.csv --acceleration 10"
 )
 def check(
+    context: typer.Context,
     file: options.CheckedArgument,
     robot: options.RobotOption = None,
     path: options.PathOption = None,
+    duration: options.DurationOption = None,
     feed: options.FeedOption = None,
+    jump: options.JumpOption = None,
+    seam: options.SeamOption = None,
+    columns: options.ColumnsOption = None,
+    flip_normals: options.FlipOption = False,
+    standoff: options.StandoffOption = None,
+    rotary: options.RotaryOption = None,
+    rotary_axes: options.RotaryAxesOption = None,
+    rotary_center: options.RotaryCenterOption = None,
+    frame: options.FrameOption = None,
+    ramp: options.RampOption = None,
     corners: options.CheckedCornersOption = None,
+    corner_tolerance: options.CornerToleranceOption = None,
     task: options.CheckedTaskOption = None,
     tool: options.ToolOption = None,
     reference: options.ReferenceOption = None,
@@ -181,8 +194,10 @@ def check(
     """Check a motion by forward kinematics: a saved plan, or one that something else made."""
     judged = velocity, acceleration, joint_limits, obstacles, clearance, srdf
     within = None if tolerance is None else sm.Tolerance(tolerance, tolerance)
-    own: dict[str, Any] = {"path": path, "feed": feed, "corners": corners, "task": task}
-    own |= {"tool": tool, "reference": reference, "lock": lock or None}
+    typed = {"path": path, **{name: context.params[name] for name in documents.OF_PATH}}
+    typed["flip_normals"] = flip_normals or None
+    own: dict[str, Any] = {name.replace("_", "-"): value for name, value in typed.items()}
+    own |= {"task": task, "tool": tool, "reference": reference, "lock": lock or None}
     own |= {"argument": argument or None, "packages": packages or None}
     if file.suffix == jobs.PROGRAM:
         given = own | {"robot": robot, "degrees": degrees or None, "tolerance": tolerance}
@@ -224,7 +239,7 @@ def check(
             )
             motion, stated = checks.read(file, degrees, within)
             asked = options.requirements(arm, *judged)
-            followed = formats.read_path(path, feed=feed, corners=corners or "blend")
+            followed = documents.followed(path, context.params, arm)
             certificate = sm.certify(
                 arm, followed, task or "pose", motion, stated, asked, progress=display.stage
             )

@@ -1,7 +1,7 @@
 """What the options of ``selfmotion plan`` say, as the table of a problem file."""
 
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,8 @@ from selfmotion.formats import (
     has_normals,
     job_of,
     parse_setting,
+    path_of,
+    pose_of,
     read_document,
     seam_job_of,
     set_key,
@@ -139,21 +141,7 @@ class Shell:
         if sum(option is not None for option in (self.path, self.circle, self.line)) != 1:
             raise sm.ProblemError("give the tool motion by one of --path, --circle and --line")
         if self.path is not None:
-            given = {
-                name: getattr(self, name)
-                for name in ("seam", "feed", "duration", "jump", "ramp", "standoff")
-            }
-            given["columns"] = None if self.columns is None else self.columns.split(",")
-            given["flip_normals"] = self.flip_normals or None
-            given |= {"rotary": self.rotary, "rotary_axes": self.rotary_axes}
-            if self.rotary_center is not None:
-                center = options.numbers(self.rotary_center, "--rotary-center", 3)
-                given["rotary_center"] = center.tolist()
-            given["tolerance"] = self.corner_tolerance
-            frame = {} if self.frame is None else {"frame": options.pose(self.frame, "--frame")}
-            return {"kind": "file", "file": str(self.path), "corners": self.corners, **frame} | {
-                key: value for key, value in given.items() if value is not None
-            }
+            return path_table(self.path, vars(self))
         of_files = (self.frame, self.ramp, self.seam, self.columns, self.standoff, self.rotary)
         if self.flip_normals or any(option is not None for option in of_files):
             raise sm.ProblemError(
@@ -191,6 +179,37 @@ class Shell:
             clearance = {"kind": "Clearance", "obstacles": bodies, "distance": self.clearance}
             found.append(clearance if self.srdf is None else {**clearance, "srdf": str(self.srdf)})
         return found
+
+
+# Options of the shell that say how --path is read; those of `plan` and of `check`.
+OF_PATH = (
+    *("feed", "duration", "jump", "seam", "columns", "flip_normals", "standoff", "rotary"),
+    *("rotary_axes", "rotary_center", "frame", "ramp", "corners", "corner_tolerance"),
+)
+
+
+def path_table(file: Path, typed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the table of a path of a file, by the options `OF_PATH` as typed."""
+    names = ("seam", "feed", "duration", "jump", "ramp", "standoff", "rotary", "rotary_axes")
+    given = {name: typed[name] for name in names}
+    given["columns"] = None if typed["columns"] is None else typed["columns"].split(",")
+    given["flip_normals"] = typed["flip_normals"] or None
+    if typed["rotary_center"] is not None:
+        center = options.numbers(typed["rotary_center"], "--rotary-center", 3)
+        given["rotary_center"] = center.tolist()
+    given["tolerance"] = typed["corner_tolerance"]
+    if typed["frame"] is not None:
+        given["frame"] = options.pose(typed["frame"], "--frame")
+    table = {"kind": "file", "file": str(file), "corners": typed["corners"] or "blend"}
+    return table | {key: value for key, value in given.items() if value is not None}
+
+
+def followed(file: Path, typed: Mapping[str, Any], robot: sm.RobotModel) -> sm.Path:
+    """Return the tool motion of a file, by the options `OF_PATH` as typed."""
+    table = path_table(file, typed)
+    if "frame" in table:
+        table["frame"] = pose_of(table["frame"])
+    return path_of(table, robot, None, Path)
 
 
 def _is_planar(robot: sm.RobotModel) -> bool:
@@ -261,7 +280,11 @@ def seams_of_file(file: Path, settings: list[str], allow_code: bool) -> sm.SeamJ
     """Return the job of a file with seams."""
     document = read_document(file)
     _set(document, settings)
-    return seam_job_of(document, file, allow_code=allow_code)
+    job = seam_job_of(document, file, allow_code=allow_code)
+    # A file with code of its own is not read twice for this.
+    if not allow_code:
+        _tell_flip_of_seams(document, file, job)
+    return job
 
 
 def _set(document: dict[str, Any], settings: list[str]) -> None:
@@ -286,26 +309,51 @@ def _tell_flip(document: dict[str, Any], file: Path | None, job: sm.Job) -> None
         return
     if not has_normals((file.parent if file else Path()) / str(path.get("file")), path):
         return
-    if _is_in_reach(job.problem):
+    problem = job.problem
+    if _is_in_reach(problem.robot, problem.path, problem.task):
         return
-    flips = not path.get("flip_normals", False)
-    other = {**document, "path": {**path, "flip_normals": flips}}
-    if _is_in_reach(job_of(other, file).problem):
-        said = "with --flip-normals (flip_normals)" if flips else "without flipping the normals"
-        stages.print(
-            f"note: poses of the path are out of reach as read, and in reach {said}: nx,ny,nz is "
-            f"the tool's z axis here, into the part; surface normals of CAD point out of it",
-            markup=False,
-            soft_wrap=True,
-        )
+    other = job_of({**document, "path": _flipped(path)}, file).problem
+    if _is_in_reach(other.robot, other.path, other.task):
+        _say_flip("the path", path)
 
 
-def _is_in_reach(problem: sm.Problem) -> bool:
+def _tell_flip_of_seams(document: dict[str, Any], file: Path, job: sm.SeamJob) -> None:
+    """Print the same of a job's first seam, where all of them are of one file."""
+    seams = document.get("seams")
+    if not (isinstance(seams, dict) and job.seams):
+        return
+    first = job.seams[0]
+    table = file.parent / str(seams.get("file"))
+    if not has_normals(table, {**seams, "seam": first.name}):
+        return
+    if _is_in_reach(job.robot, first.path, sm.Task(first.task)):
+        return
+    other = seam_job_of({**document, "seams": _flipped(seams)}, file)
+    if _is_in_reach(other.robot, other.seams[0].path, sm.Task(first.task)):
+        _say_flip(f"seam '{first.name}'", seams)
+
+
+def _flipped(table: dict[str, Any]) -> dict[str, Any]:
+    return {**table, "flip_normals": not table.get("flip_normals", False)}
+
+
+def _say_flip(what: str, table: dict[str, Any]) -> None:
+    flips = not table.get("flip_normals", False)
+    said = "with --flip-normals (flip_normals)" if flips else "without flipping the normals"
+    stages.print(
+        f"note: poses of {what} are out of reach as read, and in reach {said}: nx,ny,nz is "
+        f"the tool's z axis here, into the part; surface normals of CAD point out of it",
+        markup=False,
+        soft_wrap=True,
+    )
+
+
+def _is_in_reach(robot: sm.RobotModel, path: sm.Path, task: sm.Task) -> bool:
     """Return whether some poses of a path are in reach, each on its own."""
     q = None
-    for t in np.linspace(0.0, problem.path.duration, _LOOKS):
+    for t in np.linspace(0.0, path.duration, _LOOKS):
         try:
-            q = problem.robot.inverse_kinematics(problem.path.pose(t), problem.task, q, attempts=8)
+            q = robot.inverse_kinematics(path.pose(t), task, q, attempts=8)
         except sm.InverseKinematicsError:
             return False
     return True

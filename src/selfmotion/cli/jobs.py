@@ -1,5 +1,6 @@
 """Commands about many seams in one program."""
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -53,8 +54,8 @@ def job(
         # Before anything is planned.
         happens = {event: seam.name for seam in work.seams for event, _ in seam.events}
         formats.check_signals(happens, asked or sm.ProgramSettings())
-    for remark in work.remarks:
-        stages.print(f"note: {remark}", markup=False, soft_wrap=True)
+    remarks = work.remarks
+    outputs.tell(remarks)
     kept = folder or Path("out") / f"{file.stem}.job"
     here: Any = processes(workers) if workers > 1 else nullcontext()
     try:
@@ -63,7 +64,7 @@ def job(
     except KeyboardInterrupt:
         complain(f"stopped; what is finished is in '{kept}': run again to go on")
         raise typer.Exit(NOT_VERIFIED) from None
-    _show(program, as_json)
+    _show(program, as_json, remarks)
     for target in wanted:
         unsound = outputs.left_out(program)
         if unsound and outputs.is_motion(target) and not _is_timetable(target):
@@ -123,6 +124,7 @@ def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:
         found = job.in_parts(progress=display.stage)
     if as_json:
         data = {"verified": found.verified, "verdict": found.verdict, "cuts": list(found.cuts)}
+        data["remarks"] = list(job.problem.remarks)
         terminal.print_json(data=data)
     else:
         terminal.print(repr(found), markup=False, soft_wrap=True)
@@ -144,9 +146,10 @@ def finish_parts(job: sm.Job, out: list[Path], as_json: bool) -> NoReturn:
     raise typer.Exit(VERIFIED if found.verified else NOT_VERIFIED)
 
 
-def _show(program: sm.Program, as_json: bool) -> None:
+def _show(program: sm.Program, as_json: bool, remarks: Sequence[str] = ()) -> None:
     if as_json:
-        terminal.print_json(data=json_tables.program_json(program))
+        data = json_tables.program_json(program) | {"remarks": list(remarks)}
+        terminal.print_json(data=data)
     else:
         tables.show_program(program, terminal)
 

@@ -1,6 +1,7 @@
 """The files that a plan is written to."""
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -10,7 +11,7 @@ from rich.console import Console
 import selfmotion as sm
 from selfmotion import formats
 from selfmotion.cli import json_tables, tables
-from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, terminal
+from selfmotion.cli.app import NOT_VERIFIED, VERIFIED, stages, terminal
 
 
 def write(
@@ -46,10 +47,27 @@ def write(
         raise sm.FileFormatError(f"{'; '.join(faults)}; the plan is in {kept}")
 
 
-def finish(result: sm.Plan, out: list[Path], html: Path | None, as_json: bool) -> NoReturn:
-    """Print a plan, write its files, and end with what its verdict says."""
+def tell(remarks: Sequence[str]) -> None:
+    """Print what is to be known of a problem before it is planned."""
+    for remark in remarks:
+        stages.print(f"note: {remark}", markup=False, soft_wrap=True)
+
+
+def finish(
+    result: sm.Plan,
+    out: list[Path],
+    html: Path | None,
+    as_json: bool,
+    *,
+    remarks: Sequence[str] = (),
+) -> NoReturn:
+    """Print a plan, write its files, and end with what its verdict says.
+
+    Remarks on its problem are in what programs read; others were told before.
+    """
     if as_json:
-        terminal.print_json(data=json_tables.plan_json(result))
+        data = json_tables.plan_json(result) | {"remarks": list(remarks)}
+        terminal.print_json(data=data)
     else:
         tables.show(result, terminal)
     write(result, out, html, terminal, quiet=as_json)

@@ -55,6 +55,8 @@ def fastest(
     given = dict(zip(("acceleration", "velocity"), _limits(acceleration, velocity), strict=True))
     if keep:
         given["keep"] = dict(_factor(text) for text in keep)
+    remarks = job.problem.remarks
+    outputs.tell(remarks)
     found = fastest_with_progress(job, deadline=deadline, **given)
     if not as_json:
         stages.print(
@@ -63,7 +65,7 @@ def fastest(
             markup=False,
             soft_wrap=True,
         )
-    outputs.finish(found.plan, [*job.outputs, *(out or [])], html, as_json)
+    outputs.finish(found.plan, [*job.outputs, *(out or [])], html, as_json, remarks=remarks)
 
 
 def _time(seconds: float) -> str:

@@ -45,7 +45,7 @@ from selfmotion.formats.problem_file import (
     read_job as read_job,
     read_problem as read_problem,
 )
-from selfmotion.formats.problem_parts import obstacle as obstacle
+from selfmotion.formats.problem_parts import obstacle as obstacle, path_of as path_of
 from selfmotion.formats.problem_writing import (
     write_problem as write_problem,
 )
