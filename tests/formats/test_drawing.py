@@ -303,3 +303,82 @@ def test_curves_that_are_absurdly_far_away_are_refused_without_a_warning(tmp_pat
     document.saveas(file)
     with pytest.raises(sm.FileFormatError, match=r"SPLINE .* cannot be drawn"):
         read_drawing(file)
+
+
+def test_blocks_are_what_they_are_made_of(tmp_path: Path) -> None:
+    """Put twice, scaled and turned, within another block; layer 0 is that of the block."""
+    document = ezdxf.new("R2010", units=4)
+    inner, outer = document.blocks.new("inner"), document.blocks.new("outer")
+    inner.add_line((0, 0), (10, 0))
+    inner.add_line((10, 0), (10, 5), {"layer": "cut"})
+    outer.add_blockref("inner", (1, 1), {"rotation": 90})
+    place = {"layer": "weld", "xscale": 2, "yscale": 2, "column_count": 2, "column_spacing": 40}
+    document.modelspace().add_blockref("outer", (5, 5), place)
+    document.saveas(tmp_path / "part.dxf")
+    found = read_drawing(tmp_path / "part.dxf")
+    wanted = {
+        "weld 1": [[7, 7, 0], [7, 27, 0]],
+        "weld 2": [[47, 7, 0], [47, 27, 0]],
+        "cut 1": [[7, 27, 0], [-3, 27, 0]],
+        "cut 2": [[47, 27, 0], [37, 27, 0]],
+    }
+    assert list(found) == list(wanted)
+    for name, points in wanted.items():
+        np.testing.assert_allclose(1e3 * found[name].positions, points, atol=1e-9)
+    assert list(read_drawing(tmp_path / "part.dxf", "cut 1")) == ["cut 1", "cut 2"]
+
+
+def test_blocks_of_blocks_without_end_are_refused(tmp_path: Path) -> None:
+    document = ezdxf.new("R2010", units=4)
+    document.blocks.new("b0").add_line((0, 0), (1, 0))
+    for k in range(1, 23):
+        document.blocks.new(f"b{k}").add_blockref(f"b{k - 1}", (0, 0))
+    document.modelspace().add_blockref("b22", (0, 0))
+    document.saveas(tmp_path / "part.dxf")
+    with pytest.raises(sm.FileFormatError, match=r"INSERT .* of block 'b22': has more than"):
+        read_drawing(tmp_path / "part.dxf")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"AC1027\0\0\0", "is a DWG drawing, expected DXF: save it as DXF in CAD"),
+        (b"hello\n", "is no DXF drawing: .* is not a DXF file; save it as DXF in CAD again"),
+    ],
+)
+def test_what_is_no_drawing_says_what_to_do(content: bytes, said: str, tmp_path: Path) -> None:
+    (tmp_path / "part.dxf").write_bytes(content)
+    with pytest.raises(sm.FileFormatError, match=said):
+        read_drawing(tmp_path / "part.dxf")
+
+
+def test_a_drawing_of_hidden_layers_or_layouts_names_them(tmp_path: Path) -> None:
+    def hide(space: Any) -> None:
+        space.doc.layers.add("weld").off()
+        space.add_line((0, 0), (9, 0), {"layer": "weld"})
+
+    with pytest.raises(sm.FileFormatError, match="layer 'weld' is off or frozen: switch it on"):
+        rows_of(tmp_path, hide)
+    with pytest.raises(sm.FileFormatError, match=r"in layouts \(paper space\) is not read"):
+        rows_of(tmp_path, lambda s: s.doc.layout("Layout1").add_line((0, 0), (9, 0)))
+    with pytest.raises(sm.FileFormatError, match="its TEXT entities are no strokes"):
+        rows_of(tmp_path, lambda s: s.add_text("weld here"))
+
+
+def test_legs_of_a_drawing_are_followed_at_the_feed(tmp_path: Path) -> None:
+    """Straight, but for a corner within the tolerance, or at rest in it."""
+    corners = [(0, 0), (60, 0), (60, 40)]
+    file = drawn(tmp_path / "part.dxf", lambda s: s.add_lwpolyline(corners))
+    for rests in (False, True):
+        path = sm.read_path(file, feed=0.03, tolerance=5e-4, corners="stop" if rests else "blend")
+        samples = path.samples(np.linspace(0.0, path.duration, 2001))
+        points = samples.translation
+        np.testing.assert_allclose(points[[0, -1], :2], [[0, 0], [0.06, 0.04]], atol=1e-9)
+        legs = np.minimum(np.abs(points[:, 1]), np.abs(points[:, 0] - 0.06))
+        assert legs.max() <= 1e-9 if rests else 1e-4 < legs.max() <= 5e-4
+        away = np.linalg.norm(points[:, :2] - [0.06, 0.0], axis=1)
+        assert away.min() <= (1e-4 if rests else 5.1e-4)
+        speeds = np.linalg.norm(samples.twist[:, :3], axis=1)
+        assert speeds.max() == pytest.approx(0.03, rel=1e-3)
+        assert (speeds[away < 1e-6] < 1e-2).all()
+        np.testing.assert_allclose(samples.rotation[:, 2, 2], -1.0)

@@ -4,6 +4,7 @@ What the codes of a drawing mean: https://ezdxf.mozman.at/docs/.
 """
 
 import logging
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -25,6 +26,10 @@ _SAID = frozenset(
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())
 # A drawing has less than so many bytes; nothing is farther away than this [m].
 _BYTES, _FAR = 50_000_000, 1e3
+# Blocks have so many entities together, and are in so many others.
+_PARTS, _DEEPEST = 100_000, 20
+_NO_DRAWING = "{}: is no DXF drawing: {}; save it as DXF in CAD again (2000 or later)"
+_DWG = re.compile(rb"AC10[0-9]{2}")
 # Metres of a unit by its number in $INSUNITS.
 _UNITS = {1: 25.4e-3, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 14: 0.1}
 _UNIT_NAMES = "1 (inches), 2 (feet), 4 (mm), 5 (cm), 6 (m) or 14 (dm)"
@@ -78,9 +83,15 @@ def read_drawing(file: FilePath, seam: str | None = None) -> Mapping[str, PoseRo
     if size > _BYTES:
         raise FileFormatError(f"{file}: has {size} bytes, expected {_BYTES} at most")
     try:
+        with file.open("rb") as stream:
+            is_dwg = _DWG.match(stream.read(8)) is not None
+        if is_dwg:
+            raise FileFormatError(f"{file}: is a DWG drawing, expected DXF: save it as DXF in CAD")
         drawing = readfile(file)
+    except FileFormatError:
+        raise
     except spoilt as error:
-        raise FileFormatError(f"{file}: is no DXF drawing: {_line(error)}") from error
+        raise FileFormatError(_NO_DRAWING.format(file, _line(error))) from error
     unit = _UNITS.get(drawing.units)
     if unit is None:
         raise FileFormatError(
@@ -88,27 +99,66 @@ def read_drawing(file: FilePath, seam: str | None = None) -> Mapping[str, PoseRo
             f"drawing in CAD, expected {_UNIT_NAMES}"
         )
     try:
-        drawn = [(_visible_layer(drawing, entity), entity) for entity in drawing.modelspace()]
+        drawn = list(_drawn(file, drawing))
+    except FileFormatError:
+        raise
     except spoilt as error:
-        raise FileFormatError(f"{file}: is no DXF drawing: {_line(error)}") from error
-    present = list(dict.fromkeys(layer for layer, _ in drawn if layer is not None))
+        raise FileFormatError(_NO_DRAWING.format(file, _line(error))) from error
+    present = list(dict.fromkeys(layer for layer, _, _ in drawn if layer is not None))
     asked = [layer for layer in present if seam is None or _may_have(layer, seam)]
     if seam is not None and present and not asked:
         raise no_such_seam(file, seam, present)
     layers: dict[str, list[_Piece]] = {layer: [] for layer in asked}
     beside: Counter[str] = Counter()
-    for layer, entity in drawn:
+    hidden = sorted({str(entity.dxf.layer) for layer, _, entity in drawn if layer is None})
+    for layer, place, entity in drawn:
         if layer not in layers:
             continue
         if entity.dxftype() in _SAID:
             beside[entity.dxftype()] += 1
         else:
-            layers[layer].extend(_piece(file, layer, entity, unit))
-    found = _named(file, {layer: _strokes(pieces) for layer, pieces in layers.items()})
+            layers[layer].extend(_piece(file, layer, place, entity, unit))
+    strokes = {layer: _strokes(pieces) for layer, pieces in layers.items()}
+    found = _named(file, strokes, hidden, beside)
     if not beside:
         return found
     note = f"passed over: {', '.join(f'{count} {kind}' for kind, count in sorted(beside.items()))}"
     return {name: replace(rows, notes=(note,)) for name, rows in found.items()}
+
+
+def _drawn(file: FilePath, drawing: Any) -> Iterator[tuple[str | None, str, Any]]:
+    """Yield what is drawn in model space: its layer, None if that is hidden, its place, and it.
+
+    Blocks are what they are made of, where they are put; of that what is on layer 0 is on theirs.
+    """
+    several = [
+        (_visible_layer(drawing, item), _place(item), item, 0) for item in drawing.modelspace()
+    ][::-1]
+    count = 0
+    while several:
+        layer, place, entity, depth = several.pop()
+        if entity.dxftype() != "INSERT" or layer is None:
+            yield layer, place if depth == 0 else f"{entity.dxftype()} in {place}", entity
+            continue
+        if entity.block() is None:
+            raise FileFormatError(f"{file}: {place} puts a block that the drawing does not have")
+        inner = list[tuple[str | None, str, Any, int]]()
+        for one in entity.multi_insert() if entity.mcount > 1 else [entity]:
+            for part in one.virtual_entities():
+                own = layer if part.dxf.layer == "0" else _visible_layer(drawing, part)
+                inner.append((own, place, part, depth + 1))
+        count += len(inner)
+        if count > _PARTS or depth > _DEEPEST:
+            raise FileFormatError(
+                f"{file}: {place}: has more than {_PARTS} entities, or blocks in more than "
+                f"{_DEEPEST} others; explode what is to be drawn, and delete the rest"
+            )
+        several += reversed(inner)
+
+
+def _place(entity: Any) -> str:
+    name = f" of block '{entity.dxf.name}'" if entity.dxftype() == "INSERT" else ""
+    return f"{entity.dxftype()} {entity.dxf.handle}{name}"
 
 
 def _may_have(layer: str, seam: str) -> bool:
@@ -119,7 +169,8 @@ def _may_have(layer: str, seam: str) -> bool:
 
 def _line(error: BaseException) -> str:
     """Return what an error of ezdxf says, in one line."""
-    return " ".join(str(error).split())[:200] or type(error).__name__
+    text = " ".join(str(error).split())[:200].rstrip(".")
+    return type(error).__name__ if text in ("", "None") else text
 
 
 def _visible_layer(drawing: Any, entity: Any) -> str | None:
@@ -131,17 +182,16 @@ def _visible_layer(drawing: Any, entity: Any) -> str | None:
     return None if layer.is_off() or layer.is_frozen() else str(layer.dxf.name)
 
 
-def _piece(file: FilePath, layer: str, entity: Any, unit: float) -> Iterator[_Piece]:
+def _piece(file: FilePath, layer: str, place: str, entity: Any, unit: float) -> Iterator[_Piece]:
     """Yield an entity as points, unless it is shorter than what counts as a gap."""
     from ezdxf.lldxf.const import DXFError
 
-    kind = entity.dxftype()
-    place = f"{kind} {entity.dxf.handle}"
-    draw = DRAWN.get(kind)
+    draw = DRAWN.get(entity.dxftype())
     if draw is None:
         raise FileFormatError(
-            f"{file}: layer '{layer}': {place} is not read, expected {', '.join(DRAWN)}; draw it "
-            f"with these, delete it, or switch its layer off"
+            f"{file}: layer '{layer}': {place} is not read, expected {', '.join(DRAWN)} or blocks "
+            f"of them; explode it in CAD, delete it, switch its layer off, or choose the seam of "
+            f"another layer"
         )
     try:
         points = unit * np.array(draw(entity, _DEVIATION / unit), dtype=np.float64).reshape(-1, 3)
@@ -212,7 +262,12 @@ def _add(cut: Cut, piece: _Piece, points: Array) -> None:
             cut.add(piece.place, point, up, 0.0)
 
 
-def _named(file: FilePath, layers: Mapping[str, Sequence[PoseRows]]) -> dict[str, PoseRows]:
+def _named(
+    file: FilePath,
+    layers: Mapping[str, Sequence[PoseRows]],
+    hidden: Sequence[str],
+    beside: Mapping[str, int],
+) -> dict[str, PoseRows]:
     """Return strokes by the name of their layer, with a number where it has several."""
     found: dict[str, PoseRows] = {}
     for layer, strokes in layers.items():
@@ -224,7 +279,12 @@ def _named(file: FilePath, layers: Mapping[str, Sequence[PoseRows]]) -> dict[str
                 )
             found[name] = rows
     if not found:
+        others = [
+            *(f"layer '{name}' is off or frozen: switch it on" for name in hidden[:1]),
+            *(f"its {kind} entities are no strokes" for kind in sorted(beside)[:1]),
+        ]
         raise FileFormatError(
             f"{file}: has nothing drawn in model space, on layers that are neither off nor frozen"
+            f"; {'; '.join(others) or 'what is drawn in layouts (paper space) is not read'}"
         )
     return found

@@ -96,10 +96,10 @@ def read_path(
     Of drawings, what is drawn in model space on one layer is joined end to end, where ends are
     within 0.01 mm of each other and no third one is there. A stroke has the name of its layer,
     with a number where the layer has several, and the direction of what was drawn first of it.
-    ``LINE ARC CIRCLE ELLIPSE SPLINE LWPOLYLINE POLYLINE`` are read, curves as chords within
-    0.01 mm, which are followed as legs of a cut; texts, dimensions, hatches and points are passed
-    over with a note, and any other entity is refused by its handle, but
-    not on layers that are off or frozen, nor beside the layer of `seam`. The unit is that of
+    ``LINE ARC CIRCLE ELLIPSE SPLINE LWPOLYLINE POLYLINE`` and blocks of them are read, curves as
+    chords within 0.01 mm, which are followed as legs of a cut; texts, dimensions, hatches and
+    points are passed over with a note, and any other entity is refused by its handle, but not on
+    layers that are off or frozen, nor beside the layer of `seam`. The unit is that of
     ``$INSUNITS``, and none is refused. The tool's z axis points down, against that of the drawing.
     A feed has to be given.
 
