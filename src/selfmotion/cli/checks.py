@@ -65,6 +65,7 @@ def of_problem(
     if of_controller:
         kept = formats.what_targets_keep(problem.constraints)
         problem = replace(problem, constraints=kept)
+    motion = formats.without_followers(motion, problem.robot)
     besides = options.requirements(problem.robot, *judged)
     allowed, robot = within or job.tolerance, problem.robot
     certificate = problem.certify(motion, allowed, besides=besides, progress=progress)

@@ -238,6 +238,7 @@ def check(
                 packages=packages or (),
             )
             motion, stated = checks.read(file, degrees, within)
+            motion = formats.without_followers(motion, arm)
             asked = options.requirements(arm, *judged)
             followed = documents.followed(path, context.params, arm)
             certificate = sm.certify(

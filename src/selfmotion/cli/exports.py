@@ -78,6 +78,7 @@ def export(
     else:
         made = sm.load_plan(file)
     _check_verified(made, force, as_json)
+    _tell_followers(made.robot, out, form)
     verdicts: dict[str, str] = {}
     sound = True
     for target in out:
@@ -99,6 +100,19 @@ def export(
                 kept, verdicts[names] = _judged(made, sm.read_parts(together))
                 sound &= kept
     _finish(made, rate, verdicts, sound, as_json)
+
+
+def _tell_followers(robot: sm.RobotModel, out: list[Path], form: str | None) -> None:
+    """Print which joints are in no file, because they mimic others."""
+    following = formats.followers(robot)
+    if following and any((form or formats.SUFFIXES.get(file.suffix)) != "mujoco" for file in out):
+        pairs = ", ".join(f"'{name}' '{other}'" for name, other in following.items())
+        stages.print(
+            f"note: joints that mimic others are left out ({pairs}): controllers of ROS and MoveIt "
+            f"command none; RobotModel.all_joints gives their positions",
+            markup=False,
+            soft_wrap=True,
+        )
 
 
 def _check_verified(made: _Made, force: bool, as_json: bool) -> None:

@@ -10,6 +10,10 @@ from selfmotion.formats.documents import (
     write_document as write_document,
 )
 from selfmotion.formats.example import example_text as example_text, example_texts as example_texts
+from selfmotion.formats.followers import (
+    followers as followers,
+    without_followers as without_followers,
+)
 from selfmotion.formats.job import Job as Job
 from selfmotion.formats.joint_limits import read_joint_limits as read_joint_limits
 from selfmotion.formats.judged_programs import (
