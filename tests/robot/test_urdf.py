@@ -15,6 +15,7 @@ from selfmotion.robot import full_model as gate
 from selfmotion.robot.urdf import parse_urdf
 from support.arms import robot_named
 from support.bad_urdfs import SOUND
+from support.files_of_people import finger
 
 Q = [0.3, -0.4]
 
@@ -216,6 +217,26 @@ def test_urdfs_that_pinocchio_stumbles_over_are_refused_by_name(
     file.write_text(ONE_JOINT.format(link=link, limit=limit))
     with pytest.raises(sm.RobotError, match=message):
         sm.load_robot(file)
+
+
+@pytest.mark.parametrize(
+    ("head", "encoding"),
+    [
+        ('<?xml version="1.0" encoding="ISO-8859-1"?>', "latin-1"),
+        ('<?xml version="1.0" encoding="utf-16"?>', "utf-16"),
+        ('<?xml version="1.0"?>', "utf-8-sig"),
+        ('\n\n<?xml version="1.0"?>', "utf-8"),
+    ],
+)
+def test_a_file_is_read_in_the_letters_that_it_says(
+    head: str, encoding: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "arm.urdf"
+    text = f"{head}<!-- für Träger -->{finger()}".replace("finger", "möbel")
+    file.write_bytes(text.encode(encoding))
+    arm = sm.load_robot(file, tool="tip")
+    assert arm.name == "möbel"
+    assert arm.dof == 4
 
 
 def test_an_arm_of_one_joint_is_an_arm(tmp_path: Path) -> None:

@@ -5,8 +5,10 @@ Here such files are refused with a message that names the joint or link, and con
 become single-angle joints without limits; mesh addresses become absolute.
 """
 
+import codecs
 import copy
 import hashlib
+import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -34,6 +36,9 @@ from selfmotion.robot.urdf_text import (
 # Fixed joints that are ours: where the base stands, how the tool is held, and before the name of a
 # body that the arm carries.
 BASE_JOINT, TOOL_JOINT, BODY_JOINT = "base_placement", "tool_offset", "carried_body/"
+# What a file says it is written in, and the marks of UTF-16.
+_SAYS = re.compile(rb"\s*<\?xml[^>]*encoding=[\"']([A-Za-z0-9._-]{1,40})[\"']")
+_UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 @dataclass(frozen=True)
@@ -225,10 +230,25 @@ def read_urdf(path: Path, packages: Iterable[str] = ()) -> Urdf:
     if not path.is_file():
         raise RobotError(f"{path}: no such URDF file")
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise RobotError(f"{path}: cannot be read as UTF-8 text: {error}") from error
-    return urdf_of_file(text, Packages(path, tuple(packages)))
+        content = path.read_bytes()
+    except OSError as error:
+        raise RobotError(f"{path}: cannot be read: {error.strerror or error}") from error
+    return urdf_of_file(_text_of(path, content), Packages(path, tuple(packages)))
+
+
+def _text_of(path: Path, content: bytes) -> str:
+    """Return the text of a file of XML, in the letters that it says, or else in UTF-8."""
+    said = _SAYS.match(content)
+    encoding = "utf-16" if content.startswith(_UTF16) else said[1].decode() if said else "utf-8"
+    try:
+        text = content.decode(encoding).removeprefix("\ufeff")
+    except (LookupError, UnicodeDecodeError) as error:
+        raise RobotError(
+            f"{path}: cannot be read as {encoding.upper()} text: {error}; save it as UTF-8, or say "
+            f'what it is in (<?xml version="1.0" encoding="…"?>)'
+        ) from error
+    # Nothing may be before a declaration, but editors leave lines there.
+    return text.lstrip() if text.lstrip().startswith("<?xml") else text
 
 
 def urdf_of_file(text: str, packages: Packages) -> Urdf:
