@@ -76,6 +76,7 @@ def test_unverified_plans_exit_with_1(tmp_path: Path) -> None:
         (("plan", "ur5", "--circle", "0.1"), "error: ur5: 6 joints and task 'pose'"),
         (("plan", "panda"), "error: give the tool motion by one of"),
         (("plan", "panda", "--path", "no.csv"), "error: no.csv: cannot be read"),
+        (("plan", "a.dxf"), "error: a.dxf: is a path, expected a robot or a problem file first"),
         (("plan", "panda", "--circle", "0.1", "--start", "1,2"), "shape (2,), expected (7,)"),
         (("plan", "panda", "--circle", "0.1", "--start", "a"), "error: --start is 'a'"),
         (("plan", "panda", "--line", "1,2"), "error: --line has 2 numbers, expected 3"),

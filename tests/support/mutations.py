@@ -65,6 +65,13 @@ _OTHERS = (
     (".csv", "x;y;z\n0,4;-0,05;0,3\n0,42;0;0,3\n0,4;0,05;0,3\n"),
     (".csv", "# X,Y,Z,NX,NY,NZ\n0.4,0,0.3,0,0,-1\n0.4,0.1,0.3,0,0,-1\n"),
     (".gcode", "M82\nG28\nG92 E0\nG1 F200 E3\nG0 X1 Y1 Z0.3\nG1 F600 X9 Y1 E4\nG1 X9 Y9 E5\nM84\n"),
+    (".cls", "UNITS/MM\nRAPID\nGOTO/10,0,5\nFEDRAT/600\nCIRCLE/20,0,0,0,0,1,10,1,1,5,0,TIMES,2"
+     "\nGOTO/30,0,5\nTLAXIS/0,0,1\nINDIRV/1,0,0\nTLON,GOFWD/ (CIRCLE/30,5,5,5),ON,(LINE/30,5,5,"
+     "35,5,5)\nFINI\n"),
+    (".ncl", "RAPID\nGOTO/0,0,9\nCYCLE/DEEP,FEDTO,5,STEP,2,RAPTO,1\nGOTO/9,0,0\nCYCLE/OFF\n"),
+    (".tap", "G0 X0 Y0 Z20\nG99 G83 X10 Y0 Z-5 R2 Q3 F120\nG80\nG0 Z50\nM30\n"),
+    (".json", '{"waypoints": [{"position": [0.4, 0, 0.3], "rpy": [3.1, 0, 0]}, {"position": [0.5, '
+     '0, 0.3], "rpy": [3.1, 0, 0]}]}'),
     (".nc", "G28\nG0 X0 Y0 Z0\nG93\nG1 X9 F30\nG18 G2 X19 Z0 I5 K0\n"),
     (".json", '[{"poses": [{"position": {"x": 0.4, "y": 0, "z": 0.3}, "orientation": {"x": 1, '
      '"y": 0, "z": 0, "w": 0}}, {"position": {"x": 0.5, "y": 0, "z": 0.3}, "orientation": {"x": 1, '

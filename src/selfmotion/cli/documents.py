@@ -14,6 +14,7 @@ from selfmotion.cli import options
 from selfmotion.cli.app import plan_with_progress, stages
 from selfmotion.cli.stage_display import StageDisplay
 from selfmotion.formats import (
+    PATH_SUFFIXES,
     events_of,
     grid_documents,
     has_normals,
@@ -229,6 +230,11 @@ def read(
 
     Options that say what a problem file says itself are refused beside one.
     """
+    if Path(given).suffix.lower() in PATH_SUFFIXES:
+        raise sm.ProblemError(
+            f"{given}: is a path, expected a robot or a problem file first: selfmotion plan panda "
+            f"--path {given}"
+        )
     if Path(given).suffix not in SUFFIXES:
         document = Shell.of(context).document(given, warm_start)
         return _with_settings(document, None, settings, allow_code)

@@ -39,6 +39,7 @@ from selfmotion.formats.overrides import (
     write_combination as write_combination,
 )
 from selfmotion.formats.path_files import (
+    PATH_SUFFIXES as PATH_SUFFIXES,
     events_of as events_of,
     has_normals as has_normals,
     read_path as read_path,

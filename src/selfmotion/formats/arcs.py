@@ -11,7 +11,8 @@ _CHORD = 1e-5
 _ROUND = 2e-4
 # Nearer than this [m] is the same place.
 _SAME = 1e-9
-_POINTS = 100_000
+# Arcs of a larger radius [m] are a fault of what wrote them, and so are more chords.
+_LARGEST, _POINTS = 1e5, 100_000
 
 
 def arc_points(
@@ -46,6 +47,8 @@ def arc_points(
             f"the arc begins {1e3 * radius:.4g} mm from its centre and ends "
             f"{1e3 * other:.4g} mm from it"
         )
+    if radius > _LARGEST:
+        raise machine.fault(f"the arc has a radius of {radius:.4g} m")
     x = arms[0] / radius
     y = np.cross(axis, x)
     turn = float(np.arctan2(arms[1] @ y, arms[1] @ x)) % (2.0 * np.pi)
@@ -54,7 +57,7 @@ def arc_points(
     turn += 2.0 * np.pi * more_turns
     count = max(2, int(np.ceil(turn / (2.0 * np.arccos(max(0.0, 1.0 - _CHORD / radius))))))
     if count > _POINTS:
-        raise machine.fault(f"the arc has a radius of {radius:.4g} m")
+        raise machine.fault(f"the arc takes {count} chords, expected {_POINTS} at most")
     share = np.arange(1, count + 1)[:, None] / count
     angle, radii = turn * share, radius + (other - radius) * share
     found = center + radii * (np.cos(angle) * x + np.sin(angle) * y)

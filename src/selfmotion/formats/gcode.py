@@ -75,7 +75,8 @@ def read_gcode(file: FilePath, reading: Reading | None = None) -> Mapping[str, P
     text = machine.text()
     rotary = None if reading is None else reading.rotary
     reader = _Reader(machine, rotary, prints=_extrudes(text))
-    if not any(_LIFTS.search(_bare(line.upper())) for line in text.splitlines()):
+    lines = (line.upper() for line in text.splitlines() if len(line) < _LINE)
+    if not any(_LIFTS.search(_bare(line)) for line in lines):
         reader.stay_flat()
     for number, line in enumerate(text.splitlines(), 1):
         reader.machine.number = number

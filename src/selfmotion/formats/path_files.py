@@ -11,15 +11,27 @@ from selfmotion.formats.cldata import CLDATA, read_cldata
 from selfmotion.formats.drawing import read_drawing
 from selfmotion.formats.gcode import read_gcode
 from selfmotion.formats.path_building import JUMP, Pacing, path_of_rows
-from selfmotion.formats.path_rows import PROGRAMS, READERS, READING, PoseRows, Reading, no_such_seam
+from selfmotion.formats.path_rows import (
+    PROGRAMS,
+    READERS,
+    READING,
+    TABLES,
+    PoseRows,
+    Reading,
+    no_such_seam,
+)
+from selfmotion.formats.pose_lists import READ
 from selfmotion.path import Path
 
 _READERS: Mapping[str, Callable[[FilePath, Reading], Mapping[str, PoseRows]]] = {
     **READERS,
+    **READ,
     **dict.fromkeys(PROGRAMS, read_gcode),
     **dict.fromkeys(CLDATA, lambda file, _: read_cldata(file)),
 }
 _DRAWING = ".dxf"
+# Of files that can be nothing but a path.
+PATH_SUFFIXES = (*TABLES, *PROGRAMS, *CLDATA, _DRAWING)
 
 
 def read_path(
@@ -56,7 +68,9 @@ def read_path(
       (``arc on; gas on``: both)
     - ``.npy``: (N, 4, 4) poses, or a table (N, 3) x,y,z; (N, 4) t,x,y,z; (N, 7)
       x,y,z,qw,qx,qy,qz; (N, 8) with t first
-    - ``.yaml .json``: ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``
+    - ``.yaml .json``: ROS ``nav_msgs/Path``, ``geometry_msgs/PoseArray``, or poses in a list or by
+      names (``waypoints``, ``poses``, parameters of a node): ``position`` and ``orientation``,
+      columns of a table by name, or 4 × 4 matrices
     - ``.nc .ngc .gcode .tap .cnc .eia .mpf .g .gc .gco``: G-code of up to five axes, below
     - ``.apt .aptsource .cls .clsf .cl .ncl``: APT, cutter location data, below
     - ``.dxf``: a drawing, below; with ``pip install 'selfmotion[dxf]'``

@@ -182,10 +182,10 @@ def read_tables(file: FilePath, reading: Reading | None = None) -> dict[str, Pos
         (SEAM, EVENT),
         check=lambda names: [_meant(file, name) for name in names],
         columns=None if reading is None else reading.columns,
-        named=_named,
+        named=named,
         usual=_HEADERS,
     )
-    whole = _of_table(file, header, table, lines, texts)
+    whole = rows_of_table(file, header, table, lines, texts)
     if SEAM not in texts:
         return {"": whole}
     names = texts[SEAM]
@@ -213,13 +213,14 @@ def some_rows(rows: PoseRows, chosen: Sequence[int]) -> PoseRows:
     )
 
 
-def _of_table(
+def rows_of_table(
     file: FilePath,
     header: Sequence[str],
     table: Array,
     lines: Sequence[int],
     texts: Mapping[str, Sequence[str]],
 ) -> PoseRows:
+    """Return rows of poses of the columns of numbers of a table, and of its texts."""
     columns = _columns(file, header, table)
     events = texts.get(EVENT, [""] * len(lines))
     missing = [name for name in _POSITION if name not in columns]
@@ -254,7 +255,7 @@ def _of_table(
     )
 
 
-def _named(title: str) -> str:
+def named(title: str) -> str:
     """Return a title as its column is called here: x_mm of "X [mm]"."""
     name = title.strip().lower()
     found = _TITLE.fullmatch(name)
@@ -289,7 +290,7 @@ def _columns(file: FilePath, header: Sequence[str], table: Array) -> dict[str, A
 
 def _meant(file: FilePath, title: str) -> tuple[str, float]:
     """Return the name of a column without its unit, and that in SI units."""
-    title = _named(title)
+    title = named(title)
     name, scale = title, 1.0
     for suffix, (names, factor) in _UNITS.items():
         if title.endswith(suffix) and title.removesuffix(suffix) in names:
@@ -347,11 +348,12 @@ def _read_ros(file: FilePath) -> dict[str, PoseRows]:
             f"{file}: holds no message with poses, expected a nav_msgs/Path or "
             f"geometry_msgs/PoseArray, or a list of these"
         )
-    found = {
+    if len(messages) == 1:
+        return {"": _of_message(file, messages[0], "")}
+    return {
         f"seam {number}": _of_message(file, message, f"[{number - 1}].")
         for number, message in enumerate(messages, 1)
     }
-    return found if len(found) > 1 else {"": _of_message(file, messages[0], "")}
 
 
 def _messages(items: Sequence[Any]) -> Iterator[Any]:
@@ -371,7 +373,8 @@ def _of_message(file: FilePath, message: Any, where: str) -> PoseRows:
     if not isinstance(poses, list) or not poses:
         raise FileFormatError(
             f"{file}: {where and f'{where[:-1]} '}has no list of poses, expected a nav_msgs/Path "
-            f"or geometry_msgs/PoseArray"
+            f"or geometry_msgs/PoseArray, or poses in a list or by names (waypoints), each with "
+            f"position and orientation or x, y, z"
         )
     places = [f"{where}poses[{k}]" for k in range(len(poses))]
     rows = [_ros_pose(file, place, pose) for place, pose in zip(places, poses, strict=True)]

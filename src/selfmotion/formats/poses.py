@@ -18,8 +18,9 @@ _HUGE = 1e15
 def from_quaternion(values: Array) -> Array:
     """Return the rotation (3, 3) of a quaternion [w, x, y, z] of any length but zero."""
     length = float(np.linalg.norm(values))
-    if length < _ZERO:
-        raise ValueError("the quaternion is zero, expected [w, x, y, z] of length 1")
+    if not _ZERO <= length < _HUGE:
+        said = "zero" if length < _ZERO else f"of length {length:g}"
+        raise ValueError(f"the quaternion is {said}, expected [w, x, y, z] of length 1")
     w, x, y, z = (values / length).tolist()
     return np.asarray(Quaternion(w, x, y, z).toRotationMatrix())
 
@@ -30,8 +31,9 @@ def from_normal(normal: Array) -> Array:
     Which of them does not matter to tasks that leave the rotation about the tool's axis free.
     """
     length = float(np.linalg.norm(normal))
-    if length < _ZERO:
-        raise ValueError("the normal is zero, expected the direction of the tool's z axis")
+    if not _ZERO <= length < _HUGE:
+        said = "zero" if length < _ZERO else f"of length {length:g}"
+        raise ValueError(f"the normal is {said}, expected the direction of the tool's z axis")
     z = normal / length
     x = np.eye(3)[0 if abs(z[0]) < 0.9 else 1]
     x = x - z * (z @ x)
