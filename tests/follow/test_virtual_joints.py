@@ -13,10 +13,9 @@ from selfmotion.constraints import NodeTangents
 from selfmotion.costs import Samples
 from selfmotion.follow import AugmentedFollows, Follows
 from selfmotion.motion import Sampling
-from selfmotion.nodes.objective import scattered
-from selfmotion.problem.of_arm import WithinBand
+from selfmotion.problem.of_arm import RowWithinBand, WithinBand
 from support.arms import PANDA_HOME, robot_named
-from support.nodes import moved, nodes_of, random_step
+from support.nodes import around_of, centred, moved, nodes_of, random_step
 
 # Rounding of poses that are composed twice.
 ROUNDING = 1e-12
@@ -139,7 +138,7 @@ def test_a_problem_with_tolerances_keeps_what_its_costs_and_limits_say_of_the_ar
     bound = problem.bind_constraints(q[0], q[-1], apart=False)
     before = asked.bind_constraints(q[0, :7], q[-1, :7], apart=False)
     bands = bound[len(before) :]
-    assert all(isinstance(item, WithinBand) for item in bands)
+    assert all(isinstance(item, WithinBand | RowWithinBand) for item in bands)
     assert len(bands) == 2
     for one, other in zip(bound, before, strict=False):
         np.testing.assert_allclose(one.residual(whole), other.residual(own), atol=1e-12)
@@ -175,11 +174,10 @@ def test_gradients_along_nodes_equal_central_differences(
     assert not here.place.qd[held].any()
     direction = random_step(motion, 4)
     size = 1e-5
-    aims = [moved(motion, step + side * direction).aim for side in (size, -size)]
-    slopes, continuity = here.grid.cost.slopes(here.samples, here.partials), here.grid.continuity
-    if continuity is not None:
-        slopes += continuity.slopes(here.samples)
-    by_node = scattered(slopes)
-    gradient = here.charts.pulled(here.place, by_node[:, 0], by_node[:, 1])
+    here = centred(here)
+    aims = [moved(here, side * direction).aim for side in (size, -size)]
+    slopes = here.grid.cost.slopes(here.samples, here.curve_ends, here.partials)
+    force = here.grid.spline.scattered(slopes)
+    gradient = np.einsum("konw,kon->kw", around_of(here).changes, force)
     exact = (aims[0] - aims[1]) / (2.0 * size)
     assert abs(float((gradient * direction).sum()) - exact) < COST * np.abs(gradient).sum()

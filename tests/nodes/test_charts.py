@@ -3,12 +3,14 @@
 import numpy as np
 
 from support.arms import Case
-from support.nodes import centred, moved, nodes_of, problem_of, random_step
+from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step
 
 # Newton's method stops there [m, rad]; what follows from it is rounding.
 ON_PATH = 1e-11
 # Central differences at this distance are right to its square, and rounding over it.
 NEAR, DIFFERENCE = 1e-5, 1e-7
+# Second differences, of which those along the manifold lose twice as many digits.
+BENT = 1e-5
 
 
 def test_nodes_are_on_the_path_wherever_they_go(case: Case) -> None:
@@ -39,76 +41,78 @@ def test_they_move_by_equation_4(case: Case) -> None:
 
 
 def test_accelerations_are_those_of_the_path(case: Case) -> None:
-    """With J⁺(ẍ - J̇q̇) and any null acceleration, q(t) is on the path to third order."""
+    """With q̈ = J⁺(ẍ - J̇q̇) + (I - J⁺J) N0 α, q(t) is on the path to third order."""
     motion = nodes_of(problem_of(case), 8)
     motion = centred(moved(motion, random_step(motion, 5, 0.05)))
-    q, qd, t = motion.place.q[1:-1], motion.place.qd[1:-1], motion.grid.t[1:-1]
-    qdd = motion.grid.manifolds.accelerations(motion.place)[1:-1]
-    null = motion.charts.bases[1:-1, :, 0]
-    item, errors = motion.grid.problem.follows.items[0], []
-    for step in np.array([2e-2, 1e-2]) / max(1.0, np.abs(qd).max()):
-        later = q + step * qd + 0.5 * step**2 * (qdd + 0.3 * null)
-        each = [item.error(x + step, y) for x, y in zip(t, later, strict=True)]
+    # Also at both ends of the path, where it is known to one side alone.
+    signs = np.where(motion.grid.t < 0.5 * motion.grid.t[-1], 1.0, -1.0)
+    place, item = motion.place, motion.grid.problem.follows.items[0]
+    errors = []
+    for size in np.array([2e-2, 1e-2]) / max(1.0, np.abs(place.qd).max()):
+        step = size * signs[:, None]
+        later = place.q + step * place.qd + 0.5 * step**2 * place.qdd
+        times = motion.grid.t + step[:, 0]
+        each = [item.error(x, y) for x, y in zip(times, later, strict=True)]
         errors.append(np.abs(each).max())
     if errors[0] > 1e-9:
         assert np.log2(errors[0] / errors[1]) > 2.8, errors
 
 
-def test_tangents_and_pullbacks_are_central_differences(case: Case) -> None:
+def test_tangents_are_central_differences(case: Case) -> None:
+    """Γ = ∂(q, q̇, q̈)/∂(z, ν, α)."""
     motion = nodes_of(problem_of(case))
-    motion = moved(motion, random_step(motion, 2, 0.02))
-    step, rng = random_step(motion, 3), np.random.default_rng(4)
-    by_q, by_qd = rng.normal(size=(2, *motion.place.q.shape))
-    here = centred(motion)
-    above, below = (moved(here, sign * NEAR * step).place for sign in (1.0, -1.0))
-    change_q, change_qd = (above.q - below.q) / (2 * NEAR), (above.qd - below.qd) / (2 * NEAR)
-    r = here.nu.shape[1]
-    tangent = (here.place.tangents @ step[:, :r, None])[:, :, 0]
-    np.testing.assert_allclose(tangent, change_q, atol=DIFFERENCE * np.abs(change_q).max())
-    pulled = here.charts.pulled(here.place, by_q, by_qd)
-    # Of what is held nothing moves: z of the start and nothing else.
-    expected = np.sum(by_q * change_q) + np.sum(by_qd * change_qd)
-    assert abs(np.sum(pulled * step) - expected) < DIFFERENCE * np.abs(pulled).max() * step.size
-    # The same with a wrong cotangent is seen.
-    wrong = here.charts.pulled(here.place, by_q, 1.01 * by_qd)
-    assert abs(np.sum(wrong * step) - expected) > 1e-4
+    here = centred(moved(motion, random_step(motion, 2, 0.02)))
+    step = random_step(motion, 3)
+    above, below = (moved(here, sign * NEAR * step).place.nodes for sign in (1.0, -1.0))
+    expected = (above - below) / (2 * NEAR)
+    found = np.einsum("konw,kw->kon", around_of(here).changes, step)
+    np.testing.assert_allclose(found, expected, atol=DIFFERENCE * np.abs(expected).max())
+    # A wrong step is seen.
+    wrong = np.einsum("konw,kw->kon", around_of(here).changes, 1.01 * step)
+    assert np.abs(wrong - expected).max() > 1e-4 * np.abs(expected).max()
+
+
+def test_what_nodes_bend_by_is_a_central_difference(case: Case) -> None:
+    """∂(Γᵀλ)/∂w, at charts around the nodes: of λᵀ(q, q̇, q̈) the second derivatives."""
+    motion = nodes_of(problem_of(case))
+    here = centred(moved(motion, random_step(motion, 2, 0.02)))
+    step = random_step(motion, 3)
+    force = np.random.default_rng(4).normal(size=here.place.nodes.shape)
+
+    def value(size: float) -> np.ndarray:
+        return np.sum(force * moved(here, size * step).place.nodes, axis=(1, 2))
+
+    def bent(size: float) -> np.ndarray:
+        return (value(size) - 2.0 * value(0.0) + value(-size)) / size**2
+
+    # Without the error of second order.
+    expected = (4.0 * bent(3e-4) - bent(6e-4)) / 3.0
+    curvature = around_of(here, force).curvature
+    found = np.einsum("kv,kvw,kw->k", step, curvature, step)
+    np.testing.assert_allclose(found, expected, atol=BENT * max(1.0, np.abs(expected).max()))
+    np.testing.assert_allclose(curvature, np.swapaxes(curvature, 1, 2), atol=1e-9)
 
 
 def test_charts_around_nodes_are_of_the_same_motion(case: Case) -> None:
-    """What of ε does not act is left out, and what is known there is what eq. 4 says anew."""
+    """What of ε and a does not act is left out, and what is known there is what eq. 4 says anew."""
     motion = nodes_of(problem_of(case))
     step, r = random_step(motion, 5, 0.05), motion.nu.shape[1]
     there = moved(motion, step)
-    found = there.charts.centred(step[:, :r], there.epsilon)
+    given = there.epsilon, there.charts.spread(there.alpha)
+    found = there.charts.centred(step[:, :r], *given)
     assert found is not None
-    charts, nu, place = found
-    again = charts.at(np.zeros_like(nu), nu)
+    charts, nu, alpha, place = found
+    again = charts.at(np.zeros_like(nu), nu, alpha)
     assert again is not None
     for one in (place, again):
         np.testing.assert_allclose(one.q, there.place.q, atol=ON_PATH)
         np.testing.assert_allclose(one.qd, there.place.qd, atol=1e-9)
+        np.testing.assert_allclose(one.qdd, there.place.qdd, atol=1e-8)
         np.testing.assert_allclose(one.tangents, charts.bases, atol=1e-9)
-    by_q, by_qd = np.random.default_rng(8).normal(size=(2, *place.q.shape))
-    slopes = [charts.pulled(one, by_q, by_qd) for one in (place, again)]
-    np.testing.assert_allclose(slopes[0], slopes[1], atol=1e-8 * np.abs(slopes[1]).max())
     jacobians = np.array([motion.grid.problem.follows.jacobian(q) for q in place.q])
     np.testing.assert_allclose(jacobians @ charts.bases, 0.0, atol=1e-9)
     unit = np.swapaxes(charts.bases, 1, 2) @ charts.bases
     np.testing.assert_allclose(unit, np.broadcast_to(np.eye(unit.shape[1]), unit.shape), atol=1e-12)
-
-
-def test_other_null_motions_of_the_same_nodes_change_nothing_else(case: Case) -> None:
-    motion = centred(nodes_of(problem_of(case)))
-    wanted, none = np.random.default_rng(9).normal(size=motion.place.q.shape), 0.0 * motion.nu
-    found = motion.charts.moving(motion.place, wanted)
-    expected = motion.charts.centred(none, wanted)
-    assert expected is not None
-    np.testing.assert_allclose(found.nu, expected.nu, atol=1e-9)
-    for name in ("q", "qd", "tangents"):
-        own, other = (getattr(one.place, name) for one in (found, expected))
-        np.testing.assert_allclose(own, other, atol=1e-9)
-    slopes = [each.charts.pulled(each.place, wanted, wanted[::-1]) for each in (found, expected)]
-    np.testing.assert_allclose(slopes[0], slopes[1], atol=1e-8 * np.abs(slopes[1]).max())
 
 
 def test_towards_a_configuration(case: Case) -> None:

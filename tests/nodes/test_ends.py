@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
-from selfmotion.nodes import NodeEnds, Step, minimise
+from selfmotion.nodes import Step, minimise
 from selfmotion.optimise import Status
 from support.arms import PANDA_HOME, Case
 from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step
@@ -15,7 +15,6 @@ from support.nodes import around_of, centred, moved, nodes_of, problem_of, rando
 STEP, ALIKE = 1e-5, 1e-7
 # The optimum's ends, and what the certificate sees of them between printed digits [rad, rad/s].
 MET = 1e-8
-NONE = np.zeros(0, dtype=np.int64)
 SHAPES = ("repeated", "repeated, any speed", "an end", "a speed", "both")
 
 
@@ -50,12 +49,12 @@ def test_derivatives_are_central_differences(case: Case, shape: str) -> None:
     step = random_step(motion, 7)
     above, below = (moved(motion, sign * STEP * step) for sign in (1.0, -1.0))
     expected = (above.c - below.c) / (2.0 * STEP)
-    found = np.einsum("ekd,kd->e", ends.rows(around.changes), step[[0, -1]])
+    held = motion.grid.held
+    found = ends.border(motion.c, around.changes, held).columns.T @ step.ravel()
     np.testing.assert_allclose(found, expected, atol=ALIKE * max(1.0, np.abs(expected).max()))
     prices = np.random.default_rng(2).normal(size=ends.count)
-    by = ends.pulled(prices, len(step))
-    pulled = motion.charts.pulled(motion.place, by[:, 0], by[:, 1])
-    assert float(np.sum(pulled * step)) == pytest.approx(
+    pulled = np.einsum("kon,konw,kw->", ends.pulled(prices, len(step)), around.changes, step)
+    assert float(pulled) == pytest.approx(
         float(prices @ expected), abs=1e2 * ALIKE * max(1.0, float(np.abs(expected).max()))
     )
 
@@ -70,14 +69,14 @@ def test_the_optimum_meets_them_quickly(panda: sm.RobotModel, free: bool) -> Non
         misses.append(float(np.abs(step.motion.c).max()))
         return False
 
-    optimum = minimise(nodes_of(problem, 24, free=free), NONE, told)
+    optimum = minimise(nodes_of(problem, 24, free=free), told)
     assert optimum.status is Status.CONVERGED
     assert len(misses) <= 12
     assert misses[0] > 1e-2
     assert misses[-1] <= 1e-9
     large = [miss for miss in misses if miss > 1e-9]
     assert misses[len(large)] <= 0.1 * large[-1]
-    open_one = minimise(nodes_of(circle(panda), 24, free=free), NONE, lambda step: False)
+    open_one = minimise(nodes_of(circle(panda), 24, free=free), lambda step: False)
     assert optimum.motion.cost > open_one.motion.cost
 
 
@@ -114,13 +113,24 @@ def test_a_given_end_is_reached_on_nodes(panda: sm.RobotModel) -> None:
     np.testing.assert_allclose(plan.trajectory.q[-1], last, atol=MET)
 
 
-def test_accelerations_at_ends_are_not_for_nodes(panda: sm.RobotModel) -> None:
-    follows = circle(panda).follows
-    bound = [
-        item.bind(follows, PANDA_HOME, PANDA_HOME)
-        for item in (sm.EndAcceleration(), sm.EndVelocity())
-    ]
-    assert [NodeEnds.takes(item) for item in bound] == [False, True]
+@pytest.mark.parametrize("at_start", [False, True])
+def test_a_given_acceleration_at_an_end_is_met_on_nodes(
+    panda: sm.RobotModel, at_start: bool
+) -> None:
+    """The path's own, and some self-motion that is not that of the optimum."""
+    problem = circle(panda)
+    free = sm.plan(problem).trajectory
+    end = 0 if at_start else -1
+    null = problem.follows.null_basis(free.q[end])[:, 0]
+    wanted = free.qdd[end] + 0.4 * null
+    kind = sm.StartAcceleration if at_start else sm.EndAcceleration
+    rates = () if at_start else (sm.EndVelocity(free.qd[-1]), sm.EndConfiguration(free.q[-1]))
+    first = (sm.StartVelocity(free.qd[0]),) if at_start else ()
+    plan = sm.plan(replace(problem, constraints=(*first, *rates, kind(wanted))))
+    assert plan.certificate.verified
+    assert isinstance(plan.report.null_motion, sm.NodeNullMotion)
+    np.testing.assert_allclose(plan.trajectory.qdd[end], wanted, atol=1e-6)
+    assert np.abs(free.qdd[end] - wanted).max() > 0.1
 
 
 def circle(panda: sm.RobotModel, start=PANDA_HOME, **options) -> sm.Problem:

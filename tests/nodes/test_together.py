@@ -92,14 +92,14 @@ def test_rough_optima_are_near_those_of_newtons_method(case: Case) -> None:
     rough = advanced(Together.near(grid, motions), 2 * ROUNDS)
     found = rough.motion.grid.copied(1)
     for k in np.flatnonzero(~rough.going):
-        motion = found.near(rough.q[k], rough.qd[k])
+        motion = found.near(rough.q[k], rough.qd[k], rough.qdd[k])
         assert motion is not None
         assert motion.cost == pytest.approx(rough.costs[k], rel=1e-7)
 
         def never(step: Step) -> bool:
             return False
 
-        optimum = minimise(motion, np.zeros(0, dtype=np.int64), never)
+        optimum = minimise(motion, never)
         assert optimum.motion.cost >= (1.0 - ROUGH) * rough.costs[k]
 
 

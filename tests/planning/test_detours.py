@@ -92,7 +92,7 @@ def test_what_a_cubic_cannot_meet_the_default_meets_with_more_freedom(winding: s
     assert not sm.plan(cubic).certificate.verified
     found = sm.plan(winding)
     assert found.certificate.verified
-    assert isinstance(found.report.null_motion, sm.BSplineNullMotion)
+    assert isinstance(found.report.null_motion, sm.NodeNullMotion)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from support.arms import PANDA_HOME
 
 # What accelerations change along the way, as a share of those of a spline through few velocities;
 # three times as much where velocities at nodes waver.
-WAVERING = 1.15
+WAVERING = 1.25
 
 
 def changes(accelerations: np.ndarray) -> np.ndarray:
@@ -25,7 +25,7 @@ def test_accelerations_do_not_waver_between_nodes(task: str) -> None:
     motion = plan.trajectory
     # Away from the ends, where the self-motion starts and stops.
     t = np.linspace(0.8, 3.2, 4001)
-    few = slice(None, None, 4)
-    smooth = CubicSpline(motion.t[few], motion.qd[few])(t, 1)
+    few = np.linspace(0.0, 4.0, 33)
+    smooth = CubicSpline(few, motion(few, 1))(t, 1)
     moves = changes(smooth) > 0.1 * changes(smooth).max()
     assert np.all((changes(motion(t, 2)) <= WAVERING * changes(smooth))[moves])

@@ -16,7 +16,7 @@ from selfmotion.robot import Dynamics, Energy, ToolRates
 from selfmotion.robot.tree_arrays import JOINT
 from support.arms import Case, central_difference, objective_of, short_line
 from support.files_of_people import finger, torso
-from support.nodes import centred, moved, nodes_of, problem_of, random_step
+from support.nodes import around_of, centred, moved, nodes_of, problem_of, random_step
 from support.rollouts import assert_sensitivities, rollout_of
 
 # Against other libraries' products of rotations, and differences [m, rad].
@@ -181,14 +181,11 @@ def test_gradients_of_rollouts_are_differences(robot: sm.RobotModel) -> None:
 def test_gradients_on_nodes_are_differences(robot: sm.RobotModel) -> None:
     motion = nodes_of(problem_of(case_of(robot)))
     motion = moved(motion, random_step(motion, 2, 0.02))
-    step, rng, near = random_step(motion, 3), np.random.default_rng(4), 1e-5
-    by_q, by_qd = rng.normal(size=(2, *motion.place.q.shape))
-    here = centred(motion)
-    above, below = (moved(here, sign * near * step).place for sign in (1.0, -1.0))
-    change_q, change_qd = (above.q - below.q) / (2 * near), (above.qd - below.qd) / (2 * near)
-    pulled = here.charts.pulled(here.place, by_q, by_qd)
-    expected = np.sum(by_q * change_q) + np.sum(by_qd * change_qd)
-    assert abs(np.sum(pulled * step) - expected) < 1e-6 * np.abs(pulled).max() * step.size
+    step, near, here = random_step(motion, 3), 1e-5, centred(motion)
+    above, below = (moved(here, sign * near * step).place.nodes for sign in (1.0, -1.0))
+    expected = (above - below) / (2 * near)
+    found = np.einsum("konw,kw->kon", around_of(here).changes, step)
+    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
 
 
 def test_bodies_turn_with_what_they_mimic(robot: sm.RobotModel) -> None:

@@ -33,33 +33,40 @@ def nodes_of(problem: sm.Problem, count: int = 12, *, free: bool = False) -> Nod
 
 
 def moved(motion: NodeMotion, step: Array) -> NodeMotion:
-    """Return the nodes at other coordinates w (N + 1, 2r) of the same charts."""
-    r = motion.nu.shape[1]
-    nu = motion.nu + step[:, r:]
-    place = motion.charts.at(step[:, :r], nu)
+    """Return the nodes at other coordinates w (N + 1, 3r) of the same charts."""
+    z, nu, alpha = np.split(step, 3, axis=1)
+    rates = motion.nu + nu, motion.alpha + alpha
+    place = motion.charts.at(z, *rates)
     assert place is not None
-    return motion.grid.at(motion.charts, nu, place)
+    return NodeMotion(motion.grid, motion.charts, *rates, place)
 
 
 def centred(motion: NodeMotion) -> NodeMotion:
     """Return the same nodes with charts around them."""
-    found = motion.grid.near(motion.place.q, motion.place.qd)
+    place = motion.place
+    found = motion.grid.near(place.q, place.qd, place.qdd)
     assert found is not None
     return found
 
 
-def around_of(motion: NodeMotion, by_node: Array | None = None) -> Around:
-    """Return how nodes at the reference of their charts move, for slopes (N + 1, 2, n) or none."""
-    count, n, _ = motion.charts.bases.shape
-    slopes = np.zeros((count, 2, n)) if by_node is None else by_node
-    found = Around.of(motion.charts, motion.nu, slopes)
+def around_of(motion: NodeMotion, force: Array | None = None) -> Around:
+    """Return how nodes at the reference of their charts move, for λ (N + 1, 3, n) or none."""
+    force = np.zeros_like(motion.place.nodes) if force is None else force
+    found = Around.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
     assert found is not None
     return found
+
+
+def along(motion: NodeMotion, changes: Array, step: Array) -> Array:
+    """Return how y of each interval changes along a step w (N + 1, 3r), (N, 6, n)."""
+    both = motion.grid.spline.changes(changes)
+    pair = np.concatenate([step[:-1], step[1:]], axis=1)
+    return np.asarray(np.einsum("knad,kd->kan", both, pair))
 
 
 def random_step(motion: NodeMotion, seed: int, size: float = 1.0) -> Array:
     """Return coordinates w of that size, 0 where they are held."""
     r = motion.nu.shape[1]
-    step = size * np.random.default_rng(seed).normal(size=(len(motion.nu), 2 * r))
+    step = size * np.random.default_rng(seed).normal(size=(len(motion.nu), 3 * r))
     step.reshape(-1)[motion.grid.held] = 0.0
     return step

@@ -115,7 +115,8 @@ def planned(**given: Any) -> Any:
     plan = sm.plan(problem, **given)
     report = plan.report
     attempts = [(item.name, item.outcome) for item in report.attempts]
-    return plan.trajectory.digest, plan.tolerance, report.evaluations, report.gap, attempts
+    known = plan.trajectory.digest, plan.tolerance, report.evaluations, report.gap, report.status
+    return known, attempts
 
 
 def told() -> tuple[list[Any], Callable[..., None]]:

@@ -165,9 +165,11 @@ def test_joints_are_told_by_name(line_plan: sm.Plan) -> None:
     def certified(motion: sm.Trajectory) -> sm.Certificate:
         return sm.certify(panda, line_plan.path, "pose", motion)
 
-    turned = sm.Trajectory(motion.t, motion.q[:, ::-1], motion.qd[:, ::-1], names[::-1])
+    every = motion.q[:, ::-1], motion.qd[:, ::-1], names[::-1], motion.qdd[:, ::-1]
+    turned = sm.Trajectory(motion.t, *every)
     assert certified(turned).verified
-    assert not certified(sm.Trajectory(motion.t, motion.q, motion.qd, names[::-1])).verified
+    swapped = sm.Trajectory(motion.t, motion.q, motion.qd, names[::-1], motion.qdd)
+    assert not certified(swapped).verified
     with pytest.raises(sm.FileFormatError, match="joint 'panda_joint7' is missing"):
         certified(sm.Trajectory(motion.t, motion.q, motion.qd, (*names[:-1], "wrist")))
 

@@ -1,6 +1,10 @@
 """From a decision vector to the motion, its cost, and the gradient."""
 
-from selfmotion.engine.conditions import Conditions as Conditions
+from selfmotion.engine.conditions import (
+    Conditions as Conditions,
+    Priced as Priced,
+    active_of as active_of,
+)
 from selfmotion.engine.counts import Counts as Counts
 from selfmotion.engine.evaluation import Evaluation as Evaluation
 from selfmotion.engine.frame import carried_bases as carried_bases, transport as transport

@@ -1,11 +1,12 @@
 """The constraints of a problem as one list of numbers: h ≤ 0 or h = 0, and its derivatives."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from selfmotion.basics import Array, Ints, ProblemError
+from selfmotion.basics import Array, Flags, Ints, ProblemError
 from selfmotion.constraints import (
     Binding,
     BoundConstraint,
@@ -97,24 +98,14 @@ class Conditions:
 
         What would save less than `least` is left out.
         """
-        found: dict[tuple[str, str], tuple[float, Array]] = {}
-        first = 0
+        each, first, times = [], 0, samples.sampling.node_times
         for item in self.constraints:
             shape = item.residual(samples).shape
-            prices = np.abs(multipliers[first : first + shape[0] * shape[1]]).reshape(shape)
+            prices = multipliers[first : first + shape[0] * shape[1]].reshape(shape)
             first += prices.size
-            for column in np.flatnonzero(prices.any(axis=0)):
-                amount, words = easing_of(item, int(column))
-                saving, price = found.get((item.name, words), (0.0, np.zeros(shape[0])))
-                saving += amount * float(prices[:, column].sum())
-                found[item.name, words] = saving, np.maximum(price, prices[:, column])
-        times = samples.sampling.node_times
-        kept = [
-            Binding(name, words, saving, _spans(price > _BINDS * price.max(), times))
-            for (name, words), (saving, price) in found.items()
-            if saving >= least
-        ]
-        return tuple(sorted(kept, key=lambda item: -item.saving))
+            used = np.ones(shape, dtype=np.bool_)
+            each.append(Priced(item, prices, times if shape[0] > 1 else times[:1], used))
+        return active_of(each, times[[0, -1]], least)
 
     def violated(self, samples: Samples) -> tuple[str, ...]:
         """Return a message for each constraint that is not kept, on its worst place."""
@@ -128,6 +119,52 @@ class Conditions:
                 text = item.describe(samples, int(row), int(column))
                 messages.append(f"{item.name}: {text}")
         return tuple(messages)
+
+
+class Priced(NamedTuple):
+    """What the conditions of a constraint cost.
+
+    Attributes
+    ----------
+    item : BoundConstraint
+    prices : (K, C)
+    times : (K,)
+        When [s], increasing; one for what is asked of the whole motion.
+    used : (K, C)
+        Where what is asked for is used up, as far as prices say.
+    """
+
+    item: BoundConstraint
+    prices: Array
+    times: Array
+    used: Flags
+
+
+def active_of(each: Sequence[Priced], span: Array, least: float) -> tuple[Binding, ...]:
+    """Return what binds, the most expensive first; what would save less than `least` is left out.
+
+    `span` (2,) is when the motion begins and ends [s].
+    """
+    found: dict[tuple[str, str], tuple[float, Array, Array, Array]] = {}
+    for item, signed, times, used in each:
+        prices = np.abs(signed)
+        for column in np.flatnonzero(prices.any(axis=0)):
+            amount, words = easing_of(item, int(column))
+            none = 0.0, np.zeros(len(prices)), np.zeros(len(prices)), times
+            saving, price, at, _ = found.get((item.name, words), none)
+            own = prices[:, column]
+            at = np.maximum(at, np.where(used[:, column], own, 0.0))
+            found[item.name, words] = (
+                *(saving + amount * float(own.sum()), np.maximum(price, own)),
+                *(at, times),
+            )
+    kept = []
+    for (name, words), (saving, price, at, times) in found.items():
+        if saving >= least:
+            binds = (at if at.any() else price) > _BINDS * price.max()
+            spans = _spans(binds if binds.any() else price == price.max(), times, span)
+            kept.append(Binding(name, words, saving, spans))
+    return tuple(sorted(kept, key=lambda item: -item.saving))
 
 
 class _Stacked:
@@ -153,10 +190,10 @@ class _Stacked:
         return rows
 
 
-def _spans(binds: npt.NDArray[np.bool_], times: Array) -> tuple[tuple[float, float], ...]:
-    """Return the stretches of nodes that bind; one free node between two is none."""
+def _spans(binds: Flags, times: Array, span: Array) -> tuple[tuple[float, float], ...]:
+    """Return the stretches of times that bind, `span` of one; one free time between is none."""
     if len(binds) == 1:
-        return ((float(times[0]), float(times[-1])),)
+        return ((float(span[0]), float(span[-1])),)
     nodes = np.flatnonzero(binds)
     parts = np.split(nodes, np.flatnonzero(np.diff(nodes) > 2) + 1)
     return tuple((float(times[part[0]]), float(times[part[-1]])) for part in parts)

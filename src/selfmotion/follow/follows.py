@@ -120,9 +120,9 @@ class Follows:
         None where no joint on a chain mimics another one: then those of coordinates will do.
         Derivatives of Jacobians need them, see `selfmotion.kernels.contraction`.
         """
-        tables = [item.chain.table for item in self.items]
         if not any(item.chain.is_coupled for item in self.items):
             return None
+        tables = [item.chain.table for item in self.items]
         coordinates = [table[:-1, JOINT, 0].astype(np.int64) for table in tables]
         ends = np.cumsum([0, *map(len, coordinates)])
         columns = np.zeros((len(q), len(tables), 6, int(ends[-1])))

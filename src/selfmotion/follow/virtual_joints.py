@@ -255,6 +255,17 @@ class VirtualJoints:
         """
         return np.array([joint.scale * (1.0 if joint.turns else metre) for joint in self.each])
 
+    def joint_of(self, item: Relaxation) -> tuple[int, float] | None:
+        """Return the number of the joint by which a relaxation's one row is off, and its scale.
+
+        None where it has several rows, or that is not what a joint's coordinate says.
+        """
+        tilts = any(joint.name.startswith("tilt") for joint in self.each)
+        if len(item.rows) > 1 or (item.angular and tilts):
+            return None
+        number = next(k for k, joint in enumerate(self.each) if joint.row == item.indices[0])
+        return number, self.each[number].scale
+
     def rows_of(self, item: Relaxation, s: Array) -> tuple[Array, Array]:
         """Return the deviation in a relaxation's rows at coordinates s (K, v): (K, k), (K, k, v).
 

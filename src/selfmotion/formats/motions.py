@@ -33,7 +33,7 @@ from selfmotion.formats.moving_ends import check_ends
 from selfmotion.formats.mujoco import keyframes
 from selfmotion.formats.program_files import PROGRAMS, read_program, write_program
 from selfmotion.formats.program_settings import ProgramSettings
-from selfmotion.formats.samples import MotionSamples
+from selfmotion.formats.samples import MotionSamples, for_cubics
 from selfmotion.formats.urscript import script
 from selfmotion.job import Program
 from selfmotion.motion import Trajectory
@@ -111,6 +111,8 @@ def write_motion(
     if settings is not None:
         raise ProblemError(f"{path}: settings have no effect: they are of controllers' programs")
     motion = plan.motion if isinstance(plan, Move) else plan.trajectory
+    if name == "bag" and rate is None:
+        motion = for_cubics(motion)
     WRITERS[name](path, MotionSamples.of(motion, rate), plan.robot, rate)
 
 

@@ -15,6 +15,8 @@ from selfmotion.task import Task
 _DIGITS = 9
 # Where between two samples straight lines are compared with the motion.
 _BETWEEN = (0.25, 0.5, 0.75)
+# Cubics this near to a motion [rad or m] are as good as it; intervals are halved so often for that.
+_AS_GOOD_AS, _MOST_HALVINGS = 1e-8, 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,3 +116,23 @@ def linear_miss(plan: Plan, rate: float | None = None) -> LinearMiss:
     needed = float((np.sqrt(share) / spans).max())
     position, rotation = misses.max(axis=0).tolist()
     return LinearMiss(position, rotation, float(np.ceil(needed)))
+
+
+def for_cubics(motion: Trajectory) -> Trajectory:
+    """Return a motion with so many samples that cubics through q and q̇ are it.
+
+    For files without accelerations: each interval is halved until its cubic is near enough.
+    """
+    for _ in range(_MOST_HALVINGS):
+        t = motion.t
+        middle = 0.5 * (t[1:] + t[:-1])
+        cubic = Trajectory(t, motion.q, motion.qd, motion.joint_names)
+        far = np.abs(cubic(middle) - motion(middle)).max(axis=1) > _AS_GOOD_AS
+        if not far.any():
+            break
+        # Alike on both sides of where it matters.
+        wide = np.convolve(far, np.ones(3), "same") > 0.0
+        finer = np.sort(np.concatenate([t, middle[wide]]))
+        q, qd, qdd = (motion(finer, order) for order in range(3))
+        motion = Trajectory(finer, q, qd, motion.joint_names, qdd)
+    return motion

@@ -1,17 +1,17 @@
 """All nodes of a motion at once: where they are on their self-motion manifolds, and eq. 4 there."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from selfmotion import kernels
 from selfmotion.basics import Array
-from selfmotion.follow import Follows
-from selfmotion.nodes.kernels import look, pull
+from selfmotion.follow import BoundFollow, Follows
+from selfmotion.nodes.kernels import accelerate, bend_of, look
 from selfmotion.robot import null_space
 
-# Rates along a motion are differences over this share of its duration.
+# Accelerations of paths are differences of twists over this share of their duration.
 _STEP = 1e-5
 
 
@@ -21,7 +21,7 @@ class Place:
 
     Attributes
     ----------
-    q, qd : (N + 1, n)
+    q, qd, qdd : (N + 1, n)
     tangents : (N + 1, n, r)
         T = ∂q/∂z.
     table : (N + 1, columns)
@@ -30,8 +30,29 @@ class Place:
 
     q: Array
     qd: Array
+    qdd: Array
     tangents: Array
     table: Array
+
+    @property
+    def nodes(self) -> Array:
+        """(q, q̇, q̈), (N + 1, 3, n)."""
+        return np.stack([self.q, self.qd, self.qdd], axis=1)
+
+
+class Bases(NamedTuple):
+    """How q̇ and q̈ change with ν and α at nodes.
+
+    Attributes
+    ----------
+    by_rate : (N + 1, n, r)
+        B = ∂q̇/∂ν = ∂q̈/∂α.
+    by_both : (N + 1, n, r)
+        D = ∂q̈/∂ν.
+    """
+
+    by_rate: Array
+    by_both: Array
 
 
 class Centred(NamedTuple):
@@ -40,12 +61,13 @@ class Centred(NamedTuple):
     Attributes
     ----------
     charts : Charts
-    nu : (N + 1, r)
+    nu, alpha : (N + 1, r)
     place : Place
     """
 
     charts: "Charts"
     nu: Array
+    alpha: Array
     place: Place
 
 
@@ -53,9 +75,10 @@ class Centred(NamedTuple):
 class Charts:
     """Charts of the self-motion manifolds of all nodes, around a motion on the path.
 
-    The coordinates of a node are z (r,), where it is on its manifold, and ν (r,), its null motion
-    in eq. 4, q̇ = J⁺ẋ + (I - J⁺J) N0 ν. Where joints are held at 0, they move no tip, and the last
-    coordinates are theirs.
+    The coordinates of a node are z (r,), where it is on its manifold, ν (r,), its null motion in
+    eq. 4, q̇ = J⁺ẋ + (I - J⁺J) N0 ν, and α (r,), its null acceleration, q̈ = J⁺(ẍ - J̇q̇) +
+    (I - J⁺J) N0 α. Where joints are held at 0, they move no tip, and the last coordinates are
+    theirs.
 
     Attributes
     ----------
@@ -70,43 +93,53 @@ class Charts:
     q: Array
     bases: Array
 
-    def at(self, z: Array, nu: Array) -> Place | None:
-        """Return the nodes at z and ν, (N + 1, r) each; None where one is not to be had."""
-        return self._looked(z, self.null_motions(nu), centred=False)
+    def at(self, z: Array, nu: Array, alpha: Array) -> Place | None:
+        """Return the nodes at z, ν and α, (N + 1, r) each; None where one is not to be had."""
+        found = self._looked(z, self.spread(nu), self.spread(alpha), centred=False)
+        return None if found is None else found[0]
 
-    def centred(self, z: Array, epsilon: Array, *, carried: bool = False) -> Centred | None:
-        """Return charts around the nodes at z (N + 1, r), with what of ε (N + 1, n) acts there.
+    def around(self, z: Array, nu: Array, alpha: Array) -> tuple[Place, Bases] | None:
+        """Return the same with how it changes with ν and α there."""
+        given = z, self.spread(nu), self.spread(alpha)
+        found = self._looked(*given, centred=False, full=True)
+        return None if found is None or found[1] is None else (found[0], found[1])
+
+    def bases_at(self, place: Place) -> Bases:
+        """Return how the motion at a place at the reference changes with ν and α."""
+        other = replace(place, qdd=np.empty_like(place.qdd))
+        return self.manifolds.accelerated(other, np.zeros_like(place.q), self.bases)
+
+    def centred(
+        self, z: Array, epsilon: Array, a: Array, *, carried: bool = False
+    ) -> Centred | None:
+        """Return charts around the nodes at z (N + 1, r), with what of ε and a (N + 1, n) acts.
 
         Of the bases, only the first need be known where they are to be `carried` from node to node.
         None where a node is not to be had.
         """
-        place = self._looked(z, epsilon, centred=True, carried=carried)
-        if place is None:
+        looked = self._looked(z, epsilon, a, centred=True, carried=carried)
+        if looked is None:
             return None
+        place = looked[0]
         around = Charts(self.manifolds, place.q, place.tangents)
-        own = self.manifolds.rates(place.table)[1]
-        nu = (np.swapaxes(place.tangents, 1, 2) @ own[:, :, None])[:, :, 0]
-        return Centred(around, nu, place)
+        own, turned = self.manifolds.rates(place.table)[1], np.swapaxes(place.tangents, 1, 2)
+        nu, alpha = ((turned @ each[:, :, None])[:, :, 0] for each in (own, a))
+        return Centred(around, nu, alpha, place)
 
-    def moving(self, place: Place, qd: Array) -> Centred:
-        """Return the nodes at their `place` at the reference, as fast as q̇ (N + 1, n) in its span.
-
-        J takes N0 to 0, so that another null motion changes q̇ by as much, and nothing else.
-        """
-        nu = (np.swapaxes(self.bases, 1, 2) @ qd[:, :, None])[:, :, 0]
-        table, epsilon = place.table.copy(), self.null_motions(nu)
-        rates, before = self.manifolds.rates(table)
-        rates += epsilon - before
-        before[:] = epsilon
-        return Centred(self, nu, Place(place.q, np.array(rates), place.tangents, table))
-
-    def null_motions(self, nu: Array) -> Array:
-        """Return ε = N0 ν, (N + 1, n)."""
-        return np.asarray((self.bases @ nu[:, :, None])[:, :, 0])
+    def spread(self, coordinates: Array) -> Array:
+        """Return ε = N0 ν or a = N0 α, (N + 1, n)."""
+        return np.asarray((self.bases @ coordinates[:, :, None])[:, :, 0])
 
     def _looked(
-        self, z: Array, epsilon: Array, *, centred: bool, carried: bool = False
-    ) -> Place | None:
+        self,
+        z: Array,
+        epsilon: Array,
+        a: Array,
+        *,
+        centred: bool,
+        carried: bool = False,
+        full: bool = False,
+    ) -> tuple[Place, Bases | None] | None:
         own, bases = self.manifolds, self.bases
         q, table, tangents = np.empty_like(self.q), own.table(), np.empty_like(bases)
         qd, null_motions = own.rates(table)
@@ -117,25 +150,9 @@ class Charts:
         failed = look(q, z, bases, self.q, *given, table, tangents, own.held, centred, along)
         if failed >= 0 and own.is_whole:
             return None
-        return Place(q, np.array(qd), tangents, table)
-
-    def pulled(self, place: Place, by_q: Array, by_qd: Array) -> Array:
-        """Return the derivatives by (z, ν), (N + 1, 2r), of what has these by q and q̇."""
-        own = self.manifolds
-        out = np.empty((len(self.q), 2 * self.bases.shape[2]))
-        pull(
-            np.ascontiguousarray(by_q),
-            np.ascontiguousarray(by_qd),
-            place.table,
-            own.layout,
-            own.work,
-            own.no_error,
-            self.bases,
-            place.tangents,
-            own.follows.every_column(place.q),
-            out,
-        )
-        return out
+        place = Place(q, np.array(qd), np.empty_like(q), tangents, table)
+        around = own.accelerated(place, a, bases if full else None)
+        return place, around if full else None
 
 
 class Manifolds:
@@ -157,26 +174,16 @@ class Manifolds:
         self.follows, self.t, self.copies = follows, np.tile(t, copies), copies
         self.chains, self.layout = follows.chains, follows.layout
         self._sizes = follows.robot.dof, follows.dimension, len(follows.items)
-        self.work = np.zeros(kernels.space_size(*self._sizes[:2]))
-        self.no_error = np.zeros((len(follows.items), 6))
-        # A moment before each node and after: one step back, one on; at the ends of the path both
-        # inside.
-        step, end = _STEP * t[-1], t[-1]
-        steps = step * np.array([-1.0, 1.0])[:, None] * np.ones(len(t))
-        steps[:, t <= step] = step * np.array([1.0, 2.0])[:, None]
-        steps[:, t >= end - step] = step * np.array([-2.0, -1.0])[:, None]
-        times = np.concatenate([t, *(t + steps)])
-        self._steps = np.tile(steps, copies)
-        self._twists, self._paths = [], []
+        self._paths, asked = [], []
         for item in follows.items:
-            own = item.target(times)
-            beside = own.twist[len(t) :].reshape(2, len(t), 6)
-            self._twists.append(np.tile(beside, (1, copies, 1)).reshape(-1, 6))
+            own = item.target(t)
             parts = own.translation, own.rotation.reshape(-1, 9), own.twist
-            path = np.hstack([part[: len(t)] for part in parts])
-            self._paths.append(np.tile(path, (copies, 1)))
+            self._paths.append(np.tile(np.hstack(parts), (copies, 1)))
+            asked.append(_rates_of(item, t))
         self.held = np.tile(follows.held(t), (copies, 1))
         self.targets = np.ascontiguousarray(np.hstack([path[:, :12] for path in self._paths]))
+        # ẍ of the paths, (N + 1, 6 F).
+        self._asked = np.ascontiguousarray(np.tile(np.hstack(asked), (copies, 1)))
 
     def table(self) -> Array:
         """Return a table with nothing in it but the paths."""
@@ -189,6 +196,36 @@ class Manifolds:
     def rates(self, table: Array) -> tuple[Array, Array]:
         """Return q̇ and ε of a table, (N + 1, n) each, as views of it."""
         return kernels.rates_of(table, self.follows.robot.dof)
+
+    def accelerated(self, place: Place, a: Array, bases: Array | None) -> Bases:
+        """Set q̈ of a place for a null acceleration a (N + 1, n).
+
+        Returns how the motion changes with ν and α, for `bases`; without, nothing of use.
+        """
+        full = bases is not None
+        by = np.empty(place.tangents.shape if full else (0, 0, 0))
+        found = Bases(by, np.empty_like(by))
+        accelerate(
+            place.table,
+            self.layout,
+            self.follows.every_column(place.q),
+            self._asked,
+            np.ascontiguousarray(a),
+            np.ascontiguousarray(bases) if full else by,
+            full,
+            place.qdd,
+            *found,
+        )
+        return found
+
+    def bends(self, place: Place, force: Array, directions: Array) -> Array:
+        """Return half the second derivatives of force · q̈ along directions of q̇, (N + 1, d).
+
+        For a force (N + 1, n), and directions (N + 1, n, d).
+        """
+        every = self.follows.every_column(place.q)
+        given = np.ascontiguousarray(directions), np.ascontiguousarray(force)
+        return np.asarray(bend_of(place.table, self.layout, every, *given))
 
     def with_held_last(self, q: Array, bases: Array) -> Array:
         """Return bases (N + 1, n, r) at q (N + 1, n) whose last vectors are those of held joints.
@@ -226,40 +263,47 @@ class Manifolds:
             self._put_held_last(k, q[k], spaces)
         return spaces
 
-    def near(self, q: Array, epsilon: Array) -> Centred | None:
-        """Return charts around the nodes nearest to q, with what of ε acts there, (N + 1, n) each.
+    def near(self, q: Array, epsilon: Array, a: Array) -> Centred | None:
+        """Return charts around the nodes nearest to q, with what of ε and a acts there.
 
-        Their bases turn no more than they must from each node to the next. None where a node does
-        not come onto its manifold.
+        (N + 1, n) each. Their bases turn no more than they must from each node to the next. None
+        where a node does not come onto its manifold.
         """
         n, m, _ = self._sizes
         none = np.zeros((len(q), n - m))
         if self.held.any():
-            q, epsilon = (np.where(self.held, 0.0, x) for x in (q, epsilon))
-            return Charts(self, q, self._bases(q)).centred(none, epsilon)
+            q, epsilon, a = (np.where(self.held, 0.0, x) for x in (q, epsilon, a))
+            return Charts(self, q, self._bases(q)).centred(none, epsilon, a)
         bases = np.zeros((len(q), n, n - m))
         for first in range(0, len(q), len(q) // self.copies):
             bases[first] = self.follows.null_basis(q[first])
-        return Charts(self, q, bases).centred(none, epsilon, carried=True)
+        return Charts(self, q, bases).centred(none, epsilon, a, carried=True)
 
-    def accelerations(self, place: Place) -> Array:
-        """Return the least q̈ by which nodes follow the path, (N + 1, n): J⁺(ẍ - J̇q̇).
 
-        J q̈ is the rate of ẋ - J q̇ along the motion at fixed q̇: a central difference, which at marks
-        of the path, where it may jump, is the mean of both sides.
-        """
-        steps, (count, n) = self._steps, place.q.shape
-        moved, rates = place.q + steps[:, :, None] * place.qd, np.tile(place.qd, (2, 1))[:, :, None]
-        unmet = []
-        for item, twist in zip(self.follows.items, self._twists, strict=True):
-            jacobian, rotation, _ = item.chain.along(moved.reshape(-1, n))
-            off = twist[:, :, None] - jacobian @ rates
-            unmet.append(item.task.select_along(off, rotation)[:, :, 0])
-        before, after = np.concatenate(unmet, axis=1).reshape(2, count, -1)
-        right = ((after - before) / (steps[1] - steps[0])[:, None])[:, :, None]
-        rows = kernels.rows_along(place.table, n, right.shape[1])
-        turned = np.swapaxes(rows, 1, 2)
-        return np.asarray((turned @ np.linalg.solve(rows @ turned, right))[:, :, 0])
+def _rates_of(item: BoundFollow, t: Array) -> Array:
+    """Return the rates ẍ of a path's twists at times t (N + 1,), (N + 1, 6).
+
+    Central differences, which where it may jump are the means of both sides; at the ends of the
+    path differences to one side, of second order as well.
+    """
+    step, end = _STEP * t[-1], t[-1]
+    sides = np.where(t <= step, 1.0, np.where(t >= end - step, -1.0, 0.0))
+    one = np.flatnonzero(sides)
+    sign, here = sides[one], t[one]
+    times = np.concatenate(
+        [
+            np.minimum(t + step, end),
+            np.maximum(t - step, 0.0),
+            *(here, here + sign * step, here + 2.0 * sign * step),
+        ]
+    )
+    found = item.target(times).twist
+    after, before, beside = np.split(found, [len(t), 2 * len(t)])
+    rates = (after - before) / (2.0 * step)
+    first, second, third = beside.reshape(3, len(one), -1)
+    inward = (-3.0 * first + 4.0 * second - third) / (2.0 * step)
+    rates[one] = sign[:, None] * inward
+    return np.asarray(rates)
 
 
 def orthonormal(tangents: Array) -> Array:

@@ -7,9 +7,8 @@ import numpy as np
 
 from selfmotion.basics import Array, Ints
 from selfmotion.constraints import BoundEnd
-from selfmotion.nodes.hermite import HermiteSamples
 
-_FIRST, _LAST = 0, 1
+_FIRST, _LAST, _ORDERS = 0, 1, 3
 
 
 class Border(NamedTuple):
@@ -40,12 +39,11 @@ class Border(NamedTuple):
 
 
 class NodeEnds:
-    """Conditions on q and q̇ at both ends: given ones, or the same at the end as at the start.
+    """Conditions on q, q̇ and q̈ at both ends: given ones, or the same at the end as at the start.
 
     Parameters
     ----------
     items : sequence of BoundEnd
-        None of accelerations, see `takes`.
 
     Attributes
     ----------
@@ -57,44 +55,41 @@ class NodeEnds:
         self._items = tuple(items)
         self.count = sum(len(item.orders) * item.null.shape[1] for item in items)
 
-    @staticmethod
-    def takes(item: object) -> bool:
-        """Whether a condition is one of positions and velocities at the ends."""
-        return isinstance(item, BoundEnd) and max(item.orders) < 2
-
-    def residuals(self, samples: HermiteSamples) -> Array:
-        """Return c, (E,)."""
-        return np.concatenate([np.zeros(0), *(item.residual(samples)[0] for item in self._items)])
-
-    def rows(self, changes: Array) -> Array:
-        """Return ∂c/∂w of the first and the last node, (E, 2, 2r).
-
-        `changes` (N + 1, 2, n, 2r) is ∂(q, q̇)/∂w of the nodes.
-        """
-        ends = changes[[0, -1]]
-        none = np.zeros((0, 2, changes.shape[3]))
-        return np.concatenate([none, *(_over(self._signed(item), ends) for item in self._items)])
+    def residuals(self, nodes: Array) -> Array:
+        """Return c, (E,), for (q, q̇, q̈) of the nodes, (N + 1, 3, n)."""
+        found = [np.zeros(0)]
+        for item in self._items:
+            for order in item.orders:
+                if item.target is None:
+                    off = nodes[-1, order] - nodes[0, order]
+                else:
+                    off = nodes[-1 if item.row else 0, order] - item.target
+                found.append(item.null.T @ off)
+        return np.concatenate(found)
 
     def border(self, c: Array, changes: Array, held: Ints) -> Border:
-        """Return what is off, c (E,), with its derivatives; nothing moves what is `held`."""
+        """Return what is off, c (E,), with its derivatives; nothing moves what is `held`.
+
+        `changes` (N + 1, 3, n, s) is ∂(q, q̇, q̈)/∂w of the nodes.
+        """
         count, _, _, size = changes.shape
         by_node = np.zeros((count, size, self.count))
         if self.count:
-            by_node[[0, -1]] = np.moveaxis(self.rows(changes), 0, 2)
+            rows = [_over(self._signed(item), changes[[0, -1]]) for item in self._items]
+            by_node[[0, -1]] = np.moveaxis(np.concatenate(rows), 0, 2)
         columns = by_node.reshape(count * size, self.count)
         columns[held] = 0.0
         return Border(c, columns)
 
     def pulled(self, prices: Array, count: int) -> Array:
-        """Return Σ prices (E,) · ∂c/∂(q, q̇) of the nodes, (count, 2, n)."""
+        """Return Σ prices (E,) · ∂c/∂(q, q̇, q̈) of the nodes, (count, 3, n)."""
         n = self._items[0].null.shape[0]
-        found, first = np.zeros((count, 2, n)), 0
+        found, first = np.zeros((count, _ORDERS, n)), 0
         for item in self._items:
             signed = self._signed(item)
             own = prices[first : first + len(signed)]
             first += len(signed)
-            by = np.einsum("e,eokn->kon", own, signed)
-            found[[0, -1]] += by
+            found[[0, -1]] += np.einsum("e,eokn->kon", own, signed)
         return found
 
     def by_item(self, prices: Array) -> dict[int, Array]:
@@ -107,18 +102,18 @@ class NodeEnds:
         return found
 
     def _signed(self, item: BoundEnd) -> Array:
-        """Return ∂c/∂(q, q̇) of the first and the last node, (e, 2 orders, 2 nodes, n)."""
+        """Return ∂c/∂(q, q̇, q̈) of the first and the last node, (e, 3 orders, 2 nodes, n)."""
         n, r = item.null.shape
-        found = np.zeros((len(item.orders), r, 2, 2, n))
+        found = np.zeros((len(item.orders), r, _ORDERS, 2, n))
         for place, order in enumerate(item.orders):
             if item.target is None:
                 found[place, :, order, _LAST] = item.null.T
                 found[place, :, order, _FIRST] = -item.null.T
             else:
                 found[place, :, order, _LAST if item.row else _FIRST] = item.null.T
-        return found.reshape(-1, 2, 2, n)
+        return found.reshape(-1, _ORDERS, 2, n)
 
 
 def _over(signed: Array, ends: Array) -> Array:
-    """Return Σ signed (e, 2, 2, n) · ends (2 nodes, 2 orders, n, d), (e, 2, d)."""
+    """Return Σ signed (e, 3, 2, n) · ends (2 nodes, 3 orders, n, d), (e, 2, d)."""
     return np.asarray(np.einsum("eokn,kond->ekd", signed, ends))

@@ -1,18 +1,20 @@
-"""What numba compiles: nodes put onto their self-motion manifolds, eq. 4 there, and both backward.
+"""What numba compiles: nodes put onto their self-motion manifolds, and eq. 4 and its rate there.
 
 Each node's chart is around a reference on the manifold, with an orthonormal basis N0 of the null
 space there: z are the coordinates N0ᵀ(q - q_ref) of q on the manifold {q : F(q) = x}, and ε = N0 ν
 is the null motion of eq. 4. With B = [J; N0ᵀ],
 
-    ∂q/∂z = T = B⁻¹ [0; I],    ∂q̇/∂ν = (I - J⁺J) N0,    ∂q̇/∂z = (∂q̇/∂q) T.
+    ∂q/∂z = T = B⁻¹ [0; I],    ∂q̇/∂ν = (I - J⁺J) N0.
+
+The rate of eq. 4 along the motion is q̈ = J⁺(ẍ - J̇q̇) + (I - J⁺J) a, with a = N0 α of the node.
 """
 
 from math import sqrt
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, inlined, kernel
-from selfmotion.basics.layout import Layout
+from selfmotion.basics import Array, Flags, Ints, called, inlined, kernel
+from selfmotion.basics.layout import KIND, ORDER, POINTING, Layout
 from selfmotion.kernels import (
     Every,
     Tip,
@@ -21,15 +23,22 @@ from selfmotion.kernels import (
     errors_and_rows,
     finite,
     gram,
-    pull_stage,
     respond,
     rows_of,
     select,
     solve_cholesky,
-    space_of,
     stage_of,
     tip_of,
     view,
+)
+from selfmotion.kernels.algebra import (
+    Vector,
+    add_angular,
+    angular,
+    angular_part,
+    cross,
+    linear,
+    plus,
 )
 from selfmotion.robot import place_tips
 
@@ -191,31 +200,168 @@ def _note(tip: Tip, turn: Array, place: Array, six: Array) -> None:
 
 
 @kernel
-def pull(
-    by_q: Array,
-    by_qd: Array,
+def accelerate(
     table: Array,
     layout: Layout,
-    work: Array,
-    no_error: Array,
-    bases: Array,
-    tangents: Array,
     every: Every | None,
+    asked: Array,
+    alpha: Array,
+    bases: Array,
+    full: bool,
+    qdd: Array,
+    by_rate: Array,
+    by_both: Array,
+) -> None:
+    """Set q̈ (K, n) of nodes whose motion `look` has evaluated: q̈ = a + J⁺(b - J a).
+
+    With a (K, n) = `alpha` the null acceleration, b = S(ẍ - J̇q̇) + Ṡ(ẋ - Jq̇), and ẍ = `asked`
+    (K, 6 F). If `full`, also ∂q̇/∂ν = ∂q̈/∂α = B = (I - J⁺J) N0 (K, n, r) = `by_rate`, and
+    ∂q̈/∂ν = J⁺ ∂b/∂q̇ B (K, n, r) = `by_both`: b is quadratic in q̇, so that its central
+    difference is exact.
+    """
+    (count, n), m, r = qdd.shape, rows_of(layout), bases.shape[2]
+    right, other, six = np.empty(m), np.empty(m), np.empty(6)
+    rates, way = np.empty(n), np.empty(n)
+    for k in range(count):
+        at = stage_of(table[k], n, m)
+        _needed(table[k], layout, every, k, asked[k], at.qd, six, right)
+        _answer(at.task_jacobian, at.factor, right, alpha[k], qdd[k])
+        if not full:
+            continue
+        for x in range(r):
+            for j in range(n):
+                way[j] = bases[k, j, x]
+            for i in range(m):
+                right[i] = 0.0
+            _answer(at.task_jacobian, at.factor, right, way, rates)
+            for j in range(n):
+                by_rate[k, j, x], way[j] = rates[j], at.qd[j] + rates[j]
+            _needed(table[k], layout, every, k, asked[k], way, six, right)
+            for j in range(n):
+                way[j] = at.qd[j] - rates[j]
+            _needed(table[k], layout, every, k, asked[k], way, six, other)
+            for i in range(m):
+                right[i] = 0.5 * (right[i] - other[i])
+            for j in range(n):
+                way[j] = 0.0
+            _answer(at.task_jacobian, at.factor, right, way, rates)
+            for j in range(n):
+                by_both[k, j, x] = rates[j]
+
+
+@kernel
+def bend_of(
+    table: Array, layout: Layout, every: Every | None, directions: Array, force: Array
+) -> Array:
+    """Return half the second derivatives of λᵀq̈ along directions of q̇, (K, d).
+
+    For λ = `force` (K, n) and u = `directions` (K, n, d): -λᵀJ⁺ Q(u, u), with J̇q̇ = Q(q̇, q̇).
+    """
+    (count, n, size), m = directions.shape, rows_of(layout)
+    out, way, six = np.zeros((count, size)), np.empty(n), np.empty(6)
+    right, other, by = np.empty(m), np.empty(m), np.empty(m)
+    none = np.zeros(6 * layout.shape[0])
+    for k in range(count):
+        at = stage_of(table[k], n, m)
+        for i in range(m):
+            by[i] = 0.0
+            for j in range(n):
+                by[i] += at.task_jacobian[i, j] * force[k, j]
+        solve_cholesky(at.factor, by)
+        for x in range(size):
+            for j in range(n):
+                way[j] = directions[k, j, x]
+            _needed(table[k], layout, every, k, none, way, six, right)
+            for j in range(n):
+                way[j] = -way[j]
+            _needed(table[k], layout, every, k, none, way, six, other)
+            for i in range(m):
+                out[k, x] += 0.5 * by[i] * (right[i] + other[i])
+    return out
+
+
+@called
+def _needed(
+    row: Array,
+    layout: Layout,
+    every: Every | None,
+    s: int,
+    asked: Array,
+    rates: Array,
+    six: Array,
     out: Array,
 ) -> None:
-    """Set `out` (K, 2 r) to the derivatives by (z, ν) of what has these by q and q̇ (K, n) each."""
-    (count, n), m, r = by_q.shape, rows_of(layout), bases.shape[2]
-    space = space_of(work, n, m)
-    for k in range(count):
+    """Set `out` (m,) to what q̈ has to make of the rows at q̇ = `rates`; `six` is to work in.
+
+    Rows in tool axes turn with the tool: there, Ṡ(ẋ - Jq̇) = -S(ω × ω_d).
+    """
+    n, m = len(rates), rows_of(layout)
+    for f in range(layout.shape[0]):
+        tip = tip_of(row, f, n, m)
+        if every is None:
+            spin = _turned(layout, f, tip.jacobian, rates, six)
+        else:
+            spin = _turned_every(every[1], f, every[0][s, f], rates, six)
+        for i in range(6):
+            six[i] = asked[6 * f + i] - six[i]
+        if layout[f, KIND] == POINTING:
+            add_angular(six, -1.0, cross(spin, angular_part(tip.target_twist)))
+        select(layout, f, tip.rotation, six, out)
+
+
+@inlined
+def _turned(layout: Layout, f: int, jacobian: Array, rates: Array, out: Array) -> Vector:
+    """Set `out` (6,) to J̇6 q̇ of tip f, and return the tip's angular velocity.
+
+    By two running sums along the chain, see `selfmotion.kernels.contraction`: with s_i, w_i the
+    shares of joint i in the tip's velocities and W_<i the sum of w before it,
+
+        J̇6 q̇ = Σ_i [(2 W_<i + w_i) × s_i; W_<i × w_i].
+    """
+    spin, v, w = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for i in range(len(rates)):
+        k = layout[f, ORDER + i]
+        v, w, spin = _added(linear(jacobian, k), angular(jacobian, k), rates[k], spin, v, w)
+    for i in range(3):
+        out[i], out[3 + i] = v[i], w[i]
+    return spin
+
+
+@inlined
+def _turned_every(members: Ints, f: int, own: Array, rates: Array, out: Array) -> Vector:
+    """Do the same for the columns `own` (6, W) of all joints, of which some share a coordinate."""
+    spin, v, w, last = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), members.shape[0] - 1
+    for i in range(own.shape[1]):
+        j = members[f, i]
+        rate = rates[members[last, j]]
+        v, w, spin = _added(linear(own, j), angular(own, j), rate, spin, v, w)
+    for i in range(3):
+        out[i], out[3 + i] = v[i], w[i]
+    return spin
+
+
+@inlined
+def _added(
+    place: Vector, axis: Vector, rate: float, spin: Vector, v: Vector, w: Vector
+) -> tuple[Vector, Vector, Vector]:
+    """Return the sums v, w and W with one joint more."""
+    own = (rate * axis[0], rate * axis[1], rate * axis[2])
+    twice = plus(own, 2.0, spin)
+    return plus(v, rate, cross(twice, place)), plus(w, 1.0, cross(spin, own)), plus(own, 1.0, spin)
+
+
+@inlined
+def _answer(jacobian: Array, factor: Array, right: Array, way: Array, out: Array) -> None:
+    """Set `out` (n,) to p + J⁺(b - J p) for p = `way`; `right` (m,) is b, and is written over."""
+    m, n = jacobian.shape
+    for i in range(m):
         for j in range(n):
-            space.w[j], space.by_q[j] = by_qd[k, j], by_q[k, j]
-        pull_stage(table[k], n, layout, 0.0, None, every, k, space, no_error, space.by_epsilon)
-        for x in range(r):
-            along, free = 0.0, 0.0
-            for j in range(n):
-                along += tangents[k, j, x] * space.by_q[j]
-                free += bases[k, j, x] * space.by_epsilon[j]
-            out[k, x], out[k, r + x] = along, free
+            right[i] -= jacobian[i, j] * way[j]
+    solve_cholesky(factor, right)
+    for j in range(n):
+        out[j] = way[j]
+        for i in range(m):
+            out[j] += jacobian[i, j] * right[i]
 
 
 @kernel

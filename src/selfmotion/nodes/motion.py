@@ -2,9 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import pairwise
-from typing import Any
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -13,21 +11,15 @@ from selfmotion.constraints import BoundConstraint, BoundEnd
 from selfmotion.costs import Partials
 from selfmotion.engine import Counts
 from selfmotion.motion import Trajectory
-from selfmotion.nodes.charts import Charts, Manifolds, Place
-from selfmotion.nodes.conditions import NodeConditions
+from selfmotion.nodes.charts import Centred, Charts, Manifolds, Place
 from selfmotion.nodes.ends import NodeEnds
-from selfmotion.nodes.hermite import HermiteSamples, QuinticSamples
 from selfmotion.nodes.kernels import follow
 from selfmotion.nodes.objective import NodeCost
-from selfmotion.nodes.smoothness import Continuity, smoothing_at_rest
-from selfmotion.nodes.spline import Hermite
+from selfmotion.nodes.rows import NodeRows, looked
+from selfmotion.nodes.samples import CurveSamples
+from selfmotion.nodes.smoothness import smoothing_of, would_be_calm
+from selfmotion.nodes.spline import AT_GAUSS, Quintic
 from selfmotion.problem import Problem
-
-# A limit binds between two nodes where it is this near [units of h].
-_ALONG = 1e-5
-# Accelerations that differ from the differences of velocities by more than the largest of these
-# times this are those of a pose that is all but singular, and are damped by this much.
-_WILD, _DAMPING = 1.0, 1e-2
 
 
 class NodeGrid:
@@ -39,29 +31,28 @@ class NodeGrid:
     t : (N + 1,)
         Times of the nodes [s].
     constraints : sequence of BoundConstraint
-        Conditions at each node, h ≤ 0, and at the ends, c = 0.
+        Conditions along the motion, h ≤ 0, and at the ends, c = 0.
     free : bool
         Whether the start may move along its self-motion.
     counts : Counts
         Where work is added up.
-    continuous : bool
-        Whether accelerations are kept from jumping at the nodes.
+    calm : bool
+        Whether motions are kept from wavering everywhere, see `smoothing_of`.
     copies : int, optional
         Of how many motions these are the nodes, one after the other, at times `t` each; see
         `Manifolds`.
 
     Attributes
     ----------
-    spline : Hermite
+    spline : Quintic
     manifolds : Manifolds
     cost : NodeCost
-    conditions : NodeConditions
+    rows : NodeRows
     ends : NodeEnds
-    is_continuous : bool
-        Whether they are kept so at all nodes.
-    continuity : Continuity or None
+    scale : (3r,)
+        What makes w all rad: 1, and the reciprocals of a usual step and of its square.
     held : (k,)
-        Numbers of the coordinates w (N + 1, 2r), in one row, that stay as they are.
+        Numbers of the coordinates w (N + 1, 3r), in one row, that stay as they are.
     """
 
     def __init__(
@@ -72,33 +63,37 @@ class NodeGrid:
         *,
         free: bool,
         counts: Counts,
-        continuous: bool = False,
+        calm: bool = False,
         copies: int | None = None,
     ) -> None:
-        self.problem, self.free, self.counts = problem, free, counts
+        self.problem, self.free, self.counts, self.calm = problem, free, counts, calm
         follows = problem.follows
         self.manifolds = Manifolds(follows, t, copies)
         copies = self.manifolds.copies
-        self.spline = Hermite(t, copies)
-        self.is_continuous = continuous
-        self.continuity = None
-        if continuous or (follows.edges and copies == 1):
-            self.continuity = Continuity(problem, self.spline, everywhere=continuous)
-        smoothing = smoothing_at_rest(problem, self.spline)
+        self.spline = Quintic(t, copies)
+        smoothing = smoothing_of(problem, self.spline, calm=calm)
         self.cost = NodeCost(follows, self.spline, problem.all_costs, smoothing)
-        ends = [item for item in constraints if isinstance(item, BoundEnd)]
-        self.ends = NodeEnds(ends)
+        self.ends = NodeEnds([item for item in constraints if isinstance(item, BoundEnd)])
         others = [item for item in constraints if not item.equality]
-        self.conditions = NodeConditions(self.spline, others, follows.robot.dof)
+        self.rows = NodeRows(self.spline, others, follows.robot.dof)
         self._constraints = tuple(constraints)
+        self._one = t
         r = follows.robot.dof - follows.dimension
+        usual = float(np.median(np.diff(t)))
+        self.scale = np.repeat([1.0, 1.0 / usual, 1.0 / usual**2], r)
+        # Nodes at which q̇ and q̈ are given, by order.
+        first = len(t) * np.arange(copies)
+        self._resting: list[Ints] = []
+        for order in (1, 2):
+            asked = [rest >= order for rest in problem.rest_orders]
+            ends = np.array([0, len(t) - 1])[np.array(asked)]
+            self._resting.append((ends + first[:, None]).ravel())
         held: list[Ints] = [] if free else [np.arange(r)]
-        ends = np.array([0, len(t) - 1])[np.array(problem.rests)]
-        self._resting = (ends + len(t) * np.arange(copies)[:, None]).ravel()
-        held += [2 * r * node + r + np.arange(r) for node in self._resting]
+        for order, nodes in enumerate(self._resting, 1):
+            held += [3 * r * node + order * r + np.arange(r) for node in nodes]
         for node, count in enumerate(self.manifolds.held.sum(axis=1)):
-            last = 2 * r * node + np.arange(r - count, r)
-            held += [last, last + r] if count else []
+            last = 3 * r * node + np.arange(r - count, r)
+            held += [last, last + r, last + 2 * r] if count else []
         self.held = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *held]))
 
     @property
@@ -106,59 +101,77 @@ class NodeGrid:
         """Times of the nodes [s], (N + 1,)."""
         return self.spline.t
 
-    def on(self, t: Array) -> "NodeGrid":
-        """Return the same on other nodes."""
-        return self._other(t, continuous=self.is_continuous)
+    def on(self, t: Array, *, calm: bool = False) -> "NodeGrid":
+        """Return the same on other nodes, and from now on `calm` if wanted."""
+        found = self._other(t, calm=calm)
+        found.rows = self.rows.on(found.spline)
+        return found
 
-    @property
-    def continuous(self) -> "NodeGrid":
-        """The same with accelerations that are kept from jumping."""
-        return self._other(self.t, continuous=True)
+    def without_rows(self) -> "NodeGrid":
+        """Return the same with nothing asked but what its ends are."""
+        return self._other(self._one, [item for item in self._constraints if item.equality])
 
     def copied(self, copies: int) -> "NodeGrid":
         """Return the nodes of so many motions, one after the other, for `Together`.
 
         Of what belongs to several, `NodeMotion` knows places, samples and costs alone.
         """
-        one = self.t[: len(self.t) // self.manifolds.copies]
-        return self._other(one, continuous=False, copies=copies)
+        return self._other(self._one, copies=copies)
 
-    def _other(self, t: Array, *, continuous: bool, copies: int | None = None) -> "NodeGrid":
+    def _other(
+        self,
+        t: Array,
+        constraints: Sequence[BoundConstraint] | None = None,
+        *,
+        calm: bool = False,
+        copies: int | None = None,
+    ) -> "NodeGrid":
         return NodeGrid(
             self.problem,
             t,
-            self._constraints,
+            self._constraints if constraints is None else constraints,
             free=self.free,
             counts=self.counts,
-            continuous=continuous,
+            calm=calm or self.calm,
             copies=copies,
         )
 
-    def near(self, q: Array, qd: Array) -> "NodeMotion | None":
-        """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇.
+    def near(self, q: Array, qd: Array, qdd: Array | None = None) -> "NodeMotion | None":
+        """Return the motion whose nodes are those nearest to q (N + 1, n) at q̇ and q̈.
 
-        None where a node does not come onto its manifold.
+        Without q̈, what differences of q and q̇ make of it. None where a node does not come onto its
+        manifold.
         """
-        found = self.manifolds.near(q, self._free(qd))
-        return None if found is None else self.at(*found)
+        if qdd is None:
+            qdd = self._accelerations(q, qd)
+        found = self.manifolds.near(q, self._free(qd, 1), self._free(qdd, 2))
+        return None if found is None else self.at(found)
 
-    def around(self, charts: Charts, qd: Array) -> "NodeMotion | None":
-        """Return the motion at z = 0 of charts whose velocities are nearest to q̇, or None."""
+    def _accelerations(self, q: Array, qd: Array) -> Array:
+        """Return q̈ at the nodes: the means of what cubics through q and q̇ have on both sides."""
+        h, size = self.spline.steps[:, None], len(self._one)
+        rise, first, second = (q[1:] - q[:-1]) / h, qd[:-1], qd[1:]
+        left = (6.0 * rise - 4.0 * first - 2.0 * second) / h
+        right = (-6.0 * rise + 2.0 * first + 4.0 * second) / h
+        after, before = np.concatenate([left, left[-1:]]), np.concatenate([right[:1], right])
+        found = 0.5 * (before + after)
+        found[::size], found[size - 1 :: size] = after[::size], before[size - 1 :: size]
+        return np.asarray(found)
+
+    def around(self, charts: Charts, qd: Array, qdd: Array) -> "NodeMotion | None":
+        """Return the motion at z = 0 of charts whose rates are nearest to q̇ and q̈, or None."""
         own = self.manifolds.held
         if own.any():
             q = np.where(own, 0.0, charts.q)
             charts = replace(charts, q=q, bases=self.manifolds.with_held_last(q, charts.bases))
-        found = charts.centred(np.zeros((len(qd), charts.bases.shape[2])), self._free(qd))
-        return None if found is None else self.at(*found)
+        none = np.zeros((len(qd), charts.bases.shape[2]))
+        found = charts.centred(none, self._free(qd, 1), self._free(qdd, 2))
+        return None if found is None else self.at(found)
 
-    def moving(self, motion: "NodeMotion", qd: Array) -> "NodeMotion":
-        """Return the motion through the same nodes whose velocities are nearest to q̇."""
-        return self.at(*motion.charts.moving(motion.place, self._free(qd)))
-
-    def _free(self, qd: Array) -> Array:
-        """Return what velocities are where the arm does not rest."""
-        found = np.where(self.manifolds.held, 0.0, qd)
-        found[self._resting] = 0.0
+    def _free(self, rates: Array, order: int) -> Array:
+        """Return what rates are where the arm does not rest."""
+        found = np.where(self.manifolds.held, 0.0, rates)
+        found[self._resting[order - 1]] = 0.0
         return found
 
     def motion_towards(self, start: Array, wanted: Array, time: float) -> "NodeMotion | None":
@@ -172,12 +185,12 @@ class NodeGrid:
         share = np.minimum(np.append(0.0, np.diff(self.t)) / time, 1.0)
         if follow(start, wanted, share, own.targets, own.chains, own.layout, own.held, q) >= 0:
             return None
-        return self.near(q, np.asarray(np.gradient(q, self.t, axis=0)))
+        qd = np.asarray(np.gradient(q, self.t, axis=0))
+        return self.near(q, qd, np.asarray(np.gradient(qd, self.t, axis=0)))
 
-    def at(self, charts: Charts, nu: Array, place: Place) -> "NodeMotion":
-        """Return the motion of a place."""
-        samples = HermiteSamples(self.manifolds.follows, self.spline, place.q, place.qd)
-        return NodeMotion(self, charts, nu, place, samples)
+    def at(self, found: Centred) -> "NodeMotion":
+        """Return the motion of nodes at the reference of their charts."""
+        return NodeMotion(self, *found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,17 +201,43 @@ class NodeMotion:
     ----------
     grid : NodeGrid
     charts : Charts
-    nu : (N + 1, r)
-        Null motions there.
+    nu, alpha : (N + 1, r)
+        Null motions and null accelerations there.
     place : Place
-    samples : HermiteSamples
     """
 
     grid: NodeGrid
     charts: Charts
     nu: Array
+    alpha: Array
     place: Place
-    samples: HermiteSamples
+
+    @cached_property
+    def curve_ends(self) -> Array:
+        """Y of each interval, (N, 6, n); see `Quintic`."""
+        return self.grid.spline.ends(self.place.nodes)
+
+    @property
+    def centred(self) -> Centred:
+        """The nodes at the reference of their charts."""
+        return Centred(self.charts, self.nu, self.alpha, self.place)
+
+    def _at_gauss(self, order: int) -> Array:
+        n = self.place.q.shape[1]
+        return self.grid.spline.at(AT_GAUSS, order, self.curve_ends).reshape(-1, n)
+
+    @cached_property
+    def samples(self) -> CurveSamples:
+        """The motion as costs see it."""
+        grid = self.grid
+        return CurveSamples(grid.manifolds.follows, grid.spline.sampling, self._at_gauss)
+
+    @cached_property
+    def checked(self) -> CurveSamples:
+        """The motion as constraints see it that are no limits of joints."""
+        grid = self.grid
+        at = partial(grid.spline.at_points, ends=self.curve_ends)
+        return CurveSamples(grid.manifolds.follows, grid.spline.points, at)
 
     @cached_property
     def terms(self) -> dict[str, float]:
@@ -212,47 +251,9 @@ class NodeMotion:
         return sum(self.terms.values())
 
     @cached_property
-    def exact(self) -> QuinticSamples:
-        """The `trajectory`, which is on its path between the nodes, at the spline's samples."""
-        grid = self.grid
-        return QuinticSamples(grid.problem.follows, grid.spline, self.trajectory)
-
-    @cached_property
-    def exact_terms(self) -> dict[str, float]:
-        """What each cost contributes along `trajectory`."""
-        return self.grid.cost.terms(self.exact)
-
-    @cached_property
-    def along(self) -> Flags:
-        """On which intervals a condition binds, (N,)."""
-        return self.grid.conditions.along(self.samples.checked, _ALONG)
-
-    @property
-    def ends_of_limits(self) -> Flags:
-        """Near which intervals a limit of accelerations begins or ends to bind, (N,)."""
-        changes = np.zeros(len(self.along) + 3, dtype=np.bool_)
-        if self.grid.is_continuous:
-            changes[2:-2] = self.along[1:] != self.along[:-1]
-        # Two intervals before, and two after.
-        return changes[:-3] | changes[1:-2] | changes[2:-1] | changes[3:]
-
-    def broken(self) -> Flags:
-        """Return on which intervals `trajectory` does not keep the conditions, (N,)."""
-        broken = self.grid.conditions.broken(self.exact)[:-1]
-        return np.asarray(broken.reshape(len(self.grid.t) - 1, -1).any(axis=1))
-
-    @property
-    def exact_cost(self) -> float:
-        """F along `trajectory`."""
-        return sum(self.exact_terms.values())
-
-    @cached_property
     def aim(self) -> float:
         """What is minimised: F and what keeps the motion smooth."""
-        rough, continuity = self.grid.cost.roughness(self.samples), self.grid.continuity
-        if continuity is not None:
-            rough += 0.5 * float(np.sum(continuity.jumps(self.samples) ** 2))
-        return self.cost + rough
+        return self.cost + self.grid.cost.roughness(self.curve_ends)
 
     @cached_property
     def partials(self) -> tuple[Partials, ...]:
@@ -261,103 +262,71 @@ class NodeMotion:
 
     @cached_property
     def h(self) -> Array:
-        """The conditions, (N + 1, C)."""
-        return self.grid.conditions.residuals(self.samples.checked)
+        """All rows, less what is granted of their tolerances, (R,); see `NodeRows`."""
+        return self.grid.rows.residuals(self.checked, self.curve_ends)
 
     @cached_property
     def c(self) -> Array:
         """What is off at the ends, (E,)."""
-        return self.grid.ends.residuals(self.samples)
+        return self.grid.ends.residuals(self.place.nodes)
 
     @cached_property
-    def orders(self) -> Ints:
-        """The highest derivative of q that each condition depends on, (C,)."""
-        return self.grid.conditions.orders(self.samples.checked)
+    def violation(self) -> float:
+        """By how much the worst row is beyond its tolerance [units of h]; 0 where all are kept."""
+        return float(np.max(self.h - self.grid.rows.granted(), initial=0.0))
 
-    @property
-    def wanted(self) -> Array:
-        """The conditions as Newton's method is to keep them, (N + 1, C).
+    def breaks_hard(self) -> bool:
+        """Whether a row is beyond its tolerance that is not of a tolerance of the task."""
+        rows = self.grid.rows
+        beyond = rows.split(self.h - rows.granted())
+        pairs = zip(rows.constraints, beyond, strict=True)
+        return any(
+            not np.max(own, initial=0.0) <= 0.0
+            for item, own in pairs
+            if not getattr(item, "counts_at_once", False)
+        )
 
-        Half of what they may be beyond is for what is between the nodes.
-        """
-        return self.h - 0.5 * self.grid.conditions.tolerances
+    def would_be_calm(self) -> bool:
+        """Whether it may be kept from wavering, see `smoothing_of`."""
+        return would_be_calm(self.grid.problem, self.samples, self.cost)
 
     @property
     def epsilon(self) -> Array:
-        """The null motion ε at the nodes, (N + 1, n)."""
-        return self.charts.null_motions(self.nu)
+        """The null motion ε = N0 ν at the nodes, (N + 1, n)."""
+        return self.charts.spread(self.nu)
+
+    def stepped(self, step: Array) -> "NodeMotion | None":
+        """Return the motion at a step (N + 1, 3r) of scaled coordinates; None where it is none."""
+        r = self.nu.shape[1]
+        z, nu, alpha = np.split(step * self.grid.scale, [r, 2 * r], axis=1)
+        epsilon, a = self.charts.spread(self.nu + nu), self.charts.spread(self.alpha + alpha)
+        found = self.charts.centred(z, epsilon, a)
+        return None if found is None else self.grid.at(found)
+
+    def broken_between(self) -> Flags:
+        """Return on which intervals something is broken between the points, (N,)."""
+        grid = self.grid
+        if not grid.rows.looks_between:
+            return np.zeros(grid.spline.count, dtype=np.bool_)
+        curve = looked(grid.spline, grid.manifolds.follows, self.curve_ends)
+        return grid.rows.broken_between(curve)
 
     def forget(self) -> None:
-        """Let go of what can be computed anew: most of the memory that a long path takes."""
-        for name in ("exact", "h", "partials"):
+        """Let go of what can be computed anew."""
+        for name in ("samples", "checked", "partials", "h", "curve_ends"):
             self.__dict__.pop(name, None)
-        self.samples.forget()
-
-    def smoothed(self) -> "NodeMotion":
-        """Return the motion through the same nodes, as fast there as a spline through them.
-
-        Where few nodes are, the velocities that are best by the samples of the cost waver about
-        those of a smooth motion through the same nodes, which differ by next to nothing in cost.
-        """
-        from scipy.interpolate import CubicSpline
-
-        t, q, qd = self.grid.t, self.place.q, self.place.qd.copy()
-        # Where the path is only C², so is the motion.
-        ends = np.searchsorted(t, self.grid.problem.knots)
-        for first, last in pairwise(ends.tolist()):
-            if last - first > 1:
-                part = slice(first, last + 1)
-                sides: Any = ((1, qd[first]), (1, qd[last]))
-                # The coefficients of first order: the slopes at all nodes but the last.
-                qd[first:last] = CubicSpline(t[part], q[part], bc_type=sides).c[2]
-        return self.grid.moving(self, qd)
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """The quintic through the nodes, with q̈ by eq. 4: q̈ = J⁺(ẍ - J̇q̇) + N α.
-
-        α is by differences of q̇. Where a limit begins or ends to bind the self-motion has a kink,
-        and α is that of the side along the limit. q̈ is 0 where the arm rests.
-        """
-        problem, t, place = self.grid.problem, self.grid.t, self.place
-        qdd = self.grid.manifolds.accelerations(place)
-        along = self.along
-        before, after = np.append(False, along), np.append(along, False)
-        sides = self.grid.spline.accelerations(self.samples.ends)
-        near = 0.5 * (sides[0] + sides[1])
-        for which, side in zip((before & ~after, after & ~before), sides, strict=True):
-            near[which] = side[which]
-        bases = self.charts.bases
-        qdd += (bases @ (np.swapaxes(bases, 1, 2) @ near[:, :, None]))[:, :, 0]
-        self._calm(qdd, near)
-        qdd[self.grid.manifolds.held] = 0.0
-        for order, node in zip(problem.rest_orders, (0, -1), strict=True):
-            if order > 1:
-                qdd[node] = 0.0
-        names = problem.robot.joint_names
-        return Trajectory(t, read_only(place.q), read_only(place.qd), names, read_only(qdd))
-
-    def _calm(self, qdd: Array, near: Array) -> None:
-        """Damp q̈ where a pose is all but singular, so that the quintic does not waver there.
-
-        q̈ = a + J⁺ J (q̈ - a) with the differences a of q̇, `near` (N + 1, n), and the damped J⁺.
-        """
-        away = np.abs(qdd - near).max(axis=1)
-        wild = away > _WILD * np.abs(near).max()
-        if wild.any():
-            rows = self.grid.problem.follows.jacobians(self.place.q[wild])
-            lack = rows @ (qdd - near)[wild][:, :, None]
-            gram = rows @ rows.transpose(0, 2, 1) + _DAMPING**2 * np.eye(rows.shape[1])
-            qdd[wild] = (
-                near[wild] + (rows.transpose(0, 2, 1) @ np.linalg.solve(gram, lack))[:, :, 0]
-            )
+        """The motion itself: the quintic through the nodes."""
+        place, names = self.place, self.grid.problem.robot.joint_names
+        q, qd, qdd = (read_only(x) for x in (place.q, place.qd, place.qdd))
+        return Trajectory(self.grid.t, q, qd, names, qdd)
 
     def on(self, grid: NodeGrid) -> "NodeMotion | None":
         """Return the motion on other nodes."""
-        from scipy.interpolate import CubicHermiteSpline
-
-        t, place = self.grid.t, self.place
-        spline = CubicHermiteSpline(t, place.q, place.qd)
+        own = self.trajectory
+        q, qd, qdd = (own(grid.t, order) for order in range(3))
         # What is nearly a basis will do for charts to begin with, and turns as those around it do.
-        bases = self.charts.bases[np.searchsorted(t, grid.t, side="right") - 1]
-        return grid.around(Charts(grid.manifolds, spline(grid.t), bases), spline(grid.t, 1))
+        last = np.searchsorted(self.grid.t, grid.t, side="right") - 1
+        return grid.around(Charts(grid.manifolds, q, self.charts.bases[last]), qd, qdd)

@@ -1,290 +1,471 @@
-"""Newton's method on the self-motion manifolds of all nodes at once.
+"""Newton's method on the self-motion manifolds of all nodes at once: one solver for all problems.
 
-Where conditions h(w) ≤ 0 count, the primal-dual interior-point method: with slacks s > 0 and prices
-λ > 0, it goes towards h + s = 0, ∇F + λᵀ∂h = 0 and s λ = μ, for smaller and smaller μ (J. Nocedal,
-S. Wright, "Numerical Optimization", 2nd ed., chapter 19). Each condition knows three nodes, so that
-all matrices stay block-banded, and a step takes as much time as there are nodes.
+Rows h(w) ≤ 0 are elastic, h + s - e = 0 with s, e > 0 and a price ρ on e, so that a start far
+beyond limits or inside a body is no dead end. The primal-dual interior-point method goes towards
+
+    ∇F + λᵀ∂h = 0,   s λ = μ,   e (ρ - λ) = μ   for smaller and smaller μ
+
+(J. Nocedal, S. Wright, "Numerical Optimization", 2nd ed., chapter 19; elastic variables: R.
+Fletcher, "Practical Methods of Optimization", 2nd ed., 14.3). Eliminated, the steps of s, e and λ
+leave a matrix of the nodes alone: each row knows two neighbours, so that it is block-tridiagonal,
+and a step takes as much time as there are nodes.
 """
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from selfmotion.basics import Array, Ints
-from selfmotion.nodes.conditions import spread
+from selfmotion.basics import Array, Flags
 from selfmotion.nodes.ends import Border
 from selfmotion.nodes.motion import NodeMotion
-from selfmotion.nodes.objective import Around, scattered
-from selfmotion.nodes.optimum import Optimum, Step, Told
+from selfmotion.nodes.objective import Around
+from selfmotion.nodes.rows import LinearRows
 from selfmotion.optimise import Banded, Status
 
-# The cost is right to this share of itself once a step promises no more; where conditions count.
+# The cost is right to this share of itself once a step promises no more; where rows count.
 _AGREES, _AGREES_BOUND = 1e-8, 1e-6
 # A step that promises more than this share of the cost, and lowers it by nothing, is no rounding.
-_ROUNDING = 1e-6
-# The matrix of a step that promised no more than this share of the cost is that of its end as well.
-_LITTLE = 1e-3
+_ROUNDING = 1e-5
 # Slacks and prices go no further than this share towards 0 in one step.
 _INWARD = 0.995
 # A step is taken if it does at least this share of what it promises, and cut by half otherwise.
-_SHARE, _SHORTEST = 1e-4, 1e-6
+_SHARE, _SHORTEST = 1e-4, 1e-7
 # Motions that cost nothing, as of a joint whose axis the tool is on, are left alone: the matrix has
-# this share of its usual entry more on the diagonal, which is above rounding there.
-_FLAT = 1e-11
+# this share of its usual entry, over the square of the number of nodes, more on the diagonal: above
+# what differences leave there, and below what slow motions cost.
+_FLAT = 2.5e-5
 # One that is not positive definite gets this share of its largest entry on the diagonal, or a
 # third of what the last one needed; then more by this factor, again and again.
 _SHIFT, _LESS, _MORE = 1e-6, 1.0 / 3.0, 8.0
 # Nodes go no further than this in one step [rad or m]; one that would go beyond that is none of a
 # matrix that says something.
 _FARTHEST, _TRUSTED = 0.5, 5.0
-# Barriers begin with this share of the cost for all conditions, and end with that; slacks begin
-# with at least so much [units of h]. Where prices are known, with these.
+# Barriers begin with this share of the cost for all rows, and end with that; slacks begin with at
+# least so much [units of h]. Where prices are known, with these.
 _FIRST, _LAST, _SLACK = 1e-1, 1e-6, 1e-1
-_KNOWN_FIRST, _KNOWN_SLACK = 1e-4, 1e-3
-# A barrier is solved to this many times itself, before it falls to this share, or this power.
-_SOLVED, _FALL, _POWER = 10.0, 0.2, 1.5
-# Conditions are met to this [units of h].
-_MET = 1e-7
+_KNOWN_FIRST, _KNOWN_SLACK = 1e-5, 1e-3
+# A row that comes in begins with so much of e.
+_ELASTIC = 1e-3
+# ρ is this many times the cost for a unit of h.
+_PRICE = 10.0
+# A barrier is solved to this many times itself, before it falls to this share, or this power; at
+# the end products of slack and price may be this many times the barrier.
+_SOLVED, _FALL, _POWER, _CENTRED = 10.0, 0.2, 1.5, 30.0
+# Rows are linear to this [units of h] before a barrier falls, and at the end.
+_ABOUT_MET, _MET = 1e-2, 1e-7
+# Of a row that counts by less than this share of the barrier, the gap does not matter.
+_IDLE = 1e-2
 # What is asked of the ends is met to this [rad, rad/s].
 _MET_ENDS = 1e-9
-# So many steps in turn, each this short a share of Newton's, lead nowhere.
-_STUCK, _TINY = 5, 0.02
-# Iterations after which the method is given up: it needs ten, thirty where limits bind.
-_MOST = 80
+# While a row is broken by more than this, its own curvature is none to trust: Gauss-Newton.
+_WILD = 1e-2
+# Where a rough optimum will do, all of this may be so many times worse.
+_ROUGHLY = 100.0
+# After a full step that promised less than this share of the cost, the next one promises about its
+# square: there is no need to look around for it.
+_LITTLE = 1e-5
 
 
-def minimise(begin: NodeMotion, columns: Ints, told: Told, prices: Array | None = None) -> Optimum:
-    """Return the optimum near a motion, keeping some columns of the conditions.
+class Step(NamedTuple):
+    """An iteration.
+
+    Attributes
+    ----------
+    motion : NodeMotion
+    slope : float
+        Norm of the gradient of what is minimised.
+    length : float
+        Share of Newton's step that was taken; 0 of the first.
+    """
+
+    motion: NodeMotion
+    slope: float
+    length: float
+
+
+Told = Callable[[Step], bool]
+"""Told of each iteration; True stops."""
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Where Newton's method ended.
+
+    Attributes
+    ----------
+    motion : NodeMotion
+    prices : (R,)
+        λ of all rows; 0 of those that did not count.
+    status : Status
+    promised : float
+        By how much another step would lower the cost.
+    end_prices : (E,)
+        Of what is asked of the ends.
+    """
+
+    motion: NodeMotion
+    prices: Array
+    status: Status
+    promised: float
+    end_prices: Array
+
+
+def minimise(
+    begin: NodeMotion,
+    told: Told,
+    prices: Array | None = None,
+    *,
+    roughly: bool = False,
+    most: int = 60,
+) -> Optimum:
+    """Return the optimum near a motion.
 
     Parameters
     ----------
     begin : NodeMotion
-    columns : (c,)
-        Of h, see `NodeConditions`; may be none.
     told : callable
-    prices : (N + 1, c), optional
+    prices : (R,), optional
         Of an optimum near by.
+    roughly : bool
+        Whether it is enough where such an optimum can be begun with: rows keep off what binds.
+    most : int
+        Iterations.
     """
-    solver = _Solver(begin, columns, prices)
-    for _ in range(_MOST):
+    solver = _Solver(begin, prices, roughly=roughly)
+    for _ in range(most):
         status = solver.advance(told)
         if status is not None:
             return solver.optimum(status)
     return solver.optimum(Status.MAX_ITERATIONS)
 
 
-class _Solver:
-    """The state of Newton's method: a motion, slacks, prices and the barrier."""
+class _Model(NamedTuple):
+    """What a motion is like near by, to second order.
 
-    def __init__(self, begin: NodeMotion, columns: Ints, prices: Array | None) -> None:
-        self.motion, self._columns = begin, columns
-        h = begin.wanted[:, columns]
-        each = max(abs(begin.aim), np.finfo(float).tiny) / max(h.size, 1)
-        self._least = _LAST * each
-        if prices is None:
-            self._barrier, self._slacks = _FIRST * each, np.maximum(-h, _SLACK)
-            self._prices = self._barrier / self._slacks
-        else:
-            self._barrier = _KNOWN_FIRST * each
-            usual = self._barrier / np.maximum(-h, _KNOWN_SLACK)
-            self._prices = np.maximum(prices, usual)
-            self._slacks = np.maximum(-h, self._barrier / self._prices)
-        self._penalty, self._promised, self._length = 0.0, np.inf, 0.0
-        self._tiny, self._shift = 0, 0.0
-        self._matrix: Banded | None = None
+    Attributes
+    ----------
+    gradient : (N + 1, 3r)
+        ∂F/∂w.
+    both : (N, n, 6, 6r)
+        ∂y/∂w of both ends of each interval.
+    changes : (N + 1, 3, n, 3r)
+    curved : (N + 1, 3r, 3r)
+        What bends by the nodes' own manifolds.
+    intervals : (N, 6r, 6r)
+        What bends by costs.
+    rows : LinearRows
+    border : Border
+    """
+
+    gradient: Array
+    both: Array
+    changes: Array
+    curved: Array
+    intervals: Array
+    rows: LinearRows
+    border: Border
+
+
+class _Change(NamedTuple):
+    """A step of all unknowns."""
+
+    nodes: Array
+    slacks: Array
+    elastics: Array
+    prices: Array
+    end_prices: Array
+
+
+class _Solver:
+    """The state of Newton's method: a motion, slacks, prices and the barrier.
+
+    Of rows, s, e and λ are those of the rows that count, in their order.
+    """
+
+    def __init__(self, begin: NodeMotion, prices: Array | None, *, roughly: bool) -> None:
+        self.motion, h = begin, begin.h
+        self._size = max(abs(begin.aim), np.finfo(float).tiny)
+        each = self._size / max(int((h > -1e2).sum()), 1)
+        self._roughly, last = roughly, _KNOWN_FIRST if roughly else _LAST
+        self._least, self._price = last * each, _PRICE * self._size
+        self._barrier = (_FIRST if prices is None else _KNOWN_FIRST) * each
+        self._kept: Flags = np.zeros(len(h), dtype=np.bool_)
+        self._slacks = self._elastics = self._prices = np.zeros(0)
+        self._admit()
+        if prices is not None:
+            self._begin_with(prices)
+        self._penalty, self._promised, self._length, self._shift = 0.0, np.inf, 0.0, 0.0
         self._end_prices = np.zeros(begin.grid.ends.count)
+
+    def _begin_with(self, prices: Array) -> None:
+        """Begin with known prices of all rows, (R,)."""
+        h, known = self._h, prices[self._kept]
+        usual = self._barrier / np.maximum(-h, _KNOWN_SLACK)
+        self._prices = np.clip(np.maximum(known, usual), None, 0.5 * self._price)
+        slacks = np.maximum(-h, self._barrier / self._prices)
+        self._elastics = np.maximum(h + slacks, 0.0) + self._barrier / (self._price - self._prices)
+        self._slacks = np.maximum(slacks, self._elastics - h)
+
+    @property
+    def _h(self) -> Array:
+        """Rows that count."""
+        return self.motion.h[self._kept]
+
+    @property
+    def _gap(self) -> Array:
+        return self._h + self._slacks - self._elastics
+
+    def _admit(self) -> None:
+        """Let rows in that have come near to being broken."""
+        motion = self.motion
+        near = motion.grid.rows.near(motion.h) | self._kept
+        if near.sum() == self._kept.sum():
+            return
+        x = motion.h
+        slacks = np.maximum(-x, _SLACK) + _ELASTIC
+        full = slacks, x + slacks, np.minimum(self._barrier / slacks, 0.5 * self._price)
+        for values, own in zip(full, (self._slacks, self._elastics, self._prices), strict=True):
+            values[self._kept] = own
+        self._kept = near
+        self._slacks, self._elastics, self._prices = (values[near] for values in full)
 
     def optimum(self, status: Status) -> Optimum:
         """Return where it is now."""
-        return Optimum(self.motion, self._prices, status, self._promised, self._end_prices)
+        return Optimum(
+            self.motion, self._all(self._prices), status, self._promised, self._end_prices
+        )
+
+    def _all(self, own: Array) -> Array:
+        """Return what belongs to rows that count, in a row of all, (R,)."""
+        found = np.zeros(len(self._kept))
+        found[self._kept] = own
+        return found
 
     def advance(self, told: Told) -> Status | None:
         """Take a step; return how the method ended, if it did."""
-        motion = self.motion
-        motion.grid.counts.gradients += 1
-        slopes = scattered(motion.grid.cost.slopes(motion.samples, motion.partials))
-        by_both, by_prices, continuity = slopes, slopes, motion.grid.continuity
-        if continuity is not None:
-            by_both = slopes + scattered(continuity.slopes(motion.samples))
-        gradient = motion.charts.pulled(motion.place, by_both[:, 0], by_both[:, 1])
-        gradient.reshape(-1)[motion.grid.held] = 0.0
-        is_there = self._is_there(gradient)
-        if told(Step(motion, float(np.linalg.norm(gradient)), self._length)):
-            return Status.STOPPED
-        if is_there:
+        if self._arrived():
+            told(Step(self.motion, 0.0, self._length))
             return Status.CONVERGED
-        if self._columns.size:
-            prices = np.zeros_like(motion.h)
-            prices[:, self._columns] = self._prices
-            by_prices = slopes + motion.grid.conditions.pulled(motion.samples.checked, prices)
-        if len(motion.c):
-            by_prices = by_prices + motion.grid.ends.pulled(self._end_prices, len(slopes))
-        around = Around.of(motion.charts, motion.nu, by_prices)
-        if around is None:
+        model = self._model()
+        if model is None:
             return Status.GRADIENT
-        curved = around.curvature
-        rows, by_jumps = self._rows(around), self._by_jumps(around)
-        ends = motion.grid.ends.border(motion.c, around.changes, motion.grid.held)
-        intervals = motion.grid.cost.curvature(motion.samples, motion.partials, around.changes)
-        if self._columns.size:
-            conditions = motion.grid.conditions
-            bending = conditions.bending(motion.samples.checked, prices, around.changes)
-            if bending is not None:
-                curved, intervals = curved + bending[0], intervals + bending[1]
-        gap = motion.wanted[:, self._columns] + self._slacks
+        slope = float(np.linalg.norm(model.gradient))
+        if told(Step(self.motion, slope, self._length)):
+            return Status.STOPPED
         while True:
-            step = self._step(gradient, curved, intervals, by_jumps, rows, gap, ends)
+            step = self._step(model)
             if step is None:
                 return Status.GRADIENT
-            by_slack, by_price = self._others(rows, gap, step)
-            size = max(abs(motion.aim), np.finfo(float).tiny)
-            met = np.abs(gap).max(initial=0.0) <= _MET
-            met &= bool(np.abs(motion.c).max(initial=0.0) <= _MET_ENDS)
-            last = not self._columns.size or self._barrier <= self._least
-            agrees = _AGREES_BOUND if self._columns.size else _AGREES
-            if self._promised <= agrees * size and met and last:
+            last = not self._prices.size or self._barrier <= self._least
+            if last and self._is_there():
+                self._end_prices = step.end_prices
                 return Status.CONVERGED
-            if last or not self._solved(gap):
-                break
+            if last or not self._is_solved():
+                return self._move(model, step)
             self._barrier = max(self._least, min(_FALL * self._barrier, self._barrier**_POWER))
-        return self._move(gradient, gap, step, by_slack, by_price)
 
-    def _is_there(self, gradient: Array) -> bool:
-        """Whether another step would promise nothing, by the matrix of the last one.
+    def _model(self) -> _Model | None:
+        """Look around; None where a neighbour is not to be had."""
+        motion, grid = self.motion, self.motion.grid
+        grid.counts.gradients += 1
+        spline = grid.spline
+        slopes = grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
+        by_cost = spline.scattered(slopes)
+        rows = grid.rows.linearised(motion.checked, self._kept)
+        force, prices = by_cost, self._all(self._prices)
+        wild = float(np.max(self._h, initial=0.0)) > _WILD
+        if not wild and self._prices.size:
+            force = force + spline.scattered(rows.pulled(prices))
+        if not wild and len(motion.c):
+            force = force + grid.ends.pulled(self._end_prices, len(force))
+        around = Around.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
+        if around is None:
+            return None
+        changes = around.changes * grid.scale
+        curved = around.curvature * grid.scale * grid.scale[:, None]
+        both = spline.changes(changes)
+        intervals = grid.cost.curvature(motion.samples, motion.partials, both)
+        bending = None if wild else grid.rows.bending(motion.checked, prices, both)
+        if bending is not None:
+            intervals = intervals + bending
+        gradient = _pulled(changes, by_cost)
+        gradient.reshape(-1)[grid.held] = 0.0
+        border = grid.ends.border(motion.c, changes, grid.held)
+        return _Model(gradient, both, changes, curved, intervals, rows, border)
 
-        Only where nothing is asked of the motion but to cost little: of what else counts, the
-        matrix knows prices that change. The look around, which is most of a step, is spared then.
-        """
-        motion = self.motion
-        size = max(abs(motion.aim), np.finfo(float).tiny)
-        asked = self._columns.size or len(self._end_prices) or motion.grid.continuity is not None
-        if asked or self._matrix is None or self._promised > _LITTLE * size:
+    def _arrived(self) -> bool:
+        """Whether the last step says that another one would promise nothing."""
+        promised = self._promised / self._size
+        if not (self._length == 1.0 and promised <= _LITTLE and self._barrier <= self._least):
             return False
-        solved = self._matrix.solve(gradient.ravel())
-        if solved is None:
-            return False
-        promised = float(gradient.ravel() @ solved)
-        if promised > _AGREES * size:
-            return False
-        self._promised = promised
-        return True
+        before, self._promised = self._promised, promised**2 * self._size
+        if self._is_there():
+            return True
+        self._promised = before
+        return False
 
-    def _rows(self, around: Around) -> Array:
-        """Return ∂h/∂w of the columns, (N + 1, c, 6r); nothing moves what is held."""
-        count, _, _, size = around.changes.shape
-        if not self._columns.size:
-            return np.zeros((count, 0, 3 * size))
-        motion = self.motion
-        return motion.grid.conditions.rows(motion.samples.checked, around.changes, self._columns)
+    def _is_there(self) -> bool:
+        """Whether another step would promise nothing, and all is met."""
+        agrees = (_AGREES_BOUND if self._prices.size else _AGREES) * self._size
+        if self._roughly:
+            agrees *= _ROUGHLY
+        met = self._open <= _MET * (_ROUGHLY if self._roughly else 1.0)
+        met &= bool(np.abs(self.motion.c).max(initial=0.0) <= _MET_ENDS)
+        return bool(met and self._promised <= agrees and self._off <= _CENTRED * self._barrier)
 
-    def _by_jumps(self, around: Around) -> Array:
-        """Return the derivatives by w of what jumps of q̈ weigh, (N + 1, 6r, j)."""
-        continuity, (count, _, _, size) = self.motion.grid.continuity, around.changes.shape
-        if continuity is None:
-            return np.zeros((count, 3 * size, 0))
-        return np.swapaxes(continuity.tangents(around.changes), 1, 2)
-
-    def _solved(self, gap: Array) -> bool:
+    def _is_solved(self) -> bool:
         """Whether the problem with the present barrier is solved well enough."""
-        off = np.abs(self._slacks * self._prices - self._barrier).max(initial=0.0)
         allowed = _SOLVED * self._barrier
-        return bool(self._promised <= allowed and off <= allowed and np.abs(gap).max() <= 1e-2)
+        met = self._open <= _ABOUT_MET
+        return bool(met and self._promised <= allowed and self._off <= allowed)
 
-    def _step(
-        self,
-        gradient: Array,
-        curved: Array,
-        intervals: Array,
-        by_jumps: Array,
-        rows: Array,
-        gap: Array,
-        ends: Border,
-    ) -> Array | None:
-        """Return Newton's step of the coordinates, (N + 1, 2r)."""
-        count, size = gradient.shape
-        ratio = self._prices / self._slacks
-        turned = np.swapaxes(rows, 1, 2)
-        right = gradient.flatten()
-        if rows.shape[1]:
-            pressure = (self._barrier / self._slacks + ratio * gap)[:, :, None]
-            right += spread((turned @ pressure)[:, :, 0]).ravel()
-            right[self.motion.grid.held] = 0.0
-        wide = bool(rows.shape[1] or by_jumps.shape[2])
+    @property
+    def _open(self) -> float:
+        """The largest gap that counts.
+
+        On very short intervals rates are known to few digits: what costs next to nothing is met.
+        """
+        gap = np.abs(self._gap)
+        return float(gap[self._prices * gap > _IDLE * self._barrier].max(initial=0.0))
+
+    @property
+    def _off(self) -> float:
+        """How far products of slacks and prices are off the barrier."""
+        by_slack = np.abs(self._slacks * self._prices - self._barrier).max(initial=0.0)
+        left = self._elastics * (self._price - self._prices)
+        return float(max(by_slack, np.abs(left - self._barrier).max(initial=0.0)))
+
+    def _step(self, model: _Model) -> _Change | None:
+        """Return Newton's step of all unknowns for the present barrier."""
+        grid, barrier, prices = self.motion.grid, self._barrier, self._prices
+        slacks, elastics, left = self._slacks, self._elastics, self._price - self._prices
+        stiff = 1.0 / (slacks / prices + elastics / left)
+        off = self._h + barrier / prices - barrier / left
+        right, intervals = model.gradient, model.intervals
+        if prices.size:
+            push = model.rows.pulled(self._all(prices + stiff * off))
+            right = right + _pulled(model.changes, grid.spline.scattered(push))
+            right.reshape(-1)[grid.held] = 0.0
+            intervals = intervals + self._stiffness(model, stiff)
+        solved = self._solved(right, model.curved, intervals, model.border)
+        if solved is None:
+            return None
+        step, end_prices = solved
+        by_ends = _along(model.both, step)
+        by_prices = stiff * (model.rows.along(by_ends) + off)
+        by_slacks = barrier / prices - slacks - slacks / prices * by_prices
+        by_elastics = barrier / left - elastics + elastics / left * by_prices
+        return _Change(step, by_slacks, by_elastics, by_prices, end_prices)
+
+    def _stiffness(self, model: _Model, stiff: Array) -> Array:
+        """Return ∂hᵀ D ∂h on each interval, (N, 6r, 6r)."""
+        weights, both = self._all(stiff), model.both
+        count, n, _, size = both.shape
+        found = np.zeros((count, size, size))
+        of_limits = model.rows.squared(weights)
+        if of_limits is not None:
+            flat = both.reshape(count, 6 * n, size)
+            turned = (of_limits @ both).reshape(count, 6 * n, size)
+            found += np.swapaxes(flat, 1, 2) @ turned
+        of_points = model.rows.squared_points(weights, both)
+        return found if of_points is None else found + of_points
+
+    def _solved(
+        self, right: Array, curved: Array, intervals: Array, border: Border
+    ) -> tuple[Array, Array] | None:
+        """Return the step of the coordinates (N + 1, 3r), and the prices of the ends."""
+        count, size = right.shape
         largest = float(np.abs(curved).max() + np.abs(intervals).max())
         diagonals = np.abs(np.diagonal(intervals, axis1=1, axis2=2)).ravel()
         usual = float(np.partition(diagonals, len(diagonals) // 2)[len(diagonals) // 2])
-        shift = _FLAT * usual
+        shift = _FLAT / count**2 * usual
         while shift <= 1e6 * largest:
-            matrix = Banded(count, size, 2 if wide else 1)
+            matrix = Banded(count, size, 1)
             matrix.add(0, 0, curved)
             matrix.add_pairs(0, intervals)
-            if wide:
-                near = turned @ (ratio[:, :, None] * rows)
-                matrix.add_triples(near + by_jumps @ np.swapaxes(by_jumps, 1, 2))
             matrix.add_diagonal(shift)
             matrix.hold(self.motion.grid.held)
-            solved = matrix.solve(np.column_stack([-right, ends.columns]))
+            solved = matrix.solve(np.column_stack([-right.ravel(), border.columns]))
             if solved is not None:
-                step, prices = ends.met_by(solved)
-                if np.abs(step.reshape(count, 2, -1)[:, 0]).max() <= _TRUSTED:
-                    self._shift, self._end_prices, self._matrix = shift, prices, matrix
-                    self._promised = float(-(right + ends.columns @ prices) @ step)
-                    return step.reshape(count, size)
+                step, prices = border.met_by(solved)
+                if np.abs(step.reshape(count, 3, -1)[:, 0]).max() <= _TRUSTED:
+                    self._shift = shift
+                    self._promised = float(-(right.ravel() + border.columns @ prices) @ step)
+                    return step.reshape(count, size), prices
             shift = max(_MORE * shift, _SHIFT * largest, _LESS * self._shift)
         return None
 
-    def _others(self, rows: Array, gap: Array, step: Array) -> tuple[Array, Array]:
-        """Return the steps of slacks and prices that go with one of the coordinates."""
-        if not gap.size:
-            return gap, gap
-        near = np.zeros((len(step), 3, step.shape[1]))
-        near[1:, 0], near[:, 1], near[:-1, 2] = step[:-1], step, step[1:]
-        by_slack = -gap - (rows @ near.reshape(len(step), -1, 1))[:, :, 0]
-        by_price = (self._barrier - self._prices * by_slack) / self._slacks - self._prices
-        return by_slack, by_price
-
-    def _move(
-        self, gradient: Array, gap: Array, step: Array, by_slack: Array, by_price: Array
-    ) -> Status | None:
+    def _move(self, model: _Model, step: _Change) -> Status | None:
         """Go along a step as far as it does what it promises."""
-        motion, charts, r = self.motion, self.motion.charts, step.shape[1] // 2
-        off = float(np.abs(gap).sum() + np.abs(motion.c).sum())
-        slope = float((gradient * step).sum()) - self._barrier * float(
-            (by_slack / self._slacks).sum()
+        motion, r = self.motion, step.nodes.shape[1] // 3
+        gap = float(np.abs(motion.c).sum() + np.abs(self._gap).sum())
+        slope = float((model.gradient * step.nodes).sum()) + float(
+            np.sum(
+                (self._price - self._barrier / self._elastics) * step.elastics
+                - self._barrier / self._slacks * step.slacks
+            )
         )
-        if off > 0.0:
+        if gap > 0.0:
             # So that the step lowers the merit, whichever way the cost goes.
-            self._penalty = max(self._penalty, 2.0 * slope / off)
-        merit = self._merit(motion, self._slacks, gap)
-        promise = slope - self._penalty * off
-        farthest = float(np.abs(step[:, :r]).max())
-        length = min(_longest(self._slacks, by_slack), _FARTHEST / max(farthest, _FARTHEST))
-        while length >= _SHORTEST and self._tiny < _STUCK:
-            epsilon = charts.null_motions(motion.nu + length * step[:, r:])
-            found = charts.centred(length * step[:, :r], epsilon)
-            if found is not None:
-                new = motion.grid.at(*found)
-                h = new.wanted[:, self._columns]
-                slacks = np.maximum(self._slacks + length * by_slack, -h)
-                gained = merit - self._merit(new, slacks, h + slacks)
+            dearest = 1.5 * float(np.abs(step.end_prices).max(initial=0.0))
+            self._penalty = max(self._penalty, 2.0 * slope / gap, dearest)
+        merit = self._merit(motion, self._slacks, self._elastics)
+        promise = slope - self._penalty * gap
+        farthest = float(np.abs(step.nodes[:, :r]).max())
+        length = _FARTHEST / max(farthest, _FARTHEST)
+        for values, change in ((self._slacks, step.slacks), (self._elastics, step.elastics)):
+            length = min(length, _longest(values, change))
+        while length >= _SHORTEST:
+            new = motion.stepped(length * step.nodes)
+            if new is not None and np.isfinite(new.aim):
+                elastics = self._elastics + length * step.elastics
+                # A gap below 0 closes for nothing; one above costs the penalty, not ρ: else the
+                # rows' curvature stops the steps.
+                slacks = np.maximum(
+                    self._slacks + length * step.slacks, elastics - new.h[self._kept]
+                )
+                gained = merit - self._merit(new, slacks, elastics)
                 # Written so that NaN is no gain; what is below rounding is none to look for.
-                rounding = 1e-13 * abs(merit)
-                if gained >= -_SHARE * length * min(promise, 0.0) - rounding:
-                    self.motion, self._slacks = new, slacks
-                    share = _longest(self._prices, by_price)
-                    self._prices = self._prices + share * by_price
-                    self._length = length
-                    self._tiny = self._tiny + 1 if length < _TINY else 0
+                if gained >= -_SHARE * length * min(promise, 0.0) - 1e-13 * abs(merit):
+                    share = min(
+                        _longest(self._prices, step.prices),
+                        _longest(self._price - self._prices, -step.prices),
+                    )
+                    self._prices = self._prices + share * step.prices
+                    self._slacks, self._elastics = slacks, elastics
+                    self.motion, self._length = new, length
+                    self._end_prices = step.end_prices
+                    self._admit()
                     return None
             length *= 0.5
-        if self._columns.size or len(self._end_prices):
-            return Status.INFEASIBLE
+        if self._promised <= _ROUNDING * self._size:
+            return Status.PRECISION
         # What a good step promises and none does is no rounding: the gradient is wrong.
-        precise = self._promised <= _ROUNDING * max(abs(motion.aim), np.finfo(float).tiny)
-        return Status.PRECISION if precise else Status.GRADIENT
+        asked = self._prices.size or len(self._end_prices)
+        return Status.INFEASIBLE if asked else Status.GRADIENT
 
-    def _merit(self, motion: NodeMotion, slacks: Array, gap: Array) -> float:
-        barrier = self._barrier * float(np.log(slacks).sum())
-        off = float(np.abs(gap).sum() + np.abs(motion.c).sum())
-        return motion.aim - barrier + self._penalty * off
+    def _merit(self, motion: NodeMotion, slacks: Array, elastics: Array) -> float:
+        barrier = self._barrier * float(np.log(slacks).sum() + np.log(elastics).sum())
+        gap = np.abs(motion.h[self._kept] + slacks - elastics).sum() + np.abs(motion.c).sum()
+        elastic = self._price * float(elastics.sum())
+        return motion.aim + elastic - barrier + self._penalty * float(gap)
+
+
+def _pulled(changes: Array, force: Array) -> Array:
+    """Return Γᵀλ of nodes, (N + 1, 3r), for Γ (N + 1, 3, n, 3r) and λ (N + 1, 3, n)."""
+    count, _, n, size = changes.shape
+    flat = changes.reshape(count, 3 * n, size)
+    return np.asarray((force.reshape(count, 1, 3 * n) @ flat)[:, 0])
+
+
+def _along(both: Array, step: Array) -> Array:
+    """Return how y changes along a step (N + 1, 3r), (N, 6, n)."""
+    count, n, _, size = both.shape
+    pair = np.concatenate([step[:-1], step[1:]], axis=1)
+    changes = both.reshape(count, n * 6, size) @ pair[:, :, None]
+    return np.asarray(np.swapaxes(changes.reshape(count, n, 6), 1, 2))
 
 
 def _longest(values: Array, step: Array) -> float:

@@ -1,15 +1,15 @@
 """The cost of a motion given by its nodes, with its gradient and its curvature.
 
 Each interval's cost depends on its two nodes alone, so that the matrix of second derivatives is
-block-tridiagonal. With q, q̇ of a node as functions of its coordinates w = (z, ν), Γ = ∂(q, q̇)/∂w
-and λ = ∂F/∂(q, q̇),
+block-tridiagonal. With x = (q, q̇, q̈) of a node as functions of its coordinates w = (z, ν, α),
+Γ = ∂x/∂w and λ = ∂F/∂x,
 
-    ∂F/∂w = Γᵀλ,   ∂²F/∂w∂w' = Γᵀ (∂²F/∂(q, q̇)∂(q, q̇)') Γ' + [w is w'] ∂(Γᵀλ)/∂w at fixed λ.
+    ∂F/∂w = Γᵀλ,   ∂²F/∂w∂w' = Γᵀ (∂²F/∂x∂x') Γ' + [w is w'] ∂(Γᵀλ)/∂w at fixed λ.
 
 Where costs are quadratic forms of q and its derivatives, the first term is exact. Of others, second
 derivatives are differences of gradients: by q along the self-motion, which is where nodes can go,
-and by q̇. The last term, the manifold's own curvature, is a central difference of exact derivatives
-along the manifold.
+and by the rates. The last term, the manifold's own curvature, is made of differences along the
+manifold, and of what is linear or quadratic in ν and α.
 """
 
 from collections.abc import Sequence
@@ -21,31 +21,30 @@ import numpy as np
 from selfmotion.basics import Array
 from selfmotion.costs import Cost, Partials, PlacedLater, Samples
 from selfmotion.follow import Follows
-from selfmotion.nodes.charts import Charts, orthonormal
-from selfmotion.nodes.hermite import HermiteSamples
+from selfmotion.nodes.charts import Bases, Charts, Place, orthonormal
+from selfmotion.nodes.samples import CurveSamples
 from selfmotion.nodes.smoothness import Smoothing
-from selfmotion.nodes.spline import SHARES, Hermite
+from selfmotion.nodes.spline import AT_GAUSS, GAUSS, WEIGHTS, Quintic
 
-# Differences along a manifold are taken this far to both sides [rad or m]: nodes are as near to it
-# there as they have to be, and come onto it in one step. Rounding's error is 1e-16 over it.
-_REACH = 1e-6
+# Differences along a manifold are taken this far to both sides [rad or m]: first ones are right to
+# 1e-8 then, second ones to 1e-6.
+_REACH = 1e-4
 # Those of costs are taken to one side, so far [rad, m and their rates]: they are second derivatives
 # of a matrix that need not be exact.
 _NEAR = 1e-6
 _NAMES = ("q", "qd", "qdd", "qddd")
 # Intervals whose matrices are multiplied at once: what that takes is several times what it leaves.
-_LOT = 4096
+_LOT = 2048
 
 
 class NodeCost:
-    """F = ∫ Σ G dt along the Hermite spline of the nodes.
+    """F = ∫ Σ G dt along the quintic pieces between the nodes.
 
     Parameters
     ----------
     follows : Follows
-    spline : Hermite
+    spline : Quintic
     costs : sequence of Cost
-        Of q and q̇, or quadratic forms: see `Cost.curvature`.
     smoothing : Smoothing, optional
         Minimised besides, and no part of the costs.
     """
@@ -53,7 +52,7 @@ class NodeCost:
     def __init__(
         self,
         follows: Follows,
-        spline: Hermite,
+        spline: Quintic,
         costs: Sequence[Cost],
         smoothing: Smoothing | None = None,
     ) -> None:
@@ -62,8 +61,8 @@ class NodeCost:
         self._dof = follows.robot.dof
         self._smoothing: tuple[Array, Array] | None = None
         if smoothing is not None:
-            stiffness = self._stiffness(2, spline.weights * smoothing.shares)
-            self._smoothing = stiffness, smoothing.weight
+            each = [self._stiffness(order, b) for order, b in smoothing.shares.items()]
+            self._smoothing = np.sum(each, axis=0), smoothing.weight
 
     @cached_property
     def _forms(self) -> list[tuple[Array, Array]]:
@@ -71,50 +70,51 @@ class NodeCost:
         found = [] if self._smoothing is None else [self._smoothing]
         for cost in (cost for cost in self._costs if cost.is_quadratic):
             for order, weight in cost.curvature(self._dof).items():
-                found.append((self._stiffness(order, self._spline.weights), weight))
+                found.append((self._stiffness(order), weight))
         return found
 
-    def _stiffness(self, order: int, weights: Array) -> Array:
-        """Return K of ½ Σ K_ab x_aᵀWx_b for the ends x of each interval, (N, 4, 4)."""
-        shares = self._spline.bases[order]
-        return np.asarray(np.swapaxes(shares, 1, 2) @ (weights[:, :, None] * shares))
+    def _stiffness(self, order: int, shares: Array | None = None) -> Array:
+        """Return K of ½ Σ K_ab y_aᵀWy_b for the ends y of each interval, (N, 6, 6)."""
+        table, scale = AT_GAUSS[order], self._spline.rates(2 * order) * self._spline.steps
+        scale[self._spline.gaps] = 0.0
+        if shares is None:
+            return np.asarray(scale[:, None, None] * (table.T @ (WEIGHTS[:, None] * table)))
+        weighted = (WEIGHTS * shares)[:, :, None] * table
+        return np.asarray(scale[:, None, None] * (table.T @ weighted))
 
     def terms(self, samples: Samples) -> dict[str, float]:
         """Return what each cost contributes to F."""
         return {cost.name: float(samples.weights @ cost.value(samples)) for cost in self._costs}
 
-    def roughness(self, samples: HermiteSamples) -> float:
-        """Return what the smoothing adds."""
+    def roughness(self, ends: Array) -> float:
+        """Return what the smoothing adds, for y (N, 6, n)."""
         if self._smoothing is None:
             return 0.0
         stiffness, weight = self._smoothing
-        ends = samples.ends
         return 0.5 * float(np.sum((stiffness @ ends) * (ends @ weight)))
 
     def partials(self, samples: Samples) -> tuple[Partials, ...]:
         """Return the derivatives of the integrand of each cost at the samples."""
         return tuple(cost.gradient(samples) for cost in self._costs)
 
-    def slopes(self, samples: HermiteSamples, partials: Sequence[Partials]) -> Array:
-        """Return the derivatives of each interval's cost by q, q̇ at its ends, (N, 4, n)."""
-        together = _summed(partials)
-        weights, bases = self._spline.weights, self._spline.bases
-        count, n = len(weights), samples.q.shape[1]
-        found = np.zeros((count, 4, n))
+    def slopes(self, samples: Samples, ends: Array, partials: Sequence[Partials]) -> Array:
+        """Return the derivatives of each interval's cost by y, (N, 6, n)."""
+        together, spline = _summed(partials), self._spline
+        weights = samples.weights.reshape(spline.count, -1, 1)
+        found = np.zeros_like(ends)
         for order, name in enumerate(_NAMES):
             part = getattr(together, name)
             if part is not None:
-                shares = weights[:, :, None] * bases[order]
-                found += np.swapaxes(shares, 1, 2) @ part[:-1].reshape(count, 4, n)
+                each = weights * spline.rates(order)[:, None, None]
+                found += AT_GAUSS[order].T @ (each * part.reshape(*weights.shape[:2], -1))
         if self._smoothing is not None:
             stiffness, weight = self._smoothing
-            found += stiffness @ (samples.ends @ weight)
+            found += stiffness @ (ends @ weight)
         return found
 
-    def bends_by_rates(self, partials: Sequence[Partials]) -> bool:
-        """Whether a cost that is no quadratic form is one of q̈, the jerk or errors."""
-        bent = self._of_bent(partials)
-        return any(part is not None for part in (bent.qdd, bent.qddd, bent.error))
+    def depends_on_errors(self, partials: Sequence[Partials]) -> bool:
+        """Whether a cost weighs how far the tool is off its path: on nodes it never is."""
+        return any(part.error is not None for part in partials)
 
     def _of_bent(self, partials: Sequence[Partials]) -> Partials:
         """Return the derivatives of all costs that are no quadratic forms."""
@@ -122,85 +122,101 @@ class NodeCost:
         return _summed([own for cost, own in both if not cost.is_quadratic])
 
     def curvature(
-        self, samples: HermiteSamples, partials: Sequence[Partials], changes: Array
+        self,
+        samples: CurveSamples,
+        partials: Sequence[Partials],
+        both: Array,
+        more: Array | None = None,
     ) -> Array:
-        """Return Γᵀ (∂²F) Γ on each interval, by w of its left, then its right node, (N, 4r, 4r).
+        """Return Γᵀ (∂²F) Γ on each interval, by w of its left, then its right node, (N, d, d).
 
-        `changes` (N + 1, 2, n, 2r) is Γ of the nodes.
+        `both` (N, n, 6, d) are the changes of y; `more` (N, n, 6, 6) what else bends each joint's.
         """
-        count, _, n, size = changes.shape
-        found = np.zeros((count - 1, 2 * size, 2 * size))
-        for first in range(0, count - 1, _LOT):
-            both, part = _at_ends(changes[first : first + _LOT + 1]), slice(first, first + _LOT)
-            flat = np.swapaxes(both.reshape(len(both), 4 * n, 2 * size), 1, 2)
-            for stiffness, weight in self._forms:
-                turned = stiffness[part] @ (weight @ both).reshape(len(both), 4, -1)
-                found[part] += flat @ turned.reshape(len(both), 4 * n, 2 * size)
+        count, n, _, size = both.shape
+        found = np.zeros((count, size, size))
+        for first in range(0, count, _LOT):
+            part = slice(first, first + _LOT)
+            own = both[part]
+            turned = _bent_by(self._forms, part, own)
+            if more is not None:
+                turned += more[part] @ own
+            flat = own.reshape(len(own), 6 * n, size)
+            found[part] = np.swapaxes(flat, 1, 2) @ turned.reshape(len(own), 6 * n, size)
         if self._bent:
-            found += self._bending(samples, self._of_bent(partials), _at_ends(changes))
+            found += self._bending(samples, self._of_bent(partials), both)
         return found
 
-    def _bending(self, samples: HermiteSamples, here: Partials, both: Array) -> Array:
+    def _bending(self, samples: CurveSamples, here: Partials, both: Array) -> Array:
         """Return what costs that are no quadratic forms, with derivatives `here`, add to it.
 
-        `both` (N, 4, n, 4r) are the changes of q and q̇ at the ends of each interval.
+        By differences along the self-motion, and by one joint's rate after the other.
         """
-        spline, (count, _, n, size) = self._spline, both.shape
-        r = size // 4
-        by_q, by_qd = (
-            (bases @ both.reshape(count, 4, -1)).reshape(-1, n, size) for bases in spline.bases[:2]
-        )
+        spline, (count, n, _, size) = self._spline, both.shape
+        r, each = size // 6, len(GAUSS)
+        by = [
+            np.moveaxis(table @ both, 1, 2).reshape(-1, n, size)
+            * np.repeat(spline.rates(order), each)[:, None, None]
+            for order, table in enumerate(AT_GAUSS)
+        ]
         # Along the self-motion at the samples: between what it is at the nodes.
-        left, right = both[:, None, 0, :, :r], both[:, None, 2, :, 2 * r : 3 * r].copy()
-        # In a gap nothing moves.
+        left, right = both[:, None, :, 0, :r], both[:, None, :, 3, 3 * r : 4 * r].copy()
         right[spline.gaps] = left[spline.gaps]
-        share = SHARES[:, None, None]
-        along = orthonormal((left + share * (right - left)).reshape(-1, n, r))
+        share = GAUSS[:, None, None]
+        along = (left + share * (right - left)).reshape(-1, n, r)
+        along[np.repeat(np.isin(np.arange(count), spline.gaps), each)] = np.eye(n)[:, :r]
+        along = orthonormal(along)
         turned = np.swapaxes(along, 1, 2)
-        moved = turned @ by_q
-        directions = np.concatenate([along, along[-1:]])
-        found = np.zeros((count * len(SHARES), size, size))
+        moved = turned @ by[0]
+        found = np.zeros((count * each, size, size))
         for x in range(r):
-            changed = self._changed(samples, here, directions[:, :, x], 0.0)
+            changed = self._changed(samples, here, {"q": along[:, :, x]})
             if changed.q is not None:
-                row = (turned @ changed.q[:-1, :, None])[:, :, 0]
+                row = (turned @ changed.q[:, :, None])[:, :, 0]
                 found += _outer(np.einsum("sr,srw->sw", row, moved), moved[:, x])
-            if changed.qd is not None:
-                cross = _outer(np.einsum("sn,snw->sw", changed.qd[:-1], by_qd), moved[:, x])
-                found += cross + np.swapaxes(cross, 1, 2)
-        if here.qd is not None:
+            for order, name in enumerate(_NAMES[1:], 1):
+                part = getattr(changed, name)
+                if part is not None:
+                    cross = _outer(np.einsum("sn,snw->sw", part, by[order]), moved[:, x])
+                    found += cross + np.swapaxes(cross, 1, 2)
+        rates = [o for o, name in enumerate(_NAMES) if o and getattr(here, name) is not None]
+        for order in rates:
             for j, axis in enumerate(np.eye(n)):
-                faster = self._changed(samples, here, 0.0, axis).qd
-                if faster is not None:
-                    found += _outer(np.einsum("sn,snw->sw", faster[:-1], by_qd), by_qd[:, j])
-        found = (spline.weights.reshape(-1, 1, 1) * found).reshape(count, -1, size, size)
+                faster = self._changed(samples, here, {_NAMES[order]: axis})
+                for other in rates:
+                    part = getattr(faster, _NAMES[other])
+                    if part is not None:
+                        found += _outer(np.einsum("sn,snw->sw", part, by[other]), by[order][:, j])
+        found = (samples.weights[:, None, None] * found).reshape(count, -1, size, size)
         found = found.sum(axis=1)
         return np.asarray(0.5 * (found + np.swapaxes(found, 1, 2)))
 
     def _changed(
-        self, samples: HermiteSamples, here: Partials, q: Array | float, qd: Array | float
+        self, samples: CurveSamples, here: Partials, directions: dict[str, Array]
     ) -> Partials:
-        """Return how the derivatives `here` of bent costs change in directions of q and q̇."""
-        moved = {"q": samples.q + _NEAR * q, "qd": samples.qd + _NEAR * qd}
-        shifted = PlacedLater(samples.follows, samples.sampling, **moved)
+        """Return how the derivatives `here` of bent costs change in a direction."""
+        known = {"q": samples.q, "qd": samples.qd, "qdd": samples.qdd, "qddd": samples.qddd}
+        for name, way in directions.items():
+            known[name] = known[name] + _NEAR * way
+        shifted = PlacedLater(samples.follows, samples.sampling, **known)
         there = _summed([cost.gradient(shifted) for cost in self._bent])
         parts = {}
-        for name in ("q", "qd"):
+        for name in _NAMES:
             before, after = getattr(here, name), getattr(there, name)
             if before is not None and after is not None:
                 parts[name] = (after - before) / _NEAR
         return Partials(**parts)
 
 
-def _at_ends(changes: Array) -> Array:
-    """Return how q, q̇ at both ends of intervals change with w of both, (N, 4, n, 4r).
-
-    For Γ of the nodes, (N + 1, 2, n, 2r).
-    """
-    count, _, n, size = changes.shape
-    both = np.zeros((count - 1, 4, n, 2 * size))
-    both[:, :2, :, :size], both[:, 2:, :, size:] = changes[:-1], changes[1:]
-    return both
+def _bent_by(forms: Sequence[tuple[Array, Array]], part: slice, both: Array) -> Array:
+    """Return ∂²F of quadratic forms on some intervals times changes of y, (N, n, 6, d)."""
+    found, shape = np.zeros_like(both), (both.shape[0], both.shape[1], -1)
+    for stiffness, weight in forms:
+        turned, diagonal = stiffness[part, None] @ both, np.diagonal(weight)
+        if np.array_equal(weight, np.diag(diagonal)):
+            found += diagonal[:, None, None] * turned
+        else:
+            found += (weight @ turned.reshape(shape)).reshape(both.shape)
+    return found
 
 
 def _summed(each: Sequence[Partials]) -> Partials:
@@ -218,23 +234,15 @@ def _outer(a: Array, b: Array) -> Array:
     return np.asarray(a[:, :, None] * b[:, None, :])
 
 
-def scattered(slopes: Array) -> Array:
-    """Return derivatives by q, q̇ of the nodes, (N + 1, 2, n), for those of intervals (N, 4, n)."""
-    found = np.zeros((len(slopes) + 1, 2, slopes.shape[2]))
-    found[:-1] += slopes[:, :2]
-    found[1:] += slopes[:, 2:]
-    return found
-
-
 @dataclass(frozen=True, eq=False)
 class Around:
     """How nodes move when their coordinates do, to second order.
 
     Attributes
     ----------
-    changes : (N + 1, 2, n, 2r)
-        Γ = ∂(q, q̇)/∂(z, ν).
-    curvature : (N + 1, 2r, 2r)
+    changes : (N + 1, 3, n, 3r)
+        Γ = ∂(q, q̇, q̈)/∂(z, ν, α).
+    curvature : (N + 1, 3r, 3r)
         ∂(Γᵀλ)/∂w at fixed λ, symmetric.
     """
 
@@ -242,29 +250,92 @@ class Around:
     curvature: Array
 
     @classmethod
-    def of(cls, charts: Charts, nu: Array, by_node: Array) -> "Around | None":
+    def of(
+        cls, charts: Charts, nu: Array, alpha: Array, place: Place, force: Array
+    ) -> "Around | None":
         """Look around the reference of charts; None where a neighbour is not to be had.
 
-        `by_node` (N + 1, 2, n) is λ.
+        `place` is that of the nodes there, `force` (N + 1, 3, n) is λ.
         """
         count, n, r = charts.bases.shape
-        by_q, by_qd = np.ascontiguousarray(by_node[:, 0]), np.ascontiguousarray(by_node[:, 1])
-        changes, bends = np.zeros((count, 2, n, 2 * r)), np.zeros((count, 2 * r, 2 * r))
-        changes[:, 0, :, :r] = changes[:, 1, :, r:] = charts.bases
+        here = charts.bases_at(place)
+        changes, curvature = np.zeros((count, 3, n, 3 * r)), np.zeros((count, 3 * r, 3 * r))
+        changes[:, 0, :, :r] = charts.bases
+        changes[:, 1, :, r : 2 * r] = changes[:, 2, :, 2 * r :] = here.by_rate
+        changes[:, 2, :, r : 2 * r] = here.by_both
+        middle = _along(force, place)
         for x in range(r):
-            rates, slopes = [], []
+            sides, values = [], []
             for side in (_REACH, -_REACH):
                 z = np.zeros((count, r))
                 z[:, x] = side
-                beside = charts.at(z, nu)
-                if beside is None:
+                found = charts.around(z, nu, alpha)
+                if found is None:
                     return None
-                rates.append(beside.qd)
-                slopes.append(charts.pulled(beside, by_q, by_qd))
-            changes[:, 1, :, x] = (rates[0] - rates[1]) / (2.0 * _REACH)
-            column = (slopes[0] - slopes[1]) / (2.0 * _REACH)
-            bends[:, :, x] = column
-            bends[:, x, r:] = column[:, r:]
-        along = bends[:, :r, :r]
-        bends[:, :r, :r] = 0.5 * (along + np.swapaxes(along, 1, 2))
-        return cls(changes, bends)
+                sides.append(found)
+                values.append(_along(force, found[0]))
+            above, below = sides
+            changes[:, 1, :, x] = (above[0].qd - below[0].qd) / (2.0 * _REACH)
+            changes[:, 2, :, x] = (above[0].qdd - below[0].qdd) / (2.0 * _REACH)
+            curvature[:, x, x] = (values[0] - 2.0 * middle + values[1]) / _REACH**2
+            by_nu, by_alpha = (
+                (one - other) / (2.0 * _REACH)
+                for one, other in zip(
+                    _pulled(force, above[1]), _pulled(force, below[1]), strict=True
+                )
+            )
+            curvature[:, x, r : 2 * r] = curvature[:, r : 2 * r, x] = by_nu
+            curvature[:, x, 2 * r :] = curvature[:, 2 * r :, x] = by_alpha
+        if not cls._mixed(charts, nu, alpha, force, middle, curvature):
+            return None
+        cls._by_rates(charts, place, here, force, curvature)
+        return cls(changes, curvature)
+
+    @staticmethod
+    def _mixed(
+        charts: Charts, nu: Array, alpha: Array, force: Array, middle: Array, curvature: Array
+    ) -> bool:
+        """Set the second derivatives by two of z; return whether that could be done."""
+        count, _, r = charts.bases.shape
+        for x in range(r):
+            for y in range(x):
+                values = []
+                for side in (_REACH, -_REACH):
+                    z = np.zeros((count, r))
+                    z[:, [x, y]] = side
+                    place = charts.at(z, nu, alpha)
+                    if place is None:
+                        return False
+                    values.append(_along(force, place))
+                both = (values[0] - 2.0 * middle + values[1]) / _REACH**2
+                own = 0.5 * (both - curvature[:, x, x] - curvature[:, y, y])
+                curvature[:, x, y] = curvature[:, y, x] = own
+        return True
+
+    @staticmethod
+    def _by_rates(
+        charts: Charts, place: Place, here: Bases, force: Array, curvature: Array
+    ) -> None:
+        """Add the second derivatives by two of ν: q̈ is quadratic in q̇."""
+        r, by = here.by_rate.shape[2], here.by_rate
+        pairs = [(x, y) for x in range(r) for y in range(x)]
+        ways = [by, *(by[:, :, x : x + 1] + by[:, :, y : y + 1] for x, y in pairs)]
+        half = charts.manifolds.bends(place, force[:, 2], np.concatenate(ways, axis=2))
+        for x in range(r):
+            curvature[:, r + x, r + x] += 2.0 * half[:, x]
+        for number, (x, y) in enumerate(pairs, r):
+            mixed = half[:, number] - half[:, x] - half[:, y]
+            curvature[:, r + x, r + y] += mixed
+            curvature[:, r + y, r + x] += mixed
+
+
+def _along(force: Array, place: Place) -> Array:
+    """Return λᵀ(q, q̇, q̈) of nodes, (N + 1,)."""
+    return np.asarray(np.sum(force * place.nodes, axis=(1, 2)))
+
+
+def _pulled(force: Array, bases: Bases) -> tuple[Array, Array]:
+    """Return λᵀ∂(q̇, q̈)/∂ν and λᵀ∂q̈/∂α, (N + 1, r) each."""
+    of_qd, of_qdd = force[:, 1, None, :], force[:, 2, None, :]
+    by_nu = of_qd @ bases.by_rate + of_qdd @ bases.by_both
+    return by_nu[:, 0], (of_qdd @ bases.by_rate)[:, 0]

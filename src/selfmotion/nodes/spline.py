@@ -1,47 +1,69 @@
-"""A motion between nodes: the cubic Hermite spline of q and q̇, and where it is looked at."""
+"""A motion between nodes: quintic pieces through (q, q̇, q̈), and where they are looked at.
+
+On an interval of length h the piece is a polynomial of s = (t - t_k)/h, linear in its ends
+
+    y = (q, h q̇, h² q̈) of the left node, then of the right one:  (d/dt)^o q = h^-o U_o(s) y,
+
+with the same tables U_o for all intervals. Its control points (of the Bernstein form, G. Farin,
+"Curves and Surfaces for CAGD", ch. 5) are linear in y as well, and the curve stays within their
+convex hull: what all control points of a derivative keep, the whole curve keeps.
+"""
 
 from functools import cached_property
+from math import comb, perm
 
 import numpy as np
 
-from selfmotion.basics import Array
+from selfmotion.basics import Array, Ints
 from selfmotion.motion import Sampling
 
-# Gauss points on each interval: ∫ of the square of a quadratic is exact, and no motion of the nodes
-# is without cost at all of them.
-_ROOT = 0.5 * np.sqrt(0.6)
-_WEIGHTS = np.array([0.0, 5.0, 8.0, 5.0]) / 18.0
-# Where an interval's samples are: its first node, then these.
-SHARES = np.array([0.0, 0.5 - _ROOT, 0.5, 0.5 + _ROOT])
-_SAMPLES = len(SHARES)
-# q̈ and the jerk of the right, then the left end of an interval of length 1, by q, q̇ of both ends.
-_ENDS = {
-    2: np.array([[6.0, 2.0, -6.0, 4.0], [-6.0, -4.0, 6.0, -2.0]]),
-    3: np.array([[12.0, 6.0, -12.0, 6.0], [12.0, 6.0, -12.0, 6.0]]),
-}
-# Which of an interval's samples is in its middle.
-_MIDDLE = 2
+# Orders of derivatives that are known: q, q̇, q̈ and the jerk.
+ORDERS = 4
+# Control points of each.
+CONTROLS = (6, 5, 4, 3)
+# Gauss points on an interval: the square of a quintic's derivative is integrated exactly.
+_ROOTS, _SHARES = np.polynomial.legendre.leggauss(5)
+GAUSS, WEIGHTS = 0.5 * (1.0 + _ROOTS), 0.5 * _SHARES
+# Where constraints that are no limits of joints look at an interval, besides the last node.
+POINTS = np.array([0.0, 0.5])
 
 
-def _unit(s: Array) -> tuple[Array, ...]:
-    """Return what `Hermite.bases` are on an interval of length 1, at shares s (S,), (S, 4) each."""
-    one = np.ones_like(s)
-    tables = (
-        (1 - s**2 * (3 - 2 * s), s * (1 - s) ** 2, s**2 * (3 - 2 * s), s**2 * (s - 1)),
-        (6 * s * (s - 1), (1 - s) * (1 - 3 * s), 6 * s * (1 - s), s * (3 * s - 2)),
-        (12 * s - 6, 6 * s - 4, 6 - 12 * s, 6 * s - 2),
-        (12 * one, 6 * one, -12 * one, 6 * one),
-    )
-    return tuple(np.stack(table, axis=1) for table in tables)
+def _powers(s: Array, order: int) -> Array:
+    """Return the derivatives of 1, s, … s⁵ at s (S,), (S, 6)."""
+    each = [perm(p, order) * s ** max(p - order, 0) for p in range(6)]
+    return np.stack([x * np.ones_like(s) for x in each], axis=1)
 
 
-_UNIT = _unit(SHARES)
+# Coefficients of 1, s, … s⁵ by (q, q̇, q̈) of both ends.
+_ENDS = np.linalg.inv(
+    np.concatenate([_powers(np.array([s]), order) for s in (0.0, 1.0) for order in range(3)])
+)
 
 
-class Hermite:
-    """The cubic Hermite spline on given times, sampled at its nodes and at Gauss points between.
+def unit_bases(s: Array) -> tuple[Array, ...]:
+    """Return U_o(s) of q, q̇, q̈ and the jerk at shares s (S,) of an interval, (S, 6) each."""
+    return tuple(_powers(s, order) @ _ENDS for order in range(ORDERS))
 
-    Samples come four to an interval (its first node, three points), then the last node.
+
+def _controls() -> tuple[Array, ...]:
+    """Return how control points of q, q̇, q̈ and the jerk follow from y, (6 - o, 6) each."""
+    found = []
+    for order, count in enumerate(CONTROLS):
+        s, degree = np.linspace(0.0, 1.0, count), count - 1
+        terms = [comb(degree, i) * s**i * (1.0 - s) ** (degree - i) for i in range(count)]
+        solved = np.linalg.solve(np.stack(terms, axis=1), unit_bases(s)[order])
+        found.append(np.asarray(solved, dtype=np.float64))
+    return tuple(found)
+
+
+AT_GAUSS, AT_CONTROLS, AT_POINTS = unit_bases(GAUSS), _controls(), unit_bases(POINTS)
+AT_END = unit_bases(np.ones(1))
+# How (q, q̇, q̈) of both ends scale with h to become y.
+_SCALED = np.array([0, 1, 2, 0, 1, 2])
+
+
+class Quintic:
+    """Quintic pieces on given times.
 
     Of several motions on the same nodes, one after the other, the interval from the end of one to
     the start of the next is a gap: it weighs nothing, and nothing moves there.
@@ -61,95 +83,91 @@ class Hermite:
     gaps : (K,)
         Which intervals are gaps.
     sampling : Sampling
-        What costs look at.
-    checked : Sampling
-        What constraints look at: the nodes, and what is between each two.
+        What costs look at: the Gauss points of each interval.
     """
 
     def __init__(self, t: Array, copies: int = 1) -> None:
-        self.t, self.steps = np.tile(t, copies), np.diff(np.tile(t, copies))
+        self.t = np.tile(t, copies)
+        self.steps = np.diff(self.t)
         self.gaps = np.arange(1, copies) * len(t) - 1
-        h = self.steps[:, None].copy()
-        h[self.gaps] = 0.0
         self.steps[self.gaps] = 1.0
-        times, each = (self.t[:-1, None] + h * SHARES).ravel(), (h * _WEIGHTS).ravel()
-        times = np.append(times, t[-1])
-        self.sampling = Sampling(times, np.append(each, 0.0), np.arange(len(times)))
-        self.checked = Sampling.trapezoidal(times[::_MIDDLE])
+        h = self.steps.copy()
+        h[self.gaps] = 0.0
+        times = (self.t[:-1, None] + h[:, None] * GAUSS).ravel()
+        each = (h[:, None] * WEIGHTS).ravel()
+        self.sampling = Sampling(times, each, np.arange(len(times)))
+        self._powers = self.steps[:, None] ** _SCALED
+
+    @property
+    def count(self) -> int:
+        """N."""
+        return len(self.steps)
 
     @cached_property
-    def bases(self) -> tuple[Array, ...]:
-        """How q, q̇, q̈ and the jerk at an interval's samples follow from its ends, (N, 4, 4) each.
+    def points(self) -> Sampling:
+        """What constraints look at that are no limits of joints."""
+        inner = (self.t[:-1, None] + self.steps[:, None] * POINTS).ravel()
+        return Sampling.trapezoidal(np.append(inner, self.t[-1]))
 
-        From q, q̇ at the left and q, q̇ at the right end; at the node itself it is the derivative of
-        the interval that begins there.
-        """
-        h, inverse = self.steps, 1.0 / self.steps
-        square = inverse * inverse
-        powers = np.stack([square * inverse, square, inverse, np.ones_like(h), h], axis=1)
-        # By q it is 1/h to the order, by q̇ one less.
-        each = (powers[:, [3 - order, 4 - order] * 2] for order in range(4))
-        return tuple(power[:, None] * table for power, table in zip(each, _UNIT, strict=True))
+    def times_of(self, order: int) -> Array:
+        """Return where control points belong [s], (N, 6 - o)."""
+        shares = np.linspace(0.0, 1.0, CONTROLS[order])
+        return np.asarray(self.t[:-1, None] + self.steps[:, None] * shares)
 
-    @cached_property
-    def between(self) -> tuple[Array, ...]:
-        """How q, q̇, q̈ and the jerk between two nodes follow from both ends, (N, 4) each.
-
-        In the middle; but of q̇, a parabola, the control point of its Bernstein form: together with
-        its ends it says how fast the motion is at most. And of q̈, a line, its right end: its left
-        one is said at the node.
-        """
-        q, qd, _, qddd = (table[:, _MIDDLE] for table in self.bases)
-        ends = np.array([0.0, 1.0, 0.0, 1.0])
-        return q, 2.0 * qd - 0.5 * ends, self.at_ends(2)[0], qddd
-
-    @cached_property
-    def weights(self) -> Array:
-        """Quadrature weights of an interval's samples [s], (N, 4)."""
-        return self.sampling.weights[:-1].reshape(-1, _SAMPLES)
-
-    @cached_property
-    def shares(self) -> tuple[Array, Array]:
-        """How q̈ and the jerk at a node follow from q and q̇ near it, (N + 1, 3, 2) each.
-
-        At the node before, at itself and at the next one: as the interval says that begins there;
-        at the last node of a motion that which ends.
-        """
-        found = []
-        for order in (2, 3):
-            right, left = (rows.reshape(-1, 2, 2) for rows in self.at_ends(order))
-            shares = np.zeros((len(self.t), 3, 2))
-            shares[:-1, 1:] = left
-            shares[self.gaps] = 0.0
-            ends = np.append(self.gaps, len(self.t) - 1)
-            shares[ends, :2] = right[ends - 1]
-            found.append(shares)
-        return found[0], found[1]
-
-    def at_ends(self, order: int) -> tuple[Array, Array]:
-        """How q̈ (2) or the jerk (3) at an interval's right and left end follow from both."""
-        h = self.steps
-        powers = np.stack([1.0 / h**order, 1.0 / h ** (order - 1)] * 2, axis=1)
-        right, left = _ENDS[order]
-        return powers * right, powers * left
-
-    def accelerations(self, ends: Array) -> tuple[Array, Array]:
-        """Return q̈ at the nodes as the intervals before and after say it, (N + 1, n) each.
-
-        For q and q̇ at both ends of each, (N, 4, n); where there is no interval, the other's.
-        """
-        right, left = (np.einsum("ka,kan->kn", rows, ends) for rows in self.at_ends(2))
-        return np.concatenate([left[:1], right]), np.concatenate([left, right[-1:]])
-
-    def at_nodes(self, order: int, q: Array, qd: Array) -> Array:
-        """Return q̈ (2) or the jerk (3) at the nodes, (N + 1, …), see `shares`."""
-        shares, both = self.shares[order - 2], np.stack([q, qd], axis=1)
-        found = np.einsum("ka,ka...->k...", shares[:, 1], both)
-        found[1:] += np.einsum("ka,ka...->k...", shares[1:, 0], both[:-1])
-        found[:-1] += np.einsum("ka,ka...->k...", shares[:-1, 2], both[1:])
+    def ends(self, nodes: Array) -> Array:
+        """Return y of each interval, (N, 6, n), for (q, q̇, q̈) of the nodes, (N + 1, 3, n)."""
+        found = np.concatenate([nodes[:-1], nodes[1:]], axis=1) * self._powers[:, :, None]
+        if self.gaps.size:
+            found[self.gaps, 3] = found[self.gaps, 0]
+            found[np.ix_(self.gaps, np.array([1, 2, 4, 5]))] = 0.0
         return np.asarray(found)
 
+    def scattered(self, by_ends: Array) -> Array:
+        """Return derivatives by (q, q̇, q̈) of the nodes, for those by y (N, 6, n), (N + 1, 3, n)."""
+        own = by_ends * self._powers[:, :, None]
+        if self.gaps.size:
+            own[self.gaps] = 0.0
+        found = np.zeros((self.count + 1, 3, own.shape[2]))
+        found[:-1] += own[:, :3]
+        found[1:] += own[:, 3:]
+        return found
 
-def weighted(shares: Array, changes: Array) -> Array:
-    """Return Σ_a shares (K, 2) · changes (K, 2, n, d), (K, n, d)."""
-    return np.asarray(np.einsum("ka,kani->kni", shares, changes))
+    def changes(self, changes: Array) -> Array:
+        """Return how y changes with w of both ends of each interval, (N, n, 6, 2 d).
+
+        `changes` (N + 1, 3, n, d) is ∂(q, q̇, q̈)/∂w of the nodes.
+        """
+        turned = np.swapaxes(changes, 1, 2)
+        count, n, _, size = turned.shape
+        both = np.zeros((count - 1, n, 6, 2 * size))
+        both[:, :, :3, :size], both[:, :, 3:, size:] = turned[:-1], turned[1:]
+        both *= self._powers[:, None, :, None]
+        if self.gaps.size:
+            both[self.gaps] = 0.0
+        return both
+
+    def rates(self, order: int) -> Array:
+        """Return h^-o, (N,)."""
+        return np.asarray(self.steps ** float(-order))
+
+    def at(self, tables: tuple[Array, ...], order: int, ends: Array) -> Array:
+        """Return a derivative at shares of all intervals, (N, S, n), for U_o there and y."""
+        return np.asarray((tables[order] @ ends) * self.rates(order)[:, None, None])
+
+    def at_points(self, order: int, ends: Array) -> Array:
+        """Return a derivative at the `points`, (2 N + 1, n)."""
+        inner = self.at(AT_POINTS, order, ends).reshape(-1, ends.shape[2])
+        last = AT_END[order] @ ends[-1] * self.rates(order)[-1]
+        return np.concatenate([inner, last])
+
+    def point_shares(self, which: Ints) -> tuple[Ints, Array]:
+        """Return the intervals of some points (R,), and how q … jerk there follow from y.
+
+        (R,) and (R, 4, 6).
+        """
+        last = which == len(POINTS) * self.count
+        k = np.where(last, self.count - 1, which // len(POINTS))
+        tables = np.stack([*AT_POINTS], axis=1)[which % len(POINTS)]
+        tables[last] = np.stack([table[0] for table in AT_END])
+        powers = self.steps[k][:, None] ** -np.arange(float(ORDERS))
+        return k, tables * powers[:, :, None]

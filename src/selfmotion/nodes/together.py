@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from selfmotion.basics import Array, Flags, Ints
-from selfmotion.nodes.charts import Charts, Place
+from selfmotion.nodes.charts import Centred, Charts, Place
 from selfmotion.nodes.motion import NodeGrid, NodeMotion
-from selfmotion.nodes.objective import Around, scattered
+from selfmotion.nodes.objective import Around
+from selfmotion.nodes.spline import GAUSS
 from selfmotion.optimise import Banded
 
 # A motion is left alone when a step promises less than this share of what it costs.
@@ -25,8 +26,8 @@ _SHARES, _DONE, _FARTHEST = (1.0, 0.25, 0.0625), 1e-4, 0.5
 # More of a matrix's diagonal, as in `newton`: this share of its usual entry; where it is not
 # positive definite this one of its largest entry, and so many times more.
 _FLAT, _SHIFT, _MORE = 1e-11, 1e-6, 8.0
-# Samples of an interval; what a place is made of.
-_EACH, _PLACE = 4, ("q", "qd", "tangents", "table")
+# What a place is made of.
+_PLACE = ("q", "qd", "qdd", "tangents", "table")
 _LEAVES = "of several motions, one that is not to be had leaves the others"
 
 
@@ -55,11 +56,11 @@ class Together:
     def near(cls, grid: NodeGrid, motions: Array) -> "Together":
         """Return motions without self-motion whose nodes are those nearest to q (K, N + 1, n)."""
         many, q = grid.copied(len(motions)), motions.reshape(-1, motions.shape[2])
-        begun = many.manifolds.near(q, np.zeros_like(q))
+        begun = many.manifolds.near(q, np.zeros_like(q), np.zeros_like(q))
         if begun is None:
             raise RuntimeError(_LEAVES)
         count = len(motions)
-        return cls._of(many.at(*begun), np.ones(count, dtype=np.bool_), np.full(count, np.inf))
+        return cls._of(many.at(begun), np.ones(count, dtype=np.bool_), np.full(count, np.inf))
 
     @classmethod
     def _of(cls, motion: NodeMotion, going: Flags, promised: Array) -> "Together":
@@ -69,10 +70,10 @@ class Together:
         grid.counts.evaluated()
         grid.counts.evaluations += int(going.sum()) - 1
         each = np.sum([cost.value(samples) for cost in grid.problem.all_costs], axis=0)
-        # At nodes, and in gaps, a cost may be infinite.
+        # In gaps, a cost may be infinite.
         shares, counts = np.zeros_like(each), samples.weights > 0.0
         shares[counts] = samples.weights[counts] * each[counts]
-        costs = np.append(shares[:-1].reshape(-1, _EACH).sum(axis=1), 0.0)
+        costs = np.append(shares.reshape(-1, len(GAUSS)).sum(axis=1), 0.0)
         costs = costs.reshape(count, -1).sum(axis=1)
         return cls(motion, np.where(np.isfinite(costs), costs, np.inf), going, promised)
 
@@ -91,6 +92,11 @@ class Together:
         """How fast they are there, (K, N + 1, n)."""
         return self._each(self.motion.place.qd)
 
+    @property
+    def qdd(self) -> Array:
+        """Their accelerations there, (K, N + 1, n)."""
+        return self._each(self.motion.place.qdd)
+
     def picked(self, which: Ints) -> "Together":
         """Return some of them."""
         motion, whole = self.motion, self.motion.place
@@ -98,7 +104,7 @@ class Together:
         rows = self._rows(which)
         charts = Charts(grid.manifolds, motion.charts.q[rows], motion.charts.bases[rows])
         place = Place(*(np.ascontiguousarray(getattr(whole, name)[rows]) for name in _PLACE))
-        some = grid.at(charts, motion.nu[rows], place)
+        some = grid.at(Centred(charts, motion.nu[rows], motion.alpha[rows], place))
         return Together(some, self.costs[which], self.going[which], self.promised[which])
 
     def advanced(self) -> "Together":
@@ -126,8 +132,9 @@ class Together:
         place = Place(
             *(joined(getattr(mine.place, name), getattr(own.place, name)) for name in _PLACE)
         )
+        nu, alpha = joined(mine.nu, own.nu), joined(mine.alpha, own.alpha)
         return Together(
-            mine.grid.at(charts, joined(mine.nu, own.nu), place),
+            mine.grid.at(Centred(charts, nu, alpha, place)),
             joined(self.costs, others.costs, which),
             joined(self.going, others.going, which),
             joined(self.promised, others.promised, which),
@@ -142,18 +149,20 @@ class Together:
         motion, grid = self.motion, self.motion.grid
         grid.counts.gradients += self.count
         # Beside what is not to be had, others know nothing of that.
-        slopes = grid.cost.slopes(motion.samples, motion.partials)
-        slopes[grid.spline.gaps] = 0.0
-        by = scattered(slopes)
-        gradient = motion.charts.pulled(motion.place, by[:, 0], by[:, 1])
-        gradient.reshape(-1)[grid.held] = 0.0
-        around = Around.of(motion.charts, motion.nu, by)
+        spline = grid.spline
+        slopes = grid.cost.slopes(motion.samples, motion.curve_ends, motion.partials)
+        slopes[spline.gaps] = 0.0
+        force = spline.scattered(slopes)
+        around = Around.of(motion.charts, motion.nu, motion.alpha, motion.place, force)
         if around is None:
             raise RuntimeError(_LEAVES)
-        intervals = grid.cost.curvature(motion.samples, motion.partials, around.changes)
-        intervals[grid.spline.gaps] = 0.0
+        changes = around.changes * grid.scale
+        gradient = np.einsum("konw,kon->kw", changes, force)
+        gradient.reshape(-1)[grid.held] = 0.0
+        intervals = grid.cost.curvature(motion.samples, motion.partials, spline.changes(changes))
+        intervals[spline.gaps] = 0.0
         matrix = Banded(len(gradient), gradient.shape[1], 1)
-        matrix.add(0, 0, around.curvature)
+        matrix.add(0, 0, around.curvature * grid.scale * grid.scale[:, None])
         matrix.add_pairs(0, intervals)
         matrix.hold(grid.held)
         step, rights = np.zeros((self.count, gradient.size // self.count)), -gradient
@@ -174,18 +183,16 @@ class Together:
     def _moved(self, step: Array, promised: Array, going: Flags) -> "Together":
         """Return them along their steps, each as far as it does what it promises."""
         motion, r, due = self.motion, self.motion.nu.shape[1], np.where(going, promised, 0.0)
-        by_node = step.reshape(self.count, -1, 2, r)
+        by_node = step.reshape(self.count, -1, 3, r)
         farthest = np.abs(by_node[:, :, 0]).max(axis=(1, 2))
         most = np.where(going, _FARTHEST / np.maximum(farthest, _FARTHEST), 0.0)
         left, length = going.copy(), most.copy()
         for share in (*_SHARES, 0.0):
             length[left] = share * most[left]
-            flat = (length[:, None, None, None] * by_node).reshape(-1, 2, r)
-            epsilon = motion.charts.null_motions(motion.nu + flat[:, 1])
-            found = motion.charts.centred(flat[:, 0], epsilon)
+            found = motion.stepped((length[:, None, None, None] * by_node).reshape(-1, 3 * r))
             if found is None:
                 raise RuntimeError(_LEAVES)
-            new = Together._of(motion.grid.at(*found), going & (length > 0.0), promised)
+            new = Together._of(found, going & (length > 0.0), promised)
             left[left] = ~(new.costs <= self.costs - _DONE * length * due)[left]
             if not left.any():
                 break

@@ -35,16 +35,6 @@ class Banded:
         self.add(0, first + 1, blocks[:, s:, s:])
         self.add(1, first, blocks[:, :s, s:])
 
-    def add_triples(self, blocks: Array) -> None:
-        """Add blocks (K, 3s, 3s) of each row with the ones before and after it."""
-        s = self._size
-        self.add(0, 0, blocks[:, s : 2 * s, s : 2 * s])
-        self.add(0, 0, blocks[1:, :s, :s])
-        self.add(0, 1, blocks[:-1, 2 * s :, 2 * s :])
-        self.add(1, 0, blocks[1:, :s, s : 2 * s])
-        self.add(1, 0, blocks[:-1, s : 2 * s, 2 * s :])
-        self.add(2, 0, blocks[1:-1, :s, 2 * s :])
-
     def add_diagonal(self, value: float) -> None:
         """Add a multiple of the unit matrix."""
         self._table[self._width] += value

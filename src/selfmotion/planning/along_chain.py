@@ -53,11 +53,10 @@ def along_chain(
         motion = _through(grid, q)
         if motion is None:
             return None
-        broken = motion.broken() | _beyond_limits(motion)
+        broken = motion.broken_between() | _beyond_limits(motion)
         if not broken.any():
-            none = np.zeros(0, dtype=np.int64)
-            prices = np.zeros((len(motion.grid.t), 0))
-            return MotionOnNodes(motion, Status.PRECISION, none, prices, (), None, is_chain=True)
+            none = np.zeros(len(motion.h))
+            return MotionOnNodes(motion, Status.PRECISION, none, (), None, is_chain=True)
         finer = Grid(t).halved(np.convolve(broken, np.ones(3), "same") > 0.0)
     return None
 

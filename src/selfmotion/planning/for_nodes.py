@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 
-from selfmotion.constraints import BoundConstraint
-from selfmotion.motion import FreeNullMotion
-from selfmotion.nodes import NodeEnds
+import numpy as np
+
+from selfmotion.basics import Array
+from selfmotion.constraints import BoundConstraint, BoundEnd
+from selfmotion.motion import FreeNullMotion, Grid
+from selfmotion.nodes import NodeMotion
 from selfmotion.optimise import QuasiNewton
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.settings import MOST_NODES
+from selfmotion.planning.settings import FIRST_INTERVALS, MOST_NODES, STARTING
 from selfmotion.problem import Problem
 
 
@@ -15,21 +18,35 @@ def takes(problem: Problem, effort: Effort, constraints: Sequence[BoundConstrain
     """Whether a problem is one for nodes.
 
     Not where the user asks for another null motion or optimiser, the tool leaves the path, nothing
-    is free, a cost weighs jerks, which cubic splines do not have, or a condition is on the whole
-    motion.
+    is free, or a condition is on the whole motion.
     """
-    dof = problem.robot.dof
-    orders = [order for cost in problem.all_costs for order in cost.curvature(dof)]
     return (
         isinstance(problem.null_motion, FreeNullMotion)
         and effort.optimizer == QuasiNewton()
         and problem.damping is None
-        and problem.follows.redundancy == dof - problem.follows.dimension > 0
-        and max(orders, default=0) < 3
-        and all(NodeEnds.takes(item) for item in constraints if item.equality)
+        and problem.follows.redundancy == problem.robot.dof - problem.follows.dimension > 0
+        and all(isinstance(item, BoundEnd) for item in constraints if item.equality)
     )
 
 
 def most_nodes(problem: Problem) -> int:
     """Return how many nodes are as many as a path may need: more, the longer it is."""
     return int(MOST_NODES * (len(problem.knots) + problem.way_in_reaches))
+
+
+def first_nodes(problem: Problem) -> Array:
+    """Return the times of the nodes to begin with, (N + 1,)."""
+    steps = int(np.ceil(FIRST_INTERVALS * max(1.0, problem.way_in_reaches)))
+    t, duration = Grid.aligned(problem.knots, steps).nodes, problem.path.duration
+    # Where the arm rests, or a joint begins or ends to be held, the self-motion starts and stops.
+    ends = [end for rest, end in zip(problem.rests, (0.0, duration), strict=True) if rest]
+    near = np.array([*ends, *problem.follows.edges])[:, None] + duration * np.array(STARTING)
+    inside = near[(near > 0.0) & (near < duration)]
+    apart = np.abs(inside[:, None] - t).min(axis=1, initial=np.inf) > 0.5 * duration * 0.01
+    return np.sort(np.concatenate([t, inside[apart]]))
+
+
+def resolves(motion: NodeMotion, agreement: float) -> bool:
+    """Whether a motion costs the same on twice as many nodes, to this share of it."""
+    finer = motion.on(motion.grid.on(Grid(motion.grid.t).halved().nodes))
+    return finer is not None and abs(finer.cost - motion.cost) <= agreement * abs(finer.cost)

@@ -17,7 +17,7 @@ from selfmotion.nodes import NodeMotion
 from selfmotion.optimise import Status
 from selfmotion.path import Section
 from selfmotion.planning.draft import Draft
-from selfmotion.planning.for_nodes import most_nodes, takes
+from selfmotion.planning.for_nodes import most_nodes, resolves, takes
 from selfmotion.planning.nodes import NodeDescent
 from selfmotion.planning.settings import (
     FIRST_NODES,
@@ -130,9 +130,7 @@ def _near(
     grid, most = Grid.aligned(problem.knots, FIRST_NODES), most_nodes(problem)
     while grid.steps <= most:
         motion = descent.grid(grid.nodes).motion_towards(start, posture, time)
-        if motion is not None:
-            exact = motion.exact_cost
-            if abs(exact - motion.cost) <= LONG_AGREEMENT * abs(exact):
-                return motion
+        if motion is not None and resolves(motion, LONG_AGREEMENT):
+            return motion
         grid = grid.halved()
     return None

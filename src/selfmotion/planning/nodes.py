@@ -1,38 +1,32 @@
 """The best motion near others, by Newton's method on the nodes, and how fine it has to be."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints
+from selfmotion.basics import Array, Ints
 from selfmotion.constraints import BoundConstraint
+from selfmotion.motion import Grid, Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion, Optimum, Step, minimise
 from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.effort import Effort
 from selfmotion.planning.for_nodes import most_nodes
-from selfmotion.planning.kept_on_nodes import (
-    aim_of,
-    broken_by,
-    cost_of,
-    meets_ends,
-    nearly_broken,
-    too_much,
-)
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.settings import (
-    COST_AGREEMENT,
-    FAR_OFF,
-    FEWEST_WITH_ACCELERATIONS,
-    MOST_FINER,
-    NODE_AGREEMENT,
+    ENDS_MET,
+    FEWER,
+    FINER_POWER,
+    GIVEN_AWAY,
+    MOST_PARTS,
+    MOST_STEPS,
+    NEAR_PATH,
     NODE_ROUNDS,
-    SAME_COST,
-    SHORT_STEP,
     TOWARDS_MIDDLE,
+    WANTED_NEAR_PATH,
 )
 from selfmotion.problem import Problem
+from selfmotion.search import BESIDE
 
-_NO_COLUMNS: Ints = np.zeros(0, dtype=np.int64)
 _ARRIVED = (Status.CONVERGED, Status.PRECISION)
 
 
@@ -83,194 +77,145 @@ class NodeDescent:
         )
 
     def near(
-        self, motions: Sequence[tuple[Array, Array]], t: Array, dearest: float = np.inf
+        self,
+        motions: Sequence[Trajectory],
+        t: Array,
+        dearest: float = np.inf,
     ) -> MotionOnNodes | None:
         """Return the best motion near the cheapest of some, on nodes at times t (N + 1,).
 
-        For q and q̇ (N + 1, n) of each there.
-
-        Where what is best freely breaks conditions, also near motions from its start whose
-        self-motion goes towards the middle of the joints' limits. None where there is none that
-        keeps them, or it would cost more than `dearest`.
+        Where that breaks conditions, also near the free optimum, and near motions from its start
+        whose self-motion goes towards the middle of the joints' limits. None where there is none
+        that keeps them, or it would cost more than `dearest`.
         """
-        grid = self.grid(t)
-        near = [grid.near(q, qd) for q, qd in motions]
-        motion = min((one for one in near if one), key=aim_of, default=None)
-        return None if motion is None else self.best_near(motion, dearest)
-
-    def best_near(self, motion: NodeMotion, dearest: float = np.inf) -> MotionOnNodes | None:
-        """Return the best motion near one of nodes, likewise."""
-        grid = motion.grid
-        # Of what is infinite, or depends on accelerations in other ways, there is no curvature.
-        if not np.isfinite(motion.aim) or grid.cost.bends_by_rates(motion.partials):
-            return None
-        first = self._at_once(motion)
-        freely = self._minimise(motion, first)
-        best = self._kept(freely, first)
-        if best is not None or self._ended is not None:
-            return best
-        if freely.motion.cost >= dearest:
-            # With conditions it would cost more still.
-            self.is_hopeless = True
-            return None
-        broken = broken_by(freely.motion)
-        if too_much(freely.motion, broken):
-            return None
-        if not self._free and (freely.motion.orders[broken] == 0).any():
-            best = self._towards_middle(grid, freely.motion)
-        dearest = np.inf if best is None else best.cost
-        found = None if self._ended else self._from_free(freely, dearest)
-        return min((one for one in (best, found) if one), key=cost_of, default=None)
-
-    def again(self, standing: MotionOnNodes) -> MotionOnNodes | None:
-        """Return the optimum near a motion on its nodes."""
-        optimum = self._minimise(standing.motion, standing.columns, prices=standing.prices)
-        return self._kept(optimum, standing.columns) or self._bound(optimum, standing.columns)
-
-    def settled(self, standing: MotionOnNodes) -> MotionOnNodes:
-        """Return the optimum on nodes so near to each other that the cost is right.
-
-        With one more between each two, put onto the path.
-        """
-        dearest, most = np.inf, most_nodes(self._problem)
-        for _ in range(NODE_ROUNDS):
-            if self._ended is not None or 2 * standing.steps > most:
+        # Beside a singular pose the path may be out of reach, by next to nothing.
+        beside = t.copy()
+        beside[1:-1] += BESIDE * np.diff(t)[1:]
+        for times in (t, beside):
+            grid = self.grid(times)
+            near = [grid.near(*(motion(times, k) for k in range(3))) for motion in motions]
+            motion = min((one for one in near if one), key=_aim_of, default=None)
+            if motion is not None:
                 break
-            motion = standing.motion
-            off, size = abs(motion.exact_cost - motion.cost), abs(motion.exact_cost)
-            where = None
-            if off <= NODE_AGREEMENT * size:
-                finer = standing.refined()
-                # That is on the path, also between the nodes.
-                ends = motion.ends_of_limits
-                is_last = not (ends.any() and self._saves(motion, dearest))
-                if is_last and not standing.columns.size:
-                    # Where nothing binds, smooth velocities are all there is to look at.
-                    smooth = finer.smoothed(motion.exact_cost + SAME_COST * size)
-                    if smooth is not None:
-                        return smooth
-                broken = finer.motion.broken() & self._worth_refining(finer)
-                if is_last and not broken.any():
-                    return finer.smoothed(finer.cost) or finer
-                dearest = motion.cost
-                each = broken.reshape(-1, 2).any(axis=1)
-                where = np.convolve(each, np.ones(3), "same") > 0.0 if each.any() else ends
-            # One halving makes it about a twelfth.
-            far = off > FAR_OFF * NODE_AGREEMENT * size
-            twice = where is None and far and 4 * standing.steps <= most
-            finer = standing.refined(where, 2 if twice else 1)
-            if where is not None and broken.any():
-                # A limit begins or ends to bind there: that wants to be known well.
-                finer = finer.refined(np.repeat(where, 1 + where))
-            found = self.again(finer)
-            if found is None:
+        else:
+            return None
+        # What an earlier plan has found need not begin far from what binds.
+        is_plan = len(motions) > 1 and motion is near[0]
+        prices = np.zeros(len(motion.h)) if is_plan else None
+        return self.best_near(motion, dearest, prices)
+
+    def best_near(
+        self, motion: NodeMotion, dearest: float = np.inf, prices: Array | None = None
+    ) -> MotionOnNodes | None:
+        """Return the best motion near one of nodes, likewise; `prices` (R,) may be known."""
+        # Of what is infinite there is no curvature; on nodes the tool is never off its path.
+        if not np.isfinite(motion.aim) or motion.grid.cost.depends_on_errors(motion.partials):
+            return None
+        free = None
+        if dearest < np.inf:
+            free = self._freely(motion)
+            if free.cost >= dearest:
+                # With conditions it would cost more still.
+                self.is_hopeless = True
+                return None
+        best = self._minimise(motion, prices)
+        if best.status is Status.GRADIENT:
+            return None
+        if not _keeps(best) and self._ended is None:
+            best = self._other(motion, best, free)
+        if not _keeps(best) and self._ended is None:
+            # What control points of few nodes cannot keep, the curve may.
+            best = self._on_halved(best)
+        return self._standing(best) if _keeps(best) else None
+
+    def _freely(self, motion: NodeMotion) -> NodeMotion:
+        """Return the optimum near a motion of which nothing is asked but what its ends are."""
+        return self._minimise(motion.grid.without_rows().at(motion.centred)).motion
+
+    def _other(self, begun: NodeMotion, first: Optimum, free: NodeMotion | None) -> Optimum:
+        """Return the best of the optima from other beginnings, and the first."""
+        best = first
+        for begin in self._beginnings(begun, free):
+            if begin is not None:
+                best = min(best, self._minimise(begin, most=FEWER), key=_rank)
+            if self._ended is not None or _keeps(best):
                 break
-            standing = found
-        return standing
+        return best
 
-    @staticmethod
-    def _worth_refining(standing: MotionOnNodes) -> Flags:
-        """Return between which nodes more of them may keep the conditions better, (N,).
-
-        Where a tolerance begins and ends to be used fully, velocities have a kink: on very short
-        intervals, what Newton's method leaves of it are rates that no limit allows.
-        """
-        steps = np.diff(standing.motion.grid.t)
-        kinks = standing.motion.grid.conditions.any_at_once
-        return np.asarray((steps * MOST_FINER > steps.max()) | (not kinks))
-
-    @staticmethod
-    def _at_once(motion: NodeMotion) -> Ints:
-        """Return the columns of conditions that count from the beginning."""
-        motion.h  # noqa: B018  # which columns there are is known then
-        return motion.grid.conditions.at_once()
-
-    def _saves(self, motion: NodeMotion, before: float) -> bool:
-        """Whether more nodes where limits begin and end to bind may lower the cost."""
-        return before - motion.cost > COST_AGREEMENT * abs(motion.cost)
-
-    def _towards_middle(self, grid: NodeGrid, known: NodeMotion) -> MotionOnNodes | None:
-        """Return what is best near motions whose self-motion goes towards the limits' middle.
-
-        Not where that is what is known already, and does not keep the conditions.
-        """
-        robot, start = self._problem.robot, known.place.q[0]
+    def _beginnings(
+        self, begun: NodeMotion, free: NodeMotion | None
+    ) -> Iterator[NodeMotion | None]:
+        """Yield the free optimum, and motions that go towards the middle of the limits."""
+        grid = begun.grid
+        yield grid.at((free or self._freely(begun)).centred)
+        if self._free:
+            return
+        robot, start = self._problem.robot, begun.place.q[0]
         limited = np.isfinite(robot.lower) & np.isfinite(robot.upper)
         middle = start.copy()
         middle[limited] = 0.5 * (robot.lower[limited] + robot.upper[limited])
         for share in TOWARDS_MIDDLE:
-            motion = grid.motion_towards(start, middle, share * self._problem.path.duration)
-            if motion is not None and self._ended is None:
-                first = self._at_once(motion)
-                optimum = self._minimise(motion, first)
-                best = self._kept(optimum, first)
-                same = abs(optimum.motion.cost - known.cost) <= COST_AGREEMENT * abs(known.cost)
-                if best is not None or same:
-                    return best
-        return None
+            yield grid.motion_towards(start, middle, share * self._problem.path.duration)
 
-    def _kept(self, optimum: Optimum, columns: Ints = _NO_COLUMNS) -> MotionOnNodes | None:
-        """Return the optimum if it is one, and keeps all conditions."""
-        motion = optimum.motion
-        none = (
-            optimum.status is Status.GRADIENT or not meets_ends(motion) or broken_by(motion).any()
-        )
-        return None if none else self._standing(optimum, columns)
+    def _on_halved(self, optimum: Optimum) -> Optimum:
+        """Return the optimum on twice as many nodes, or what there is."""
+        finer = Grid(optimum.motion.grid.t).halved().nodes
+        motion = optimum.motion.on(optimum.motion.grid.on(finer))
+        return optimum if motion is None else self._minimise(motion)
 
-    def _from_free(self, freely: Optimum, dearest: float) -> MotionOnNodes | None:
-        """Return the optimum that keeps all conditions, from one that keeps none."""
-        motion = freely.motion
-        orders = motion.orders
-        if (orders[broken_by(motion)] < 2).all():
-            return self._bound(freely, self._at_once(motion), dearest)
-        most = self._effort.max_evaluations
-        if most is not None and most < FEWEST_WITH_ACCELERATIONS:
-            return None
-        smooth = motion.grid.continuous.near(motion.place.q, motion.place.qd)
-        if smooth is None:
-            return None
-        motion = self._minimise(smooth, self._at_once(smooth), dearest).motion
-        # One such limit leads to the next: all count at once.
-        every = (orders == 2) & ~motion.grid.conditions.of_bodies()
-        columns = np.flatnonzero(every | broken_by(motion) | nearly_broken(motion))
-        columns = np.union1d(columns, self._at_once(motion))
-        return self._bound(self._minimise(motion, columns, dearest), columns, dearest)
+    def again(self, standing: MotionOnNodes, *, roughly: bool = False) -> MotionOnNodes | None:
+        """Return the optimum near a motion on its nodes."""
+        optimum = self._minimise(standing.motion, standing.prices, roughly=roughly)
+        return self._standing(optimum) if _keeps(optimum) else None
 
-    def _bound(
-        self, optimum: Optimum, columns: Ints, dearest: float = np.inf
-    ) -> MotionOnNodes | None:
-        """Return the optimum that keeps all conditions, from one that keeps some columns of them.
+    def settled(self, standing: MotionOnNodes) -> MotionOnNodes:
+        """Return the optimum on nodes so near to each other that more change nothing.
 
-        None where none is found, or would be dearer than that.
+        The curve is on its path between them, control points give hardly anything away, and what
+        is asked at points holds between them.
         """
-        while self._ended is None and optimum.status in _ARRIVED:
-            motion = optimum.motion
-            broken = broken_by(motion)
-            if not meets_ends(motion):
-                return None
-            if not broken.any():
-                return self._standing(optimum, columns)
-            if broken[columns].any():
-                return None
-            columns = np.union1d(columns, np.flatnonzero(broken | nearly_broken(motion)))
-            if too_much(motion, columns):
-                return None
-            optimum = self._minimise(motion, columns, dearest)
-        return None
+        before, most, is_rough = np.inf, most_nodes(self._problem), True
+        for _ in range(NODE_ROUNDS):
+            if self._ended is not None:
+                break
+            t = self._finer(standing)
+            if t is None and before - standing.cost > GIVEN_AWAY * abs(standing.cost):
+                # Where limits of q̈ or jerk begin and end to bind, the best motion has a kink: finer
+                # there, while it pays.
+                t, before = _at_kinks(standing.motion), standing.cost
+            finer = None if t is None or len(t) > most else standing.on(t)
+            polishes = finer is None
+            if polishes and not is_rough:
+                break
+            found = self.again(finer or standing, roughly=not polishes)
+            if found is None:
+                break
+            standing, is_rough = found.after(standing.cost), not polishes
+        return standing
+
+    def _finer(self, standing: MotionOnNodes) -> Array | None:
+        """Return times of nodes near enough to each other, or None where these are."""
+        motion = standing.motion
+        grid, spline = motion.grid, motion.grid.spline
+        errors = self._problem.errors_between(motion.trajectory).max(axis=1)
+        parts = np.ceil((errors / WANTED_NEAR_PATH) ** FINER_POWER - 1e-9)
+        parts = np.clip(np.where(errors <= NEAR_PATH, 1.0, parts), 1.0, MOST_PARTS).astype(int)
+        away = grid.rows.given_away(standing.prices, motion.curve_ends)
+        least = GIVEN_AWAY * abs(motion.aim)
+        if away.sum() > least:
+            parts[(away > least / spline.count) & (parts == 1)] = 2
+        parts[motion.broken_between() & (parts == 1)] = 2
+        return None if (parts == 1).all() else _divided(spline.t, parts)
 
     def _minimise(
         self,
         motion: NodeMotion,
-        columns: Ints,
-        dearest: float = np.inf,
         prices: Array | None = None,
+        *,
+        roughly: bool = True,
+        most: int = MOST_STEPS,
     ) -> Optimum:
-        def told(step: Step) -> bool:
-            # Where another motion is known, a way of short steps is not worth it.
-            short = dearest < np.inf and 0.0 < step.length < SHORT_STEP
-            return self._told(step) or step.motion.cost > dearest or short
-
-        return minimise(motion, columns, told, prices)
+        return minimise(motion, self._told, prices, roughly=roughly, most=most)
 
     def _told(self, step: Step) -> bool:
         """Note an iteration; return whether to stop."""
@@ -284,9 +229,8 @@ class NodeDescent:
             evaluations=effort.counts.evaluations,
         )
         self.history.append(iteration)
-        if meets_ends(motion) and (motion.h <= motion.grid.conditions.tolerances).all():
-            none = np.zeros((len(motion.h), 0))
-            self.latest = MotionOnNodes(motion, Status.STOPPED, _NO_COLUMNS, none, (), None)
+        if _is_kept(motion) and len(motion.h) == len(motion.grid.rows.granted()):
+            self.latest = MotionOnNodes(motion, Status.STOPPED, np.zeros(len(motion.h)), (), None)
         if effort.callback is not None and effort.callback(iteration):
             self._ended = Status.STOPPED
         most = effort.max_evaluations
@@ -294,7 +238,47 @@ class NodeDescent:
             self._ended = Status.MAX_EVALUATIONS
         return self._ended is not None
 
-    def _standing(self, optimum: Optimum, columns: Ints) -> MotionOnNodes:
+    def _standing(self, optimum: Optimum) -> MotionOnNodes:
         # What keeps the conditions, and leads no further, is as good as it gets.
         arrived = optimum.status if optimum.status in _ARRIVED else Status.PRECISION
-        return MotionOnNodes.of(optimum, self._constraints, columns, self._ended or arrived)
+        return MotionOnNodes.of(optimum, self._constraints, self._ended or arrived)
+
+
+def _is_kept(motion: NodeMotion) -> bool:
+    """Whether all conditions are kept."""
+    # Written so that NaN is not.
+    return bool(motion.violation <= 0.0 and np.abs(motion.c).max(initial=0.0) <= ENDS_MET)
+
+
+def _keeps(optimum: Optimum) -> bool:
+    """Whether an optimum is one, and keeps all conditions."""
+    return optimum.status is not Status.GRADIENT and _is_kept(optimum.motion)
+
+
+def _rank(optimum: Optimum) -> tuple[bool, float]:
+    """Return what sorts optima, the smaller the better: of broken ones by how much."""
+    if _keeps(optimum):
+        return False, optimum.motion.aim
+    return True, optimum.motion.violation
+
+
+def _aim_of(motion: NodeMotion) -> float:
+    """Return what is minimised, to sort by."""
+    return motion.aim
+
+
+def _divided(t: Array, parts: Ints) -> Array:
+    """Return times (N + 1,) with each interval in so many equal parts, (N,)."""
+    first = np.repeat(np.cumsum(parts) - parts, parts)
+    share = (np.arange(parts.sum()) - first) / np.repeat(parts, parts)
+    inner = np.repeat(t[:-1], parts) + share * np.repeat(np.diff(t), parts)
+    return np.append(inner, t[-1])
+
+
+def _at_kinks(motion: NodeMotion) -> Array | None:
+    """Return times with more nodes where limits of q̈ or jerk begin or end to bind, or None."""
+    where = motion.grid.rows.kinks(motion.curve_ends)
+    if not where.any():
+        return None
+    wide = np.convolve(where, np.ones(3), "same") > 0.0
+    return _divided(motion.grid.t, 1 + wide)

@@ -6,13 +6,13 @@ from functools import cached_property
 
 import numpy as np
 
-from selfmotion.basics import Array, Flags, Ints
+from selfmotion.basics import Array, Flags
 from selfmotion.constraints import Binding, BoundConstraint
-from selfmotion.engine import Conditions, Evaluation
+from selfmotion.engine import Evaluation, Priced, active_of
 from selfmotion.motion import Grid, NodeNullMotion, NullMotion
 from selfmotion.nodes import NodeMotion, Optimum
 from selfmotion.optimise import Status
-from selfmotion.planning.settings import LEAST_SAVING, MOST_UNEVEN
+from selfmotion.planning.settings import LEAST_SAVING
 from selfmotion.search import BESIDE
 
 
@@ -24,20 +24,17 @@ class MotionOnNodes:
     ----------
     motion : NodeMotion
     status : Status
-    columns : (c,)
-        Of the conditions: those that counted.
-    prices : (N + 1, c)
-        Of these, on the nodes of the optimum.
+    prices : (R,)
+        Of all rows of its conditions.
     active : tuple of Binding
     remaining : float or None
-        What a finer grid and another step might still save [cost]; None where that is not known.
+        What more nodes and another step might still save [cost]; None where that is not known.
     is_chain : bool
         Whether it is a chain of the global search, which is at its optimum.
     """
 
     motion: NodeMotion
     status: Status
-    columns: Ints
     prices: Array
     active: tuple[Binding, ...]
     remaining: float | None
@@ -45,20 +42,16 @@ class MotionOnNodes:
 
     @classmethod
     def of(
-        cls,
-        optimum: Optimum,
-        constraints: Sequence[BoundConstraint],
-        columns: Ints,
-        status: Status,
+        cls, optimum: Optimum, constraints: Sequence[BoundConstraint], status: Status
     ) -> "MotionOnNodes":
-        """Return what stands at an optimum, for which some columns of the conditions counted."""
+        """Return what stands at an optimum."""
         motion: NodeMotion = optimum.motion
         active: tuple[Binding, ...] = ()
-        if columns.size or optimum.end_prices.size:
-            active = _binding(optimum, constraints, columns)
+        if optimum.prices.any() or optimum.end_prices.size:
+            active = _binding(optimum, constraints)
         promised = optimum.promised if np.isfinite(optimum.promised) else 0.0
-        remaining = abs(motion.exact_cost - motion.cost) + promised
-        return cls(motion, status, columns, optimum.prices, active, remaining)
+        away = motion.grid.rows.given_away(optimum.prices, motion.curve_ends)
+        return cls(motion, status, optimum.prices, active, promised + float(away.sum()))
 
     @property
     def steps(self) -> int:
@@ -78,7 +71,7 @@ class MotionOnNodes:
     @property
     def cost(self) -> float:
         """F."""
-        return self.motion.exact_cost
+        return self.motion.cost
 
     @cached_property
     def keeps_off_itself(self) -> bool:
@@ -97,50 +90,46 @@ class MotionOnNodes:
     def evaluation(self) -> Evaluation:
         """Return the motion with its costs."""
         motion = self.motion
-        found = Evaluation(self.coefficients, motion.exact_terms, motion.trajectory, damped=False)
+        found = Evaluation(self.coefficients, motion.terms, motion.trajectory, damped=False)
         motion.forget()
         return found
 
-    def smoothed(self, dearest: float) -> "MotionOnNodes | None":
-        """Return it with smooth velocities; None where it costs more then, or breaks conditions."""
-        motion = self.motion.smoothed()
-        if not motion.exact_cost <= dearest or motion.broken().any():
-            return None
-        motion.forget()
-        return replace(self, motion=motion)
+    def after(self, before: float) -> "MotionOnNodes":
+        """Return it as what came of a motion on fewer nodes that cost so much."""
+        remaining = (self.remaining or 0.0) + max(before - self.cost, 0.0)
+        return replace(self, remaining=remaining)
 
-    def refined(self, where: Flags | None = None, times: int = 1) -> "MotionOnNodes":
-        """Return it with more nodes: all intervals halved so many times, or some (N,) once."""
-        t = self.motion.grid.t
-        self.motion.forget()
-        finer = Grid(t).halved(where).graded(MOST_UNEVEN).nodes
-        for _ in range(1, times):
-            finer = Grid(finer).halved().nodes
-        motion = self.motion.on(self.motion.grid.on(finer))
-        if motion is None:
-            # Beside a singular pose the path may be out of reach, by next to nothing.
-            finer = Grid(t).halved(where, BESIDE).nodes
-            motion = self.motion.on(self.motion.grid.on(finer))
-        if motion is None:
-            return self
-        # Prices are of conditions at nodes: the more there are, the less each counts.
-        near = np.searchsorted(t, finer, side="right") - 1
-        prices = self.prices[near] * (len(t) / len(finer))
-        return replace(self, motion=motion, prices=prices)
+    def on(self, t: Array) -> "MotionOnNodes | None":
+        """Return it on other nodes (N + 1,); None where one of them is out of reach.
+
+        Beside a singular pose the path may be so, by next to nothing: a little later it is not.
+        """
+        beside, new = t.copy(), ~np.isin(t, self.motion.grid.t)
+        beside[new] += BESIDE * np.diff(t, append=t[-1])[new]
+        calm = self.motion.would_be_calm()
+        for times in (t, beside):
+            motion = self.motion.on(self.motion.grid.on(times, calm=calm))
+            if motion is not None:
+                prices = motion.grid.rows.carried(self.motion.grid.rows, self.prices)
+                self.motion.forget()
+                return replace(self, motion=motion, prices=prices)
+        return None
+
+    def refined(self, where: Flags | None = None) -> "MotionOnNodes":
+        """Return it with all intervals halved, or some (N,); as it is where that cannot be."""
+        return self.on(Grid(self.motion.grid.t).halved(where).nodes) or self
 
 
-def _binding(
-    optimum: Optimum, constraints: Sequence[BoundConstraint], columns: Ints
-) -> tuple[Binding, ...]:
-    """Return what kept an optimum from a lower cost, of some columns of the conditions."""
+def _binding(optimum: Optimum, constraints: Sequence[BoundConstraint]) -> tuple[Binding, ...]:
+    """Return what kept an optimum from a lower cost."""
     motion, grid = optimum.motion, optimum.motion.grid
-    prices = np.zeros_like(motion.h)
-    prices[:, columns] = optimum.prices
-    inner = iter(grid.conditions.by_constraint(prices))
+    inner = iter(grid.rows.priced(optimum.prices, motion.curve_ends))
     ends = grid.ends.by_item(optimum.end_prices)
-    each = [ends[id(item)] if item.equality else next(inner).ravel() for item in constraints]
-    return Conditions(constraints, Grid(grid.t)).active(
-        motion.samples.checked,
-        np.concatenate([np.zeros(0), *each]),
-        LEAST_SAVING * abs(motion.cost),
-    )
+    each = []
+    for item in constraints:
+        if item.equality:
+            own = ends[id(item)][None]
+            each.append(Priced(item, own, np.zeros(1), np.ones(own.shape, dtype=np.bool_)))
+        else:
+            each.append(next(inner))
+    return active_of(each, grid.t[[0, -1]], LEAST_SAVING * abs(motion.cost))

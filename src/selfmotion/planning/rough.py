@@ -11,8 +11,7 @@ from selfmotion.motion import Grid, Trajectory
 from selfmotion.nodes import NodeGrid, NodeMotion, Together
 from selfmotion.planning.apart import apart_of, unlike
 from selfmotion.planning.effort import Effort
-from selfmotion.planning.for_nodes import takes
-from selfmotion.planning.kept_on_nodes import broken_by
+from selfmotion.planning.for_nodes import resolves, takes
 from selfmotion.planning.settings import (
     ABOUT_AS_GOOD,
     HEATS,
@@ -104,7 +103,7 @@ class OnNodes:
         # Interrupted, or none is the best for sure: the cheapest one that keeps all will do.
         near = (self._motion(self._found, k) for k in _cheapest(self._found))
         motions = [motion for motion in near if motion is not None]
-        kept = (one for one in motions if not broken_by(one).any())
+        kept = (one for one in motions if one.violation <= 0.0)
         best = next((one for one in kept if self._clear(one)), next(iter(motions), None))
         return [] if best is None else [_rough(best)]
 
@@ -114,17 +113,17 @@ class OnNodes:
         motions, arrived = carried(problem.follows, np.array(starts), grid.nodes)
         if not arrived.any():
             return False
-        nodes = NodeGrid(problem, grid.nodes, (), free=True, counts=self._effort.counts)
+        nodes = self._grid(problem, grid)
         total = 1 + ROUGH_ROUNDS
         self._progress("rough motions", 1, total)
         found = self._found = Together.near(nodes, motions[arrived])
         soft = problem.softened(float(found.costs.min()))
         if soft is not problem:
-            nodes = NodeGrid(soft, grid.nodes, (), free=True, counts=self._effort.counts)
+            nodes = self._grid(soft, grid)
             found = self._found = Together.near(nodes, motions[arrived])
         alone, near = unlike(found.q, _cheapest(found), self._apart, ONE_VALLEY)
         which = [*alone, *near][: max(HEATS[0][0], finalists)]
-        if not which or nodes.cost.bends_by_rates(found.motion.partials):
+        if not which or nodes.cost.depends_on_errors(found.motion.partials):
             return False
         found = self._found = found.picked(np.array(which, dtype=np.int64))
         for number in range(2, total + 1):
@@ -133,6 +132,10 @@ class OnNodes:
                 found = self._found = found.advanced()
         self._ranked = self._decisive(found, finalists)
         return bool(self._ranked)
+
+    def _grid(self, problem: Problem, grid: Grid) -> NodeGrid:
+        counts = self._effort.counts
+        return NodeGrid(problem, grid.nodes, (), free=True, counts=counts, calm=True)
 
     def _decisive(self, found: Together, finalists: int) -> list[RoughMotion]:
         """Return the cheapest motion that keeps all, then others about as cheap; or none.
@@ -149,15 +152,11 @@ class OnNodes:
             # What costs the same to the last digits is one of the arm's mirror images.
             if motion is None or any(_same(motion.cost, one.cost) for one in kept):
                 continue
-            off = abs(motion.exact_cost - motion.cost)
-            if found.going[k] or not off <= ROUGH_AGREEMENT * abs(motion.cost):
+            if found.going[k] or not resolves(motion, ROUGH_AGREEMENT):
                 return []
             # What got stuck may become better as well.
             stuck = found.promised[k] > ABOUT_AS_GOOD * abs(motion.cost)
-            broken = broken_by(motion)
-            # What was softened is kept from now on.
-            broken[motion.grid.conditions.at_once()] = False
-            if stuck or broken.any():
+            if stuck or motion.breaks_hard():
                 others.append(_rough(motion))
             elif self._clear(motion):
                 kept.append(_rough(motion))
@@ -173,8 +172,9 @@ class OnNodes:
         problem, q = self._problem, found.q[k]
         bound = problem.bind_constraints(q[0], q[-1], apart=self._effort.apart)
         t = found.motion.grid.t[: len(q)]
-        grid = NodeGrid(problem, t, bound, free=True, counts=self._effort.counts)
-        return grid.near(q, found.qd[k])
+        counts = self._effort.counts
+        grid = NodeGrid(problem, t, bound, free=True, counts=counts, calm=True)
+        return grid.near(q, found.qd[k], found.qdd[k])
 
     def _clear(self, motion: NodeMotion) -> bool:
         return self._problem.keeps_off_itself(motion.place.q)

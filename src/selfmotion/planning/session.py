@@ -11,7 +11,7 @@ from selfmotion.optimise import Iteration, Status
 from selfmotion.planning.along_chain import along_chain
 from selfmotion.planning.beginning import Beginning
 from selfmotion.planning.descent import Descent, breaks
-from selfmotion.planning.for_nodes import takes
+from selfmotion.planning.for_nodes import first_nodes, most_nodes, takes
 from selfmotion.planning.nodes import NodeDescent
 from selfmotion.planning.on_nodes import MotionOnNodes
 from selfmotion.planning.standing import RolledMotion, Standing, score
@@ -184,14 +184,16 @@ class Session:
             objective, warm = self.rolled.objective, self._warm
             if not np.isfinite(objective.value(self.rolled.x)):
                 return None
-            samples, grid = objective.samples(self.rolled.x), objective.grid
-            motions = [(samples.q[grid.node_stages], samples.qd[grid.node_stages])]
-            if self._known is not None:
-                motions = [(self._known(grid.nodes), self._known(grid.nodes, 1))]
+            t = first_nodes(start.problem)
+            known = self._known or objective.at(self.rolled.x).trajectory
+            motions = [known]
             if warm is not None and warm.trajectory.t[-1] == warm.path.duration:
-                known = slower(warm.trajectory, pace_of(warm, start.problem))
-                motions.insert(0, (known(grid.nodes), known(grid.nodes, 1)))
-            return descent.near(motions, grid.nodes, dearest)
+                own = slower(warm.trajectory, pace_of(warm, start.problem))
+                motions = [own, known]
+                if len(own.t) <= most_nodes(start.problem):
+                    # Its nodes are where such a motion needs them.
+                    t = np.unique(np.append(own.t, start.problem.knots))
+            return descent.near(motions, t, dearest)
 
         self._by_nodes(optimum)
         return self.on_nodes is not None

@@ -8,16 +8,19 @@ bench-starts` (free starts against the best of everything tried) and `make suite
 # Agreement of the cost on a grid and on the halved one, at which the coarser optimum stands; and at
 # which it tells what null motion is wanted.
 COST_AGREEMENT = 1e-4
-# The same of nodes, of which twice as many are a sixteenth as far from the truth.
-NODE_AGREEMENT = 3e-5
+# And at which a rough motion tells what its start is worth.
 ROUGH_AGREEMENT = 1e-2
-# Farther off than so many times what nodes may be, intervals are halved twice at once.
-FAR_OFF = 8.0
-# Where tolerances are used fully, intervals are no more than so many times finer than the longest.
-MOST_FINER = 16.0
-# An interval so many times as long as one beside it is halved as well: beside short ones, long ones
-# make accelerations that no finer motion has.
-MOST_UNEVEN = 4.0
+# Intervals of the first nodes, and so many for each time that the tool goes as far as the arm
+# reaches.
+FIRST_INTERVALS = 16
+# More of them where self-motions start and stop: as shares of the duration from there.
+STARTING = (-0.03, -0.01, 0.01, 0.03)
+# Between its nodes a motion may be off its path by this [m, rad]. Where it is by more, intervals
+# are divided so that it is by that, as the error falls with their fourth power; at most into so
+# many parts.
+NEAR_PATH, WANTED_NEAR_PATH, FINER_POWER, MOST_PARTS = 2e-7, 1e-7, 0.25, 4.0
+# What control points give away of the cost, or what finer nodes save, is nothing [share].
+GIVEN_AWAY = 3e-5
 # A grid on which the motion at x = 0 costs this much more or less will do for a rough null motion.
 ALIKE = 0.05
 # While a null motion is chosen, this share of the steps that it should have will do.
@@ -25,29 +28,23 @@ THINNER = 2
 # A cost that rises this much on so many grids in turn has no limit.
 RISE = 1.5
 RISES = 2
-# Costs that differ by less than this share are the same where velocities are made smooth.
-SAME_COST = 1e-6
 # Nodes of Newton's method: at most so many for each stretch of the path on which it is smooth.
 MOST_NODES = 1024
-# More of them are put in so often, at most, where limits begin and end to bind.
-NODE_ROUNDS = 8
-# Where limits of acceleration bind, that takes some sixty evaluations of the cost; who has fewer
-# than this goes another way.
-FEWEST_WITH_ACCELERATIONS = 100
+# More of them are put in so often, at most.
+NODE_ROUNDS = 14
 # What is asked of the ends is met to this [rad, rad/s].
 ENDS_MET = 1e-8
-# Conditions that are nearer than this to being broken [units of h] count with those that are.
-NEARLY = 0.02
+# Steps of Newton's method: it needs fifteen, forty where limits bind all over; from others than the
+# first beginning, what takes long leads nowhere.
+MOST_STEPS, FEWER = 80, 40
 # Where the motion at x = 0 does not lead to what keeps the conditions: the self-motion goes towards
 # the middle of the limits in such shares of the duration.
-TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0)
-# Newton's method with limits takes steps this short where they are hard to keep [share].
-SHORT_STEP = 0.25
+TOWARDS_MIDDLE = (1.0 / 16.0, 1.0 / 64.0, 1.0 / 4.0)
 # What would save less than this share of the cost does not bind.
 LEAST_SAVING = 1e-6
 # Between its nodes a motion may be off the path by this share of the tolerance where that is looked
 # at, in the middle; and by this share of what it was before steps were halved.
-RESOLVED = 0.05
+RESOLVED = 0.3
 FALLS = 0.7
 # Limits that are exceeded between the nodes on more grids than this are so on any; and nothing is
 # optimised again on grids with more than so many times the steps.

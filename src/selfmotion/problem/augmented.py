@@ -26,6 +26,7 @@ from selfmotion.path import Path
 from selfmotion.problem.of_arm import (
     BodiesOfArm,
     BoundOfArm,
+    RowWithinBand,
     WithinBand,
     cost_of_arm,
     quantity_of_arm,
@@ -156,7 +157,9 @@ class AugmentedProblem(Problem):
         own = self.asked.bind_constraints(start[:n], end[:n], apart=apart)
         found = [self._bound(item, ends) for item in own]
         bands = [item for item in self.asked.relaxations if np.isfinite(item.band)]
-        found += [WithinBand.of(item, self.follows) for item in bands]
+        for item in bands:
+            of_row = RowWithinBand.of_row(item, self.follows)
+            found.append(of_row or WithinBand.of(item, self.follows))
         pinned = any(item.pins[1] for item in self.asked.constraints)
         given = any(item.fixed_end(self.asked.robot) is not None for item in self.asked.constraints)
         if pinned and not given:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from selfmotion.basics import Array, Flags, Ints
 from selfmotion.certificate import Column, Quantity
 from selfmotion.collision import Closest, CollisionModel
-from selfmotion.constraints import BoundConstraint, NodeTangents, easing_of
+from selfmotion.constraints import BoundConstraint, BoundLimits, NodeTangents, easing_of
 from selfmotion.constraints.conditions import BoundQuantity, motion_at_nodes
 from selfmotion.costs import Cost, Partials, Samples
 from selfmotion.follow import AugmentedFollows, Follows
@@ -229,8 +229,7 @@ class WithinBand(BoundQuantity):
     def of(cls, item: Relaxation, follows: AugmentedFollows) -> "WithinBand":
         """Return that of a relaxation with a band, for an arm with virtual joints."""
         first, last = item.window(follows.duration)
-        margin = min(max(_MARGIN, _LEAST / item.band), _MOST)
-        return cls(_band(item, follows), margin, (first, last))
+        return cls(_band(item, follows), _margin(item), (first, last))
 
     def _outside(self, samples: Samples) -> npt.NDArray[np.bool_]:
         t = samples.sampling.node_times
@@ -247,6 +246,46 @@ class WithinBand(BoundQuantity):
         found = super().tangents(samples, motion)
         found[self._outside(samples)] = 0.0
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class RowWithinBand(BoundLimits):
+    """One row stays within its band: its virtual joint stays within limits.
+
+    Outside of its window that is held at 0.
+    """
+
+    counts_at_once: ClassVar[bool] = True
+
+    @classmethod
+    def of_row(cls, item: Relaxation, follows: AugmentedFollows) -> "RowWithinBand | None":
+        """Return that of a relaxation; None where no joint's coordinate is its deviation."""
+        joint = follows.virtual.joint_of(item)
+        if joint is None:
+            return None
+        number, scale = joint
+        k = follows.robot.dof - len(follows.virtual.each) + number
+        bound = np.array([item.band / scale])
+        return cls(
+            name=f"relaxation {item.name}",
+            order=0,
+            joints=np.array([k]),
+            joint_names=(follows.robot.joint_names[k],),
+            units=("rad" if item.angular else "m",),
+            lower=-bound,
+            upper=bound,
+            scale=bound,
+            margin=_margin(item),
+        )
+
+    def easing(self, column: int) -> tuple[float, str]:
+        """See `easing_of`: 2 % of the band."""
+        return 0.02, f"2 % more room for the deviation {self.name.removeprefix('relaxation ')}"
+
+
+def _margin(item: Relaxation) -> float:
+    """Return the share of a band that is aimed to be left unused."""
+    return min(max(_MARGIN, _LEAST / item.band), _MOST)
 
 
 def _band(item: Relaxation, follows: AugmentedFollows) -> Quantity:

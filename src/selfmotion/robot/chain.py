@@ -314,7 +314,7 @@ class Chain:
         both = sum(1 for a, b in zip(up, down, strict=False) if a == b) - 1
         return [(joint, -1) for joint in up[:both:-1]] + [(joint, 1) for joint in down[both + 1 :]]
 
-    @property
+    @cached_property
     def table(self) -> Array:
         """What compiled kinematics need of its joints, then of its tip, (c + 1, 6, 3)."""
         return self.arrays.table

@@ -1,0 +1,130 @@
+"""Rows of limits at control points, of others at points, and how they change with the nodes."""
+
+import numpy as np
+import pytest
+
+import selfmotion as sm
+from selfmotion.nodes.spline import AT_CONTROLS, ORDERS, Quintic, unit_bases
+from support.arms import PANDA_HOME
+from support.nodes import along, around_of, centred, moved, nodes_of, random_step
+
+NEAR, DIFFERENCE = 1e-5, 1e-6
+
+CONSTRAINTS = {
+    "positions": lambda: [sm.JointPositionLimits()],
+    "rates": lambda: [
+        sm.JointVelocityLimits(1.0),
+        sm.JointAccelerationLimits(2.0),
+        sm.JointJerkLimits(20.0),
+    ],
+    "a band": lambda: [sm.Band.of_elbow("up")],
+    "tool": lambda: [sm.ToolLimits(acceleration=1.0)],
+    "two": lambda: [sm.JointPositionLimits(), sm.JointAccelerationLimits(2.0)],
+    "clearance": lambda: [
+        sm.JointPositionLimits(),
+        sm.Clearance([sm.Sphere("ball", (0.6, 0.35, 0.4), 0.1)], distance=0.02),
+    ],
+}
+
+
+def motion_with(panda: sm.RobotModel, name: str):
+    path = sm.Circle.around(panda.pose(PANDA_HOME), 0.15, 4.0, normal=(1.0, 0.0, 0.0))
+    problem = sm.Problem(
+        *(panda, path, "position", PANDA_HOME),
+        constraints=CONSTRAINTS[name](),
+        rest=False,
+        collision=None,
+    )
+    motion = nodes_of(problem, 10)
+    return centred(moved(motion, random_step(motion, 1, 0.02)))
+
+
+@pytest.mark.parametrize("name", CONSTRAINTS)
+def test_rows_and_pullbacks_are_central_differences(panda: sm.RobotModel, name: str) -> None:
+    motion = motion_with(panda, name)
+    step, rows = random_step(motion, 2) * motion.grid.scale, motion.grid.rows
+    above, below = (moved(motion, sign * NEAR * step).h for sign in (1.0, -1.0))
+    # Control points that two intervals share are asked for once.
+    kept = motion.h > -500.0
+    change = ((above - below) / (2 * NEAR))[kept]
+    changes = along(motion, around_of(motion).changes, step)
+    linear = rows.linearised(motion.checked, kept)
+    scale = max(np.abs(change).max(), 1.0)
+    # Distances of hulls to a sphere have slopes of their own accuracy.
+    allowed = 1e-3 if name == "clearance" else DIFFERENCE
+    np.testing.assert_allclose(linear.along(changes), change, atol=allowed * scale)
+    prices = np.zeros(len(kept))
+    prices[kept] = np.random.default_rng(3).uniform(size=kept.sum())
+    pulled = float(np.sum(linear.pulled(prices) * changes))
+    expected = float(prices[kept] @ change)
+    assert pulled == pytest.approx(expected, abs=allowed * scale * kept.sum())
+    # Those that do not count have no say.
+    few = kept & (np.arange(len(kept)) % 3 == 0)
+    some = rows.linearised(motion.checked, few).along(changes)
+    np.testing.assert_allclose(some, linear.along(changes)[few[kept]], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", CONSTRAINTS)
+def test_squares_of_rows_are_the_sums_of_their_products(panda: sm.RobotModel, name: str) -> None:
+    motion = motion_with(panda, name)
+    step, kept = random_step(motion, 2), motion.h > -500.0
+    around = around_of(motion)
+    both = motion.grid.spline.changes(around.changes)
+    linear = motion.grid.rows.linearised(motion.checked, kept)
+    weights = np.zeros(len(kept))
+    weights[kept] = np.random.default_rng(4).uniform(size=kept.sum())
+    pair = np.concatenate([step[:-1], step[1:]], axis=1)
+    found = 0.0
+    of_limits, of_points = linear.squared(weights), linear.squared_points(weights, both)
+    if of_limits is not None:
+        changes = along(motion, around.changes, step)
+        found += float(np.einsum("kan,knab,kbn->", changes, of_limits, changes))
+    if of_points is not None:
+        found += float(np.einsum("kd,kde,ke->", pair, of_points, pair))
+    changes = along(motion, around.changes, step)
+    expected = float(weights[kept] @ linear.along(changes) ** 2)
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("order", range(ORDERS))
+def test_control_points_bound_the_curve(order: int) -> None:
+    """What they keep, the whole curve keeps; at both ends they are the curve."""
+    rng = np.random.default_rng(order)
+    spline = Quintic(np.cumsum(rng.uniform(0.1, 1.0, 9)))
+    ends = spline.ends(rng.normal(size=(9, 3, 5)))
+    control = spline.at(AT_CONTROLS, order, ends)
+    curve = spline.at(unit_bases(np.linspace(0.0, 1.0, 201)), order, ends)
+    rounding = 1e-12 * np.abs(control).max()
+    assert (curve.max(axis=1) <= control.max(axis=1) + rounding).all()
+    assert (curve.min(axis=1) >= control.min(axis=1) - rounding).all()
+    np.testing.assert_allclose(curve[:, [0, -1]], control[:, [0, -1]], atol=rounding)
+    # Not of the middle ones alone: the law says something.
+    assert (curve.max(axis=1) > control[:, 1:-1].max(axis=1)).any()
+
+
+def test_the_pieces_are_those_of_the_trajectory(panda: sm.RobotModel) -> None:
+    """What is optimised is what the certificate judges."""
+    motion = motion_with(panda, "two")
+    t = motion.grid.spline.sampling.t
+    for order, values in enumerate((motion.samples.q, motion.samples.qd, motion.samples.qdd)):
+        expected = motion.trajectory(t, order)
+        np.testing.assert_allclose(values, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_prices_are_carried_to_other_nodes_by_density(panda: sm.RobotModel) -> None:
+    """Each row's price is that of the nearest one; what they add up to stays about the same."""
+    motion = motion_with(panda, "tool")
+    limits = motion_with(panda, "rates")
+    for one in (motion, limits):
+        finer = one.on(one.grid.on(np.sort(np.append(one.grid.t, one.grid.t[:-1] + 0.2))))
+        assert finer is not None
+        prices = np.where(one.h > -500.0, 1.0, 0.0)
+        carried = finer.grid.rows.carried(one.grid.rows, prices)
+        assert carried.shape == finer.h.shape
+        carried[finer.h <= -500.0] = 0.0
+        # Of each kind of row, per time.
+        parts = (
+            rows.split(each) for rows, each in ((finer.grid.rows, carried), (one.grid.rows, prices))
+        )
+        for mine, theirs in zip(*parts, strict=True):
+            assert mine.sum() == pytest.approx(theirs.sum(), rel=0.25)

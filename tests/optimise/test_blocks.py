@@ -1,0 +1,31 @@
+"""Block-banded systems are the dense ones."""
+
+import numpy as np
+import pytest
+
+from selfmotion.optimise import Banded
+
+
+@pytest.mark.parametrize("size", [1, 3, 6])
+def test_a_banded_system_is_the_dense_one(size: int) -> None:
+    rng, count = np.random.default_rng(size), 7
+    matrix = Banded(count, size, 1)
+    dense = np.zeros((count * size, count * size))
+    pairs = rng.normal(size=(count - 1, 2 * size, 2 * size))
+    pairs = pairs @ np.swapaxes(pairs, 1, 2)
+    for k, block in enumerate(pairs):
+        dense[k * size : (k + 2) * size, k * size : (k + 2) * size] += block
+    matrix.add_pairs(0, pairs)
+    matrix.add_diagonal(0.5)
+    dense += 0.5 * np.eye(len(dense))
+    np.testing.assert_allclose(matrix.dense(), dense, atol=1e-12)
+    held = np.array([0, size, count * size - 1])
+    matrix.hold(held)
+    dense[held], dense[:, held] = 0.0, 0.0
+    dense[held, held] = 1.0
+    right = rng.normal(size=count * size)
+    solved = matrix.solve(right)
+    assert solved is not None
+    np.testing.assert_allclose(dense @ solved, right, atol=1e-9)
+    matrix.add_diagonal(-1e3)
+    assert matrix.solve(right) is None
