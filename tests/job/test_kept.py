@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.job.files import Shelf
 from selfmotion.job.seam import backwards_plan
 from selfmotion.task import SE3
 from support.arms import robot_named
@@ -121,6 +122,20 @@ def test_what_was_spoilt_is_planned_again(kept, tmp_path: Path, spoil) -> None:
     times = {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("*.npz")}
     assert again(tmp_path).verified
     assert times == {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("*.npz")}
+
+
+def test_another_plan_of_the_same_problem_is_not_what_was_kept(kept, tmp_path: Path) -> None:
+    """Two that begin elsewhere are both sound: only what was written with them tells them apart."""
+    _, program = kept
+    plan = program.plans["one"]
+    shelf = Shelf(tmp_path, sm.Tolerance(), {})
+    files = [tmp_path / f"nearby-one.{key}.json" for key in ("a", "b")]
+    for number, file in enumerate(files):
+        other = replace(plan, coefficients=np.full(1, float(number)))
+        shelf.keep_plans(file, ([other], ""))
+    assert shelf.plans(files[0], plan.problem) is not None
+    swapped(tmp_path, "nearby")
+    assert [shelf.plans(file, plan.problem) for file in files] == [None, None]
 
 
 def test_another_version_plans_again(kept, tmp_path: Path, monkeypatch) -> None:

@@ -10,7 +10,11 @@ from selfmotion.basics.arrays import (
     read_only as read_only,
     shown as shown,
 )
-from selfmotion.basics.digests import digest_of as digest_of, version as version
+from selfmotion.basics.digests import (
+    digest_of as digest_of,
+    digest_of_file as digest_of_file,
+    version as version,
+)
 from selfmotion.basics.errors import (
     BreakdownError as BreakdownError,
     CollisionError as CollisionError,

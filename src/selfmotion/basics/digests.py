@@ -5,6 +5,7 @@ import marshal
 from collections.abc import Mapping
 from functools import cache
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,11 @@ def digest_of(*values: Any) -> str:
     for value in values:
         found.update(marshal.dumps(_plain(value), _PLAIN))
     return found.hexdigest()
+
+
+def digest_of_file(file: Path) -> str:
+    """Return the SHA-256 of a file; "" for one that is missing."""
+    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
 
 
 def _plain(value: Any) -> Any:

@@ -10,7 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from selfmotion.basics import Array, FileFormatError, SelfmotionError, as_path, write_text
+from selfmotion.basics import (
+    Array,
+    FileFormatError,
+    SelfmotionError,
+    as_path,
+    digest_of_file,
+    write_text,
+)
 from selfmotion.certificate import Tolerance
 from selfmotion.collision import obstacle_from_dict
 from selfmotion.constraints import Constraint
@@ -105,8 +112,8 @@ def _step(values: Mapping[str, Any], made: Plan | Move) -> Step:
 class Shelf:
     """A folder with what a job has finished: plans and moves by what was asked for.
 
-    What is kept is read in one way: measured again with today's tolerance, whole, unchanged and
-    verified, or it is planned again.
+    What is kept is read in one way: written for this very work, whole, unchanged, measured again
+    with today's tolerance and verified; or it is planned again.
 
     Parameters
     ----------
@@ -158,9 +165,8 @@ class Shelf:
         if file is None or kept is None:
             return None
         try:
-            count, reason = int(kept["plans"]), str(kept["reason"])
-            files = [file.with_suffix(f".{k}.npz") for k in range(count)]
-            found = [self._plan(name) for name in files]
+            files = _written(kept, file)
+            found, reason = [self._plan(name) for name in files], str(kept["reason"])
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None
         sound = all(
@@ -179,9 +185,9 @@ class Shelf:
         if file is None:
             return
         plans, reason = made
-        for number, plan in enumerate(plans):
-            plan.save(file.with_suffix(f".{number}.npz"))
-        _write(file, {"kept": file.stem, "plans": len(plans), "reason": reason})
+        for plan, archive in zip(plans, _archives(file, len(plans)), strict=True):
+            plan.save(archive)
+        _write(file, len(plans), {"reason": reason})
 
     def move(self, file: Path | None, missing: Move, ends: Array) -> Move | None:
         """Return the move between ends (2, n) that was kept, or `missing` with the reason.
@@ -194,7 +200,8 @@ class Shelf:
         try:
             if kept["trouble"]:
                 return replace(missing, reason=str(kept["trouble"]))
-            found = load_move(file.with_suffix(".npz"), known=self._known)
+            (archive,) = _written(kept, file)
+            found = load_move(archive, known=self._known)
         except (FileFormatError, KeyError, TypeError, ValueError):
             return None
         if not found.verified or any(another_tool(found.robot, missing.robot)):
@@ -208,10 +215,10 @@ class Shelf:
         """Keep a move, or why there is none."""
         if file is None:
             return
-        if move.trajectory is not None:
-            move.save(file.with_suffix(".npz"))
-        trouble = "" if move.trajectory is not None else move.trouble
-        _write(file, {"kept": file.stem, "trouble": trouble})
+        count = int(move.trajectory is not None)
+        for archive in _archives(file, count):
+            move.save(archive)
+        _write(file, count, {"trouble": "" if count else move.trouble})
 
     def _read(self, file: Path | None) -> dict[str, Any] | None:
         if file is None or not file.exists():
@@ -225,5 +232,25 @@ class Shelf:
         return found if own else None
 
 
-def _write(file: Path, values: Mapping[str, Any]) -> None:
-    write_text(file, json.dumps(values))
+def _archives(file: Path, count: int) -> list[Path]:
+    """Return where so many plans or moves of one piece of work are."""
+    return [file.with_suffix(f".{number}.npz") for number in range(count)]
+
+
+def _write(file: Path, count: int, values: Mapping[str, Any]) -> None:
+    """Write what is known of a piece of work, last: its key, and the digest of each archive."""
+    digests = [digest_of_file(archive) for archive in _archives(file, count)]
+    write_text(file, json.dumps({"kept": file.stem, "digests": digests, **values}))
+
+
+def _written(kept: Mapping[str, Any], file: Path) -> list[Path]:
+    """Return the archives that were written with what is known of a piece of work.
+
+    One of other work has a sound motion as well, and may be of the same problem, from elsewhere.
+    """
+    digests = list(kept["digests"])
+    archives = _archives(file, len(digests))
+    for archive, digest in zip(archives, digests, strict=True):
+        if digest_of_file(archive) != digest:
+            raise FileFormatError(f"{archive}: is not the one that was written with {file.name}")
+    return archives

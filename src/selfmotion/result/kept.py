@@ -1,11 +1,9 @@
 """What finished work is kept under: a digest of all that decides what comes of it."""
 
-import hashlib
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
-from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import digest_of, version
+from selfmotion.basics import digest_of, digest_of_file, version
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.robot import RobotModel, mesh_digests
@@ -30,16 +28,13 @@ def files_of(
     if own not in known:
         known[own] = mesh_digests(robot.urdf, "collision")
     bodies = (body for item in constraints for body in _bodies(item, robot))
-    return {**known[own], **{str(file): _digest(file) for body in bodies for file in body.files}}
+    given = {str(file): digest_of_file(file) for body in bodies for file in body.files}
+    return {**known[own], **given}
 
 
 def _bodies(item: Constraint, robot: RobotModel) -> Iterator[Obstacle]:
     # Its requirement makes bodies, which takes a good part of a second.
     yield from item.obstacles if isinstance(item, Clearance) else item.requirement(robot).obstacles
-
-
-def _digest(file: Path) -> str:
-    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else ""
 
 
 class Made(dict[str, Any]):
