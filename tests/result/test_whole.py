@@ -77,6 +77,11 @@ def test_everything_that_is_judged_is_in_the_digest_of_a_problem(plan: sm.Plan) 
         replace(problem, constraints=[sm.JointVelocityLimits(1.0 + 1e-15)]),
         replace(problem, relaxations=[sm.Relaxation("x", 0.01)]),
         replace(problem, damping=sm.Damping()),
+        # What limits of one's own are held against besides.
+        *(
+            replace(problem, robot=replace(problem.robot, **{f"{rate}_limit": np.full(3, 7.0)}))
+            for rate in ("velocity", "acceleration", "jerk", "effort")
+        ),
         sm.Problem(robot_named("planar_3r"), problem.path, "position", problem.start)
         if robot_named("planar_3r").can_follow("position")
         else replace(problem, relaxations=[sm.Relaxation("y", 0.01)]),
@@ -129,6 +134,11 @@ def test_what_a_plan_was_not_judged_by_is_told(plan: sm.Plan) -> None:
     assert not list(asked.failures(plan))
     for changes, said in (
         ({"robot": robot_named("panda")}, "another arm"),
+        (
+            {"robot": replace(problem.robot, acceleration_limit=np.full(3, 7.0))},
+            "acceleration of its joint 'joint1' is inf rad/s², not 7",
+        ),
+        ({"robot": replace(problem.robot, touching=(("a", "b"),))}, "links of it may touch"),
         ({"path": sm.Dwell(problem.path.pose(0.0), 2.0)}, "along another path"),
         ({"task": sm.Task.POSITION}, "its task is"),
         ({"relaxations": [sm.Relaxation("x", 0.01)]}, "other rows are relaxed"),
@@ -137,6 +147,19 @@ def test_what_a_plan_was_not_judged_by_is_told(plan: sm.Plan) -> None:
         ({"tolerance": sm.Tolerance(1e-8, 1e-8)}, "judged within 1e-06 m"),
     ):
         assert said in "; ".join(replace(asked, **changes).failures(plan)), changes
+
+
+def test_parts_that_are_not_judged_by_rest_are_not_verified(plan: sm.Plan) -> None:
+    asked = plan.problem
+    assert sm.Parts(asked, (plan,)).verified
+    others = (replace(asked, rest=False), replace(asked, damping=sm.Damping()))
+    for problem in others:
+        made = replace(plan, problem=problem)
+        made = replace(made, certificate=made.check())
+        assert made.certificate.verified
+        assert "not judged by rest" in sm.Parts(asked, (made,)).verdict
+        # But where it was asked for without.
+        assert sm.Parts(problem, (made,)).verified
 
 
 def test_gaps_are_told_with_joint_amount_unit_and_what_is_allowed(plan: sm.Plan) -> None:

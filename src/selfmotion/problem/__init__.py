@@ -10,7 +10,7 @@ from selfmotion.problem.parts import (
     times_along as times_along,
 )
 from selfmotion.problem.problem import Problem as Problem, check_problem as check_problem
-from selfmotion.problem.rest import rest_orders as rest_orders
+from selfmotion.problem.rest import arm_rest_orders as arm_rest_orders, rest_orders as rest_orders
 from selfmotion.problem.saved_problem import (
     arm_and_constraints as arm_and_constraints,
     describe_arm as describe_arm,

@@ -402,6 +402,10 @@ class Problem:
             robot.lower,
             robot.upper,
             robot.velocity_limit,
+            # What constraints take from the arm where they say no more.
+            robot.acceleration_limit,
+            robot.jerk_limit,
+            robot.effort_limit,
             damping,
             followed,
             [item.to_dict() for item in self.relaxations],

@@ -4,6 +4,7 @@ from selfmotion.result.asked import (
     Asked as Asked,
     another_tool as another_tool,
     described as described,
+    keeps_as_far as keeps_as_far,
     not_judged_by as not_judged_by,
 )
 from selfmotion.result.bundle import read_bundle as read_bundle, write_bundle as write_bundle

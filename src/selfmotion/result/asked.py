@@ -11,6 +11,7 @@ from selfmotion.certificate import USUAL, Tolerance
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.follow import Follow
 from selfmotion.path import Path
+from selfmotion.problem import Problem, arm_rest_orders
 from selfmotion.result.plan import Plan
 from selfmotion.robot import RobotModel
 from selfmotion.task import Relaxation, Task
@@ -41,6 +42,8 @@ class Asked:
         What the path may be missed by, or less.
     also : sequence of Follow
         What else of the arm follows a path.
+    rest : bool
+        Whether the arm has to rest where its paths do, unless `constraints` say how fast it is.
     """
 
     robot: RobotModel
@@ -51,6 +54,7 @@ class Asked:
     clearance: Clearance | None = None
     tolerance: Tolerance = USUAL
     also: Sequence[Follow] = ()
+    rest: bool = True
 
     def failures(self, plan: Plan) -> Iterator[str]:
         """Yield, in words, what of it a plan was not judged by."""
@@ -65,12 +69,23 @@ class Asked:
         if not _same_bands(problem.relaxations, self.relaxations):
             yield "other rows are relaxed"
         yield from not_judged_by(problem.all_constraints, self.constraints, self.clearance)
+        yield from self._restless(problem)
         within, wanted = plan.tolerance, self.tolerance
         if not (within.position <= wanted.position and within.rotation <= wanted.rotation):
             yield (
                 f"it is judged within {within.position:.2g} m and {within.rotation:.2g} rad, "
                 f"expected {wanted.position:.2g} m and {wanted.rotation:.2g} rad"
             )
+
+    def _restless(self, made: Problem) -> Iterator[str]:
+        """Yield that a problem does not ask for rest at an end where it was asked for."""
+        wanted = arm_rest_orders(made.follows, self.constraints) if self.rest else (0, 0)
+        # A damped motion is not judged by its rest.
+        judged = made.rest_orders if made.damping is None else (0, 0)
+        for end, order, found in zip(("start", "end"), wanted, judged, strict=True):
+            if found < order:
+                what = " without acceleration" if found else ""
+                yield f"it is not judged by rest{what} at its {end}, which was asked for"
 
 
 def another_tool(made: RobotModel, asked: RobotModel) -> Iterator[str]:
@@ -83,6 +98,37 @@ def another_tool(made: RobotModel, asked: RobotModel) -> Iterator[str]:
         yield f"its path is in the frame of '{made.reference}', not '{asked.reference}'"
     elif dict(made.locked) != dict(asked.locked):
         yield "other joints are locked, or elsewhere"
+    elif set(made.touching) != set(asked.touching):
+        yield "other links of it may touch"
+    else:
+        yield from _other_limits(made, asked)
+
+
+# What constraints take from an arm where they say no more: attribute, in words, power of time.
+_LIMITS = (
+    ("lower", "lower limit", ""),
+    ("upper", "upper limit", ""),
+    ("velocity_limit", "limit of speed", "/s"),
+    ("acceleration_limit", "limit of acceleration", "/s²"),
+    ("jerk_limit", "limit of jerk", "/s³"),
+)
+
+
+def _other_limits(made: RobotModel, asked: RobotModel) -> Iterator[str]:
+    """Yield a joint of an arm that has other limits than that of the same arm as it was asked."""
+    for name, words, power in _LIMITS:
+        found, wanted = getattr(made, name), getattr(asked, name)
+        others = np.flatnonzero(found != wanted)
+        if others.size:
+            k = int(others[0])
+            joint = asked.joint_names[k]
+            yield (
+                f"the {words} of its joint '{joint}' is {found[k]:g} "
+                f"{asked.unit_of(joint)}{power}, not {wanted[k]:g}"
+            )
+            return
+    if not np.array_equal(made.effort_limit, asked.effort_limit):
+        yield "its limits of torque are others"
 
 
 def not_judged_by(
@@ -93,7 +139,7 @@ def not_judged_by(
     for item in asked:
         if described(item) not in known:
             yield f"it is not judged by {type(item).__name__}, which was asked for"
-    if clearance is not None and not any(_as_far(item, clearance) for item in judged):
+    if clearance is not None and not any(keeps_as_far(item, clearance) for item in judged):
         yield "it is not judged by the clearance that was asked for"
 
 
@@ -170,7 +216,7 @@ def _same_bands(made: Sequence[Relaxation], asked: Sequence[Relaxation]) -> bool
     return True
 
 
-def _as_far(item: Constraint, apart: Clearance) -> bool:
+def keeps_as_far(item: Constraint, apart: Clearance) -> bool:
     """Whether a constraint keeps all that a clearance does of the arm itself and its own bodies."""
     return (
         isinstance(item, Clearance)

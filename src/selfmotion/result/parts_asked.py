@@ -75,6 +75,7 @@ class PartsAsked:
             (*kept, *([] if own is None else [own])),
             tolerance=self._parts.tolerance,
             also=problem.also,
+            rest=problem.rest and problem.damping is None,
         )
         yield from asked.failures(plan)
         start = problem.given_start
