@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import selfmotion as sm
+from selfmotion.job import Step
 from selfmotion.job.files import Shelf
 from selfmotion.job.seam import backwards_plan
 from selfmotion.task import SE3
@@ -168,6 +169,18 @@ def test_a_seams_own_clearance_is_kept_besides_that_of_the_job() -> None:
     made = sm.plan_job(robot_named("panda"), [own], clearance=post, **ASKED).require()
     bodies = {item.name for item in made.plans["one"].obstacles}
     assert bodies == {"far", "post"}
+
+
+def test_all_bodies_are_kept_as_far_as_was_asked_by_one_clearance() -> None:
+    """One that keeps as far from nothing, and one that hardly keeps from all, are not enough."""
+    post = sm.Box("post", [0.0, -0.6, 0.6], [0.1, 0.1, 1.2])
+    asked = sm.Clearance([post], 0.02)
+
+    def step(*judged: sm.Clearance) -> Step:
+        return Step("one", sm.Move(robot_named("panda"), judged, None, "none"))
+
+    assert step(sm.Clearance([], 0.02), sm.Clearance([post], 0.0)).meets({"post": post}, asked)
+    assert not step(sm.Clearance([post], 0.03)).meets({"post": post}, asked)
 
 
 @pytest.mark.parametrize("limit", [1.2, 1.262, 1.28])

@@ -9,6 +9,7 @@ from pathlib import Path as FilePath
 from selfmotion.basics import PlanError, as_path, write_text
 from selfmotion.certificate import Tolerance
 from selfmotion.collision import Obstacle
+from selfmotion.constraints import Clearance
 from selfmotion.job.specification import Specification
 from selfmotion.job.step import Step
 from selfmotion.motion import Trajectory, joined_motions
@@ -169,10 +170,13 @@ class Program:
 
     def _left_out(self) -> Iterator[str]:
         """Yield what stands there and was not looked at."""
-        asked = self.specification.obstacles if self.specification else ()
-        standing: dict[str, Obstacle] = {item.name: item for item in asked}
+        asked = self.specification
+        standing: dict[str, Obstacle] = {}
+        if asked is not None:
+            standing = {item.name: item for item in asked.obstacles}
+        apart = None if asked is None else asked.clearance or Clearance(distance=0.0)
         for step in self.steps:
-            met = step.meets(standing)
+            met = step.meets(standing, apart)
             if met:
                 yield f"'{step.name}' is not judged against '{met[0]}', which stands there by then"
             standing |= {item.name: item for item in step.leaves}

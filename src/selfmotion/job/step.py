@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from selfmotion.collision import Obstacle
-from selfmotion.constraints import Constraint
+from selfmotion.constraints import Clearance, Constraint
 from selfmotion.motion import Trajectory
-from selfmotion.result import Move, Plan
+from selfmotion.result import Move, Plan, keeps_as_far
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +74,23 @@ class Step:
         check = self.made.certificate
         return "" if check.verified else f"seam '{self.name}': {check.verdict}"
 
-    def meets(self, standing: Mapping[str, Obstacle]) -> list[str]:
-        """Return the names of what it is not judged against, though it stands there."""
-        known = {item.name: item for item in self.made.obstacles}
+    def meets(self, standing: Mapping[str, Obstacle], apart: Clearance | None = None) -> list[str]:
+        """Return the names of what it is not judged against, though it stands there.
+
+        With `apart`, at its distance or more: another requirement may be about the same bodies.
+        """
+        bodies = self.made.obstacles if apart is None else self._kept_from(apart)
+        known = {item.name: item for item in bodies}
         return [
             name
             for name, item in standing.items()
             if name not in self.may_meet and not _same(known.get(name), item)
         ]
+
+    def _kept_from(self, apart: Clearance) -> tuple[Obstacle, ...]:
+        """Return the bodies from which it keeps as far as a clearance asks, or farther."""
+        far = (item for item in self.constraints if keeps_as_far(item, apart))
+        return tuple(body for item in far if isinstance(item, Clearance) for body in item.obstacles)
 
 
 def _same(one: Obstacle | None, other: Obstacle) -> bool:
