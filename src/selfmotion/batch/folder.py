@@ -12,7 +12,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import SelfmotionError, write_bytes, write_text
+from selfmotion.basics import SelfmotionError, digest_of_file, write_bytes, write_text
+from selfmotion.batch.held import is_made_for
+from selfmotion.batch.items import Item
 from selfmotion.batch.maps import labels, maps
 from selfmotion.batch.row import Row, measured
 from selfmotion.result import load_plan
@@ -35,26 +37,30 @@ class Folder:
         """Return where a problem's plan is."""
         return self.path / "plans" / f"{name}.npz"
 
-    def finished(self, name: str, key: str) -> Row | None:
+    def finished(self, item: Item) -> Row | None:
         """Return the row of a problem that an earlier run finished; None where it has to be run.
 
         Its plan is measured again: a row is not believed. Where the file is not the one that was
-        written with the row, it is planned again.
+        written with the row, or not of what is asked, it is planned again.
         """
+        name = item.name
         file = self._row_file(name)
         if not file.is_file():
             return None
         try:
             values = json.loads(file.read_text(encoding="utf-8"))
             row = Row(file=self.plan_file(name), **values)
-            if row.key != key or row.fault:
+            if row.key != item.key or row.fault:
                 return None
             if row.error:
-                return row
-            if hashlib.sha256(row.file.read_bytes()).hexdigest() != row.digest:
+                return replace(row, settings=dict(item.settings))
+            if digest_of_file(row.file) != row.digest:
                 return None
-            plan = load_plan(row.file, known=self._known)
-            return None if plan.altered else replace(row, **measured(plan, row.goal))
+            plan, job = load_plan(row.file, known=self._known), item.make()
+            if plan.altered or not is_made_for(plan, job):
+                return None
+            row = replace(row, settings=dict(item.settings), goal=job.goal)
+            return replace(row, **measured(plan, job.goal))
         except (OSError, ValueError, TypeError, SelfmotionError):
             return None  # not one of ours, or of another version: it is written anew
 

@@ -207,7 +207,7 @@ class _Run:
 
     def _task(self, item: Item) -> dict[str, Any] | None:
         """Return what a worker needs; None where there is nothing to do."""
-        row = self._folder.finished(item.name, item.key)
+        row = self._folder.finished(item)
         if row is not None:
             self.rows[item.name] = row
             self.resumed += 1
