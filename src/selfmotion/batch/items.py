@@ -10,7 +10,7 @@ from selfmotion.basics import FileFormatError, ProblemError, SelfmotionError
 from selfmotion.costs import FunctionCost
 from selfmotion.formats import Job, grid_documents, job_of, read_document
 from selfmotion.problem import Problem, problem_to_dict
-from selfmotion.result import files_of, key_of
+from selfmotion.result import files_of, key_of, own_modules
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +51,8 @@ class Item:
                 f"a class from selfmotion.Cost"
             )
         problem = problem_to_dict(job.problem)
-        paths = [item.path for item in job.problem.follows.items]
-        parts = (*paths, job.problem.null_motion, *job.problem.costs)
-        own = {type(part).__module__ for part in (*parts, *job.problem.constraints)}
-        modules = sorted(name for name in own if not name.startswith(("selfmotion.", "__main__")))
+        # A class in a script that is run is known to processes that begin with it alone.
+        modules = [name for name in own_modules(problem) if name != "__main__"]
         options = {**job.settings, "goal": job.goal, "keep": job.keep}
         files = files_of(job.problem.robot, job.problem.all_constraints, {})
         return {"problem": problem, "options": options, "modules": modules, "files": files}

@@ -14,7 +14,12 @@ from selfmotion.result.joints import (
     gaps as gaps,
     moving_end as moving_end,
 )
-from selfmotion.result.kept import Made as Made, files_of as files_of, key_of as key_of
+from selfmotion.result.kept import (
+    Made as Made,
+    files_of as files_of,
+    key_of as key_of,
+    own_modules as own_modules,
+)
 from selfmotion.result.limits_used import (
     LimitsUsed as LimitsUsed,
     quantities_of_pace as quantities_of_pace,

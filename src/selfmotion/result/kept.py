@@ -1,9 +1,11 @@
 """What finished work is kept under: a digest of all that decides what comes of it."""
 
+import sys
 from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from selfmotion.basics import digest_of, digest_of_file, version
+from selfmotion.basics import Saved, digest_of, digest_of_file, version
 from selfmotion.collision import Obstacle
 from selfmotion.constraints import Clearance, Constraint
 from selfmotion.robot import RobotModel, mesh_digests
@@ -12,9 +14,60 @@ from selfmotion.robot import RobotModel, mesh_digests
 def key_of(asked: Any, files: Any) -> str:
     """Return the digest of what was asked for, as JSON-safe values, and of the files it reads.
 
-    And of the package's version: what another one made is made again.
+    And of the package's version, and of the files of classes that are not of the package: what
+    another one made is made again.
     """
-    return digest_of(version(), asked, files)
+    return digest_of(version(), asked, files, _code_of(asked))
+
+
+def own_modules(asked: Any) -> list[str]:
+    """Return the modules, not of this package, of the classes that JSON-safe values name.
+
+    Of all that is made of others, and of what these are derived from.
+    """
+    strangers = [(kind, cls) for kind, cls in _classes() if not _is_ours(cls)]
+    if not strangers:
+        return []
+    names = set(_named(asked))
+    found = {base for kind, cls in strangers if kind in names for base in cls.__mro__}
+    return sorted({cls.__module__ for _, cls in strangers if cls in found})
+
+
+def _classes() -> Iterator[tuple[str, type]]:
+    """Yield all classes that files know, with the name by which they do."""
+    for cls in _below(Saved):
+        yield getattr(cls, "kind", ""), cls
+    for cls in _below(Obstacle):
+        yield getattr(cls, "shape", ""), cls
+
+
+def _below(cls: type) -> Iterator[type]:
+    several: list[type] = cls.__subclasses__()
+    for each in several:
+        yield each
+        yield from _below(each)
+
+
+def _is_ours(cls: type) -> bool:
+    return cls.__module__.partition(".")[0] == __name__.partition(".")[0]
+
+
+def _named(value: Any) -> Iterator[str]:
+    """Yield the names of classes in a description."""
+    if isinstance(value, Mapping):
+        yield from (value[key] for key in ("kind", "shape") if isinstance(value.get(key), str))
+        for item in value.values():
+            yield from _named(item)
+    # Long lists are of numbers.
+    elif isinstance(value, list | tuple) and not (value and isinstance(value[0], float)):
+        for item in value:
+            yield from _named(item)
+
+
+def _code_of(asked: Any) -> dict[str, str]:
+    """Return the digests of the files in which the user's own classes are that values name."""
+    files = {name: getattr(sys.modules.get(name), "__file__", None) for name in own_modules(asked)}
+    return {name: digest_of_file(Path(file)) for name, file in files.items() if file}
 
 
 def files_of(
@@ -24,7 +77,8 @@ def files_of(
 
     Those of an arm are read once, and put into what is `known`.
     """
-    own = f"meshes of {robot.urdf.sha256}"
+    # The same text names other files where its packages are elsewhere.
+    own = f"meshes of {robot.urdf.sha256} in {robot.urdf.package_dirs}"
     if own not in known:
         known[own] = mesh_digests(robot.urdf, "collision")
     bodies = (body for item in constraints for body in _bodies(item, robot))
