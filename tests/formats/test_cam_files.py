@@ -399,6 +399,13 @@ def test_a_job_is_read_from_a_machine_program(tmp_path: Path) -> None:
         ("G1 X10 R3", "R is read of arcs only"),
         ("M98", "subprograms are not read"),
         ("G0 G1 X4", "G0 and G1 are in one line"),
+        ("G10 L2 P1 X100 Y0 Z0", "G10: zeros and offsets that a program sets"),
+        ("G29 X50", "and ways home, are not read"),
+        ("G1 X10 G4 P100", "G4 waits, and its line says a motion"),
+        ("G4 X1 P100", "or two times"),
+        ("G4 P1 G10", "G4 and G10 are in one line"),
+        ("G1 X10 L3", "L repeats the line, which is not read"),
+        ("G93 G1 X10 F60\nX20", "says no F, which after G93 each line has"),
     ],
 )
 def test_other_words_are_refused_by_line(tmp_path: Path, line: str, said: str) -> None:
@@ -541,6 +548,25 @@ def test_effects_of_a_block_have_their_order(
     for cut, (on, off) in zip(cuts, events, strict=True):
         last = len(cut.positions) - 1
         assert cut.events == ((on * last, "M3"), (off * last, "M5"))
+
+
+def test_a_line_that_waits_changes_modes_and_switches_all_the_same(tmp_path: Path) -> None:
+    text = "G21 G90 G0 X0 Y0 Z0\nG1 X10 F600\nN7 M8 G4 P1 G91 M9\nX10\nG4 P1 M30\nX90\n"
+    (cut,) = read_gcode(written(tmp_path, "waits.nc", text)).values()
+    np.testing.assert_allclose(cut.positions[:, 0], [0.0, 0.01, 0.02])
+    assert cut.events == ((1, "M8"), (1, "G4 P1"), (1, "M9"), (2, "G4 P1"))
+
+
+def test_a_feed_is_none_of_another_kind_and_changing_powers_are_told(tmp_path: Path) -> None:
+    timed = "G21 G90 G0 X0 Y0 Z0\nG93 G1 X10 F60\nG94 X30\n"
+    (cut,) = read_gcode(written(tmp_path, "timed.nc", timed)).values()
+    assert cut.feed is None
+    laser = "G21 G90 G0 X0 Y0 Z0\nM3 S900\nG1 X10 F600 S900\nX20 S0\nX30 S900\n"
+    (cut,) = read_gcode(written(tmp_path, "laser.nc", laser)).values()
+    assert [note for note in cut.notes if "S changes" in note] == [
+        "line 4: S changes from cut to cut, and is passed over: where a laser or a spindle "
+        "switches, write M codes"
+    ]
 
 
 def test_events_of_rows_with_times_are_at_these_times_after_a_ramp(tmp_path: Path) -> None:

@@ -41,6 +41,8 @@ _REASONS = {
     "G68.2": "turned frames are not read: let CAM write places in one frame, after G43.4",
 }
 _HEIDENHAIN = re.compile(r"[0-9]*\s*BEGIN PGM")
+# A wait, a retraction of its own, a look at a bed.
+_STANDING = {"G4", "G10", "G11", "G29"}
 # Zeros of workpieces; a program has one.
 _ZEROS = {"G54", "G55", "G56", "G57", "G58", "G59"}
 _TIP = {"G43.4", "G43.5"}
@@ -116,6 +118,8 @@ class _Reader:
         self._hole: dict[str, float] = {}
         # How far material is fed, and whether words say so from the start.
         self._fed, self._fed_from_start = 0.0, True
+        # What S said on the line of a cut.
+        self._power: float | None = None
 
     def stay_flat(self) -> None:
         """Stay at Z 0, as lasers and plotters do, whose programs say no Z."""
@@ -155,10 +159,9 @@ class _Reader:
             words.append((found[1], found[2]))
             at = found.end()
         codes = [f"{letter}{float(value):g}" for letter, value in words if letter in "GM"]
-        if any(code in ("G4", "G10", "G11", "G29") for code in codes):
-            # Nothing moves; a wait, a retraction of its own, or a look at a bed.
-            machine.happens(text)
-            return False
+        if not _STANDING.isdisjoint(codes):
+            self._stand(words, codes)
+            return not _ENDS.isdisjoint(codes)
         values: dict[str, float] = {}
         for letter, value in words:
             if letter in "GM":
@@ -197,7 +200,36 @@ class _Reader:
             self._move(values)
         for code in late:
             self._mode(code)
-        return any(code in _ENDS for code in codes)
+        return not _ENDS.isdisjoint(codes)
+
+    def _stand(self, words: Sequence[tuple[str, str]], codes: Sequence[str]) -> None:
+        """Take a line in which nothing moves; its modes hold from then on."""
+        machine = self.machine
+        name, *others = [code for code in codes if code in _STANDING]
+        said = [(letter, value) for letter, value in words if letter not in "GMN"]
+        letters = {letter for letter, _ in said}
+        if others:
+            raise machine.fault(f"{name} and {others[0]} are in one line")
+        if name == "G4":
+            moved = letters - set("PXUSF") if len(letters) < 2 else letters - set("P")
+            if moved or not _MOTIONS.keys().isdisjoint(codes):
+                raise machine.fault(
+                    "G4 waits, and its line says a motion, or two times: write both into lines of "
+                    "their own"
+                )
+        elif not letters.isdisjoint("L" if self._prints else _AXES + "IJKLR"):
+            raise machine.fault(
+                f"{name}: zeros and offsets that a program sets, and ways home, are not read: let "
+                f"CAM write places in one frame"
+            )
+        switched = [code for code in codes if code.startswith("M")]
+        for code in codes:
+            if code != name and code not in STOPS:
+                self._mode(code)
+        machine.happens(" ".join([name, *(f"{letter}{value}" for letter, value in said)]))
+        for code in switched:
+            if code in STOPS:
+                self._mode(code)
 
     def _mode(self, code: str) -> None:
         match code:
@@ -206,6 +238,9 @@ class _Reader:
             case "G90" | "G91":
                 self._absolute = code == "G90"
             case "G93" | "G94":
+                if self._inverse_time != (code == "G93"):
+                    # What F said is a number of the other kind.
+                    self.machine.feed = 0.0
                 self._inverse_time = code == "G93"
             case "G49":
                 self._tip = False
@@ -371,6 +406,17 @@ class _Reader:
                 goal[k] = self._unit * values[name] + (0.0 if self._absolute else goal[k])
         axis = self._axis(values, arc)
         travels = fed <= 0.0 if self._prints else self._motion == 0
+        if values.get("L", 1.0) > 1.0:
+            raise machine.fault("L repeats the line, which is not read: write its places")
+        if "S" in values and not travels:
+            if self._power not in (None, values["S"]):
+                machine.note(
+                    "S changes from cut to cut, and is passed over: where a laser or a spindle "
+                    "switches, write M codes"
+                )
+            self._power = values["S"]
+        if self._inverse_time and "F" not in values and not travels:
+            raise machine.fault("says no F, which after G93 each line has for itself")
         if travels:
             machine.rapid(self._part(goal), axis)
         elif not arc:
